@@ -1,0 +1,23 @@
+"""The one kind of error that reaches an artist as a message instead of a traceback.
+
+Lives beside the rooms, on the ground floor, because every room raises it and only `host`
+and `ui` turn it into an operator report or a line on stderr with a non-zero exit.
+"""
+
+from __future__ import annotations
+
+
+class HairloomError(Exception):
+    """Bad input: says what is wrong, where it was found, and what to do about it.
+
+    Args:
+        problem: what is wrong, one sentence without a full stop.
+        place: the file, object or field in which it was found.
+        remedy: what the reader can do, an imperative without a full stop.
+    """
+
+    def __init__(self, problem: str, *, place: str, remedy: str) -> None:
+        super().__init__(f"{place}: {problem}. {remedy}.")
+        self.problem = problem
+        self.place = place
+        self.remedy = remedy

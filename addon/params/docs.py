@@ -1,0 +1,62 @@
+"""From a `Settings` class to its table in docs/parameters.md."""
+
+from __future__ import annotations
+
+import math
+
+from .field import Parameter, Settings
+
+_UNIT_SYMBOLS = {
+    "length": "m",
+    "angle": "°",
+    "time": "s",
+    "rate": "1/s",
+    "speed": "m/s",
+    "acceleration": "m/s²",
+    "factor": "0 to 1",
+    "none": "",
+}
+
+
+def table(settings: type[Settings]) -> str:
+    """A Markdown section: heading and one row a parameter."""
+    rows = [
+        f"## {settings.title}",
+        "",
+        "| Name | Default | Slider | Allowed | Unit | What it does | Source |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+        *(_row(parameter) for parameter in settings.parameters()),
+        "",
+    ]
+    return "\n".join(rows)
+
+
+def _row(parameter: Parameter) -> str:
+    cells = [
+        f"**{parameter.label}** `{parameter.name}`",
+        _shown(parameter, parameter.default),
+        _span(parameter, parameter.soft_range),
+        _span(parameter, parameter.hard_range),
+        _UNIT_SYMBOLS[parameter.unit],
+        parameter.description,
+        parameter.source,
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def _span(parameter: Parameter, span: tuple[float, float] | None) -> str:
+    if parameter.kind == "choice":
+        return ", ".join(label for _, label, _ in parameter.choices)
+    if span is None:
+        return ""
+    return f"{_shown(parameter, span[0])} to {_shown(parameter, span[1])}"
+
+
+def _shown(parameter: Parameter, value: object) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(f"{channel:g}" for channel in value)
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if isinstance(value, (int, float)):
+        return f"{math.degrees(value) if parameter.unit == 'angle' else value:g}"
+    return str(value)

@@ -1,0 +1,201 @@
+"""Declaring a parameter, and the checked, immutable object that holds a set of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, Self
+
+from ..errors import HairloomError
+
+Kind = Literal["number", "integer", "toggle", "color", "choice"]
+#: length [m], angle [rad], time [s], rate [1/s], speed [m/s], factor [0..1], acceleration [m/s^2]
+Unit = Literal["none", "length", "angle", "time", "rate", "speed", "factor", "acceleration"]
+Range = tuple[float, float]
+
+_METADATA_KEY = "parameter"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter: everything that Blender, GLSL, presets and the docs need to know of it.
+
+    `soft_range` is what a slider offers, `hard_range` what a value may be; both inclusive.
+    `source` names the paper or equation, or says "Hairloom".
+    """
+
+    name: str
+    kind: Kind
+    default: Any
+    label: str
+    description: str
+    source: str
+    unit: Unit = "none"
+    soft_range: Range | None = None
+    hard_range: Range | None = None
+    choices: tuple[tuple[str, str, str], ...] = ()  # identifier, label, description
+
+    def checked(self, value: Any, place: str) -> Any:
+        """The value in its canonical type, or HairloomError naming the value and its range."""
+        try:
+            return self._canonical(value)
+        except (TypeError, ValueError) as error:
+            raise HairloomError(
+                f"'{self.name}' is {value!r}, but {error}", place=place, remedy=self._remedy()
+            ) from error
+
+    def _canonical(self, value: Any) -> Any:
+        if self.kind == "toggle":
+            if not isinstance(value, bool):
+                raise TypeError("it must be true or false")
+            return value
+        if self.kind == "choice":
+            if value not in [identifier for identifier, _, _ in self.choices]:
+                raise ValueError("that is not one of its choices")
+            return str(value)
+        if self.kind == "color":
+            red, green, blue = (self._in_range(_finite(channel)) for channel in value)
+            return (red, green, blue)
+        if self.kind == "integer":
+            if isinstance(value, bool) or int(value) != value:
+                raise TypeError("it must be a whole number")
+            return int(self._in_range(_finite(value)))
+        return self._in_range(_finite(value))
+
+    def _in_range(self, value: float) -> float:
+        low, high = self.hard_range or (-math.inf, math.inf)
+        if not low <= value <= high:
+            raise ValueError(f"it must lie from {low:g} to {high:g}")
+        return value
+
+    def _remedy(self) -> str:
+        if self.choices:
+            return "Use one of " + ", ".join(identifier for identifier, _, _ in self.choices)
+        if self.hard_range:
+            low, high = self.hard_range
+            return f"Use a value from {low:g} to {high:g} (default {self.default})"
+        return f"Use a {self.kind} (default {self.default})"
+
+
+def _finite(value: Any) -> float:
+    if isinstance(value, (bool, str)):
+        raise TypeError("it must be a number")
+    if not math.isfinite(value):
+        raise ValueError("it must be finite")
+    return float(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Base of every room's parameter set: frozen, and checked against its declarations when made.
+
+    Raises:
+        HairloomError: a value is outside its hard range or of the wrong kind.
+    """
+
+    #: short name, as in preset files, property groups and the docs
+    section: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        for parameter in self.parameters():
+            value = parameter.checked(getattr(self, parameter.name), f"{self.section} settings")
+            object.__setattr__(self, parameter.name, value)
+
+    @classmethod
+    def parameters(cls) -> tuple[Parameter, ...]:
+        """The declarations in the order in which they stand in the class."""
+        return tuple(
+            dataclasses.replace(field.metadata[_METADATA_KEY], name=field.name)
+            for field in dataclasses.fields(cls)
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, as presets and reports hold it."""
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], place: str) -> Self:
+        """Settings from plain data; names that are missing keep their default.
+
+        Raises:
+            HairloomError: a name is unknown, or a value is outside its hard range.
+        """
+        declared = {parameter.name: parameter for parameter in cls.parameters()}
+        unknown = sorted(set(values) - set(declared))
+        if unknown:
+            raise HairloomError(
+                f"unknown {cls.section} parameter '{unknown[0]}'",
+                place=place,
+                remedy="Use one of " + ", ".join(declared),
+            )
+        return cls(**{name: declared[name].checked(v, place) for name, v in values.items()})
+
+
+def number(
+    default: float,
+    *,
+    label: str,
+    description: str,
+    soft: Range,
+    hard: Range,
+    unit: Unit = "none",
+    source: str = "Hairloom",
+) -> Any:
+    """Declare a real number."""
+    return _declare(
+        Parameter("", "number", float(default), label, description, source, unit, soft, hard)
+    )
+
+
+def integer(
+    default: int,
+    *,
+    label: str,
+    description: str,
+    soft: Range,
+    hard: Range,
+    source: str = "Hairloom",
+) -> Any:
+    """Declare a whole number."""
+    return _declare(
+        Parameter("", "integer", int(default), label, description, source, "none", soft, hard)
+    )
+
+
+def color(
+    default: tuple[float, float, float],
+    *,
+    label: str,
+    description: str,
+    source: str = "Hairloom",
+    maximum: float = 1.0,
+) -> Any:
+    """Declare a scene-linear Rec.709 colour."""
+    span = (0.0, maximum)
+    return _declare(
+        Parameter("", "color", tuple(default), label, description, source, "none", span, span)
+    )
+
+
+def toggle(default: bool, *, label: str, description: str, source: str = "Hairloom") -> Any:
+    """Declare an on/off switch."""
+    return _declare(Parameter("", "toggle", default, label, description, source))
+
+
+def choice(
+    default: str,
+    choices: tuple[tuple[str, str, str], ...],
+    *,
+    label: str,
+    description: str,
+    source: str = "Hairloom",
+) -> Any:
+    """Declare one of several named options, each (identifier, label, description)."""
+    return _declare(Parameter("", "choice", default, label, description, source, choices=choices))
+
+
+def _declare(parameter: Parameter) -> Any:
+    return dataclasses.field(default=parameter.default, metadata={_METADATA_KEY: parameter})

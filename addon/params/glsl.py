@@ -1,0 +1,46 @@
+"""From a `Settings` class to a GLSL struct in std140 layout, and from values to its bytes.
+
+std140 (OpenGL 4.5 specification, section 7.6.2.2): a scalar aligns to 4 bytes, a vec3 to 16 and
+takes 12, the whole struct is padded to a multiple of 16.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .field import Parameter, Settings
+
+_SCALAR_TYPES = {"number": "float", "integer": "int", "toggle": "int", "choice": "int"}
+
+
+def struct_source(settings: type[Settings], struct_name: str) -> str:
+    """GLSL declaration of the struct, one member a parameter, in declaration order."""
+    members = [f"  {_SCALAR_TYPES.get(p.kind, 'vec3')} {p.name};" for p in settings.parameters()]
+    return "\n".join([f"struct {struct_name} {{", *members, "};", ""])
+
+
+def struct_values(settings: Settings) -> np.ndarray:
+    """The values as std140 bytes, (n,) float32; integers are stored by their bit pattern."""
+    words: list[float | np.int32] = []
+    for parameter in settings.parameters():
+        value = getattr(settings, parameter.name)
+        if parameter.kind == "color":
+            words.extend([0.0] * (-len(words) % 4))
+            words.extend(value)
+        else:
+            words.append(_scalar(parameter, value))
+    words.extend([0.0] * (-len(words) % 4))
+    packed = np.zeros(len(words), np.float32)
+    bits = packed.view(np.int32)
+    for index, word in enumerate(words):
+        if isinstance(word, np.int32):
+            bits[index] = word
+        else:
+            packed[index] = word
+    return packed
+
+
+def _scalar(parameter: Parameter, value: float | bool | str) -> float | np.int32:
+    if parameter.kind == "choice":
+        return np.int32([identifier for identifier, _, _ in parameter.choices].index(str(value)))
+    return float(value) if parameter.kind == "number" else np.int32(value)

@@ -1,0 +1,93 @@
+"""Presets: JSON data with a version and a source, checked and never executed.
+
+{"hairloom": 1, "section": "kajiya_kay", "title": "...", "source": "...", "values": {...}}
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import HairloomError
+from .field import Settings
+
+PRESET_VERSION = 1
+
+#: version n -> the step that makes it version n + 1; one entry for each version that ever shipped
+MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
+
+
+@dataclass(frozen=True)
+class Preset[S: Settings]:
+    """A named set of values, and where they come from."""
+
+    title: str
+    source: str
+    settings: S
+
+
+def read_preset[S: Settings](path: Path, settings: type[S]) -> Preset[S]:
+    """Read and check one preset file.
+
+    Raises:
+        HairloomError: not JSON, of a newer version, for another section, or with a bad value.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise HairloomError(
+            f"this preset cannot be read ({error})", place=str(path), remedy="Save it again"
+        ) from error
+    return preset_from_dict(data, settings, str(path))
+
+
+def preset_from_dict[S: Settings](data: Any, settings: type[S], place: str) -> Preset[S]:
+    """Check plain data against the declarations; older versions are migrated step by step."""
+    if not isinstance(data, dict) or not isinstance(data.get("values"), Mapping):
+        raise HairloomError(
+            "this is not a Hairloom preset", place=place, remedy="Choose a preset saved by Hairloom"
+        )
+    data = migrated(data, place)
+    if data.get("section") != settings.section:
+        raise HairloomError(
+            f"this preset is for '{data.get('section')}', not for '{settings.section}'",
+            place=place,
+            remedy="Choose a preset of the same kind",
+        )
+    values = settings.from_dict(data["values"], place)
+    return Preset(str(data.get("title", "")), str(data.get("source", "")), values)
+
+
+def preset_as_dict(preset: Preset[Any]) -> dict[str, Any]:
+    """Plain data, ready for JSON."""
+    return {
+        "hairloom": PRESET_VERSION,
+        "section": preset.settings.section,
+        "title": preset.title,
+        "source": preset.source,
+        "values": preset.settings.as_dict(),
+    }
+
+
+def migrated(data: dict[str, Any], place: str) -> dict[str, Any]:
+    """The same preset in the present version."""
+    version = data.get("hairloom")
+    if not isinstance(version, int) or isinstance(version, bool) or version > PRESET_VERSION:
+        raise HairloomError(
+            f"preset version {version!r} is not known to this Hairloom (it knows {PRESET_VERSION})",
+            place=place,
+            remedy="Update Hairloom",
+        )
+    while version < PRESET_VERSION:
+        if version not in MIGRATIONS:
+            raise HairloomError(
+                f"preset version {version} was never released",
+                place=place,
+                remedy="Choose a preset saved by Hairloom",
+            )
+        data = MIGRATIONS[version](data)
+        version += 1
+    return data

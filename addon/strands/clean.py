@@ -1,0 +1,92 @@
+"""From untrusted curves to a `StrandSet`: what cannot be used is dropped, counted and named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from .strand_set import DEFAULT_RADIUS, StrandSet
+
+#: A strand shorter than this is a point to the eye and has no direction in float32 [m].
+SHORTEST_STRAND = 1.0e-6
+
+
+@dataclass(frozen=True)
+class Cleaned:
+    """The usable strands, how many were dropped for which reason, and which ones were kept."""
+
+    strands: StrandSet
+    dropped: dict[str, int]
+    kept: Ints  # (strand_count,) indices into the input
+
+
+def clean(
+    points: Floats,
+    offsets: Ints,
+    *,
+    radius: Floats | None = None,
+    group: Ints | None = None,
+    root_uv: Floats | None = None,
+) -> Cleaned:
+    """Make a `StrandSet` from curves of any origin.
+
+    Args:
+        points: (point_count, 3) [m].
+        offsets: (curve_count + 1,), ascending from 0 to point_count.
+        radius: (point_count,) [m]; absent, not finite or not positive: 0.04 mm.
+        group: (curve_count,); absent: one group, 0.
+        root_uv: (curve_count, 2); values that are not finite become 0.
+    """
+    points = np.asarray(points, np.float32).reshape(-1, 3)
+    offsets = np.asarray(offsets, np.int64)
+    counts = np.diff(offsets)
+    curve_count = len(counts)
+
+    faults = {
+        "fewer than two points": counts < 2,
+        "a point that is not finite": _any_per_curve(~np.isfinite(points).all(axis=1), offsets),
+        "no length": _no_length(points, offsets),
+    }
+    usable = np.ones(curve_count, bool)
+    dropped: dict[str, int] = {}
+    for reason, is_faulty in faults.items():
+        count = int((is_faulty & usable).sum())
+        if count:
+            dropped[reason] = count
+        usable &= ~is_faulty
+
+    kept = np.flatnonzero(usable)
+    point_kept = np.repeat(usable, counts)
+    strands = StrandSet(
+        points=points[point_kept],
+        offsets=np.concatenate([[0], np.cumsum(counts[kept])]).astype(np.int32),
+        radius=_usable_radius(radius, len(points))[point_kept],
+        group=np.zeros(len(kept), np.int32) if group is None else np.asarray(group)[kept],
+        root_uv=None if root_uv is None else np.nan_to_num(root_uv, posinf=0, neginf=0)[kept],
+    )
+    return Cleaned(strands, dropped, kept)
+
+
+def _any_per_curve(flags: Bools, offsets: Ints) -> Bools:
+    totals = np.concatenate([[0], np.cumsum(flags)])
+    return totals[offsets[1:]] > totals[offsets[:-1]]
+
+
+def _no_length(points: Floats, offsets: Ints) -> Bools:
+    """Whether a curve's box has no extent; a curve of finite points then has no length either."""
+    box = np.zeros((len(offsets) - 1, 3), np.float32)
+    filled = np.flatnonzero(np.diff(offsets) > 0)
+    if len(filled):
+        starts = offsets[filled]
+        finite = np.nan_to_num(points, nan=0.0, posinf=0.0, neginf=0.0)
+        box[filled] = np.maximum.reduceat(finite, starts) - np.minimum.reduceat(finite, starts)
+    return (box < SHORTEST_STRAND).all(axis=1)
+
+
+def _usable_radius(radius: Floats | None, point_count: int) -> Floats:
+    if radius is None:
+        return np.full(point_count, DEFAULT_RADIUS, np.float32)
+    radius = np.asarray(radius, np.float32)
+    return np.where(np.isfinite(radius) & (radius > 0.0), radius, np.float32(DEFAULT_RADIUS))

@@ -1,0 +1,61 @@
+"""Resampling strands by arc length to one CV count, so that they form a dense grid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .strand_set import StrandSet
+
+
+def resample(strands: StrandSet, cv_count: int) -> StrandSet:
+    """The same strands with `cv_count` points each, equally spaced along the polyline.
+
+    Roots and tips stay exactly where they are; a set that already has this count is returned
+    as it is, so that an artist's own spacing survives.
+    """
+    if strands.strand_count == 0 or (strands.point_counts == cv_count).all():
+        return strands
+    left, weight = arc_length_positions(strands, cv_count)
+    points = _mix(strands.points, left, weight[..., None])
+    radius = _mix(strands.radius, left, weight)
+    return StrandSet(
+        points.reshape(-1, 3),
+        np.arange(strands.strand_count + 1, dtype=np.int32) * cv_count,
+        radius.reshape(-1),
+        strands.group,
+        strands.root_uv,
+        strands.root_triangle,
+        strands.root_barycentric,
+    )
+
+
+def arc_length_positions(strands: StrandSet, cv_count: int) -> tuple[Ints, Floats]:
+    """Where equally spaced samples lie: index of the point before, and the weight of the next.
+
+    Returns:
+        left: (strand_count, cv_count) indices into points.
+        weight: (strand_count, cv_count) in [0, 1].
+    """
+    points = strands.points.astype(np.float64)
+    step = np.zeros(strands.point_count)
+    step[1:] = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    step[strands.offsets[:-1]] = 0.0
+    along = np.cumsum(step)  # ascending over all strands, so one search serves them all
+    first, last = strands.offsets[:-1], strands.offsets[1:] - 1
+
+    share = np.linspace(0.0, 1.0, cv_count)
+    wanted = along[first, None] + (along[last] - along[first])[:, None] * share
+    right = np.searchsorted(along, wanted.ravel(), side="left").reshape(wanted.shape)
+    right = np.clip(right, first[:, None] + 1, last[:, None])
+    left = right - 1
+    span = along[right] - along[left]
+    weight = np.divide(wanted - along[left], span, out=np.zeros_like(wanted), where=span > 0.0)
+    weight = np.clip(weight, 0.0, 1.0)
+    left[:, 0], weight[:, 0] = first, 0.0
+    left[:, -1], weight[:, -1] = last - 1, 1.0
+    return left, weight.astype(np.float32)
+
+
+def _mix(values: Floats, left: Ints, weight: Floats) -> Floats:
+    return values[left] * (1.0 - weight) + values[left + 1] * weight

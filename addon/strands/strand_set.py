@@ -1,0 +1,174 @@
+"""`StrandSet`, the one model of hair: a ragged array of points, and what each strand carries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import HairloomError
+
+#: Thinner and wider than any hair; widths outside of it are taken for a mistake in units.
+DEFAULT_RADIUS = 4.0e-5  # [m], half of 0.08 mm, a typical human hair
+
+
+@dataclass(frozen=True)
+class StrandSet:
+    """Strands from root to tip in one space (said by whoever made it), checked when made.
+
+    points: (point_count, 3) float32 [m], strand after strand, root first.
+    offsets: (strand_count + 1,) int32, strand s is points[offsets[s]:offsets[s + 1]].
+    radius: (point_count,) float32 [m].
+    group: (strand_count,) int32.
+    root_uv: (strand_count, 2) float32, or None where no UVs are known.
+    root_triangle: (strand_count,) int32, or None when unbound.
+    root_barycentric: (strand_count, 3) float32, or None when unbound.
+
+    Raises:
+        HairloomError: shapes that do not fit, a strand of fewer than two points, values that
+            are not finite. Use `strands.clean` to make a set from untrusted curves.
+    """
+
+    points: Floats
+    offsets: Ints
+    radius: Floats
+    group: Ints
+    root_uv: Floats | None = None
+    root_triangle: Ints | None = None
+    root_barycentric: Floats | None = None
+
+    def __post_init__(self) -> None:
+        for name, dtype in _DTYPES.items():
+            value = getattr(self, name)
+            if value is not None:
+                value = np.ascontiguousarray(value, dtype)
+                value.flags.writeable = False
+                object.__setattr__(self, name, value)
+        self._check_shapes()
+        if self.strand_count and self.point_counts.min() < 2:
+            raise _broken("a strand has fewer than two points")
+        if not np.isfinite(self.points).all():
+            raise _broken("a point is not finite")
+
+    def _check_shapes(self) -> None:
+        if self.offsets.ndim != 1 or not len(self.offsets) or self.offsets[0] != 0:
+            raise _broken("offsets must be a list that starts with 0")
+        points, strands = int(self.offsets[-1]), self.strand_count
+        expected = {
+            "points": (points, 3),
+            "radius": (points,),
+            "group": (strands,),
+            "root_uv": (strands, 2),
+            "root_triangle": (strands,),
+            "root_barycentric": (strands, 3),
+        }
+        for name, shape in expected.items():
+            value = getattr(self, name)
+            if value is not None and value.shape != shape:
+                raise _broken(f"{name} has shape {value.shape} instead of {shape}")
+        if (self.root_triangle is None) != (self.root_barycentric is None):
+            raise _broken("root_triangle and root_barycentric come together or not at all")
+
+    @property
+    def strand_count(self) -> int:
+        return len(self.offsets) - 1
+
+    @property
+    def point_count(self) -> int:
+        return len(self.points)
+
+    @property
+    def point_counts(self) -> Ints:
+        """Points of each strand, (strand_count,)."""
+        return np.diff(self.offsets)
+
+    @property
+    def roots(self) -> Floats:
+        """First point of each strand, (strand_count, 3) [m]."""
+        return self.points[self.offsets[:-1]]
+
+    @property
+    def is_bound(self) -> bool:
+        return self.root_triangle is not None
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether all strands have the same number of points, so that `grid` works."""
+        return self.strand_count == 0 or bool((self.point_counts == self.point_counts[0]).all())
+
+    @property
+    def grid(self) -> Floats:
+        """The points as (strand_count, cv_count, 3); only for a uniform set."""
+        if not self.is_uniform:
+            raise _broken("the strands differ in point count; resample them first")
+        cv_count = int(self.point_counts[0]) if self.strand_count else 2
+        return self.points.reshape(self.strand_count, cv_count, 3)
+
+    @property
+    def strand_of_point(self) -> Ints:
+        """Index of the strand that owns each point, (point_count,)."""
+        return np.repeat(np.arange(self.strand_count, dtype=np.int32), self.point_counts)
+
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Lowest and highest corner of all points, each (3,) [m]; zeros for an empty set."""
+        if not self.point_count:
+            return np.zeros(3, np.float32), np.zeros(3, np.float32)
+        return self.points.min(axis=0), self.points.max(axis=0)
+
+    def lengths(self) -> Floats:
+        """Arc length of each strand, (strand_count,) [m]."""
+        segments = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
+        segments[self.offsets[1:-1] - 1] = 0.0  # from one strand's tip to the next one's root
+        totals = np.concatenate([[0.0], np.cumsum(segments, dtype=np.float64)])
+        starts = self.offsets[:-1]
+        return (totals[self.offsets[1:] - 1] - totals[starts]).astype(np.float32)
+
+    def take(self, strands: Ints) -> StrandSet:
+        """The strands with these indices, in this order."""
+        counts = self.point_counts[strands]
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+        inside = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
+        picked = np.repeat(self.offsets[:-1][strands], counts) + inside
+        per_strand: dict[str, Any] = {
+            name: None if getattr(self, name) is None else getattr(self, name)[strands]
+            for name in _PER_STRAND
+        }
+        return StrandSet(self.points[picked], offsets, self.radius[picked], **per_strand)
+
+    def with_points(self, points: Floats) -> StrandSet:
+        """The same strands with moved points, (point_count, 3) [m]."""
+        return replace(self, points=points)
+
+    def transformed(self, matrix: Floats) -> StrandSet:
+        """Moved by an affine (4, 4) matrix; radii scale by the cube root of its volume change."""
+        linear = np.asarray(matrix, np.float64)[:3, :3]
+        scale = abs(np.linalg.det(linear)) ** (1.0 / 3.0)
+        points = self.points @ linear.T + np.asarray(matrix, np.float64)[:3, 3]
+        return replace(
+            self, points=points.astype(np.float32), radius=self.radius * np.float32(scale)
+        )
+
+    def strands(self) -> Iterator[Floats]:
+        """Each strand's points, for slow references and tests."""
+        for start, end in zip(self.offsets[:-1], self.offsets[1:], strict=True):
+            yield self.points[start:end]
+
+
+_DTYPES = {
+    "points": np.float32,
+    "offsets": np.int32,
+    "radius": np.float32,
+    "group": np.int32,
+    "root_uv": np.float32,
+    "root_triangle": np.int32,
+    "root_barycentric": np.float32,
+}
+_PER_STRAND = ("group", "root_uv", "root_triangle", "root_barycentric")
+assert set(_DTYPES) == {field.name for field in fields(StrandSet)}
+
+
+def _broken(problem: str) -> HairloomError:
+    return HairloomError(problem, place="strand data", remedy="Pass it through strands.clean")

@@ -1,0 +1,86 @@
+"""`Surface`: the triangle mesh that hair grows from, rests on or collides with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import HairloomError
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles in one space (said by whoever made it), checked when made.
+
+    positions: (vertex_count, 3) float32 [m].
+    triangles: (triangle_count, 3) int32, counter-clockwise seen from outside.
+    corner_uv: (triangle_count, 3, 2) float32, or None for a mesh without UVs.
+
+    Raises:
+        HairloomError: shapes that do not fit, an index out of range, values not finite.
+    """
+
+    positions: Floats
+    triangles: Ints
+    corner_uv: Floats | None = None
+
+    def __post_init__(self) -> None:
+        for name, dtype in (("positions", np.float32), ("triangles", np.int32)):
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype))
+        if self.corner_uv is not None:
+            object.__setattr__(self, "corner_uv", np.ascontiguousarray(self.corner_uv, np.float32))
+        for array in (self.positions, self.triangles):
+            if array.ndim != 2 or array.shape[1] != 3:
+                raise _broken(f"an array has shape {array.shape} instead of (n, 3)")
+        count = len(self.triangles)
+        if self.corner_uv is not None and self.corner_uv.shape != (count, 3, 2):
+            raise _broken(f"corner_uv has shape {self.corner_uv.shape}, not {(count, 3, 2)}")
+        if count and not 0 <= self.triangles.min() <= self.triangles.max() < len(self.positions):
+            raise _broken("a triangle names a vertex that does not exist")
+        if not np.isfinite(self.positions).all():
+            raise _broken("a vertex is not finite")
+
+    @property
+    def corners(self) -> Floats:
+        """The three corners of each triangle, (triangle_count, 3, 3) [m]."""
+        return self.positions[self.triangles]
+
+    def triangle_normals(self) -> Floats:
+        """Unit normals, (triangle_count, 3); zero for a triangle without area."""
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        return _unit(np.cross(b - a, c - a))
+
+    def vertex_normals(self) -> Floats:
+        """Unit normals weighted by corner angle, (vertex_count, 3) (Thuermer and Wuethrich 1998)."""
+        corners, normals = self.corners, self.triangle_normals()
+        total = np.zeros_like(self.positions)
+        for corner in range(3):
+            one = _unit(corners[:, (corner + 1) % 3] - corners[:, corner])
+            two = _unit(corners[:, (corner + 2) % 3] - corners[:, corner])
+            angle = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1.0, 1.0))
+            np.add.at(total, self.triangles[:, corner], normals * angle[:, None])
+        return _unit(total)
+
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Lowest and highest corner, each (3,) [m]."""
+        return self.positions.min(axis=0), self.positions.max(axis=0)
+
+    def transformed(self, matrix: Floats) -> Surface:
+        """Moved by an affine (4, 4) matrix; a mirroring one turns the triangles over."""
+        matrix = np.asarray(matrix, np.float64)
+        moved = (self.positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+        if np.linalg.det(matrix[:3, :3]) >= 0.0:
+            return replace(self, positions=moved)
+        uv = None if self.corner_uv is None else self.corner_uv[:, ::-1]
+        return replace(self, positions=moved, triangles=self.triangles[:, ::-1], corner_uv=uv)
+
+
+def _unit(vectors: Floats) -> Floats:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+
+
+def _broken(problem: str) -> HairloomError:
+    return HairloomError(problem, place="mesh data", remedy="Check the mesh (Mesh > Clean Up)")
