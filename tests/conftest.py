@@ -1,0 +1,29 @@
+"""What all tests share: the package `hairloom`, a GPU context, the real grooms."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from extension_loader import REPOSITORY, load_package
+
+load_package()
+
+
+@pytest.fixture(scope="session")
+def gpu_context() -> Any:
+    """Blender's `gpu` module, ready to draw offscreen."""
+    pytest.importorskip("bpy", reason="the GPU tests need Blender or the bpy module")
+    import gpu
+
+    gpu.init()
+    return gpu
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of the real grooms: HAIRLOOM_DATA, else shared/data beside the repository."""
+    folder = Path(os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"the real grooms are not here: no folder {folder}; set HAIRLOOM_DATA")
+    return folder

@@ -1,0 +1,67 @@
+"""Makes the parts of docs/ that come from the code: the parameter tables, and the pictures.
+
+python tools/make_docs.py [--check | --pictures]
+
+--check fails when docs/parameters.md is not what the code would write; --pictures also runs the
+demo and copies its pictures into docs/images.
+"""
+
+import argparse
+import importlib
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from extension_loader import PACKAGE, REPOSITORY, load_package
+
+PARAMETERS = REPOSITORY / "docs" / "parameters.md"
+IMAGES = REPOSITORY / "docs" / "images"
+HEADING = """# Parameters
+
+Made by `make docs` from the declarations in each room's `settings.py`: change them there.
+On the command line each is set with `--set SECTION.NAME=VALUE`; angles there are in radians.
+
+"""
+
+
+def parameter_tables() -> str:
+    """docs/parameters.md, whole."""
+    load_package()
+    parameters = importlib.import_module(f"{PACKAGE}.addon.parameters")
+    docs = importlib.import_module(f"{PACKAGE}.addon.params.docs")
+    return HEADING + "\n".join(
+        docs.table(settings) for settings in parameters.ALL_SETTINGS.values()
+    )
+
+
+def make_pictures() -> None:
+    """Run the demo on the built-in head and keep its pictures."""
+    IMAGES.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        headless = [sys.executable, str(REPOSITORY / "tools" / "headless.py")]
+        subprocess.run([*headless, "demo", "--output", folder], check=True)
+        for name in ("still.png", "motion.png"):
+            shutil.copyfile(Path(folder) / name, IMAGES / name)
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--check", action="store_true")
+    options.add_argument("--pictures", action="store_true")
+    chosen = options.parse_args()
+    text = parameter_tables()
+    if chosen.check:
+        current = PARAMETERS.is_file() and PARAMETERS.read_text(encoding="utf-8") == text
+        if not current:
+            print("docs/parameters.md is out of date: run make docs", file=sys.stderr)
+        return 0 if current else 1
+    PARAMETERS.write_text(text, encoding="utf-8")
+    if chosen.pictures:
+        make_pictures()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

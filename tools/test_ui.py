@@ -1,0 +1,162 @@
+"""Tests Hairloom in a Blender that has a window, on OpenGL and on Vulkan.
+
+python tools/test_ui.py [SESSION ...]      all of it, or only the named window sessions
+
+First the extension's zip is installed as an artist would, then all tests run in that Blender in
+the background, then each tests/window/session_*.py plays with a real window under Xvfb. Logs and
+screenshots go to out/window/. The last line is `N passed, N failed`.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+OUTPUT = REPOSITORY / "out" / "window"
+INSTALLED = OUTPUT / "installed"
+BACKENDS = ("opengl", "vulkan")
+TESTS_LIMIT_S = 1500
+SESSION_LIMIT_S = 240
+CLOSING_LINE = "SESSION PASSED"
+PROBLEM_LINES = 30
+
+
+@dataclass
+class Tally:
+    passed: int = 0
+    failed: int = 0
+
+    def add(self, passed: int, failed: int) -> None:
+        self.passed += passed
+        self.failed += failed
+
+
+def run_blender(
+    how: str, arguments: list[str], log: Path, limit_s: float, environment: dict[str, str]
+) -> int:
+    """The exit code of `tools/window_blender HOW ARGUMENTS`; 124 when it ran past its limit."""
+    with log.open("wb") as stream:
+        process = subprocess.Popen(
+            [REPOSITORY / "tools" / "window_blender", how, *arguments],
+            cwd=REPOSITORY,
+            env=os.environ | environment,
+            stdout=stream,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        try:
+            return process.wait(limit_s)
+        except subprocess.TimeoutExpired:
+            stream.write(f"\ntest_ui: stopped after {limit_s:.0f} s\n".encode())
+            return 124
+        finally:
+            # Not only on a time limit: Ctrl-C must not leave a Blender behind either.
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+
+
+def announce(name: str, backend: str, passed: bool, detail: str, log: Path) -> None:
+    verdict = "passed" if passed else "FAILED"
+    print(f"{verdict}  {name} on {backend}: {detail}", flush=True)
+    if not passed:
+        print(f"        the end of {log.relative_to(REPOSITORY)}:")
+        for line in log.read_text(errors="replace").splitlines()[-PROBLEM_LINES:]:
+            print(f"        | {line}")
+
+
+def install_extension(tally: Tally) -> bool:
+    """Installs the built zip into a fresh user folder, which each session then gets a copy of."""
+    zips = sorted((REPOSITORY / "dist").glob("hairloom-*.zip"))
+    if len(zips) != 1:
+        print(f"dist/ must hold one hairloom-*.zip, not {len(zips)}: run `make zip`")
+        return False
+    log = OUTPUT / "install.log"
+    code = run_blender(
+        "background",
+        ["--command", "extension", "install-file", "-r", "user_default", "-e", str(zips[0])],
+        log,
+        SESSION_LIMIT_S,
+        {"BLENDER_USER_RESOURCES": str(INSTALLED)},
+    )
+    found = (INSTALLED / "extensions/user_default/hairloom/blender_manifest.toml").is_file()
+    passed = code == 0 and found
+    announce("installing the zip", "either", passed, f"exit code {code}", log)
+    tally.add(passed, not passed)
+    return passed
+
+
+def run_tests(backend: str, tally: Tally) -> None:
+    """tests/pure, tests/gpu and tests/blender in Blender's own Python, in the background."""
+    log, report = OUTPUT / f"tests-{backend}.log", OUTPUT / f"tests-{backend}.xml"
+    arguments = ["--factory-startup", "--gpu-backend", backend, "--python-exit-code", "1"]
+    arguments += ["--python", "tests/run_in_blender.py", "--", f"--junitxml={report}"]
+    code = run_blender("background", arguments, log, TESTS_LIMIT_S, {})
+    if not report.is_file():
+        announce("tests", backend, False, f"exit code {code} and no report", log)
+        tally.add(0, 1)
+        return
+    suites = list(ElementTree.parse(report).iter("testsuite"))
+
+    def count(key: str) -> int:
+        return sum(int(suite.get(key, 0)) for suite in suites)
+
+    failed, skipped = count("failures") + count("errors"), count("skipped")
+    passed = max(count("tests") - failed - skipped, 0)
+    failed = failed or int(code != 0)  # a crash after the last test is a failure too
+    detail = f"{passed} passed, {failed} failed, {skipped} skipped, exit code {code}"
+    announce("tests", backend, failed == 0, detail, log)
+    tally.add(passed, failed)
+
+
+def run_session(script: Path, backend: str, tally: Tally) -> None:
+    """One window session, in a Blender of its own with the extension installed, not enabled."""
+    name = f"{script.stem.removeprefix('session_')}-{backend}"
+    log, resources = OUTPUT / f"{name}.log", OUTPUT / f"resources-{name}"
+    shutil.copytree(INSTALLED, resources)
+    arguments = ["--factory-startup", "--gpu-backend", backend, "--enable-event-simulate"]
+    arguments += ["--python-exit-code", "1", "--python", str(script)]
+    environment = {
+        "BLENDER_USER_RESOURCES": str(resources),
+        "HAIRLOOM_SCREENSHOTS": str(OUTPUT),
+        "HAIRLOOM_SESSION": name,
+    }
+    start = time.monotonic()
+    code = run_blender("window", arguments, log, SESSION_LIMIT_S, environment)
+    seconds = time.monotonic() - start
+    shutil.rmtree(resources)
+    closed = CLOSING_LINE in log.read_text(errors="replace").splitlines()
+    passed = code == 0 and closed
+    detail = f"exit code {code}, {seconds:.0f} s" + ("" if closed else f", no '{CLOSING_LINE}'")
+    announce(script.stem, backend, passed, detail, log)
+    tally.add(passed, not passed)
+
+
+def main(wanted: list[str]) -> int:
+    sessions = sorted((REPOSITORY / "tests" / "window").glob("session_*.py"))
+    if unknown := set(wanted) - {script.stem for script in sessions}:
+        print(f"no such session: {', '.join(sorted(unknown))}")
+        return 2
+    shutil.rmtree(OUTPUT, ignore_errors=True)
+    OUTPUT.mkdir(parents=True)
+    tally = Tally()
+    installed = install_extension(tally)
+    if not wanted:
+        for backend in BACKENDS:
+            run_tests(backend, tally)
+    for script in sessions:
+        for backend in BACKENDS if installed else ():
+            if not wanted or script.stem in wanted:
+                run_session(script, backend, tally)
+    print(f"{tally.passed} passed, {tally.failed} failed")
+    return int(tally.failed > 0 or tally.passed == 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
