@@ -11,6 +11,8 @@ from .strand_set import DEFAULT_RADIUS, StrandSet
 
 #: A strand shorter than this is a point to the eye and has no direction in float32 [m].
 SHORTEST_STRAND = 1.0e-6
+#: A point farther from the origin is a broken number: float32 there cannot tell strands apart [m].
+FARTHEST_POINT = 1.0e4
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,9 @@ def clean(
     faults = {
         "fewer than two points": counts < 2,
         "a point that is not finite": _any_per_curve(~np.isfinite(points).all(axis=1), offsets),
+        "a point farther than 10 km away": _any_per_curve(
+            (np.abs(points) > FARTHEST_POINT).any(axis=1), offsets
+        ),
         "no length": _no_length(points, offsets),
     }
     usable = np.ones(curve_count, bool)

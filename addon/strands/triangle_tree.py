@@ -1,0 +1,88 @@
+"""A balanced tree of boxes over the triangles of a surface: which ones can be nearest to a point.
+
+Built and walked level by level, so that numpy does the work for all points at once. A node of
+level n is a box around its share of the triangles; node i has the children 2 i and 2 i + 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+
+#: Triangles in a leaf; fewer cost more box tests, more cost more exact tests.
+LEAF_SIZE = 4
+
+
+@dataclass(frozen=True)
+class TriangleTree:
+    """levels: for each level (low, high), each (2^level, 3) float64, corners of the boxes.
+    leaf_triangles: (leaf_count, LEAF_SIZE) indices; the last leaves may repeat a triangle.
+    """
+
+    levels: tuple[tuple[Floats, Floats], ...]
+    leaf_triangles: Ints
+
+    def nearest_leaf(self, points: Floats) -> Ints:
+        """The leaf reached by always entering the nearer box, (point_count,): a first guess."""
+        node = np.zeros(len(points), np.int64)
+        for low, high in self.levels[1:]:
+            left = _squared_distance(points, low[2 * node], high[2 * node])
+            right = _squared_distance(points, low[2 * node + 1], high[2 * node + 1])
+            node = 2 * node + (right < left)
+        return node
+
+    def leaves_within(
+        self, points: Floats, squared_reach: Floats, limit: int
+    ) -> tuple[Ints, Ints] | None:
+        """All (point, leaf) pairs whose box is nearer than the point's reach, ascending by point.
+
+        None where that takes more than `limit` pairs at once: ask again with fewer points.
+        """
+        point, node = np.arange(len(points)), np.zeros(len(points), np.int64)
+        for low, high in self.levels[1:]:
+            point, node = np.repeat(point, 2), np.repeat(2 * node, 2)
+            node[1::2] += 1
+            distance = _squared_distance(points[point], low[node], high[node])
+            is_near = distance < squared_reach[point]
+            point, node = point[is_near], node[is_near]
+            if len(point) > limit:
+                return None
+        return point, node
+
+
+def build_tree(corners: Floats) -> TriangleTree:
+    """A tree by median splits of the triangle centres along each node's longest axis.
+
+    Args:
+        corners: (triangle_count, 3, 3) float64, at least one triangle.
+    """
+    depth = max(0, int(np.ceil(np.log2(len(corners) / LEAF_SIZE))))
+    padded = np.minimum(np.arange(LEAF_SIZE << depth), len(corners) - 1)
+    order = _median_order(corners.mean(axis=1), padded, depth)
+    low, high = corners.min(axis=1)[order], corners.max(axis=1)[order]
+    levels = []
+    for level in range(depth + 1):
+        shape = (1 << level, -1, 3)
+        levels.append((low.reshape(shape).min(axis=1), high.reshape(shape).max(axis=1)))
+    return TriangleTree(tuple(levels), order.reshape(-1, LEAF_SIZE))
+
+
+def _median_order(centers: Floats, order: Ints, depth: int) -> Ints:
+    """`order` sorted so that the two halves of every node lie on two sides of its median."""
+    for level in range(depth):
+        nodes = order.reshape(1 << level, -1)
+        inside = centers[nodes]
+        axis = np.ptp(inside, axis=1).argmax(axis=1)
+        along = np.take_along_axis(inside, axis[:, None, None], axis=2)[..., 0]
+        order = np.take_along_axis(nodes, along.argsort(axis=1, kind="stable"), axis=1).ravel()
+    return order
+
+
+def _squared_distance(points: Floats, low: Floats, high: Floats) -> Floats:
+    """From points to boxes, pair by pair, (n,)."""
+    outside = np.maximum(low - points, points - high)
+    np.maximum(outside, 0.0, out=outside)
+    return np.einsum("ij,ij->i", outside, outside)

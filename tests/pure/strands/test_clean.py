@@ -1,0 +1,65 @@
+"""Untrusted curves: each fault is dropped, counted once, and named."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.strands.clean import clean
+from hairloom.addon.strands.strand_set import DEFAULT_RADIUS
+
+STRAIGHT = [[0, 0, 0], [0, 0, 1]]
+CURVES = [
+    STRAIGHT,
+    [[1, 1, 1]],
+    [],
+    [[2, 2, 2], [np.nan, 2, 3], [2, 2, 4]],
+    [[3, 3, 3], [3, np.inf, 3]],
+    [[4, 4, 4], [4, 4, 4], [4, 4, 4]],
+    [[5, 5, 5], [5, 5, 5], [5, 5, 6]],
+    [[np.nan, 0, 0]],
+    [[8, 8, 8], [8, -1e30, 8]],
+]
+
+
+def flat(curves: list[list[list[float]]]) -> tuple[np.ndarray, np.ndarray]:
+    points = np.array([point for curve in curves for point in curve], float).reshape(-1, 3)
+    return points, np.concatenate([[0], np.cumsum([len(curve) for curve in curves])])
+
+
+def test_each_fault_is_counted_once_and_named() -> None:
+    cleaned = clean(*flat(CURVES))
+    assert cleaned.dropped == {
+        "fewer than two points": 3,
+        "a point that is not finite": 2,
+        "a point farther than 10 km away": 1,
+        "no length": 1,
+    }
+    assert cleaned.kept.tolist() == [0, 6]
+    assert [points.tolist() for points in cleaned.strands.strands()] == [CURVES[0], CURVES[6]]
+
+
+def test_what_belongs_to_a_curve_stays_with_it() -> None:
+    points, offsets = flat(CURVES)
+    uv = np.arange(18.0).reshape(9, 2)
+    uv[6] = (np.nan, 0.5)
+    radius = np.full(len(points), 1e-4)
+    radius[[0, 1]] = (np.nan, -1.0)
+    strands = clean(points, offsets, radius=radius, group=np.arange(9), root_uv=uv).strands
+    assert strands.group.tolist() == [0, 6]
+    assert strands.root_uv is not None
+    assert strands.root_uv.tolist() == [[0.0, 1.0], [0.0, 0.5]]
+    assert strands.radius == pytest.approx([DEFAULT_RADIUS] * 2 + [1e-4] * 3)
+
+
+@pytest.mark.parametrize("curves", [[], [[]], [[[0, 0, 0]]]])
+def test_nothing_usable_gives_an_empty_set(curves: list[list[list[float]]]) -> None:
+    cleaned = clean(*flat(curves))
+    assert cleaned.strands.strand_count == 0
+    assert sum(cleaned.dropped.values()) == len(curves)
+
+
+def test_an_empty_curve_at_the_end_is_dropped_and_spares_its_neighbour() -> None:
+    cleaned = clean(*flat([STRAIGHT, []]))
+    assert cleaned.strands.strand_count == 1
+    assert cleaned.dropped == {"fewer than two points": 1}
