@@ -1,0 +1,83 @@
+"""`CardMesh`: the triangles of all hair cards in the order in which they are to be drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import HairloomError
+
+
+@dataclass(frozen=True)
+class CardMesh:
+    """Cards as triangles in world space, checked when made.
+
+    positions: (vertex_count, 3) float32 [m].
+    triangles: (triangle_count, 3) int32, counter-clockwise seen from outside the head.
+    uv: (vertex_count, 2) float32 in [0, 1]; u runs across the card within its column of the
+        texture, v from 0 at the root to 1 at the tip. Row 0 of a texture, its lowest, is the root.
+        (glTF counts v from the top of the picture, so there the root has v = 1.)
+    normal: (vertex_count, 3) float32 unit vectors, away from the head.
+    tangent: (vertex_count, 3) float32 unit vectors from root to tip.
+    occlusion: (vertex_count,) float32, ambient occlusion from 0, shut in, to 1, open.
+    card: (triangle_count,) int32, which card a triangle belongs to.
+    atlas_columns: columns of the texture that u spans.
+
+    Raises:
+        HairloomError: shapes that do not fit, an index out of range, values not finite.
+    """
+
+    positions: Floats
+    triangles: Ints
+    uv: Floats
+    normal: Floats
+    tangent: Floats
+    occlusion: Floats
+    card: Ints
+    atlas_columns: int = 1
+
+    def __post_init__(self) -> None:
+        vertex_count, triangle_count = len(self.positions), len(self.triangles)
+        for name, (dtype, shape) in _layout(vertex_count, triangle_count).items():
+            value: Floats | Ints = np.ascontiguousarray(getattr(self, name), dtype)
+            if value.shape != shape:
+                raise _broken(f"{name} has shape {value.shape} instead of {shape}")
+            if not np.isfinite(value).all():
+                raise _broken(f"{name} holds a value that is not finite")
+            object.__setattr__(self, name, value)
+        if triangle_count and not 0 <= self.triangles.min() <= self.triangles.max() < vertex_count:
+            raise _broken("a triangle names a vertex that does not exist")
+
+    @property
+    def card_count(self) -> int:
+        return len(np.unique(self.card))
+
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Lowest and highest corner, each (3,) [m]; zeros for a mesh without cards."""
+        if not len(self.positions):
+            return np.zeros(3, np.float32), np.zeros(3, np.float32)
+        return self.positions.min(axis=0), self.positions.max(axis=0)
+
+    def with_occlusion(self, occlusion: Floats) -> CardMesh:
+        """The same mesh with ambient occlusion, (vertex_count,)."""
+        return replace(self, occlusion=occlusion)
+
+
+def _layout(vertex_count: int, triangle_count: int) -> dict[str, tuple[type, tuple[int, ...]]]:
+    return {
+        "positions": (np.float32, (vertex_count, 3)),
+        "triangles": (np.int32, (triangle_count, 3)),
+        "uv": (np.float32, (vertex_count, 2)),
+        "normal": (np.float32, (vertex_count, 3)),
+        "tangent": (np.float32, (vertex_count, 3)),
+        "occlusion": (np.float32, (vertex_count,)),
+        "card": (np.int32, (triangle_count,)),
+    }
+
+
+def _broken(problem: str) -> HairloomError:
+    return HairloomError(
+        problem, place="card mesh", remedy="Build the cards again from clean strands"
+    )

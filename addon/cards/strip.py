@@ -1,0 +1,159 @@
+"""From guides to cards: one textured strip of triangles along each guide.
+
+side ->            u runs along `side`, v along the guide, so that side x tangent = normal and
+3---4---5  tip     the strip is seen counter-clockwise from outside. Each quad is cut into two
+| / | / |          triangles here, root first: nobody may triangulate later, because that
+0---1---2  root    would lose the order in which the cards must be drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..strands import StrandSet
+from ..strands.frames import tangents, transported_normals
+from ..strands.resample import resample
+from .card_mesh import CardMesh
+from .settings import CardSettings
+
+#: Roots whose distance to their neighbours is measured.
+_SPACING_SAMPLES = 512
+#: For a single guide, which has no neighbour [m].
+_LONELY_SPACING = 0.01
+
+
+@dataclass(frozen=True)
+class CardFrames:
+    """Where each row of each card is and how it lies.
+
+    center, tangent, normal, side: (card_count, row_count, 3) float32, right-handed in the order
+    side, tangent, normal; center in [m], the others unit vectors.
+    """
+
+    center: Floats
+    tangent: Floats
+    normal: Floats
+    side: Floats
+
+
+def build_cards(guides: Floats, root_normal: Floats, settings: CardSettings) -> CardMesh:
+    """One card for each guide, in the order of the guides; occlusion is 1 until it is computed.
+
+    Args:
+        guides: (guide_count, cv_count, 3) [m], finite, root first.
+        root_normal: (guide_count, 3) unit normals of the head under the roots.
+
+    Raises:
+        HairloomError: a guide is not finite or has fewer than two CVs.
+    """
+    frames = card_frames(guides, root_normal, settings.segment_count)
+    card_count, row_count = frames.center.shape[:2]
+    across = np.linspace(0.0, 1.0, settings.column_count + 1, dtype=np.float32)
+    along = np.linspace(0.0, 1.0, row_count, dtype=np.float32)
+
+    width = settings.width_factor * mean_spacing(guides[:, 0]) * taper(along, settings.tip_width)
+    triangles = strip_triangles(row_count, settings.column_count)
+    vertices_per_card = row_count * len(across)
+    first = np.arange(card_count, dtype=np.int32) * vertices_per_card
+    return CardMesh(
+        positions=_positions(frames, width, across, settings).reshape(-1, 3),
+        triangles=(first[:, None, None] + triangles).reshape(-1, 3),
+        uv=_uv(card_count, across, along, settings).reshape(-1, 2),
+        normal=_normals(frames, across, settings).reshape(-1, 3),
+        tangent=np.repeat(frames.tangent.reshape(-1, 3), len(across), axis=0),
+        occlusion=np.ones(card_count * vertices_per_card, np.float32),
+        card=np.repeat(np.arange(card_count, dtype=np.int32), len(triangles)),
+        atlas_columns=settings.atlas_columns,
+    )
+
+
+def card_frames(guides: Floats, root_normal: Floats, segment_count: int) -> CardFrames:
+    """Rows at equal arc length along each guide, without twist, facing away from the head."""
+    center = _resampled(guides, segment_count + 1)
+    tangent = tangents(center)
+    normal = transported_normals(tangent, root_normal)
+    side = np.cross(tangent, normal)
+    turn = _facing_turn(normal, side, root_normal)[:, None, None]
+    facing = normal * np.cos(turn) + side * np.sin(turn)
+    return CardFrames(center, tangent, facing, np.cross(tangent, facing))
+
+
+def _facing_turn(normal: Floats, side: Floats, root_normal: Floats) -> Floats:
+    """The turn of each whole card about its guide that brings it to face the root's normal best.
+
+    At the root alone that would be decided by chance: hair often starts along the normal. The sum
+    over the rows of cos(turn) normal.r + sin(turn) side.r is largest for this angle [rad].
+    """
+    ahead = np.einsum("gri,gi->g", normal, root_normal)
+    aside = np.einsum("gri,gi->g", side, root_normal)
+    return np.arctan2(aside, ahead).astype(np.float32)
+
+
+def mean_spacing(roots: Floats) -> float:
+    """Mean distance from a root to its nearest neighbour [m], coinciding roots left out.
+
+    Estimated from at most `_SPACING_SAMPLES` roots, each measured against all.
+    """
+    points = np.asarray(roots, np.float64)
+    chosen = np.linspace(0, len(points) - 1, min(len(points), _SPACING_SAMPLES)).astype(np.int64)
+    squared = sum((points[chosen, None, axis] - points[:, axis]) ** 2 for axis in range(3))
+    squared = np.where(squared > 0.0, squared, np.inf)
+    nearest = squared.min(axis=1, initial=np.inf)
+    found = np.isfinite(nearest)
+    return float(np.sqrt(nearest[found]).mean()) if found.any() else _LONELY_SPACING
+
+
+def taper(along: Floats, tip_width: float) -> Floats:
+    """Width as a part of the root's: full at the root, `tip_width` at the tip, smooth between."""
+    return 1.0 + (tip_width - 1.0) * along * along * (3.0 - 2.0 * along)
+
+
+def strip_triangles(row_count: int, column_count: int) -> Ints:
+    """Triangles of one card, row by row from the root, ((row_count - 1) * column_count * 2, 3)."""
+    row, column = np.mgrid[0 : row_count - 1, 0:column_count].astype(np.int32)
+    low = row * (column_count + 1) + column
+    high = low + column_count + 1
+    lower_half = np.stack([low, low + 1, high + 1], axis=-1)
+    upper_half = np.stack([low, high + 1, high], axis=-1)
+    return np.stack([lower_half, upper_half], axis=2).reshape(-1, 3)
+
+
+def _positions(frames: CardFrames, width: Floats, across: Floats, settings: CardSettings) -> Floats:
+    """The guide runs through the middle; the edges fall back by a parabola of height `bend`."""
+    aside = (across - 0.5) * width[:, None]
+    behind = -settings.bend * width[:, None] * (2.0 * across - 1.0) ** 2
+    return (
+        frames.center[:, :, None]
+        + frames.side[:, :, None] * aside[..., None]
+        + frames.normal[:, :, None] * behind[..., None]
+    )
+
+
+def _normals(frames: CardFrames, across: Floats, settings: CardSettings) -> Floats:
+    """Perpendicular to the bent card, and leaning further outwards by `roundness`."""
+    edge = 2.0 * across - 1.0
+    lean = (4.0 * settings.bend + settings.roundness) * edge  # the parabola's slope is 4 bend edge
+    normals = frames.normal[:, :, None] + frames.side[:, :, None] * lean[:, None]
+    return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+
+
+def _uv(card_count: int, across: Floats, along: Floats, settings: CardSettings) -> Floats:
+    """(card_count, row_count, column_count + 1, 2): each card in one column of the texture."""
+    random = np.random.default_rng(settings.seed)
+    column = random.integers(settings.atlas_columns, size=card_count)
+    u = (column[:, None] + across) / settings.atlas_columns
+    return np.stack(np.broadcast_arrays(u[:, None, :], along[None, :, None]), axis=-1)
+
+
+def _resampled(guides: Floats, row_count: int) -> Floats:
+    guide_count, cv_count = guides.shape[:2]
+    strands = StrandSet(
+        points=guides.reshape(-1, 3),
+        offsets=np.arange(guide_count + 1) * cv_count,
+        radius=np.zeros(guide_count * cv_count),
+        group=np.zeros(guide_count, np.int32),
+    )
+    return resample(strands, row_count).grid

@@ -1,0 +1,165 @@
+"""NAME.hairloom.json beside a GLB: what a glTF file cannot say about how its hair is to be drawn.
+
+For the engine programmer who writes the hair material. Plain data; all vectors in the GLB's axes.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ..cards.card_mesh import CardMesh
+from .atomic import write_text_atomic
+from .axes import from_z_up
+
+SIDECAR_VERSION = 1
+
+#: From this alpha on a pixel counts as opaque: nearly 1, for textures that were compressed.
+OPAQUE_ALPHA = 0.99
+
+
+def write_sidecar(glb_path: Path, mesh: CardMesh, *, portable: bool = True) -> Path:
+    """Write the description of the cards in `glb_path` beside it; its path is returned.
+
+    Args:
+        mesh: the cards as they were written, world space, Z up.
+        portable: whether ambient occlusion is in TEXCOORD_1 only.
+
+    Raises:
+        HairloomError: nothing can be written there.
+    """
+    path = glb_path.with_suffix(".hairloom.json")
+    content = {"file": glb_path.name, **description(mesh, portable=portable)}
+    write_text_atomic(path, json.dumps(content, indent=2) + "\n")
+    return path
+
+
+def description(mesh: CardMesh, *, portable: bool = True) -> dict[str, Any]:
+    """The sidecar's content but for the file name."""
+    return {
+        "hairloom_sidecar": SIDECAR_VERSION,
+        "generator": "Hairloom",
+        "axes": "right-handed, +Y up, metres, triangles counter-clockwise seen from outside",
+        "counts": {
+            "cards": mesh.card_count,
+            "triangles": len(mesh.triangles),
+            "vertices": len(mesh.positions),
+        },
+        "bounds": _bounds(mesh),
+        "attributes": _ATTRIBUTES | ({} if portable else {"_AO": _OCCLUSION}),
+        "texture": {"columns": mesh.atlas_columns, **_TEXTURE},
+        "draw_order": _DRAW_ORDER,
+        "opaque_alpha": OPAQUE_ALPHA,
+        "passes": _FOUR_PASSES,
+        "passes_fallback": _THREE_PASSES,
+        "shading": _SHADING,
+        "engines": _ENGINES,
+    }
+
+
+def _bounds(mesh: CardMesh) -> dict[str, list[float]]:
+    corners = from_z_up(mesh.positions, "Y")
+    if not len(corners):
+        return {"minimum": [0.0] * 3, "maximum": [0.0] * 3}
+    return {
+        "minimum": [float(value) for value in corners.min(axis=0)],
+        "maximum": [float(value) for value in corners.max(axis=0)],
+    }
+
+
+_OCCLUSION = "ambient occlusion per vertex, 0 shut in to 1 open"
+_ATTRIBUTES = {
+    "POSITION": "rest pose",
+    "NORMAL": "of the card, away from the head, rounded across the card",
+    "TANGENT": "xyz across the strands, along u; strands run from root to tip along "
+    "cross(NORMAL, TANGENT.xyz)",
+    "TEXCOORD_0": "u across the card within its column of the texture, v from 1 at the root "
+    "to 0 at the tip",
+    "TEXCOORD_1": f"{_OCCLUSION}, the same in both components; multiply the shaded colour with it",
+}
+_TEXTURE = {
+    "columns_are": "variants of a strip of hair, side by side in u; each card uses one",
+    "rgb": "sRGB, stretched noise: multiply by baseColorFactor, the colour of the hair",
+    "alpha": "straight coverage; 0 at both sides of a column, fully opaque in its middle",
+}
+_DRAW_ORDER = {
+    "order": "cards from the inside to the outside of the hair; draw the indices as they stand",
+    "first": "all opaque meshes, the head included, before the first hair pass",
+    "valid_while": "the hair keeps its place on the head; sort hanging parts at run time, by card",
+    "keep": "index order; optimisers that reorder triangles for vertex caches destroy it",
+}
+
+
+def _pass(
+    name: str, pixels: str, *, color: bool, depth_write: bool, depth_test: str, cull: str
+) -> dict[str, Any]:
+    is_blended = "transparent" in name
+    return {
+        "name": name,
+        "pixels": pixels,
+        "color_write": color,
+        "depth_write": depth_write,
+        "depth_test": depth_test,
+        "cull": cull,
+        "blend": "source alpha, one minus source alpha" if is_blended else "off",
+    }
+
+
+_OPAQUE = "alpha >= opaque_alpha"
+_REST = "alpha < opaque_alpha"
+#: Scheuermann 2004: the first pass alone tests alpha, so that the others keep early depth tests.
+_FOUR_PASSES = [
+    _pass("prime depth", _OPAQUE, color=False, depth_write=True, depth_test="less", cull="none"),
+    _pass("opaque", "all", color=True, depth_write=False, depth_test="equal", cull="none"),
+    _pass(
+        "transparent back faces",
+        "all",
+        color=True,
+        depth_write=False,
+        depth_test="less",
+        cull="front",
+    ),
+    _pass(
+        "transparent front faces",
+        "all",
+        color=True,
+        depth_write=True,
+        depth_test="less",
+        cull="back",
+    ),
+]
+#: The simpler scheme of the same author, with an alpha test in every pass.
+_THREE_PASSES = [
+    _pass("opaque", _OPAQUE, color=True, depth_write=True, depth_test="less", cull="none"),
+    _pass(
+        "transparent back faces",
+        _REST,
+        color=True,
+        depth_write=False,
+        depth_test="less",
+        cull="front",
+    ),
+    _pass(
+        "transparent front faces",
+        _REST,
+        color=True,
+        depth_write=True,
+        depth_test="less",
+        cull="back",
+    ),
+]
+_SHADING = {
+    "model": "Scheuermann 2004; T from root to tip, N, L, V unit vectors, H = normalize(L + V)",
+    "diffuse": "max(0, 0.75 dot(N, L) + 0.25)",
+    "shifted_tangent": "normalize(T + shift N); positive moves the highlight to the tip",
+    "specular": "smoothstep(-1, 0, dot(T, H)) pow(sqrt(1 - dot(T, H)^2), exponent)",
+    "sum": "(diffuse + two speculars, shifted apart) rgb baseColorFactor occlusion",
+}
+_ENGINES = {
+    "three.js": "draws blended double-sided materials twice, back faces first; "
+    "material.forceSinglePass = true draws the file's order once",
+    "Godot": "gives blended materials a depth pre-pass; set Transparency to Alpha for the file's "
+    "order in one pass",
+    "others": "one blended double-sided pass in index order is nearly right from every side",
+}

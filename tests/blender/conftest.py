@@ -1,0 +1,71 @@
+"""What the tests of Blender's side share: an empty scene, the registered extension, small grooms."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
+
+import hairloom  # noqa: E402  it is loaded by tests/conftest.py
+from hairloom.addon.strands import StrandSet  # noqa: E402
+
+
+@pytest.fixture(autouse=True)
+def empty_scene() -> None:
+    """A file with nothing in it, and nothing to undo."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+@pytest.fixture
+def extension(empty_scene: None) -> Iterator[None]:
+    """Hairloom registered, as when its extension is enabled."""
+    hairloom.register()
+    yield
+    hairloom.unregister()
+
+
+@pytest.fixture
+def sphere() -> Any:
+    """A UV sphere of radius 0.1 m with UVs, named Head."""
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, segments=24, ring_count=12)
+    head = bpy.context.object
+    head.name = "Head"
+    return head
+
+
+def hedgehog(count: int = 60, points: int = 8, length: float = 0.08, seed: int = 1) -> StrandSet:
+    """Straight strands that stand on the sphere of radius 0.1 m."""
+    outward = np.random.default_rng(seed).normal(size=(count, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    along = 0.1 + np.linspace(0.0, length, points)
+    return StrandSet(
+        points=(outward[:, None] * along[:, None]).reshape(-1, 3),
+        offsets=np.arange(count + 1) * points,
+        radius=np.full(count * points, 5.0e-5),
+        group=np.arange(count) % 2,
+    )
+
+
+@pytest.fixture
+def new_hair(extension: None) -> Callable[..., Any]:
+    """Makes a hair curves object from strands (a hedgehog), on a head or on none."""
+    from hairloom.addon.host.curves import write_curves
+
+    def make(head: Any = None, strands: StrandSet | None = None) -> Any:
+        strands = hedgehog() if strands is None else strands
+        hair = write_curves("Hair", strands, head, bpy.context.collection)
+        for other in bpy.context.selected_objects:
+            other.select_set(False)
+        hair.select_set(True)
+        bpy.context.view_layer.objects.active = hair
+        return hair
+
+    return make
+
+
+@pytest.fixture
+def evaluated() -> Callable[[], Any]:
+    """Gives the evaluated dependency graph as it is now."""
+    return lambda: bpy.context.evaluated_depsgraph_get()

@@ -1,0 +1,259 @@
+"""Hair cards as GLB, read back by hand: order, attributes, material; and what Blender keeps."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.cards.card_mesh import CardMesh
+from hairloom.addon.cards.settings import CardSettings
+from hairloom.addon.cards.sort import inside_out_order
+from hairloom.addon.cards.strip import build_cards
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.sidecar import description
+from hairloom.addon.shading.textures import TextureSettings, card_texture
+
+bpy = pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
+
+from hairloom.addon.host import glb  # noqa: E402
+
+TEXTURE = TextureSettings(variant_width=32, height=128)
+
+
+class Glb:
+    """A GLB file, read with the standard library and numpy alone."""
+
+    _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+    _DTYPE = {5126: "<f4", 5125: "<u4", 5123: "<u2"}
+
+    def __init__(self, path: Path) -> None:
+        content = path.read_bytes()
+        magic, version, length = struct.unpack_from("<4sII", content)
+        assert (magic, version, length) == (b"glTF", 2, len(content))
+        json_length, _ = struct.unpack_from("<I4s", content, 12)
+        self.json: dict[str, Any] = json.loads(content[20 : 20 + json_length])
+        self._binary = content[20 + json_length + 8 :]
+
+    @property
+    def primitive(self) -> dict[str, Any]:
+        """The only primitive of the only mesh."""
+        (mesh,) = self.json["meshes"]
+        (primitive,) = mesh["primitives"]
+        return primitive
+
+    def view(self, index: int) -> bytes:
+        view = self.json["bufferViews"][index]
+        start = view.get("byteOffset", 0)
+        return self._binary[start : start + view["byteLength"]]
+
+    def accessor(self, index: int) -> np.ndarray:
+        accessor = self.json["accessors"][index]
+        dtype, width = self._DTYPE[accessor["componentType"]], self._WIDTH[accessor["type"]]
+        values = np.frombuffer(
+            self.view(accessor["bufferView"]),
+            dtype,
+            accessor["count"] * width,
+            accessor.get("byteOffset", 0),
+        )
+        return values.reshape(-1, width)
+
+    def corners(self, name: str) -> np.ndarray:
+        """One attribute at each corner of each triangle, in index order, (triangles, 3, width)."""
+        indices = self.accessor(self.primitive["indices"]).reshape(-1, 3)
+        return self.accessor(self.primitive["attributes"][name])[indices]
+
+
+def to_blender(vectors: np.ndarray) -> np.ndarray:
+    """glTF's axes to Blender's."""
+    return np.stack([vectors[..., 0], -vectors[..., 2], vectors[..., 1]], axis=-1)
+
+
+def hair(count: int = 120, seed: int = 2) -> CardMesh:
+    """Cards that hang around a sphere of 10 cm, each at its own distance, in random order."""
+    random = np.random.default_rng(seed)
+    distance = random.permutation(np.linspace(0.1, 0.16, count))
+    angle = random.uniform(0.0, 2.0 * np.pi, count)
+    out = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=-1)
+    along = np.linspace(0.0, 1.0, 16)[:, None]
+    fall = along * [0.0, 0.0, -0.15] + random.uniform(-0.03, 0.03, (count, 1, 3)) * along**2
+    guides = out[:, None] * distance[:, None, None] + fall
+    mesh = build_cards(guides.astype(np.float32), out.astype(np.float32), CardSettings())
+    return mesh.with_occlusion(random.random(len(mesh.positions)))
+
+
+@pytest.fixture(scope="module")
+def sorted_hair() -> CardMesh:
+    return inside_out_order(hair(), None)
+
+
+@pytest.fixture(scope="module")
+def texture(sorted_hair: CardMesh) -> np.ndarray:
+    return card_texture(TEXTURE, sorted_hair.atlas_columns)
+
+
+@pytest.fixture(scope="module")
+def written(
+    sorted_hair: CardMesh, texture: np.ndarray, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    path = tmp_path_factory.mktemp("glb") / "cards.glb"
+    glb.write_glb(path, sorted_hair, texture, name="Hair", base_color=(0.3, 0.15, 0.07))
+    return path
+
+
+def test_index_order_is_the_sorted_order(written: Path, sorted_hair: CardMesh) -> None:
+    corners = to_blender(Glb(written).corners("POSITION"))
+    np.testing.assert_array_equal(corners, sorted_hair.positions[sorted_hair.triangles])
+
+
+def test_index_order_is_kept_whatever_it_is(tmp_path: Path) -> None:
+    """An order that no exporter would choose by itself: every triangle at random."""
+    mesh = hair(30)
+    shuffle = np.random.default_rng(0).permutation(len(mesh.triangles))
+    mesh = replace(mesh, triangles=mesh.triangles[shuffle], card=mesh.card[shuffle])
+    glb.write_glb(tmp_path / "cards.glb", mesh, None)
+    corners = to_blender(Glb(tmp_path / "cards.glb").corners("POSITION"))
+    np.testing.assert_array_equal(corners, mesh.positions[mesh.triangles])
+
+
+def test_cards_come_from_the_inside_to_the_outside(written: Path) -> None:
+    """From the file alone: each run of triangles that share vertices is farther out."""
+    file = Glb(written)
+    indices = file.accessor(file.primitive["indices"]).astype(np.int64)
+    assert len(indices) == 120 * 12 * 2 * 2 * 3
+    cards = indices.reshape(120, -1)
+    assert [set(a) & set(b) for a, b in zip(cards[1:], cards[:-1], strict=True)] == [set()] * 119
+    positions = to_blender(file.accessor(file.primitive["attributes"]["POSITION"]))
+    distance = np.median(np.linalg.norm(positions[cards] - positions.mean(axis=0), axis=2), axis=1)
+    assert np.corrcoef(distance, np.arange(120))[0, 1] > 0.97
+
+
+def test_vertex_data_follow_the_sidecar(written: Path, sorted_hair: CardMesh) -> None:
+    file, mesh = Glb(written), sorted_hair
+    at_corner = mesh.triangles
+    assert set(file.primitive["attributes"]) == set(description(mesh)["attributes"])
+    flipped = mesh.uv[at_corner] * [1.0, -1.0] + [0.0, 1.0]
+    np.testing.assert_allclose(file.corners("TEXCOORD_0"), flipped, atol=1e-6)
+    occlusion = np.repeat(mesh.occlusion[at_corner][..., None], 2, axis=2)
+    np.testing.assert_allclose(file.corners("TEXCOORD_1"), occlusion, atol=1e-6)
+    normal = to_blender(file.corners("NORMAL"))
+    np.testing.assert_allclose(normal, mesh.normal[at_corner], atol=1e-4)  # rounded by Blender
+    across = to_blender(file.corners("TANGENT")[..., :3])
+    along = np.cross(normal, across)
+    assert (along * mesh.tangent[at_corner]).sum(axis=-1).min() > 0.9
+    assert len(file.accessor(0)) == len(mesh.positions)  # no vertex was split
+
+
+def test_material_is_blended_double_sided_and_tinted(written: Path) -> None:
+    (material,) = Glb(written).json["materials"]
+    assert material["alphaMode"] == "BLEND"
+    assert material["doubleSided"] is True
+    surface = material["pbrMetallicRoughness"]
+    np.testing.assert_allclose(surface["baseColorFactor"], [0.3, 0.15, 0.07, 1.0], atol=1e-6)
+    assert surface["metallicFactor"] == 0
+    assert surface["roughnessFactor"] == pytest.approx(glb.ROUGHNESS)
+    assert surface["baseColorTexture"].get("texCoord", 0) == 0
+    (sampler,) = Glb(written).json["samplers"]
+    clamp_to_edge = 33071
+    assert (sampler["wrapS"], sampler["wrapT"]) == (clamp_to_edge, clamp_to_edge)
+
+
+def test_the_embedded_picture_is_the_texture(
+    written: Path, texture: np.ndarray, tmp_path: Path
+) -> None:
+    file = Glb(written)
+    (picture,) = file.json["images"]
+    png = tmp_path / "picture.png"
+    png.write_bytes(file.view(picture["bufferView"]))
+    image = bpy.data.images.load(str(png))
+    try:
+        pixels = np.empty(texture.size, np.float32)
+        image.pixels.foreach_get(pixels)
+    finally:
+        bpy.data.images.remove(image)
+    pixels = pixels.reshape(texture.shape)
+    np.testing.assert_allclose(pixels[..., 3], texture[..., 3], atol=0.51 / 255.0)
+    coded = 1.055 * texture[..., :3] ** (1 / 2.4) - 0.055
+    # also where alpha is 0: otherwise dark fringes
+    np.testing.assert_allclose(pixels[..., :3], coded, atol=0.51 / 255.0)
+
+
+def test_custom_attributes_only_where_they_are_asked_for(
+    written: Path, sorted_hair: CardMesh, tmp_path: Path
+) -> None:
+    assert not [n for n in Glb(written).primitive["attributes"] if n.startswith("_")]
+    path = tmp_path / "cards.glb"
+    glb.write_glb(path, sorted_hair, None, portable=False)
+    occlusion = Glb(path).corners("_AO")[..., 0]
+    np.testing.assert_allclose(occlusion, sorted_hair.occlusion[sorted_hair.triangles], atol=1e-6)
+
+
+def block_counts() -> dict[str, int]:
+    """How many data-blocks of every kind there are."""
+    kinds = [p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
+    return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
+
+
+def test_the_users_scene_is_left_alone(sorted_hair: CardMesh, tmp_path: Path) -> None:
+    """In edit mode, on a second view layer, at another frame."""
+    bpy.ops.mesh.primitive_cube_add()
+    window, scene = bpy.context.window, bpy.context.scene
+    window.view_layer = scene.view_layers.new("second")
+    scene.frame_set(7)
+    cube = bpy.data.objects["Cube"]
+    window.view_layer.objects.active = cube
+    bpy.ops.object.mode_set(mode="EDIT")
+    before = block_counts()
+    glb.write_glb(tmp_path / "cards.glb", sorted_hair, None)
+    assert block_counts() == before
+    assert (window.scene, window.view_layer.name, scene.frame_current) == (scene, "second", 7)
+    assert cube.mode == "EDIT"
+    assert window.view_layer.objects.active == cube
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_an_impossible_path_leaves_nothing(sorted_hair: CardMesh, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    before = block_counts()
+    with pytest.raises(HairloomError, match="cannot be written"):
+        glb.write_glb(tmp_path / "file" / "cards.glb", sorted_hair, None)
+    assert block_counts() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_failing_exporter_leaves_the_old_file_and_no_data(
+    sorted_hair: CardMesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "cards.glb"
+    path.write_bytes(b"old")
+    before, scene = block_counts(), bpy.context.window.scene
+
+    def half(temporary: Path, *_: object, **__: object) -> None:
+        temporary.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(glb, "_export", half)
+    with pytest.raises(KeyboardInterrupt):
+        glb.write_glb(path, sorted_hair, None)
+    assert path.read_bytes() == b"old"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["cards.glb"]
+    assert block_counts() == before
+    assert bpy.context.window.scene == scene
+
+
+def test_no_cards_and_no_exporter_are_messages(sorted_hair: CardMesh, tmp_path: Path) -> None:
+    empty = build_cards(np.zeros((0, 16, 3)), np.zeros((0, 3)), CardSettings())
+    with pytest.raises(HairloomError, match="no cards"):
+        glb.write_glb(tmp_path / "cards.glb", empty, None)
+    bpy.ops.preferences.addon_disable(module="io_scene_gltf2")
+    try:
+        with pytest.raises(HairloomError, match="switched off"):
+            glb.write_glb(tmp_path / "cards.glb", sorted_hair, None)
+    finally:
+        bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
+    assert list(tmp_path.iterdir()) == []

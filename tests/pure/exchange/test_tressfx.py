@@ -1,0 +1,278 @@
+"""TressFX files against bytes packed by hand from the published layout, and against real grooms."""
+
+from __future__ import annotations
+
+import struct
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
+from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands.strand_set import DEFAULT_RADIUS
+
+STRANDS, VERTICES = 3, 4
+
+
+def positions() -> np.ndarray:
+    """Three strands of four points in a file's Y-up axes."""
+    random = np.random.default_rng(4)
+    return random.uniform(-0.2, 0.2, (STRANDS, VERTICES, 3)).astype(np.float32)
+
+
+def version_4(
+    points: np.ndarray,
+    *,
+    uv: np.ndarray | None = None,
+    thickness: np.ndarray | None = None,
+    version: float = 4.0,
+) -> bytes:
+    """A version 4 file, packed field by field: 160 bytes of header, then the blocks."""
+    strands, vertices = points.shape[:2]
+    body = b""
+    offsets = {"uv": 0, "thickness": 0}
+    for strand in points:
+        for index, point in enumerate(strand):
+            body += struct.pack("<4f", *point, 0.0 if index == 0 else 1.0)
+    for name, values in (("uv", uv), ("thickness", thickness)):
+        if values is not None:
+            offsets[name] = 160 + len(body)
+            body += struct.pack(f"<{values.size}f", *values.ravel())
+    header = struct.pack("<f", version)
+    header += struct.pack("<7I", strands, vertices, 160, offsets["uv"], 0, offsets["thickness"], 0)
+    return header.ljust(160, b"\0") + body
+
+
+def version_3(points: np.ndarray, uv: np.ndarray) -> bytes:
+    """A version 3 file: 296 bytes of header, float3 positions, strand UVs."""
+    strands, vertices = points.shape[:2]
+    body = struct.pack(f"<{points.size}f", *points.ravel())
+    header = struct.pack("<f4I", 3.0, strands, vertices, 2, 1).ljust(144, b"\0")
+    header += struct.pack("<6I", 296, 0, 296 + len(body), 0, 0, 0)
+    return header.ljust(296, b"\0") + body + struct.pack(f"<{uv.size}f", *uv.ravel())
+
+
+def z_up(points: np.ndarray) -> np.ndarray:
+    return np.array([[(x, -z, y) for x, y, z in strand] for strand in points.tolist()], np.float32)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "groom.tfx"
+    path.write_bytes(version_4(positions()))
+    return path
+
+
+def test_version_4_is_read_as_packed(tmp_path: Path) -> None:
+    path = tmp_path / "groom.tfx"
+    uv = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]], np.float32)
+    thickness = np.array([3e-5, 4e-5, 5e-5], np.float32)
+    path.write_bytes(version_4(positions(), uv=uv, thickness=thickness))
+    groom = read_tfx(path)
+    assert (groom.version, groom.dropped, groom.source) == (4.0, {}, path)
+    np.testing.assert_array_equal(groom.strands.grid, z_up(positions()))
+    np.testing.assert_array_equal(groom.strands.root_uv, uv)
+    np.testing.assert_array_equal(groom.strands.radius, np.repeat(thickness, VERTICES))
+
+
+def test_version_3_is_read_as_packed(tmp_path: Path) -> None:
+    path = tmp_path / "groom.tfx"
+    uv = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]], np.float32)
+    path.write_bytes(version_3(positions(), uv))
+    groom = read_tfx(path)
+    assert groom.version == 3.0
+    np.testing.assert_array_equal(groom.strands.grid, z_up(positions()))
+    np.testing.assert_array_equal(groom.strands.root_uv, uv)
+
+
+def test_axis_and_scale(file: Path) -> None:
+    strands = read_tfx(file, up="Z", scale=0.01).strands
+    np.testing.assert_allclose(strands.grid, positions() * np.float32(0.01), rtol=1e-6)
+    with pytest.raises(HairloomError, match="Use Y or Z"):
+        read_tfx(file, up="X")
+
+
+@pytest.mark.parametrize("value", [1.0, 0.0, -1.0, np.nan, np.inf])
+def test_thickness_that_is_no_radius_falls_back(tmp_path: Path, value: float) -> None:
+    path = tmp_path / "groom.tfx"
+    path.write_bytes(version_4(positions(), thickness=np.array([4e-5, value, 5e-5])))
+    radius = read_tfx(path).strands.radius.reshape(STRANDS, VERTICES)
+    np.testing.assert_allclose(radius[:, 0], [4e-5, DEFAULT_RADIUS, 5e-5], rtol=1e-6)
+
+
+def test_bad_strands_are_dropped_counted_and_named(tmp_path: Path) -> None:
+    path = tmp_path / "groom.tfx"
+    points = positions()
+    points[0, 2, 1] = np.nan
+    points[1] = points[1, 0]
+    path.write_bytes(version_4(points))
+    groom = read_tfx(path)
+    assert groom.dropped == {"a point that is not finite": 1, "no length": 1}
+    np.testing.assert_array_equal(groom.strands.grid, z_up(points)[2:])
+
+
+@pytest.mark.parametrize(
+    ("name", "strands", "vertices"),
+    [("front_top", 876, 16), ("side", 3066, 16), ("back", 517, 16), ("tail", 474, 16)],
+)
+def test_ponytail(shared_data: Path, name: str, strands: int, vertices: int) -> None:
+    groom = read_tfx(shared_data / "tressfx_ponytail" / f"{name}.tfx")
+    assert groom.strands.grid.shape == (strands, vertices, 3)
+    assert (groom.version, groom.dropped) == (3.0, {})
+
+
+def test_sintel(shared_data: Path) -> None:
+    groom = read_tfx(shared_data / "sintel" / "SintelHairOriginal-sintel_hair.16points.tfx")
+    assert groom.strands.grid.shape == (11_400, 16, 3)
+    assert groom.dropped == {}
+    low, high = groom.strands.bounds()
+    assert 1.3 < low[2] < high[2] < 1.7  # the hair of a standing human, Z up
+
+
+def grown(strand_count: int, cv_count: int, **more: np.ndarray) -> StrandSet:
+    random = np.random.default_rng(strand_count)
+    return StrandSet(
+        points=random.uniform(-1.0, 1.0, (strand_count * cv_count, 3)),
+        offsets=np.arange(strand_count + 1) * cv_count,
+        radius=np.repeat(random.uniform(1e-5, 1e-4, strand_count), cv_count),
+        group=np.zeros(strand_count, np.int32),
+        **more,
+    )
+
+
+@pytest.mark.parametrize("up", ["Y", "Z"])
+def test_round_trip_is_exact(tmp_path: Path, up: str) -> None:
+    path = tmp_path / "groom.tfx"
+    strands = grown(50, 16, root_uv=np.random.default_rng(0).random((50, 2)))
+    write_tfx(path, strands, up=up)
+    groom = read_tfx(path, up=up)
+    for name in ("points", "offsets", "radius", "root_uv"):
+        np.testing.assert_array_equal(getattr(groom.strands, name), getattr(strands, name))
+
+
+def test_written_file_holds_what_the_layout_says(tmp_path: Path) -> None:
+    """Read back with struct alone."""
+    path = tmp_path / "groom.tfx"
+    strands = grown(5, 8)
+    write_tfx(path, strands)
+    content = path.read_bytes()
+    version, count, vertices, at, uv, vertex_uv, thickness, color = struct.unpack_from(
+        "<f7I", content
+    )
+    assert (version, count, vertices, at, uv, vertex_uv, color) == (4.0, 5, 8, 160, 0, 0, 0)
+    floats = np.array(struct.unpack_from("<160f", content, at)).reshape(5, 8, 4)
+    np.testing.assert_array_equal(floats[:, 0, 3], 0.0)
+    np.testing.assert_array_equal(floats[:, 1:, 3], 1.0)
+    np.testing.assert_array_equal(z_up(floats[..., :3]), strands.grid)
+    assert struct.unpack_from("<5f", content, thickness) == tuple(strands.radius[::8])
+    assert len(content) == thickness + 5 * 4
+
+
+@pytest.mark.parametrize(("cv_count", "expected"), [(2, 4), (4, 4), (9, 16), (64, 64), (70, 64)])
+def test_vertex_count_is_a_power_of_two(tmp_path: Path, cv_count: int, expected: int) -> None:
+    path = tmp_path / "groom.tfx"
+    strands = grown(6, cv_count)
+    write_tfx(path, strands)
+    grid = read_tfx(path).strands.grid
+    assert grid.shape == (6, expected, 3)
+    np.testing.assert_array_equal(grid[:, [0, -1]], strands.grid[:, [0, -1]])
+
+
+def test_writing_nothing_or_an_odd_count_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "groom.tfx"
+    with pytest.raises(HairloomError, match="no strands"):
+        write_tfx(path, grown(3, 4).take(np.array([], np.int64)))
+    with pytest.raises(HairloomError, match="12 vertices"):
+        write_tfx(path, grown(3, 4), vertex_count=12)
+    assert not path.exists()
+
+
+def patched(offset: int, value: bytes) -> bytes:
+    content = bytearray(version_4(positions(), thickness=np.full(STRANDS, 4e-5)))
+    content[offset : offset + len(value)] = value
+    return bytes(content)
+
+
+def u32(value: int) -> bytes:
+    return struct.pack("<I", value)
+
+
+def f32(value: float) -> bytes:
+    return struct.pack("<f", value)
+
+
+WHOLE = patched(0, b"")
+BAD_FILES = {
+    "empty": (b"", "empty"),
+    "three bytes": (b"abc", "version, bytes 0 to 4"),
+    "short header": (WHOLE[:100], "header, bytes 0 to 160"),
+    "short positions": (WHOLE[:200], "positions, bytes 160 to 352"),
+    "short thickness": (WHOLE[:-1], "thickness, bytes 352 to 364"),
+    "version 2": (patched(0, f32(2.0)), "byte 0, reads as 2"),
+    "version 5": (patched(0, f32(5.0)), "byte 0, reads as 5"),
+    "version NaN": (patched(0, f32(float("nan"))), "byte 0, reads as nan"),
+    "version 3 in a version 4 file": (patched(0, f32(3.0)), "positions would start at byte"),
+    "text": (b"# Wavefront OBJ\nv 0 0 0\n" * 20, "no TressFX 3 or 4 file"),
+    "no strands": (patched(4, u32(0)), "no strands (byte 4)"),
+    "no vertices": (patched(8, u32(0)), "no vertices a strand (byte 8)"),
+    "one vertex": (patched(8, u32(1)), "fewer than two points"),
+    "four billion strands": (patched(4, u32(0xFFFFFFFF)), "past the end of the file"),
+    "four billion vertices": (patched(8, u32(0xFFFFFFFF)), "past the end of the file"),
+    "positions outside": (patched(12, u32(1_000_000)), "positions, bytes 1,000,000 to"),
+    "positions in the header": (patched(12, u32(8)), "inside the header"),
+    "thickness outside": (patched(24, u32(0xFFFFFF00)), "thickness, bytes"),
+    "strand UVs outside": (patched(16, u32(360)), "strand_uv, bytes 360"),
+    "all NaN": (version_4(positions() * np.nan), "3 with a point that is not finite"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_bad_files_are_named_with_place_and_remedy(tmp_path: Path, name: str) -> None:
+    content, expected = BAD_FILES[name]
+    path = tmp_path / "groom.tfx"
+    path.write_bytes(content)
+    tracemalloc.start()
+    with pytest.raises(HairloomError) as caught:
+        read_tfx(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert expected in caught.value.problem
+    assert caught.value.place == str(path)
+    assert caught.value.remedy
+    assert peak < 1_000_000
+
+
+def test_folder_and_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(HairloomError, match="folder"):
+        read_tfx(tmp_path)
+    with pytest.raises(HairloomError, match="cannot be read"):
+        read_tfx(tmp_path / "missing.tfx")
+
+
+def test_no_mutation_ends_in_anything_but_a_groom_or_a_message(tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    originals = [
+        version_4(positions(), uv=np.zeros((STRANDS, 2)), thickness=np.full(STRANDS, 4e-5)),
+        version_3(positions(), np.zeros((STRANDS, 2), np.float32)),
+    ]
+    path = tmp_path / "groom.tfx"
+    outcomes = {"read": 0, "refused": 0}
+    for trial in range(300):
+        content = bytearray(originals[trial % 2])
+        for _ in range(random.integers(1, 6)):
+            # half of the hits go to the header, where they hurt most
+            end = 160 if random.random() < 0.5 else len(content)
+            content[random.integers(end)] = random.integers(256)
+        if random.random() < 0.3:
+            content = content[: random.integers(len(content))]
+        path.write_bytes(content)
+        try:
+            strands = read_tfx(path).strands
+            assert strands.strand_count and np.isfinite(strands.points).all()
+            outcomes["read"] += 1
+        except HairloomError:
+            outcomes["refused"] += 1
+    assert min(outcomes.values()) > 30, outcomes
