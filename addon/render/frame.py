@@ -1,0 +1,98 @@
+"""The recipe of one still frame: meshes, strands, and the samples averaged to pixels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gpu
+
+from ..arrays import Floats
+from .camera import Camera, frame_camera, look_at, orthographic, perspective
+from .mesh_pass import MeshPass
+from .shader_program import ShaderRecipe, program
+from .snapshot import MeshSnapshot, Snapshot
+from .strand_pass import StrandPass
+from .textures import drawing_into, texture_to_array
+
+__all__ = [
+    "Camera",
+    "MeshSnapshot",
+    "Snapshot",
+    "frame_camera",
+    "look_at",
+    "orthographic",
+    "perspective",
+    "render_coverage",
+    "render_image",
+]
+
+#: the largest side that a target may have on every GPU that Blender supports
+LARGEST_SIDE = 16384
+_TRANSPARENT = (0.0, 0.0, 0.0, 0.0)
+
+_BOX_RECIPE = ShaderRecipe(
+    name="box_filter",
+    compute="box_filter.comp.glsl",
+    textures=(("FLOAT_2D", "samples_of"),),
+    images=(("RGBA32F", "picture"),),
+    integers=("samples_across",),
+)
+
+
+def render_image(
+    snapshot: Snapshot,
+    camera: Camera,
+    width: int,
+    height: int,
+    samples: int = 2,
+    *,
+    background: tuple[float, float, float, float] = _TRANSPARENT,
+    passes: tuple[MeshPass, StrandPass] | None = None,
+) -> Floats:
+    """Draw a snapshot, (height, width, 4) float32 scene-linear, premultiplied, row 0 at the bottom.
+
+    Args:
+        width, height: [pixels].
+        samples: samples across a pixel: 3 draws 3 x 3 and averages them.
+        background: premultiplied rgba.
+        passes: those of an earlier call, so that what did not change is not uploaded again.
+
+    Raises:
+        ValueError: a size that no GPU can draw.
+        ShaderError: a shader does not compile here.
+    """
+    largest = max(width, height) * samples
+    if min(width, height, samples) < 1 or largest > LARGEST_SIDE:
+        raise ValueError(f"a picture of {width} x {height} with {samples} samples across")
+    mesh_pass, strand_pass = passes or (MeshPass(), StrandPass())
+    size = width * samples, height * samples
+    color = gpu.types.GPUTexture(size, format="RGBA32F")
+    depth = gpu.types.GPUTexture(size, format="DEPTH_COMPONENT32F")
+    target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+    with drawing_into(target):
+        target.clear(color=background, depth=1.0)
+        mesh_pass.draw(snapshot, camera, *size)
+        strand_pass.draw(snapshot, camera, *size, samples=samples)
+    return texture_to_array(color if samples == 1 else _averaged(color, samples))
+
+
+def render_coverage(
+    snapshot: Snapshot, camera: Camera, width: int, height: int, samples: int = 1
+) -> Floats:
+    """How much of each pixel strands and meshes cover, (height, width) in [0, 1]."""
+    return render_image(snapshot, camera, width, height, samples)[..., 3]
+
+
+def _averaged(color: Any, samples: int) -> Any:
+    """A texture with `samples` x `samples` texels for each pixel, made one texel a pixel."""
+    width, height = color.width // samples, color.height // samples
+    picture = gpu.types.GPUTexture((width, height), format="RGBA32F")
+    shader = program(_BOX_RECIPE)
+    shader.bind(
+        textures={"samples_of": color},
+        images={"picture": picture},
+        integers={"samples_across": samples},
+    )
+    gpu.compute.dispatch(shader.shader, -(-width // 8), -(-height // 8), 1)
+    gpu.shader.unbind()
+    return picture

@@ -1,0 +1,240 @@
+"""From a recipe to a compiled shader, kept for ever, and its resources bound completely.
+
+Shaders are never dropped while Blender runs: one that is collected while bound is used after it
+is freed. `release()` is for unregistering, and for the end: a GPU object that outlives Blender's
+GPU, as those do that are alive when a script calls sys.exit(), crashes it.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import sys
+import tempfile
+import weakref
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import gpu
+
+from ..params import Settings
+from ..params.glsl import struct_source
+from .shader_source import SHADER_FOLDER, ShaderError, ShaderText, compose
+
+
+@dataclass(frozen=True)
+class ShaderRecipe:
+    """All that a shader is made of. Slots are given in the order of declaration.
+
+    vertex, fragment, compute: file names in `folders`.
+    structs: files with the structs that blocks use; they come before everything else.
+    settings: parameter sets whose structs, named after the classes, blocks use as well.
+    blocks: (struct, name) of each uniform block.
+    textures: (sampler type, name); images: (format, name), written to by compute shaders.
+    integers: names of INT push constants (UINT ones stay 0 on OpenGL); numbers: (type, name).
+    inputs: (type, name) of vertex attributes; varyings: (interpolation, type, name).
+    outputs: (type, name) of fragment outputs.
+    group_size: compute local size in x and y.
+    """
+
+    name: str
+    vertex: str = ""
+    fragment: str = ""
+    compute: str = ""
+    structs: tuple[str, ...] = ()
+    settings: tuple[type[Settings], ...] = ()
+    blocks: tuple[tuple[str, str], ...] = ()
+    textures: tuple[tuple[str, str], ...] = ()
+    images: tuple[tuple[str, str], ...] = ()
+    integers: tuple[str, ...] = ()
+    numbers: tuple[tuple[str, str], ...] = ()
+    inputs: tuple[tuple[str, str], ...] = ()
+    varyings: tuple[tuple[str, str, str], ...] = ()
+    outputs: tuple[tuple[str, str], ...] = ()
+    group_size: tuple[int, int] = (8, 8)
+    folders: tuple[Path, ...] = (SHADER_FOLDER,)
+
+    @property
+    def texts(self) -> dict[str, ShaderText]:
+        """Each stage composed, by stage name."""
+        files = {"vertex": self.vertex, "fragment": self.fragment, "compute": self.compute}
+        return {stage: compose(file, self.folders) for stage, file in files.items() if file}
+
+
+class ShaderProgram:
+    """A compiled shader that refuses to run with a resource missing."""
+
+    def __init__(self, recipe: ShaderRecipe) -> None:
+        self.recipe = recipe
+        self.shader = _compiled(recipe)
+
+    def bind(
+        self,
+        *,
+        blocks: Mapping[str, Any] | None = None,
+        textures: Mapping[str, Any] | None = None,
+        images: Mapping[str, Any] | None = None,
+        integers: Mapping[str, int] | None = None,
+        numbers: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Bind the shader and each declared resource; call before every draw or dispatch.
+
+        Blender's binding slots are global, and an unbound resource crashes Vulkan. The caller
+        keeps the resources alive until it has drawn: what is freed is unbound.
+
+        Raises:
+            ShaderError: a declared resource is not given, or one is given that is not declared.
+        """
+        recipe = self.recipe
+        self._require("block", [name for _, name in recipe.blocks], blocks)
+        self._require("texture", [name for _, name in recipe.textures], textures)
+        self._require("image", [name for _, name in recipe.images], images)
+        self._require("integer", recipe.integers, integers)
+        self._require("number", [name for _, name in recipe.numbers], numbers)
+        self.shader.bind()
+        for name, block in (blocks or {}).items():
+            self.shader.uniform_block(name, block)
+        for name, texture in (textures or {}).items():
+            self.shader.uniform_sampler(name, texture)
+        for name, image in (images or {}).items():
+            self.shader.image(name, image)
+        for name, integer in (integers or {}).items():
+            self.shader.uniform_int(name, integer)
+        for name, number in (numbers or {}).items():
+            self.shader.uniform_float(name, number)
+
+    def _require(self, kind: str, declared: Any, given: Mapping[str, Any] | None) -> None:
+        difference = set(declared) ^ set(given or {})
+        if difference:
+            names = ", ".join(sorted(difference))
+            raise ShaderError(f"{self.recipe.name}: {kind} not both declared and bound: {names}")
+
+
+class Releasable(Protocol):
+    """Something that keeps GPU objects, and can let go of them and make them anew."""
+
+    def release(self) -> None: ...
+
+
+_PROGRAMS: dict[ShaderRecipe, ShaderProgram] = {}
+_KEEPERS: weakref.WeakSet[Releasable] = weakref.WeakSet()
+
+
+def program(recipe: ShaderRecipe) -> ShaderProgram:
+    """The compiled shader of a recipe; compiled on the first call, in a context that can draw.
+
+    Raises:
+        ShaderError: it does not compose or compile; the message has file, line and log.
+    """
+    if recipe not in _PROGRAMS:
+        _PROGRAMS[recipe] = ShaderProgram(recipe)
+    return _PROGRAMS[recipe]
+
+
+def released_with_shaders(keeper: Releasable) -> None:
+    """Have `release()` release this one too, as long as it lives."""
+    _KEEPERS.add(keeper)
+
+
+@atexit.register
+def release() -> None:
+    """Let go of all shaders and of what passes keep. For unregistering, and at exit."""
+    for keeper in list(_KEEPERS):
+        keeper.release()
+    if _PROGRAMS:
+        gpu.shader.unbind()
+        _PROGRAMS.clear()
+
+
+def _compiled(recipe: ShaderRecipe) -> Any:
+    texts = recipe.texts
+    info = _create_info(recipe, texts)
+    with _standard_output() as log:
+        try:
+            return gpu.shader.create_from_info(info)
+        except Exception as error:
+            problem = str(error)
+    raise ShaderError(f"{recipe.name}: {problem}\n{_mapped(log.text(), texts)}")
+
+
+def _create_info(recipe: ShaderRecipe, texts: Mapping[str, ShaderText]) -> Any:
+    info = gpu.types.GPUShaderCreateInfo()
+    structs = [compose(file, recipe.folders).source for file in recipe.structs]
+    structs += [struct_source(settings, settings.__name__) for settings in recipe.settings]
+    if structs:
+        info.typedef_source("\n".join(structs))
+    for slot, (kind, name) in enumerate(recipe.blocks):
+        info.uniform_buf(slot, kind, name)
+    for slot, (kind, name) in enumerate(recipe.textures):
+        info.sampler(slot, kind, name)
+    for slot, (image_format, name) in enumerate(recipe.images):
+        info.image(slot, image_format, "FLOAT_2D", name, qualifiers={"WRITE"})
+    for name in recipe.integers:
+        info.push_constant("INT", name)
+    for kind, name in recipe.numbers:
+        info.push_constant(kind, name)
+    if "compute" in texts:
+        info.local_group_size(*recipe.group_size)
+        info.compute_source(texts["compute"].source)
+    else:
+        _declare_drawing(info, recipe, texts)
+    return info
+
+
+def _declare_drawing(info: Any, recipe: ShaderRecipe, texts: Mapping[str, ShaderText]) -> None:
+    for slot, (kind, name) in enumerate(recipe.inputs):
+        info.vertex_in(slot, kind, name)
+    if recipe.varyings:
+        interface = gpu.types.GPUStageInterfaceInfo(f"{recipe.name}_interface")
+        for interpolation, kind, name in recipe.varyings:
+            getattr(interface, interpolation)(kind, name)
+        info.vertex_out(interface)
+    for slot, (kind, name) in enumerate(recipe.outputs):
+        info.fragment_out(slot, kind, name)
+    info.vertex_source(texts["vertex"].source)
+    info.fragment_source(texts["fragment"].source)
+
+
+def _mapped(log: str, texts: Mapping[str, ShaderText]) -> str:
+    """The log in the places of our files; a line says first which stage it is about."""
+    stage, lines = next(iter(texts)), []
+    for line in log.splitlines():
+        for candidate in texts:
+            if f"{candidate}shader" in line.replace(" ", "").lower():
+                stage = candidate
+        lines.append(texts[stage].mapped(line))
+    return "\n".join(lines)
+
+
+class _Log:
+    """What was written to standard output while it was caught."""
+
+    def __init__(self) -> None:
+        self.file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by text()
+
+    def text(self) -> str:
+        with self.file as file:
+            file.seek(0)
+            return file.read().decode("utf-8", "replace")
+
+
+@contextlib.contextmanager
+def _standard_output() -> Iterator[_Log]:
+    """Catch what Blender's C side prints, which is where the compiler's log goes."""
+    log = _Log()
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        kept = os.dup(1)
+    except OSError:  # a Blender without a console has no standard output to catch
+        yield log
+        return
+    os.dup2(log.file.fileno(), 1)
+    try:
+        yield log
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)

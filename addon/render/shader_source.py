@@ -1,0 +1,128 @@
+"""Shaders as text: includes and names resolved, every line traceable to its file.
+
+Two things are understood beyond GLSL, each on its own terms:
+    #include "lib_x.glsl"   pulls in a file of gpu_shaders/, once a shader
+    {{name}}                a constant that Python declares once, see CONSTANTS
+An unknown include or name is an error here, with file and line, before any driver sees it.
+Importable and testable without gpu.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+from ..shading.lights import LIGHT_CAPACITY, NEAREST_DISTANCE
+
+SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
+
+#: A texture side may be 16384 texels on every GPU that Blender supports.
+STRAND_ROWS = 16384
+#: how a pass writes its colour; see encoded() in lib_output.glsl
+OUTPUTS = ("scene_linear", "viewport")
+
+CONSTANTS: Mapping[str, str] = MappingProxyType(
+    {
+        "light_capacity": str(LIGHT_CAPACITY),
+        "nearest_distance": repr(NEAREST_DISTANCE),
+        "strand_rows": str(STRAND_ROWS),
+        **{f"output_{name}": str(index) for index, name in enumerate(OUTPUTS)},
+    }
+)
+
+_INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]*)"\s*$')
+_NAME = re.compile(r"\{\{\s*([^{}]*?)\s*\}\}")
+_COMPILER_LINE = re.compile(r"python_shader\.glsl:(\d+)")
+
+
+class ShaderError(RuntimeError):
+    """A shader that cannot be composed, compiled or bound; it says where, and the log."""
+
+
+def output_index(output: str) -> int:
+    """The number by which shaders know an output.
+
+    Raises:
+        ValueError: there is no such output.
+    """
+    if output not in OUTPUTS:
+        raise ValueError(f"output {output!r} is none of {', '.join(OUTPUTS)}")
+    return OUTPUTS.index(output)
+
+
+@dataclass(frozen=True)
+class ShaderText:
+    """One composed shader stage.
+
+    origins: (file name, line number from 1) of every line of `source`.
+    """
+
+    source: str
+    origins: tuple[tuple[str, int], ...]
+
+    def place(self, line: int) -> str:
+        """`file:line` of a line of the composed source, counted from 1."""
+        if not 1 <= line <= len(self.origins):
+            return f"composed line {line}"
+        file, number = self.origins[line - 1]
+        return f"{file}:{number}"
+
+    def mapped(self, log: str) -> str:
+        """A compiler log with its line numbers turned into places in our files."""
+        return _COMPILER_LINE.sub(lambda found: self.place(int(found.group(1))), log)
+
+
+def compose(name: str, folders: Sequence[Path] = (SHADER_FOLDER,)) -> ShaderText:
+    """The file of this name with all that it includes, each file once, in order of need.
+
+    Args:
+        folders: searched in turn; tests put their own before SHADER_FOLDER.
+
+    Raises:
+        ShaderError: an unknown file or name, with the file and line that asks for it.
+    """
+    lines: list[str] = []
+    origins: list[tuple[str, int]] = []
+    _append(name, "shader", tuple(folders), set(), lines, origins)
+    return ShaderText("\n".join(lines) + "\n", tuple(origins))
+
+
+def _append(
+    name: str,
+    asked_by: str,
+    folders: tuple[Path, ...],
+    done: set[str],
+    lines: list[str],
+    origins: list[tuple[str, int]],
+) -> None:
+    """Add one file to the end of `lines`, what it includes before the line that includes it."""
+    if name in done:
+        return
+    done.add(name)
+    for number, line in enumerate(_read(name, asked_by, folders).splitlines(), start=1):
+        include = _INCLUDE.match(line)
+        if include:
+            _append(include.group(1), f"{name}:{number}", folders, done, lines, origins)
+            continue
+        lines.append(_named(line, f"{name}:{number}"))
+        origins.append((name, number))
+
+
+def _read(name: str, asked_by: str, folders: tuple[Path, ...]) -> str:
+    for folder in folders:
+        if (folder / name).is_file():
+            return (folder / name).read_text(encoding="utf-8")
+    raise ShaderError(f"{asked_by}: there is no shader file '{name}'")
+
+
+def _named(line: str, place: str) -> str:
+    def value(found: re.Match[str]) -> str:
+        if found.group(1) not in CONSTANTS:
+            known = ", ".join(sorted(CONSTANTS))
+            raise ShaderError(f"{place}: unknown name '{found.group(1)}'; known are {known}")
+        return CONSTANTS[found.group(1)]
+
+    return _NAME.sub(value, line)

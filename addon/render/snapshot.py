@@ -1,0 +1,107 @@
+"""What is drawn, as plain arrays: no live data of Blender ever reaches a pass.
+
+Pure numpy: importable without gpu.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..shading.lights import Light
+from ..shading.settings import ShadingSettings, StrandSettings
+from ..strands import Surface
+
+type Color = tuple[float, float, float]
+
+SKIN: Color = (0.55, 0.38, 0.31)
+#: an index of refraction of 1.4 gives ((1.4 - 1) / (1.4 + 1))^2
+SKIN_SHEEN = 0.028
+
+
+@dataclass(frozen=True, eq=False)
+class MeshSnapshot:
+    """A lit mesh in world space.
+
+    vertex_normals: (vertex_count, 3) unit vectors.
+    color: scene-linear albedo.
+    occlusion: (vertex_count,) light that arrives, 0 to 1; None is 1 everywhere.
+    sheen: the share of the light that the surface throws back as it is, head on.
+    """
+
+    surface: Surface
+    vertex_normals: Floats
+    color: Color = SKIN
+    occlusion: Floats | None = None
+    sheen: float = SKIN_SHEEN
+
+    @classmethod
+    def of(
+        cls, surface: Surface, color: Color = SKIN, occlusion: Floats | None = None
+    ) -> MeshSnapshot:
+        """A mesh with smooth normals of its own."""
+        return cls(surface, surface.vertex_normals(), color, occlusion)
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """One moment of hair, the meshes around it, and the light.
+
+    strands: (strand_count, cv_count, 3) float32 [m], world space, root first.
+    radius: (strand_count, cv_count) float32 [m].
+    occlusion: (strand_count, cv_count) ambient light that arrives, 0 to 1; None is 1 everywhere.
+    seed: (strand_count,) whole numbers below 2^24, which the noise of a strand hangs on; None is
+        each strand's index.
+    ambient: the world's colour [W/(m^2 sr)].
+    volume_center: (3,) [m], what strands look away from; None is the middle of all roots.
+
+    A pass uploads an array again only when it is another object than before: hand the same array
+    on where nothing changed, and a new array (not the old one rewritten) where something did.
+
+    Raises:
+        ValueError: shapes that do not fit.
+    """
+
+    strands: Floats
+    radius: Floats
+    occlusion: Floats | None = None
+    seed: Ints | None = None
+    meshes: tuple[MeshSnapshot, ...] = ()
+    lights: tuple[Light, ...] = ()
+    ambient: Color = (0.05, 0.05, 0.05)
+    shading: ShadingSettings = field(default_factory=ShadingSettings)
+    strand_settings: StrandSettings = field(default_factory=StrandSettings)
+    volume_center: Floats | None = None
+
+    def __post_init__(self) -> None:
+        if self.strands.ndim != 3 or self.strands.shape[1] < 2 or self.strands.shape[2] != 3:
+            raise ValueError(f"strands have shape {self.strands.shape}, not (S, C >= 2, 3)")
+        expected = {
+            "radius": self.strands.shape[:2],
+            "occlusion": self.strands.shape[:2],
+            "seed": self.strands.shape[:1],
+            "volume_center": (3,),
+        }
+        for name, shape in expected.items():
+            value = getattr(self, name)
+            if value is not None and np.shape(value) != shape:
+                raise ValueError(f"{name} has shape {np.shape(value)}, not {shape}")
+
+    @property
+    def strand_count(self) -> int:
+        return int(self.strands.shape[0])
+
+    @property
+    def cv_count(self) -> int:
+        return int(self.strands.shape[1])
+
+    @property
+    def center(self) -> Floats:
+        """What strands look away from, (3,) [m]."""
+        if self.volume_center is not None:
+            return np.asarray(self.volume_center, np.float32)
+        if not self.strand_count:
+            return np.zeros(3, np.float32)
+        return self.strands[:, 0].mean(axis=0, dtype=np.float64).astype(np.float32)

@@ -1,0 +1,112 @@
+"""Arrays onto the GPU and back, and the state that drawing borrows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats
+from .shader_source import STRAND_ROWS
+
+_CHANNELS = {"R32F": 1, "RG32F": 2, "RGBA32F": 4, "RGBA16F": 4}
+
+
+def texture_from(pixels: Floats, texture_format: str) -> Any:
+    """A 2D texture from (height, width, channels); float32, filtered by no one (use texelFetch)."""
+    height, width, channels = pixels.shape
+    assert channels == _CHANNELS[texture_format], (pixels.shape, texture_format)
+    # The Buffer reads the array's memory as it lies: dtype and order must be right.
+    pixels = np.ascontiguousarray(pixels, np.float32)
+    data = gpu.types.Buffer("FLOAT", pixels.shape, pixels)
+    return gpu.types.GPUTexture((width, height), format=texture_format, data=data)
+
+
+def texture_to_array(texture: Any) -> Floats:
+    """A float texture as (height, width, channels) float32, row 0 at the bottom."""
+    pixels = np.array(texture.read(), np.float32)
+    return pixels.reshape(texture.height, texture.width, -1)
+
+
+def strand_rows(values: Floats) -> Floats:
+    """Per-CV values (strand_count, cv_count, channels) as texture rows, one a strand.
+
+    Strand s lies in row s % 16384, from column (s // 16384) * cv_count on: beyond 16384 strands,
+    the largest texture side, further column blocks follow. Unused texels are 0.
+
+    Raises:
+        ValueError: more strands than blocks of columns can hold.
+    """
+    strand_count, cv_count, channels = values.shape
+    blocks = max(-(-strand_count // STRAND_ROWS), 1)
+    if blocks * cv_count > STRAND_ROWS:
+        raise ValueError(f"{strand_count} strands of {cv_count} CVs do not fit a texture")
+    if blocks == 1:
+        return values
+    padded = np.zeros((blocks * STRAND_ROWS, cv_count, channels), np.float32)
+    padded[:strand_count] = values
+    columns = padded.reshape(blocks, STRAND_ROWS, cv_count, channels).swapaxes(0, 1)
+    return np.ascontiguousarray(columns).reshape(STRAND_ROWS, blocks * cv_count, channels)
+
+
+class UniformBlock:
+    """A uniform buffer that follows its values; made on first use."""
+
+    def __init__(self) -> None:
+        self._values: Floats | None = None
+        self._buffer: Any = None
+
+    def holding(self, values: Floats) -> Any:
+        """The buffer with these std140 bytes in it, (n,) float32, n a multiple of 4."""
+        values = np.ascontiguousarray(values, np.float32)
+        assert values.size % 4 == 0, values.size
+        if self._values is None or self._values.size != values.size:
+            self._buffer = gpu.types.GPUUniformBuf(values)
+        elif self._values.tobytes() != values.tobytes():
+            self._buffer.update(values)
+        self._values = values.copy()
+        return self._buffer
+
+
+@contextmanager
+def drawing_state(
+    *, depth_test: str = "LESS_EQUAL", depth_write: bool = True, blend: str = "NONE"
+) -> Iterator[None]:
+    """Set all state that a draw depends on, and put it back however the draw ends.
+
+    Culling, facing and colour mask cannot be asked for; they return to Blender's own defaults.
+    The viewport and scissor are those of the framebuffer and stay as they are.
+    """
+    state = gpu.state
+    before = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
+    try:
+        state.depth_test_set(depth_test)
+        state.depth_mask_set(depth_write)
+        state.blend_set(blend)
+        _set_unreadable_defaults()
+        yield
+    finally:
+        state.depth_test_set(before[0])
+        state.depth_mask_set(before[1])
+        state.blend_set(before[2])
+        _set_unreadable_defaults()
+        gpu.shader.unbind()
+
+
+@contextmanager
+def drawing_into(framebuffer: Any) -> Iterator[None]:
+    """Draw into a framebuffer of our own; the one that was bound comes back with its scissor."""
+    scissor = gpu.state.scissor_get()
+    with framebuffer.bind():
+        yield
+    # Vulkan opens the scissor of a framebuffer that is bound again
+    gpu.state.scissor_set(*scissor)
+
+
+def _set_unreadable_defaults() -> None:
+    gpu.state.face_culling_set("NONE")
+    gpu.state.front_facing_set(False)
+    gpu.state.color_mask_set(True, True, True, True)

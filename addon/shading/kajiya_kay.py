@@ -1,0 +1,97 @@
+"""Kajiya-Kay shading of hair with Scheuermann's two shifted highlights: the reference.
+
+Twin of gpu_shaders/lib_kajiya_kay.glsl: same names, same order.
+
+References:
+    Kajiya and Kay 1989, "Rendering Fur with Three Dimensional Textures".
+    Scheuermann 2004, "Practical Real-Time Hair Rendering and Shading".
+
+With T from root to tip, a positive shift moves the highlight to the TIP: T' = T + s N tilts the
+tangent outwards, and the place where T' is across the half vector lies further down the strand.
+(One source of ours, a translation of Scheuermann's slides, says root; the geometry and the slides
+themselves say tip, and a test holds it.)
+
+All directions are unit vectors in one space, (..., 3), and broadcast.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats
+from .settings import ShadingSettings
+
+_SMALLEST = 1.0e-6
+
+
+def strand_normal(point: Floats, tangent: Floats, center: Floats) -> Floats:
+    """Normal of the hair's volume: away from its centre, made perpendicular to the strand.
+
+    Where the strand itself points away from the centre, any perpendicular will do.
+    """
+    outward = _unit_or(point - center, np.array([0.0, 0.0, 1.0]))
+    across = outward - tangent * _dot(outward, tangent)[..., None]
+    axis = np.eye(3)[np.abs(tangent).argmin(axis=-1)]
+    is_long = (_dot(across, across) > _SMALLEST)[..., None]
+    return _unit_or(np.where(is_long, across, np.cross(tangent, axis)), axis)
+
+
+def diffuse_bias(normal: Floats, to_light: Floats) -> Floats:
+    """max(0, 0.75 N.L + 0.25): light creeps around the hair, which is never quite opaque."""
+    return np.maximum(0.0, 0.75 * _dot(normal, to_light) + 0.25)
+
+
+def shifted_tangent(tangent: Floats, normal: Floats, shift: Floats | float) -> Floats:
+    """normalize(T + s N); `shift` is (...)."""
+    return _unit_or(tangent + np.asarray(shift)[..., None] * normal, tangent)
+
+
+def strand_specular(tangent: Floats, half_vector: Floats, exponent: float) -> Floats:
+    """smoothstep(-1, 0, T.H) sin(T, H)^p: a highlight where the strand is across H."""
+    along = _dot(tangent, half_vector)
+    across_squared = np.maximum(0.0, 1.0 - along * along)
+    rise = np.clip(along + 1.0, 0.0, 1.0)
+    return rise * rise * (3.0 - 2.0 * rise) * across_squared ** (0.5 * exponent)
+
+
+def kajiya_kay(
+    tangent: Floats,
+    normal: Floats,
+    to_light: Floats,
+    to_eye: Floats,
+    shift_noise: Floats,
+    sparkle_noise: Floats,
+    shading: ShadingSettings,
+) -> Floats:
+    """(diffuse + specular) of one light, (..., 3) rgb.
+
+    Times irradiance / pi, base colour and occlusion it is radiance. Noises are in [0, 1].
+    """
+    diffuse = diffuse_bias(normal, to_light)[..., None]
+    half_vector = _unit_or(to_light + to_eye, normal)
+    shift = shading.shift_noise * (shift_noise - 0.5)
+    primary_tangent = shifted_tangent(tangent, normal, shading.primary_shift + shift)
+    secondary_tangent = shifted_tangent(tangent, normal, shading.secondary_shift + shift)
+    primary = strand_specular(primary_tangent, half_vector, shading.primary_exponent)
+    secondary = strand_specular(secondary_tangent, half_vector, shading.secondary_exponent)
+    secondary = secondary * (1.0 + shading.sparkle * (sparkle_noise - 1.0))
+    specular = primary[..., None] * (shading.primary_strength * np.array(shading.primary_color))
+    specular = specular + secondary[..., None] * (
+        shading.secondary_strength * np.array(shading.secondary_color)
+    )
+    return diffuse + diffuse * specular
+
+
+def strand_base(color_noise: Floats, shading: ShadingSettings) -> Floats:
+    """Each strand's colour, (..., 3): the base made darker or brighter by its noise in [0, 1]."""
+    brightness = 1.0 + shading.color_variation * (2.0 * color_noise - 1.0)
+    return np.array(shading.base_color) * brightness[..., None]
+
+
+def _dot(one: Floats, other: Floats) -> Floats:
+    return np.sum(one * other, axis=-1)
+
+
+def _unit_or(vector: Floats, fallback: Floats) -> Floats:
+    length = np.linalg.norm(vector, axis=-1, keepdims=True)
+    return np.where(length > _SMALLEST, vector / np.maximum(length, _SMALLEST), fallback)

@@ -1,0 +1,21 @@
+// How a finished colour is written to the target.
+
+// The sRGB transfer curve (IEC 61966-2-1), which is all that Blender's view transform "Standard"
+// does to colours inside the display's range.
+vec3 srgb_encoded(vec3 radiance)
+{
+  vec3 curved = 1.055 * pow(max(radiance, vec3(0.0031308)), vec3(1.0 / 2.4)) - 0.055;
+  return mix(curved, 12.92 * radiance, lessThanEqual(radiance, vec3(0.0031308)));
+}
+
+// What to write so that scene-linear `radiance` appears right in the target.
+// {{output_scene_linear}}: a picture of our own, scene-linear as it is.
+// {{output_viewport}}: Blender's viewport from a POST_VIEW handler, which applies no view transform
+// and shows a written L as the code value L^(1/2.2): so the wanted code value to the power of 2.2.
+vec3 output_encoded(vec3 radiance, int encoding)
+{
+  if (encoding == {{output_viewport}}) {
+    return pow(srgb_encoded(clamp(radiance, 0.0, 1.0)), vec3(2.2));
+  }
+  return radiance;
+}

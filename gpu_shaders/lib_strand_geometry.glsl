@@ -1,0 +1,57 @@
+// Strands as ribbons that face the eye: where a strand's data lies, its curve, its width.
+//
+// Reference: Catmull and Rom 1974, the uniform cubic form.
+// Holds no resources.
+//
+// A ribbon is a triangle strip of two vertices a station. Stations 0, 1, 2 ... go from root to tip,
+// `subdivisions` of them to each segment between two CVs:
+//
+//   side +1   1---3---5---7---9      gl_VertexID
+//             | \ | \ | \ | \ |
+//   side -1   0---2---4---6---8
+//            CV 0    CV 1    CV 2    with 2 subdivisions
+//
+// Limits: where the curve turns sharply in the picture, the ribbon narrows in the bend.
+
+// Strand s is row s % {{strand_rows}} of a texture, in column block s / {{strand_rows}}.
+ivec2 strand_texel(int strand, int cv, int cv_count)
+{
+  return ivec2((strand / {{strand_rows}}) * cv_count + cv, strand % {{strand_rows}});
+}
+
+vec3 catmull_rom_point(vec3 p0, vec3 p1, vec3 p2, vec3 p3, float u)
+{
+  return 0.5 * (2.0 * p1 + u * (p2 - p0 + u * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 +
+                                               u * (3.0 * (p1 - p2) + p3 - p0))));
+}
+
+// The curve's derivative; the chord where it vanishes.
+vec3 catmull_rom_tangent(vec3 p0, vec3 p1, vec3 p2, vec3 p3, float u)
+{
+  vec3 slope = 0.5 * (p2 - p0 + u * (2.0 * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3) +
+                                     3.0 * u * (3.0 * (p1 - p2) + p3 - p0)));
+  vec3 chord = dot(p2 - p1, p2 - p1) > 0.0 ? p2 - p1 : vec3(0.0, 0.0, 1.0);
+  return normalize(dot(slope, slope) > 0.0 ? slope : chord);
+}
+
+// Half the ribbon's width in pixels of the target: the radius as the camera sees it at the clip
+// position's depth, but no less than half the minimum. The taper to the tip (1 at the root) makes
+// even the minimum narrower, down to one pixel of the target, below which ribbons break up.
+float ribbon_half_width(float radius, float taper, float minimum_width, vec4 clip, View view)
+{
+  float pixels_per_metre = view.projection[1][1] * 0.5 * view.viewport.y / max(abs(clip.w), 1.0e-6);
+  float untapered = max(radius * pixels_per_metre, 0.5 * minimum_width);
+  return max(untapered * taper, 0.5 * min(minimum_width, 1.0));
+}
+
+// The clip position moved sidewise, across the tangent as the picture shows it. `clip_tangent` is
+// the tangent's direction through the same matrix; the quotient rule spares the division by w, so
+// that points behind the eye do no harm.
+vec4 ribbon_edge(vec4 clip, vec4 clip_tangent, float side, float half_width, View view)
+{
+  vec2 along = (clip_tangent.xy * clip.w - clip.xy * clip_tangent.w) * view.viewport.xy;
+  float size = length(along);
+  vec2 across = size > 1.0e-20 ? vec2(-along.y, along.x) / size : vec2(1.0, 0.0);
+  vec2 shift = across * side * half_width * 2.0 / view.viewport.xy;
+  return vec4(clip.xy + shift * clip.w, clip.zw);
+}

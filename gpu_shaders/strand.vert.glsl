@@ -1,0 +1,42 @@
+// Strands, vertex stage: one instance a strand, no vertex attributes.
+#include "lib_strand_geometry.glsl"
+
+void main()
+{
+  int strand = gl_InstanceID;
+  int station = gl_VertexID >> 1;
+  float side = float(gl_VertexID & 1) * 2.0 - 1.0;
+  int last = cv_count - 1;
+  int segment = min(station / strands.subdivisions, last - 1);
+  float u = float(station - segment * strands.subdivisions) / float(strands.subdivisions);
+
+  // xyz position, w radius
+  vec4 from = texelFetch(cv_points, strand_texel(strand, segment, cv_count), 0);
+  vec4 to = texelFetch(cv_points, strand_texel(strand, segment + 1, cv_count), 0);
+  vec3 before = texelFetch(cv_points, strand_texel(strand, max(segment - 1, 0), cv_count), 0).xyz;
+  vec3 after = texelFetch(cv_points, strand_texel(strand, min(segment + 2, last), cv_count), 0).xyz;
+  // beyond its ends the strand goes on straight
+  before = segment == 0 ? 2.0 * from.xyz - to.xyz : before;
+  after = segment == last - 1 ? 2.0 * to.xyz - from.xyz : after;
+
+  // x occlusion, y seed
+  vec2 from_look = texelFetch(cv_looks, strand_texel(strand, segment, cv_count), 0).xy;
+  vec2 to_look = texelFetch(cv_looks, strand_texel(strand, segment + 1, cv_count), 0).xy;
+
+  vec3 point = catmull_rom_point(before, from.xyz, to.xyz, after, u);
+  vec3 tangent = catmull_rom_tangent(before, from.xyz, to.xyz, after, u);
+  float along = (float(segment) + u) / float(last);
+  float radius = mix(from.w, to.w, u) * strands.width_scale;
+  float taper = mix(1.0, strands.tip_width, along);
+
+  strand_point = point;
+  strand_tangent = tangent;
+  strand_along_and_occlusion = vec2(along, mix(from_look.x, to_look.x, u));
+  strand_seed = int(from_look.y);
+
+  vec4 clip = view.view_projection * vec4(point, 1.0);
+  vec4 clip_tangent = view.view_projection * vec4(tangent, 0.0);
+  float minimum = strands.minimum_width * float(samples_across);
+  float half_width = ribbon_half_width(radius, taper, minimum, clip, view);
+  gl_Position = ribbon_edge(clip, clip_tangent, side, half_width, view);
+}

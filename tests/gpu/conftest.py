@@ -1,0 +1,54 @@
+"""What the GPU tests share: compute shaders that write numbers, and scenes to draw."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+SHADERS = Path(__file__).parent / "shaders"
+
+
+@pytest.fixture
+def compute(gpu_context: Any) -> Callable[..., np.ndarray]:
+    """Run a compute shader of tests/gpu/shaders over a grid, back comes (height, width, 4)."""
+    from hairloom.addon.render.shader_program import ShaderRecipe, program
+    from hairloom.addon.render.shader_source import SHADER_FOLDER
+    from hairloom.addon.render.textures import texture_from, texture_to_array
+
+    def run(
+        file: str,
+        size: tuple[int, int],
+        *,
+        textures: Mapping[str, np.ndarray] | None = None,
+        blocks: Mapping[str, tuple[str, np.ndarray]] | None = None,
+        **recipe: Any,
+    ) -> np.ndarray:
+        """`textures` are (h, w, 4) arrays by name, `blocks` (struct, std140 values) by name."""
+        shader = program(
+            ShaderRecipe(
+                name=file,
+                compute=file,
+                textures=tuple(("FLOAT_2D", name) for name in textures or {}),
+                images=(("RGBA32F", "result"),),
+                blocks=tuple((struct, name) for name, (struct, _) in (blocks or {}).items()),
+                folders=(SHADERS, SHADER_FOLDER),
+                **recipe,
+            )
+        )
+        result = gpu_context.types.GPUTexture(size, format="RGBA32F")
+        inputs = {name: texture_from(t, "RGBA32F") for name, t in (textures or {}).items()}
+        buffers = {
+            name: gpu_context.types.GPUUniformBuf(values)
+            for name, (_, values) in (blocks or {}).items()
+        }
+        shader.bind(textures=inputs, images={"result": result}, blocks=buffers)
+        gpu_context.compute.dispatch(shader.shader, -(-size[0] // 8), -(-size[1] // 8), 1)
+        pixels = texture_to_array(result)
+        gpu_context.shader.unbind()
+        return pixels
+
+    return run

@@ -1,0 +1,286 @@
+"""Drawn pictures against brute force, against the Python reference, and against themselves."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.shading.kajiya_kay import kajiya_kay, strand_base, strand_normal
+from hairloom.addon.shading.lights import Light, light_direction, light_irradiance
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.strands import Surface
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+PLAIN = ShadingSettings(
+    base_color=(1.0, 1.0, 1.0),
+    primary_strength=0.0,
+    secondary_strength=0.0,
+    shift_noise=0.0,
+    color_variation=0.0,
+)
+RIBBON = StrandSettings(width_scale=1.0, tip_width=1.0, minimum_width=0.0, subdivisions=1)
+
+
+@pytest.fixture(scope="module")
+def frame() -> Any:
+    pytest.importorskip("gpu")
+    from hairloom.addon.render import frame
+
+    return frame
+
+
+@pytest.fixture(scope="module")
+def front(frame: Any) -> Any:
+    """An orthographic camera that shows x and z from 0 to 1 and looks along +y."""
+    return frame.Camera(
+        frame.look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 3.0)
+    )
+
+
+def uprights(x: np.ndarray, radius: float, y: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Vertical strands of two points from z = 0 to 1 at these x."""
+    strands = np.zeros((len(x), 2, 3), np.float32)
+    strands[..., 0], strands[..., 1], strands[:, 1, 2] = x[:, None], y, 1.0
+    return strands, np.full((len(x), 2), radius, np.float32)
+
+
+def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
+    """One broad ribbon: positions, tangents, noise, lights and settings reach the shader right."""
+    strand = np.array([[[-0.1, 0.0, 0.0], [0.1, 0.0, 0.02]]], np.float32)
+    radius, occlusion = np.full((1, 2), 0.05, np.float32), np.array([[0.4, 0.8]], np.float32)
+    shading = ShadingSettings(noise_cells=7.0)
+    settings = dataclasses.replace(RIBBON, subdivisions=2)
+    lights = (
+        Light.sun((0.2, 0.7, -1.0), (1.0, 0.9, 0.8), 3.0),
+        Light.point((0.3, -0.4, 0.5), (0.5, 0.7, 1.0), 8.0),
+    )
+    center, ambient = np.array([0.0, 0.5, -0.3], np.float32), (0.1, 0.2, 0.3)
+    snapshot = frame.Snapshot(
+        strand,
+        radius,
+        occlusion,
+        seed=np.array([4711]),
+        lights=lights,
+        ambient=ambient,
+        shading=shading,
+        strand_settings=settings,
+        volume_center=center,
+    )
+    eye = np.array([0.05, -0.6, 0.2])
+    camera = frame.Camera(frame.look_at(eye, (0, 0, 0)), frame.perspective(0.6, 1.0, 0.1, 5.0))
+    picture = frame.render_image(snapshot, camera, 301, 301, 1)
+
+    from hairloom.addon.shading.strand_noise import strand_noise
+
+    for along in (0.2, 0.5, 0.77):
+        point = strand[0, 0] + along * (strand[0, 1] - strand[0, 0]).astype(np.float64)
+        clip = camera.projection @ camera.view @ [*point, 1.0]
+        column, row = ((clip[:2] / clip[3] + 1.0) / 2.0 * 301).astype(int)
+        tangent = (strand[0, 1] - strand[0, 0]) / np.linalg.norm(strand[0, 1] - strand[0, 0])
+        normal = strand_normal(point, tangent.astype(np.float64), center)
+        to_eye = (eye - point) / np.linalg.norm(eye - point)
+        seed = np.array(4711)
+        noises = [strand_noise(seed, c, np.array(along * 7.0)) for c in range(2)]
+        light = np.array(ambient)
+        for lamp in lights:
+            lit = kajiya_kay(
+                tangent, normal, light_direction(lamp, point), to_eye, *noises, shading
+            )
+            light = light + light_irradiance(lamp, point) / np.pi * lit
+        base = strand_base(strand_noise(seed, 2, np.array(0.0)), shading)
+        expected = light * base * (0.4 + along * 0.4)
+        assert picture[row, column, :3] == pytest.approx(expected, rel=0.02)
+        assert picture[row, column, 3] == 1.0
+
+
+def hairy_sphere(frame: Any, **shading: float) -> Any:
+    """A unit sphere whose hair runs down the meridians; one sun behind the eye, level with both."""
+    around = np.radians(np.arange(0.0, 360.0, 0.6))[:, None]
+    polar = np.radians(np.linspace(20.0, 160.0, 24))[None, :]
+    strands = np.stack(
+        [
+            np.sin(polar) * np.cos(around),
+            np.sin(polar) * np.sin(around),
+            np.cos(polar) + 0 * around,
+        ],
+        axis=-1,
+    ).astype(np.float32)
+    values = PLAIN.as_dict() | {"primary_color": (1.0, 1.0, 1.0), "primary_exponent": 120.0}
+    return frame.Snapshot(
+        strands,
+        np.full(strands.shape[:2], 0.012, np.float32),
+        lights=(Light.sun((0.0, 1.0, 0.0), (1.0, 1.0, 1.0), 3.0),),
+        ambient=(0.0, 0.0, 0.0),
+        shading=ShadingSettings(**(values | shading)),
+        strand_settings=RIBBON,
+        volume_center=np.zeros(3, np.float32),
+    )
+
+
+@pytest.mark.parametrize("shift", [0.3, 0.15, 0.0, -0.15, -0.3])
+def test_positive_shift_moves_the_highlight_to_the_tips(frame: Any, shift: float) -> None:
+    """Roots are at the top, tips at the bottom: the band must sink by atan(shift)."""
+    camera = frame.Camera(
+        frame.look_at((0.0, -5.0, 0.0), (0.0, 0.0, 0.0)), frame.orthographic(2.2, 1.0, 1.0, 9.0)
+    )
+    rows = (np.arange(300) + 0.5) / 300 * 2.2 - 1.1
+    lit = hairy_sphere(frame, primary_strength=4.0, primary_shift=shift)
+    matt = hairy_sphere(frame)
+    middle = slice(140, 160)
+    band = frame.render_image(lit, camera, 300, 300, 2)[:, middle, 1].mean(axis=1)
+    band -= frame.render_image(matt, camera, 300, 300, 2)[:, middle, 1].mean(axis=1)
+    # The diffuse term dims the highlight towards the shadow, so its peak is a little short of it.
+    height = np.arcsin(rows[band.argmax()])
+    assert height == pytest.approx(-np.arctan(shift), abs=0.03)
+
+
+def test_a_mesh_hides_what_is_behind_it_only(frame: Any, front: Any) -> None:
+    """Strands before, behind, and a square over the left half."""
+    square = np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 0, 1], [0, 0, 1]], np.float32)
+    mesh = frame.MeshSnapshot.of(
+        Surface(square, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 1.0)
+    )
+    x = np.array([0.1, 0.3, 0.6, 0.8])
+    strands, radius = uprights(x, 0.02)
+    strands[[0, 2], :, 1], strands[[1, 3], :, 1] = -0.5, 0.5
+    snapshot = frame.Snapshot(
+        strands,
+        radius,
+        meshes=(mesh,),
+        ambient=(1.0, 1.0, 1.0),
+        shading=dataclasses.replace(PLAIN, base_color=(1.0, 0.0, 0.0)),
+        strand_settings=RIBBON,
+    )
+    picture = frame.render_image(snapshot, front, 100, 100, 1)
+    middle = picture[50]
+    assert middle[10].tolist() == [1.0, 0.0, 0.0, 1.0], "before the square"
+    assert middle[30].tolist() == [0.0, 0.0, 1.0, 1.0], "behind the square"
+    assert middle[60].tolist() == [1.0, 0.0, 0.0, 1.0] == middle[80].tolist(), "beside it"
+    assert middle[70].tolist() == [0.0, 0.0, 0.0, 0.0], "nothing"
+
+
+def test_more_strands_than_a_texture_has_rows(frame: Any) -> None:
+    """20,000 strands, each in a cell of its own, each with a brightness that names it."""
+    columns, rows = 200, 100
+    x, z = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
+    strands = np.zeros((columns * rows, 3, 3), np.float32)
+    strands[..., 0] = x.reshape(-1, 1)
+    strands[..., 2] = z.reshape(-1, 1) + np.array([-0.004, 0.0, 0.004])
+    occlusion = np.repeat(((np.arange(len(strands)) % 977) / 977)[:, None], 3, axis=1)
+    snapshot = frame.Snapshot(
+        strands,
+        np.full(strands.shape[:2], 0.0015, np.float32),
+        occlusion.astype(np.float32),
+        ambient=(1.0, 1.0, 1.0),
+        shading=PLAIN,
+        strand_settings=RIBBON,
+    )
+    camera = frame.Camera(
+        frame.look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 3.0)
+    )
+    picture = frame.render_image(snapshot, camera, columns * 5, rows * 5, 1)
+    middle = picture[2::5, 2::5]
+    assert (middle[..., 3] == 1.0).all()
+    assert np.abs(middle[..., 0].ravel() - occlusion[:, 0]).max() < 1e-5
+    assert (picture[:, 0::5, 3] == 0.0).all(), "the gaps between the cells stay empty"
+
+
+def test_more_strands_than_a_texture_can_hold() -> None:
+    from hairloom.addon.render.textures import strand_rows
+
+    too_many = np.broadcast_to(np.float32(0.0), (16384 * 600, 30, 4))
+    with pytest.raises(ValueError, match="do not fit"):
+        strand_rows(too_many)
+
+
+def test_no_strands_leave_the_background(frame: Any, front: Any) -> None:
+    none = frame.Snapshot(np.zeros((0, 4, 3), np.float32), np.zeros((0, 4), np.float32))
+    background = (0.25, 0.5, 0.75, 1.0)
+    picture = frame.render_image(none, front, 8, 6, 2, background=background)
+    assert picture.shape == (6, 8, 4) and picture.dtype == np.float32
+    assert (picture == np.array(background, np.float32)).all()
+
+
+def test_two_frames_are_identical_and_passes_may_be_kept(frame: Any) -> None:
+    from hairloom.addon.render.mesh_pass import MeshPass
+    from hairloom.addon.render.strand_pass import StrandPass
+
+    snapshot = hairy_sphere(frame, primary_strength=2.0)
+    moved = dataclasses.replace(snapshot, strands=snapshot.strands * np.float32(0.5))
+    camera = frame.frame_camera(
+        (np.full(3, -1.0), np.full(3, 1.0)), (0.2, -1, 0.3), np.radians(30), 1.0
+    )
+    first = frame.render_image(snapshot, camera, 120, 120)
+    assert (frame.render_image(snapshot, camera, 120, 120) == first).all()
+    passes = MeshPass(), StrandPass()
+    for shown in (moved, snapshot):
+        kept = frame.render_image(shown, camera, 120, 120, passes=passes)
+    assert (kept == first).all(), "the points that moved were uploaded again"
+    small = frame.render_image(moved, camera, 120, 120, passes=passes)
+    assert 0.1 < (small[..., 3].sum() / first[..., 3].sum()) < 0.5
+
+
+def test_thin_strands_get_the_minimum_width(frame: Any, front: Any) -> None:
+    """Widths count in pixels of the finished picture, whatever the samples."""
+    strands, radius = uprights(np.array([0.25, 0.75]), 1e-6)
+    for samples, width in ((1, 2.0), (4, 0.5), (4, 1.0)):
+        settings = dataclasses.replace(RIBBON, minimum_width=width)
+        snapshot = frame.Snapshot(strands, radius, strand_settings=settings)
+        drawn = frame.render_coverage(snapshot, front, 40, 40, samples)
+        assert drawn.sum(axis=1) == pytest.approx(np.full(40, 2.0 * width))
+
+
+def test_radius_scale_and_taper(frame: Any, front: Any) -> None:
+    strands, radius = uprights(np.array([0.5]), 0.05)
+    settings = dataclasses.replace(RIBBON, width_scale=2.0, tip_width=0.25)
+    drawn = frame.render_coverage(
+        frame.Snapshot(strands, radius, strand_settings=settings), front, 100, 100, 4
+    )
+    width = drawn.sum(axis=1) / 100.0
+    height = (np.arange(100) + 0.5) / 100.0
+    assert width == pytest.approx(0.2 * (1.0 - 0.75 * height), abs=0.003)
+
+
+def test_samples_are_averaged_premultiplied(frame: Any, front: Any) -> None:
+    """A half-covered white pixel is half white and half there, over any background."""
+    strands, radius = uprights(np.array([0.25]), 0.1250)
+    snapshot = frame.Snapshot(
+        strands, radius, ambient=(1.0, 1.0, 1.0), shading=PLAIN, strand_settings=RIBBON
+    )
+    picture = frame.render_image(snapshot, front, 4, 4, 4)
+    assert picture[1, :, 3].tolist() == [0.5, 0.5, 0.0, 0.0]
+    assert picture[1, :, 0].tolist() == [0.5, 0.5, 0.0, 0.0]
+    over = frame.render_image(snapshot, front, 4, 4, 4, background=(0.0, 0.0, 1.0, 1.0))
+    assert over[1, 0].tolist() == [0.5, 0.5, 1.0, 1.0]
+
+
+def test_impossible_sizes_are_refused(frame: Any, front: Any) -> None:
+    strands, radius = uprights(np.array([0.5]), 0.1)
+    for width, height, samples in ((0, 4, 1), (4, 4, 0), (9000, 4, 2)):
+        with pytest.raises(ValueError, match="picture"):
+            frame.render_image(frame.Snapshot(strands, radius), front, width, height, samples)
+
+
+def test_snapshots_refuse_arrays_that_do_not_fit(frame: Any) -> None:
+    strands, radius = uprights(np.array([0.5, 0.6]), 0.1)
+    with pytest.raises(ValueError, match="occlusion"):
+        frame.Snapshot(strands, radius, np.ones((2, 3)))
+    with pytest.raises(ValueError, match="strands"):
+        frame.Snapshot(strands[:, :1], radius[:, :1])
+
+
+def test_strands_around_and_behind_the_eye(frame: Any) -> None:
+    """Nothing bursts across the picture when hair passes through the camera."""
+    strands, radius = uprights(np.array([0.0]), 0.001)
+    strands[0] = [[0.02, -1.0, 0.0], [0.02, 1.0, 0.0]]
+    snapshot = frame.Snapshot(strands, radius, strand_settings=RIBBON)
+    camera = frame.Camera(
+        frame.look_at((0, 0, 0), (0, 1, 0)), frame.perspective(1.0, 1.0, 0.01, 10)
+    )
+    drawn = frame.render_coverage(snapshot, camera, 100, 100)
+    assert drawn.any() and drawn[:, :49].sum() == 0.0
+    assert drawn[:44].sum() == 0.0 and drawn[56:].sum() == 0.0

@@ -1,0 +1,60 @@
+"""Shaders that fail say where; shaders that run are bound completely."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SHADERS = Path(__file__).parent / "shaders"
+
+
+@pytest.fixture
+def recipes(gpu_context: Any) -> Any:
+    from hairloom.addon.render import shader_program
+
+    return shader_program
+
+
+def test_compile_error_names_our_file_and_line(recipes: Any, capfd: Any) -> None:
+    from hairloom.addon.render.shader_source import SHADER_FOLDER, ShaderError
+
+    recipe = recipes.ShaderRecipe(
+        name="broken", compute="broken.glsl", folders=(SHADERS, SHADER_FOLDER)
+    )
+    with pytest.raises(ShaderError, match=r"broken\.glsl:6") as caught:
+        recipes.program(recipe)
+    assert "undeclared_thing" in str(caught.value)
+    assert "python_shader" not in str(caught.value)
+    assert "undeclared_thing" not in capfd.readouterr().out, "the log was caught, not printed"
+
+
+def test_each_recipe_is_compiled_once(recipes: Any) -> None:
+    from hairloom.addon.render.strand_pass import STRAND_RECIPE
+
+    assert recipes.program(STRAND_RECIPE) is recipes.program(STRAND_RECIPE)
+
+
+def test_missing_and_unknown_resources_are_refused(recipes: Any) -> None:
+    from hairloom.addon.render.frame import _BOX_RECIPE
+    from hairloom.addon.render.shader_source import ShaderError
+
+    shader = recipes.program(_BOX_RECIPE)
+    with pytest.raises(ShaderError, match="samples_of"):
+        shader.bind(images={"picture": None}, integers={"samples_across": 2})
+    with pytest.raises(ShaderError, match="other"):
+        shader.bind(
+            textures={"samples_of": None},
+            images={"picture": None},
+            integers={"samples_across": 2, "other": 1},
+        )
+
+
+def test_release_forgets_all_and_shaders_come_back(recipes: Any) -> None:
+    from hairloom.addon.render.mesh_pass import MESH_RECIPE
+
+    before = recipes.program(MESH_RECIPE)
+    recipes.release()
+    recipes.release()
+    assert recipes.program(MESH_RECIPE) is not before

@@ -1,0 +1,177 @@
+"""GLSL against its Python twins, number by number, and the bytes of uniform blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from hairloom.addon.params import Settings, choice, color, integer, number, toggle
+from hairloom.addon.params.glsl import struct_values
+from hairloom.addon.shading.kajiya_kay import kajiya_kay, strand_base, strand_normal
+from hairloom.addon.shading.lights import Light, light_direction, light_irradiance, pack_lights
+from hairloom.addon.shading.settings import ShadingSettings
+from hairloom.addon.shading.strand_noise import hash_integer, hash_unit, strand_noise
+
+CENTER = np.array([0.1, -0.2, 0.3])
+WEAK = {"primary_strength": 1.0, "secondary_strength": 1.0}
+SETTINGS = {
+    "default": ShadingSettings(),
+    "unit": ShadingSettings(**WEAK),
+    "shifted": ShadingSettings(
+        primary_shift=-0.4, secondary_shift=0.3, primary_exponent=300.0, shift_noise=1.0, **WEAK
+    ),
+    "soft": ShadingSettings(primary_exponent=1.0, secondary_exponent=2.0, sparkle=1.0, **WEAK),
+}
+
+
+def directions(rows: int, columns: int) -> np.ndarray:
+    """Unit vectors over the whole sphere, poles included, (rows, columns, 3)."""
+    polar = np.linspace(0.0, np.pi, rows)[:, None]
+    around = np.linspace(0.0, 2.0 * np.pi, columns)[None, :]
+    return np.stack(
+        [
+            np.sin(polar) * np.cos(around),
+            np.sin(polar) * np.sin(around),
+            np.cos(polar) + 0 * around,
+        ],
+        axis=-1,
+    )
+
+
+def with_lane(vectors: np.ndarray, lane: np.ndarray | float = 0.0) -> np.ndarray:
+    lane = np.broadcast_to(np.asarray(lane), vectors.shape[:-1])[..., None]
+    return np.concatenate([vectors, lane], axis=-1).astype(np.float32)
+
+
+@pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)
+def test_kajiya_kay(compute: Callable[..., np.ndarray], settings: ShadingSettings) -> None:
+    random = np.random.default_rng(11)
+    rows, columns = 64, 96
+    lights = with_lane(directions(rows, columns), np.linspace(0.0, 1.0, columns))
+    eyes = with_lane(directions(columns, rows).swapaxes(0, 1), random.random((rows, columns)))
+    tangents = random.normal(size=(rows, columns, 3))
+    tangents = with_lane(tangents / np.linalg.norm(tangents, axis=-1, keepdims=True))
+    points = with_lane(random.normal(size=(rows, columns, 3)))
+    found = compute(
+        "kajiya_kay.glsl",
+        (columns, rows),
+        textures={"tangents": tangents, "points": points, "eyes": eyes, "lights": lights},
+        blocks={"shading": ("ShadingSettings", struct_values(settings))},
+        settings=(ShadingSettings,),
+    )
+    tangent = tangents[..., :3].astype(np.float64)
+    normal = strand_normal(points[..., :3].astype(np.float64), tangent, CENTER)
+    light, eye = lights.astype(np.float64), eyes.astype(np.float64)
+    expected = kajiya_kay(
+        tangent, normal, light[..., :3], eye[..., :3], light[..., 3], eye[..., 3], settings
+    )
+    assert expected.max() > 1.5, "the grid must meet highlights"
+    # 1e-4 of the light that a highlight of strength 1 sends out; a strength magnifies rounding
+    strength = max(1.0, settings.primary_strength, settings.secondary_strength)
+    assert np.abs(found[..., :3] - expected).max() < 1e-4 * strength
+    assert np.abs(found[..., 3] - strand_base(light[..., 3], settings)[..., 0]).max() < 1e-6
+
+
+def test_strand_normal(compute: Callable[..., np.ndarray]) -> None:
+    """Also where strands point straight outward, where any perpendicular will do."""
+    tangents = directions(40, 60).astype(np.float32)
+    random = np.random.default_rng(5)
+    points = random.normal(size=tangents.shape)
+    points[::2] = CENTER + 3.0 * tangents[::2]
+    points = points.astype(np.float32)
+    found = compute(
+        "strand_normal.glsl",
+        (60, 40),
+        textures={"points": with_lane(points), "tangents": with_lane(tangents)},
+        settings=(ShadingSettings,),
+    )[..., :3]
+    expected = strand_normal(points, tangents, CENTER.astype(np.float32))
+    assert np.abs(np.linalg.norm(found, axis=-1) - 1.0).max() < 1e-5
+    assert np.abs(np.sum(found * tangents, axis=-1)).max() < 1e-4
+    assert np.abs(found - expected)[1::2].max() < 1e-4
+
+
+def test_noise_agrees_bit_by_bit(compute: Callable[..., np.ndarray]) -> None:
+    random = np.random.default_rng(3)
+    queries = np.zeros((64, 64, 4), np.float32)
+    queries[..., 0] = random.integers(0, 2**24, (64, 64))
+    queries[..., 1] = random.integers(0, 4, (64, 64))
+    queries[..., 2] = random.random((64, 64)) * 40.0
+    queries[0, :, 0] = np.arange(64)
+    found = compute("strand_noise.glsl", (64, 64), textures={"queries": queries})
+    seed, channel = queries[..., 0].astype(np.uint32), queries[..., 1].astype(np.uint32)
+    expected = hash_integer(seed * np.uint32(4) + channel)
+    assert (found[..., 0] == expected >> 16).all()
+    assert (found[..., 1] == expected & 0xFFFF).all()
+    assert (found[..., 2] == hash_unit(seed, queries[..., 2].astype(np.uint32))).all()
+    for c in range(4):
+        noise = strand_noise(seed, c, queries[..., 2])
+        assert np.abs(found[..., 3] - noise)[channel == c].max() < 1e-6
+
+
+def test_lights(compute: Callable[..., np.ndarray]) -> None:
+    random = np.random.default_rng(9)
+    lights = [
+        Light.sun((0.3, -0.2, -1.0), (1.0, 0.9, 0.8), 4.0),
+        Light.point((0.5, 1.5, 1.0), (0.2, 0.4, 1.0), 60.0),
+        Light.point((-2.0, 0.1, 0.3), (1.0, 1.0, 1.0), 10.0),
+    ]
+    points = random.normal(size=(1, 50, 3)).astype(np.float32)
+    block = pack_lights(lights, (0.1, 0.2, 0.3))
+    found = compute(
+        "lights.glsl",
+        (50, 6),
+        textures={"points": with_lane(points)},
+        blocks={"lights": ("Lights", block)},
+        structs=("struct_lights.glsl",),
+    )
+    assert (found[..., 3] == 3.0).all()
+    packed = block.reshape(-1, 4)
+    for light in lights:
+        vectors = packed[1:4, :3]
+        row = int(np.abs(vectors - np.array(light.vector, np.float32)).sum(axis=1).argmin())
+        direction, irradiance = found[2 * row, :, :3], found[2 * row + 1, :, :3]
+        assert np.abs(direction - light_direction(light, points[0])).max() < 1e-5
+        assert irradiance == pytest.approx(light_irradiance(light, points[0]), rel=1e-4)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OddSettings(Settings):
+    """Members in an order that meets every rule of std140."""
+
+    section: ClassVar[str] = "odd"
+
+    first: float = number(0.125, label="", description="", soft=(0, 1), hard=(0, 1))
+    tint: tuple[float, float, float] = color((0.1, 0.2, 0.3), label="", description="")
+    behind_tint: float = number(0.75, label="", description="", soft=(0, 1), hard=(0, 1))
+    whole: int = integer(-12345, label="", description="", soft=(-1, 1), hard=(-99999, 9))
+    is_on: bool = toggle(True, label="", description="")
+    is_off: bool = toggle(False, label="", description="")
+    other_tint: tuple[float, float, float] = color((0.4, 0.5, 0.6), label="", description="")
+    mode: str = choice(
+        "third",
+        (("first", "", ""), ("second", "", ""), ("third", "", "")),
+        label="",
+        description="",
+    )
+    last: float = number(0.875, label="", description="", soft=(0, 1), hard=(0, 1))
+
+
+def test_glsl_reads_every_parameter_right(compute: Callable[..., np.ndarray]) -> None:
+    found = compute(
+        "settings_struct.glsl",
+        (7, 1),
+        blocks={"odd": ("OddSettings", struct_values(OddSettings()))},
+        settings=(OddSettings,),
+    )[0]
+    assert found[0, 0] == 0.125
+    assert found[1, :3] == pytest.approx([0.1, 0.2, 0.3])
+    assert found[2, 0] == 0.75
+    assert found[3, 0] == -12345.0
+    assert found[4, :2].tolist() == [1.0, 0.0]
+    assert found[5, :3] == pytest.approx([0.4, 0.5, 0.6])
+    assert found[6, :2].tolist() == [2.0, 0.875]
