@@ -1,0 +1,109 @@
+"""What hair runs into: spheres and closed meshes, posed by matrices that move during a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import HairloomError
+from .distance_field import DistanceField
+
+__all__ = ["Collider", "DistanceField", "PosedCollider", "SphereCollider"]
+
+
+class Collider(Protocol):
+    """A solid in its own object space, asked for signed distances (negative inside)."""
+
+    @property
+    def bounds(self) -> tuple[Floats, float]:
+        """Center (3,) and radius [m] of a sphere around it."""
+
+    def near(self, points: Floats, reach: float) -> Ints:
+        """Indices of the points (3, n) that may be closer than `reach` [m], quickly."""
+
+    def distance(self, points: Floats) -> tuple[Floats, Floats]:
+        """Signed distance [m] (n,) at the points (3, n), and its gradient (3, n)."""
+
+
+@dataclass(frozen=True)
+class SphereCollider:
+    """A ball. center: (3,) object space [m]. radius: [m]."""
+
+    center: Floats
+    radius: float
+
+    def __post_init__(self) -> None:
+        center = np.asarray(self.center, np.float32)
+        object.__setattr__(self, "center", center)
+        if center.shape != (3,) or not np.isfinite(center).all() or not 0 < self.radius < np.inf:
+            raise HairloomError(
+                f"a ball at {self.center} with radius {self.radius} has no volume",
+                place="sphere collider",
+                remedy="Give it a finite place and a radius above zero",
+            )
+
+    @property
+    def bounds(self) -> tuple[Floats, float]:
+        return self.center, self.radius
+
+    def near(self, points: Floats, reach: float) -> Ints:
+        return np.arange(points.shape[1])
+
+    def distance(self, points: Floats) -> tuple[Floats, Floats]:
+        outward = points - self.center[:, None]
+        length = np.sqrt((outward * outward).sum(axis=0))
+        gradient = outward / np.maximum(length, np.float32(1.0e-9))
+        gradient[2, length < 1.0e-9] = 1.0  # at the very center any way out is as good
+        return length - np.float32(self.radius), gradient
+
+
+@dataclass(frozen=True)
+class PosedCollider:
+    """A collider and its way during one frame.
+
+    matrix_before, matrix_now: (4, 4) affine, object to world, at the frame's begin and end. In
+    between they are blended linearly, as the carried roots are, so that both stay together.
+
+    Raises:
+        HairloomError: a matrix that is not finite or flattens the collider.
+    """
+
+    collider: Collider
+    matrix_before: Floats
+    matrix_now: Floats
+
+    def __post_init__(self) -> None:
+        for name in ("matrix_before", "matrix_now"):
+            matrix = np.asarray(getattr(self, name), np.float64)
+            object.__setattr__(self, name, matrix)
+            if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+                raise _broken("its matrix is not a finite 4 by 4 matrix")
+            if np.linalg.cond(matrix[:3, :3]) > 1.0e6:
+                raise _broken("its scale is zero")
+
+    def matrix_at(self, moment: float) -> Floats:
+        """Object to world (4, 4) float64 at `moment`, 0 the frame's begin and 1 its end."""
+        blend: Floats = self.matrix_before + (self.matrix_now - self.matrix_before) * moment
+        return blend
+
+
+def transform_points(matrix: Floats, points: Floats) -> Floats:
+    """Points (3, n) moved by an affine (4, 4) matrix, float32, without BLAS."""
+    rows = np.asarray(matrix, np.float32)
+    result = np.empty_like(points)
+    scratch = np.empty_like(points[0])
+    for axis in range(3):
+        np.multiply(points[0], rows[axis, 0], out=result[axis])
+        result[axis] += np.multiply(points[1], rows[axis, 1], out=scratch)
+        result[axis] += np.multiply(points[2], rows[axis, 2], out=scratch)
+        result[axis] += rows[axis, 3]
+    return result
+
+
+def _broken(problem: str) -> HairloomError:
+    return HairloomError(
+        problem, place="collider", remedy="Apply or correct the collider's transform"
+    )

@@ -1,0 +1,167 @@
+"""The signed distance of a closed mesh, sampled once on a grid and looked up trilinearly.
+
+Distance: exact, from the closest point of the mesh. Sign: generalised winding number (Jacobson et
+al. 2013, "Robust Inside-Outside Segmentation using Generalized Winding Numbers"), which small
+holes, doubled faces and slivers do not upset, with solid angles by Van Oosterom and Strackee 1983.
+It is evaluated only at nodes nearer to the surface than one cell; between two neighbours of which
+one is farther than a cell there is no surface, so all other signs follow along the rows.
+
+Error of the look-up: zero where the distance is linear; near edges and corners, and where the cell
+is crossed by the medial axis, below one cell's half diagonal, in practice a tenth of a cell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..errors import HairloomError
+from ..strands import Surface
+from ..strands.closest_point import closest_point
+from .settings import DynamicsSettings
+
+#: Cells around the mesh's box, so that the nearest outside is sampled too.
+MARGIN = 2
+#: Points whose solid angles are summed at once.
+_CHUNK = 2048
+
+
+class DistanceField:
+    """Signed distance on a grid, object space of the surface it was made from.
+
+    values: (nx, ny, nz) float32 [m], negative inside.
+    low: (3,) float32 [m], place of node (0, 0, 0).
+    cell: edge of a cell [m].
+    """
+
+    def __init__(self, values: Floats, low: Floats, cell: float) -> None:
+        self.values = np.ascontiguousarray(values, np.float32)
+        self.low = np.asarray(low, np.float32)
+        self.cell = float(cell)
+        self._flat = self.values.ravel()
+        self._strides = tuple(stride // 4 for stride in self.values.strides)
+        self._top = np.array(self.values.shape, np.float32)[:, None] - np.float32(1.0)
+        self._corners = [
+            x * self._strides[0] + y * self._strides[1] + z
+            for x in (0, 1)
+            for y in (0, 1)
+            for z in (0, 1)
+        ]
+
+    @classmethod
+    def from_surface(cls, surface: Surface, settings: DynamicsSettings) -> DistanceField:
+        """Sample a closed mesh.
+
+        Raises:
+            HairloomError: no faces, no size, or no inside at this resolution.
+        """
+        if not len(surface.triangles):
+            raise _broken("it has no faces", "Choose a closed mesh as collider")
+        used = surface.positions[np.unique(surface.triangles)].astype(np.float64)
+        low, high = used.min(axis=0), used.max(axis=0)
+        cell = float((high - low).max()) / settings.collider_resolution
+        if cell <= 0.0:
+            raise _broken("all its vertices lie in one point", "Choose a mesh with volume")
+        low = low - MARGIN * cell
+        shape = np.ceil((high - low) / cell).astype(int) + MARGIN + 1
+        axes = [low[axis] + cell * np.arange(shape[axis]) for axis in range(3)]
+        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        distance = closest_point(nodes.reshape(-1, 3), surface).distance.reshape(shape)
+        inside = _inside(nodes, distance, surface, cell)
+        if not inside.any():
+            raise _broken(
+                "it encloses no volume at this resolution",
+                "Close its holes, or raise the collider resolution",
+            )
+        return cls(np.where(inside, -distance, distance), low, cell)
+
+    @property
+    def bounds(self) -> tuple[Floats, float]:
+        half = self._top[:, 0] * np.float32(self.cell / 2.0)
+        return self.low + half, float(np.linalg.norm(half))
+
+    def near(self, points: Floats, reach: float) -> Ints:
+        """Points whose nearest node is not farther than `reach` and the way to it: as distance
+        changes by no more than the way, no point within `reach` is missed."""
+        place, outside = self._placed(points)
+        place += np.float32(0.5)
+        index = self._index(place)
+        limit = np.float32(reach + self.cell * 0.8661)  # half the diagonal of a cell
+        kept: Ints = np.flatnonzero((self._flat.take(index) < limit) & (outside < reach))
+        return kept
+
+    def distance(self, points: Floats) -> tuple[Floats, Floats]:
+        """Trilinear distance [m] (n,) and its exact gradient (3, n).
+
+        Outside of the grid the distance grows by the way to the grid's box.
+        """
+        place, outside = self._placed(points)
+        np.minimum(place, self._top - np.float32(1.0e-3), out=place)
+        index = self._index(place)
+        fx, fy, fz = place - np.floor(place)
+        corner = [self._flat.take(index + offset) for offset in self._corners]
+        # along z, then y, then x; what is left over at each turn is a derivative
+        dz = [far - near for near, far in zip(corner[::2], corner[1::2], strict=True)]
+        z = [near + fz * slope for near, slope in zip(corner[::2], dz, strict=True)]
+        dy = [z[1] - z[0], z[3] - z[2]]
+        y = [z[0] + fy * dy[0], z[2] + fy * dy[1]]
+        slope_z = [dz[0] + fy * (dz[1] - dz[0]), dz[2] + fy * (dz[3] - dz[2])]
+        gradient = np.empty_like(points)
+        gradient[0] = y[1] - y[0]
+        gradient[1] = dy[0] + fx * (dy[1] - dy[0])
+        gradient[2] = slope_z[0] + fx * (slope_z[1] - slope_z[0])
+        gradient *= np.float32(1.0 / self.cell)
+        return y[0] + fx * gradient[0] * np.float32(self.cell) + outside, gradient
+
+    def _placed(self, points: Floats) -> tuple[Floats, Floats]:
+        """Points in cells, held inside the grid, and how far outside of it they were [m]."""
+        place = points - self.low[:, None]
+        place *= np.float32(1.0 / self.cell)
+        held = np.clip(place, np.float32(0.0), self._top)
+        place -= held
+        place *= place
+        outside = np.sqrt(place[0] + place[1] + place[2]) * np.float32(self.cell)
+        return held, outside
+
+    def _index(self, place: Floats) -> Ints:
+        """Flat index of the node below each place (3, n), which is not negative."""
+        x, y, z = place.astype(np.int32)
+        return x * self._strides[0] + y * self._strides[1] + z
+
+
+def winding_number(points: Floats, surface: Surface) -> Floats:
+    """How often the surface winds around each point (n, 3): 1 inside a closed mesh, 0 outside."""
+    corners = surface.corners.astype(np.float64)
+    result = np.empty(len(points))
+    for first in range(0, len(points), _CHUNK):
+        chunk = points[first : first + _CHUNK].astype(np.float64)
+        result[first : first + _CHUNK] = _solid_angles(chunk, corners) / (4.0 * np.pi)
+    return result
+
+
+def _solid_angles(points: Floats, corners: Floats) -> Floats:
+    """Sum of the signed solid angles of all triangles (t, 3, 3) from each point (n, 3).
+
+    tan(angle / 2) = a.(b x c) / (|a||b||c| + (a.b)|c| + (b.c)|a| + (c.a)|b|)
+    """
+    a, b, c = (corners[:, k] - points[:, None] for k in range(3))
+    la, lb, lc = (np.sqrt(np.einsum("ntk,ntk->nt", v, v)) for v in (a, b, c))
+    ab, bc, ca = (np.einsum("ntk,ntk->nt", v, w) for v, w in ((a, b), (b, c), (c, a)))
+    volume = np.einsum("ntk,ntk->nt", a, np.cross(b, c))
+    total: Floats = np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb).sum(axis=1)
+    return 2.0 * total
+
+
+def _inside(nodes: Floats, distance: Floats, surface: Surface, cell: float) -> Bools:
+    """Whether each node (nx, ny, nz) lies inside; a mesh turned inside out counts as well."""
+    is_near = distance <= cell * 1.001
+    known = np.zeros(distance.shape, bool)
+    known[is_near] = np.abs(winding_number(nodes[is_near], surface)) > 0.5
+    # each row starts outside, thanks to the margin; a far node is as the last near one before it
+    along = np.broadcast_to(np.arange(distance.shape[2]), distance.shape)
+    last = np.maximum.accumulate(np.where(is_near, along, 0), axis=2)
+    return np.take_along_axis(known, last, axis=2)
+
+
+def _broken(problem: str, remedy: str) -> HairloomError:
+    return HairloomError(problem, place="mesh collider", remedy=remedy)

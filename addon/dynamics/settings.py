@@ -1,0 +1,162 @@
+"""The parameters of hair in motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..params import Settings, integer, number
+
+
+@dataclass(frozen=True, kw_only=True)
+class DynamicsSettings(Settings):
+    """How guides move, keep their style and meet colliders.
+
+    Stiffness is given as the number of swings a second that a strand would make if this stiffness
+    alone brought it back: it does not depend on the substep, the CV count or the strand's length.
+    """
+
+    section: ClassVar[str] = "dynamics"
+    title: ClassVar[str] = "Dynamics"
+
+    substep_rate: float = number(
+        240.0,
+        label="Substeps",
+        description="Steps of the simulation in a second, whatever the frame rate",
+        soft=(60.0, 480.0),
+        hard=(30.0, 2000.0),
+        unit="rate",
+        source="Jakobsen 2001; fixed step with accumulator, Fiedler 2004",
+    )
+    longest_frame: float = number(
+        0.25,
+        label="Longest Frame",
+        description="A longer pause between two frames is simulated as this much time",
+        soft=(0.05, 1.0),
+        hard=(0.01, 10.0),
+        unit="time",
+    )
+    gravity: float = number(
+        1.0,
+        label="Gravity",
+        description="Share of the scene's gravity that pulls at the hair",
+        soft=(0.0, 2.0),
+        hard=(-10.0, 10.0),
+    )
+    weight_held: float = number(
+        1.0,
+        label="Weight Held",
+        description="Share of the weight that the style already carries as it was combed; at 1 a "
+        "groom does not sag when it comes to rest",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+    )
+    damping: float = number(
+        0.5,
+        label="Air Damping",
+        description="How fast still air takes the speed out of the hair",
+        soft=(0.0, 10.0),
+        hard=(0.0, 1000.0),
+        unit="rate",
+        source="Jakobsen 2001",
+    )
+    style_damping: float = number(
+        5.0,
+        label="Swing Damping",
+        description="How fast swinging about the style dies away, seen from the moving head",
+        soft=(0.0, 20.0),
+        hard=(0.0, 1000.0),
+        unit="rate",
+    )
+    style_root: float = number(
+        4.0,
+        label="Style Stiffness, Root",
+        description="Pull of the first CVs to their place in the style, in swings a second",
+        soft=(0.0, 10.0),
+        hard=(0.0, 1000.0),
+        unit="rate",
+        source="Global shape constraint, Han and Harada 2012",
+    )
+    style_tip: float = number(
+        1.2,
+        label="Style Stiffness, Tip",
+        description="Pull of the tip to its place in the style, in swings a second",
+        soft=(0.0, 10.0),
+        hard=(0.0, 1000.0),
+        unit="rate",
+        source="Global shape constraint, Han and Harada 2012",
+    )
+    bend: float = number(
+        1.5,
+        label="Bend Stiffness",
+        description="How strongly waves and curls keep their form, in swings a second of a strand "
+        "held at its root",
+        soft=(0.0, 5.0),
+        hard=(0.0, 50.0),
+        unit="rate",
+        source="Local shape constraint, Han and Harada 2012",
+    )
+    length_tolerance: float = number(
+        0.002,
+        label="Length Tolerance",
+        description="Guides are solved again until no segment is off by more than this share",
+        soft=(0.0005, 0.01),
+        hard=(0.0001, 1.0),
+    )
+    length_iterations: int = integer(
+        8,
+        label="Length Iterations",
+        description="Newton steps at most of each substep's last solve for the segment lengths",
+        soft=(1, 16),
+        hard=(1, 64),
+        source="Fast projection, Goldenthal et al. 2007",
+    )
+    contact_passes: int = integer(
+        2,
+        label="Contact Passes",
+        description="How often contacts and lengths are solved in turn in each substep",
+        soft=(1, 4),
+        hard=(1, 16),
+    )
+    friction: float = number(
+        0.3,
+        label="Friction",
+        description="Coefficient of friction between hair and colliders",
+        soft=(0.0, 1.0),
+        hard=(0.0, 10.0),
+        source="Coulomb; position-based as in Macklin et al. 2014",
+    )
+    radius_root: float = number(
+        0.001,
+        label="Collision Radius, Root",
+        description="Distance that the first CVs keep from colliders",
+        soft=(0.0, 0.01),
+        hard=(0.0, 0.1),
+        unit="length",
+        source='"Pearl" configuration, Nguyen and Donnelly 2005',
+    )
+    radius_tip: float = number(
+        0.004,
+        label="Collision Radius, Tip",
+        description="Distance that the tip keeps from colliders, so that none slips between CVs",
+        soft=(0.0, 0.02),
+        hard=(0.0, 0.1),
+        unit="length",
+        source='"Pearl" configuration, Nguyen and Donnelly 2005',
+    )
+    push_speed: float = number(
+        0.5,
+        label="Push-out Speed",
+        description="How fast hair that starts inside a collider is led out",
+        soft=(0.05, 5.0),
+        hard=(0.001, 100.0),
+        unit="speed",
+    )
+    collider_resolution: int = integer(
+        56,
+        label="Collider Resolution",
+        description="Cells along the longest side of a mesh collider's distance field",
+        soft=(24, 96),
+        hard=(8, 192),
+    )

@@ -1,0 +1,115 @@
+"""What the simulation remembers of its guides from one frame to the next.
+
+Everything is a structure of arrays, (3, cv_count, guide_count) float32 in world space: one numpy
+call works on one CV, or all CVs, of every guide at once, over contiguous memory. That is 8 to 16
+times faster than an array of points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import HairloomError
+from .constraints import PINNED
+from .style import rest_curvature, twist_reference
+
+
+@dataclass(frozen=True)
+class Rest:
+    """The style, as it was when the simulation started; constant.
+
+    position: (3, cv_count, guide_count) float32 world [m].
+    length: (cv_count - 1, guide_count) float32 [m] of each segment.
+    curvature: (3, cv_count - 2, guide_count) float32 [m], each segment minus the one before it,
+        in the frame of the one before it.
+    twist_cv: (guide_count,) the CV that tells how a guide is turned about its root segment.
+    """
+
+    position: Floats
+    length: Floats
+    curvature: Floats
+    twist_cv: Ints
+
+
+@dataclass(frozen=True)
+class DynamicsState:
+    """Guides in motion.
+
+    position, previous: (3, cv_count, guide_count) float32 world [m], one substep apart.
+    rest: the style and the lengths to keep.
+    substep: length [s] of the last substep; 0 when there was none.
+    time_left: time [s] that has passed but is shorter than a substep, so not yet simulated.
+    """
+
+    position: Floats
+    previous: Floats
+    rest: Rest
+    substep: float = 0.0
+    time_left: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.position.flags.writeable = False
+        self.previous.flags.writeable = False
+
+    @property
+    def cv_count(self) -> int:
+        return int(self.position.shape[1])
+
+    @property
+    def guide_count(self) -> int:
+        return int(self.position.shape[2])
+
+    @property
+    def grid(self) -> Floats:
+        """CVs as (guide_count, cv_count, 3) float32 world [m]."""
+        return np.ascontiguousarray(self.position.transpose(2, 1, 0))
+
+
+def start(guide_grid: Floats) -> DynamicsState:
+    """Guides at rest in their style.
+
+    Args:
+        guide_grid: (guide_count, cv_count, 3) world [m], cv_count at least 2.
+
+    Raises:
+        HairloomError: another shape, or a CV that is not finite.
+    """
+    position = rows_of(guide_grid, "guides")
+    if position.shape[1] < PINNED:
+        raise HairloomError(
+            "a guide needs at least two CVs", place="guides", remedy="Raise the CV count"
+        )
+    segment = np.diff(position, axis=1)
+    twist_cv = twist_reference(position)
+    rest = Rest(
+        position=position,
+        length=np.sqrt((segment * segment).sum(axis=0)),
+        curvature=rest_curvature(position, twist_cv),
+        twist_cv=twist_cv,
+    )
+    for array in (rest.length, rest.curvature, rest.twist_cv):
+        array.flags.writeable = False
+    return DynamicsState(position, position, rest)
+
+
+def rows_of(grid: Floats, place: str) -> Floats:
+    """(guide_count, cv_count, 3) points as contiguous rows (3, cv_count, guide_count) float32.
+
+    Raises:
+        HairloomError: another shape, or a value that is not finite.
+    """
+    if grid.ndim != 3 or grid.shape[2] != 3:
+        raise HairloomError(
+            f"CVs have shape {grid.shape} instead of (guides, CVs, 3)",
+            place=place,
+            remedy="Resample the guides to one CV count",
+        )
+    rows = np.ascontiguousarray(grid.transpose(2, 1, 0), np.float32)
+    if not np.isfinite(rows).all():
+        raise HairloomError(
+            "a CV is not a finite number", place=place, remedy="Check what moves the surface"
+        )
+    return rows

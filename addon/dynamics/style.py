@@ -1,0 +1,160 @@
+"""The style comes back: global and local shape of a guide in one direct solve.
+
+Global shape pulls each CV to its place in the style that the head carries; local shape keeps the
+curvature between segments, so that waves and curls keep their form wherever the strand swings
+(both: Han and Harada 2012, "Real-time Hair Simulation with Efficient Hair Style Preservation").
+There both are relaxed CV after CV. Here they are the energies of one quadratic problem,
+
+    minimise  1/2 |x - x_free|^2 + 1/2 sum g_c |x_c - style_c|^2 + s/2 sum |b_i(x) - k_i|^2
+
+    b_i(x) = (x_{i+1} - x_i) - (x_i - x_{i-1})            second difference at CV i
+    k_i                                                   the same at rest, carried along by
+                                                          the frame of segment i-1
+    g = (omega_global dt)^2,  s = (omega_bend dt)^2       backward Euler of springs
+
+whose matrix I + diag(g) + s B^T B is banded, constant, and the same for all guides: one solve with
+scalar factors brings the stiffest style back without iterations, stable for any dt.
+
+Frames: on each segment a tangent t and a normal u, carried from segment to segment by the smallest
+rotation (Bishop 1975). With unit tangents that rotation is  u' = u - (u.t') / (1 + t.t') (t + t').
+
+Limitations: k is taken from the frames before the solve, so very stiff curls follow their root
+with a delay of some substeps; a strand that folds back on itself by 180 degrees loses its twist.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .banded import SharedBand
+from .constraints import PINNED, TINY, dot
+from .settings import DynamicsSettings
+
+#: A cantilever's first mode: omega = 1.8751^2 sqrt(EI / (rho A)) / L^2 (Euler-Bernoulli).
+_CANTILEVER = 3.5160
+
+
+@dataclass(frozen=True)
+class StyleBand:
+    """pull: g of each free CV. bend: s. band: the factored matrix."""
+
+    pull: Floats
+    bend: float
+    band: SharedBand
+
+
+@lru_cache(maxsize=8)
+def style_band(settings: DynamicsSettings, cv_count: int, dt: float) -> StyleBand:
+    """The matrix of the style solve for all free CVs of any guide."""
+    free = cv_count - PINNED
+    along = np.arange(PINNED, cv_count) / max(cv_count - 1, 1)
+    frequency = settings.style_root + (settings.style_tip - settings.style_root) * along
+    pull = (2.0 * np.pi * frequency * dt) ** 2
+    segments = cv_count - 1
+    bend = (2.0 * np.pi * settings.bend * segments**2 / _CANTILEVER * dt) ** 2
+    second = np.eye(free) - 2.0 * np.eye(free, k=-1) + np.eye(free, k=-2)
+    matrix = np.eye(free) + np.diag(pull) + bend * second.T @ second
+    column = pull.astype(np.float32)[:, None]
+    return StyleBand(column, float(bend), SharedBand(matrix))
+
+
+def restore_style(
+    position: Floats, style: Floats, curvature: Floats, twist_cv: Ints, matrix: StyleBand
+) -> None:
+    """Move the free CVs of `position` (3, cv_count, guide_count) to the minimum, in place.
+
+    Solved for the correction, so that rounding of world coordinates is not multiplied by s.
+    """
+    right = style[:, PINNED:] - position[:, PINNED:]
+    right *= matrix.pull
+    if matrix.bend:
+        residual = _curvature_residual(position, style, curvature, twist_cv)
+        residual *= np.float32(matrix.bend)
+        right += residual
+        right[:, :-1] -= residual[:, 1:]
+        right[:, :-1] -= residual[:, 1:]
+        right[:, :-2] += residual[:, 2:]
+    matrix.band.solve(right)
+    position[:, PINNED:] += right
+
+
+def twist_reference(position: Floats) -> Ints:
+    """The CV that lies farthest beside the line of the root segment, (guide_count,)."""
+    beside = _across(position - position[:, :1], _unit(position[:, 1] - position[:, 0])[:, None])
+    squared: Floats = (beside * beside).sum(axis=0)
+    return squared.argmax(axis=0)
+
+
+def rest_curvature(position: Floats, twist_cv: Ints) -> Floats:
+    """Second differences in the frame of the segment before, (3, cv_count - 2, guide_count)."""
+    tangent, normal, _ = frames(position, position, twist_cv)
+    second = np.diff(position, n=2, axis=1)
+    axes = (tangent, normal, _cross(tangent, normal))
+    return np.stack([(second * axis[:, :-1]).sum(axis=0) for axis in axes])
+
+
+def frames(position: Floats, style: Floats, twist_cv: Ints) -> tuple[Floats, Floats, Floats]:
+    """Tangent and normal (3, cv_count - 1, guide_count) of each segment, and the segment [m].
+
+    The first normal points to the twist CV of the style, the others follow without twist. It is
+    zero on a straight guide, which has no curvature to turn.
+    """
+    segment = position[:, 1:] - position[:, :-1]
+    tangent = _unit(segment)
+    normal = np.empty_like(tangent)
+    guide = np.arange(position.shape[2])
+    normal[:, 0] = _unit(_across(style[:, twist_cv, guide] - style[:, 0], tangent[:, 0]))
+    middle = tangent[:, 1:] + tangent[:, :-1]
+    share = tangent[:, 1:] * middle  # 1 + t.t' = t'.(t + t')
+    scale = share[0] + share[1]
+    scale += share[2]
+    scale += np.float32(1.0e-6)
+    middle_scaled = middle / scale
+    product = np.empty_like(normal[:, 0])
+    along = np.empty_like(product[0])
+    for i in range(1, tangent.shape[1]):
+        np.multiply(normal[:, i - 1], tangent[:, i], out=product)
+        np.add(product[0], product[1], out=along)
+        along += product[2]
+        np.multiply(middle_scaled[:, i - 1], along, out=product)
+        np.subtract(normal[:, i - 1], product, out=normal[:, i])
+    return tangent, normal, segment
+
+
+def _curvature_residual(
+    position: Floats, style: Floats, curvature: Floats, twist_cv: Ints
+) -> Floats:
+    """k - b(x), (3, cv_count - 2, guide_count)."""
+    tangent, normal, segment = frames(position, style, twist_cv)
+    tangent, normal = tangent[:, :-1], normal[:, :-1]
+    residual = _cross(tangent, normal)
+    residual *= curvature[2]
+    normal *= curvature[1]
+    residual += normal
+    tangent *= curvature[0]
+    residual += tangent
+    residual -= segment[:, 1:]
+    residual += segment[:, :-1]
+    return residual
+
+
+def _across(vector: Floats, unit: Floats) -> Floats:
+    return vector - unit * dot(vector, unit)
+
+
+def _unit(vector: Floats) -> Floats:
+    return vector / np.maximum(np.sqrt(dot(vector, vector)), TINY)
+
+
+def _cross(one: Floats, two: Floats) -> Floats:
+    result = np.empty_like(one)
+    scratch = np.empty_like(one[0])
+    for axis, (y, z) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.multiply(one[y], two[z], out=result[axis])
+        np.multiply(one[z], two[y], out=scratch)
+        result[axis] -= scratch
+    return result

@@ -1,0 +1,69 @@
+"""Choosing guides: the strands that are simulated, spread evenly over the scalp."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..strands import StrandSet
+from .settings import GuideSettings
+
+#: Candidates a guide, at most: spreading gets no better with more, only slower.
+_CANDIDATES_PER_GUIDE = 100
+
+
+def choose_guides(strands: StrandSet, settings: GuideSettings) -> Ints:
+    """Indices of the strands that become guides, (guide_count,) int64, ascending.
+
+    Each group gets a share by its size, at least one guide, and spreads it over its roots by
+    farthest-point sampling (Gonzalez 1985): the next guide is the root farthest from all guides
+    so far. The same seed gives the same guides. No more guides than strands, none of none.
+    """
+    random = np.random.default_rng(settings.seed)
+    _, group = np.unique(strands.group, return_inverse=True)
+    by_group = np.argsort(group, kind="stable")
+    sizes = np.bincount(group)
+    shares = group_shares(sizes, settings.guide_count)
+    members = np.split(by_group, np.cumsum(sizes)[:-1]) if len(sizes) else []
+    chosen = [
+        _spread(strands.roots, member, int(share), random)
+        for member, share in zip(members, shares, strict=True)
+    ]
+    return np.sort(np.concatenate([np.zeros(0, np.int64), *chosen]))
+
+
+def group_shares(sizes: Ints, guide_count: int) -> Ints:
+    """How many guides each group gets, (group_count,): one each, then by largest remainder.
+
+    Never more than the group's size; in total guide_count, or as many as there are strands, or
+    as many as there are groups.
+    """
+    total, group_count = int(sizes.sum()), len(sizes)
+    spare = min(guide_count, total) - group_count
+    if spare <= 0 or total == group_count:
+        return np.ones(group_count, np.int64)
+    # after the first guide of each group; then no share can pass its group's size
+    quota = spare * (sizes - 1) / (total - group_count)
+    share = np.floor(quota).astype(np.int64)
+    left_over = spare - int(share.sum())
+    share[np.argsort(share - quota, kind="stable")[:left_over]] += 1
+    return share + 1
+
+
+def _spread(roots: Floats, member: Ints, count: int, random: np.random.Generator) -> Ints:
+    """`count` of these strands, their roots far from each other."""
+    if count >= len(member):
+        return member
+    if len(member) > count * _CANDIDATES_PER_GUIDE:
+        member = random.choice(member, count * _CANDIDATES_PER_GUIDE, replace=False)
+    x, y, z = np.ascontiguousarray(roots[member].T)
+    chosen = np.empty(count, np.int64)
+    nearest = np.full(len(member), np.inf, np.float32)
+    latest = int(random.integers(len(member)))
+    for index in range(count):
+        chosen[index] = latest
+        distance = (x - x[latest]) ** 2 + (y - y[latest]) ** 2 + (z - z[latest]) ** 2
+        np.minimum(nearest, distance, out=nearest)
+        nearest[latest] = -1.0  # never again, even where roots coincide
+        latest = int(nearest.argmax())
+    return member[chosen]

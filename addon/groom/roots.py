@@ -1,0 +1,177 @@
+"""Roots on the surface: where each strand is held, and how it is carried when the surface moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..errors import HairloomError
+from ..strands import StrandSet, Surface
+from ..strands.closest_point import ClosestPointSearch
+
+#: Median distance of the roots, as a part of the surface's diagonal, beyond which the groom
+#: cannot belong to it; grooms that fit lie within 1 %.
+IMPLAUSIBLE_DISTANCE = 0.15
+#: Factors between the units that grooms come in: powers of ten, inch and foot, to and from metres.
+_UNIT_FACTORS = (*(10.0**n for n in range(-4, 5)), 0.0254, 0.3048, 1 / 0.0254, 1 / 0.3048)
+_SAMPLED_ROOTS = 500
+#: Sine of a triangle's first angle below which rounding in float64 decides about its normal.
+_FLAT = 1.0e-9
+
+
+@dataclass(frozen=True)
+class BoundRoots:
+    """strands: bound to the surface, root UVs filled from it where they were unknown.
+    distance: (strand_count,) float32 [m], from each root to its point of the surface.
+    """
+
+    strands: StrandSet
+    distance: Floats
+
+
+@dataclass(frozen=True)
+class RootFrames:
+    """A right-handed orthonormal frame where each strand is held, in the space of the surface.
+
+    origin: (strand_count, 3) float64 [m], on the surface.
+    rotation: (strand_count, 3, 3) float64, columns: along the triangle's first edge, bitangent,
+        normal.
+    """
+
+    origin: Floats
+    rotation: Floats
+
+
+def bind_roots(strands: StrandSet, surface: Surface, *, place: str) -> BoundRoots:
+    """Hold each root at the closest point of the surface; the points stay where they are.
+
+    Args:
+        strands: in the space of the surface.
+        place: names the groom in error messages.
+
+    Raises:
+        HairloomError: the surface has no triangles, or the groom is of another scale than it.
+    """
+    search = ClosestPointSearch(surface)
+    roots = strands.roots
+    closest = search.closest(roots)
+    _check_scale(roots, closest.distance, surface, search, place)
+    root_uv = strands.root_uv
+    if root_uv is None and surface.corner_uv is not None:
+        corner_uv = surface.corner_uv[closest.triangle]
+        root_uv = np.einsum("sk,skj->sj", closest.barycentric, corner_uv)
+    bound = replace(
+        strands,
+        root_uv=root_uv,
+        root_triangle=closest.triangle,
+        root_barycentric=closest.barycentric,
+    )
+    return BoundRoots(bound, closest.distance.astype(np.float32))
+
+
+def root_frames(
+    positions: Floats, triangles: Ints, root_triangle: Ints, root_barycentric: Floats
+) -> RootFrames:
+    """The frames of roots on a surface as it is deformed now.
+
+    A triangle without area or first edge gets axes of the world in their place, so that every
+    frame is a finite rotation.
+
+    Args:
+        positions: (vertex_count, 3) [m].
+        triangles: (triangle_count, 3).
+        root_triangle: (strand_count,).
+        root_barycentric: (strand_count, 3).
+    """
+    a, b, c = (positions[triangles[root_triangle, k]].astype(np.float64) for k in range(3))
+    weight = np.asarray(root_barycentric, np.float64)
+    # offsets from a: barycentric coordinates in float32 need not sum to 1 exactly
+    origin = a + weight[:, 1:2] * (b - a) + weight[:, 2:3] * (c - a)
+    tangent, _ = _unit(b - a, 0.0, fallback=(1.0, 0.0, 0.0))
+    flat = _FLAT * np.linalg.norm(c - a, axis=1)
+    normal, is_flat = _unit(np.cross(tangent, c - a), flat, fallback=(0.0, 0.0, 1.0))
+    normal[is_flat] = _across(tangent[is_flat])
+    rotation = np.stack([tangent, np.cross(normal, tangent), normal], axis=2)
+    return RootFrames(origin, rotation)
+
+
+def follow(grid: Floats, rest: RootFrames, now: RootFrames) -> Floats:
+    """Each strand carried rigidly with its root, (strand_count, cv_count, 3) float32 [m].
+
+    Adds only the change, so that a root that did not move returns its strand bit for bit.
+
+    Args:
+        grid: (strand_count, cv_count, 3) [m], the strands at rest.
+        rest, now: frames of the same roots at rest and now.
+    """
+    turn = (now.rotation - rest.rotation) @ rest.rotation.transpose(0, 2, 1)
+    local = grid - rest.origin[:, None].astype(np.float32)
+    # the rounding of the origin to float32 must not show: it is turned here instead
+    rounding = rest.origin - rest.origin.astype(np.float32)
+    shift = now.origin - rest.origin - np.einsum("sij,sj->si", turn, rounding)
+    moved = local @ turn.astype(np.float32).transpose(0, 2, 1)
+    moved += shift.astype(np.float32)[:, None]
+    moved += grid
+    return np.asarray(moved, np.float32)
+
+
+def _check_scale(
+    roots: Floats, distance: Floats, surface: Surface, search: ClosestPointSearch, place: str
+) -> None:
+    """Raise when the roots lie too far from the surface to have grown on it."""
+    if not len(roots):
+        return
+    low, high = surface.bounds()
+    surface_size = float(np.linalg.norm(high - low))
+    if np.median(distance) <= IMPLAUSIBLE_DISTANCE * surface_size:
+        return
+    roots_size = float(np.linalg.norm(np.ptp(roots, axis=0)))
+    factor = _fitting_factor(roots, roots_size, search)
+    if factor is None:
+        raise HairloomError(
+            f"its roots lie {np.median(distance):.3g} m from the head (median); they span"
+            f" {roots_size:.3g} m, the head spans {surface_size:.3g} m, and no usual unit makes"
+            " them meet",
+            place=place,
+            remedy="Move the groom onto the head, choose its up axis, or choose another head",
+        )
+    raise HairloomError(
+        f"this groom is of another scale than the head: its roots span {roots_size:.3g} m,"
+        f" the head spans {surface_size:.3g} m",
+        place=place,
+        remedy=f"Scale the groom by {factor:.4g} (pass --groom-scale {factor:.4g})",
+    )
+
+
+def _fitting_factor(roots: Floats, roots_size: float, search: ClosestPointSearch) -> float | None:
+    """The factor between units that brings the roots onto the surface, if one does.
+
+    Distances are judged by the size of the scaled roots: roots that shrink to a point somewhere
+    inside of the head are near to it, but do not fit.
+    """
+    sample = roots[:: -(-len(roots) // _SAMPLED_ROOTS)].astype(np.float64)
+    distance = {f: float(np.median(search.closest(sample * f).distance)) for f in _UNIT_FACTORS}
+    best = min(_UNIT_FACTORS, key=lambda factor: distance[factor] / factor)
+    fits = distance[best] <= IMPLAUSIBLE_DISTANCE * best * roots_size
+    return best if fits and best != 1.0 else None
+
+
+def _unit(
+    vectors: Floats, shortest: Floats | float, fallback: tuple[float, float, float]
+) -> tuple[Floats, Bools]:
+    """Unit vectors, and which are the fallback because they were no longer than the shortest."""
+    length = np.linalg.norm(vectors, axis=1)
+    is_short = length <= shortest
+    unit = vectors / np.where(is_short, 1.0, length)[:, None]
+    unit[is_short] = fallback
+    return unit, is_short
+
+
+def _across(tangent: Floats) -> Floats:
+    """Unit vectors across these unit tangents, as near to the world's axes as can be."""
+    axis = np.zeros_like(tangent)
+    axis[np.arange(len(tangent)), np.abs(tangent).argmin(axis=1)] = 1.0
+    across = axis - tangent * np.einsum("ij,ij->i", axis, tangent)[:, None]
+    return across / np.linalg.norm(across, axis=1, keepdims=True)

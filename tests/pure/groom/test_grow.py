@@ -1,0 +1,139 @@
+"""Grown hair: bound, of the lengths asked for, outside of the head, falling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.roots import bind_roots
+from hairloom.addon.groom.settings import GrowSettings
+from hairloom.addon.strands import StrandSet, Surface
+
+SMALL = GrowSettings(strand_count=400)
+#: no wave, frizz or lock: hair as the comb and gravity leave it
+PLAIN = GrowSettings(strand_count=400, clump=0.0, wave=0.0, frizz=0.0)
+
+
+@pytest.fixture(scope="module")
+def grown(egg: Surface) -> StrandSet:
+    return grow(egg, SMALL, scalp_density(egg))
+
+
+def outside_by(points: np.ndarray) -> np.ndarray:
+    """How far outside of the egg: (|p / axes| - 1) times its least semi-axis, a lower bound."""
+    return (np.linalg.norm(points / [0.08, 0.1, 0.12], axis=-1) - 1.0) * 0.08
+
+
+def test_strands_are_bound_where_they_start(egg: Surface, grown: StrandSet) -> None:
+    assert grown.strand_count == 400
+    assert grown.grid.shape == (400, SMALL.cv_count, 3)
+    assert grown.root_triangle is not None
+    assert grown.root_barycentric is not None
+    corners = egg.corners[grown.root_triangle]
+    origin = np.einsum("nk,nkj->nj", grown.root_barycentric, corners)
+    assert grown.roots == pytest.approx(origin, abs=1e-6)
+    again = bind_roots(grown, egg, place="test")
+    assert again.distance.max() < 1e-6
+    assert grown.root_uv == pytest.approx(again.strands.root_uv, abs=1e-3)
+
+
+def test_lengths_lie_between_the_shortest_and_the_longest(grown: StrandSet) -> None:
+    shortest = SMALL.length * (1.0 - SMALL.length_variation)
+    lengths = grown.lengths()
+    assert lengths.min() > 0.97 * shortest
+    assert lengths.max() < 1.03 * SMALL.length
+    assert np.ptp(lengths) > 0.5 * SMALL.length * SMALL.length_variation
+
+
+def test_segments_lengthen_by_the_ratio(egg: Surface) -> None:
+    settings = GrowSettings(strand_count=50, segment_ratio=1.2, lift=1.0, droop=0.0, volume=0.0)
+    grid = grow(egg, settings, scalp_density(egg)).grid
+    segments = np.linalg.norm(np.diff(grid, axis=1), axis=2)
+    ratio = np.median(segments[:, 1:] / segments[:, :-1], axis=0)
+    assert ratio == pytest.approx(np.full(14, 1.2), abs=0.02)
+
+
+def test_hair_stays_out_of_the_head(grown: StrandSet) -> None:
+    """A quarter of a metre of hair on a head of 20 cm lies over it, not through it."""
+    assert outside_by(grown.grid[:, 1:]).min() > 0.0
+    assert outside_by(grown.grid[:, 5:]).min() > 0.25 * SMALL.clearance
+
+
+def test_without_pushing_out_it_would_go_through(egg: Surface) -> None:
+    """The test above can fail: straight strands of the same roots, falling, pass the head."""
+    strands = grow(egg, PLAIN, scalp_density(egg))
+    straight = strands.roots[:, None] + np.linspace(0, 0.2, 16)[:, None] * np.array(
+        [0.0, 0.0, -1.0]
+    )
+    assert outside_by(straight[:, 1:]).min() < -0.02
+
+
+def test_hair_falls_and_leaves_the_face_free(grown: StrandSet) -> None:
+    tips, roots = grown.grid[:, -1], grown.roots
+    assert (tips[:, 2] < roots[:, 2]).mean() > 0.95
+    is_before_face = (np.abs(grown.points[:, 0]) < 0.03) & (grown.points[:, 1] < -0.06)
+    assert not (is_before_face & (grown.points[:, 2] < 0.0)).any()
+
+
+def test_lift_raises_the_root_and_full_lift_follows_the_normal(egg: Surface) -> None:
+    def steepness(lift: float) -> float:
+        settings = GrowSettings(
+            strand_count=200, lift=lift, droop=0.0, clump=0.0, wave=0.0, frizz=0.0, volume=0.0
+        )
+        grid = grow(egg, settings, scalp_density(egg)).grid
+        first = grid[:, 1] - grid[:, 0]
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        normal = grid[:, 0] / np.array([0.08, 0.1, 0.12]) ** 2
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        return float(np.einsum("ij,ij->i", first, normal).mean())
+
+    flat, half, full = steepness(0.0), steepness(0.5), steepness(1.0)
+    assert flat < half - 0.2 < full - 0.4
+    assert full == pytest.approx(1.0, abs=0.01)
+
+
+def test_locks_draw_tips_together(egg: Surface) -> None:
+    def nearest_tips(clump: float) -> float:
+        settings = GrowSettings(strand_count=400, clump=clump, wave=0.0, frizz=0.0, clump_size=20)
+        tips = grow(egg, settings, scalp_density(egg)).grid[:, -1]
+        apart = np.linalg.norm(tips[:, None] - tips[None], axis=2)
+        np.fill_diagonal(apart, np.inf)
+        return float(np.median(apart.min(axis=1)))
+
+    assert nearest_tips(0.95) < 0.5 * nearest_tips(0.0)
+
+
+def test_the_seed_decides_and_nothing_else_does(egg: Surface) -> None:
+    def points(seed: int) -> np.ndarray:
+        return grow(egg, GrowSettings(strand_count=50, seed=seed)).points
+
+    assert (points(1) == points(1)).all()
+    assert (points(1) != points(2)).any()
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_hardly_any_strands(egg: Surface, count: int) -> None:
+    strands = grow(egg, GrowSettings(strand_count=count, cv_count=4), scalp_density(egg))
+    assert strands.strand_count == count
+    assert np.isfinite(strands.points).all()
+    assert strands.is_bound
+
+
+@pytest.mark.parametrize("extreme", ["low", "high"])
+def test_all_extremes_of_the_sliders_give_finite_hair(egg: Surface, extreme: str) -> None:
+    side = 0 if extreme == "low" else 1
+    values = {
+        p.name: p.soft_range[side]
+        for p in GrowSettings.parameters()
+        if p.soft_range is not None and p.name != "strand_count"
+    }
+    strands = grow(egg, GrowSettings.from_dict(values | {"strand_count": 60}, "test"))
+    assert np.isfinite(strands.points).all()
+    assert (strands.lengths() > 0.0).all()
+
+
+def test_a_head_without_faces_is_told(egg: Surface) -> None:
+    with pytest.raises(HairloomError):
+        grow(Surface(egg.positions, np.zeros((0, 3))), SMALL)

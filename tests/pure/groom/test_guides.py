@@ -1,0 +1,87 @@
+"""Guides: fair shares, even spread, and the same ones again for the same seed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.arrays import Floats, Ints
+from hairloom.addon.groom.guides import choose_guides, group_shares
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.strands import StrandSet
+
+
+def strands_at(root: Floats, group: Ints) -> StrandSet:
+    points = np.stack([root, root + np.array([0.0, 0.0, 0.1])], axis=1).reshape(-1, 3)
+    return StrandSet(points, np.arange(len(root) + 1) * 2, np.full(len(points), 4e-5), group)
+
+
+def square(count: int, seed: int = 1) -> Floats:
+    flat = np.random.default_rng(seed).random((count, 2))
+    return np.concatenate([flat, np.zeros((count, 1))], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "guide_count", "shares"),
+    [
+        ([100], 10, [10]),
+        ([60, 30, 10], 10, [5, 3, 2]),
+        ([1000, 1, 1], 10, [8, 1, 1]),
+        ([5, 5], 100, [5, 5]),
+        ([5, 5, 5], 2, [1, 1, 1]),
+        ([1, 1, 1], 3, [1, 1, 1]),
+        ([3, 500], 500, [3, 497]),
+        ([], 10, []),
+    ],
+)
+def test_shares(sizes: list[int], guide_count: int, shares: list[int]) -> None:
+    assert group_shares(np.array(sizes, np.int64), guide_count).tolist() == shares
+
+
+def test_shares_of_random_groups_are_fair() -> None:
+    random = np.random.default_rng(1)
+    for _ in range(300):
+        sizes = random.integers(1, 200, random.integers(1, 20))
+        guide_count = int(random.integers(1, 400))
+        shares = group_shares(sizes, guide_count)
+        assert shares.sum() == max(min(guide_count, sizes.sum()), len(sizes))
+        assert (shares >= 1).all()
+        assert (shares <= sizes).all()
+        order = np.argsort(sizes, kind="stable")
+        assert (np.diff(shares[order])[np.diff(sizes[order]) > 0] >= 0).all()
+
+
+def test_guides_spread_over_each_group() -> None:
+    """Farthest-point sampling is a 2-approximation: cover and separation match (Gonzalez 1985)."""
+    root = square(4000)
+    group = (root[:, 0] > 0.7).astype(np.int64)
+    strands = strands_at(root, group)
+    guides = choose_guides(strands, GuideSettings(guide_count=100))
+    assert len(guides) == len(set(guides.tolist())) == 100
+    assert np.bincount(group[guides]) == pytest.approx(100 * np.bincount(group) / 4000, abs=1)
+    for name in (0, 1):
+        own, chosen = root[group == name], root[guides[group[guides] == name]]
+        cover = np.linalg.norm(own[:, None] - chosen[None], axis=2).min(axis=1).max()
+        between = np.linalg.norm(chosen[:, None] - chosen[None], axis=2)
+        assert between[between > 0].min() >= cover * (1.0 - 1e-6)
+
+
+def test_the_seed_decides_and_nothing_else_does() -> None:
+    strands = strands_at(square(5000), np.zeros(5000, np.int64))
+    settings = GuideSettings(guide_count=20, seed=3)
+    guides = choose_guides(strands, settings)
+    assert (guides == choose_guides(strands, settings)).all()
+    other = choose_guides(strands, GuideSettings(guide_count=20, seed=4))
+    assert set(guides.tolist()) != set(other.tolist())
+
+
+def test_more_guides_than_strands_takes_them_all_and_none_of_none() -> None:
+    strands = strands_at(square(30), np.arange(30) % 3)
+    assert choose_guides(strands, GuideSettings()).tolist() == list(range(30))
+    none = strands.take(np.zeros(0, np.int64))
+    assert choose_guides(none, GuideSettings()).tolist() == []
+
+
+def test_roots_in_one_point_still_give_different_guides() -> None:
+    strands = strands_at(np.zeros((50, 3)), np.zeros(50, np.int64))
+    assert len(set(choose_guides(strands, GuideSettings(guide_count=10)).tolist())) == 10
