@@ -1,0 +1,166 @@
+"""The main job without a window: `blender -b --command hairloom VERB ...`.
+
+Exit codes: 0 done, 1 bad input (one line on stderr says what, where and what to do),
+2 wrong usage. Every file is written whole or not at all.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..errors import HairloomError
+from ..parameters import ALL_SETTINGS
+from .inputs import Sources
+from .jobs import Job, cards, demo, export, render, simulate
+
+VERBS = {"simulate": simulate, "render": render, "cards": cards, "export": export, "demo": demo}
+
+
+def run(arguments: list[str]) -> int:
+    """Blender calls this with what follows `--command hairloom`."""
+    try:
+        options = parser().parse_args(arguments)
+    except SystemExit as stop:  # argparse has printed its message or the help
+        return int(stop.code or 0)
+    try:
+        VERBS[options.verb](_job(options))
+    except HairloomError as error:
+        print(f"hairloom: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def parser() -> argparse.ArgumentParser:
+    """The verbs and their options."""
+    top = argparse.ArgumentParser(
+        prog="hairloom", description="Simulate, render and export real-time hair."
+    )
+    verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
+    for name, flow in VERBS.items():
+        about = (flow.__doc__ or "").strip().splitlines()[0]
+        verb = verbs.add_parser(name, help=about, description=about)
+        _add_source_options(verb)
+        _add_job_options(verb, name)
+    return top
+
+
+def _add_source_options(verb: argparse.ArgumentParser) -> None:
+    sources = verb.add_argument_group("what to work on (files, or objects of the open scene)")
+    sources.add_argument("--groom", help="hair curves object or .tfx file (default: grown here)")
+    sources.add_argument("--head", help="mesh that the hair grows from (default: built in)")
+    sources.add_argument("--collider", help="closed mesh that hair stays out of (default: head)")
+    sources.add_argument("--groom-scale", type=float, default=1.0, help="scale a groom file")
+    sources.add_argument("--groom-up", choices=("Y", "Z"), default="Y", help="up in a groom file")
+    sources.add_argument("--no-uv", action="store_true", help="accept a head without UVs")
+    sources.add_argument(
+        "--strict", action="store_true", help="fail when a single strand must be dropped"
+    )
+
+
+def _add_job_options(verb: argparse.ArgumentParser, name: str) -> None:
+    job = verb.add_argument_group("the job")
+    job.add_argument("--output", required=name != "demo", default="out", help=_OUTPUTS[name])
+    job.add_argument("--report", help="write a JSON report to this file")
+    job.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="SECTION.NAME=VALUE",
+        help="change a parameter, such as dynamics.damping=2 (docs/parameters.md lists them)",
+    )
+    if name in ("simulate", "demo"):
+        job.add_argument("--seconds", type=float, default=2.0, help="length of the head's shake")
+        job.add_argument("--frame-rate", type=float, default=60.0, help="frames a second")
+        job.add_argument(
+            "--scene", action="store_true", help="use the scene's animation and frame range"
+        )
+    if name in ("render", "export"):
+        job.add_argument("--take", help="a take written by 'hairloom simulate'")
+        job.add_argument("--frame", type=int, default=0, help="frame of the take, from 0")
+    if name in ("render", "demo"):
+        job.add_argument("--width", type=int, default=960, help="pixels across")
+        job.add_argument("--height", type=int, default=720, help="pixels down")
+        job.add_argument("--samples", type=int, default=3, help="sub-pixels along each side")
+    if name == "render":
+        job.add_argument("--sheet", help="write a contact sheet of the take to this .png too")
+
+
+_OUTPUTS = {
+    "simulate": "take to write (.npz)",
+    "render": "picture to write (.png)",
+    "cards": "hair cards to write (.glb)",
+    "export": "strands to write (.tfx)",
+    "demo": "folder to write into (default: out)",
+}
+
+
+def _job(options: argparse.Namespace) -> Job:
+    _check_numbers(options)
+    return Job(
+        verb=options.verb,
+        sources=Sources(
+            groom=options.groom,
+            head=options.head,
+            collider=options.collider,
+            groom_scale=options.groom_scale,
+            groom_up=options.groom_up,
+            need_uv=not options.no_uv,
+        ),
+        settings={
+            section: made.from_dict(_overrides(options.set, section), "--set")
+            for section, made in ALL_SETTINGS.items()
+        },
+        output=Path(options.output),
+        options=options,
+    )
+
+
+def _check_numbers(options: argparse.Namespace) -> None:
+    """Refuse sizes that nobody can draw before any work is done."""
+    for name, least, most in _LIMITS:
+        value = getattr(options, name, least)
+        if not least <= value <= most:
+            raise HairloomError(
+                f"{value} cannot be used",
+                place="--" + name.replace("_", "-"),
+                remedy=f"Use a number from {least:g} to {most:g}",
+            )
+
+
+_LIMITS = (
+    ("width", 1, 4096),
+    ("height", 1, 4096),
+    ("samples", 1, 4),  # times 4096 pixels is the largest texture that every GPU has
+    ("seconds", 0.0, 3600.0),
+    ("frame_rate", 1.0, 1000.0),
+    ("groom_scale", 1e-6, 1e6),
+)
+
+
+def _overrides(assignments: list[str], section: str) -> dict[str, Any]:
+    """The values that --set gives to one section."""
+    values: dict[str, Any] = {}
+    for assignment in assignments:
+        name, equals, text = assignment.partition("=")
+        owner, dot, parameter = name.partition(".")
+        if not equals or not dot or owner not in ALL_SETTINGS:
+            raise HairloomError(
+                f"'{assignment}' does not name a parameter",
+                place="--set",
+                remedy="Write SECTION.NAME=VALUE with a section of " + ", ".join(ALL_SETTINGS),
+            )
+        if owner == section:
+            values[parameter] = _value(text)
+    return values
+
+
+def _value(text: str) -> Any:
+    """A JSON value, or the text itself (the name of a choice)."""
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text

@@ -1,0 +1,134 @@
+"""Grooms in and out of the open scene, as the artist's buttons ask for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from .. import pipeline
+from ..cards.settings import CardSettings
+from ..exchange.sidecar import write_sidecar
+from ..exchange.tressfx import read_tfx, write_tfx
+from ..groom.grow import grow, scalp_density
+from ..groom.roots import bind_roots
+from ..groom.settings import GrowSettings, GuideSettings
+from ..shading.ambient import AmbientSettings
+from ..shading.textures import TextureSettings, card_texture
+from ..strands import StrandSet
+from .curves import write_curves
+from .glb import write_glb
+from .properties import settings_of
+from .source import read_source
+from .surfaces import read_surface
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What happened: one line of result, what was dropped, and what the artist should know."""
+
+    result: str
+    dropped: dict[str, int]
+    warnings: tuple[str, ...] = ()
+
+
+def import_tfx(
+    path: Path,
+    head: bpy.types.Object | None,
+    collection: bpy.types.Collection,
+    *,
+    up: str,
+    scale: float,
+) -> tuple[bpy.types.Object, Outcome]:
+    """Read a TressFX file into hair curves, on a head if there is one.
+
+    Raises:
+        HairloomError: the file cannot be read, or is of another scale than the head.
+    """
+    read = read_tfx(path, up=up, scale=scale)
+    strands, warnings = read.strands, ()
+    if head is not None:
+        strands, warnings = _on_head(strands, head, path.name)
+    hair = write_curves(path.stem, strands, head, collection)
+    result = f"{path.name}: {strands.strand_count:,} strands, TressFX {read.version:g}"
+    return hair, Outcome(result, read.dropped, warnings)
+
+
+def grow_on(
+    head: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    collection: bpy.types.Collection,
+    values: Any,
+) -> bpy.types.Object:
+    """Hair curves grown on a mesh.
+
+    Args:
+        values: an operator or group with the properties of GrowSettings.
+
+    Raises:
+        HairloomError: it has no faces to grow on.
+    """
+    surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    strands = grow(surface, settings_of(values, GrowSettings), scalp_density(surface))
+    return write_curves(f"{head.name} Hair", strands, head, collection)
+
+
+def export_cards(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, path: Path) -> Outcome:
+    """Write the groom as hair cards (GLB and sidecar), one for each guide.
+
+    Raises:
+        HairloomError: no hair that can be used, or the file cannot be written.
+    """
+    source, groom = read_source(hair, depsgraph), hair.data.hairloom
+    guides = settings_of(groom.guides, GuideSettings)
+    rig = pipeline.prepare(source.strands, source.head, guides, place=hair.name)
+    mesh = pipeline.cards_of(
+        rig, settings_of(groom.cards, CardSettings), settings_of(groom.ambient, AmbientSettings)
+    )
+    texture = card_texture(settings_of(groom.card_texture, TextureSettings))
+    write_glb(path, mesh, texture, name=path.stem)
+    sidecar = write_sidecar(path, mesh)
+    result = f"Wrote {mesh.card_count:,} cards to {path.name} and {sidecar.name}"
+    return Outcome(result, source.dropped, source.warnings)
+
+
+def export_tfx(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, path: Path, *, up: str, scale: float
+) -> Outcome:
+    """Write all strands as Blender shows them as TressFX.
+
+    Raises:
+        HairloomError: no strands, or the file cannot be written.
+    """
+    source = read_source(hair, depsgraph)
+    strands = source.strands
+    if source.head is not None and strands.strand_count:
+        strands = bind_roots(strands, source.head, place=hair.name).strands
+    write_tfx(path, strands, up=up, scale=scale)
+    result = f"Wrote {strands.strand_count:,} strands to {path.name}"
+    return Outcome(result, source.dropped, source.warnings)
+
+
+def dropped_phrase(dropped: dict[str, int]) -> str:
+    """Such as "dropped 3 (fewer than two points), 1 (no length)"; empty where nothing was."""
+    reasons: Iterable[str] = (f"{count:,} ({reason})" for reason, count in dropped.items())
+    return "dropped " + ", ".join(reasons) if dropped else ""
+
+
+def _on_head(
+    strands: StrandSet, head: bpy.types.Object, place: str
+) -> tuple[StrandSet, tuple[str, ...]]:
+    """Strands with the head's UVs at their roots, which Blender's own hair tools go by."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    bound = bind_roots(replace(strands, root_uv=None), surface, place=place).strands
+    if surface.corner_uv is not None:
+        return bound, ()
+    warning = (
+        f"{head.name}: it has no UVs, so Blender's own hair tools cannot hold these strands. "
+        "Unwrap it (Edit Mode, UV > Unwrap)."
+    )
+    return bound, (warning,)

@@ -1,0 +1,89 @@
+"""Where settings live: those of a groom on its Curves, those of a character on its Object."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, PointerProperty
+
+from ..parameters import ALL_SETTINGS
+from . import live
+from .properties import annotations, property_group
+
+GROOM_SECTIONS = ("guides", "strands", "shading", "ambient", "cards", "card_texture")
+CHARACTER_SECTIONS = ("dynamics",)
+
+
+def _changed(owner: bpy.types.ID) -> None:
+    live.settings_changed(owner)
+
+
+def _pointers(sections: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        section: PointerProperty(
+            type=SECTION_GROUPS[section],
+            name=ALL_SETTINGS[section].title,
+            description=f"Settings of {ALL_SETTINGS[section].title.lower()}",
+        )
+        for section in sections
+    }
+
+
+def _is_mesh(_group: Any, obj: bpy.types.Object) -> bool:
+    return obj.type == "MESH"
+
+
+SECTION_GROUPS = {
+    section: property_group(ALL_SETTINGS[section], _changed)
+    for section in (*GROOM_SECTIONS, *CHARACTER_SECTIONS)
+}
+
+
+def operator_properties(section: str) -> dict[str, Any]:
+    """For the `__annotations__` of an operator that works by the settings of one section."""
+    return annotations(ALL_SETTINGS[section])
+
+
+class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
+    """Everything about one groom that goes with its curves."""
+
+    __annotations__ = _pointers(GROOM_SECTIONS)
+
+
+class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
+    """Everything about one object's hair that another object with the same curves may have otherwise."""
+
+    __annotations__ = {
+        **_pointers(CHARACTER_SECTIONS),
+        "collider": PointerProperty(
+            type=bpy.types.Object,
+            name="Collider",
+            description="Closed mesh that the hair stays out of; empty: the surface it grows from",
+            poll=_is_mesh,
+        ),
+        "hide_original": BoolProperty(
+            name="Hide Blender's Strands",
+            description="While previewing, show Blender's own drawing of these curves as a box",
+            default=True,
+            update=lambda self, _context: _changed(self.id_data),
+        ),
+    }
+
+
+CLASSES = (*SECTION_GROUPS.values(), HAIRLOOM_PG_groom, HAIRLOOM_PG_character)
+
+
+def register() -> None:
+    """After CLASSES are registered."""
+    bpy.types.Curves.hairloom = PointerProperty(
+        type=HAIRLOOM_PG_groom, name="Hairloom", description="Settings of this groom"
+    )
+    bpy.types.Object.hairloom = PointerProperty(
+        type=HAIRLOOM_PG_character, name="Hairloom", description="Settings of this object's hair"
+    )
+
+
+def unregister() -> None:
+    del bpy.types.Object.hairloom
+    del bpy.types.Curves.hairloom

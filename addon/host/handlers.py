@@ -1,0 +1,70 @@
+"""Blender's events, handed on to the live grooms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import live
+
+_is_reacting = False
+
+
+@persistent
+def on_load_pre(*_: Any) -> None:
+    live.forget_all()
+
+
+@persistent
+def on_load_post(*_: Any) -> None:
+    live.forget_all()
+
+
+@persistent
+def on_undo_post(*_: Any) -> None:
+    live.undone()
+
+
+@persistent
+def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    _react(live.updated, depsgraph)
+
+
+@persistent
+def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    _react(live.frame_changed, depsgraph)
+
+
+def _react(reaction: Callable[[bpy.types.Depsgraph], None], depsgraph: bpy.types.Depsgraph) -> None:
+    """Once at a time, and not for a render, which has its own copy of the scene and its thread."""
+    global _is_reacting
+    if _is_reacting or not live.sessions() or depsgraph.mode != "VIEWPORT":
+        return
+    _is_reacting = True
+    try:
+        reaction(depsgraph)
+    finally:
+        _is_reacting = False
+
+
+HANDLERS = (
+    (bpy.app.handlers.load_pre, on_load_pre),
+    (bpy.app.handlers.load_post, on_load_post),
+    (bpy.app.handlers.undo_post, on_undo_post),
+    (bpy.app.handlers.redo_post, on_undo_post),
+    (bpy.app.handlers.depsgraph_update_post, on_depsgraph_update),
+    (bpy.app.handlers.frame_change_post, on_frame_change),
+)
+
+
+def register() -> None:
+    for handlers, handler in HANDLERS:
+        handlers.append(handler)
+
+
+def unregister() -> None:
+    for handlers, handler in reversed(HANDLERS):
+        handlers.remove(handler)

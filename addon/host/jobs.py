@@ -1,0 +1,262 @@
+"""The verbs of the command line, each one screen of named steps."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from .. import pipeline
+from ..arrays import Floats
+from ..cards.settings import CardSettings
+from ..dynamics.colliders import DistanceField
+from ..dynamics.settings import DynamicsSettings
+from ..errors import HairloomError
+from ..exchange.sidecar import write_sidecar
+from ..exchange.tressfx import write_tfx
+from ..groom.settings import GrowSettings, GuideSettings
+from ..params import Settings
+from ..pipeline import Pose, Rig
+from ..shading.ambient import AmbientSettings
+from ..shading.settings import ShadingSettings, StrandSettings
+from ..shading.textures import TextureSettings, card_texture
+from .glb import write_glb
+from .images import contact_sheet, write_png
+from .inputs import Inputs, Sources, read_inputs
+from .report import Progress, Report
+from .studio import Studio
+from .take import Take, read_take, scene_poses, shaken_poses, write_take
+from .take import simulate as simulate_take
+
+SHEET_COLUMNS, SHEET_ROWS = 4, 3
+
+
+@dataclass(frozen=True)
+class Job:
+    """One call of a verb: what to work on, how, and where the result goes."""
+
+    verb: str
+    sources: Sources
+    settings: dict[str, Settings]
+    output: Path
+    options: argparse.Namespace
+
+    def set[S: Settings](self, kind: type[S]) -> S:
+        """This job's values of one parameter set."""
+        values = self.settings[kind.section]
+        assert isinstance(values, kind)
+        return values
+
+
+def simulate(job: Job) -> None:
+    """Simulate the guides and write them as a take."""
+    report = Report(job.verb)
+    rig, inputs = _rig(job, report)
+    take = _simulate(job, rig, inputs, report)
+    with report.stage("write take"):
+        write_take(job.output, take)
+    _finish(job, report, job.output)
+
+
+def render(job: Job) -> None:
+    """Draw a still, at rest or at a frame of a take, and a contact sheet of the take."""
+    if job.options.sheet and not job.options.take:
+        raise HairloomError(
+            "a contact sheet needs motion", place="--sheet", remedy="Give a take with --take"
+        )
+    report = Report(job.verb)
+    rig, _ = _rig(job, report)
+    studio = _studio(job, rig, report)
+    if job.options.sheet:
+        take = read_take(Path(job.options.take), rig)
+        _write_sheet(Path(job.options.sheet), studio, rig, take, report)
+    pose, points = _moment(job, rig)
+    _write_still(job, job.output, studio, pose, points, report)
+    _finish(job, report, job.output)
+
+
+def cards(job: Job) -> None:
+    """Turn the guides into hair cards, sorted from inside to outside, and write a GLB."""
+    report = Report(job.verb)
+    rig, _ = _rig(job, report)
+    _write_cards(job, job.output, rig, report)
+    _finish(job, report, job.output)
+
+
+def export(job: Job) -> None:
+    """Write the strands, at rest or at a frame of a take, as TressFX."""
+    report = Report(job.verb)
+    rig, _ = _rig(job, report)
+    _, points = _moment(job, rig)
+    with report.stage("write strands"):
+        write_tfx(job.output, rig.strands.with_points(points.reshape(-1, 3)))
+    _finish(job, report, job.output)
+
+
+def demo(job: Job) -> None:
+    """Do it all: simulate, still, contact sheet, hair cards, strands and report.json."""
+    report = Report(job.verb)
+    folder = job.output
+    rig, inputs = _rig(job, report)
+    take = _simulate(job, rig, inputs, report)
+    studio = _studio(job, rig, report)
+    _write_still(job, folder / "still.png", studio, *_rest(rig), report)
+    _write_sheet(folder / "motion.png", studio, rig, take, report)
+    _write_cards(job, folder / "cards.glb", rig, report)
+    with report.stage("write strands"):
+        write_tfx(folder / "strands.tfx", rig.strands)
+    report.add_output(folder / "strands.tfx")
+    report.write(folder / "report.json")
+    print(f"Wrote {', '.join(report.facts['outputs'])} and report.json into {folder}")
+
+
+def _rig(job: Job, report: Report) -> tuple[Rig, Inputs]:
+    """Read what the job names and make it ready to move."""
+    print("reading", job.sources.groom or "(a groom grown here)", flush=True)
+    with report.stage("read inputs"):
+        inputs = read_inputs(job.sources, job.set(GrowSettings))
+    _tell_drops(job, inputs)
+    with report.stage("bind roots, choose guides"):
+        rig = pipeline.prepare(
+            inputs.strands, inputs.head, job.set(GuideSettings), place=inputs.groom_name
+        )
+    low, high = rig.strands.bounds()
+    report.facts.update(
+        groom=Path(inputs.groom_name).name,
+        strands=rig.strands.strand_count,
+        guides=len(rig.guides),
+        children=rig.strands.strand_count - len(rig.guides),
+        cv_count=rig.strands.grid.shape[1],
+        bounds_m=[low.round(5).tolist(), high.round(5).tolist()],
+        dropped=inputs.dropped,
+    )
+    return rig, inputs
+
+
+def _tell_drops(job: Job, inputs: Inputs) -> None:
+    """Say what was dropped; with --strict that is an error."""
+    if not inputs.dropped:
+        return
+    reasons = ", ".join(f"{count} with {reason}" for reason, count in inputs.dropped.items())
+    if job.options.strict:
+        raise HairloomError(
+            f"strands would be dropped: {reasons}",
+            place=inputs.groom_name,
+            remedy="Mend the groom, or leave out --strict",
+        )
+    print(f"hairloom: {inputs.groom_name}: dropped strands: {reasons}", flush=True)
+
+
+def _simulate(job: Job, rig: Rig, inputs: Inputs, report: Report) -> Take:
+    """Run the dynamics under the scene's animation or the shake."""
+    rate = float(job.options.frame_rate)
+    with report.stage("collider"):
+        collider = DistanceField.from_surface(inputs.collider, job.set(DynamicsSettings))
+    poses, rate = _poses(job, rig, inputs, rate)
+    progress = Progress("simulating", len(poses) - 1)
+    take, worst = simulate_take(
+        rig, collider, poses, rate, job.set(DynamicsSettings), report.stage, progress.show
+    )
+    report.facts.update(
+        frames=len(poses),
+        frame_rate=rate,
+        stretch_max_percent=round(worst.stretch * 100.0, 4),
+        penetration_max_mm=round(worst.penetration * 1000.0, 4),
+    )
+    return take
+
+
+def _poses(job: Job, rig: Rig, inputs: Inputs, rate: float) -> tuple[list[Pose], float]:
+    """The head's poses, and their rate: the scene's, when its animation is asked for."""
+    if not job.options.scene:
+        return shaken_poses(rig, round(job.options.seconds * rate) + 1, rate), rate
+    if inputs.head_object is None:
+        raise HairloomError(
+            "only an object of the open scene is animated",
+            place="--scene",
+            remedy="Name the head's object with --head, or leave out --scene",
+        )
+    scene = bpy.context.scene
+    frames = range(scene.frame_start, scene.frame_end + 1)
+    return list(scene_poses(inputs.head_object, frames)), scene.render.fps / scene.render.fps_base
+
+
+def _rest(rig: Rig) -> tuple[Pose, Floats]:
+    return rig.rest_pose, rig.strands.grid
+
+
+def _moment(job: Job, rig: Rig) -> tuple[Pose, Floats]:
+    """The pose and all strands at the frame of the take that was asked for; else at rest."""
+    if not job.options.take:
+        return _rest(rig)
+    take = read_take(Path(job.options.take), rig)
+    if not 0 <= job.options.frame < take.frame_count:
+        raise HairloomError(
+            f"frame {job.options.frame} is not in this take",
+            place=job.options.take,
+            remedy=f"Use a frame from 0 to {take.frame_count - 1}",
+        )
+    pose = take.pose(job.options.frame)
+    return pose, pipeline.strands_at(rig, pose, take.guides[job.options.frame])
+
+
+def _studio(job: Job, rig: Rig, report: Report) -> Studio:
+    with report.stage("ambient occlusion"):
+        occlusion = pipeline.rest_occlusion(rig, job.set(AmbientSettings))
+        head_occlusion = pipeline.head_occlusion(rig, job.set(AmbientSettings))
+    return Studio(rig, occlusion, head_occlusion, job.set(ShadingSettings), job.set(StrandSettings))
+
+
+def _write_still(
+    job: Job, path: Path, studio: Studio, pose: Pose, points: Floats, report: Report
+) -> None:
+    print("drawing the still", flush=True)
+    options = job.options
+    with report.stage("draw still"):
+        picture = studio.picture(pose, points, options.width, options.height, options.samples)
+    with report.stage("write still"):
+        write_png(path, picture)
+    report.add_output(path)
+
+
+def _write_sheet(path: Path, studio: Studio, rig: Rig, take: Take, report: Report) -> None:
+    """Frames spread evenly over the take, as one picture."""
+    count = min(SHEET_COLUMNS * SHEET_ROWS, take.frame_count)
+    progress, pictures = Progress("drawing the contact sheet", count), []
+    for frame in np.linspace(0, take.frame_count - 1, count).round().astype(int):
+        pose = take.pose(frame)
+        with report.stage("interpolate strands"):
+            points = pipeline.strands_at(rig, pose, take.guides[frame])
+        with report.stage("draw frame"):
+            pictures.append(studio.picture(pose, points, 480, 360, samples=2))
+        progress.show(len(pictures))
+    write_png(path, contact_sheet(pictures, SHEET_COLUMNS))
+    report.add_output(path)
+
+
+def _write_cards(job: Job, path: Path, rig: Rig, report: Report) -> None:
+    print("building hair cards", flush=True)
+    with report.stage("build cards"):
+        mesh = pipeline.cards_of(rig, job.set(CardSettings), job.set(AmbientSettings))
+    with report.stage("card texture"):
+        texture = card_texture(job.set(TextureSettings), mesh.atlas_columns)
+    with report.stage("write cards"):
+        write_glb(
+            path, mesh, texture, name=path.stem, base_color=job.set(ShadingSettings).base_color
+        )
+        sidecar = write_sidecar(path, mesh)
+    report.facts.update(cards=mesh.card_count, card_triangles=len(mesh.triangles))
+    report.add_output(path)
+    report.add_output(sidecar)
+
+
+def _finish(job: Job, report: Report, output: Path) -> None:
+    """Name the result, and write the report where one was asked for."""
+    if not report.facts["outputs"]:
+        report.add_output(output)
+    if job.options.report:
+        report.write(Path(job.options.report))
+    print(f"Wrote {output}")

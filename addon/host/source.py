@@ -1,0 +1,78 @@
+"""What an artist's hair is made of: its curves, and the mesh that they grow from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from ..errors import HairloomError
+from ..strands import StrandSet, Surface
+from ..strands.clean import Cleaned
+from .curves import read_curves
+from .objects import head_of
+from .surfaces import read_surface
+
+
+@dataclass(frozen=True)
+class Source:
+    """Hair and head as Blender shows them, in world space.
+
+    dropped: reason -> number of curves that cannot be used.
+    warnings: what the artist should know, each with its remedy.
+    """
+
+    strands: StrandSet
+    dropped: dict[str, int]
+    head: Surface | None
+    warnings: tuple[str, ...]
+
+
+def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
+    """Read hair and head; without a usable head the hair goes on, with a warning.
+
+    Raises:
+        HairloomError: the object holds no hair curves, or none that can be used.
+    """
+    read = usable_curves(hair, depsgraph)
+    head, warning = _read_head(hair, depsgraph)
+    return Source(read.strands, read.dropped, head, () if warning is None else (warning,))
+
+
+def usable_curves(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
+    """As `read_curves`, but nothing is an error too.
+
+    Raises:
+        HairloomError: the object holds no hair curves, or none that can be used.
+    """
+    read = read_curves(hair, depsgraph)
+    if not read.strands.strand_count:
+        reasons = ", ".join(f"{count:,} with {reason}" for reason, count in read.dropped.items())
+        raise HairloomError(
+            f"none of its curves can be used ({reasons})" if reasons else "it has no curves",
+            place=hair.name,
+            remedy="Add curves of two points or more, or undo what removed them",
+        )
+    return read
+
+
+def _read_head(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[Surface | None, str | None]:
+    """The head, if there is a usable one, and a warning."""
+    head = head_of(hair)
+    if head is None:
+        return None, (
+            f"{hair.name}: it has no surface, so it follows its own object only and collides with "
+            "nothing. Set Surface in its Data properties."
+        )
+    try:
+        surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    except HairloomError as error:
+        return None, str(error)
+    if surface.corner_uv is None:
+        return surface, (
+            f"{head.name}: it has no UVs, so exported strands know no place on its texture. "
+            "Unwrap it (Edit Mode, UV > Unwrap)."
+        )
+    return surface, None

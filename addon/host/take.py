@@ -1,0 +1,168 @@
+"""A take: the guides of a groom over a range of frames, simulated once and drawn often."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from .. import pipeline
+from ..arrays import Floats
+from ..dynamics.colliders import Collider, PosedCollider
+from ..dynamics.measure import deepest_penetration, max_stretch
+from ..dynamics.settings import DynamicsSettings
+from ..errors import HairloomError
+from ..exchange.atomic import atomic_write
+from ..pipeline import Pose, Rig
+from .surfaces import read_surface
+
+#: the shake: how far the head turns and sways, and how often
+SHAKE_ANGLE = np.radians(25.0)
+SHAKE_SWAY = 0.03  # [m]
+SHAKE_RATE = 1.0  # [1/s]
+GRAVITY = np.array([0.0, 0.0, -9.81])  # [m/s^2]
+
+
+@dataclass(frozen=True)
+class Take:
+    """Guides in world space, and the head that they went with.
+
+    guides: (frame_count, guide_count, cv_count, 3) float32 [m].
+    heads: (frame_count, vertex_count, 3) float32 [m].
+    frame_rate: [1/s].
+    """
+
+    guides: Floats
+    heads: Floats
+    frame_rate: float
+
+    @property
+    def frame_count(self) -> int:
+        return len(self.guides)
+
+    def pose(self, frame: int) -> Pose:
+        return Pose(self.heads[frame], np.eye(4))
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The worst of all frames: stretch as a fraction, penetration in metres."""
+
+    stretch: float
+    penetration: float
+
+
+def simulate(
+    rig: Rig,
+    collider: Collider,
+    poses: list[Pose],
+    frame_rate: float,
+    settings: DynamicsSettings,
+    stage: Callable[[str], AbstractContextManager[None]],
+    each_frame: Callable[[int], object],
+) -> tuple[Take, Worst]:
+    """Run the dynamics through the poses, the first being where the hair starts at rest.
+
+    Args:
+        stage: gives a context in which a named stage is timed.
+        each_frame: told the number of each finished frame.
+    """
+    motion = pipeline.begin(rig, poses[0])
+    guides, stretch, penetration = [motion.dynamics.grid], 0.0, 0.0
+    for frame, (before, now) in enumerate(pairwise(poses), start=1):
+        posed = (PosedCollider(collider, before.matrix, now.matrix),)
+        with stage("simulate frame"):
+            motion = pipeline.advance(rig, motion, now, posed, settings, GRAVITY, 1.0 / frame_rate)
+        guides.append(motion.dynamics.grid)
+        stretch = max(stretch, max_stretch(motion.dynamics))
+        penetration = max(penetration, deepest_penetration(motion.dynamics, posed))
+        each_frame(frame)
+    heads = np.stack([_head_of(pose) for pose in poses])
+    return Take(np.stack(guides), heads, frame_rate), Worst(stretch, penetration)
+
+
+def shaken_poses(rig: Rig, frame_count: int, frame_rate: float) -> list[Pose]:
+    """The head turning left and right and swaying: eases in, so that frame 0 is at rest."""
+    assert rig.head is not None
+    low, high = rig.head.bounds()
+    centre = (low + high) / 2.0
+    poses = []
+    for frame in range(frame_count):
+        seconds = frame / frame_rate
+        phase = 2.0 * np.pi * SHAKE_RATE * seconds
+        ease = min(seconds / 0.25, 1.0)
+        matrix = _turn_about(centre, ease * SHAKE_ANGLE * np.sin(phase))
+        matrix[0, 3] += ease * SHAKE_SWAY * np.sin(phase)
+        moved = rig.head.positions @ matrix[:3, :3].T + matrix[:3, 3]
+        poses.append(Pose(moved.astype(np.float32), matrix))
+    return poses
+
+
+def scene_poses(head_object: str, frames: range) -> Iterator[Pose]:
+    """The head as the scene animates it, one pose a frame; leaves the scene where it was."""
+    scene = bpy.context.scene
+    shown, rest = scene.frame_current, None
+    try:
+        for frame in frames:
+            scene.frame_set(frame)
+            head = bpy.data.objects[head_object]
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            surface = read_surface(head, depsgraph, need_uv=False, place=head_object)
+            matrix = np.array(head.evaluated_get(depsgraph).matrix_world)
+            rest = np.linalg.inv(matrix) if rest is None else rest
+            yield Pose(surface.positions, matrix @ rest)
+    finally:
+        scene.frame_set(shown)
+
+
+def write_take(path: Path, take: Take) -> None:
+    """Write a take as .npz, atomically."""
+    with atomic_write(path) as temporary, open(temporary, "wb") as file:
+        np.savez(file, guides=take.guides, heads=take.heads, frame_rate=take.frame_rate)
+
+
+def read_take(path: Path, rig: Rig) -> Take:
+    """Read a take that belongs to this rig.
+
+    Raises:
+        HairloomError: not a take, or one of another groom.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            take = Take(data["guides"], data["heads"], float(data["frame_rate"]))
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise HairloomError(
+            f"this take cannot be read ({error})",
+            place=str(path),
+            remedy="Make it again with hairloom simulate",
+        ) from error
+    assert rig.head is not None
+    wanted = (len(rig.guides), rig.strands.grid.shape[1], 3), rig.head.positions.shape
+    if (take.guides.shape[1:], take.heads.shape[1:]) != wanted:
+        raise HairloomError(
+            f"this take is of another groom (it holds guides of shape {take.guides.shape[1:]},"
+            f" this groom has {wanted[0]})",
+            place=str(path),
+            remedy="Give the groom, head and guide settings that it was simulated with",
+        )
+    return take
+
+
+def _head_of(pose: Pose) -> Floats:
+    assert pose.head_positions is not None, "a take is of hair on a head"
+    return pose.head_positions
+
+
+def _turn_about(centre: Floats, angle: float) -> Floats:
+    """A (4, 4) rotation about the vertical through a point."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    matrix = np.eye(4)
+    matrix[:2, :2] = [[cosine, -sine], [sine, cosine]]
+    matrix[:3, 3] = centre - matrix[:3, :3] @ centre
+    return matrix

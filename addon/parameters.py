@@ -1,0 +1,25 @@
+"""Every parameter set of Hairloom in one table: for the command line, the docs and the tests."""
+
+from __future__ import annotations
+
+from .cards.settings import CardSettings
+from .dynamics.settings import DynamicsSettings
+from .groom.settings import GrowSettings, GuideSettings
+from .params import Settings
+from .shading.ambient import AmbientSettings
+from .shading.settings import ShadingSettings, StrandSettings
+from .shading.textures import TextureSettings
+
+ALL_SETTINGS: dict[str, type[Settings]] = {
+    settings.section: settings
+    for settings in (
+        GrowSettings,
+        GuideSettings,
+        DynamicsSettings,
+        StrandSettings,
+        ShadingSettings,
+        AmbientSettings,
+        CardSettings,
+        TextureSettings,
+    )
+}

@@ -1,0 +1,206 @@
+"""The flows of data through the pure rooms: a groom made ready, a frame of motion, a card build.
+
+Each flow hands values from room to room and decides nothing itself. `host` calls them from the
+artist's buttons and from the command line alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .arrays import Floats, Ints
+from .cards.card_mesh import CardMesh
+from .cards.settings import CardSettings
+from .cards.sort import inside_out_order
+from .cards.strip import build_cards
+from .dynamics.colliders import PosedCollider
+from .dynamics.settings import DynamicsSettings
+from .dynamics.state import DynamicsState, start
+from .dynamics.step import Drive
+from .dynamics.step import advance as advance_dynamics
+from .groom.guides import choose_guides
+from .groom.roots import RootFrames, bind_roots, follow, root_frames
+from .groom.settings import GuideSettings
+from .groom.weights import GuideWeights, guide_weights
+from .refine.interpolate import ride
+from .shading.ambient import AmbientSettings, ambient_occlusion
+from .strands import StrandSet, Surface
+from .strands.resample import resample
+
+
+#: Where the light that reaches the skin is measured, above it, so that it is in the hair [m].
+SKIN_CLEARANCE = 0.003
+#: Drawn strands stand for several hairs each, through which a scalp would shine: more extinction.
+SCALP_EXTINCTION = 12.0
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the body is at one moment.
+
+    head_positions: (vertex_count, 3) [m], world space, or None for hair without a head.
+    matrix: (4, 4), moves rest world space to now; carries hair without a head, and colliders.
+    """
+
+    head_positions: Floats | None
+    matrix: Floats
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A groom made ready to move: all strands at one CV count, their guides and weights.
+
+    strands: uniform, world space at rest; bound when there is a head.
+    guides: (guide_count,) indices of the strands that are simulated.
+    rest_frames: of all strands, or None without a head.
+    """
+
+    strands: StrandSet
+    head: Surface | None
+    guides: Ints
+    weights: GuideWeights
+    rest_frames: RootFrames | None
+
+    @property
+    def rest_pose(self) -> Pose:
+        return Pose(None if self.head is None else self.head.positions, np.eye(4))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What one frame hands to the next.
+
+    carried_guides: (guide_count, cv_count, 3) [m], the guides' rest shape carried by the roots.
+    """
+
+    dynamics: DynamicsState
+    carried_guides: Floats
+    pose: Pose
+
+
+def prepare(
+    strands: StrandSet, head: Surface | None, settings: GuideSettings, *, place: str
+) -> Rig:
+    """Bind strands to the head, choose the guides, weigh them for every strand.
+
+    Args:
+        strands: world space at rest.
+        head: world space at rest, or None for hair that only follows its object.
+        place: names the groom in error messages.
+
+    Raises:
+        HairloomError: no strands, or a groom of another scale than the head.
+    """
+    bound = strands if head is None else bind_roots(strands, head, place=place).strands
+    uniform = resample(bound, settings.cv_count)
+    guides = choose_guides(uniform, settings)
+    grid, group = uniform.grid, uniform.group
+    weights = guide_weights(
+        uniform.roots,
+        group,
+        uniform.roots[guides],
+        group[guides],
+        strand_grid=grid,
+        guide_grid=grid[guides],
+    )
+    return Rig(uniform, head, guides, weights, _frames(uniform, head))
+
+
+def _frames(strands: StrandSet, head: Surface | None) -> RootFrames | None:
+    if head is None:
+        return None
+    assert strands.root_triangle is not None and strands.root_barycentric is not None
+    return root_frames(
+        head.positions, head.triangles, strands.root_triangle, strands.root_barycentric
+    )
+
+
+def carried(rig: Rig, pose: Pose, chosen: Ints | slice = slice(None)) -> Floats:
+    """Rest shapes of the chosen strands, each carried rigidly by its own root, (n, cv_count, 3)."""
+    grid = rig.strands.grid[chosen]
+    if rig.head is None or pose.head_positions is None or rig.rest_frames is None:
+        return (grid @ pose.matrix[:3, :3].T + pose.matrix[:3, 3]).astype(np.float32)
+    triangle, barycentric = rig.strands.root_triangle, rig.strands.root_barycentric
+    assert triangle is not None and barycentric is not None
+    now = root_frames(
+        pose.head_positions, rig.head.triangles, triangle[chosen], barycentric[chosen]
+    )
+    rest = RootFrames(rig.rest_frames.origin[chosen], rig.rest_frames.rotation[chosen])
+    return follow(grid, rest, now)
+
+
+def begin(rig: Rig, pose: Pose) -> Motion:
+    """Hair at rest in this pose."""
+    guides = carried(rig, pose, rig.guides)
+    return Motion(start(guides), guides, pose)
+
+
+def advance(
+    rig: Rig,
+    motion: Motion,
+    pose: Pose,
+    colliders: tuple[PosedCollider, ...],
+    settings: DynamicsSettings,
+    gravity: Floats,
+    duration: float,
+) -> Motion:
+    """One frame of motion: the roots go with the head, the dynamics moves the rest.
+
+    Args:
+        gravity: (3,) [m/s^2], world space.
+        duration: time since the motion's pose [s].
+    """
+    guides = carried(rig, pose, rig.guides)
+    drive = Drive(motion.carried_guides, guides, colliders, gravity)
+    return Motion(advance_dynamics(motion.dynamics, drive, settings, duration), guides, pose)
+
+
+def strands_now(rig: Rig, motion: Motion) -> Floats:
+    """All strands at this moment of a running motion, (strand_count, cv_count, 3) [m]."""
+    return strands_at(rig, motion.pose, motion.dynamics.grid)
+
+
+def strands_at(rig: Rig, pose: Pose, guides_now: Floats) -> Floats:
+    """All strands riding on guides, (strand_count, cv_count, 3) [m], world space.
+
+    Args:
+        guides_now: (guide_count, cv_count, 3) [m], simulated or baked, world space.
+    """
+    strands = carried(rig, pose)
+    return ride(strands, strands[rig.guides], guides_now, rig.weights)
+
+
+def rest_occlusion(rig: Rig, settings: AmbientSettings) -> Floats:
+    """Ambient occlusion of every CV at rest, (strand_count, cv_count), 1 where nothing shades."""
+    strands = rig.strands
+    occlusion = ambient_occlusion(strands, strands.points, rig.head, settings)
+    return occlusion.reshape(strands.strand_count, -1)
+
+
+def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:
+    """How much of the light the hair lets through to the head, (vertex_count,); None without one."""
+    if rig.head is None:
+        return None
+    above = rig.head.positions + SKIN_CLEARANCE * rig.head.vertex_normals()
+    under_hair = replace(settings, extinction=SCALP_EXTINCTION)
+    return ambient_occlusion(rig.strands, above, None, under_hair)
+
+
+def cards_of(rig: Rig, settings: CardSettings, ambient: AmbientSettings) -> CardMesh:
+    """One card for each guide, with ambient occlusion, in order from the inside to the outside."""
+    guides = rig.strands.grid[rig.guides]
+    mesh = build_cards(guides, root_normals(rig)[rig.guides], settings)
+    occlusion = ambient_occlusion(rig.strands, mesh.positions, rig.head, ambient)
+    return inside_out_order(mesh.with_occlusion(occlusion), rig.head)
+
+
+def root_normals(rig: Rig) -> Floats:
+    """The surface's normal under each root, (strand_count, 3); without a head, outwards."""
+    if rig.rest_frames is not None:
+        return np.ascontiguousarray(rig.rest_frames.rotation[:, :, 2])
+    outward = rig.strands.roots - rig.strands.points.mean(axis=0)
+    length = np.linalg.norm(outward, axis=1, keepdims=True)
+    up = np.array([0.0, 0.0, 1.0], np.float32)
+    return np.where(length > 0.0, outward / np.maximum(length, 1e-12), up).astype(np.float32)

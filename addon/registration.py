@@ -1,0 +1,77 @@
+"""What Blender learns of Hairloom when it is enabled, and forgets when it is disabled.
+
+Nothing here touches the GPU: that begins with the first draw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+
+from .host import groups, handlers, live
+from .host.command_line import run
+from .ui import operators_files, operators_preview, panels
+
+#: the package that Blender knows, above this one; it is called otherwise in every repository
+ROOT_PACKAGE = __package__.rpartition(".")[0]
+COMMAND = "hairloom"
+
+CLASSES: tuple[type[Any], ...] = (
+    *groups.CLASSES,
+    *operators_preview.CLASSES,
+    *operators_files.CLASSES,
+    *panels.CLASSES,
+)
+
+type Step = tuple[Callable[[], Any], Callable[[], Any]]
+
+_command: Any = None
+
+
+def register() -> None:
+    """Take all steps, or none: what was done is undone when one fails, and the error raised."""
+    done: list[Step] = []
+    try:
+        for step in _steps():
+            step[0]()
+            done.append(step)
+    except BaseException:
+        for _, undo in reversed(done):
+            undo()
+        raise
+
+
+def unregister() -> None:
+    """The exact mirror image, after the previews have ended."""
+    live.clear()
+    for _, undo in reversed(_steps()):
+        undo()
+
+
+def _steps() -> tuple[Step, ...]:
+    """What is done and how it is undone, in order."""
+    return (
+        *(_class_step(each) for each in CLASSES),
+        (groups.register, groups.unregister),
+        (panels.register, panels.unregister),
+        (handlers.register, handlers.unregister),
+        (_register_command, _unregister_command),
+    )
+
+
+def _class_step(each: type[Any]) -> Step:
+    return (
+        lambda: bpy.utils.register_class(each),
+        lambda: bpy.utils.unregister_class(each),
+    )
+
+
+def _register_command() -> None:
+    global _command
+    _command = bpy.utils.register_cli_command(COMMAND, run)
+
+
+def _unregister_command() -> None:
+    bpy.utils.unregister_cli_command(_command)

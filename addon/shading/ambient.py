@@ -1,0 +1,146 @@
+"""Ambient occlusion of hair: how much of the sky's light reaches a point through hair and body.
+
+The hair becomes a grid of extinction coefficients, light dies in it by Beer and Lambert's law,
+and the 26 directions to a cell's neighbours stand for all directions with the weights of
+Lebedev's quadrature of degree 7 (Lebedev 1976). The optical depth along each direction is one
+running sum over the whole grid, so that the cost does not grow with the number of points.
+
+Limitations: nothing outside of the hair's bounding box shades; detail below a cell is lost.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ..arrays import Floats
+from ..params import Settings, integer, number
+from ..strands import StrandSet, Surface
+from .density_grid import body_depth, grid_around, hair_depth, sample
+
+#: From a cell to one of its 26 neighbours.
+type Step = tuple[int, int, int]
+#: Lebedev's weights of 26 directions: 6 along axes, 12 across edges, 8 across corners; sum 1.
+_DIRECTION_WEIGHTS = {1: 1 / 21, 2: 4 / 105, 3: 9 / 280}
+
+
+@dataclass(frozen=True, kw_only=True)
+class AmbientSettings(Settings):
+    """Shade between the strands, from light that comes from all sides."""
+
+    section: ClassVar[str] = "ambient"
+    title: ClassVar[str] = "Ambient Occlusion"
+
+    strength: float = number(
+        1.0,
+        label="Strength",
+        description="How much of the shade between the strands is shown",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+    )
+    extinction: float = number(
+        1.0,
+        label="Extinction",
+        description="How fast light dies in the hair, as a factor of what the strands' radius "
+        "gives; raise it where few strands stand for many",
+        soft=(0.0, 10.0),
+        hard=(0.0, 10_000.0),
+        source="Kajiya and Kay 1989, section 2; Kim and Neumann 2001, opacity shadow maps",
+    )
+    upper_share: float = number(
+        0.4,
+        label="Light from Above",
+        description="0: the sky shines from all sides alike, 1: from straight above only",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+    )
+    open_sky: float = number(
+        0.5,
+        label="Open Sky",
+        description="Share of the sky that counts as no shade at all: half of it is what the "
+        "surface of a solid body sees",
+        unit="factor",
+        soft=(0.25, 1.0),
+        hard=(0.05, 1.0),
+    )
+    cell_count: int = integer(
+        56,
+        label="Cells",
+        description="Cells of the grid along the longest side of the hair",
+        soft=(16, 96),
+        hard=(4, 256),
+    )
+
+
+def ambient_occlusion(
+    strands: StrandSet, points: Floats, body: Surface | None, settings: AmbientSettings
+) -> Floats:
+    """How open each point is, (n,) float32: 1 at the outside of the hair, 0 where no light comes.
+
+    Args:
+        strands: the hair that shades, world space.
+        points: (n, 3) [m], world space; CVs of the same hair or any others.
+        body: what else shades, world space, or None.
+    """
+    if not strands.strand_count or not len(points):
+        return np.ones(len(points), np.float32)
+    grid = grid_around(strands, settings.cell_count)
+    depth = hair_depth(strands, grid) * np.float32(settings.extinction)
+    if body is not None:
+        depth = np.maximum(depth, body_depth(body, grid))
+    openness = sky_openness(depth, settings.upper_share)
+    seen = sample(openness, grid.coordinates(points)) / settings.open_sky
+    return (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
+
+
+def sky_openness(depth: Floats, upper_share: float) -> Floats:
+    """Mean transmittance of the sky's light at the centre of each cell, of depth's shape."""
+    total = np.zeros_like(depth)
+    for direction, weight in sky_directions(upper_share):
+        total += weight * np.exp(-depth_towards(depth, direction))
+    return total
+
+
+def sky_directions(upper_share: float) -> Iterator[tuple[Step, float]]:
+    """Steps to the 26 neighbours of a cell and the share of light from there; shares sum to 1."""
+    steps: list[Step] = [
+        step for step in itertools.product((-1, 0, 1), (-1, 0, 1), (-1, 0, 1)) if any(step)
+    ]
+    up = np.array([max(z, 0) / np.linalg.norm((x, y, z)) for x, y, z in steps])
+    even = np.array([_DIRECTION_WEIGHTS[sum(map(abs, step))] for step in steps])
+    # from above only: the lobe up^4 is about as wide as the directions lie apart
+    above = even * up**4
+    share = (1.0 - upper_share) * even + upper_share * above / above.sum()
+    return ((step, float(weight)) for step, weight in zip(steps, share, strict=True) if weight)
+
+
+def depth_towards(depth: Floats, step: Step) -> Floats:
+    """Optical depth from each cell's centre out of the grid along one of 26 directions.
+
+    Half of the own cell, then every cell on the way, each crossed over the length of the step.
+    """
+    axis = int(np.argmax(np.abs(step)))
+    others = [step[other] for other in range(3) if other != axis]
+    layers = np.moveaxis(depth, axis, 0)
+    if step[axis] > 0:
+        layers = layers[::-1]
+    beyond = np.zeros(layers.shape, np.float32)
+    for index in range(1, len(layers)):
+        _add_shifted(beyond[index], beyond[index - 1] + layers[index - 1], others)
+    crossed = (beyond + 0.5 * layers) * np.float32(np.linalg.norm(step))
+    return np.moveaxis(crossed[::-1] if step[axis] > 0 else crossed, 0, axis)
+
+
+def _add_shifted(target: Floats, source: Floats, step: list[int]) -> None:
+    """target[i, j] += source[i + step[0], j + step[1]] where that exists."""
+    to, at = [], []
+    for size, shift in zip(target.shape, step, strict=True):
+        to.append(slice(max(0, -shift), size - max(0, shift)))
+        at.append(slice(max(0, shift), size - max(0, -shift)))
+    target[tuple(to)] += source[tuple(at)]

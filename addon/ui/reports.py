@@ -1,0 +1,49 @@
+"""How operators tell the artist what happened."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import bpy
+
+from ..errors import HairloomError
+from ..host.groom_files import Outcome, dropped_phrase
+
+
+def reporting(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
+    """For an operator's `execute`: bad input becomes an error report, not a traceback."""
+
+    @functools.wraps(execute)
+    def reported(self: Any, context: bpy.types.Context) -> set[str]:
+        try:
+            return execute(self, context)
+        except HairloomError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+    return reported
+
+
+def tell(operator: bpy.types.Operator, outcome: Outcome) -> None:
+    """The result, with what was dropped, after the warnings."""
+    for warning in outcome.warnings:
+        operator.report({"WARNING"}, warning)
+    parts = filter(None, (outcome.result, dropped_phrase(outcome.dropped)))
+    operator.report({"WARNING" if outcome.dropped else "INFO"}, "; ".join(parts))
+
+
+@contextmanager
+def waiting(context: bpy.types.Context) -> Iterator[None]:
+    """The wait cursor, for work that takes a second or more."""
+    window = context.window
+    if window is None or bpy.app.background:
+        yield
+        return
+    window.cursor_modal_set("WAIT")
+    try:
+        yield
+    finally:
+        window.cursor_modal_restore()

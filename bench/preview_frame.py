@@ -1,0 +1,124 @@
+"""One frame of the preview, 11,400 strands of 16 points at 960 x 720, stage by stage.
+
+The reference draws the same strands as plain lines with the gpu module's own shader, uploaded
+again each frame as a batch: what an add-on does that follows the module's examples. Ours draws
+ribbons with width and two subdivisions, lit by three lights and with two shifted highlights.
+"""
+
+import json
+import platform
+import statistics
+import time
+from collections.abc import Callable
+
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+from mathutils import Matrix
+
+from hairloom.addon import pipeline
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.settings import GrowSettings, GuideSettings
+from hairloom.addon.host.built_in_head import built_in_head
+from hairloom.addon.host.take import GRAVITY, shaken_poses
+from hairloom.addon.render.camera import frame_camera
+from hairloom.addon.render.snapshot import Snapshot
+from hairloom.addon.render.strand_pass import StrandPass
+from hairloom.addon.shading.lights import three_point_lights
+
+STRANDS, WIDTH, HEIGHT, FRAMES = 11_400, 960, 720, 30
+
+
+class Stopwatch:
+    """Milliseconds of each stage, frame by frame."""
+
+    def __init__(self) -> None:
+        self.times: dict[str, list[float]] = {}
+
+    def measure[T](self, name: str, work: Callable[[], T]) -> T:
+        begin = time.perf_counter()
+        result = work()
+        self.times.setdefault(name, []).append((time.perf_counter() - begin) * 1000.0)
+        return result
+
+    def medians(self) -> dict[str, float]:
+        return {name: round(statistics.median(times[2:]), 3) for name, times in self.times.items()}
+
+
+class Lines:
+    """The reference: every strand as a line strip of one pixel, in one colour."""
+
+    def __init__(self, strand_count: int, cv_count: int) -> None:
+        self._shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+        first = np.arange(strand_count * cv_count, dtype=np.int32).reshape(strand_count, cv_count)
+        self._indices = np.stack([first[:, :-1], first[:, 1:]], axis=-1).reshape(-1, 2)
+
+    def draw(self, points: np.ndarray) -> None:
+        batch = batch_for_shader(
+            self._shader, "LINES", {"pos": points.reshape(-1, 3)}, indices=self._indices
+        )
+        self._shader.uniform_float("color", (0.5, 0.3, 0.1, 1.0))
+        batch.draw(self._shader)
+
+
+def main() -> None:
+    gpu.init()
+    head = built_in_head()
+    strands = grow(head, GrowSettings(strand_count=STRANDS), scalp_density(head))
+    rig = pipeline.prepare(strands, head, GuideSettings(), place="bench")
+    poses = shaken_poses(rig, FRAMES, 60.0)
+    motion = pipeline.begin(rig, poses[0])
+    radius = rig.strands.radius.reshape(STRANDS, -1)
+    camera = frame_camera(rig.strands.bounds(), (-0.5, -1.0, 0.2), 0.5, WIDTH / HEIGHT)
+    lights, ours = three_point_lights(camera.view), StrandPass()
+    lines = Lines(STRANDS, rig.strands.grid.shape[1])
+    color = gpu.types.GPUTexture((WIDTH, HEIGHT), format="RGBA16F")
+    depth = gpu.types.GPUTexture((WIDTH, HEIGHT), format="DEPTH_COMPONENT32F")
+    target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+    matrix = camera.projection @ camera.view
+
+    def drawn(draw: Callable[[], None]) -> None:
+        """Draws, and waits until one pixel can be read back."""
+        with target.bind():
+            target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
+            gpu.state.depth_test_set("LESS_EQUAL")
+            gpu.matrix.load_matrix(Matrix(matrix.tolist()))
+            gpu.matrix.load_projection_matrix(Matrix.Identity(4))
+            draw()
+            target.read_color(0, 0, 1, 1, 4, 0, "FLOAT")
+
+    watch = Stopwatch()
+    for pose in poses[1:]:
+        motion = watch.measure(
+            "simulate_ms",
+            lambda m=motion, p=pose: pipeline.advance(
+                rig, m, p, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0
+            ),
+        )
+        points = watch.measure("interpolate_ms", lambda m=motion: pipeline.strands_now(rig, m))
+        snapshot = Snapshot(strands=points, radius=radius, lights=lights)
+        watch.measure(
+            "draw_ms",
+            lambda s=snapshot: drawn(lambda: ours.draw(s, camera, WIDTH, HEIGHT)),
+        )
+        watch.measure("lines_ms", lambda p=points: drawn(lambda: lines.draw(p)))
+    medians = watch.medians()
+    print(
+        json.dumps(
+            {
+                **medians,
+                "strands": STRANDS,
+                "reference": "LINES, builtin UNIFORM_COLOR, batch_for_shader each frame",
+                "draw_ratio": round(medians["lines_ms"] / medians["draw_ms"], 3),
+                "backend": gpu.platform.backend_type_get(),
+                "renderer": gpu.platform.renderer_get(),
+                "blender": bpy.app.version_string,
+                "python": platform.python_version(),
+            }
+        )
+    )
+
+
+main()

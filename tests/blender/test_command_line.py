@@ -1,0 +1,274 @@
+"""The command line as a farm calls it: exit codes, messages, and nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="the command line runs inside Blender")
+
+import bpy
+
+from hairloom.addon.exchange.tressfx import write_tfx
+from hairloom.addon.host import command_line
+from hairloom.addon.strands import StrandSet
+
+HEAD_OBJ = """
+v -0.1 -0.1 0.0
+v 0.1 -0.1 0.0
+v 0.1 0.1 0.0
+v -0.1 0.1 0.0
+v 0.0 0.0 0.15
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+vt 0.5 0.5
+f 4/4 3/3 2/2 1/1
+f 1/1 2/2 5/5
+f 2/2 3/3 5/5
+f 3/3 4/4 5/5
+f 4/4 1/1 5/5
+"""
+SMALL = ["--set", "guides.guide_count=20", "--set", "guides.cv_count=8"]
+
+
+def hair_on_pyramid(strand_count: int = 60, cv_count: int = 8) -> StrandSet:
+    """Straight hair that stands on the pyramid of HEAD_OBJ as OBJ's Y up places it."""
+    random = np.random.default_rng(5)
+    root = random.uniform(-0.05, 0.05, (strand_count, 3)) * [1.0, 0.0, 1.0] + [0.0, -0.075, 0.0]
+    along = np.linspace(0.0, 0.1, cv_count)[None, :, None] * np.array([0.3, -1.0, 0.2])
+    points = (root[:, None] + along).astype(np.float32)
+    return StrandSet(
+        points.reshape(-1, 3),
+        np.arange(strand_count + 1) * cv_count,
+        np.full(strand_count * cv_count, 4e-5),
+        np.zeros(strand_count),
+    )
+
+
+@pytest.fixture
+def head(tmp_path: Path) -> Path:
+    path = tmp_path / "head.obj"
+    path.write_text(HEAD_OBJ)
+    return path
+
+
+@pytest.fixture
+def groom(tmp_path: Path) -> Path:
+    path = tmp_path / "hair.tfx"
+    write_tfx(path, hair_on_pyramid())
+    return path
+
+
+def tfx_bytes(positions: np.ndarray, version: float = 4.0) -> bytes:
+    """A TressFX v4 file by formats' table, written without our writer: positions (s, v, 3)."""
+    strands, vertices = positions.shape[:2]
+    header = struct.pack("<f8I", version, strands, vertices, 160, 0, 0, 0, 0, 0).ljust(160, b"\0")
+    block = np.ones((strands, vertices, 4), "<f4")
+    block[..., :3] = positions
+    return header + block.tobytes()
+
+
+STRAIGHT = np.linspace([0, 0, 0.15], [0, 0, 0.25], 8)[None]
+BAD_GROOMS = {
+    "truncated": tfx_bytes(np.repeat(STRAIGHT, 9, axis=0))[:700],
+    "wrong version": tfx_bytes(STRAIGHT, version=2.0),
+    "garbage": bytes(np.random.default_rng(1).integers(0, 256, 4000, dtype=np.uint8)),
+    "empty": b"",
+    "no strands": tfx_bytes(np.zeros((0, 8, 3))),
+    "one-point strands": tfx_bytes(STRAIGHT[:, :1]),
+    "only NaN": tfx_bytes(np.full((5, 8, 3), np.nan)),
+    "another scale": tfx_bytes(np.repeat(STRAIGHT, 30, axis=0) * 100.0),
+}
+
+
+@pytest.mark.parametrize("kind", BAD_GROOMS)
+@pytest.mark.parametrize("verb", ["simulate", "render", "cards", "export", "demo"])
+def test_a_bad_groom_gets_a_message_and_leaves_nothing(
+    verb: str, kind: str, head: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bad = tmp_path / "bad.tfx"
+    bad.write_bytes(BAD_GROOMS[kind])
+    output = tmp_path / "made" / "result.glb"
+    arguments = [verb, "--groom", str(bad), "--head", str(head), "--output", str(output)]
+    blocks = data_blocks()
+
+    assert command_line.run(arguments) == 1
+
+    message = capfd.readouterr().err
+    assert message.startswith("hairloom: ") and str(bad) in message
+    assert message.count(". ") >= 1, f"no remedy in: {message}"
+    assert "Traceback" not in message
+    assert not output.exists() and not list(tmp_path.rglob("*.glb"))
+    assert data_blocks() == blocks
+
+
+def data_blocks() -> dict[str, int]:
+    names = ("objects", "meshes", "materials", "images", "scenes", "hair_curves")
+    return {name: len(getattr(bpy.data, name)) for name in names}
+
+
+def test_another_scale_names_the_factor(
+    head: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    big = tmp_path / "big.tfx"
+    strands = hair_on_pyramid()
+    write_tfx(big, strands.with_points(strands.points * 100.0))
+    arguments = ["export", "--groom", str(big), "--head", str(head)]
+    assert command_line.run([*arguments, "--output", str(tmp_path / "out.tfx")]) == 1
+    assert "0.01" in capfd.readouterr().err
+    scaled = [*arguments, "--groom-scale", "0.01", "--output", str(tmp_path / "out.tfx")]
+    assert command_line.run(scaled) == 0
+
+
+@pytest.mark.parametrize("verb", ["simulate", "render", "cards", "export"])
+def test_a_head_without_uvs_needs_a_word(
+    verb: str, groom: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bare = tmp_path / "bare.obj"
+    lines = [line for line in HEAD_OBJ.splitlines() if not line.startswith("vt")]
+    faces = [" ".join(word.split("/")[0] for word in line.split(" ")) for line in lines]
+    bare.write_text("\n".join(faces))
+    arguments = [verb, "--groom", str(groom), "--head", str(bare), *SMALL]
+    assert command_line.run([*arguments, "--output", str(tmp_path / "result.glb")]) == 1
+    message = capfd.readouterr().err
+    assert str(bare) in message and "UV" in message and "--no-uv" in message
+    assert not (tmp_path / "result.glb").exists()
+
+
+def test_a_head_without_uvs_is_accepted_on_request(groom: Path, tmp_path: Path) -> None:
+    bare = tmp_path / "bare.obj"
+    bare.write_text("\n".join(x for x in HEAD_OBJ.replace("/", " /").splitlines() if x[:2] == "v "))
+    with open(bare, "a") as file:
+        file.write("\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n")
+    arguments = ["export", "--groom", str(groom), "--head", str(bare), "--no-uv", *SMALL]
+    assert command_line.run([*arguments, "--output", str(tmp_path / "out.tfx")]) == 0
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "named"),
+    [
+        ("--head", "nowhere.obj", "nowhere.obj"),
+        ("--head", "no such object", "no such object"),
+        ("--head", "notes.txt", "notes.txt"),
+        ("--groom", "nowhere.tfx", "nowhere.tfx"),
+        ("--set", "dynamics.nonsense=1", "nonsense"),
+        ("--set", "guides.guide_count=many", "guide_count"),
+        ("--set", "nonsense", "--set"),
+    ],
+)
+def test_a_wrong_name_is_named(
+    option: str,
+    value: str,
+    named: str,
+    groom: Path,
+    head: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    arguments = ["cards", "--groom", str(groom), "--head", str(head), option, value]
+    assert command_line.run([*arguments, "--output", str(tmp_path / "out.glb")]) == 1
+    assert named in capfd.readouterr().err
+    assert not (tmp_path / "out.glb").exists()
+
+
+def test_wrong_usage_exits_with_2() -> None:
+    assert command_line.run(["paint"]) == 2
+    assert command_line.run(["render"]) == 2
+    assert command_line.run(["render", "--help"]) == 0
+
+
+def test_single_bad_strands_are_counted_or_refused(
+    head: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    positions = np.repeat(STRAIGHT, 30, axis=0) + np.random.default_rng(2).normal(
+        0.0, 0.01, (30, 1, 3)
+    )
+    positions[4, 3] = np.nan
+    spoiled = tmp_path / "spoiled.tfx"
+    spoiled.write_bytes(tfx_bytes(positions))
+    report = tmp_path / "report.json"
+    arguments = ["export", "--groom", str(spoiled), "--head", str(head), *SMALL]
+    arguments += ["--output", str(tmp_path / "out.tfx"), "--report", str(report)]
+    assert command_line.run(arguments) == 0
+    assert json.loads(report.read_text())["dropped"] == {"a point that is not finite": 1}
+    (tmp_path / "out.tfx").unlink()
+    assert command_line.run([*arguments, "--strict"]) == 1
+    assert "not finite" in capfd.readouterr().err
+    assert not (tmp_path / "out.tfx").exists()
+
+
+def test_simulate_render_and_export_agree_on_the_take(
+    groom: Path, head: Path, tmp_path: Path, gpu_context: object
+) -> None:
+    source = ["--groom", str(groom), "--head", str(head), *SMALL]
+    take = tmp_path / "hair.npz"
+    shake = ["--seconds", "0.2", "--output", str(take)]
+    assert command_line.run(["simulate", *source, *shake]) == 0
+    with np.load(take) as data:
+        assert data["guides"].shape == (13, 20, 8, 3)
+        assert np.abs(data["guides"][-1] - data["guides"][0]).max() > 1e-3, "nothing moved"
+    picture = tmp_path / "still.png"
+    drawn = ["--take", str(take), "--frame", "12", "--width", "64", "--height", "48"]
+    assert command_line.run(["render", *source, *drawn, "--output", str(picture)]) == 0
+    image = bpy.data.images.load(str(picture))
+    pixels = np.array(image.pixels[:]).reshape(48, 64, 4)
+    bpy.data.images.remove(image)
+    assert np.ptp(pixels[..., :3]) > 0.2, "the picture is empty"
+    wrong = ["--take", str(take), "--frame", "13", "--output", str(tmp_path / "none.png")]
+    assert command_line.run(["render", *source, *wrong]) == 1
+    assert not (tmp_path / "none.png").exists()
+
+
+def test_the_demo_writes_everything_the_report_names(tmp_path: Path, gpu_context: object) -> None:
+    """The built-in head and groom, small."""
+    small = ["--set", "grow.strand_count=300", "--set", "guides.guide_count=40"]
+    size = ["--width", "96", "--height", "72", "--samples", "1", "--seconds", "0.2"]
+    assert command_line.run(["demo", *small, *size, "--output", str(tmp_path)]) == 0
+    report = json.loads((tmp_path / "report.json").read_text())
+    for name in report["outputs"]:
+        assert (tmp_path / name).stat().st_size > 0
+    assert report["strands"] == 300 and report["guides"] == 40 and report["children"] == 260
+    assert report["stretch_max_percent"] < 1.0
+    assert report["backend"] and report["renderer"]
+    assert {"read inputs", "simulate frame", "draw still", "build cards"} <= set(
+        report["stages_ms"]
+    )
+
+
+def test_the_scene_moves_the_head(tmp_path: Path) -> None:
+    """With --scene the take follows the object's own animation, and leaves the frame alone."""
+    scene = bpy.context.scene
+    mesh = bpy.data.meshes.new("Moving")
+    mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (0, 1, 0), (0, 0, -1)], [], [(0, 1, 2), (0, 3, 1)])
+    mesh.uv_layers.new(name="UVMap")
+    moving = bpy.data.objects.new("Moving head", mesh)
+    scene.collection.objects.link(moving)
+    moving.keyframe_insert("location", frame=1)
+    moving.location.x = 0.5
+    moving.keyframe_insert("location", frame=5)
+    hair = tmp_path / "hair.tfx"
+    random = np.random.default_rng(3)
+    roots = random.uniform(-0.3, 0.3, (25, 1, 3)) * [1, 1, 0]
+    points = (roots + np.linspace([0, 0, 0.0], [0, 0, 0.3], 8)).astype(np.float32)
+    strands = StrandSet(points.reshape(-1, 3), np.arange(26) * 8, np.full(200, 4e-5), np.zeros(25))
+    write_tfx(hair, strands)
+    scene.frame_start, scene.frame_end = 1, 5
+    scene.frame_set(2)
+    take = tmp_path / "take.npz"
+    try:
+        arguments = ["simulate", "--groom", str(hair), "--head", "Moving head", "--scene", *SMALL]
+        assert command_line.run([*arguments, "--output", str(take)]) == 0
+        assert scene.frame_current == 2
+    finally:
+        bpy.data.objects.remove(moving)
+        bpy.data.meshes.remove(mesh)
+    with np.load(take) as data:
+        moved = data["guides"][-1, :, 0] - data["guides"][0, :, 0]
+        assert data["frame_rate"] == 24.0
+    np.testing.assert_allclose(moved, np.tile([0.5, 0.0, 0.0], (20, 1)), atol=1e-5)

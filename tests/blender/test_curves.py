@@ -1,0 +1,216 @@
+"""Hair curves in and out of Blender."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Euler, Matrix
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.host.curves import read_curves, write_curves
+from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands.clean import clean
+
+
+def ragged(seed=0, counts=(2, 5, 16, 3)):
+    rng = np.random.default_rng(seed)
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    return StrandSet(
+        points=rng.normal(size=(offsets[-1], 3)),
+        offsets=offsets,
+        radius=rng.uniform(1e-5, 1e-3, offsets[-1]),
+        group=np.arange(len(counts)) % 3,
+        root_uv=rng.random((len(counts), 2)),
+    )
+
+
+def written(strands, surface=None):
+    return write_curves("Hair", strands, surface, bpy.context.collection)
+
+
+def raw_curves(points, counts):
+    """Curves object from any numbers, also such that no StrandSet would take."""
+    curves = bpy.data.hair_curves.new("Raw")
+    curves.add_curves(list(counts))
+    curves.position_data.foreach_set("vector", np.asarray(points, np.float32).ravel())
+    obj = bpy.data.objects.new("Raw", curves)
+    bpy.context.collection.objects.link(obj)
+    return obj
+
+
+def same(one, other):
+    return all(
+        np.array_equal(getattr(one, name), getattr(other, name))
+        for name in ("points", "offsets", "radius", "group", "root_uv")
+    )
+
+
+def test_what_is_written_is_read_back_bit_for_bit(evaluated):
+    strands = ragged()
+    read = read_curves(written(strands), evaluated())
+    assert same(read.strands, strands)
+    assert read.dropped == {}
+
+
+def test_world_space_follows_a_turned_scaled_and_mirrored_object(evaluated):
+    strands = ragged()
+    obj = written(strands)
+    matrix = Matrix.LocRotScale((1, 2, 3), Euler((0.3, 0.7, -1.1)), (2.0, 3.0, -0.5))
+    obj.matrix_world = matrix
+    read = read_curves(obj, evaluated()).strands
+    expected = [matrix @ obj.data.points[i].position for i in range(strands.point_count)]
+    assert read.points == pytest.approx(np.array(expected), abs=1e-5)
+    assert read.radius == pytest.approx(strands.radius * math.cbrt(3.0), rel=1e-5)
+
+
+def test_more_points_than_are_moved_at_once(evaluated):
+    strands = ragged(counts=(4,) * 5000)
+    obj = written(strands)
+    obj.matrix_world = Matrix.Translation((10.0, 0.0, 0.0))
+    read = read_curves(obj, evaluated()).strands
+    assert read.points == pytest.approx(strands.points + [10.0, 0.0, 0.0], abs=2e-6)
+
+
+def with_modifier(obj, *nodes):
+    """A geometry nodes modifier that sends the curves through these nodes."""
+    tree = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
+    for in_out in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+    source = tree.nodes.new("NodeGroupInput").outputs[0]
+    for kind, inputs in nodes:
+        node = tree.nodes.new(kind)
+        for name, value in inputs.items():
+            node.inputs[name].default_value = value
+        tree.links.new(source, node.inputs[0])
+        source = node.outputs[0]
+    tree.links.new(source, tree.nodes.new("NodeGroupOutput").inputs[0])
+    obj.modifiers.new("Nodes", "NODES").node_group = tree
+
+
+def test_modifiers_are_applied(evaluated):
+    strands = ragged(counts=(16, 16))
+    obj = written(strands)
+    with_modifier(
+        obj,
+        ("GeometryNodeSetPosition", {"Offset": (0.0, 0.0, 1.0)}),
+        ("GeometryNodeResampleCurve", {"Count": 5}),
+    )
+    read = read_curves(obj, evaluated()).strands
+    assert read.point_counts.tolist() == [5, 5]
+    assert read.roots == pytest.approx(strands.roots + [0.0, 0.0, 1.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["groom_group_id", "group"])
+def test_groups_are_known_by_two_names(name, evaluated):
+    obj = written(ragged())
+    if "groom_group_id" in obj.data.attributes:
+        obj.data.attributes.remove(obj.data.attributes["groom_group_id"])
+    obj.data.attributes.new(name, "INT", "CURVE").data.foreach_set("value", [7, 7, 8, 9])
+    assert read_curves(obj, evaluated()).strands.group.tolist() == [7, 7, 8, 9]
+
+
+def test_a_group_attribute_of_another_kind_is_no_group(evaluated):
+    obj = written(ragged(counts=(3,)))
+    obj.data.attributes.new("group", "FLOAT_COLOR", "CURVE")
+    assert read_curves(obj, evaluated()).strands.group.tolist() == [0]
+
+
+def test_unusable_curves_are_dropped_and_counted(evaluated):
+    nan, inf = float("nan"), float("inf")
+    curves = [
+        [(0, 0, 0), (0, 0, 1)],
+        [(0, 0, 0)],
+        [(0, 0, 0), (nan, 0, 1)],
+        [(0, 0, 0), (0, inf, 1), (0, 0, 2)],
+        [(1, 1, 1), (1, 1, 1), (1, 1, 1)],
+        [(5, 0, 0), (5, 0, 1), (5, 0, 2)],
+    ]
+    obj = raw_curves([p for curve in curves for p in curve], [len(curve) for curve in curves])
+    obj.location.x = 100.0
+    read = read_curves(obj, evaluated())
+    assert read.dropped == {
+        "fewer than two points": 1,
+        "a point that is not finite": 2,
+        "no length": 1,
+    }
+    assert read.kept.tolist() == [0, 5]
+    assert read.strands.roots.tolist() == [[100, 0, 0], [105, 0, 0]]
+
+
+def test_the_short_way_for_sound_curves_gives_what_clean_gives(evaluated):
+    strands = ragged(counts=(2, 3, 16))
+    read = read_curves(written(strands), evaluated())
+    cleaned = clean(
+        strands.points,
+        strands.offsets,
+        radius=strands.radius,
+        group=strands.group,
+        root_uv=strands.root_uv,
+    )
+    assert same(read.strands, cleaned.strands)
+    assert read.kept.tolist() == cleaned.kept.tolist()
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_bad_radius_is_replaced(bad, evaluated):
+    strands = ragged(counts=(3, 3))
+    obj = written(strands)
+    obj.data.attributes["radius"].data[4].value = bad
+    radius = read_curves(obj, evaluated()).strands.radius
+    assert np.isfinite(radius).all() and (radius > 0.0).all()
+    assert radius[:4] == pytest.approx(strands.radius[:4])
+
+
+def test_no_curves_give_an_empty_set(evaluated):
+    empty = bpy.data.objects.new("Empty", bpy.data.hair_curves.new("Empty"))
+    bpy.context.collection.objects.link(empty)
+    assert read_curves(empty, evaluated()).strands.strand_count == 0
+
+
+def test_an_empty_set_can_be_written(evaluated):
+    obj = written(ragged().take(np.array([], int)))
+    assert read_curves(obj, evaluated()).strands.strand_count == 0
+
+
+def test_other_objects_are_refused_with_a_remedy(evaluated, sphere):
+    legacy = bpy.data.objects.new("Legacy", bpy.data.curves.new("Legacy", "CURVE"))
+    bpy.context.collection.objects.link(legacy)
+    for obj, words in ((legacy, "Convert"), (sphere, "particle hair")):
+        with pytest.raises(HairloomError, match=words) as raised:
+            read_curves(obj, evaluated())
+        assert raised.value.place == obj.name
+
+
+def test_written_on_a_moved_head_strands_stay_where_they_are(evaluated, sphere):
+    sphere.matrix_world = Matrix.LocRotScale((1, 2, 3), Euler((0.3, 0.7, -1.1)), (2, 2, 2))
+    bpy.context.view_layer.update()
+    strands = ragged()
+    obj = written(strands, sphere)
+    assert read_curves(obj, evaluated()).strands.points == pytest.approx(strands.points, abs=2e-6)
+    assert (obj.data.surface, obj.parent) == (sphere, sphere)
+    assert obj.data.surface_uv_map == sphere.data.uv_layers.active.name
+    sphere.location.x += 1.0
+    moved = read_curves(obj, evaluated()).strands.points
+    assert moved == pytest.approx(strands.points + [1.0, 0.0, 0.0], abs=2e-6)
+
+
+def test_blenders_own_surface_node_accepts_the_attachment(evaluated, sphere):
+    """Deform Curves on Surface moves the strands with the mesh and finds no invalid UV."""
+    from hairloom.addon.groom.roots import bind_roots
+    from hairloom.addon.host.surfaces import read_surface
+
+    surface = read_surface(sphere, evaluated(), need_uv=True, place="head")
+    corners = surface.corners.mean(axis=1)[30:60]
+    points = np.stack([corners, corners * 1.5], axis=1).reshape(-1, 3)
+    loose = StrandSet(points, np.arange(31) * 2, np.full(60, 1e-4), np.zeros(30))
+    obj = written(bind_roots(loose, surface, place="hair").strands, sphere)
+    with_modifier(obj, ("GeometryNodeDeformCurvesOnSurface", {}))
+    sphere.shape_key_add(name="Basis")
+    raised = sphere.shape_key_add(name="Raised")
+    for point in raised.points:
+        point.co.z += 0.25
+    raised.value = 1.0
+    moved = read_curves(obj, evaluated()).strands.points
+    assert obj.modifiers[0].node_warnings[:] == []
+    assert moved == pytest.approx(points + [0.0, 0.0, 0.25], abs=1e-4)

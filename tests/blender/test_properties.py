@@ -1,0 +1,167 @@
+"""Blender properties from parameter declarations, and what becomes of their values."""
+
+import math
+
+import bpy
+import pytest
+from hairloom import register, unregister
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.host import groups, live
+from hairloom.addon.host.properties import property_group, settings_of
+from hairloom.addon.parameters import ALL_SETTINGS
+
+SECTIONS = [*groups.GROOM_SECTIONS, *groups.CHARACTER_SECTIONS]
+PARAMETERS = [
+    pytest.param(section, parameter, id=f"{section}.{parameter.name}")
+    for section in SECTIONS
+    for parameter in ALL_SETTINGS[section].parameters()
+]
+
+
+@pytest.fixture
+def group_of(new_hair):
+    """Gives the property group of a section on a new hair object."""
+    hair = new_hair()
+
+    def get(section):
+        owner = hair.data if section in groups.GROOM_SECTIONS else hair
+        return getattr(owner.hairloom, section)
+
+    return get
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_untouched_properties_are_the_declared_defaults(section, group_of):
+    assert settings_of(group_of(section), ALL_SETTINGS[section]) == ALL_SETTINGS[section]()
+
+
+@pytest.mark.parametrize(("section", "parameter"), PARAMETERS)
+def test_a_property_shows_what_was_declared(section, parameter, group_of):
+    shown = group_of(section).bl_rna.properties[parameter.name]
+    assert (shown.name, shown.description) == (parameter.label, parameter.description)
+    if parameter.kind in ("number", "integer"):
+        hard, soft = (shown.hard_min, shown.hard_max), (shown.soft_min, shown.soft_max)
+        assert hard == pytest.approx(parameter.hard_range)
+        assert soft == pytest.approx(parameter.soft_range)
+    if parameter.unit == "angle":
+        assert shown.subtype == "ANGLE"
+    if parameter.unit == "length":
+        assert shown.unit == "LENGTH"
+    if parameter.kind == "color":
+        assert shown.subtype == "COLOR"
+
+
+@pytest.mark.parametrize(("section", "parameter"), PARAMETERS)
+def test_every_value_that_blender_takes_is_one_that_settings_take(section, parameter, group_of):
+    """Blender stores float32: the ends of the range must not fall outside of it by rounding."""
+    if parameter.hard_range is None:
+        pytest.skip("it has no range")
+    group, settings = group_of(section), ALL_SETTINGS[section]
+    for wanted in (-math.inf, *parameter.hard_range, math.inf):
+        limited = max(-(2**31), min(wanted, 2**31 - 1)) if parameter.kind == "integer" else wanted
+        setattr(group, parameter.name, (limited,) * 3 if parameter.kind == "color" else limited)
+        value = getattr(settings_of(group, settings), parameter.name)
+        if math.isfinite(wanted):
+            assert value == pytest.approx((wanted,) * 3 if parameter.kind == "color" else wanted)
+
+
+def test_a_changed_value_reaches_the_settings_as_it_was_typed(group_of):
+    group = group_of("shading")
+    group.primary_shift = 0.1
+    assert settings_of(group, ALL_SETTINGS["shading"]).primary_shift == 0.1
+
+
+def test_an_edit_names_the_data_block_at_once(new_hair, monkeypatch):
+    hair, named = new_hair(), []
+    monkeypatch.setattr(live, "settings_changed", named.append)
+    hair.data.hairloom.shading.ambient = 0.5
+    hair.hairloom.dynamics.damping = 2.0
+    hair.hairloom.hide_original = False
+    assert named == [hair.data, hair, hair]
+
+
+def test_choices_and_toggles_have_properties_too(extension):
+    """No parameter uses them yet; the next one that does must find them working."""
+    from dataclasses import dataclass
+
+    from hairloom.addon.params import Settings, choice, toggle
+
+    @dataclass(frozen=True, kw_only=True)
+    class Example(Settings):
+        section = "example"
+        title = "Example"
+        lamp: bool = toggle(True, label="Lamp", description="On or off")
+        up: str = choice("Y", (("Y", "Y", "y up"), ("Z", "Z", "z up")), label="Up", description="?")
+
+    group = property_group(Example)
+    bpy.utils.register_class(group)
+    bpy.types.Scene.hairloom_example = bpy.props.PointerProperty(type=group)
+    try:
+        values = bpy.context.scene.hairloom_example
+        assert settings_of(values, Example) == Example()
+        values.lamp, values.up = False, "Z"
+        assert settings_of(values, Example) == Example(lamp=False, up="Z")
+    finally:
+        del bpy.types.Scene.hairloom_example
+        bpy.utils.unregister_class(group)
+
+
+def test_a_copy_of_the_curves_has_the_same_settings(new_hair):
+    hair = new_hair()
+    hair.data.hairloom.shading.ambient = 0.5
+    assert hair.data.copy().hairloom.shading.ambient == 0.5
+
+
+def test_settings_survive_saving_also_by_a_blender_without_hairloom(new_hair, tmp_path):
+    hair = new_hair()
+    hair.data.hairloom.shading.base_color = (0.5, 0.25, 0.125)
+    hair.hairloom.dynamics.damping = 2.0
+    file = str(tmp_path / "hair.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    unregister()
+    bpy.ops.wm.open_mainfile(filepath=file)
+    assert not hasattr(bpy.data.objects["Hair"], "hairloom")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    register()
+    bpy.ops.wm.open_mainfile(filepath=file)
+    hair = bpy.data.objects["Hair"]
+    assert hair.data.hairloom.shading.base_color[:] == (0.5, 0.25, 0.125)
+    assert hair.hairloom.dynamics.damping == 2.0
+
+
+def test_everything_that_the_artist_can_set_has_a_description(extension):
+    """Properties of groups and operators; Blender's own (name, filepath...) are its own matter."""
+    own_to_blender = set(bpy.types.PropertyGroup.bl_rna.properties.keys()) | {
+        "check_existing",
+        "directory",
+        "filepath",
+        "files",
+        "filter_glob",
+    }
+    undescribed = [
+        f"{name}.{shown.identifier}"
+        for name in dir(bpy.types)
+        if name.startswith("HAIRLOOM_PG_")
+        for shown in getattr(bpy.types, name).bl_rna.properties
+        if shown.identifier not in own_to_blender and not shown.description
+    ]
+    operators = [getattr(bpy.ops.hairloom, name) for name in dir(bpy.ops.hairloom)]
+    for operator in operators:
+        rna = operator.get_rna_type()
+        assert rna.description, rna.identifier
+        undescribed += [
+            f"{rna.identifier}.{shown.identifier}"
+            for shown in rna.properties
+            if shown.identifier not in own_to_blender and not shown.description
+        ]
+    assert operators
+    assert undescribed == []
+
+
+def test_settings_out_of_range_in_a_script_are_clamped_by_blender(group_of):
+    group = group_of("strands")
+    group.subdivisions = 10**6
+    settings = settings_of(group, ALL_SETTINGS["strands"])
+    assert settings.subdivisions == 64
+    with pytest.raises(HairloomError, match="64"):
+        type(settings)(subdivisions=10**6)

@@ -1,0 +1,85 @@
+"""An artist's hands and eyes in a window session: mouse and keys, and what the screen shows.
+
+Events are sent one a tick, as Blender wants them: call what yields by `yield from`.
+"""
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Euler
+
+#: Buttons of our panel, the first of its tab: x from the sidebar's left edge as a part of its
+#: width, y in pixels from its top at UI scale 1.
+SIDEBAR_BUTTONS = {
+    "hairloom.preview": (0.45, 46),
+    "hairloom.play": (0.25, 72),
+    "hairloom.reset": (0.65, 72),
+}
+
+
+def viewport() -> Any:
+    """The area of the 3D viewport."""
+    return next(area for area in bpy.context.window.screen.areas if area.type == "VIEW_3D")
+
+
+def region(kind: str) -> Any:
+    return next(each for each in viewport().regions if each.type == kind)
+
+
+def press(key: str) -> Iterator[int]:
+    window = bpy.context.window
+    for value in ("PRESS", "RELEASE"):
+        window.event_simulate(key, value)
+        yield 1
+
+
+def click(x: int, y: int) -> Iterator[int]:
+    """The left mouse button at a pixel of the window, from its lower left corner."""
+    window = bpy.context.window
+    window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+    yield 2
+    for value in ("PRESS", "RELEASE"):
+        window.event_simulate("LEFTMOUSE", value, x=x, y=y)
+        yield 1
+
+
+def open_our_sidebar() -> Iterator[int]:
+    viewport().spaces.active.show_region_ui = True
+    yield 5
+    region("UI").active_panel_category = "Hairloom"
+    yield 5
+
+
+def sidebar_button(operator: str) -> tuple[int, int]:
+    """Where a button of our panel is in the window."""
+    sidebar, (across, below) = region("UI"), SIDEBAR_BUTTONS[operator]
+    scale = bpy.context.preferences.system.ui_scale
+    top = sidebar.y + sidebar.height
+    return int(sidebar.x + across * sidebar.width), int(top - below * scale)
+
+
+def look_from_front(distance: float) -> None:
+    """At the origin, along +Y, from this far away [m]."""
+    view = viewport().spaces.active.region_3d
+    view.view_perspective = "PERSP"
+    view.view_location = (0.0, 0.0, 0.0)
+    view.view_rotation = Euler((np.pi / 2.0, 0.0, 0.0)).to_quaternion()
+    view.view_distance = distance
+
+
+def viewport_pixels(screenshot: Path) -> np.ndarray:
+    """The viewport between toolbar and sidebar, (height, width, 3) in 0 to 1, top row first."""
+    window = bpy.context.window
+    raw = subprocess.run(
+        ["convert", str(screenshot), "-depth", "8", "rgb:-"], check=True, capture_output=True
+    ).stdout
+    screen = np.frombuffer(raw, np.uint8).reshape(window.height, window.width, 3)
+    view, header, tools, sidebar = (region(k) for k in ("WINDOW", "HEADER", "TOOLS", "UI"))
+    # the tool settings' header lies over the view as well, below the header; so does the text
+    top = window.height - header.y + 3 * header.height
+    left, right = tools.x + tools.width, sidebar.x if sidebar.width > 1 else view.x + view.width
+    return screen[top : window.height - view.y, left:right] / 255.0
