@@ -1,6 +1,6 @@
 # All that one does here, in one place. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-ui bench docs zip lock clean
+.PHONY: help setup demo test test-ui bench docs pictures zip lock clean
 
 PYTHON = .venv/bin/python
 OUT = out
@@ -32,6 +32,9 @@ bench: setup ## one benchmark: NAME=x runs bench/x.py, no NAME lists them
 
 docs: setup ## write what the documentation takes from the code
 	$(PYTHON) tools/make_docs.py
+
+pictures: setup ## draw the documentation's pictures anew
+	$(PYTHON) tools/make_docs.py --pictures
 
 zip: setup ## the extension's zip, into dist/
 	@rm -rf dist && mkdir dist

@@ -20,6 +20,7 @@ from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, start
 from .dynamics.step import Drive
 from .dynamics.step import advance as advance_dynamics
+from .errors import HairloomError
 from .groom.guides import choose_guides
 from .groom.roots import RootFrames, bind_roots, follow, root_frames
 from .groom.settings import GuideSettings
@@ -28,7 +29,6 @@ from .refine.interpolate import ride
 from .shading.ambient import AmbientSettings, ambient_occlusion
 from .strands import StrandSet, Surface
 from .strands.resample import resample
-
 
 #: Where the light that reaches the skin is measured, above it, so that it is in the hair [m].
 SKIN_CLEARANCE = 0.003
@@ -93,6 +93,10 @@ def prepare(
     Raises:
         HairloomError: no strands, or a groom of another scale than the head.
     """
+    if not strands.strand_count:
+        raise HairloomError(
+            "it has no strands that can be used", place=place, remedy="Choose hair that has strands"
+        )
     bound = strands if head is None else bind_roots(strands, head, place=place).strands
     uniform = resample(bound, settings.cv_count)
     guides = choose_guides(uniform, settings)
@@ -180,7 +184,7 @@ def rest_occlusion(rig: Rig, settings: AmbientSettings) -> Floats:
 
 
 def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:
-    """How much of the light the hair lets through to the head, (vertex_count,); None without one."""
+    """The light that the hair lets through to the head, (vertex_count,); None without a head."""
     if rig.head is None:
         return None
     above = rig.head.positions + SKIN_CLEARANCE * rig.head.vertex_normals()

@@ -37,6 +37,7 @@ class Contacts:
     index: (n,) into the free CVs, flattened (cv_count - 2, guide_count).
     normal: (3, n) outwards, world. offset: (n,) [m], the CV shall keep normal . x >= offset.
     origin: (3, n) world [m], where the CV would be had it stayed with the collider.
+    is_out: (n,) whether the offset leads all the way out.
     push: (n,) [m], how far it was pushed so far in this substep.
     """
 
@@ -44,6 +45,7 @@ class Contacts:
     normal: Floats
     offset: Floats
     origin: Floats
+    is_out: Bools
     push: Floats
 
     def push_out(self, position: Floats, friction: float) -> Bools:
@@ -59,7 +61,7 @@ class Contacts:
             here -= self._friction(here, push, friction)
         for row, value in zip(free, here, strict=True):
             row[self.index] = value
-        return gap > -SKIN
+        return (gap > -SKIN) & self.is_out
 
     def _friction(self, here: Floats, push: Floats, friction: float) -> Floats:
         slip = here - self.origin
@@ -152,7 +154,8 @@ def _contacts_with(
     origin += transform_points(now - before, local)
     reached = distance - dot(normal, here - origin) + np.float32(led_out)
     offset = dot(normal, here) - distance + np.minimum(own_radius, reached)
-    return Contacts(index, normal, offset, origin, np.zeros_like(offset))
+    is_out = reached >= own_radius
+    return Contacts(index, normal, offset, origin, is_out, np.zeros_like(offset))
 
 
 def _near(

@@ -29,6 +29,9 @@ def deepest_penetration(state: DynamicsState, colliders: tuple[PosedCollider, ..
     for posed in colliders if points.size else ():
         inverse = np.linalg.inv(posed.matrix_now)
         distance, gradient = posed.collider.distance(transform_points(inverse, points))
+        # in the collider's space a step outwards is as long as the inverse makes it; the gradient
+        # gives the direction only, because a sampled one is short where two sides are as near
+        gradient /= np.maximum(np.sqrt(dot(gradient, gradient)), TINY)
         steepness = inverse[:3, :3].T.astype(np.float32)
         outward = sum(steepness[:, axis, None] * gradient[axis] for axis in range(3))
         scale = np.maximum(np.sqrt(dot(outward, outward)), TINY)

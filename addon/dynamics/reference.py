@@ -40,7 +40,7 @@ def advance_slowly(
     if not guides:
         return state
     rows = [np.stack([g.x for g in guides]), np.stack([g.previous for g in guides])]
-    position, previous = (np.float32(grid.transpose(2, 1, 0)) for grid in rows)
+    position, previous = (grid.transpose(2, 1, 0).astype(np.float32) for grid in rows)
     left = max(time - count * dt, 0.0)
     return DynamicsState(position, previous, state.rest, dt if count else state.substep, left)
 
@@ -53,6 +53,7 @@ class _Plane:
     normal: Floats
     offset: float
     origin: Floats
+    is_out: bool
     push: float = 0.0
 
 
@@ -204,8 +205,9 @@ class _Guide:
                 continue
             origin = self.previous[cv] + ((now - before) @ local)[:3]
             was = distance - normal @ (self.x[cv] - origin)
-            allowed = min(radius, was + settings.push_speed * dt)
-            planes.append(_Plane(cv, normal, normal @ self.x[cv] - distance + allowed, origin))
+            reached = was + settings.push_speed * dt
+            offset = float(normal @ self.x[cv]) - distance + min(radius, reached)
+            planes.append(_Plane(cv, normal, offset, origin, reached >= radius))
         return planes
 
     def _push_out(self, planes: list[_Plane], friction: float) -> dict[int, Floats]:
@@ -219,7 +221,7 @@ class _Guide:
             slip = slip - plane.normal * (plane.normal @ slip)
             length = max(float(np.linalg.norm(slip)), 1.0e-9)
             self.x[plane.cv] -= slip * min(friction * push / length, 1.0)
-            if missing > -SKIN:
+            if missing > -SKIN and plane.is_out:
                 touching[plane.cv] = plane.normal
         return touching
 

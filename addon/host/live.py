@@ -1,9 +1,9 @@
 """All previewed grooms: begun and ended by the artist, kept in step with what Blender changes.
 
 Reactions to Blender's events only read; they write nothing into bpy.data. The one exception is
-no data of the artist's: the evaluated copy of a previewed object is shown as its bounds, so that
-Blender's own strands do not stand in front of ours. It is neither saved nor undone, and Blender
-makes a fresh copy when it evaluates the object again.
+no data of the artist's: the evaluated copy of a previewed object is shown as a box, so that
+Blender's own strands do not stand among ours. It is neither saved nor undone nor rendered, and
+Blender makes a fresh copy when it evaluates the object again.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
     overlay.retry()
     _sessions[session.uid] = session
     _publish(session, depsgraph)
+    _refresh_views()
     return session
 
 
@@ -50,7 +51,8 @@ def stop(session: Session) -> None:
     overlay.drop(session.uid)
     hair = session.hair.handle.find()
     if hair is not None:
-        _show_as(hair, bpy.context.view_layer.depsgraph, hair.display_type)
+        _show_originals(hair, bpy.context.view_layer.depsgraph, show=True)
+        _refresh_views()
 
 
 def stop_all() -> None:
@@ -117,6 +119,7 @@ def settings_changed(owner: bpy.types.ID) -> None:
         hair = session.hair.handle.find()
         if hair is not None and owner in (hair, hair.data):
             _attempt(session, depsgraph, Session.take_settings)
+            _refresh_views()
             if session.is_stale:
                 _read_again_soon()
 
@@ -202,15 +205,24 @@ def _publish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
     hair = session.hair.found()
     overlay.show(session.uid, Drawing(session.snapshot, hair.visible_get(), spaces_without(hair)))
     is_hidden = hair.hairloom.hide_original and hair.mode == "OBJECT"
-    _show_as(hair, depsgraph, "BOUNDS" if is_hidden else hair.display_type)
+    _show_originals(hair, depsgraph, show=not is_hidden)
 
 
-def _show_as(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, display: str) -> None:
+def _show_originals(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, show: bool) -> None:
+    """Solid view leaves out what is shown as its bounds, EEVEE what no camera can see."""
     evaluated = hair.evaluated_get(depsgraph)
-    if evaluated.is_evaluated and evaluated.display_type != display:
+    if not evaluated.is_evaluated:
+        return
+    display, is_seen = (hair.display_type, hair.visible_camera) if show else ("BOUNDS", False)
+    if evaluated.display_type != display:
         evaluated.display_type = display
-        # Solid view goes on showing the samples it has collected until it hears of an update
-        hair.update_tag(refresh={"OBJECT"})
+    if evaluated.visible_camera != is_seen:
+        evaluated.visible_camera = is_seen
+
+
+def _refresh_views() -> None:
+    """Solid view shows the samples it has collected until it hears of an update."""
+    bpy.context.scene.update_tag()
 
 
 def _read_again_soon() -> None:

@@ -21,7 +21,7 @@ _UNIT_SYMBOLS = {
 def table(settings: type[Settings]) -> str:
     """A Markdown section: heading and one row a parameter."""
     rows = [
-        f"## {settings.title}",
+        f"## {settings.title} (`{settings.section}`)",
         "",
         "| Name | Default | Slider | Allowed | Unit | What it does | Source |",
         "| --- | --- | --- | --- | --- | --- | --- |",
@@ -57,6 +57,8 @@ def _shown(parameter: Parameter, value: object) -> str:
         return ", ".join(f"{channel:g}" for channel in value)
     if isinstance(value, bool):
         return "on" if value else "off"
+    if parameter.kind == "integer" and isinstance(value, (int, float)):
+        return str(int(value))
     if isinstance(value, (int, float)):
         return f"{math.degrees(value) if parameter.unit == 'angle' else value:g}"
     return str(value)

@@ -44,7 +44,7 @@ class AmbientSettings(Settings):
         hard=(0.0, 1.0),
     )
     extinction: float = number(
-        1.0,
+        2.0,
         label="Extinction",
         description="How fast light dies in the hair, as a factor of what the strands' radius "
         "gives; raise it where few strands stand for many",

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
+from ..strands.closest_point import closest_point
 
 #: How far below the surface the middle of the body's shell lies [cells].
 _SHELL_DEPTH = 2.5
@@ -69,16 +70,37 @@ def hair_depth(strands: StrandSet, grid: Grid) -> Floats:
 
 
 def body_depth(body: Surface, grid: Grid) -> Floats:
-    """Optical depth of the body across each cell: opaque on a shell below its surface, else 0."""
-    normals = body.vertex_normals()
-    shell = body.positions - normals * np.float32(_SHELL_DEPTH * grid.cell)
+    """Optical depth of the body across each cell: opaque on a shell below its surface, else 0.
+
+    Parts that are thinner than the shell is deep, such as ears, have none.
+    """
     depth = np.zeros(grid.shape, np.float32)
+    shell, is_inside = _inset(body, grid)
+    corners = shell[body.triangles[is_inside[body.triangles].all(axis=1)]]
     high = grid.low + grid.cell * np.array(grid.shape)
-    inside = _samples(shell[body.triangles].astype(np.float64), grid.cell, grid.low, high)
-    coordinates = np.floor((inside - grid.low) / grid.cell).astype(np.int64)
+    points = _samples(corners, grid.cell, grid.low, high)
+    coordinates = np.floor((points - grid.low) / grid.cell).astype(np.int64)
     is_near = ((coordinates >= 0) & (coordinates < grid.shape)).all(axis=1)
     depth[tuple(coordinates[is_near].T)] = _OPAQUE
     return _thickened(depth)
+
+
+def _inset(body: Surface, grid: Grid) -> tuple[Floats, Bools]:
+    """The body's vertices moved to the middle of the shell, and which came out inside the body."""
+    normals = body.vertex_normals()
+    inward = _SHELL_DEPTH * grid.cell
+    shell = body.positions.astype(np.float64) - inward * normals
+    margin = 2.0 * inward
+    low, high = grid.low - margin, grid.low + grid.cell * np.array(grid.shape) + margin
+    near = np.flatnonzero(((shell > low) & (shell < high)).all(axis=1))
+    is_inside = np.ones(len(shell), bool)
+    if len(near) and len(body.triangles):
+        closest = closest_point(shell[near], body)
+        corner_normals = normals[body.triangles[closest.triangle]]
+        normal = np.einsum("nk,nkj->nj", closest.barycentric, corner_normals)
+        height = np.einsum("ij,ij->i", shell[near] - closest.point, normal)
+        is_inside[near] = height < -0.7 * inward
+    return shell, is_inside
 
 
 def sample(values: Floats, coordinates: Floats) -> Floats:

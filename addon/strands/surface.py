@@ -53,7 +53,7 @@ class Surface:
         return _unit(np.cross(b - a, c - a))
 
     def vertex_normals(self) -> Floats:
-        """Unit normals weighted by corner angle, (vertex_count, 3) (Thuermer and Wuethrich 1998)."""
+        """Unit normals, (vertex_count, 3), weighted by angle (Thuermer and Wuethrich 1998)."""
         corners, normals = self.corners, self.triangle_normals()
         total = np.zeros_like(self.positions)
         for corner in range(3):

@@ -12,7 +12,7 @@ from ..errors import HairloomError
 from ..host import groom_files
 from ..host.groups import operator_properties
 from .reports import reporting, tell, waiting
-from .selection import active_mesh, needs_hair, selected_hair
+from .selection import active_mesh, needs_hair, chosen_hair
 
 UP_AXES = (
     ("Y", "Y Up", "The file's Y axis points up, as in most engines"),
@@ -142,7 +142,7 @@ class HAIRLOOM_OT_export_tfx(bpy.types.Operator, ExportHelper):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hair, depsgraph = selected_hair(context)[0], context.evaluated_depsgraph_get()
+        hair, depsgraph = chosen_hair(context)[0], context.evaluated_depsgraph_get()
         with waiting(context):
             outcome = groom_files.export_tfx(
                 hair, depsgraph, Path(self.filepath), up=self.up, scale=self.scale
@@ -166,7 +166,7 @@ class HAIRLOOM_OT_export_cards(bpy.types.Operator, ExportHelper):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hair, depsgraph = selected_hair(context)[0], context.evaluated_depsgraph_get()
+        hair, depsgraph = chosen_hair(context)[0], context.evaluated_depsgraph_get()
         with waiting(context):
             outcome = groom_files.export_cards(hair, depsgraph, Path(self.filepath))
         tell(self, outcome)

@@ -9,7 +9,7 @@ import bpy
 from ..host import live
 from ..host.groom_files import Outcome
 from .reports import reporting, tell, waiting
-from .selection import needs_hair, selected_hair
+from .selection import needs_hair, chosen_hair
 
 TICKS_PER_SECOND = 60.0
 STATUS = "Hairloom plays. Move the head or the sliders. Esc: stop, the hair returns to its style"
@@ -27,7 +27,7 @@ class HAIRLOOM_OT_preview(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hair = selected_hair(context)
+        hair = chosen_hair(context)
         if all(live.session_of(each) for each in hair):
             stop_preview(hair)
             return {"FINISHED"}
@@ -62,7 +62,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
             return {"FINISHED"}  # the operator that plays sees it and ends
         with waiting(context):
             if not live.sessions():
-                start_preview(self, context, selected_hair(context))
+                start_preview(self, context, chosen_hair(context))
             for warning in live.play(context.evaluated_depsgraph_get()):
                 self.report({"WARNING"}, warning)
         self._begin(context)

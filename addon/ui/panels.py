@@ -11,7 +11,7 @@ import bpy
 from ..host import live
 from ..host.groom_files import dropped_phrase
 from ..host.session import Session
-from .selection import selected_hair
+from .selection import chosen_hair
 
 type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
 
@@ -21,7 +21,7 @@ _LETTER_WIDTH = 7.0
 
 def _hair(context: bpy.types.Context) -> bpy.types.Object | None:
     """The hair that the panels are about."""
-    hair = selected_hair(context)
+    hair = chosen_hair(context)
     return hair[0] if hair else None
 
 

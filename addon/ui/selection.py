@@ -4,12 +4,32 @@ from __future__ import annotations
 
 import bpy
 
+from ..host import live
+from ..host.objects import head_of
 
-def selected_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The active and all other selected hair curves, the active first."""
+
+def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The hair that buttons and panels are about, the active first.
+
+    That is the selected hair curves; else those on the selected meshes, as when the head is being
+    moved; else those that are previewed.
+    """
     candidates = [context.active_object, *context.selected_objects]
-    hair = [obj for obj in candidates if obj is not None and obj.type == "CURVES"]
-    return list(dict.fromkeys(hair))
+    selected = list(dict.fromkeys(obj for obj in candidates if obj is not None))
+    hair = [obj for obj in selected if obj.type == "CURVES"]
+    return hair or _grown_on(selected, context) or _previewed()
+
+
+def _grown_on(
+    meshes: list[bpy.types.Object], context: bpy.types.Context
+) -> list[bpy.types.Object]:
+    everything = context.view_layer.objects
+    return [obj for obj in everything if obj.type == "CURVES" and head_of(obj) in meshes]
+
+
+def _previewed() -> list[bpy.types.Object]:
+    found = [session.hair.handle.find() for session in live.sessions()]
+    return [obj for obj in found if obj is not None]
 
 
 def active_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -21,7 +41,7 @@ def active_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
 
 def needs_hair(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether hair curves are selected; says so on the greyed-out button."""
-    if selected_hair(context):
+    if chosen_hair(context):
         return True
     operator.poll_message_set("Select hair curves first (Add > Curve > Empty Hair, or import some)")
     return False

@@ -293,16 +293,23 @@ def test_loading_a_file_drops_all_previews_and_keeps_the_settings(preview, tmp_p
 
 def test_blenders_own_strands_are_hidden_in_the_evaluated_copy_only(preview, evaluated):
     hair, head, session = preview
-    assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
-    assert hair.display_type == "TEXTURED"
+    shown, hidden = ("TEXTURED", True), ("BOUNDS", False)
+
+    def display(obj):
+        return obj.display_type, obj.visible_camera
+
+    assert display(hair.evaluated_get(evaluated())) == hidden
+    assert display(hair) == shown
     head.location.x = 1.0
     update()
-    assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
+    assert display(hair.evaluated_get(evaluated())) == hidden
     hair.hairloom.hide_original = False
-    assert hair.evaluated_get(evaluated()).display_type == "TEXTURED"
+    assert display(hair.evaluated_get(evaluated())) == shown
     hair.hairloom.hide_original = True
+    assert display(hair.evaluated_get(evaluated())) == hidden
     live.stop(session)
-    assert hair.evaluated_get(evaluated()).display_type == "TEXTURED"
+    assert display(hair.evaluated_get(evaluated())) == shown
+    assert display(hair) == shown
 
 
 def test_a_preview_adds_and_changes_no_data(new_hair, sphere, evaluated):

@@ -73,13 +73,25 @@ def look_from_front(distance: float) -> None:
 
 def viewport_pixels(screenshot: Path) -> np.ndarray:
     """The viewport between toolbar and sidebar, (height, width, 3) in 0 to 1, top row first."""
-    window = bpy.context.window
+    view, header, tools, sidebar = (region(k) for k in ("WINDOW", "HEADER", "TOOLS", "UI"))
+    # the tool settings' header lies over the view as well, below the header; so does the text
+    top = header.y - 2 * header.height
+    left, right = tools.x + tools.width, sidebar.x if sidebar.width > 1 else view.x + view.width
+    return _rectangle(screenshot, left, right, view.y, top)
+
+
+def viewport_middle(screenshot: Path, reach: int = 20) -> np.ndarray:
+    """The pixels around the middle of the view, as in `viewport_pixels`."""
+    view = region("WINDOW")
+    x, y = view.x + view.width // 2, view.y + view.height // 2
+    return _rectangle(screenshot, x - reach, x + reach, y - reach, y + reach)
+
+
+def _rectangle(screenshot: Path, left: int, right: int, bottom: int, top: int) -> np.ndarray:
+    """A part of the screen, which the window fills; the window counts from below."""
     raw = subprocess.run(
         ["convert", str(screenshot), "-depth", "8", "rgb:-"], check=True, capture_output=True
     ).stdout
+    window = bpy.context.window
     screen = np.frombuffer(raw, np.uint8).reshape(window.height, window.width, 3)
-    view, header, tools, sidebar = (region(k) for k in ("WINDOW", "HEADER", "TOOLS", "UI"))
-    # the tool settings' header lies over the view as well, below the header; so does the text
-    top = window.height - header.y + 3 * header.height
-    left, right = tools.x + tools.width, sidebar.x if sidebar.width > 1 else view.x + view.width
-    return screen[top : window.height - view.y, left:right] / 255.0
+    return screen[window.height - top : window.height - bottom, left:right] / 255.0

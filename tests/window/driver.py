@@ -37,7 +37,7 @@ def play(steps: Iterator[int | None]) -> None:
                 bpy.ops.wm.quit_blender()
         return None
 
-    bpy.app.timers.register(tick, first_interval=1.0)
+    bpy.app.timers.register(tick, first_interval=1.0, persistent=True)
 
 
 def enable_extension() -> None:

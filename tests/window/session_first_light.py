@@ -17,10 +17,13 @@ from artist import (
     press,
     sidebar_button,
     viewport,
+    viewport_middle,
     viewport_pixels,
 )
 
 STRANDS = 1500
+RED = (0.8, 0.05, 0.05)
+DISTANCE = 0.9  # of the eye [m]
 FILE = str(Path(bpy.app.tempdir) / "first_light.blend")
 
 
@@ -37,8 +40,8 @@ def pixels(label):
     return viewport_pixels(driver.screenshot(label))
 
 
-def changed(before, after, at_least=8.0 / 255.0):
-    """Share of the viewport's pixels that differ visibly."""
+def changed(before, after, at_least=0.1):
+    """Share of the pixels that differ by more than Blender's own anti-aliasing does."""
     return float((np.abs(after - before).max(axis=2) > at_least).mean())
 
 
@@ -48,6 +51,7 @@ def steps():
     yield from set_the_scene()
     for shading in ("SOLID", "MATERIAL"):
         yield from preview(shading)
+    viewport().spaces.active.shading.type = "SOLID"
     yield from sliders_act_at_once()
     yield from play_and_stop()
     yield from undo()
@@ -65,15 +69,16 @@ def set_the_scene():
     bpy.ops.object.shade_smooth()
     assert bpy.ops.hairloom.grow(strand_count=STRANDS, length=0.12) == {"FINISHED"}
     bpy.context.object.name = "Hair"
-    viewport().spaces.active.overlay.show_floor = False
-    look_from_front(distance=0.9)
+    overlays = viewport().spaces.active.overlay
+    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    look_from_front(DISTANCE)
     yield from open_our_sidebar()
 
 
 def preview(shading):
     """The button in the sidebar draws the strands; once more, and all is as before."""
     viewport().spaces.active.shading.type = shading
-    yield 30 if shading == "MATERIAL" else 5  # EEVEE compiles its shaders
+    yield from wait_for_the_head()
     off = pixels(f"{shading.lower()}-off")
     yield from click(*sidebar_button("hairloom.preview"))
     yield 10
@@ -81,37 +86,67 @@ def preview(shading):
     on = pixels(f"{shading.lower()}-preview")
     assert overlay().failure() == ""
     assert changed(off, on) > 0.02, f"{shading}: the strands do not show"
-    yield from depth_is_tested(on, shading)
+    yield from depth_is_tested(shading)
     if shading == "SOLID":
         yield from click(*sidebar_button("hairloom.preview"))
-        yield 5
+        yield 15  # until Blender's own anti-aliasing has settled
         assert live().sessions() == ()
-        assert changed(off, pixels("solid-off-again")) < 0.002, "something stays after the preview"
+        left, shown = changed(off, pixels("solid-off-again")), changed(off, on)
+        assert left < 0.1 * shown, f"something stays after the preview: {left} of {shown}"
 
 
-def depth_is_tested(on, shading):
-    """A plate before the head hides hair; behind it, it does not."""
-    bpy.ops.mesh.primitive_cube_add(size=0.15, location=(0.0, -0.4, 0.0))
+def wait_for_the_head():
+    """Until it stays in the middle of the view: EEVEE compiles its shaders first, and goes on
+    showing the last picture for a while."""
+    seen = 0
+    for _ in range(80):
+        yield 10
+        picture = driver.screenshot("waiting")
+        background = np.median(viewport_pixels(picture)[-20:, :20], axis=(0, 1))
+        middle = np.median(viewport_middle(picture), axis=(0, 1))
+        picture.unlink()
+        seen = seen + 1 if np.abs(middle - background).max() > 0.1 else 0
+        if seen == 4:
+            return
+    raise AssertionError("the head never shows")
+
+
+def depth_is_tested(shading):
+    """A plate before the head hides the hair; behind it, it does not."""
+    bpy.ops.mesh.primitive_cube_add(size=0.15, location=(0.0, -0.4, 0.09))
     plate = bpy.context.object
     plate.scale.y = 0.01
+    look_at_hair_from_above()
     yield 5
-    before = pixels(f"{shading.lower()}-plate-before")
+    before = viewport_middle(driver.screenshot(f"{shading.lower()}-plate-before"))
     plate.location.y = 0.4
     yield 5
-    behind = pixels(f"{shading.lower()}-plate-behind")
+    behind = viewport_middle(driver.screenshot(f"{shading.lower()}-plate-behind"))
     bpy.data.objects.remove(plate)
-    bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
-    bpy.data.objects["Hair"].select_set(True)
+    look_from_front(DISTANCE)
+    select_hair()
     yield 5
-    height, width, _ = on.shape
-    middle = np.s_[height // 2 - 20 : height // 2 + 20, width // 2 - 20 : width // 2 + 20]
-    assert before[middle].std(axis=(0, 1)).max() < 0.02, "hair shines through a plate before it"
-    assert behind[middle].std(axis=(0, 1)).max() > 0.02, "a plate behind hides the hair"
+    roughness = [patch.std(axis=(0, 1)).max() for patch in (before, behind)]
+    assert roughness[0] < 0.02, f"hair shines through a plate before it: {roughness}"
+    assert roughness[1] > 0.05, f"a plate behind hides the hair: {roughness}"
+
+
+def look_at_hair_from_above():
+    """The middle of the view on the hair over the forehead."""
+    look_from_front(DISTANCE)
+    viewport().spaces.active.region_3d.view_location = (0.0, 0.0, 0.09)
+
+
+def select_hair():
+    hair = bpy.data.objects["Hair"]
+    hair.select_set(True)
+    bpy.context.view_layer.objects.active = hair
 
 
 def sliders_act_at_once():
+    yield from wait_for_the_head()
     before = pixels("slider-before")
-    bpy.data.objects["Hair"].data.hairloom.shading.base_color = (0.8, 0.05, 0.05)
+    bpy.data.objects["Hair"].data.hairloom.shading.base_color = RED
     yield 5
     after = pixels("slider-after")
     assert changed(before, after) > 0.02
@@ -134,16 +169,17 @@ def play_and_stop():
         strands = live().sessions()[0].snapshot.strands
         carried = at_rest + np.array([head.location.x, 0.0, 0.0])
         offsets.append(float((strands - carried)[:, -1, 0].mean()))
-    driver.screenshot("play-moving")
+    moving = pixels("play-moving")
     assert min(offsets) < -0.001, f"the tips do not lag behind: {offsets}"
     head.location.x = 0.0
     yield 2
     yield from press("ESC")
-    yield 5
+    yield 15
     assert not live().is_playing()
     strands = live().sessions()[0].snapshot.strands
     assert np.abs(strands - at_rest).max() < 1e-5, "ESC did not restore the style"
-    assert changed(before, pixels("play-stopped")) < 0.002, "the picture is not the one before"
+    left = changed(before, pixels("play-stopped"))
+    assert left < 0.1 * changed(before, moving), "the picture is not the one before"
 
 
 def undo():
@@ -178,7 +214,7 @@ def save_and_reload():
     yield 10
     assert live().sessions() == ()
     hair = bpy.data.objects["Hair"]
-    assert hair.data.hairloom.shading.base_color[:] == np.float32([0.8, 0.05, 0.05]).tolist()
+    assert np.allclose(hair.data.hairloom.shading.base_color, RED)
     assert hair.display_type == "TEXTURED"
     off = pixels("reloaded-off")
     yield from click(*sidebar_button("hairloom.preview"))

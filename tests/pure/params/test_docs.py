@@ -38,7 +38,7 @@ def test_angles_are_shown_in_degrees() -> None:
 @pytest.mark.parametrize("kind", ALL_SETTINGS.values(), ids=ALL_SETTINGS)
 def test_each_parameter_has_a_row_of_seven_cells(kind: type[Settings]) -> None:
     lines = table(kind).splitlines()
-    assert lines[0] == f"## {kind.title}"
+    assert lines[0] == f"## {kind.title} (`{kind.section}`)"
     rows = [line for line in lines if line.startswith("| **")]
     assert len(rows) == len(kind.parameters())
     for row, parameter in zip(rows, kind.parameters(), strict=True):

@@ -194,6 +194,17 @@ def test_the_body_shuts_out_the_light_from_behind_and_only_that() -> None:
     assert free == pytest.approx(1.0)
 
 
+def test_a_thin_sheet_shades_neither_of_its_sides() -> None:
+    """An ear: a plate 2 mm thick. Its shell would come out at the other side."""
+    plate = ball(1.0)
+    plate = Surface(plate.positions * [0.001, 0.08, 0.08], plate.triangles)
+    strands = straight_hair(50)
+    depth = body_depth(plate, grid_around(strands, 40))
+    assert depth.max() == 0.0
+    thick = Surface(plate.positions * [80.0, 1.0, 1.0], plate.triangles)
+    assert body_depth(thick, grid_around(strands, 40)).max() > 0.0
+
+
 def test_light_from_above_leaves_the_lower_side_dark() -> None:
     strands = hair_on_ball()
     height = strands.roots[:, 2]

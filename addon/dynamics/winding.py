@@ -1,0 +1,118 @@
+"""How often a surface winds around a point, for many points at once.
+
+The generalised winding number (Jacobson et al. 2013, "Robust Inside-Outside Segmentation using
+Generalized Winding Numbers") is the sum of the triangles' solid angles over 4 pi: 1 inside, 0
+outside, and small holes, doubled faces and slivers hardly change it. Triangles that are far from a
+point, measured by the size of their group, are summed as one dipole (Barill et al. 2018, "Fast
+Winding Numbers for Soups and Clouds", the first-order term); near ones exactly.
+
+Error against the exact sum: below 0.05, while 0.5 is what divides inside from outside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..strands import Surface
+from ..strands.triangle_tree import TriangleTree, build_tree
+
+#: A group of triangles is far at this many times its own radius from its centre.
+FAR = 2.5
+#: Points that walk down the tree together.
+_CHUNK = 4096
+
+
+@dataclass(frozen=True)
+class _Dipoles:
+    """What the triangles below each node of one level come to, seen from afar.
+
+    center: (node_count, 3) [m], weighted by area. moment: (node_count, 3) [m^2], the sum of area
+    times normal. radius: (node_count,) [m], around the centre.
+    """
+
+    center: Floats
+    moment: Floats
+    radius: Floats
+
+
+def winding_number(points: Floats, surface: Surface) -> Floats:
+    """(n,) float64: 1 inside of a closed mesh, 0 outside, -1 inside of one turned inside out.
+
+    Args:
+        points: (n, 3) [m], space of the surface, which has at least one triangle.
+    """
+    corners = surface.corners.astype(np.float64)
+    tree = build_tree(corners)
+    leaves = _without_repeats(tree.leaf_triangles)
+    dipoles = _dipoles(tree, leaves, corners)
+    chunks = np.array_split(np.asarray(points, np.float64), max(1, -(-len(points) // _CHUNK)))
+    angles = [_solid_angle(chunk, dipoles, leaves, corners) for chunk in chunks]
+    return np.concatenate(angles) / (4.0 * np.pi)
+
+
+def _solid_angle(points: Floats, dipoles: list[_Dipoles], leaves: Ints, corners: Floats) -> Floats:
+    """Sum over all triangles, walking down from the root to what is near each point."""
+    total = np.zeros(len(points))
+    point, node = np.arange(len(points)), np.zeros(len(points), np.int64)
+    for level, group in enumerate(dipoles):
+        away = group.center[node] - points[point]
+        squared = np.einsum("ij,ij->i", away, away)
+        is_far = squared > (FAR * group.radius[node]) ** 2
+        flux = np.einsum("ij,ij->i", group.moment[node[is_far]], away[is_far])
+        total += np.bincount(point[is_far], flux / squared[is_far] ** 1.5, len(points))
+        point, node = point[~is_far], node[~is_far]
+        if level + 1 < len(dipoles):
+            point, node = np.repeat(point, 2), np.repeat(2 * node, 2)
+            node[1::2] += 1
+    for triangle in leaves.T:
+        chosen = triangle[node]
+        exists = chosen >= 0
+        angle = triangle_angle(points[point[exists]], corners[chosen[exists]])
+        total += np.bincount(point[exists], angle, len(points))
+    return total
+
+
+def triangle_angle(points: Floats, corners: Floats) -> Floats:
+    """Signed solid angle (n,) of triangle (n, 3, 3) from point (n, 3), pair by pair.
+
+    tan(angle / 2) = a.(b x c) / (|a||b||c| + (a.b)|c| + (b.c)|a| + (c.a)|b|)
+    (Van Oosterom and Strackee 1983)
+    """
+    a, b, c = np.moveaxis(corners - points[:, None], 1, 0)
+    la, lb, lc = (np.sqrt(_dot(v, v)) for v in (a, b, c))
+    below = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+    return 2.0 * np.arctan2(_dot(a, np.cross(b, c)), below)
+
+
+def _without_repeats(leaves: Ints) -> Ints:
+    """The leaves with -1 wherever a triangle stands that an earlier leaf has already."""
+    flat = leaves.ravel()
+    kept = np.full(flat.shape, -1, np.int64)
+    triangle, first = np.unique(flat, return_index=True)
+    kept[first] = triangle
+    return kept.reshape(leaves.shape)
+
+
+def _dipoles(tree: TriangleTree, leaves: Ints, corners: Floats) -> list[_Dipoles]:
+    """The dipoles of every level, from the root to the leaves."""
+    edge_one, edge_two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    moment = np.cross(edge_one, edge_two) / 2.0
+    moment, center = np.vstack([moment, np.zeros(3)]), corners.mean(axis=1)  # row -1: no triangle
+    center = np.vstack([center, center[-1]])
+    weight = np.linalg.norm(moment, axis=1) + 1.0e-30
+    levels = []
+    for level, (low, high) in enumerate(tree.levels):
+        members = leaves.reshape(1 << level, -1)
+        share = weight[members]
+        middle = np.einsum("nm,nmk->nk", share, center[members]) / share.sum(axis=1)[:, None]
+        reach = np.maximum(high - middle, middle - low)  # to the box's farthest corner
+        radius = np.linalg.norm(reach, axis=1)
+        levels.append(_Dipoles(middle, moment[members].sum(axis=1), radius))
+    return levels
+
+
+def _dot(one: Floats, two: Floats) -> Floats:
+    return np.einsum("ij,ij->i", one, two)

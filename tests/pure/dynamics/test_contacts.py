@@ -1,0 +1,177 @@
+"""Hair and colliders: outside stays outside, inside is led out, friction drags along."""
+
+import numpy as np
+import pytest
+
+from hairloom.addon.dynamics.colliders import DistanceField, PosedCollider, SphereCollider
+from hairloom.addon.dynamics.contacts import cv_radius
+from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.state import start
+from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.errors import HairloomError
+
+BARE = {"radius_root": 0.0, "radius_tip": 0.0}
+
+
+def depths(scene, states, fps=60.0):
+    return [
+        deepest_penetration(state, scene.colliders(k / fps, (k + 1) / fps))
+        for k, state in enumerate(states[1:])
+    ]
+
+
+def lying(kit, guide_count=40, cv_count=16, length=0.25):
+    """Guides that stand up from the top of a ball of 0.1 m and fall over to all sides."""
+    angle = np.linspace(0.0, 2.0 * np.pi, guide_count, endpoint=False)
+    tilt = np.stack([0.3 * np.cos(angle), 0.3 * np.sin(angle), np.ones(guide_count)], axis=1)
+    tilt /= np.linalg.norm(tilt, axis=1, keepdims=True)
+    along = np.linspace(0.0, length, cv_count)
+    return (tilt[:, None] * (0.1 + along[:, None])).astype(np.float32)
+
+
+def test_limp_hair_lies_on_a_ball(kit):
+    """CV centers stay within 0.1 mm of the surface, without any collision radius to help."""
+    settings = DynamicsSettings(**kit.LIMP | BARE | {"damping": 2.0})
+    scene = kit.Scene(lying(kit), settings, on_head=(SphereCollider((0, 0, 0), 0.1),))
+    states = scene.play(2.0)
+    assert np.linalg.norm(states[-1].grid[:, 6], axis=1).max() < 0.13  # it did fall down
+    assert max(depths(scene, states)) < 1e-4
+    assert max(max_stretch(state) for state in states) < 0.01
+
+
+def test_pearls_grow_towards_the_tip(kit):
+    settings = DynamicsSettings(
+        **kit.LIMP | {"damping": 2.0, "radius_root": 0.001, "radius_tip": 0.02}
+    )
+    scene = kit.Scene(lying(kit), settings, on_head=(SphereCollider((0, 0, 0), 0.1),))
+    away = np.linalg.norm(scene.play(2.0)[-1].grid, axis=2) - 0.1
+    radius = cv_radius(settings, 16)
+    assert radius[-1] == pytest.approx(0.02)
+    assert (np.diff(radius) > 0.0).all()
+    assert (away[:, 2:] > radius - 1e-3).all()
+
+
+def test_a_mesh_holds_hair_out(kit):
+    """The same through a distance field of a ball mesh, to 1 mm, with the default radius."""
+    field = DistanceField.from_surface(kit.icosphere(0.1, 3), DynamicsSettings())
+    settings = DynamicsSettings(**kit.LIMP | {"damping": 2.0})
+    scene = kit.Scene(lying(kit), settings, on_head=(field,))
+    states = scene.play(1.5)
+    closest = min(np.linalg.norm(state.grid[:, 2:], axis=2).min() for state in states)
+    assert closest > 0.1 - 1e-3
+    assert max(depths(scene, states)) < 1e-3
+
+
+def test_a_moving_ball_sweeps_hair_along(kit):
+    """A ball comes through hanging hair at 1 m/s: never through it."""
+    settings = DynamicsSettings(**kit.LIMP | {"damping": 1.0})
+    ball = SphereCollider((0, 0, 0), 0.06)
+    grid = kit.straight(12, 16, 0.25)
+    state, farthest = start(grid), 0.0
+    for frame in range(30):
+        before, now = (kit.translation(0.05, -0.15 + k / 60.0, -0.15) for k in (frame, frame + 1))
+        posed = (PosedCollider(ball, before, now),)
+        state = advance(state, Drive(grid, grid, posed, kit.EARTH), settings, 1 / 60)
+        assert deepest_penetration(state, posed) < 1e-4
+        assert max_stretch(state) < 0.01
+        farthest = max(farthest, float(state.grid[:, :, 1].max()))
+    assert farthest > 0.1
+
+
+def test_hair_that_starts_inside_is_led_out(kit):
+    """It comes out within a second and never gets faster than a fall."""
+    settings = DynamicsSettings()
+    grid = lying(kit, length=0.2)
+    scene = kit.Scene(grid, settings, standing=(SphereCollider((0.0, 0.08, 0.2), 0.05),))
+    states = scene.play(2.0)
+    depth = depths(scene, states)
+    assert depth[0] > 0.02
+    assert depth[-1] < 1e-4
+    fastest = max(np.abs(s.position - s.previous).max() * settings.substep_rate for s in states[1:])
+    assert fastest < 3.0
+    calm = np.abs(states[-1].position - states[-1].previous).max() * settings.substep_rate
+    assert calm < 0.05
+
+
+def test_push_speed_is_the_limit(kit):
+    """A single free CV deep inside walks out along the normal at push_speed, and stays calm."""
+    settings = DynamicsSettings(
+        **kit.LIMP | BARE | {"push_speed": 0.2, "friction": 0.0, "length_tolerance": 1.0}
+    )
+    grid = kit.straight(1, 3, 200.0, (0.0, 1.0, 0.0))  # a long arm: nearly free to rise
+    scene = kit.Scene(
+        grid, settings, standing=(SphereCollider((0, 200.0, -0.05), 0.1),), gravity=np.zeros(3)
+    )
+    height = [state.position[2, 2, 0] for state in scene.play(0.5)]
+    assert height[6] == pytest.approx(0.02, rel=0.05)  # 0.2 m/s for 0.1 s
+    assert height[-1] == pytest.approx(0.05, abs=1e-3)
+
+
+def test_friction_drags_hair_along(kit):
+    """On a turning ball, rough hair goes with it and smooth hair does not."""
+    ball = SphereCollider((0, 0, 0), 0.1)
+    way = {}
+    for friction in (0.0, 1.0):
+        settings = DynamicsSettings(
+            **kit.LIMP | BARE | {"damping": 1.0, "friction": friction, "style_tip": 0.0}
+        )
+        grid = lying(kit)
+        state = start(grid)
+        still = np.eye(4)
+        for _ in range(60):  # settle
+            posed = (PosedCollider(ball, still, still),)
+            state = advance(state, Drive(grid, grid, posed, kit.EARTH), settings, 1 / 60)
+        settled = state.grid
+        for frame in range(12):
+            turns = (kit.rotation(2, k * 0.02) for k in (frame, frame + 1))
+            posed = (PosedCollider(ball, *turns),)
+            state = advance(state, Drive(grid, grid, posed, kit.EARTH), settings, 1 / 60)
+        middle = state.grid[:, 5], settled[:, 5]
+        angle = [np.arctan2(points[:, 1], points[:, 0]) for points in middle]
+        turned = (angle[0] - angle[1] + np.pi) % (2.0 * np.pi) - np.pi
+        way[friction] = np.median(turned)
+    assert way[1.0] > 0.05
+    assert abs(way[0.0]) < 0.3 * way[1.0]
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_a_scaled_ball_is_an_ellipsoid(kit, mirror):
+    """Uneven scale and mirroring: distances are the world's, and hair stays outside."""
+    matrix = np.diag([0.6 * mirror, 1.4, 1.0, 1.0])
+    settings = DynamicsSettings(**kit.LIMP | BARE | {"damping": 2.0})
+    grid = lying(kit)
+    state = start(grid)
+    posed = (PosedCollider(SphereCollider((0, 0, 0), 0.1), matrix, matrix),)
+    for _ in range(90):
+        state = advance(state, Drive(grid, grid, posed, kit.EARTH), settings, 1 / 60)
+    level = np.linalg.norm(state.grid[:, 2:] / np.diag(matrix)[:3], axis=2) / 0.1
+    assert level.min() > 0.99
+    assert deepest_penetration(state, posed) < 2e-4
+
+
+def test_penetration_is_measured_in_the_world(kit):
+    """A CV 1 cm under the surface of a ball scaled by 2 is 1 cm deep."""
+    grid = kit.straight(1, 3, 0.2, (1.0, 0.0, 0.0))
+    grid[0, 2] = [0.19, 0.0, 0.0]
+    ball = SphereCollider((0, 0, 0), 0.1)
+    twice = np.diag([2.0, 2.0, 2.0, 1.0])
+    assert deepest_penetration(start(grid), (PosedCollider(ball, twice, twice),)) == pytest.approx(
+        0.01, rel=1e-4
+    )
+    assert deepest_penetration(start(grid), ()) == 0.0
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [np.diag([1.0, 0.0, 1.0, 1.0]), np.full((4, 4), np.nan), np.eye(3)],
+)
+def test_a_flat_or_broken_collider_is_named(matrix):
+    with pytest.raises(HairloomError, match="transform"):
+        PosedCollider(SphereCollider((0, 0, 0), 0.1), np.eye(4), matrix)
+
+
+@pytest.mark.parametrize(("center", "radius"), [((0, 0, 0), 0.0), ((0, np.nan, 0), 1.0)])
+def test_a_ball_without_volume_is_named(center, radius):
+    with pytest.raises(HairloomError, match="no volume"):
+        SphereCollider(center, radius)

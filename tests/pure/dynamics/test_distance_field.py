@@ -1,0 +1,141 @@
+"""Signed distances against what balls and boxes have by formula."""
+
+import numpy as np
+import pytest
+
+from hairloom.addon.dynamics.distance_field import DistanceField
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.winding import winding_number
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.strands import Surface
+from hairloom.addon.strands.closest_point import closest_point
+
+RESOLUTION = 40
+
+
+def field_of(surface, resolution=RESOLUTION):
+    return DistanceField.from_surface(surface, DynamicsSettings(collider_resolution=resolution))
+
+
+def scattered(reach, count=4000, seed=0):
+    points = np.random.default_rng(seed).uniform(-reach, reach, (3, count))
+    return points.astype(np.float32)
+
+
+def box_distance(points, size):
+    """Signed distance of a box around the origin (Quilez)."""
+    q = np.abs(points) - np.asarray(size)[:, None] / 2.0
+    outside = np.linalg.norm(np.maximum(q, 0.0), axis=0)
+    return outside + np.minimum(q.max(axis=0), 0.0)
+
+
+@pytest.fixture(scope="module")
+def ball(kit):
+    return field_of(kit.icosphere(0.1))
+
+
+@pytest.fixture(scope="module")
+def brick(kit):
+    return field_of(kit.box((0.2, 0.12, 0.08)))
+
+
+def test_ball(ball):
+    """Near the surface within a tenth of a cell of the formula, the mesh's own facets included."""
+    points = scattered(0.13)
+    exact = np.linalg.norm(points, axis=0) - 0.1
+    distance, gradient = ball.distance(points)
+    near = np.abs(exact) < 2.0 * ball.cell
+    assert np.abs(distance - exact)[near].max() < 0.1 * ball.cell
+    away = points / np.linalg.norm(points, axis=0)
+    assert (gradient * away).sum(axis=0)[near].min() > 0.96
+    np.testing.assert_allclose(np.linalg.norm(gradient, axis=0)[near], 1.0, atol=0.04)
+
+
+def test_box_within_half_a_diagonal(brick):
+    """Exact beside the faces, cut off by a part of a cell at edges and corners; coarser far off."""
+    points = scattered(0.11, 20000)
+    exact = box_distance(points, (0.2, 0.12, 0.08))
+    distance, _ = brick.distance(points)
+    error, near = np.abs(distance - exact), np.abs(exact) < 2.0 * brick.cell
+    assert error[near].max() < 0.5 * brick.cell
+    assert np.median(error[near]) < 0.01 * brick.cell
+    assert error.max() < 2.0 * brick.cell
+    assert ((distance < 0.0) == (exact < 0.0))[np.abs(exact) > 0.3 * brick.cell].all()
+
+
+def test_gradient_is_the_slope(brick):
+    points = scattered(0.1, 500).astype(np.float64)
+    _, gradient = brick.distance(points)
+    step = 1e-6
+    cell = (points - brick.low[:, None]) / brick.cell
+    top = np.array(brick.values.shape)[:, None] - 1.0
+    in_grid = ((cell > 0.0) & (cell < top)).all(axis=0)
+    inside_a_cell = (np.abs(cell - np.round(cell)) > 1e-3).all(axis=0) & in_grid
+    assert inside_a_cell.sum() > 100
+    for axis in range(3):
+        way = np.zeros((3, 1))
+        way[axis] = step
+        slope = (brick.distance(points + way)[0] - brick.distance(points - way)[0]) / (2 * step)
+        np.testing.assert_allclose(gradient[axis][inside_a_cell], slope[inside_a_cell], atol=1e-3)
+
+
+def test_near_nodes_are_exact_and_all_signs_right(kit):
+    surface = kit.icosphere(0.1, 1)
+    field = field_of(surface, 12)
+    nodes = np.indices(field.values.shape).reshape(3, -1).T * field.cell + field.low
+    exact = closest_point(nodes, surface).distance
+    exact[winding_number(nodes, surface) > 0.5] *= -1.0  # at every node, not only near ones
+    values, near = field.values.ravel(), np.abs(exact) < 2.0 * field.cell
+    np.testing.assert_allclose(values[near], exact[near], atol=1e-6)
+    np.testing.assert_array_equal(values[~near] < 0.0, exact[~near] < 0.0)
+
+
+def test_near_misses_none(ball):
+    for reach in (0.001, 0.01, 0.03):
+        points = scattered(0.2)
+        within = np.linalg.norm(points, axis=0) - 0.1 < reach - 1e-4
+        chosen = ball.near(points, reach)
+        assert np.isin(np.flatnonzero(within), chosen).all()
+        assert len(chosen) < points.shape[1]
+
+
+def test_outside_of_the_grid_distance_goes_on(ball):
+    points = np.array([[0.5, 0.0, -0.3], [0.0, 0.9, 0.3], [0.0, 0.0, 0.3]], np.float32)
+    distance, gradient = ball.distance(points)
+    exact = np.linalg.norm(points, axis=0) - 0.1
+    assert (distance > 0.5 * exact).all()
+    assert (distance < 1.05 * exact).all()
+    assert ((gradient * points).sum(axis=0) > 0.0).all()
+    assert not len(ball.near(points, 0.05))
+
+
+def test_a_hole_does_not_turn_the_inside_out(kit):
+    whole = kit.icosphere(0.1, 2)
+    holed = Surface(whole.positions, whole.triangles[6:])
+    field = field_of(holed)
+    assert field.distance(np.zeros((3, 1), np.float32))[0][0] < -0.08
+    assert field.distance(np.full((3, 1), 0.09, np.float32))[0][0] > 0.04
+
+
+def test_a_mesh_turned_inside_out_is_the_same(kit, brick):
+    surface = kit.box((0.2, 0.12, 0.08))
+    turned = field_of(Surface(surface.positions, surface.triangles[:, ::-1]))
+    np.testing.assert_allclose(turned.values, brick.values, atol=1e-6)
+
+
+def test_winding_counts(kit):
+    points = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
+    np.testing.assert_allclose(winding_number(points, kit.icosphere(0.1, 2)), [1, 0], atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("positions", "triangles", "message"),
+    [
+        (np.zeros((3, 3)), np.zeros((0, 3), int), "no faces"),
+        (np.zeros((3, 3)), np.array([[0, 1, 2]]), "one point"),
+        (np.eye(3), np.array([[0, 1, 2]]), "encloses no volume"),
+    ],
+)
+def test_a_mesh_without_volume_is_named(positions, triangles, message):
+    with pytest.raises(HairloomError, match=message):
+        field_of(Surface(positions.astype(np.float32), triangles))

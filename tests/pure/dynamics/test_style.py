@@ -1,0 +1,74 @@
+"""Frames that do not twist, and a style that comes back."""
+
+import numpy as np
+
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.state import rows_of, start
+from hairloom.addon.dynamics.style import frames, restore_style, style_band
+from hairloom.addon.strands.frames import transported_normals
+
+
+def test_frames_are_the_transported_normals(kit):
+    """Against the frames of the strands room, which use Rodrigues' formula."""
+    state = start(kit.curly(30, 16))
+    tangent, normal, _ = frames(state.position, state.position, state.rest.twist_cv)
+    expected = transported_normals(tangent.transpose(2, 1, 0), normal[:, 0].T)
+    np.testing.assert_allclose(normal.transpose(2, 1, 0), expected, atol=2e-5)
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=0), 1.0, atol=1e-5)
+
+
+def test_curvature_turns_with_the_root(kit):
+    """A guide moved rigidly has nothing to restore, whatever the turn."""
+    grid = kit.curly(30, 16)
+    turn = kit.rotation(0, 1.1) @ kit.rotation(2, 2.3)
+    state = start(grid)
+    carried = rows_of(kit.moved(turn, grid), "test")
+    position = carried.copy()
+    settings = DynamicsSettings(bend=20.0)
+    band = style_band(settings, 16, 1 / 240)
+    restore_style(position, carried, state.rest.curvature, state.rest.twist_cv, band)
+    np.testing.assert_allclose(position, carried, atol=2e-6)
+
+
+def test_bend_alone_brings_curls_back_without_place(kit):
+    """Straightened hair curls up again by its bend stiffness, with no pull to its place."""
+    grid = kit.curly(10, 16)
+    state = start(grid)
+    straightened = grid[:, :1] + (grid[:, 1:2] - grid[:, :1]) * np.arange(16)[:, None]
+    position = rows_of(straightened.astype(np.float32), "test")
+    carried = rows_of(grid, "test")
+    band = style_band(DynamicsSettings(style_root=0, style_tip=0, bend=10), 16, 1 / 240)
+
+    def shape_error():
+        second = np.diff(position, n=2, axis=1) - np.diff(carried, n=2, axis=1)
+        return np.abs(second).max()
+
+    before = shape_error()
+    for _ in range(60):
+        position[:, :2] = carried[:, :2]
+        restore_style(position, carried, state.rest.curvature, state.rest.twist_cv, band)
+    assert shape_error() < 0.02 * before
+
+
+def test_solve_is_the_minimum(kit):
+    """The place pull alone is a weighted mean of where a CV is and where it belongs."""
+    state = start(kit.curly(5, 8))
+    settings = DynamicsSettings(style_root=3.0, style_tip=1.0, bend=0.0)
+    dt = 1 / 60
+    position = state.position + np.float32(0.01)
+    restore_style(
+        position, state.position, state.rest.curvature, state.rest.twist_cv,
+        style_band(settings, 8, dt),
+    )  # fmt: skip
+    frequency = 3.0 - 2.0 * np.arange(2, 8) / 7
+    pull = (2 * np.pi * frequency * dt) ** 2
+    expected = state.position[:, 2:] + 0.01 / (1.0 + pull)[:, None]
+    np.testing.assert_allclose(position[:, 2:], expected, atol=1e-6)
+
+
+def test_straight_guides_have_no_twist_to_lose(kit):
+    state = start(kit.straight(4, 10))
+    tangent, normal, _ = frames(state.position, state.position, state.rest.twist_cv)
+    assert np.isfinite(normal).all()
+    np.testing.assert_allclose(tangent[2], -1.0, atol=1e-6)
+    np.testing.assert_allclose(state.rest.curvature, 0.0, atol=1e-6)
