@@ -18,7 +18,7 @@ from .cards.strip import build_cards
 from .dynamics.colliders import PosedCollider
 from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, start
-from .dynamics.step import Drive
+from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance as advance_dynamics
 from .errors import HairloomError
 from .groom.guides import choose_guides
@@ -72,10 +72,12 @@ class Rig:
 class Motion:
     """What one frame hands to the next.
 
-    carried_guides: (guide_count, cv_count, 3) [m], the guides' rest shape carried by the roots.
+    guides: (guide_count, cv_count, 3) [m], simulated, with their roots in this pose.
+    carried_guides: the same without dynamics: their rest shape carried by the roots.
     """
 
     dynamics: DynamicsState
+    guides: Floats
     carried_guides: Floats
     pose: Pose
 
@@ -138,7 +140,7 @@ def carried(rig: Rig, pose: Pose, chosen: Ints | slice = slice(None)) -> Floats:
 def begin(rig: Rig, pose: Pose) -> Motion:
     """Hair at rest in this pose."""
     guides = carried(rig, pose, rig.guides)
-    return Motion(start(guides), guides, pose)
+    return Motion(start(guides), guides, guides, pose)
 
 
 def advance(
@@ -156,14 +158,15 @@ def advance(
         gravity: (3,) [m/s^2], world space.
         duration: time since the motion's pose [s].
     """
-    guides = carried(rig, pose, rig.guides)
-    drive = Drive(motion.carried_guides, guides, colliders, gravity)
-    return Motion(advance_dynamics(motion.dynamics, drive, settings, duration), guides, pose)
+    target = carried(rig, pose, rig.guides)
+    drive = Drive(motion.carried_guides, target, colliders, gravity)
+    state = advance_dynamics(motion.dynamics, drive, settings, duration)
+    return Motion(state, grid_at_frame_end(state, drive), target, pose)
 
 
 def strands_now(rig: Rig, motion: Motion) -> Floats:
     """All strands at this moment of a running motion, (strand_count, cv_count, 3) [m]."""
-    return strands_at(rig, motion.pose, motion.dynamics.grid)
+    return strands_at(rig, motion.pose, motion.guides)
 
 
 def strands_at(rig: Rig, pose: Pose, guides_now: Floats) -> Floats:

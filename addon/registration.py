@@ -45,6 +45,7 @@ def register() -> None:
 
 def unregister() -> None:
     """The exact mirror image, after the previews have ended."""
+    operators_preview.stop_ticking()
     live.clear()
     for _, undo in reversed(_steps()):
         undo()

@@ -11,16 +11,16 @@ import bpy
 
 from .. import pipeline
 from ..cards.settings import CardSettings
-from ..exchange.sidecar import write_sidecar
 from ..exchange.tressfx import read_tfx, write_tfx
 from ..groom.grow import grow, scalp_density
 from ..groom.roots import bind_roots
 from ..groom.settings import GrowSettings, GuideSettings
 from ..shading.ambient import AmbientSettings
-from ..shading.textures import TextureSettings, card_texture
+from ..shading.settings import ShadingSettings
+from ..shading.textures import TextureSettings
 from ..strands import StrandSet
+from .card_files import CardChoices, write_cards
 from .curves import write_curves
-from .glb import write_glb
 from .properties import settings_of
 from .source import read_source
 from .surfaces import read_surface
@@ -49,7 +49,8 @@ def import_tfx(
         HairloomError: the file cannot be read, or is of another scale than the head.
     """
     read = read_tfx(path, up=up, scale=scale)
-    strands, warnings = read.strands, ()
+    strands: StrandSet = read.strands
+    warnings: tuple[str, ...] = ()
     if head is not None:
         strands, warnings = _on_head(strands, head, path.name)
     hair = write_curves(path.stem, strands, head, collection)
@@ -85,12 +86,13 @@ def export_cards(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, path: P
     source, groom = read_source(hair, depsgraph), hair.data.hairloom
     guides = settings_of(groom.guides, GuideSettings)
     rig = pipeline.prepare(source.strands, source.head, guides, place=hair.name)
-    mesh = pipeline.cards_of(
-        rig, settings_of(groom.cards, CardSettings), settings_of(groom.ambient, AmbientSettings)
+    choices = CardChoices(
+        settings_of(groom.cards, CardSettings),
+        settings_of(groom.card_texture, TextureSettings),
+        settings_of(groom.ambient, AmbientSettings),
+        settings_of(groom.shading, ShadingSettings),
     )
-    texture = card_texture(settings_of(groom.card_texture, TextureSettings))
-    write_glb(path, mesh, texture, name=path.stem)
-    sidecar = write_sidecar(path, mesh)
+    mesh, sidecar = write_cards(path, rig, choices)
     result = f"Wrote {mesh.card_count:,} cards to {path.name} and {sidecar.name}"
     return Outcome(result, source.dropped, source.warnings)
 

@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, PointerProperty
 
 from ..parameters import ALL_SETTINGS
 from . import live
-from .properties import annotations, property_group
+from .properties import property_annotations, property_group
 
 GROOM_SECTIONS = ("guides", "strands", "shading", "ambient", "cards", "card_texture")
 CHARACTER_SECTIONS = ("dynamics",)
@@ -42,7 +42,7 @@ SECTION_GROUPS = {
 
 def operator_properties(section: str) -> dict[str, Any]:
     """For the `__annotations__` of an operator that works by the settings of one section."""
-    return annotations(ALL_SETTINGS[section])
+    return property_annotations(ALL_SETTINGS[section])
 
 
 class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):

@@ -15,15 +15,14 @@ from ..cards.settings import CardSettings
 from ..dynamics.colliders import DistanceField
 from ..dynamics.settings import DynamicsSettings
 from ..errors import HairloomError
-from ..exchange.sidecar import write_sidecar
 from ..exchange.tressfx import write_tfx
 from ..groom.settings import GrowSettings, GuideSettings
 from ..params import Settings
 from ..pipeline import Pose, Rig
 from ..shading.ambient import AmbientSettings
 from ..shading.settings import ShadingSettings, StrandSettings
-from ..shading.textures import TextureSettings, card_texture
-from .glb import write_glb
+from ..shading.textures import TextureSettings
+from .card_files import CardChoices, write_cards
 from .images import contact_sheet, write_png
 from .inputs import Inputs, Sources, read_inputs
 from .report import Progress, Report
@@ -239,15 +238,13 @@ def _write_sheet(path: Path, studio: Studio, rig: Rig, take: Take, report: Repor
 
 def _write_cards(job: Job, path: Path, rig: Rig, report: Report) -> None:
     print("building hair cards", flush=True)
-    with report.stage("build cards"):
-        mesh = pipeline.cards_of(rig, job.set(CardSettings), job.set(AmbientSettings))
-    with report.stage("card texture"):
-        texture = card_texture(job.set(TextureSettings), mesh.atlas_columns)
-    with report.stage("write cards"):
-        write_glb(
-            path, mesh, texture, name=path.stem, base_color=job.set(ShadingSettings).base_color
-        )
-        sidecar = write_sidecar(path, mesh)
+    choices = CardChoices(
+        job.set(CardSettings),
+        job.set(TextureSettings),
+        job.set(AmbientSettings),
+        job.set(ShadingSettings),
+    )
+    mesh, sidecar = write_cards(path, rig, choices, report.stage)
     report.facts.update(cards=mesh.card_count, card_triangles=len(mesh.triangles))
     report.add_output(path)
     report.add_output(sidecar)

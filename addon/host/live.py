@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import bpy
 
@@ -106,10 +107,9 @@ def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
 
 def rest(depsgraph: bpy.types.Depsgraph, *, keep_playing: bool) -> None:
     """All hair back into its style."""
+    back = Session.rest if keep_playing else Session.stop
     for session in sessions():
-        _attempt(
-            session, depsgraph, lambda s: s.rest(depsgraph) if keep_playing else s.stop(depsgraph)
-        )
+        _attempt(session, depsgraph, lambda s: back(s, depsgraph))
 
 
 def settings_changed(owner: bpy.types.ID) -> None:
@@ -132,7 +132,8 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
             session.is_stale = True
             _read_again_soon()
         follows = not session.is_playing and _follows(session, moved)
-        _attempt(session, depsgraph, lambda s, f=follows: _update(s, depsgraph, f, is_lit_anew))
+        update = partial(_update, depsgraph=depsgraph, follows=follows, is_lit_anew=is_lit_anew)
+        _attempt(session, depsgraph, update)
 
 
 def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:

@@ -38,13 +38,15 @@ def property_group(settings: type[Settings], changed: Changed | None = None) -> 
     """
     namespace = {
         "__doc__": settings.title,
-        "__annotations__": annotations(settings, changed),
+        "__annotations__": property_annotations(settings, changed),
         "settings": settings,
     }
     return type(f"HAIRLOOM_PG_{settings.section}", (bpy.types.PropertyGroup,), namespace)
 
 
-def annotations(settings: type[Settings], changed: Changed | None = None) -> dict[str, Any]:
+def property_annotations(
+    settings: type[Settings], changed: Changed | None = None
+) -> dict[str, Any]:
     """name -> Blender property, for the `__annotations__` of a group or an operator."""
     return {parameter.name: _property(parameter, changed) for parameter in settings.parameters()}
 

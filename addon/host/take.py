@@ -74,12 +74,12 @@ def simulate(
         each_frame: told the number of each finished frame.
     """
     motion = pipeline.begin(rig, poses[0])
-    guides, stretch, penetration = [motion.dynamics.grid], 0.0, 0.0
+    guides, stretch, penetration = [motion.guides], 0.0, 0.0
     for frame, (before, now) in enumerate(pairwise(poses), start=1):
         posed = (PosedCollider(collider, before.matrix, now.matrix),)
         with stage("simulate frame"):
             motion = pipeline.advance(rig, motion, now, posed, settings, GRAVITY, 1.0 / frame_rate)
-        guides.append(motion.dynamics.grid)
+        guides.append(motion.guides)
         stretch = max(stretch, max_stretch(motion.dynamics))
         penetration = max(penetration, deepest_penetration(motion.dynamics, posed))
         each_frame(frame)

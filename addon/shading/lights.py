@@ -41,7 +41,12 @@ class Light:
     power: Color
 
     @classmethod
-    def sun(cls, shines_along: Sequence[float], color: Sequence[float], strength: float) -> Light:
+    def sun(
+        cls,
+        shines_along: Sequence[float] | Floats,
+        color: Sequence[float] | Floats,
+        strength: float,
+    ) -> Light:
         """A sun that shines along a direction, of Blender's strength [W/m^2].
 
         Raises:
@@ -56,7 +61,9 @@ class Light:
         return cls("sun", _triple(-along / length), _triple(np.multiply(color, strength)))
 
     @classmethod
-    def point(cls, position: Sequence[float], color: Sequence[float], power: float) -> Light:
+    def point(
+        cls, position: Sequence[float] | Floats, color: Sequence[float] | Floats, power: float
+    ) -> Light:
         """A point light at a position [m], of Blender's power [W]."""
         return cls("point", _triple(position), _triple(np.multiply(color, power)))
 

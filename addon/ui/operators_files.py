@@ -12,7 +12,7 @@ from ..errors import HairloomError
 from ..host import groom_files
 from ..host.groups import operator_properties
 from .reports import reporting, tell, waiting
-from .selection import active_mesh, needs_hair, chosen_hair
+from .selection import active_mesh, chosen_hair, needs_hair
 
 UP_AXES = (
     ("Y", "Y Up", "The file's Y axis points up, as in most engines"),

@@ -9,10 +9,14 @@ import bpy
 from ..host import live
 from ..host.groom_files import Outcome
 from .reports import reporting, tell, waiting
-from .selection import needs_hair, chosen_hair
+from .selection import chosen_hair, needs_hair
 
 TICKS_PER_SECOND = 60.0
 STATUS = "Hairloom plays. Move the head or the sliders. Esc: stop, the hair returns to its style"
+
+
+#: ticks while hair plays; kept here because Blender does not tell an operator that it is disabled
+_timer: bpy.types.Timer | None = None
 
 
 class HAIRLOOM_OT_preview(bpy.types.Operator):
@@ -42,7 +46,6 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
     bl_idname = "hairloom.play"
     bl_label = "Play"
 
-    _timer: bpy.types.Timer | None = None
     _last_tick: float = 0.0
 
     @classmethod
@@ -65,31 +68,26 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
                 start_preview(self, context, chosen_hair(context))
             for warning in live.play(context.evaluated_depsgraph_get()):
                 self.report({"WARNING"}, warning)
-        self._begin(context)
+        start_ticking(context)
+        self._last_tick = time.perf_counter()
+        context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not live.is_playing():
-            self._end(context)
+            stop_ticking()
             return {"FINISHED"}
         if event.type == "ESC" and event.value == "PRESS":
             live.rest(context.evaluated_depsgraph_get(), keep_playing=False)
-            self._end(context)
+            stop_ticking()
             return {"CANCELLED"}
         if event.type == "TIMER":
             self._tick(context)
         return {"PASS_THROUGH"}
 
-    def cancel(self, context: bpy.types.Context) -> None:
+    def cancel(self, _context: bpy.types.Context) -> None:
         """Blender ends the operator: a file is loaded or its window closed."""
-        self._end(context)
-
-    def _begin(self, context: bpy.types.Context) -> None:
-        manager = context.window_manager
-        self._timer = manager.event_timer_add(1.0 / TICKS_PER_SECOND, window=context.window)
-        self._last_tick = time.perf_counter()
-        manager.modal_handler_add(self)
-        context.workspace.status_text_set(STATUS)
+        stop_ticking()
 
     def _tick(self, context: bpy.types.Context) -> None:
         """Simulate the time that really passed; other timers' ticks in between are left out."""
@@ -98,13 +96,6 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
             return
         live.advance(context.evaluated_depsgraph_get(), now - self._last_tick)
         self._last_tick = now
-
-    def _end(self, context: bpy.types.Context) -> None:
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-        if context.workspace is not None:
-            context.workspace.status_text_set(None)
 
 
 class HAIRLOOM_OT_reset(bpy.types.Operator):
@@ -123,6 +114,24 @@ class HAIRLOOM_OT_reset(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         live.rest(context.evaluated_depsgraph_get(), keep_playing=True)
         return {"FINISHED"}
+
+
+def start_ticking(context: bpy.types.Context) -> None:
+    global _timer
+    stop_ticking()
+    _timer = context.window_manager.event_timer_add(1.0 / TICKS_PER_SECOND, window=context.window)
+    context.workspace.status_text_set(STATUS)
+
+
+def stop_ticking() -> None:
+    """Leave no timer and no text in the status bar, however Play ends."""
+    global _timer
+    if _timer is None:
+        return
+    bpy.context.window_manager.event_timer_remove(_timer)
+    _timer = None
+    if bpy.context.workspace is not None:
+        bpy.context.workspace.status_text_set(None)
 
 
 def start_preview(

@@ -20,9 +20,7 @@ def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
     return hair or _grown_on(selected, context) or _previewed()
 
 
-def _grown_on(
-    meshes: list[bpy.types.Object], context: bpy.types.Context
-) -> list[bpy.types.Object]:
+def _grown_on(meshes: list[bpy.types.Object], context: bpy.types.Context) -> list[bpy.types.Object]:
     everything = context.view_layer.objects
     return [obj for obj in everything if obj.type == "CURVES" and head_of(obj) in meshes]
 

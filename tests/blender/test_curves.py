@@ -69,7 +69,7 @@ def test_more_points_than_are_moved_at_once(evaluated):
     obj = written(strands)
     obj.matrix_world = Matrix.Translation((10.0, 0.0, 0.0))
     read = read_curves(obj, evaluated()).strands
-    assert read.points == pytest.approx(strands.points + [10.0, 0.0, 0.0], abs=2e-6)
+    assert read.points == pytest.approx(strands.points + np.array([10.0, 0.0, 0.0]), abs=2e-6)
 
 
 def with_modifier(obj, *nodes):
@@ -98,7 +98,7 @@ def test_modifiers_are_applied(evaluated):
     )
     read = read_curves(obj, evaluated()).strands
     assert read.point_counts.tolist() == [5, 5]
-    assert read.roots == pytest.approx(strands.roots + [0.0, 0.0, 1.0], abs=1e-6)
+    assert read.roots == pytest.approx(strands.roots + np.array([0.0, 0.0, 1.0]), abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["groom_group_id", "group"])
@@ -192,7 +192,7 @@ def test_written_on_a_moved_head_strands_stay_where_they_are(evaluated, sphere):
     assert obj.data.surface_uv_map == sphere.data.uv_layers.active.name
     sphere.location.x += 1.0
     moved = read_curves(obj, evaluated()).strands.points
-    assert moved == pytest.approx(strands.points + [1.0, 0.0, 0.0], abs=2e-6)
+    assert moved == pytest.approx(strands.points + np.array([1.0, 0.0, 0.0]), abs=2e-6)
 
 
 def test_blenders_own_surface_node_accepts_the_attachment(evaluated, sphere):
@@ -213,4 +213,4 @@ def test_blenders_own_surface_node_accepts_the_attachment(evaluated, sphere):
     raised.value = 1.0
     moved = read_curves(obj, evaluated()).strands.points
     assert obj.modifiers[0].node_warnings[:] == []
-    assert moved == pytest.approx(points + [0.0, 0.0, 0.25], abs=1e-4)
+    assert moved == pytest.approx(points + np.array([0.0, 0.0, 0.25]), abs=1e-4)

@@ -4,6 +4,7 @@ import math
 
 import bpy
 import pytest
+
 from hairloom import register, unregister
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.host import groups, live

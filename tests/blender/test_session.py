@@ -8,10 +8,11 @@ import math
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
+
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.host import live, overlay
 from hairloom.addon.strands import StrandSet
-from mathutils import Matrix
 
 FRAME = 1.0 / 60.0
 
@@ -69,7 +70,7 @@ def test_without_a_surface_hair_follows_its_own_object(new_hair, evaluated):
     before = drawn(session)
     hair.location = (1.0, 2.0, 3.0)
     update()
-    assert drawn(session) == pytest.approx(before + [1.0, 2.0, 3.0], abs=1e-6)
+    assert drawn(session) == pytest.approx(before + np.array([1.0, 2.0, 3.0]), abs=1e-6)
 
 
 def play(evaluated, frames, each=lambda frame: None):
@@ -88,7 +89,7 @@ def test_playing_hair_lags_behind_and_returns_when_stopped(preview, evaluated):
         head.location.x = 0.02 * (frame + 1)
 
     play(evaluated, 6, push)
-    carried = at_rest + [head.location.x, 0.0, 0.0]
+    carried = at_rest + np.array([head.location.x, 0.0, 0.0])
     offset = drawn(session) - carried
     assert np.abs(offset[:, 0]).max() < 1e-5, "roots go with the head"
     assert offset[:, -1, 0].mean() < -0.005, "tips stay behind"
@@ -120,7 +121,7 @@ def test_hair_stays_out_of_the_head_that_moves_into_it(preview, evaluated):
 
 
 def test_a_chosen_collider_is_used_in_place_of_the_head(preview, evaluated):
-    hair, head, session = preview
+    hair, _, session = preview
     bpy.ops.mesh.primitive_cube_add(size=0.05, location=(0.0, 0.0, 1.0))
     cube = bpy.context.object
     hair.hairloom.collider = cube
@@ -196,7 +197,7 @@ def test_animated_settings_and_heads_are_followed_frame_by_frame(preview):
         head.keyframe_insert("location", frame=frame)
     bpy.context.scene.frame_set(11)
     assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 1.0
-    assert drawn(session) == pytest.approx(before + [1.0, 0.0, 0.0], abs=1e-5)
+    assert drawn(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-5)
 
 
 def test_edited_curves_are_read_again_and_others_left_alone(preview, evaluated):
@@ -214,7 +215,9 @@ def test_edited_curves_are_read_again_and_others_left_alone(preview, evaluated):
     live.catch_up(evaluated())
     assert session.rig is not rig
     assert drawn(session)[0, -1] == pytest.approx([0.0, 0.25, 0.5], abs=1e-5)
-    assert drawn(session)[1, 0] == pytest.approx(rig.strands.roots[1] + [0, 0.25, 0], abs=1e-5)
+    assert drawn(session)[1, 0] == pytest.approx(
+        rig.strands.roots[1] + np.array([0, 0.25, 0]), abs=1e-5
+    )
 
 
 def test_curves_may_become_fewer_and_none(preview, evaluated):
@@ -237,7 +240,7 @@ def test_renaming_is_no_matter(preview):
     hair.name, head.name = "Wig", "Bust"
     head.location.x = 1.0
     update()
-    assert drawn(session) == pytest.approx(before + [1.0, 0.0, 0.0], abs=1e-6)
+    assert drawn(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
 
 
 @pytest.mark.parametrize("which", ["Hair", "Head"])
@@ -332,7 +335,7 @@ def test_hidden_hair_is_not_drawn(preview):
 
 
 def test_a_final_render_does_not_disturb_the_preview(preview):
-    _, head, session = preview
+    _, _, session = preview
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)

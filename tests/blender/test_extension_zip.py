@@ -1,0 +1,165 @@
+"""The extension as artists get it: its manifest, its zip, and what Blender does with them."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import bpy
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+SCRIPTS = Path(bpy.utils.system_resource("SCRIPTS"))
+EXTENSION_TOOL = SCRIPTS / "addons_core/bl_pkg/cli/blender_ext.py"
+#: folders and files that a user of the zip has no use for
+NOT_FOR_USERS = ("tests", "tools", "docs", "bench", "out", "dist", "Makefile", "pyproject.toml")
+
+
+def extension_tool(*arguments):
+    """Blender's own packager, as `blender --command extension` runs it."""
+    done = subprocess.run(
+        [sys.executable, str(EXTENSION_TOOL), *map(str, arguments)], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def in_fresh_blender(script, resources):
+    """Runs a script in a new Blender with user folders of its own; what it prints last as JSON."""
+    wheel = [sys.executable, script]
+    program = [bpy.app.binary_path, "-b", "--python-exit-code", "1", "--python", script]
+    done = subprocess.run(
+        list(map(str, program if bpy.app.binary_path else wheel)),
+        env=os.environ | {"BLENDER_USER_RESOURCES": str(resources)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    answers = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    return json.loads(answers[-1]), done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("dist")
+    extension_tool("build", "--source-dir", REPOSITORY, "--output-dir", folder)
+    (path,) = folder.glob("hairloom-*.zip")
+    return path
+
+
+@pytest.fixture(scope="module")
+def names(built):
+    with zipfile.ZipFile(built) as archive:
+        assert archive.testzip() is None
+        return archive.namelist()
+
+
+@pytest.fixture(scope="module")
+def manifest():
+    return tomllib.loads((REPOSITORY / "blender_manifest.toml").read_text(encoding="utf-8"))
+
+
+def tracked(folder):
+    """What lies below a folder of the repository and belongs to the extension."""
+    return {
+        path.relative_to(REPOSITORY).as_posix()
+        for path in (REPOSITORY / folder).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+
+
+def test_blender_accepts_the_repository_and_the_zip(built):
+    extension_tool("validate", REPOSITORY)
+    extension_tool("validate", built)
+
+
+def test_what_the_validator_does_not_check_is_right(manifest):
+    """It accepts unknown licences, schema versions, keys and websites."""
+    assert manifest["schema_version"] == "1.0.0"
+    assert manifest["id"] == "hairloom"
+    assert manifest["type"] == "add-on"
+    assert manifest["license"] == ["SPDX:GPL-3.0-or-later"]
+    assert manifest["blender_version_min"] == "5.2.0"
+    assert re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
+    assert "blender" not in manifest["name"].lower()
+    assert len(manifest["tagline"]) <= 64 and manifest["tagline"][-1].isalnum()
+    assert set(manifest["permissions"]) == {"files"}
+    assert all(reason[-1].isalnum() for reason in manifest["permissions"].values())
+    known = {"schema_version", "id", "version", "name", "tagline", "maintainer", "type", "tags"}
+    known |= {"blender_version_min", "license", "copyright", "permissions", "build", "website"}
+    known |= {"wheels", "platforms", "blender_version_max"}
+    assert set(manifest) <= known
+    assert all((REPOSITORY / wheel).is_file() for wheel in manifest.get("wheels", ()))
+    assert "GNU GENERAL PUBLIC LICENSE" in (REPOSITORY / "LICENSE").read_text(encoding="utf-8")
+
+
+def test_the_zip_holds_all_that_runs_and_nothing_else(names):
+    for folder in ("addon", "gpu_shaders", "presets"):
+        assert tracked(folder) <= set(names), folder
+    assert {"__init__.py", "blender_manifest.toml", "LICENSE"} <= set(names)
+    assert [n for n in names if n.split("/")[0] in NOT_FOR_USERS] == []
+    assert [n for n in names if "__pycache__" in n or n.endswith((".pyc", ".blend1", ".zip"))] == []
+    assert [n for n in names if any(part.startswith(".") for part in n.split("/"))] == []
+    assert [n for n in names if n.endswith("/")] == [], "an empty folder"
+
+
+def test_no_module_edits_the_path_or_takes_its_name_for_granted():
+    """Blender renames the package, and shows a policy violation for entries in sys.path."""
+    for file in (REPOSITORY / "addon").rglob("*.py"):
+        text = file.read_text(encoding="utf-8")
+        assert "sys.path" not in text, file
+        assert not re.search(r"^\s*(from|import) (hairloom|addon)\b", text, re.MULTILINE), file
+
+
+INSTALL = """
+import json, sys
+import bpy, addon_utils
+NAME = "bl_ext.user_default.hairloom"
+bpy.ops.extensions.package_install_files(
+    filepath={zip!r}, repo="user_default", enable_on_install=True
+)
+assert all(addon_utils.check(NAME)), "not enabled after the installation"
+
+def traces():
+    handlers = [h for n in dir(bpy.app.handlers) for h in [getattr(bpy.app.handlers, n)]]
+    own = [f for h in handlers if isinstance(h, list) for f in h if "hairloom" in f.__module__]
+    classes = [n for n in dir(bpy.types) if "HAIRLOOM" in n]
+    return [len(own), len(classes), hasattr(bpy.types.Curves, "hairloom"), len(dir(bpy.ops.hairloom))]
+
+enabled, after = traces(), set()
+for _ in range(10):
+    addon_utils.disable(NAME, default_set=True)
+    after.add(json.dumps(traces()))
+    assert not any(addon_utils.check(NAME))
+    assert addon_utils.enable(NAME, default_set=True) is not None
+    assert traces() == enabled
+
+bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+bpy.ops.hairloom.grow(strand_count=50, length=0.1)
+bpy.ops.hairloom.preview()
+live = sys.modules[NAME + ".addon.host.live"]
+registration = sys.modules[NAME + ".addon.registration"]
+print(json.dumps(dict(
+    enabled=enabled,
+    after=sorted(after),
+    strands=live.sessions()[0].rig.strands.strand_count,
+    root=registration.ROOT_PACKAGE,
+)), flush=True)
+"""
+
+
+def test_it_installs_from_the_zip_and_goes_on_and_off_ten_times(built, tmp_path):
+    script = tmp_path / "install.py"
+    script.write_text(INSTALL.format(zip=str(built)), encoding="utf-8")
+    answer, output = in_fresh_blender(script, tmp_path / "resources")
+    assert answer["after"] == ["[0, 0, false, 0]"]
+    handlers, classes, _, operators = answer["enabled"]
+    assert handlers == 6 and classes > 15 and operators == 7
+    assert answer["strands"] == 50
+    assert answer["root"] == "bl_ext.user_default.hairloom"
+    assert "Policy" not in output
+    assert not re.search(r"Traceback[\s\S]*hairloom", output), output

@@ -1,0 +1,144 @@
+"""Enabling and disabling, again and again, leaves nothing behind."""
+
+import bpy
+import pytest
+
+import hairloom
+from hairloom.addon import registration
+from hairloom.addon.host import groups, live, overlay
+
+
+@pytest.fixture
+def commands(monkeypatch):
+    """The command line verbs that Blender knows; it has no list of its own."""
+    known = []
+    add, remove = bpy.utils.register_cli_command, bpy.utils.unregister_cli_command
+
+    def register_cli_command(name, run):
+        handle = add(name, run)
+        known.append((name, handle))
+        return handle
+
+    def unregister_cli_command(handle):
+        remove(handle)
+        known[:] = [entry for entry in known if entry[1] is not handle]
+
+    monkeypatch.setattr(bpy.utils, "register_cli_command", register_cli_command)
+    monkeypatch.setattr(bpy.utils, "unregister_cli_command", unregister_cli_command)
+    return known
+
+
+def traces():
+    """All of Hairloom that Blender can know of."""
+    handlers = {
+        name: [f"{each.__module__}.{each.__qualname__}" for each in handlers]
+        for name in dir(bpy.app.handlers)
+        if isinstance(handlers := getattr(bpy.app.handlers, name), list)
+    }
+    menus = {name: len(getattr(bpy.types, name).draw._draw_funcs) for name in EXTENDED_MENUS}
+    properties = {
+        owner.__name__: sorted(owner.bl_rna.properties.keys())
+        for owner in (
+            bpy.types.Curves,
+            bpy.types.Object,
+            bpy.types.Scene,
+            bpy.types.WindowManager,
+            bpy.types.Mesh,
+        )
+    }
+    classes = [name for name in dir(bpy.types) if "hairloom" in name.lower()]
+    own_attributes = [hasattr(bpy.types.Curves, "hairloom"), hasattr(bpy.types.Object, "hairloom")]
+    timer = bpy.app.timers.is_registered(live._read_again)
+    operators = dir(bpy.ops.hairloom)
+    return handlers, menus, properties, classes, own_attributes, timer, operators
+
+
+EXTENDED_MENUS = ("TOPBAR_MT_file_import", "TOPBAR_MT_file_export", "VIEW3D_MT_curve_add")
+
+
+@pytest.fixture(autouse=True)
+def menus_can_be_counted():
+    """Blender turns a menu's draw into a list the first time that anything is appended to it."""
+    for name in EXTENDED_MENUS:
+        getattr(bpy.types, name).append(_nothing)
+    yield
+    for name in EXTENDED_MENUS:
+        getattr(bpy.types, name).remove(_nothing)
+
+
+def _nothing(_menu, _context):
+    pass
+
+
+def test_ten_times_on_and_off_leave_nothing(commands):
+    before = traces()
+    for _ in range(10):
+        hairloom.register()
+        assert traces() != before
+        assert [name for name, _ in commands] == ["hairloom"]
+        hairloom.unregister()
+        assert traces() == before
+        assert commands == []
+
+
+def test_disabling_ends_previews_and_timers(new_hair, sphere, evaluated):
+    hair = new_hair(sphere)
+    session = live.start(hair, evaluated())
+    hair.data.hairloom.guides.guide_count = 5
+    assert bpy.app.timers.is_registered(live._read_again)
+    hairloom.unregister()
+    try:
+        assert live.sessions() == ()
+        assert overlay.drawing_of(session.uid) is None
+        assert not bpy.app.timers.is_registered(live._read_again)
+        assert hair.evaluated_get(evaluated()).display_type == "TEXTURED"
+    finally:
+        hairloom.register()
+
+
+@pytest.mark.parametrize("failing", [0, 5, len(registration.CLASSES) - 1])
+def test_what_was_registered_is_rolled_back_when_a_class_fails(failing, monkeypatch, commands):
+    before = traces()
+    register_class = bpy.utils.register_class
+
+    def fail_once(each):
+        if each is registration.CLASSES[failing]:
+            raise RuntimeError("this one fails")
+        register_class(each)
+
+    monkeypatch.setattr(bpy.utils, "register_class", fail_once)
+    with pytest.raises(RuntimeError, match="this one fails"):
+        hairloom.register()
+    assert traces() == before
+    assert commands == []
+
+
+def test_a_late_failure_rolls_everything_back(monkeypatch, commands):
+    before = traces()
+
+    def fail(*_):
+        raise RuntimeError("no commands today")
+
+    monkeypatch.setattr(bpy.utils, "register_cli_command", fail)
+    with pytest.raises(RuntimeError, match="no commands today"):
+        hairloom.register()
+    assert traces() == before
+
+
+def test_handlers_survive_loading_a_file(extension):
+    own = [handler for _, handler in registration.handlers.HANDLERS]
+    assert own
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    for handlers, handler in registration.handlers.HANDLERS:
+        assert handlers.count(handler) == 1
+
+
+def test_every_class_has_a_name_of_ours():
+    kinds = ("PG", "OT", "PT", "FH")
+    for each in registration.CLASSES:
+        assert each.__name__.startswith(tuple(f"HAIRLOOM_{kind}_" for kind in kinds))
+    assert {*groups.CLASSES} <= {*registration.CLASSES}
+
+
+def test_the_root_package_is_the_one_that_blender_knows():
+    assert registration.ROOT_PACKAGE == "hairloom"
