@@ -12,7 +12,7 @@ import bpy
 
 from .host import groups, handlers, live
 from .host.command_line import run
-from .ui import operators_files, operators_preview, panels
+from .ui import operators_files, operators_presets, operators_preview, panels
 
 #: the package that Blender knows, above this one; it is called otherwise in every repository
 ROOT_PACKAGE = __package__.rpartition(".")[0]
@@ -22,6 +22,7 @@ CLASSES: tuple[type[Any], ...] = (
     *groups.CLASSES,
     *operators_preview.CLASSES,
     *operators_files.CLASSES,
+    *operators_presets.CLASSES,
     *panels.CLASSES,
 )
 

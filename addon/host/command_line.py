@@ -14,8 +14,10 @@ from typing import Any
 
 from ..errors import HairloomError
 from ..parameters import ALL_SETTINGS
+from ..params import Settings
 from .inputs import Sources
 from .jobs import Job, cards, demo, export, render, simulate
+from .presets import named_preset
 
 VERBS = {"simulate": simulate, "render": render, "cards": cards, "export": export, "demo": demo}
 
@@ -72,6 +74,13 @@ def _add_job_options(verb: argparse.ArgumentParser, name: str) -> None:
         metavar="SECTION.NAME=VALUE",
         help="change a parameter, such as dynamics.damping=2 (docs/parameters.md lists them)",
     )
+    job.add_argument(
+        "--preset",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a preset such as looks/blond or dynamics/soft, or a preset file",
+    )
     if name in ("simulate", "demo"):
         job.add_argument("--seconds", type=float, default=2.0, help="length of the head's shake")
         job.add_argument("--frame-rate", type=float, default=60.0, help="frames a second")
@@ -110,10 +119,7 @@ def _job(options: argparse.Namespace) -> Job:
             groom_up=options.groom_up,
             need_uv=not options.no_uv,
         ),
-        settings={
-            section: made.from_dict(_overrides(options.set, section), "--set")
-            for section, made in ALL_SETTINGS.items()
-        },
+        settings=_settings(options),
         output=Path(options.output),
         options=options,
     )
@@ -139,6 +145,20 @@ _LIMITS = (
     ("frame_rate", 1.0, 1000.0),
     ("groom_scale", 1e-6, 1e6),
 )
+
+
+def _settings(options: argparse.Namespace) -> dict[str, Settings]:
+    """All parameter sets: the defaults, changed by --preset, changed by --set."""
+    chosen = {section: made() for section, made in ALL_SETTINGS.items()}
+    for name in options.preset:
+        preset = named_preset(name)
+        chosen[preset.settings.section] = preset.settings
+    return {
+        section: type(values).from_dict(
+            values.as_dict() | _overrides(options.set, section), "--set"
+        )
+        for section, values in chosen.items()
+    }
 
 
 def _overrides(assignments: list[str], section: str) -> dict[str, Any]:

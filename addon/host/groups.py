@@ -52,7 +52,7 @@ class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
 
 
 class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
-    """Everything about one object's hair that another object with the same curves may have otherwise."""
+    """Everything about the hair of one object, of which several may share their curves."""
 
     __annotations__ = {
         **_pointers(CHARACTER_SECTIONS),
@@ -66,7 +66,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             name="Hide Blender's Strands",
             description="While previewing, show Blender's own drawing of these curves as a box",
             default=True,
-            update=lambda self, _context: _changed(self.id_data),
+            update=lambda self, _context: live.display_changed(self.id_data),
         ),
     }
 

@@ -9,6 +9,7 @@ Blender makes a fresh copy when it evaluates the object again.
 from __future__ import annotations
 
 import time
+import traceback
 from collections.abc import Callable
 from functools import partial
 
@@ -22,8 +23,6 @@ from .session import Session
 
 #: Edits come in bursts, as brush strokes do: read again when this long [s] nothing came.
 SETTLING_TIME = 0.2
-#: A longer pause than this [s] between two ticks of Play is not caught up with.
-LONGEST_TICK = 0.1
 
 _sessions: dict[int, Session] = {}
 _notice = ""
@@ -43,6 +42,7 @@ def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
     _sessions[session.uid] = session
     _publish(session, depsgraph)
     _refresh_views()
+    overlay.redraw_panels()
     return session
 
 
@@ -50,6 +50,7 @@ def stop(session: Session) -> None:
     """Preview this groom no longer."""
     _sessions.pop(session.uid, None)
     overlay.drop(session.uid)
+    overlay.redraw_panels()
     hair = session.hair.handle.find()
     if hair is not None:
         _show_originals(hair, bpy.context.view_layer.depsgraph, show=True)
@@ -100,9 +101,7 @@ def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
     """Simulate the time [s] that has passed since the last call."""
     for session in sessions():
         if session.is_playing:
-            _attempt(
-                session, depsgraph, lambda s: s.advance(depsgraph, min(duration, LONGEST_TICK))
-            )
+            _attempt(session, depsgraph, lambda s: s.advance(depsgraph, duration))
 
 
 def rest(depsgraph: bpy.types.Depsgraph, *, keep_playing: bool) -> None:
@@ -119,9 +118,14 @@ def settings_changed(owner: bpy.types.ID) -> None:
         hair = session.hair.handle.find()
         if hair is not None and owner in (hair, hair.data):
             _attempt(session, depsgraph, Session.take_settings)
-            _refresh_views()
             if session.is_stale:
                 _read_again_soon()
+
+
+def display_changed(owner: bpy.types.ID) -> None:
+    """Whether Blender's own strands are to be seen has been changed."""
+    settings_changed(owner)
+    _refresh_views()
 
 
 def updated(depsgraph: bpy.types.Depsgraph) -> None:
@@ -137,10 +141,16 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
 
 
 def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
-    """Blender's own animation went on: follow it, and take over animated settings and lights."""
+    """Blender's own animation went on: follow it, and take over animated settings and lights.
+
+    Curves that are animated themselves are not read again at every frame.
+    """
+    _, _, is_lit_anew = _changes(depsgraph)
     for session in sessions():
         _attempt(session, depsgraph, Session.take_settings)
-        _attempt(session, depsgraph, lambda s: _update(s, depsgraph, not s.is_playing, True))
+        follows = not session.is_playing
+        update = partial(_update, depsgraph=depsgraph, follows=follows, is_lit_anew=is_lit_anew)
+        _attempt(session, depsgraph, update)
 
 
 def undone() -> None:
@@ -191,12 +201,17 @@ def _follows(session: Session, moved: set[int]) -> bool:
 def _attempt(
     session: Session, depsgraph: bpy.types.Depsgraph, action: Callable[[Session], object]
 ) -> None:
-    """Do it and show the result; a groom that cannot go on is stopped, with a notice."""
+    """Do it and show the result; a groom that cannot go on is stopped, with a notice.
+
+    A defect of ours ends it as well, told in full but once, not at every event from now on.
+    """
     global _notice
     try:
         action(session)
         _publish(session, depsgraph)
-    except HairloomError as error:
+    except Exception as error:
+        if not isinstance(error, HairloomError):
+            traceback.print_exc()
         _notice = f"Preview of {session.name} ended. {error}"
         print(f"Hairloom: {_notice}")
         stop(session)
@@ -243,10 +258,13 @@ def _read_again() -> float | None:
 
 
 def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
-    """Read what was edited now."""
+    """Read what was edited now; hair on another head is begun anew."""
     for session in sessions():
-        if session.is_stale:
+        if session.is_stale and session.has_another_head():
+            _attempt(session, depsgraph, lambda s: start(s.hair.found(), depsgraph))
+        elif session.is_stale:
             _attempt(session, depsgraph, lambda s: s.read_again(depsgraph))
+    overlay.redraw_panels()
 
 
 def clear() -> None:

@@ -74,11 +74,21 @@ def retry() -> None:
 
 
 def redraw() -> None:
-    """Ask all 3D views and sidebars to draw themselves again."""
+    """Ask all 3D views to draw themselves again."""
+    _redraw({("VIEW_3D", "WINDOW")})
+
+
+def redraw_panels() -> None:
+    """Ask all places that have a panel of ours to draw themselves again."""
+    _redraw({("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")})
+
+
+def _redraw(places: set[tuple[str, str]]) -> None:
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in {"VIEW_3D", "PROPERTIES"}:
-                area.tag_redraw()
+            for region in area.regions:
+                if (area.type, region.type) in places:
+                    region.tag_redraw()
 
 
 def _draw() -> None:
@@ -130,7 +140,7 @@ def _tell_failure() -> None:
     """Outside of drawing, where the handler may be removed and the window be told."""
     _remove_handler()
     bpy.context.workspace.status_text_set(_failure.splitlines()[0])
-    redraw()
+    redraw_panels()
 
 
 def _remove_handler() -> None:

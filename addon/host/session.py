@@ -66,6 +66,7 @@ class Session:
         self.source = read_source(hair, depsgraph)
         uses_head = self.source.head is not None and head is not None
         self.head = Body.at_rest(head, depsgraph) if uses_head else None
+        self.head_uid = head and head.session_uid
         self.obstacle: Obstacle | None = None
         self.is_playing = False
         self.is_stale = False
@@ -97,6 +98,11 @@ class Session:
         self.light(depsgraph)
         self.rest(depsgraph)
         self.is_stale = False
+
+    def has_another_head(self) -> bool:
+        """Whether the artist has set another surface since the session began."""
+        head = head_of(self.hair.found())
+        return (head and head.session_uid) != self.head_uid
 
     def read_again(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """Take over edited curves and guide settings; whether anything was different.
@@ -151,7 +157,7 @@ class Session:
         self._show(pipeline.carried(self.rig, pose))
 
     def play(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Get ready to simulate from the style on; the first time that builds the collider, which takes seconds.
+        """Get ready to simulate from the style on; makes the collider, which can take a second.
 
         Raises:
             HairloomError: as `rest`, or the collider is no closed mesh.

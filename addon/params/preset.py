@@ -35,13 +35,34 @@ def read_preset[S: Settings](path: Path, settings: type[S]) -> Preset[S]:
     Raises:
         HairloomError: not JSON, of a newer version, for another section, or with a bad value.
     """
+    return preset_from_dict(_content(path), settings, str(path))
+
+
+def read_any_preset(path: Path, kinds: Mapping[str, type[Settings]]) -> Preset[Any]:
+    """Read and check a preset of any of these sections.
+
+    Raises:
+        HairloomError: as `read_preset`, or of none of these sections.
+    """
+    data = _content(path)
+    section = data.get("section") if isinstance(data, dict) else None
+    kind = kinds.get(section) if isinstance(section, str) else None
+    if kind is None:
+        raise HairloomError(
+            f"this is a preset of no known kind ('{section}')",
+            place=str(path),
+            remedy="Choose a preset of " + ", ".join(kinds),
+        )
+    return preset_from_dict(data, kind, str(path))
+
+
+def _content(path: Path) -> Any:
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise HairloomError(
             f"this preset cannot be read ({error})", place=str(path), remedy="Save it again"
         ) from error
-    return preset_from_dict(data, settings, str(path))
 
 
 def preset_from_dict[S: Settings](data: Any, settings: type[S], place: str) -> Preset[S]:

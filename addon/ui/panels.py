@@ -69,6 +69,7 @@ def _draw_message(
 
 
 def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    layout.menu("HAIRLOOM_MT_looks")
     _draw_group(layout, hair.data.hairloom.shading)
 
 
@@ -82,6 +83,7 @@ def draw_guides(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    layout.menu("HAIRLOOM_MT_dynamics")
     layout.prop(hair.hairloom, "collider")
     _draw_group(layout, hair.hairloom.dynamics)
 

@@ -1,4 +1,4 @@
-"""What the tests of Blender's side share: an empty scene, the registered extension, small grooms."""
+"""What the tests of Blender's side share: an empty scene, the extension, small grooms."""
 
 from collections.abc import Callable, Iterator
 from typing import Any

@@ -128,7 +128,8 @@ def traces():
     handlers = [h for n in dir(bpy.app.handlers) for h in [getattr(bpy.app.handlers, n)]]
     own = [f for h in handlers if isinstance(h, list) for f in h if "hairloom" in f.__module__]
     classes = [n for n in dir(bpy.types) if "HAIRLOOM" in n]
-    return [len(own), len(classes), hasattr(bpy.types.Curves, "hairloom"), len(dir(bpy.ops.hairloom))]
+    operators = dir(bpy.ops.hairloom)
+    return [len(own), len(classes), hasattr(bpy.types.Curves, "hairloom"), len(operators)]
 
 enabled, after = traces(), set()
 for _ in range(10):

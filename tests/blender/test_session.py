@@ -220,6 +220,36 @@ def test_edited_curves_are_read_again_and_others_left_alone(preview, evaluated):
     )
 
 
+def test_another_surface_begins_the_preview_anew(preview, evaluated):
+    hair, head, _ = preview
+    other = head.copy()
+    other.data, other.name = head.data.copy(), "Other"
+    bpy.context.collection.objects.link(other)
+    hair.data.surface = other
+    update()
+    live.catch_up(evaluated())
+    (session,) = live.sessions()
+    assert session.head.handle.name == "Other"
+    other.location.x = 1.0
+    update()
+    assert drawn(session)[:, 0, 0].mean() == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_defect_ends_the_preview_and_is_told_once(preview, monkeypatch, capfd):
+    _, head, session = preview
+
+    def fail(*_):
+        raise ZeroDivisionError("a defect")
+
+    monkeypatch.setattr(type(session), "rest", fail)
+    for x in (1.0, 2.0):
+        head.location.x = x
+        update()
+    assert live.sessions() == ()
+    assert "a defect" in live.notice()
+    assert capfd.readouterr().err.count("Traceback") == 1
+
+
 def test_curves_may_become_fewer_and_none(preview, evaluated):
     hair, _, session = preview
     hair.data.remove_curves(indices=list(range(50)))
@@ -364,6 +394,11 @@ def test_scene_lights_are_followed(preview):
     sun.data.energy = 1.0
     update()
     assert overlay.drawing_of(session.uid).snapshot.lights[0].power == (1.0, 1.0, 1.0)
+    for frame, energy in ((1, 1.0), (11, 2.0)):
+        sun.data.energy = energy
+        sun.data.keyframe_insert("energy", frame=frame)
+    bpy.context.scene.frame_set(11)
+    assert overlay.drawing_of(session.uid).snapshot.lights[0].power == (2.0, 2.0, 2.0)
 
 
 @pytest.mark.parametrize("groom", ["none", "one point each"])
