@@ -208,7 +208,7 @@ def test_a_thin_sheet_shades_neither_of_its_sides() -> None:
 def test_light_from_above_leaves_the_lower_side_dark() -> None:
     strands = hair_on_ball()
     height = strands.roots[:, 2]
-    settings = AmbientSettings(upper_share=1.0, open_sky=1.0)
+    settings = AmbientSettings(extinction=1.0, upper_share=1.0, open_sky=1.0)
     shade = ambient_occlusion(strands, strands.points, ball(0.08), settings).reshape(-1, 8)[:, -1]
     assert shade[height > 0.05].mean() > 0.85
     assert shade[height < -0.06].mean() < 0.1

@@ -1,0 +1,188 @@
+"""The artist's buttons for files: they do it, or say what is wrong, where, and what to do."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
+from hairloom.addon.strands import StrandSet
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+
+def grown(head, **settings):
+    head.select_set(True)
+    bpy.context.view_layer.objects.active = head
+    assert bpy.ops.hairloom.grow(**settings) == {"FINISHED"}
+    return bpy.context.object
+
+
+@pytest.fixture
+def told(capfd):
+    """What the operators have reported since the last call; a report never is a traceback."""
+
+    def read():
+        captured = capfd.readouterr()
+        assert "Traceback" not in captured.out + captured.err
+        return captured.out
+
+    return read
+
+
+@pytest.fixture
+def groom_file(tmp_path):
+    """A .tfx of strands on the sphere of radius 0.1 m."""
+    outward = np.random.default_rng(3).normal(size=(40, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    points = outward[:, None] * np.linspace(0.1, 0.2, 8)[None, :, None]
+    strands = StrandSet(points.reshape(-1, 3), np.arange(41) * 8, np.full(320, 1e-4), np.zeros(40))
+    path = tmp_path / "groom.tfx"
+    write_tfx(path, strands)
+    return path
+
+
+def test_grown_hair_stands_on_its_mesh_and_is_ready_for_blenders_tools(sphere):
+    sphere.location = (1.0, 2.0, 3.0)
+    hair = grown(sphere, strand_count=200, length=0.05)
+    assert len(hair.data.curves) == 200
+    assert hair.data.surface == sphere and hair.data.surface_uv_map == "UVMap"
+    roots = np.array([curve.points[0].position for curve in hair.data.curves])
+    assert np.linalg.norm(roots - np.array(sphere.location), axis=1) == pytest.approx(
+        np.full(200, 0.1), rel=0.05
+    )
+
+
+def test_growing_needs_a_mesh(told):
+    with pytest.raises(RuntimeError, match="Select the mesh to grow hair on"):
+        bpy.ops.hairloom.grow()
+
+
+def test_a_file_comes_in_onto_the_selected_head(sphere, groom_file, told):
+    assert bpy.ops.hairloom.import_tfx(filepath=str(groom_file)) == {"FINISHED"}
+    hair = bpy.context.object
+    assert hair.name == "groom" and hair.data.surface == sphere and hair.parent == sphere
+    assert "groom.tfx: 40 strands" in told()
+    uv = np.empty(80, np.float32)
+    hair.data.attributes["surface_uv_coordinate"].data.foreach_get("vector", uv)
+    assert uv.min() >= 0.0 and uv.max() <= 1.0 and np.ptp(uv) > 0.5
+
+
+def test_a_file_comes_in_alone_without_a_head(groom_file):
+    bpy.ops.hairloom.import_tfx(filepath=str(groom_file))
+    hair = bpy.context.object
+    assert hair.data.surface is None and hair.parent is None
+    expected = read_tfx(groom_file).strands
+    assert len(hair.data.points) == expected.point_count
+
+
+def test_several_files_come_in_together_and_bad_ones_are_reported(groom_file, tmp_path, told):
+    (tmp_path / "garbage.tfx").write_bytes(b"no hair in here")
+    with pytest.raises(RuntimeError, match=r"garbage\.tfx"):
+        bpy.ops.hairloom.import_tfx(
+            filepath=str(groom_file),
+            directory=str(tmp_path),
+            files=[{"name": "garbage.tfx"}, {"name": "groom.tfx"}],
+        )
+    assert [obj.name for obj in bpy.data.objects if obj.type == "CURVES"] == ["groom"]
+
+
+@pytest.mark.parametrize("damage", ["truncated", "garbage", "empty", "missing", "of another scale"])
+def test_a_file_that_cannot_be_used_is_named_and_leaves_nothing(damage, sphere, groom_file, told):
+    options, content = {}, groom_file.read_bytes()
+    if damage == "truncated":
+        groom_file.write_bytes(content[: len(content) // 2])
+    elif damage == "garbage":
+        groom_file.write_bytes(b"x" * 500)
+    elif damage == "empty":
+        groom_file.write_bytes(b"")
+    elif damage == "missing":
+        groom_file.unlink()
+    else:
+        options["scale"] = 100.0
+    with pytest.raises(RuntimeError, match=r"groom\.tfx") as raised:
+        bpy.ops.hairloom.import_tfx(filepath=str(groom_file), **options)
+    assert "Traceback" not in str(raised.value)
+    told()
+    assert [obj.name for obj in bpy.data.objects] == ["Head"]
+    assert len(bpy.data.hair_curves) == 0
+
+
+def test_a_head_without_uvs_is_a_warning_with_the_remedy(sphere, groom_file, told):
+    sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
+    sphere.data.update()
+    assert bpy.ops.hairloom.import_tfx(filepath=str(groom_file)) == {"FINISHED"}
+    assert "Unwrap" in told()
+    out = groom_file.with_name("out.tfx")
+    assert bpy.ops.hairloom.export_tfx(filepath=str(out)) == {"FINISHED"}
+    assert "Unwrap" in told() and out.is_file()
+
+
+def test_strands_leave_as_they_came(sphere, groom_file, told):
+    bpy.ops.hairloom.import_tfx(filepath=str(groom_file))
+    out = groom_file.with_name("out.tfx")
+    assert bpy.ops.hairloom.export_tfx(filepath=str(out)) == {"FINISHED"}
+    assert "40 strands" in told()
+    before, after = read_tfx(groom_file).strands, read_tfx(out).strands
+    assert after.points == pytest.approx(before.points, abs=1e-6)
+
+
+def test_axes_and_scale_are_undone_by_their_own_inverse(groom_file):
+    bpy.ops.hairloom.import_tfx(filepath=str(groom_file), up="Z", scale=0.01)
+    out = groom_file.with_name("out.tfx")
+    bpy.ops.hairloom.export_tfx(filepath=str(out), up="Z", scale=0.01)
+    before, after = read_tfx(groom_file).strands, read_tfx(out).strands
+    assert after.points == pytest.approx(before.points, rel=1e-5, abs=1e-6)
+
+
+def test_cards_are_written_with_their_sidecar(sphere, tmp_path, told):
+    hair = grown(sphere, strand_count=300, length=0.05)
+    hair.data.hairloom.guides.guide_count = 20
+    out = tmp_path / "cards.glb"
+    data_blocks = {data.name_full for data in bpy.data.user_map()}
+    assert bpy.ops.hairloom.export_cards(filepath=str(out)) == {"FINISHED"}
+    assert out.read_bytes()[:4] == b"glTF"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "cards.glb",
+        "cards.hairloom.json",
+    ]
+    assert "20 cards" in told()
+    assert {data.name_full for data in bpy.data.user_map()} == data_blocks
+
+
+@pytest.mark.parametrize("operator", ["export_cards", "export_tfx"])
+def test_hair_without_curves_is_not_exported(operator, sphere, tmp_path, told):
+    hair = grown(sphere, strand_count=10)
+    hair.data.remove_curves()
+    with pytest.raises(RuntimeError, match="no curves"):
+        getattr(bpy.ops.hairloom, operator)(filepath=str(tmp_path / "out.glb"))
+    told()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("operator", "name"), [("export_cards", "x.glb"), ("export_tfx", "x.tfx")])
+def test_a_place_that_cannot_be_written_to_is_named(operator, name, sphere, tmp_path, told):
+    grown(sphere, strand_count=50)
+    (tmp_path / "no folder").write_text("a file")
+    path = tmp_path / "no folder" / name
+    with pytest.raises(RuntimeError, match="no folder"):
+        getattr(bpy.ops.hairloom, operator)(filepath=str(path))
+    told()
+    assert [path.name for path in tmp_path.iterdir()] == ["no folder"]
+
+
+def test_the_ponytail_of_four_files_comes_in_at_once(shared_data, told):
+    folder = Path(shared_data) / "tressfx_ponytail"
+    files = [{"name": path.name} for path in sorted(folder.glob("*.tfx"))]
+    assert bpy.ops.hairloom.import_tfx(
+        filepath=str(folder / files[0]["name"]), directory=str(folder), files=files
+    ) == {"FINISHED"}
+    assert len([obj for obj in bpy.data.objects if obj.type == "CURVES"]) == len(files) == 4
+    assert len(bpy.context.selected_objects) == 4
+
+
+def test_the_file_menus_and_dropping_know_our_formats():
+    handler = bpy.types.HAIRLOOM_FH_tfx
+    assert handler.bl_file_extensions == ".tfx"
+    assert handler.bl_import_operator == "hairloom.import_tfx"
