@@ -92,6 +92,25 @@ def install_extension(tally: Tally) -> bool:
     return passed
 
 
+def run_command_line(tally: Tally) -> None:
+    """The installed extension as a farm calls it: one job that is done, one that is refused."""
+    made = OUTPUT / "cards.glb"
+    small = ["--set", "grow.strand_count=200", "--set", "guides.guide_count=50"]
+    jobs = {
+        "a job": (["--output", str(made), *small], 0),
+        "a missing groom": (["--groom", "missing.tfx", "--output", str(made)], 1),
+    }
+    for name, (arguments, expected) in jobs.items():
+        log = OUTPUT / "command-line.log"
+        command = ["--command", "hairloom", "cards", *arguments]
+        environment = {"BLENDER_USER_RESOURCES": str(INSTALLED)}
+        code = run_blender("background", command, log, SESSION_LIMIT_S, environment)
+        passed = code == expected and made.is_file() == (expected == 0)
+        announce(f"command line, {name}", "either", passed, f"exit code {code}", log)
+        tally.add(passed, not passed)
+        made.unlink(missing_ok=True)
+
+
 def run_tests(backend: str, tally: Tally) -> None:
     """tests/pure, tests/gpu and tests/blender in Blender's own Python, in the background."""
     log, report = OUTPUT / f"tests-{backend}.log", OUTPUT / f"tests-{backend}.xml"
@@ -148,6 +167,8 @@ def main(wanted: list[str]) -> int:
     tally = Tally()
     installed = install_extension(tally)
     if not wanted:
+        if installed:
+            run_command_line(tally)
         for backend in BACKENDS:
             run_tests(backend, tally)
     for script in sessions:

@@ -54,13 +54,13 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     Raises:
         HairloomError: naming the file or object that cannot be used, and what to do.
     """
-    head = _read_head(sources)
-    head_object = bpy.data.objects.get(sources.head or "")
-    dropped: dict[str, int] = {}
-    if sources.groom is None:
-        strands = grow(head, grow_settings, scalp_density(head))
-    else:
+    if sources.groom is not None:
         strands, dropped = _read_groom(sources.groom, sources)
+        head = _read_head(sources)
+    else:
+        head, dropped = _read_head(sources), {}
+        strands = grow(head, grow_settings, scalp_density(head))
+    head_object = bpy.data.objects.get(sources.head or "")
     collider = head if sources.collider is None else _read_mesh(sources.collider, need_uv=False)
     return Inputs(
         strands,
