@@ -220,8 +220,9 @@ def _attempt(
 def _publish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
     hair = session.hair.found()
     overlay.show(session.uid, Drawing(session.snapshot, hair.visible_get(), spaces_without(hair)))
-    is_hidden = hair.hairloom.hide_original and hair.mode == "OBJECT"
-    _show_originals(hair, depsgraph, show=not is_hidden)
+    is_replaced = hair.mode == "OBJECT" and not overlay.failure()
+    hides = is_replaced and hair.hairloom.hide_original
+    _show_originals(hair, depsgraph, show=not hides)
 
 
 def _show_originals(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, show: bool) -> None:

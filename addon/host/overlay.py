@@ -140,6 +140,7 @@ def _tell_failure() -> None:
     """Outside of drawing, where the handler may be removed and the window be told."""
     _remove_handler()
     bpy.context.workspace.status_text_set(_failure.splitlines()[0])
+    bpy.context.scene.update_tag()  # Blender's own strands are to be seen again
     redraw_panels()
 
 

@@ -104,8 +104,8 @@ class Session:
         head = head_of(self.hair.found())
         return (head and head.session_uid) != self.head_uid
 
-    def read_again(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Take over edited curves and guide settings; whether anything was different.
+    def read_again(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Take over edited curves and guide settings; what did not change stays as it is.
 
         The curves are taken to be in the pose in which the session began, as edits are.
         """
@@ -121,10 +121,9 @@ class Session:
         )
         if same_guides and _same(strands, self.source.strands):
             self.take_settings()
-            return False
+            return
         self.source = replace(self.source, strands=strands, dropped=read.dropped)
         self._prepare(hair, depsgraph)
-        return True
 
     def take_settings(self) -> None:
         """Take over what acts at once; guide and ambient settings make the session stale."""

@@ -13,6 +13,9 @@ from .curves import read_curves
 from .objects import head_of
 from .surfaces import read_surface
 
+#: node group of the modifier that Blender 5.2 gives to new hair
+_OWN_DYNAMICS = "Hair Dynamics"
+
 
 @dataclass(frozen=True)
 class Source:
@@ -35,8 +38,21 @@ def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sourc
         HairloomError: the object holds no hair curves, or none that can be used.
     """
     read = usable_curves(hair, depsgraph)
-    head, warning = _read_head(hair, depsgraph)
-    return Source(read.strands, read.dropped, head, () if warning is None else (warning,))
+    head, head_warning = _read_head(hair, depsgraph)
+    warnings = tuple(filter(None, (head_warning, _dynamics_warning(hair))))
+    return Source(read.strands, read.dropped, head, warnings)
+
+
+def _dynamics_warning(hair: bpy.types.Object) -> str | None:
+    """Blender's own hair dynamics would move what ours moves as well."""
+    for modifier in hair.modifiers:
+        nodes = modifier.node_group if modifier.type == "NODES" else None
+        if nodes is not None and modifier.show_viewport and nodes.name.startswith(_OWN_DYNAMICS):
+            return (
+                f"{hair.name}: its modifier {modifier.name} simulates too. "
+                "Turn it off in the viewport."
+            )
+    return None
 
 
 def usable_curves(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:

@@ -75,7 +75,7 @@ def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     _draw_group(layout, hair.data.hairloom.strands)
-    _draw_group(layout, hair.data.hairloom.ambient)
+    _draw_titled(layout, hair.data.hairloom.ambient)
 
 
 def draw_guides(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -91,8 +91,13 @@ def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     layout.operator("hairloom.export_cards", icon="EXPORT")
     layout.operator("hairloom.export_tfx", icon="EXPORT")
-    _draw_group(layout, hair.data.hairloom.cards)
-    _draw_group(layout, hair.data.hairloom.card_texture)
+    _draw_titled(layout, hair.data.hairloom.cards)
+    _draw_titled(layout, hair.data.hairloom.card_texture)
+
+
+def _draw_titled(layout: bpy.types.UILayout, group: Any) -> None:
+    layout.label(text=group.settings.title)
+    _draw_group(layout, group)
 
 
 def _draw_group(layout: bpy.types.UILayout, group: Any) -> None:

@@ -364,6 +364,48 @@ def test_hidden_hair_is_not_drawn(preview):
     assert not overlay.drawing_of(session.uid).is_visible
 
 
+def test_another_scene_in_the_window_does_not_end_the_preview(preview):
+    _, head, session = preview
+    before, window, scene = drawn(session), bpy.context.window, bpy.context.scene
+    window.scene = bpy.data.scenes.new("Elsewhere")
+    window.scene.collection.objects.link(bpy.data.objects.new("Thing", None))
+    update()
+    bpy.context.scene.objects["Thing"].location.x = 1.0
+    update()
+    assert live.sessions() == (session,)
+    assert not overlay.drawing_of(session.uid).is_visible
+    window.scene = scene
+    head.location.x = 1.0
+    update()
+    assert overlay.drawing_of(session.uid).is_visible
+    assert drawn(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
+
+
+def test_sculpting_shows_blenders_own_strands(preview, evaluated):
+    hair, _, session = preview
+    bpy.ops.object.mode_set(mode="SCULPT_CURVES")
+    hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
+    update()
+    assert hair.evaluated_get(evaluated()).display_type == "TEXTURED"
+    live.catch_up(evaluated())
+    assert drawn(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    update()
+    assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
+
+
+def test_two_objects_that_share_their_curves(preview, evaluated):
+    hair, _, session = preview
+    twin = bpy.data.objects.new("Twin", hair.data)
+    bpy.context.collection.objects.link(twin)
+    second = live.start(twin, evaluated())
+    hair.data.hairloom.shading.ambient = 0.5
+    assert [overlay.drawing_of(s.uid).snapshot.shading.ambient for s in (session, second)] == [
+        0.5,
+        0.5,
+    ]
+
+
 def test_a_final_render_does_not_disturb_the_preview(preview):
     _, _, session = preview
     scene = bpy.context.scene
@@ -432,6 +474,22 @@ def test_a_head_without_faces_or_uvs_is_a_warning(new_hair, sphere, evaluated):
     session = live.start(hair, evaluated())
     assert "no faces" in session.source.warnings[0]
     assert session.rig.head is None
+
+
+def test_blenders_own_hair_dynamics_are_a_warning(new_hair, sphere, evaluated):
+    hair = new_hair(sphere)
+    modifier = hair.modifiers.new("Swing", "NODES")
+    modifier.node_group = bpy.data.node_groups.new("Hair Dynamics", "GeometryNodeTree")
+    modifier.show_viewport = False
+    assert live.start(hair, evaluated()).source.warnings == ()
+    modifier.show_viewport = True
+    tree = modifier.node_group
+    for in_out in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+    source, result = (tree.nodes.new(f"NodeGroup{kind}") for kind in ("Input", "Output"))
+    tree.links.new(source.outputs[0], result.inputs[0])
+    (warning,) = live.start(hair, evaluated()).source.warnings
+    assert "Swing" in warning and "Turn it off" in warning
 
 
 def test_two_grooms_on_one_head_go_separate_ways(new_hair, sphere, evaluated):

@@ -80,6 +80,11 @@ def viewport_pixels(screenshot: Path) -> np.ndarray:
     return _rectangle(screenshot, left, right, view.y, top)
 
 
+def changed(before: np.ndarray, after: np.ndarray, at_least: float = 0.1) -> float:
+    """Share of the pixels that differ by more than Blender's own anti-aliasing does."""
+    return float((np.abs(after - before).max(axis=2) > at_least).mean())
+
+
 def viewport_middle(screenshot: Path, reach: int = 20) -> np.ndarray:
     """The pixels around the middle of the view, as in `viewport_pixels`."""
     view = region("WINDOW")

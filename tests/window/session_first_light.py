@@ -11,6 +11,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
+    changed,
     click,
     look_from_front,
     open_our_sidebar,
@@ -38,11 +39,6 @@ def overlay():
 def pixels(label):
     """What the viewport shows, (height, width, 3) in 0 to 1."""
     return viewport_pixels(driver.screenshot(label))
-
-
-def changed(before, after, at_least=0.1):
-    """Share of the pixels that differ by more than Blender's own anti-aliasing does."""
-    return float((np.abs(after - before).max(axis=2) > at_least).mean())
 
 
 def steps():

@@ -1,0 +1,200 @@
+"""What artists do all day: open every panel, hide, go to local view, play the animation; and what
+they may meet: hair without a surface, a file that is none, a GPU that refuses a shader."""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import (
+    changed,
+    click,
+    look_from_front,
+    open_our_sidebar,
+    press,
+    sidebar_button,
+    viewport,
+    viewport_pixels,
+)
+
+failures: list[str] = []
+drawn: set[str] = set()
+
+
+def of_hairloom(module):
+    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
+
+
+def pixels(label):
+    return viewport_pixels(driver.screenshot(label))
+
+
+def steps():
+    yield from press("ESC")
+    driver.enable_extension()
+    watch_panels()
+    yield from nothing_selected()
+    yield from set_the_scene()
+    yield from every_panel_draws()
+    yield from hiding_and_local_view()
+    yield from blenders_own_animation()
+    yield from hair_without_a_surface()
+    yield from a_failing_shader_is_told_once()
+    assert failures == [], failures
+
+
+def watch_panels():
+    """All panels open, and every exception in their draw noted: Blender would only print it."""
+    panels = [each for each in of_hairloom("registration").CLASSES if "_PT_" in each.__name__]
+    for each in reversed(panels):
+        bpy.utils.unregister_class(each)
+    for each in panels:
+        each.draw = watched(each)
+        each.bl_options = set()
+        bpy.utils.register_class(each)
+
+
+def watched(panel):
+    original, name = panel.draw, panel.__name__
+
+    def draw(self, context):
+        try:
+            original(self, context)
+            drawn.add(name)
+        except Exception as error:
+            failures.append(f"{name}: {error!r}")
+
+    return draw
+
+
+def nothing_selected():
+    """An empty scene: buttons are grey, and nothing raises."""
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    yield from open_our_sidebar()
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield 3
+    driver.screenshot("nothing-selected")
+    assert of_hairloom("host.live").sessions() == ()
+
+
+def set_the_scene():
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    bpy.context.object.name = "Head"
+    bpy.ops.hairloom.grow(strand_count=800, length=0.12)
+    bpy.context.object.name = "Hair"
+    bpy.context.object.data.add_curves([1, 1, 1])
+    overlays = viewport().spaces.active.overlay
+    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    look_from_front(0.9)
+    yield 5
+
+
+def every_panel_draws():
+    """In the sidebar and in Properties > Data, without preview and with it."""
+    properties = next(a for a in bpy.context.screen.areas if a.type == "PROPERTIES")
+    properties.spaces.active.context = "DATA"
+    yield 5
+    drawn.clear()
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield 10
+    driver.screenshot("all-panels")
+    missing = {
+        each.__name__ for each in of_hairloom("registration").CLASSES if "_PT_" in each.__name__
+    } - drawn
+    assert not missing, f"never drawn: {missing}"
+    (session,) = of_hairloom("host.live").sessions()
+    assert session.source.dropped == {"fewer than two points": 3}
+
+
+def hiding_and_local_view():
+    hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
+    shown = pixels("shown")
+    hair.hide_set(True)
+    yield 10
+    hidden = pixels("hidden")
+    assert changed(shown, hidden) > 0.01, "hidden hair is drawn"
+    hair.hide_set(False)
+    hair.select_set(True)  # hiding deselects
+    yield 10
+    assert changed(shown, pixels("shown-again")) < 0.003
+
+    hair.select_set(False)
+    head.select_set(True)
+    with bpy.context.temp_override(area=viewport(), region=viewport().regions[-1]):
+        bpy.ops.view3d.localview(frame_selected=False)
+    yield 10
+    local = pixels("local-view")
+    assert changed(hidden, local) < 0.003, "hair is drawn in a local view without it"
+    with bpy.context.temp_override(area=viewport(), region=viewport().regions[-1]):
+        bpy.ops.view3d.localview(frame_selected=False)
+    yield 10
+    assert changed(local, pixels("out-of-local-view")) > 0.01
+
+
+def blenders_own_animation():
+    """Space bar: hair goes with the animated head, drawn at every frame."""
+    live, head = of_hairloom("host.live"), bpy.data.objects["Head"]
+    for frame, x in ((1, 0.0), (40, 0.2)):
+        head.location.x = x
+        head.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+    at_first = live.sessions()[0].snapshot.strands
+    bpy.ops.screen.animation_play()
+    yield 10
+    bpy.ops.screen.animation_cancel(restore_frame=False)
+    yield 2
+    moved = live.sessions()[0].snapshot.strands - at_first
+    assert bpy.context.scene.frame_current > 1
+    assert np.allclose(moved, [head.matrix_world.translation.x, 0.0, 0.0], atol=1e-5)
+    head.animation_data_clear()
+    head.location.x = 0.0
+    yield 5
+
+
+def hair_without_a_surface():
+    """A warning in the panel, no more."""
+    live = of_hairloom("host.live")
+    hair = bpy.data.objects["Hair"]
+    live.stop_all()
+    hair.data.surface, hair.parent = None, None
+    hair.select_set(True)
+    bpy.context.view_layer.objects.active = hair
+    yield 3
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield 10
+    (session,) = live.sessions()
+    assert "no surface" in session.source.warnings[0]
+    driver.screenshot("without-surface")
+
+
+def a_failing_shader_is_told_once():
+    overlay = of_hairloom("host.overlay")
+    strand_pass = of_hairloom("render.strand_pass").StrandPass
+    draw, calls = strand_pass.draw, []
+
+    def fail(*_, **__):
+        calls.append(1)
+        raise RuntimeError("this GPU refuses")
+
+    strand_pass.draw = fail
+    for x in (0.01, 0.02, 0.0):
+        bpy.data.objects["Hair"].location.x = x
+        yield 5
+    driver.screenshot("failing-shader")
+    assert len(calls) == 1, f"it was tried {len(calls)} times"
+    hair = bpy.data.objects["Hair"].evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert hair.display_type == "TEXTURED", "neither our strands nor Blender's are to be seen"
+    assert "this GPU refuses" in of_hairloom("host.live").notice()
+    strand_pass.draw = draw
+    for _ in range(2):  # off and on again
+        yield from click(*sidebar_button("hairloom.preview"))
+        yield 5
+    assert overlay.failure() == "" and of_hairloom("host.live").notice() == ""
+    driver.screenshot("drawn-again")
+
+
+driver.play(steps())
