@@ -21,6 +21,7 @@ from .forces import best_rotation
 from .settings import DynamicsSettings
 from .state import DynamicsState
 from .step import Drive
+from .style import GENTLE, SHARP
 
 
 def advance_slowly(
@@ -68,7 +69,7 @@ class _Guide:
 
         self.x, self.previous = points(state.position), points(state.previous)
         self.rest = points(state.rest.position)
-        self.twist_cv = int(state.rest.twist_cv[guide])
+        self.twist_cv = int(state.rest.shape.twist_cv[guide])
         self.length = [float(np.linalg.norm(b - a)) for a, b in pairwise(self.rest)]
         self.before = drive.target_before[guide].astype(np.float64)
         self.now = drive.target_now[guide].astype(np.float64)
@@ -147,7 +148,10 @@ class _Guide:
             right[cv - PINNED] += pull * style[cv]
         for i in range(1, count - 1):
             rest_second = self.rest[i + 1] - 2.0 * self.rest[i] + self.rest[i - 1]
-            wanted = turns[i - 1] @ rest_turns[i - 1].T @ rest_second
+            style_second = style[i + 1] - 2.0 * style[i] + style[i - 1]
+            hold = _hold(rest_second, (self.length[i] + self.length[i - 1]) / 2.0)
+            wanted = hold * (turns[i - 1] @ rest_turns[i - 1].T @ rest_second)
+            wanted = wanted + (1.0 - hold) * style_second
             weights = {i - 1: 1.0, i: -2.0, i + 1: 1.0}
             for one, weight in weights.items():
                 if one < PINNED:
@@ -229,6 +233,12 @@ class _Guide:
         if plane.push > 0.0:
             away = plane.normal @ (self.x[plane.cv] - plane.origin)
             self.previous[plane.cv] += plane.normal * max(away, 0.0)
+
+
+def _hold(rest_second: Floats, length: float) -> float:
+    """1 for gentle bends, 0 for sharp kinks, straight in between."""
+    sharpness = float(np.linalg.norm(rest_second)) / length if length else 2.0
+    return min(max((SHARP - sharpness) / (SHARP - GENTLE), 0.0), 1.0)
 
 
 def _jacobian(x: Floats) -> Floats:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from ..errors import HairloomError
 from .constraints import PINNED
-from .style import rest_curvature, twist_reference
+from .style import LocalShape, local_shape
 
 
 @dataclass(frozen=True)
@@ -23,15 +23,12 @@ class Rest:
 
     position: (3, cv_count, guide_count) float32 world [m].
     length: (cv_count - 1, guide_count) float32 [m] of each segment.
-    curvature: (3, cv_count - 2, guide_count) float32 [m], each segment minus the one before it,
-        in the frame of the one before it.
-    twist_cv: (guide_count,) the CV that tells how a guide is turned about its root segment.
+    shape: what is kept of it wherever the guides swing.
     """
 
     position: Floats
     length: Floats
-    curvature: Floats
-    twist_cv: Ints
+    shape: LocalShape
 
 
 @dataclass(frozen=True)
@@ -83,14 +80,12 @@ def start(guide_grid: Floats) -> DynamicsState:
             "a guide needs at least two CVs", place="guides", remedy="Raise the CV count"
         )
     segment = np.diff(position, axis=1)
-    twist_cv = twist_reference(position)
     rest = Rest(
         position=position,
         length=np.sqrt((segment * segment).sum(axis=0)),
-        curvature=rest_curvature(position, twist_cv),
-        twist_cv=twist_cv,
+        shape=local_shape(position),
     )
-    for array in (rest.length, rest.curvature, rest.twist_cv):
+    for array in (rest.length, rest.shape.curvature, rest.shape.hold, rest.shape.twist_cv):
         array.flags.writeable = False
     return DynamicsState(position, position, rest)
 

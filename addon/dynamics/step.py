@@ -92,7 +92,7 @@ def advance(
         predict(position, previous, frame.impulse, kept, out=spare)
         previous, position, spare = position, spare, previous
         pin(position, style)
-        restore_style(position, style, rest.curvature, rest.twist_cv, matrix)
+        restore_style(position, style, rest.shape, matrix)
         keep_lengths(position, rest.length, None)
         contacts = find_contacts(position, previous, drive.colliders, span, settings, dt)
         _keep_outside(position, rest.length, contacts, settings)

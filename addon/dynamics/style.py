@@ -18,8 +18,13 @@ scalar factors brings the stiffest style back without iterations, stable for any
 Frames: on each segment a tangent t and a normal u, carried from segment to segment by the smallest
 rotation (Bishop 1975). With unit tangents that rotation is  u' = u - (u.t') / (1 + t.t') (t + t').
 
-Limitations: k is taken from the frames before the solve, so very stiff curls follow their root
-with a delay of some substeps; a strand that folds back on itself by 180 degrees loses its twist.
+k is taken from the frames before the solve, so it follows the segment before it and does not push
+back on it. Sharp kinks feed on that and tremble for ever. So from GENTLE to SHARP k turns from the
+one that the strand carries to the one that the head carries, which follows nothing in the strand.
+
+Limitations: very stiff curls follow their root with a delay of some substeps; sharply kinked hair
+swings less, because its kinks want to keep their direction; a strand that folds back on itself by
+180 degrees loses its twist.
 """
 
 from __future__ import annotations
@@ -36,6 +41,25 @@ from .settings import DynamicsSettings
 
 #: A cantilever's first mode: omega = 1.8751^2 sqrt(EI / (rho A)) / L^2 (Euler-Bernoulli).
 _CANTILEVER = 3.5160
+
+
+#: Curvature over segment length, 2 sin(angle / 2): a gentle bend, and a sharp kink.
+GENTLE, SHARP = 0.3, 0.8
+
+
+@dataclass(frozen=True)
+class LocalShape:
+    """The curvature of guides at rest, all float32 but the last.
+
+    curvature: (3, cv_count - 2, guide_count) [m], each segment minus the one before it, in the
+        frame of the one before it.
+    hold: (cv_count - 2, guide_count), the share that turns with the strand, 0 at sharp kinks.
+    twist_cv: (guide_count,) the CV that tells how a guide is turned about its root segment.
+    """
+
+    curvature: Floats
+    hold: Floats
+    twist_cv: Ints
 
 
 @dataclass(frozen=True)
@@ -62,9 +86,7 @@ def style_band(settings: DynamicsSettings, cv_count: int, dt: float) -> StyleBan
     return StyleBand(column, float(bend), SharedBand(matrix))
 
 
-def restore_style(
-    position: Floats, style: Floats, curvature: Floats, twist_cv: Ints, matrix: StyleBand
-) -> None:
+def restore_style(position: Floats, style: Floats, shape: LocalShape, matrix: StyleBand) -> None:
     """Move the free CVs of `position` (3, cv_count, guide_count) to the minimum, in place.
 
     Solved for the correction, so that rounding of world coordinates is not multiplied by s.
@@ -72,7 +94,7 @@ def restore_style(
     right = style[:, PINNED:] - position[:, PINNED:]
     right *= matrix.pull
     if matrix.bend:
-        residual = _curvature_residual(position, style, curvature, twist_cv)
+        residual = _curvature_residual(position, style, shape)
         residual *= np.float32(matrix.bend)
         right += residual
         right[:, :-1] -= residual[:, 1:]
@@ -80,6 +102,18 @@ def restore_style(
         right[:, :-2] += residual[:, 2:]
     matrix.band.solve(right)
     position[:, PINNED:] += right
+
+
+def local_shape(position: Floats) -> LocalShape:
+    """What of the shape of guides (3, cv_count, guide_count) is to be kept wherever they swing."""
+    twist_cv = twist_reference(position)
+    curvature = rest_curvature(position, twist_cv)
+    segment = np.diff(position, axis=1)
+    length = np.sqrt((segment * segment).sum(axis=0))
+    bent = np.sqrt((curvature * curvature).sum(axis=0))
+    sharpness = bent / np.maximum((length[1:] + length[:-1]) / 2.0, TINY)
+    hold = np.clip((SHARP - sharpness) / (SHARP - GENTLE), 0.0, 1.0).astype(np.float32)
+    return LocalShape(curvature, hold, twist_cv)
 
 
 def twist_reference(position: Floats) -> Ints:
@@ -125,11 +159,10 @@ def frames(position: Floats, style: Floats, twist_cv: Ints) -> tuple[Floats, Flo
     return tangent, normal, segment
 
 
-def _curvature_residual(
-    position: Floats, style: Floats, curvature: Floats, twist_cv: Ints
-) -> Floats:
+def _curvature_residual(position: Floats, style: Floats, shape: LocalShape) -> Floats:
     """k - b(x), (3, cv_count - 2, guide_count)."""
-    tangent, normal, segment = frames(position, style, twist_cv)
+    tangent, normal, segment = frames(position, style, shape.twist_cv)
+    curvature = shape.curvature
     tangent, normal = tangent[:, :-1], normal[:, :-1]
     residual = _cross(tangent, normal)
     residual *= curvature[2]
@@ -137,6 +170,8 @@ def _curvature_residual(
     residual += normal
     tangent *= curvature[0]
     residual += tangent
+    residual *= shape.hold
+    residual += (np.float32(1.0) - shape.hold) * np.diff(style, n=2, axis=1)
     residual -= segment[:, 1:]
     residual += segment[:, :-1]
     return residual
