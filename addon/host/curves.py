@@ -10,14 +10,12 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet
-from ..strands.clean import FARTHEST_POINT, SHORTEST_STRAND, Cleaned, clean
+from ..strands.affine import mean_scale, moved
+from ..strands.clean import Cleaned, clean
 
 #: Attributes of the curve domain that hold a strand's group, the first that is there wins; Unreal
 #: and USD know the first by this name.
 GROUP_ATTRIBUTES = ("groom_group_id", "group")
-#: a strand whose ends are this far apart is long enough for `clean`, whose measure is per axis
-_SHORTEST_SQUARED = 3.0 * SHORTEST_STRAND**2
-_BLOCK = 8192  # points that are moved at once
 _REMEDIES = {
     "CURVE": "Convert them: Object > Convert > Curves (hair)",
     "MESH": "Select hair curves; particle hair converts by Object > Convert > Curves (hair)",
@@ -45,10 +43,10 @@ def read_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleane
     group = next(
         filter(_is_there, (_attribute(curves, n, "CURVE") for n in GROUP_ATTRIBUTES)), None
     )
-    return _cleaned(
-        _in_world(_positions(curves), matrix),
+    return clean(
+        moved(_positions(curves), matrix),
         _offsets(curves),
-        radius=None if radius is None else radius * np.float32(_scale(matrix)),
+        radius=None if radius is None else radius * np.float32(mean_scale(matrix)),
         group=group,
         root_uv=_attribute(curves, "surface_uv_coordinate", "CURVE"),
     )
@@ -136,59 +134,3 @@ def _set_attribute(
 
 def _is_there(values: Any) -> bool:
     return values is not None
-
-
-def _scale(matrix: Floats) -> float:
-    """How much longer things get on average: cube root of the volume change."""
-    return float(abs(np.linalg.det(matrix[:3, :3])) ** (1.0 / 3.0))
-
-
-def _in_world(points: Floats, matrix: Floats) -> Floats:
-    """Moved by an affine (4, 4) matrix, in blocks that stay in the cache.
-
-    Not by `@`: BLAS spreads so thin a product over threads that wait for each other, and takes
-    anything from 2 to 300 ms for 1.6 million points on a busy machine; this takes 13.
-    """
-    if np.array_equal(matrix, np.eye(4)):
-        return points
-    rows = matrix.astype(np.float32)
-    moved = np.empty_like(points)
-    with np.errstate(invalid="ignore", over="ignore"):  # a point that is NaN is dropped later
-        for begin in range(0, len(points), _BLOCK):
-            x, y, z = np.ascontiguousarray(points[begin : begin + _BLOCK].T)
-            for axis in range(3):
-                along = x * rows[axis, 0]
-                along += y * rows[axis, 1]
-                along += z * rows[axis, 2]
-                moved[begin : begin + _BLOCK, axis] = along + rows[axis, 3]
-    return moved
-
-
-def _cleaned(
-    points: Floats,
-    offsets: Ints,
-    *,
-    radius: Floats | None,
-    group: Ints | None,
-    root_uv: Floats | None,
-) -> Cleaned:
-    """`clean`, but sound curves with a radius, which are the rule, pass without a copy."""
-    if radius is None or not _are_sound(points, offsets, radius, root_uv):
-        return clean(points, offsets, radius=radius, group=group, root_uv=root_uv)
-    count = len(offsets) - 1
-    group = np.zeros(count, np.int32) if group is None else group
-    return Cleaned(StrandSet(points, offsets, radius, group, root_uv), {}, np.arange(count))
-
-
-def _are_sound(points: Floats, offsets: Ints, radius: Floats, root_uv: Floats | None) -> bool:
-    """Whether `clean` would certainly drop and replace nothing; False may be a false alarm."""
-    if len(offsets) < 2 or np.diff(offsets).min() < 2:
-        return False
-    # a sum of squares is finite, or below a limit, only if every one of them is
-    if not np.vdot(points, points) < FARTHEST_POINT**2 or radius.min() <= 0.0:
-        return False
-    others = [radius] if root_uv is None else [radius, root_uv]
-    if not all(np.isfinite(np.vdot(each, each)) for each in others):
-        return False
-    reach = points[offsets[1:] - 1] - points[offsets[:-1]]
-    return bool((np.einsum("ij,ij->i", reach, reach) >= _SHORTEST_SQUARED).all())

@@ -45,6 +45,11 @@ def clean(
     offsets = np.asarray(offsets, np.int64)
     counts = np.diff(offsets)
     curve_count = len(counts)
+    if radius is not None and _are_sound(points, offsets, radius, root_uv):
+        group = np.zeros(curve_count, np.int32) if group is None else group
+        return Cleaned(
+            StrandSet(points, offsets, radius, group, root_uv), {}, np.arange(curve_count)
+        )
 
     faults = {
         "fewer than two points": counts < 2,
@@ -72,6 +77,20 @@ def clean(
         root_uv=None if root_uv is None else np.nan_to_num(root_uv, posinf=0, neginf=0)[kept],
     )
     return Cleaned(strands, dropped, kept)
+
+
+def _are_sound(points: Floats, offsets: Ints, radius: Floats, root_uv: Floats | None) -> bool:
+    """Whether certainly nothing is to be dropped or replaced, which is the rule; False may err."""
+    if len(offsets) < 2 or np.diff(offsets).min() < 2:
+        return False
+    # a sum of squares is finite, or below a limit, only if every one of them is
+    if not np.vdot(points, points) < FARTHEST_POINT**2 or np.min(radius) <= 0.0:
+        return False
+    others = [radius] if root_uv is None else [radius, root_uv]
+    if not all(np.isfinite(np.vdot(each, each)) for each in others):
+        return False
+    reach = points[offsets[1:] - 1] - points[offsets[:-1]]
+    return bool((np.einsum("ij,ij->i", reach, reach) >= 3.0 * SHORTEST_STRAND**2).all())
 
 
 def _any_per_curve(flags: Bools, offsets: Ints) -> Bools:

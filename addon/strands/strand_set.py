@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
+from .affine import mean_scale, moved
 
 #: Thinner and wider than any hair; widths outside of it are taken for a mistake in units.
 DEFAULT_RADIUS = 4.0e-5  # [m], half of 0.08 mm, a typical human hair
@@ -144,12 +145,8 @@ class StrandSet:
 
     def transformed(self, matrix: Floats) -> StrandSet:
         """Moved by an affine (4, 4) matrix; radii scale by the cube root of its volume change."""
-        linear = np.asarray(matrix, np.float64)[:3, :3]
-        scale = abs(np.linalg.det(linear)) ** (1.0 / 3.0)
-        points = self.points @ linear.T + np.asarray(matrix, np.float64)[:3, 3]
-        return replace(
-            self, points=points.astype(np.float32), radius=self.radius * np.float32(scale)
-        )
+        radius = self.radius * np.float32(mean_scale(matrix))
+        return replace(self, points=moved(self.points, matrix), radius=radius)
 
     def strands(self) -> Iterator[Floats]:
         """Each strand's points, for slow references and tests."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
+from .affine import moved
 
 
 @dataclass(frozen=True)
@@ -69,12 +70,11 @@ class Surface:
 
     def transformed(self, matrix: Floats) -> Surface:
         """Moved by an affine (4, 4) matrix; a mirroring one turns the triangles over."""
-        matrix = np.asarray(matrix, np.float64)
-        moved = (self.positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
-        if np.linalg.det(matrix[:3, :3]) >= 0.0:
-            return replace(self, positions=moved)
+        positions = moved(self.positions, matrix)
+        if np.linalg.det(np.asarray(matrix, np.float64)[:3, :3]) >= 0.0:
+            return replace(self, positions=positions)
         uv = None if self.corner_uv is None else self.corner_uv[:, ::-1]
-        return replace(self, positions=moved, triangles=self.triangles[:, ::-1], corner_uv=uv)
+        return replace(self, positions=positions, triangles=self.triangles[:, ::-1], corner_uv=uv)
 
 
 def _unit(vectors: Floats) -> Floats:

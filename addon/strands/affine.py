@@ -1,0 +1,36 @@
+"""Moving many points by one matrix."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats
+
+_BLOCK = 8192  # points that are moved at once, so that they stay in the cache
+
+
+def moved(points: Floats, matrix: Floats) -> Floats:
+    """Points (n, 3) moved by an affine (4, 4) matrix, float32; the same array for no motion.
+
+    Not by `@`: BLAS spreads so thin a product over threads that wait for each other, and takes
+    anything from 2 to 300 ms for 1.6 million points on a busy machine; this takes 13. Points that
+    are not finite stay so.
+    """
+    if np.array_equal(matrix, np.eye(4)):
+        return points
+    rows = np.asarray(matrix, np.float32)
+    result = np.empty(points.shape, np.float32)
+    with np.errstate(invalid="ignore", over="ignore"):
+        for begin in range(0, len(points), _BLOCK):
+            x, y, z = np.ascontiguousarray(points[begin : begin + _BLOCK].T)
+            for axis in range(3):
+                along = x * rows[axis, 0]
+                along += y * rows[axis, 1]
+                along += z * rows[axis, 2]
+                result[begin : begin + _BLOCK, axis] = along + rows[axis, 3]
+    return result
+
+
+def mean_scale(matrix: Floats) -> float:
+    """How much longer things get on average: the cube root of the change of volume."""
+    return float(abs(np.linalg.det(np.asarray(matrix, np.float64)[:3, :3])) ** (1.0 / 3.0))
