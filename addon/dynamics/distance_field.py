@@ -53,19 +53,21 @@ class DistanceField:
         ]
 
     @classmethod
-    def from_surface(cls, surface: Surface, settings: DynamicsSettings) -> DistanceField:
-        """Sample a closed mesh.
+    def from_surface(
+        cls, surface: Surface, settings: DynamicsSettings, *, place: str = "mesh collider"
+    ) -> DistanceField:
+        """Sample a closed mesh; `place` names it in messages.
 
         Raises:
             HairloomError: no faces, no size, or no inside at this resolution.
         """
         if not len(surface.triangles):
-            raise _broken("it has no faces", "Choose a closed mesh as collider")
+            raise _broken(place, "it has no faces", "Choose a closed mesh as collider")
         used = surface.positions[np.unique(surface.triangles)].astype(np.float64)
         low, high = used.min(axis=0), used.max(axis=0)
         cell = float((high - low).max()) / settings.collider_resolution
         if cell <= 0.0:
-            raise _broken("all its vertices lie in one point", "Choose a mesh with volume")
+            raise _broken(place, "all its vertices lie in one point", "Choose a mesh with volume")
         low = low - MARGIN * cell
         shape = np.ceil((high - low) / cell).astype(int) + MARGIN + 1
         axes = [low[axis] + cell * np.arange(shape[axis]) for axis in range(3)]
@@ -74,6 +76,7 @@ class DistanceField:
         inside = _inside(nodes, distance, surface, cell)
         if not inside.any():
             raise _broken(
+                place,
                 "it encloses no volume at this resolution",
                 "Close its holes, or raise the collider resolution",
             )
@@ -170,5 +173,5 @@ def _inside(nodes: Floats, distance: Floats, surface: Surface, cell: float) -> B
     return np.take_along_axis(known, last, axis=2)
 
 
-def _broken(problem: str, remedy: str) -> HairloomError:
-    return HairloomError(problem, place="mesh collider", remedy=remedy)
+def _broken(place: str, problem: str, remedy: str) -> HairloomError:
+    return HairloomError(problem, place=place, remedy=remedy)

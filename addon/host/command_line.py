@@ -117,6 +117,7 @@ def _job(options: argparse.Namespace) -> Job:
             collider=options.collider,
             groom_scale=options.groom_scale,
             groom_up=options.groom_up,
+            need_head=options.verb in ("simulate", "demo"),
             need_uv=not options.no_uv,
         ),
         settings=_settings(options),

@@ -15,6 +15,7 @@ from ..strands import StrandSet, Surface
 from .built_in_head import built_in_head
 from .curves import read_curves
 from .mesh_files import read_mesh_file
+from .objects import head_of
 from .surfaces import read_surface
 
 BUILT_IN = "built-in"
@@ -24,8 +25,10 @@ BUILT_IN = "built-in"
 class Sources:
     """What the caller asks for; each is a file, an object of the open scene, or None.
 
-    groom None: one is grown on the head. head None: the built-in one, or none when the groom
-    brings no head. collider None: the head itself.
+    groom None: one is grown on the head. head None: the one that hair curves name as their
+    surface; the built-in one where a groom is grown. collider None: the head itself.
+    need_head: whether a groom without a head is refused.
+    need_uv: whether a head without UVs is refused.
     """
 
     groom: str | None = None
@@ -33,6 +36,7 @@ class Sources:
     collider: str | None = None
     groom_scale: float = 1.0
     groom_up: str = "Y"
+    need_head: bool = True
     need_uv: bool = True
 
 
@@ -43,9 +47,9 @@ class Inputs:
     strands: StrandSet
     dropped: dict[str, int]
     groom_name: str
-    head: Surface
+    head: Surface | None
     head_object: str | None
-    collider: Surface
+    collider: Surface | None
 
 
 def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
@@ -54,37 +58,42 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     Raises:
         HairloomError: naming the file or object that cannot be used, and what to do.
     """
+    head_name = sources.head or _surface_name(sources.groom)
     if sources.groom is not None:
         strands, dropped = _read_groom(sources.groom, sources)
-        head = _read_head(sources)
+        head = _read_head(head_name, sources)
     else:
-        head, dropped = _read_head(sources), {}
+        head, dropped = _read_head(head_name, sources), {}
+        assert head is not None, "the built-in one is always there"
         strands = grow(head, grow_settings, scalp_density(head))
-    head_object = bpy.data.objects.get(sources.head or "")
-    collider = head if sources.collider is None else _read_mesh(sources.collider, need_uv=False)
-    return Inputs(
-        strands,
-        dropped,
-        sources.groom or BUILT_IN,
-        head,
-        head_object and head_object.name,
-        collider,
-    )
+    collider = head
+    if sources.collider is not None:
+        collider = _read_mesh(sources.collider, need_uv=False)
+    head_object = bpy.data.objects.get(head_name or "")
+    name = sources.groom or BUILT_IN
+    return Inputs(strands, dropped, name, head, head_object and head_object.name, collider)
 
 
-def _read_head(sources: Sources) -> Surface:
-    if sources.head is not None:
-        return _read_mesh(sources.head, need_uv=sources.need_uv)
+def _read_head(name: str | None, sources: Sources) -> Surface | None:
+    """The head of this name; without one the built-in head, for hair that is grown here."""
+    if name is not None:
+        return _read_mesh(name, need_uv=sources.need_uv)
     if sources.groom is None:
         return built_in_head()
-    surface = getattr(_object_data(sources.groom), "surface", None)
-    if surface is not None:
-        return _read_mesh(surface.name, need_uv=sources.need_uv)
-    raise HairloomError(
-        "it has no head to grow on",
-        place=sources.groom,
-        remedy="Name the head with --head FILE_OR_OBJECT",
-    )
+    if sources.need_head:
+        raise HairloomError(
+            "it has no head to move with",
+            place=sources.groom,
+            remedy="Name the head with --head FILE_OR_OBJECT",
+        )
+    return None
+
+
+def _surface_name(groom: str | None) -> str | None:
+    """The mesh that a hair curves object of the scene says it grows on."""
+    hair = bpy.data.objects.get(groom or "")
+    surface = head_of(hair) if hair is not None and hair.type == "CURVES" else None
+    return None if surface is None else surface.name
 
 
 def _read_groom(source: str, sources: Sources) -> tuple[StrandSet, dict[str, int]]:
@@ -106,11 +115,6 @@ def _read_mesh(source: str, *, need_uv: bool) -> Surface:
     if Path(source).suffix:
         return read_mesh_file(Path(source), need_uv=need_uv)
     raise _unknown(source, "mesh", "a mesh file such as head.obj")
-
-
-def _object_data(name: str) -> object:
-    found = bpy.data.objects.get(name)
-    return None if found is None else found.data
 
 
 def _unknown(source: str, kind: str, example: str) -> HairloomError:

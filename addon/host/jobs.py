@@ -153,7 +153,11 @@ def _simulate(job: Job, rig: Rig, inputs: Inputs, report: Report) -> Take:
     """Run the dynamics under the scene's animation or the shake."""
     rate = float(job.options.frame_rate)
     with report.stage("collider"):
-        collider = DistanceField.from_surface(inputs.collider, job.set(DynamicsSettings))
+        assert inputs.collider is not None, "simulate and demo refuse a groom without a head"
+        name = job.sources.collider or job.sources.head or "built-in head"
+        collider = DistanceField.from_surface(
+            inputs.collider, job.set(DynamicsSettings), place=name
+        )
     poses, rate = _poses(job, rig, inputs, rate)
     progress = Progress("simulating", len(poses) - 1)
     take, worst = simulate_take(

@@ -34,7 +34,7 @@ class Obstacle:
 
     @classmethod
     def new(cls, body: Body, surface: Surface, settings: DynamicsSettings) -> Obstacle:
-        field = DistanceField.from_surface(surface, settings)
+        field = DistanceField.from_surface(surface, settings, place=body.handle.name)
         return cls(body, surface, field, settings.collider_resolution, np.eye(4))
 
     def move(self, depsgraph: bpy.types.Depsgraph) -> PosedCollider:

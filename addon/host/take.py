@@ -20,7 +20,8 @@ from ..dynamics.settings import DynamicsSettings
 from ..errors import HairloomError
 from ..exchange.atomic import atomic_write
 from ..pipeline import Pose, Rig
-from .surfaces import read_surface
+from .objects import Body
+from .surfaces import read_positions
 
 #: the shake: how far the head turns and sways, and how often
 SHAKE_ANGLE = np.radians(25.0)
@@ -105,18 +106,19 @@ def shaken_poses(rig: Rig, frame_count: int, frame_rate: float) -> list[Pose]:
 
 
 def scene_poses(head_object: str, frames: range) -> Iterator[Pose]:
-    """The head as the scene animates it, one pose a frame; leaves the scene where it was."""
-    scene = bpy.context.scene
-    shown, rest = scene.frame_current, None
+    """The head as the scene animates it, one pose a frame; leaves the scene where it was.
+
+    Rest is where the head is now: what was read from the scene was read in this frame.
+    """
+    scene, head = bpy.context.scene, bpy.data.objects[head_object]
+    shown = scene.frame_current
+    body = Body.at_rest(head, bpy.context.evaluated_depsgraph_get())
     try:
         for frame in frames:
             scene.frame_set(frame)
-            head = bpy.data.objects[head_object]
             depsgraph = bpy.context.evaluated_depsgraph_get()
-            surface = read_surface(head, depsgraph, need_uv=False, place=head_object)
-            matrix = np.array(head.evaluated_get(depsgraph).matrix_world)
-            rest = np.linalg.inv(matrix) if rest is None else rest
-            yield Pose(surface.positions, matrix @ rest)
+            positions = read_positions(head, depsgraph, place=head_object)
+            yield Pose(positions, body.moved(depsgraph))
     finally:
         scene.frame_set(shown)
 
@@ -136,13 +138,22 @@ def read_take(path: Path, rig: Rig) -> Take:
     try:
         with np.load(path, allow_pickle=False) as data:
             take = Take(data["guides"], data["heads"], float(data["frame_rate"]))
+    except FileNotFoundError as error:
+        raise HairloomError(
+            "there is no such file", place=str(path), remedy="Check the path"
+        ) from error
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise HairloomError(
-            f"this take cannot be read ({error})",
+            "this file is no take, or it is damaged",
             place=str(path),
             remedy="Make it again with hairloom simulate",
         ) from error
-    assert rig.head is not None
+    if rig.head is None:
+        raise HairloomError(
+            "a take needs the head that it was simulated with",
+            place=str(path),
+            remedy="Name the head with --head FILE_OR_OBJECT",
+        )
     wanted = (len(rig.guides), rig.strands.grid.shape[1], 3), rig.head.positions.shape
     if (take.guides.shape[1:], take.heads.shape[1:]) != wanted:
         raise HairloomError(

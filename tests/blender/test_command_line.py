@@ -15,6 +15,8 @@ import bpy
 
 from hairloom.addon.exchange.tressfx import write_tfx
 from hairloom.addon.host import command_line
+from hairloom.addon.host.curves import write_curves
+from hairloom.addon.host.take import scene_poses
 from hairloom.addon.strands import StrandSet
 
 HEAD_OBJ = """
@@ -241,34 +243,49 @@ def test_the_demo_writes_everything_the_report_names(tmp_path: Path, gpu_context
     )
 
 
-def test_the_scene_moves_the_head(tmp_path: Path) -> None:
-    """With --scene the take follows the object's own animation, and leaves the frame alone."""
+@pytest.fixture
+def walking_head() -> bpy.types.Object:
+    """A tetrahedron that walks 0.5 m along x from frame 1 to 5, seen in frame 3."""
     scene = bpy.context.scene
-    mesh = bpy.data.meshes.new("Moving")
-    mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (0, 1, 0), (0, 0, -1)], [], [(0, 1, 2), (0, 3, 1)])
+    mesh = bpy.data.meshes.new("Walking")
+    corners = [(-1, -1, 0), (1, -1, 0), (0, 1, 0), (0, 0, -1)]
+    mesh.from_pydata(corners, [], [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)])
     mesh.uv_layers.new(name="UVMap")
-    moving = bpy.data.objects.new("Moving head", mesh)
-    scene.collection.objects.link(moving)
-    moving.keyframe_insert("location", frame=1)
-    moving.location.x = 0.5
-    moving.keyframe_insert("location", frame=5)
-    hair = tmp_path / "hair.tfx"
-    random = np.random.default_rng(3)
-    roots = random.uniform(-0.3, 0.3, (25, 1, 3)) * [1, 1, 0]
-    points = (roots + np.linspace([0, 0, 0.0], [0, 0, 0.3], 8)).astype(np.float32)
-    strands = StrandSet(points.reshape(-1, 3), np.arange(26) * 8, np.full(200, 4e-5), np.zeros(25))
-    write_tfx(hair, strands)
+    head = bpy.data.objects.new("Walking head", mesh)
+    scene.collection.objects.link(head)
+    head.keyframe_insert("location", frame=1)
+    head.location.x = 0.5
+    head.keyframe_insert("location", frame=5)
     scene.frame_start, scene.frame_end = 1, 5
-    scene.frame_set(2)
+    scene.frame_set(3)
+    return head
+
+
+def standing_hair() -> StrandSet:
+    """25 strands that stand on the tetrahedron's top where it is in frame 3."""
+    random = np.random.default_rng(3)
+    roots = random.uniform(-0.2, 0.2, (25, 1, 3)) * [1, 1, 0] + [0.25, 0, 0]
+    points = (roots + np.linspace([0, 0, 0.0], [0, 0, 0.3], 8)).astype(np.float32)
+    return StrandSet(points.reshape(-1, 3), np.arange(26) * 8, np.full(200, 4e-5), np.zeros(25))
+
+
+def test_the_scene_moves_the_head(tmp_path: Path, walking_head: bpy.types.Object) -> None:
+    """With --scene the take follows the object's own animation, and leaves the frame alone."""
+    write_curves("Walking hair", standing_hair(), walking_head, bpy.context.scene.collection)
     take = tmp_path / "take.npz"
-    try:
-        arguments = ["simulate", "--groom", str(hair), "--head", "Moving head", "--scene", *SMALL]
-        assert command_line.run([*arguments, "--output", str(take)]) == 0
-        assert scene.frame_current == 2
-    finally:
-        bpy.data.objects.remove(moving)
-        bpy.data.meshes.remove(mesh)
+    arguments = ["simulate", "--groom", "Walking hair", "--scene", *SMALL]
+    assert command_line.run([*arguments, "--output", str(take)]) == 0
+    assert bpy.context.scene.frame_current == 3
     with np.load(take) as data:
-        moved = data["guides"][-1, :, 0] - data["guides"][0, :, 0]
+        root = data["guides"][:, :, 0]
         assert data["frame_rate"] == 24.0
-    np.testing.assert_allclose(moved, np.tile([0.5, 0.0, 0.0], (20, 1)), atol=1e-5)
+    way = np.tile([0.5, 0.0, 0.0], (20, 1))
+    np.testing.assert_allclose(root[-1] - root[0], way, atol=1e-5)
+    assert abs(root[0, :, 0].mean()) < 0.2, "frame 1 begins where the head is in frame 1"
+
+
+def test_rest_is_where_the_scene_was_read(walking_head: bpy.types.Object) -> None:
+    """The collider is made from the head as it was read, so its motion must count from there."""
+    poses = list(scene_poses(walking_head.name, range(1, 6)))
+    np.testing.assert_allclose(poses[2].matrix, np.eye(4), atol=1e-6)
+    assert poses[0].matrix[0, 3] == pytest.approx(-0.25, abs=1e-5)
