@@ -160,13 +160,14 @@ def play_and_stop():
     assert live().is_playing(), "the Play button did nothing"
     offsets = []
     for frame in range(20):
-        head.location.x = 0.004 * (frame + 1)
+        head.location.x = 0.06 if frame < 10 else 0.08
         yield 1
         strands = live().sessions()[0].snapshot.strands
         carried = at_rest + np.array([head.location.x, 0.0, 0.0])
         offsets.append(float((strands - carried)[:, -1, 0].mean()))
     moving = pixels("play-moving")
     assert min(offsets) < -0.001, f"the tips do not lag behind: {offsets}"
+    assert abs(offsets[9]) < abs(min(offsets)), f"the tips do not come after: {offsets}"
     head.location.x = 0.0
     yield 2
     yield from press("ESC")
