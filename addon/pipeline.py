@@ -6,7 +6,7 @@ artist's buttons and from the command line alike.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,14 +26,9 @@ from .groom.roots import RootFrames, bind_roots, follow, root_frames
 from .groom.settings import GuideSettings
 from .groom.weights import GuideWeights, guide_weights
 from .refine.interpolate import ride
-from .shading.ambient import AmbientSettings, ambient_occlusion
+from .shading.ambient import AmbientSettings, ambient_occlusion, skin_occlusion
 from .strands import StrandSet, Surface
 from .strands.resample import resample
-
-#: Where the light that reaches the skin is measured, above it, so that it is in the hair [m].
-SKIN_CLEARANCE = 0.003
-#: Drawn strands stand for several hairs each, through which a scalp would shine: more extinction.
-SCALP_EXTINCTION = 12.0
 
 
 @dataclass(frozen=True)
@@ -188,11 +183,7 @@ def rest_occlusion(rig: Rig, settings: AmbientSettings) -> Floats:
 
 def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:
     """The light that the hair lets through to the head, (vertex_count,); None without a head."""
-    if rig.head is None:
-        return None
-    above = rig.head.positions + SKIN_CLEARANCE * rig.head.vertex_normals()
-    under_hair = replace(settings, extinction=SCALP_EXTINCTION)
-    return ambient_occlusion(rig.strands, above, None, under_hair)
+    return None if rig.head is None else skin_occlusion(rig.strands, rig.head, settings)
 
 
 def cards_of(rig: Rig, settings: CardSettings, ambient: AmbientSettings) -> CardMesh:

@@ -7,6 +7,7 @@ import platform
 import statistics
 import sys
 import time
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,8 @@ import numpy as np
 
 from ..exchange.atomic import write_text_atomic
 from .studio import gpu_in_use
+
+_MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
 
 
 class Report:
@@ -50,7 +53,9 @@ class Report:
 
 def environment() -> dict[str, str]:
     """What the run ran on; backend and renderer are empty where nothing was drawn."""
+    manifest = tomllib.loads(_MANIFEST.read_text(encoding="utf-8"))
     return {
+        "hairloom": manifest["version"],
         "blender": bpy.app.version_string,
         "python": platform.python_version(),
         "numpy": np.__version__,

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -26,6 +26,10 @@ from .density_grid import body_depth, grid_around, hair_depth, sample
 type Step = tuple[int, int, int]
 #: Lebedev's weights of 26 directions: 6 along axes, 12 across edges, 8 across corners; sum 1.
 _DIRECTION_WEIGHTS = {1: 1 / 21, 2: 4 / 105, 3: 9 / 280}
+
+
+#: Where light on the skin is measured, above it, so that it lies in the hair [m].
+SKIN_CLEARANCE = 0.003
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +72,14 @@ class AmbientSettings(Settings):
         unit="factor",
         soft=(0.25, 1.0),
         hard=(0.05, 1.0),
+    )
+    scalp_extinction: float = number(
+        12.0,
+        label="Scalp Extinction",
+        description="The same for light on its way to the skin; higher, so that a scalp does not "
+        "shine through strands that stand for many",
+        soft=(0.0, 30.0),
+        hard=(0.0, 10_000.0),
     )
     cell_count: int = integer(
         56,
@@ -144,3 +156,10 @@ def _add_shifted(target: Floats, source: Floats, step: list[int]) -> None:
         to.append(slice(max(0, -shift), size - max(0, shift)))
         at.append(slice(max(0, shift), size - max(0, -shift)))
     target[tuple(to)] += source[tuple(at)]
+
+
+def skin_occlusion(strands: StrandSet, skin: Surface, settings: AmbientSettings) -> Floats:
+    """The light that the hair lets through to each vertex of the skin, (vertex_count,) float32."""
+    above = skin.positions + SKIN_CLEARANCE * skin.vertex_normals()
+    through = replace(settings, extinction=settings.scalp_extinction)
+    return ambient_occlusion(strands, above, None, through)

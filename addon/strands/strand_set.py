@@ -108,11 +108,6 @@ class StrandSet:
         cv_count = int(self.point_counts[0]) if self.strand_count else 2
         return self.points.reshape(self.strand_count, cv_count, 3)
 
-    @property
-    def strand_of_point(self) -> Ints:
-        """Index of the strand that owns each point, (point_count,)."""
-        return np.repeat(np.arange(self.strand_count, dtype=np.int32), self.point_counts)
-
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner of all points, each (3,) [m]; zeros for an empty set."""
         if not self.point_count:

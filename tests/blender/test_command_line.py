@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from pathlib import Path
 
@@ -238,6 +239,7 @@ def test_the_demo_writes_everything_the_report_names(tmp_path: Path, gpu_context
     assert report["strands"] == 300 and report["guides"] == 40 and report["children"] == 260
     assert report["stretch_max_percent"] < 1.0
     assert report["backend"] and report["renderer"]
+    assert re.fullmatch(r"\d+\.\d+\.\d+", report["hairloom"])
     assert {"read inputs", "simulate frame", "draw still", "build cards"} <= set(
         report["stages_ms"]
     )

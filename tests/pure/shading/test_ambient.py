@@ -10,6 +10,7 @@ from hairloom.addon.shading.ambient import (
     AmbientSettings,
     ambient_occlusion,
     depth_towards,
+    skin_occlusion,
     sky_directions,
     sky_openness,
 )
@@ -243,3 +244,15 @@ def test_no_hair_and_no_points() -> None:
     none = strands.take(np.zeros(0, np.int64))
     assert (ambient_occlusion(none, strands.points, None, AmbientSettings()) == 1.0).all()
     assert ambient_occlusion(strands, np.zeros((0, 3)), None, AmbientSettings()).shape == (0,)
+
+
+def test_skin_is_dark_only_under_the_hair() -> None:
+    """A ball with hair on its upper half only: the skin under it loses more light than the rest."""
+    skin = ball(0.08)
+    strands = hair_on_ball()
+    upper = strands.take(np.flatnonzero(strands.roots[:, 2] > 0.0))
+    light = skin_occlusion(upper, skin, AmbientSettings())
+    height = skin.positions[:, 2]
+    assert light[height > 0.05].mean() < light[height < -0.05].mean() - 0.2
+    more = skin_occlusion(upper, skin, AmbientSettings(scalp_extinction=100.0))
+    assert more[height > 0.05].mean() < light[height > 0.05].mean()

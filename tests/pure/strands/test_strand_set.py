@@ -46,13 +46,12 @@ def test_what_does_not_fit_is_refused(changes: dict[str, Any], problem: str) -> 
         ragged(**changes)
 
 
-def test_lengths_and_strand_of_point_agree_with_loops() -> None:
+def test_lengths_agree_with_loops() -> None:
     strands = ragged()
     lengths = [
         np.linalg.norm(np.diff(points, axis=0), axis=1).sum() for points in strands.strands()
     ]
     assert strands.lengths() == pytest.approx(lengths, rel=1e-6)
-    assert strands.strand_of_point.tolist() == [s for s, n in enumerate(COUNTS) for _ in range(n)]
     assert strands.roots == pytest.approx(np.array([points[0] for points in strands.strands()]))
 
 
