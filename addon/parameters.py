@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from .cards.settings import CardSettings
+from .dynamics.cloth_settings import FinSettings
 from .dynamics.settings import DynamicsSettings
+from .dynamics.sphere_fit import SphereFitSettings
 from .groom.settings import GrowSettings, GuideSettings
 from .params import Settings
 from .shading.ambient import AmbientSettings
@@ -16,6 +18,8 @@ ALL_SETTINGS: dict[str, type[Settings]] = {
         GrowSettings,
         GuideSettings,
         DynamicsSettings,
+        FinSettings,
+        SphereFitSettings,
         StrandSettings,
         ShadingSettings,
         AmbientSettings,

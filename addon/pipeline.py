@@ -20,6 +20,7 @@ from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, start
 from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance as advance_dynamics
+from .dynamics.way import bow
 from .errors import HairloomError
 from .groom.guides import choose_guides
 from .groom.roots import RootFrames, bind_roots, follow, root_frames
@@ -29,6 +30,8 @@ from .refine.interpolate import ride
 from .shading.ambient import AmbientSettings, ambient_occlusion, skin_occlusion
 from .strands import StrandSet, Surface
 from .strands.resample import resample
+
+NO_WIND = np.zeros(3)
 
 
 @dataclass(frozen=True)
@@ -69,12 +72,22 @@ class Motion:
 
     guides: (guide_count, cv_count, 3) [m], simulated, with their roots in this pose.
     carried_guides: the same without dynamics: their rest shape carried by the roots.
+    carried_earlier: the same one frame earlier; None at the start.
+    duration: of the last frame [s]; 0 at the start.
     """
 
     dynamics: DynamicsState
     guides: Floats
     carried_guides: Floats
     pose: Pose
+    carried_earlier: Floats | None = None
+    duration: float = 0.0
+
+    def bow_to(self, target: Floats, duration: float) -> Floats | None:
+        """How the way to the carried guides (guide_count, cv_count, 3) after `duration` bends."""
+        if self.carried_earlier is None or not duration:
+            return None
+        return bow(self.carried_earlier, self.carried_guides, target, self.duration / duration)
 
 
 def prepare(
@@ -146,17 +159,21 @@ def advance(
     settings: DynamicsSettings,
     gravity: Floats,
     duration: float,
+    scene_wind: Floats = NO_WIND,
 ) -> Motion:
     """One frame of motion: the roots go with the head, the dynamics moves the rest.
 
     Args:
         gravity: (3,) [m/s^2], world space.
         duration: time since the motion's pose [s].
+        scene_wind: (3,) [m/s], world space.
     """
     target = carried(rig, pose, rig.guides)
-    drive = Drive(motion.carried_guides, target, colliders, gravity)
+    before = motion.carried_guides
+    target_bow = motion.bow_to(target, duration)
+    drive = Drive(before, target, colliders, gravity, target_bow, scene_wind)
     state = advance_dynamics(motion.dynamics, drive, settings, duration)
-    return Motion(state, grid_at_frame_end(state, drive), target, pose)
+    return Motion(state, grid_at_frame_end(state, drive), target, pose, before, duration)
 
 
 def strands_now(rig: Rig, motion: Motion) -> Floats:

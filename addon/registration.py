@@ -10,9 +10,17 @@ from typing import Any
 
 import bpy
 
-from .host import groups, handlers, live
+from .host import groups, handlers, reactions
 from .host.command_line import run
-from .ui import operators_files, operators_presets, operators_preview, panels
+from .ui import (
+    operators_bake,
+    operators_colliders,
+    operators_files,
+    operators_fins,
+    operators_presets,
+    operators_preview,
+    panels,
+)
 
 #: the package that Blender knows, above this one; it is called otherwise in every repository
 ROOT_PACKAGE = __package__.rpartition(".")[0]
@@ -21,9 +29,13 @@ COMMAND = "hairloom"
 CLASSES: tuple[type[Any], ...] = (
     *groups.CLASSES,
     *operators_preview.CLASSES,
+    *operators_bake.CLASSES,
+    *operators_colliders.CLASSES,
     *operators_files.CLASSES,
     *operators_presets.CLASSES,
     *panels.CLASSES,
+    *operators_fins.CLASSES,
+    *operators_bake.FIN_CLASSES,
 )
 
 type Step = tuple[Callable[[], Any], Callable[[], Any]]
@@ -47,7 +59,8 @@ def register() -> None:
 def unregister() -> None:
     """The exact mirror image, after the previews have ended."""
     operators_preview.stop_ticking()
-    live.clear()
+    operators_bake.stop()
+    reactions.clear()
     for _, undo in reversed(_steps()):
         undo()
 

@@ -3,6 +3,10 @@
 The reference draws the same strands as plain lines with the gpu module's own shader, uploaded
 again each frame as a batch: what an add-on does that follows the module's examples. Ours draws
 ribbons with width and two subdivisions, lit by three lights and with two shifted highlights.
+
+The same frames once more with guides that stay on the GPU: `gpu_simulate_ms` and `gpu_ride_ms`
+end when the GPU has done it, `gpu_draw_ms` has nothing to pack and to upload. `cpu_frame_ms` and
+`gpu_frame_ms` are the three stages of either way together.
 """
 
 import json
@@ -22,6 +26,7 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.host.built_in_head import built_in_head
+from hairloom.addon.host.compute_solver import ComputeSolver
 from hairloom.addon.host.take import GRAVITY, shaken_poses
 from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.snapshot import Snapshot
@@ -29,6 +34,10 @@ from hairloom.addon.render.strand_pass import StrandPass
 from hairloom.addon.shading.lights import three_point_lights
 
 STRANDS, WIDTH, HEIGHT, FRAMES = 11_400, 960, 720, 30
+WAYS = {
+    "cpu": ("simulate_ms", "interpolate_ms", "draw_ms"),
+    "gpu": ("gpu_simulate_ms", "gpu_ride_ms", "gpu_draw_ms"),
+}
 
 
 class Stopwatch:
@@ -63,6 +72,20 @@ class Lines:
         batch.draw(self._shader)
 
 
+def simulated(solver: ComputeSolver, pose: pipeline.Pose) -> None:
+    """A frame of dynamics; the guides are read back, 0.05 ms, so that it is over."""
+    solver.advance(pose, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0)
+    solver.guides()
+
+
+def ridden(solver: ComputeSolver, snapshot: Snapshot) -> Snapshot:
+    """The snapshot with all strands on the GPU, done when they can be read back, 0.1 ms."""
+    shown = solver.shown(snapshot)
+    assert shown.device_points is not None
+    shown.device_points.texture.read()
+    return shown
+
+
 def main() -> None:
     gpu.init()
     head = built_in_head()
@@ -72,7 +95,8 @@ def main() -> None:
     motion = pipeline.begin(rig, poses[0])
     radius = rig.strands.radius.reshape(STRANDS, -1)
     camera = frame_camera(rig.strands.bounds(), (-0.5, -1.0, 0.2), 0.5, WIDTH / HEIGHT)
-    lights, ours = three_point_lights(camera.view), StrandPass()
+    lights, ours, riding = three_point_lights(camera.view), StrandPass(), StrandPass()
+    solver = ComputeSolver(rig)
     lines = Lines(STRANDS, rig.strands.grid.shape[1])
     color = gpu.types.GPUTexture((WIDTH, HEIGHT), format="RGBA16F")
     depth = gpu.types.GPUTexture((WIDTH, HEIGHT), format="DEPTH_COMPONENT32F")
@@ -104,7 +128,15 @@ def main() -> None:
             lambda s=snapshot: drawn(lambda: ours.draw(s, camera, WIDTH, HEIGHT)),
         )
         watch.measure("lines_ms", lambda p=points: drawn(lambda: lines.draw(p)))
+        watch.measure("gpu_simulate_ms", lambda p=pose: simulated(solver, p))
+        snapshot = watch.measure("gpu_ride_ms", lambda s=snapshot: ridden(solver, s))
+        watch.measure(
+            "gpu_draw_ms",
+            lambda s=snapshot: drawn(lambda: riding.draw(s, camera, WIDTH, HEIGHT)),
+        )
     medians = watch.medians()
+    for way, stages in WAYS.items():
+        medians[f"{way}_frame_ms"] = round(sum(medians[stage] for stage in stages), 3)
     print(
         json.dumps(
             {

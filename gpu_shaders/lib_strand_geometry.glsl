@@ -13,11 +13,7 @@
 //
 // Limits: where the curve turns sharply in the picture, the ribbon narrows in the bend.
 
-// Strand s is row s % {{strand_rows}} of a texture, in column block s / {{strand_rows}}.
-ivec2 strand_texel(int strand, int cv, int cv_count)
-{
-  return ivec2((strand / {{strand_rows}}) * cv_count + cv, strand % {{strand_rows}});
-}
+#include "lib_strand_texel.glsl"
 
 vec3 catmull_rom_point(vec3 p0, vec3 p1, vec3 p2, vec3 p3, float u)
 {

@@ -37,13 +37,16 @@ def parameter_tables() -> str:
 
 
 def make_pictures() -> None:
-    """Run the demo on the built-in head and keep its pictures."""
+    """Run the demo on the built-in head, in air and under water, and keep its pictures."""
     IMAGES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         headless = [sys.executable, str(REPOSITORY / "tools" / "headless.py")]
         subprocess.run([*headless, "demo", "--output", folder], check=True)
         for name in ("still.png", "motion.png"):
             shutil.copyfile(Path(folder) / name, IMAGES / name)
+        preset = ["--preset", "dynamics/under_water"]
+        subprocess.run([*headless, "demo", *preset, "--output", folder], check=True)
+        shutil.copyfile(Path(folder) / "motion.png", IMAGES / "under_water.png")
 
 
 def main() -> int:

@@ -1,7 +1,8 @@
 """Direct solves of small banded systems, one a guide, in step with all guides.
 
 Rows are CVs or segments, so a sweep down the band is a Python loop of whole-row numpy calls.
-Only +, -, *, / are used, which IEEE 754 rounds alike everywhere: no BLAS.
+Only +, -, *, / are used, which IEEE 754 rounds alike everywhere: no BLAS. For some hundred guides
+the calls cost more than the numbers, so arrays are taken apart into rows once.
 """
 
 from __future__ import annotations
@@ -21,19 +22,22 @@ def solve_tridiagonal(diagonal: Floats, beside: Floats, right: Floats) -> None:
         beside: (n - 1, guide_count), entry i couples rows i and i + 1.
         right: (n, guide_count).
     """
-    count = len(right)
-    ratio = np.empty_like(beside)
-    scratch = np.empty_like(right[0]) if count else right
-    for i in range(1, count):
-        np.divide(beside[i - 1], diagonal[i - 1], out=ratio[i - 1])
-        np.multiply(ratio[i - 1], beside[i - 1], out=scratch)
-        diagonal[i] -= scratch
-        np.multiply(ratio[i - 1], right[i - 1], out=scratch)
-        right[i] -= scratch
+    if not len(right):
+        return
+    pivots, answers, ratios = list(diagonal), list(right), list(np.empty_like(beside))
+    scratch = np.empty_like(right[0])
+    pivot, answer = pivots[0], answers[0]
+    for ratio, upper, below, answer_below in zip(
+        ratios, beside, pivots[1:], answers[1:], strict=True
+    ):
+        np.divide(upper, pivot, ratio)
+        below -= np.multiply(ratio, upper, scratch)
+        answer_below -= np.multiply(ratio, answer, scratch)
+        pivot, answer = below, answer_below
     right /= diagonal
-    for i in range(count - 2, -1, -1):
-        np.multiply(ratio[i], right[i + 1], out=scratch)
-        right[i] -= scratch
+    for ratio, above in zip(reversed(ratios), reversed(answers[:-1]), strict=True):
+        above -= np.multiply(ratio, answer, scratch)
+        answer = above
 
 
 class SharedBand:
@@ -42,6 +46,9 @@ class SharedBand:
 
     Args:
         matrix: (n, n) float64; entries farther than two from the diagonal are taken as zero.
+
+    near, far: (n,) float32, L beside the diagonal: row i takes near[i] of row i - 1, far[i] of
+    i - 2. inverse_pivot: (n,) float32, 1 / D.
     """
 
     def __init__(self, matrix: Floats) -> None:
@@ -56,21 +63,24 @@ class SharedBand:
             pivot[i] = matrix[i, i]
             pivot[i] -= near[i] ** 2 * pivot[i - 1] if i >= 1 else 0.0
             pivot[i] -= far[i] ** 2 * pivot[i - 2] if i >= 2 else 0.0
-        self._near = [np.float32(value) for value in near]
-        self._far = [np.float32(value) for value in far]
-        self._inverse_pivot = (1.0 / pivot).astype(np.float32)[:, None]
+        self.near, self.far = near.astype(np.float32), far.astype(np.float32)
+        self.inverse_pivot = (1.0 / pivot).astype(np.float32)
 
     def solve(self, right: Floats) -> None:
         """Replace `right` (3, n, guide_count) float32 by the solution."""
-        count = right.shape[1]
-        row = [right[:, i] for i in range(count)]
-        scratch = np.empty_like(row[0]) if count else right
+        if not right.shape[1]:
+            return
+        band = np.ascontiguousarray(right.transpose(1, 0, 2))  # x, y and z of a row in one go
+        row, scratch = list(band), np.empty_like(band[0])
+        near, far = self.near.tolist(), self.far.tolist()  # which numpy takes sooner than its own
+        count = len(band)
         for i in range(1, count):
-            row[i] -= np.multiply(row[i - 1], self._near[i], out=scratch)
+            row[i] -= np.multiply(row[i - 1], near[i], scratch)
             if i >= 2:
-                row[i] -= np.multiply(row[i - 2], self._far[i], out=scratch)
-        right *= self._inverse_pivot
+                row[i] -= np.multiply(row[i - 2], far[i], scratch)
+        band *= self.inverse_pivot[:, None, None]
         for i in range(count - 2, -1, -1):
-            row[i] -= np.multiply(row[i + 1], self._near[i + 1], out=scratch)
+            row[i] -= np.multiply(row[i + 1], near[i + 1], scratch)
             if i + 2 < count:
-                row[i] -= np.multiply(row[i + 2], self._far[i + 2], out=scratch)
+                row[i] -= np.multiply(row[i + 2], far[i + 2], scratch)
+        right[:] = band.transpose(1, 0, 2)

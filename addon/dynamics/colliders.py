@@ -1,4 +1,5 @@
-"""What hair runs into: spheres and closed meshes, posed by matrices that move during a frame."""
+"""What hair runs into: balls, capsules, sets of balls and closed meshes, posed by matrices that
+move during a frame."""
 
 from __future__ import annotations
 
@@ -10,8 +11,18 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .distance_field import DistanceField
+from .shapes import CapsuleCollider, SphereCollider
+from .sphere_set import SphereSetCollider
+from .way import at
 
-__all__ = ["Collider", "DistanceField", "PosedCollider", "SphereCollider"]
+__all__ = [
+    "CapsuleCollider",
+    "Collider",
+    "DistanceField",
+    "PosedCollider",
+    "SphereCollider",
+    "SphereSetCollider",
+]
 
 
 class Collider(Protocol):
@@ -29,43 +40,11 @@ class Collider(Protocol):
 
 
 @dataclass(frozen=True)
-class SphereCollider:
-    """A ball. center: (3,) object space [m]. radius: [m]."""
-
-    center: Floats
-    radius: float
-
-    def __post_init__(self) -> None:
-        center = np.asarray(self.center, np.float32)
-        object.__setattr__(self, "center", center)
-        if center.shape != (3,) or not np.isfinite(center).all() or not 0 < self.radius < np.inf:
-            raise HairloomError(
-                f"a ball at {self.center} with radius {self.radius} has no volume",
-                place="sphere collider",
-                remedy="Give it a finite place and a radius above zero",
-            )
-
-    @property
-    def bounds(self) -> tuple[Floats, float]:
-        return self.center, self.radius
-
-    def near(self, points: Floats, reach: float) -> Ints:
-        return np.arange(points.shape[1])
-
-    def distance(self, points: Floats) -> tuple[Floats, Floats]:
-        outward = points - self.center[:, None]
-        length = np.sqrt((outward * outward).sum(axis=0))
-        gradient = outward / np.maximum(length, np.float32(1.0e-9))
-        gradient[2, length < 1.0e-9] = 1.0  # at the very center any way out is as good
-        return length - np.float32(self.radius), gradient
-
-
-@dataclass(frozen=True)
 class PosedCollider:
     """A collider and its way during one frame.
 
-    matrix_before, matrix_now: (4, 4) affine, object to world, at the frame's begin and end. In
-    between they are blended linearly, as the carried roots are, so that both stay together.
+    matrix_before, matrix_now: (4, 4) affine, object to world, at the frame's begin and end.
+    matrix_bow: (4, 4), how the way between them is bent, see `way.bow`; None: straight.
 
     Raises:
         HairloomError: a matrix that is not finite or flattens the collider.
@@ -74,20 +53,23 @@ class PosedCollider:
     collider: Collider
     matrix_before: Floats
     matrix_now: Floats
+    matrix_bow: Floats | None = None
 
     def __post_init__(self) -> None:
-        for name in ("matrix_before", "matrix_now"):
+        for name in ("matrix_before", "matrix_now", "matrix_bow"):
+            if getattr(self, name) is None:
+                continue
             matrix = np.asarray(getattr(self, name), np.float64)
             object.__setattr__(self, name, matrix)
             if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
                 raise _broken("its matrix is not a finite 4 by 4 matrix")
-            if np.linalg.cond(matrix[:3, :3]) > 1.0e6:
+            if name != "matrix_bow" and np.linalg.cond(matrix[:3, :3]) > 1.0e6:
                 raise _broken("its scale is zero")
 
     def matrix_at(self, moment: float) -> Floats:
         """Object to world (4, 4) float64 at `moment`, 0 the frame's begin and 1 its end."""
-        blend: Floats = self.matrix_before + (self.matrix_now - self.matrix_before) * moment
-        return blend
+        way = self.matrix_now - self.matrix_before
+        return at(self.matrix_before, way, self.matrix_bow, moment)
 
 
 def transform_points(matrix: Floats, points: Floats) -> Floats:

@@ -11,6 +11,7 @@ constraint and costs as much as two relaxations:
 
 where n is the normal of the collider that CV c touches, or zero. So a CV in contact is 1 / (1 - b)
 times heavier across the surface and slides along it, and keeping the length does not push it in.
+A held tip has nearly W = 0.
 """
 
 from __future__ import annotations
@@ -25,16 +26,33 @@ PINNED = 2
 #: b above. At 1 a segment that stands straight on a collider could not change its length at all;
 #: at 0.98 hair with its root deep inside of a collider was seen to tremble, at 0.9 not.
 CONTACT_WEIGHT = np.float32(0.9)
+#: Mass that a held tip seems to have more than others, as a share: all but 1, as the lengths of a
+#: straight guide between two ends that cannot move have no solution. The tip is put back at once.
+HELD = np.float32(0.99)
 #: Lengths below this count as zero [m].
 TINY = np.float32(1.0e-9)
+_TINY_SQUARED = TINY * TINY
+#: A length cannot be kept better, as float32 rounds world coordinates of some metres [m].
+ROUNDING = np.float32(1.0e-6)
 
 
-def pin(position: Floats, carried: Floats) -> None:
-    """Put the pinned CVs where the head carries them; they have infinite mass."""
+def pin(position: Floats, carried: Floats, length: Floats, tip_held: Floats | None) -> None:
+    """Put the pinned CVs where the head carries them; they have infinite mass.
+
+    A held tip goes no farther than its length along the strand reaches.
+    """
     position[:, :PINNED] = carried[:, :PINNED]
+    if tip_held is not None:
+        root = carried[:, PINNED - 1]
+        way = carried[:, -1] - root
+        reach = length[PINNED - 1 :].sum(axis=0)
+        way *= np.minimum(reach / np.maximum(np.sqrt(dot(way, way)), TINY), np.float32(1.0))
+        np.copyto(position[:, -1], root + way, where=tip_held > 0.0)
 
 
-def keep_lengths(position: Floats, length: Floats, normal: Floats | None) -> None:
+def keep_lengths(
+    position: Floats, length: Floats, normal: Floats | None, tip_held: Floats | None
+) -> None:
     """Bring all segments of `position` (3, cv_count, guide_count) towards their length, in place.
 
     One Newton step; exact but for the turn of the segments that it makes.
@@ -43,49 +61,126 @@ def keep_lengths(position: Floats, length: Floats, normal: Floats | None) -> Non
         length: (cv_count - 1, guide_count) [m].
         normal: (3, cv_count - 2, guide_count) unit normal at each free CV that touches a
             collider, zero at the others; None where nothing touches.
+        tip_held: see `state.Rest`.
     """
     if position.shape[1] > PINNED:
-        _newton_step(position, length[1:], normal)
+        _newton_step(position, length[1:], normal, tip_held)
+
+
+def relax_lengths(position: Floats, length: Floats, tip_held: Floats | None, sweeps: int) -> None:
+    """Bring segments towards their length one after the other, from root to tip, again and again
+    (Jakobsen 2001): each gives half of its error to both of its ends, all of it to a free one."""
+    last = position.shape[1] - 1
+    for _ in range(sweeps):
+        for cv in range(PINNED, last + 1):
+            segment = position[:, cv] - position[:, cv - 1]
+            now = np.sqrt(dot(segment, segment))
+            segment *= (now - length[cv - 1]) / np.maximum(now, TINY)
+            lower = np.float32(0.0 if cv == PINNED else 0.5)
+            upper: Floats | np.float32 = np.float32(1.0) - lower
+            if tip_held is not None and cv == last:
+                upper = upper * (np.float32(1.0) - tip_held)
+                position[:, cv - 1] += segment * (np.float32(1.0) - upper if cv > PINNED else lower)
+            else:
+                position[:, cv - 1] += segment * lower
+            position[:, cv] -= segment * upper
+
+
+def hold_within_reach(position: Floats, length: Floats) -> None:
+    """No CV farther from the last pinned one than its length along the strand (Kim, Chentanez and
+    Mueller 2012, "Long Range Attachments")."""
+    root = position[:, PINNED - 1 : PINNED]
+    way = position[:, PINNED:] - root
+    reach = np.cumsum(length[PINNED - 1 :], axis=0)
+    way *= np.minimum(reach / np.maximum(np.sqrt(dot(way, way)), TINY), np.float32(1.0))
+    way += root
+    position[:, PINNED:] = way
 
 
 def finish_lengths(
-    position: Floats, length: Floats, normal: Floats | None, tolerance: float, iterations: int
+    position: Floats,
+    length: Floats,
+    normal: Floats | None,
+    tip_held: Floats | None,
+    tolerance: float,
+    iterations: int,
 ) -> None:
     """Go on, with the guides that need it, until no segment is off by more than `tolerance`.
 
     Few guides do, and only when they are jerked around. One that is still off after `iterations`
-    Newton steps is laid out anew from the root with its segments' directions (follow the leader).
+    Newton steps is laid out anew.
     """
     if position.shape[1] <= PINNED:
         return
     guide = _off_length(position, length, tolerance)
     for _ in range(iterations if guide.size else 0):
         some, some_length = position[:, :, guide], length[:, guide]
-        _newton_step(some, some_length[1:], None if normal is None else normal[:, :, guide])
+        touching = None if normal is None else normal[:, :, guide]
+        held = None if tip_held is None else tip_held[guide]
+        _newton_step(some, some_length[1:], touching, held)
         position[:, :, guide] = some
         guide = guide[_off_length(some, some_length, tolerance)]
         if not guide.size:
             return
     if guide.size:
-        some = position[:, :, guide]
-        direction, _ = directions(some[:, 1:])
-        some[:, PINNED:] = some[:, 1:2] + np.cumsum(direction * length[1:, guide], axis=1)
-        position[:, :, guide] = some
+        held = None if tip_held is None else tip_held[guide]
+        position[:, :, guide] = _laid_out(position[:, :, guide], length[:, guide], held)
+
+
+def _laid_out(position: Floats, length: Floats, tip_held: Floats | None) -> Floats:
+    """Guides with their segments' directions and exact lengths, from the root (follow the leader).
+
+    Those with held tips are laid out from the tip first, as FABRIK does (Aristidou and Lasenby
+    2011); where both cannot be had, the length counts and not the tip's place.
+    """
+    if tip_held is not None:
+        direction, _ = directions(position[:, PINNED - 1 :])
+        from_tip = np.cumsum((direction * length[PINNED - 1 :])[:, ::-1], axis=1)[:, ::-1]
+        from_tip = position[:, -1:] - from_tip
+        np.copyto(position[:, PINNED:-1], from_tip[:, 1:], where=tip_held > 0.0)
+    direction, _ = directions(position[:, PINNED - 1 :])
+    way = np.cumsum(direction * length[PINNED - 1 :], axis=1)
+    position[:, PINNED:] = position[:, PINNED - 1 : PINNED] + way
+    return position
 
 
 def _off_length(position: Floats, length: Floats, tolerance: float) -> Ints:
     """Guides of which a segment is off by more than this share of its length."""
-    _, error = directions(position[:, 1:])
-    error -= length[1:]
+    segment = position[:, PINNED:] - position[:, PINNED - 1 : -1]
+    error = _length(segment)
+    error -= length[PINNED - 1 :]
     np.abs(error, out=error)
-    off: Ints = np.flatnonzero((error > length[1:] * np.float32(tolerance)).any(axis=0))
+    allowed = length[PINNED - 1 :] * np.float32(tolerance)
+    allowed += ROUNDING
+    off: Ints = np.flatnonzero((error > allowed).any(axis=0))
     return off
 
 
-def _newton_step(position: Floats, length: Floats, normal: Floats | None) -> None:
+def _newton_step(
+    position: Floats, length: Floats, normal: Floats | None, tip_held: Floats | None
+) -> None:
     direction, error = directions(position[:, 1:])
     error -= length
     diagonal, beside = chain_matrix(direction)
+    tip = None if tip_held is None else position[:, -1].copy()
+    if tip_held is not None:
+        diagonal[-1] -= HELD * tip_held
+        if normal is not None:
+            normal = normal.copy()
+            normal[:, -1] *= np.float32(1.0) - tip_held  # it does not slide
+    _solve_and_move(position, direction, error, diagonal, beside, normal)
+    if tip is not None and tip_held is not None:
+        np.copyto(position[:, -1], tip, where=tip_held > 0.0)
+
+
+def _solve_and_move(
+    position: Floats,
+    direction: Floats,
+    error: Floats,
+    diagonal: Floats,
+    beside: Floats,
+    normal: Floats | None,
+) -> None:
     if normal is None:
         solve_tridiagonal(diagonal, beside, error)
         direction *= error
@@ -122,10 +217,23 @@ def chain_matrix(direction: Floats) -> tuple[Floats, Floats]:
 def directions(position: Floats) -> tuple[Floats, Floats]:
     """Unit direction (3, n - 1, guide_count) and length [m] (n - 1, guide_count) of segments."""
     segment = position[:, 1:] - position[:, :-1]
-    length = dot(segment, segment)
-    np.sqrt(length, out=length)
-    segment /= np.maximum(length, TINY)
+    length = _length(segment)
+    segment /= length
     return segment, length
+
+
+def _length(vector: Floats) -> Floats:
+    """Length over the first axis, never zero; what is added is lost to rounding above 1e-5 m."""
+    squared = dot(vector, vector)
+    squared += _TINY_SQUARED
+    length: Floats = np.sqrt(squared, out=squared)
+    return length
+
+
+def unit(vector: Floats) -> Floats:
+    """Unit vectors over the first axis; zero where the vector is."""
+    result: Floats = vector / _length(vector)
+    return result
 
 
 def dot(one: Floats, two: Floats) -> Floats:
@@ -133,5 +241,5 @@ def dot(one: Floats, two: Floats) -> Floats:
     total = one[0] * two[0]
     scratch = one[1] * two[1]
     total += scratch
-    total += np.multiply(one[2], two[2], out=scratch)
+    total += np.multiply(one[2], two[2], scratch)
     return total

@@ -28,17 +28,20 @@ from .settings import DynamicsSettings
 REACH = 0.002
 #: Closer than this to its plane a CV counts as touching, so that lengths do not push it in [m].
 SKIN = np.float32(1.0e-4)
+#: A collider that turns around within a frame is flat on its way; then it holds nothing out. Share
+#: of the largest scale.
+FLAT = 1.0e-3
 
 
 @dataclass(frozen=True)
 class Contacts:
     """Planes of one collider, n of them.
 
-    index: (n,) into the free CVs, flattened (cv_count - 2, guide_count).
-    normal: (3, n) outwards, world. offset: (n,) [m], the CV shall keep normal . x >= offset.
-    origin: (3, n) world [m], where the CV would be had it stayed with the collider.
-    is_out: (n,) whether the offset leads all the way out.
-    push: (n,) [m], how far it was pushed so far in this substep.
+    index: (m,) into the points that contacts were looked for.
+    normal: (3, m) outwards, world. offset: (m,) [m], the point shall keep normal . x >= offset.
+    origin: (3, m) world [m], where the point would be had it stayed with the collider.
+    is_out: (m,) whether the offset leads all the way out.
+    push: (m,) [m], how far it was pushed so far in this substep.
     """
 
     index: Ints
@@ -49,9 +52,8 @@ class Contacts:
     push: Floats
 
     def push_out(self, position: Floats, friction: float) -> Bools:
-        """Bring CVs back to their planes, in place; returns which ones touch, (n,)."""
-        free = _free_rows(position)
-        here = np.stack([row.take(self.index) for row in free])
+        """Bring points (3, n) back to their planes, in place; returns which ones touch, (m,)."""
+        here = _chosen(position, self.index)
         gap = dot(self.normal, here)
         np.subtract(self.offset, gap, out=gap)
         push = np.maximum(gap, np.float32(0.0))
@@ -59,7 +61,7 @@ class Contacts:
         here += self.normal * push
         if friction:
             here -= self._friction(here, push, friction)
-        for row, value in zip(free, here, strict=True):
+        for row, value in zip(position, here, strict=True):
             row[self.index] = value
         return (gap > -SKIN) & self.is_out
 
@@ -73,38 +75,39 @@ class Contacts:
     def absorb(self, position: Floats, previous: Floats) -> None:
         """Take away the speed that pushing out has made: contacts do not bounce.
 
-        Changes `previous`, so that no pushed CV moves away from the collider.
+        Changes `previous` (3, n), so that no pushed point moves away from the collider.
         """
         pushed = np.flatnonzero(self.push > 0.0)
-        index, normal = self.index[pushed], self.normal[:, pushed]
-        here = np.stack([row.take(index) for row in _free_rows(position)])
-        away = np.maximum(dot(normal, here - self.origin[:, pushed]), np.float32(0.0))
-        for row, value in zip(_free_rows(previous), normal * away, strict=True):
+        index, normal = self.index[pushed], _chosen(self.normal, pushed)
+        moved = _chosen(position, index)
+        moved -= _chosen(self.origin, pushed)
+        away = np.maximum(dot(normal, moved), np.float32(0.0))
+        for row, value in zip(previous, normal * away, strict=True):
             row[index] += value
 
 
 def find_contacts(
     position: Floats,
     previous: Floats,
+    radius: Floats,
     colliders: tuple[PosedCollider, ...],
     span: tuple[float, float],
-    settings: DynamicsSettings,
-    dt: float,
+    led_out: float,
 ) -> list[Contacts]:
-    """Planes for all free CVs near a collider.
+    """Planes for all points near a collider.
 
     Args:
-        position, previous: (3, cv_count, guide_count) world [m], a substep apart.
+        position, previous: (3, n) float32 world [m], a substep apart; views do.
+        radius: (n,) float32 [m], the distance that each point keeps.
         span: begin and end of the substep as shares of the frame.
+        led_out: how far [m] a point that is inside may be led out in this substep.
     """
-    if position.shape[1] <= PINNED or not position.shape[2]:
+    if not position.shape[1]:
         return []
-    radius = cv_radius(settings, position.shape[1])
     found = (
-        _contacts_with(posed, position, previous, span, radius, settings.push_speed * dt)
-        for posed in colliders
+        _contacts_with(posed, position, previous, radius, span, led_out) for posed in colliders
     )
-    return [contacts for contacts in found if len(contacts.index)]
+    return [contacts for contacts in found if contacts is not None and len(contacts.index)]
 
 
 def cv_radius(settings: DynamicsSettings, cv_count: int) -> Floats:
@@ -114,12 +117,18 @@ def cv_radius(settings: DynamicsSettings, cv_count: int) -> Floats:
     return radius.astype(np.float32)
 
 
-def touched_normals(contacts: list[Contacts], touching: list[Bools], like: Floats) -> Floats:
-    """Normal (3, cv_count - 2, guide_count) at each free CV that touches, zero elsewhere."""
+def touched_normals(contacts: list[Contacts], touching: list[Bools], like: Floats) -> Floats | None:
+    """Normal (3, cv_count - 2, guide_count) at each free CV that touches, zero elsewhere; None
+    where none does."""
+    chosen = [np.flatnonzero(is_touching) for is_touching in touching]
+    if not any(one.size for one in chosen):
+        return None
     normals = np.zeros((3, like.shape[1] - PINNED, like.shape[2]), np.float32)
     rows = normals.reshape(3, -1)
-    for one, is_touching in zip(contacts, touching, strict=True):
-        rows[:, one.index[is_touching]] = one.normal[:, is_touching]
+    for one, which in zip(contacts, chosen, strict=True):
+        index = one.index[which]
+        for row, values in zip(rows, _chosen(one.normal, which), strict=True):
+            row[index] = values
     return normals
 
 
@@ -127,30 +136,33 @@ def _contacts_with(
     posed: PosedCollider,
     position: Floats,
     previous: Floats,
-    span: tuple[float, float],
     radius: Floats,
+    span: tuple[float, float],
     led_out: float,
-) -> Contacts:
+) -> Contacts | None:
     before, now = (posed.matrix_at(moment) for moment in span)
+    scales = np.linalg.svd(now[:3, :3], compute_uv=False)
+    if scales[-1] <= FLAT * scales[0]:
+        return None
     inverse = np.linalg.inv(now)
     reach = float(radius.max()) + REACH
-    index, local = _near(posed, position, now, inverse, reach)
+    index, local = _near(posed, position, now, inverse, scales, reach)
 
     distance, gradient = posed.collider.distance(local)
     # distance and normal in the world: the gradient transforms by the inverse transposed, and its
     # length says how much the distance is scaled along it
-    steepness = inverse[:3, :3].T.astype(np.float32)
-    normal = sum(steepness[:, axis, None] * gradient[axis] for axis in range(3))
+    steepness = np.eye(4)
+    steepness[:3, :3] = inverse[:3, :3].T
+    normal = transform_points(steepness, gradient)
     scale = np.maximum(np.sqrt(dot(normal, normal)), TINY)
     normal /= scale
     distance = distance / scale
-    own_radius = radius[index // position.shape[2]]
+    own_radius = radius.take(index)
 
     close = np.flatnonzero(distance < own_radius + np.float32(REACH))
-    index, local = index[close], local[:, close]
-    normal, distance, own_radius = normal[:, close], distance[close], own_radius[close]
-    here = np.stack([row.take(index) for row in _free_rows(position)])
-    origin = np.stack([row.take(index) for row in _free_rows(previous)])
+    index, distance, own_radius = index[close], distance[close], own_radius[close]
+    local, normal = _chosen(local, close), _chosen(normal, close)
+    here, origin = _chosen(position, index), _chosen(previous, index)
     origin += transform_points(now - before, local)
     reached = distance - dot(normal, here - origin) + np.float32(led_out)
     offset = dot(normal, here) - distance + np.minimum(own_radius, reached)
@@ -159,27 +171,30 @@ def _contacts_with(
 
 
 def _near(
-    posed: PosedCollider, position: Floats, now: Floats, inverse: Floats, reach: float
+    posed: PosedCollider,
+    position: Floats,
+    now: Floats,
+    inverse: Floats,
+    scales: Floats,
+    reach: float,
 ) -> tuple[Ints, Floats]:
-    """Free CVs that may be within `reach` [m], and where they are in object space (3, n).
+    """Points that may be within `reach` [m], and where they are in object space (3, n).
 
     A bounding sphere first, then the collider's own quick answer.
     """
     center, radius = posed.collider.bounds
-    stretch = np.linalg.svd(now[:3, :3], compute_uv=False)
     center = (now[:3, :3] @ center + now[:3, 3]).astype(np.float32)
-    free = _free_rows(position)
-    squared, scratch = np.zeros_like(free[0]), np.empty_like(free[0])
-    for axis, row in enumerate(free):
-        np.subtract(row, center[axis], out=scratch)
-        scratch *= scratch
-        squared += scratch
-    index = np.flatnonzero(squared < np.float32((radius * stretch[0] + reach) ** 2))
-    local = transform_points(inverse, np.stack([row.take(index) for row in free]))
-    kept = posed.collider.near(local, reach / float(stretch[-1]))
-    return index[kept], local[:, kept]
+    offset = position - center[:, None]
+    squared = dot(offset, offset)
+    index = np.flatnonzero(squared < np.float32((radius * scales[0] + reach) ** 2))
+    local = transform_points(inverse, _chosen(position, index))
+    kept = posed.collider.near(local, reach / float(scales[-1]))
+    return index[kept], _chosen(local, kept)
 
 
-def _free_rows(position: Floats) -> list[Floats]:
-    """x, y and z of all free CVs, each flat: views into `position`."""
-    return [position[axis, PINNED:].reshape(-1) for axis in range(3)]
+def _chosen(rows: Floats, index: Ints) -> Floats:
+    """The chosen columns (3, m) of rows (3, n)."""
+    chosen = np.empty((3, len(index)), rows.dtype)
+    for row, out in zip(rows, chosen, strict=True):
+        row.take(index, out=out, mode="clip")  # the other modes buffer
+    return chosen

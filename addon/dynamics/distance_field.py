@@ -13,6 +13,8 @@ is crossed by the medial axis, below one cell's half diagonal, in practice a ten
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
@@ -45,12 +47,11 @@ class DistanceField:
         self._flat = self.values.ravel()
         self._strides = tuple(stride // 4 for stride in self.values.strides)
         self._top = np.array(self.values.shape, np.float32)[:, None] - np.float32(1.0)
-        self._corners = [
-            x * self._strides[0] + y * self._strides[1] + z
-            for x in (0, 1)
-            for y in (0, 1)
-            for z in (0, 1)
-        ]
+        # of each node the values of itself and its neighbours along z, y and both: what lies near
+        # in space is then read from one place
+        _, along_y, along_z = self._strides
+        offsets = (0, along_z, along_y, along_y + along_z)
+        self._squares = np.stack([np.roll(self._flat, -offset) for offset in offsets], axis=1)
 
     @classmethod
     def from_surface(
@@ -74,7 +75,7 @@ class DistanceField:
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         distance = _distances(nodes, surface, cell)
         inside = _inside(nodes, distance, surface, cell)
-        if not inside.any():
+        if not (inside & (distance > 1.0e-3 * cell)).any():  # a node in a sheet is not inside
             raise _broken(
                 place,
                 "it encloses no volume at this resolution",
@@ -82,19 +83,31 @@ class DistanceField:
             )
         return cls(np.where(inside, -distance, distance), low, cell)
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[Floats, float]:
-        half = self._top[:, 0] * np.float32(self.cell / 2.0)
-        return self.low + half, float(np.linalg.norm(half))
+        """Around the nodes that lie inside, and the cells that the surface crosses beside them."""
+        inside = np.argwhere(self.values < 0.0).astype(np.float32)
+        if not len(inside):
+            half = self._top[:, 0] * np.float32(self.cell / 2.0)
+            return self.low + half, float(np.linalg.norm(half))
+        center = (inside.min(axis=0) + inside.max(axis=0)) / np.float32(2.0)
+        inside -= center
+        farthest = float(np.sqrt((inside * inside).sum(axis=1).max()))
+        return self.low + center * np.float32(self.cell), (farthest + 3.0**0.5) * self.cell
 
     def near(self, points: Floats, reach: float) -> Ints:
         """Points whose nearest node is not farther than `reach` and the way to it: as distance
         changes by no more than the way, no point within `reach` is missed."""
-        place, outside = self._placed(points)
-        place += np.float32(0.5)
-        index = self._index(place)
+        place = points - self.low[:, None]
+        place *= np.float32(1.0 / self.cell)
+        held = np.clip(place, np.float32(0.0), self._top)
+        place -= held
+        np.abs(place, out=place)
+        outside = np.maximum(np.maximum(place[0], place[1]), place[2])  # along one axis will do
+        held += np.float32(0.5)
         limit = np.float32(reach + self.cell * 0.8661)  # half the diagonal of a cell
-        kept: Ints = np.flatnonzero((self._flat.take(index) < limit) & (outside < reach))
+        is_near = self._flat.take(self._index(held)) < limit
+        kept: Ints = np.flatnonzero(is_near & (outside < np.float32(reach / self.cell)))
         return kept
 
     def distance(self, points: Floats) -> tuple[Floats, Floats]:
@@ -106,7 +119,8 @@ class DistanceField:
         np.minimum(place, self._top - np.float32(1.0e-3), out=place)
         index = self._index(place)
         fx, fy, fz = place - np.floor(place)
-        corner = [self._flat.take(index + offset) for offset in self._corners]
+        near, far = (self._squares.take(index + step, axis=0).T for step in (0, self._strides[0]))
+        corner = [*np.ascontiguousarray(near), *np.ascontiguousarray(far)]
         # along z, then y, then x; what is left over at each turn is a derivative
         dz = [far - near for near, far in zip(corner[::2], corner[1::2], strict=True)]
         z = [near + fz * slope for near, slope in zip(corner[::2], dz, strict=True)]

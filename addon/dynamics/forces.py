@@ -11,6 +11,9 @@ from .banded import solve_tridiagonal
 from .constraints import PINNED, chain_matrix, directions, dot
 from .settings import DynamicsSettings
 
+#: Guides at most that the mean rotation of a groom is taken from.
+SAMPLED_GUIDES = 256
+
 
 def speed_kept(settings: DynamicsSettings, dt: float) -> float:
     """Share of the speed that damping leaves after `dt` seconds."""
@@ -27,6 +30,32 @@ def carried_share(settings: DynamicsSettings, dt: float) -> float:
     return (1.0 - speed_kept(settings, dt)) * settings.style_damping / both if both else 0.0
 
 
+def air_share(settings: DynamicsSettings, dt: float) -> float:
+    """Share of the air's speed that damping gives to the hair in `dt` seconds, as above."""
+    both = settings.damping + settings.style_damping
+    return (1.0 - speed_kept(settings, dt)) * settings.damping / both if both else 0.0
+
+
+def brake(position: Floats, previous: Floats, drag: float, air_way: Floats | None) -> None:
+    """Drag by the square of the speed, implicitly: v_rel / (1 + drag |v_rel| dt), in place.
+
+    Changes `previous`, which holds the speed.
+
+    Args:
+        air_way: (3, guide_count), what the air goes in a substep [m]; None when it stands still.
+    """
+    way = position - previous
+    if air_way is not None:
+        way -= air_way[:, None]
+    length = np.sqrt(dot(way, way))
+    length *= np.float32(drag)
+    length += np.float32(1.0)
+    way /= length
+    if air_way is not None:
+        way += air_way[:, None]
+    np.subtract(position, way, out=previous)
+
+
 def predict(position: Floats, previous: Floats, impulse: Floats, kept: float, out: Floats) -> None:
     """Verlet step with time correction (Jakobsen 2001), all (3, cv_count, guide_count) [m].
 
@@ -40,20 +69,26 @@ def predict(position: Floats, previous: Floats, impulse: Floats, kept: float, ou
 
 
 def felt_gravity(
-    gravity: Floats, settings: DynamicsSettings, rest: Floats, carried: Floats
+    gravity: Floats, settings: DynamicsSettings, turn: Floats, carried: Floats
 ) -> Floats:
     """Acceleration [m/s^2] of each CV, (3, cv_count, guide_count), or (3, 1, 1) if all are alike.
 
     A groom is combed under gravity, so at rest its own stiffness already holds the part of the
     weight that the lengths do not. That part is taken off, and it turns with the head: a groom at
-    rest stays as it is, and hangs otherwise as soon as the head is tilted.
+    rest stays as it is, and hangs otherwise as soon as the head is tilted. It is combed in air:
+    under water, where buoyancy carries the weight, the style lifts the hair, as hair does there.
+
+    Args:
+        turn: (3, 3) how the groom has turned since, see `best_rotation`.
+        carried: (3, cv_count, guide_count) world [m], the style.
     """
     pull = np.asarray(gravity, np.float32) * np.float32(settings.gravity)
-    if not settings.weight_held or not rest.shape[1] > PINNED or not rest.shape[2]:
-        return pull[:, None, None]
-    combed = (best_rotation(rest, carried) @ pull.astype(np.float64)).astype(np.float32)
+    left = pull * np.float32(1.0 - settings.buoyancy)
+    if not settings.weight_held or not carried.shape[1] > PINNED or not carried.shape[2]:
+        return left[:, None, None]
+    combed = (turn @ pull.astype(np.float64)).astype(np.float32)
     felt = np.empty_like(carried)
-    felt[:] = pull[:, None, None]
+    felt[:] = left[:, None, None]
     felt[:, PINNED:] -= np.float32(settings.weight_held) * weight_on_style(combed, carried)
     return felt
 
@@ -73,22 +108,30 @@ def weight_on_style(gravity: Floats, carried: Floats) -> Floats:
     return gravity[:, None, None] - direction
 
 
+def sampled(guide_count: int) -> slice:
+    """The guides that tell how the whole groom has turned: a few hundred, evenly chosen."""
+    return slice(None, None, max(-(-guide_count // SAMPLED_GUIDES), 1))
+
+
 def best_rotation(rest: Floats, carried: Floats) -> Floats:
     """The one rotation (3, 3) float64 that turns the whole groom from rest to where it is carried.
 
-    Kabsch 1976, from the pinned CVs and the tips. A small share of the identity picks the smallest
-    rotation where the groom leaves one free, as a single straight guide does.
+    Kabsch 1976, from the pinned CVs and the tips of sampled guides. A small share of the identity
+    picks the smallest rotation where the groom leaves one free, as a single straight guide does.
 
     Limitation: fur on several limbs feels their mean rotation.
     """
-    cvs = np.r_[: min(PINNED, rest.shape[1]), rest.shape[1] - 1]
-    before = rest[:, cvs].reshape(3, -1).astype(np.float64)
-    now = carried[:, cvs].reshape(3, -1).astype(np.float64)
-    before -= before.mean(axis=1, keepdims=True)
-    now -= now.mean(axis=1, keepdims=True)
-    spread = now @ before.T
-    spread += np.eye(3) * (1.0e-6 * math.sqrt((before**2).sum() * (now**2).sum()) + 1.0e-12)
+    cvs = [*range(min(PINNED, rest.shape[1])), rest.shape[1] - 1]
+    guides = sampled(rest.shape[2])
+    before = rest[:, cvs, guides].reshape(3, -1).astype(np.float64)
+    now = carried[:, cvs, guides].reshape(3, -1).astype(np.float64)
+    before -= before.mean(axis=1, keepdims=True)  # the mean of `now` then adds nothing
+    # no BLAS: it would wake its threads for this
+    spread = np.einsum("in,jn->ij", now, before)
+    spread.flat[::4] += 1.0e-6 * np.einsum("in,in->", before, before) + 1.0e-12
     left, _, right = np.linalg.svd(spread)
-    handed = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
-    rotation: Floats = left @ handed @ right
+    rotation: Floats = left @ right
+    if np.linalg.det(rotation) < 0.0:
+        left[:, 2] *= -1.0
+        rotation = left @ right
     return rotation

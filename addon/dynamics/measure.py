@@ -22,6 +22,22 @@ def max_stretch(state: DynamicsState) -> float:
     return float(change.max())
 
 
+def farthest_reach(state: DynamicsState) -> float:
+    """Largest distance of a CV from its guide's root, over the length along the strand to there.
+
+    At rest at most 1. The segment of the pinned CVs counts with the length that the head gives it.
+    """
+    length = state.rest.length.copy()
+    if not length.size:
+        return 0.0
+    length[: PINNED - 1] = directions(state.position[:, :PINNED])[1]
+    along = np.cumsum(length, axis=0)
+    away = state.position[:, 1:] - state.position[:, :1]
+    away = np.sqrt(dot(away, away))
+    share = np.divide(away, along, out=np.zeros_like(along), where=along > TINY)
+    return float(share.max())
+
+
 def deepest_penetration(state: DynamicsState, colliders: tuple[PosedCollider, ...]) -> float:
     """How deep [m] the center of any free CV lies in a collider at the frame's end; 0 if none."""
     points = state.position[:, PINNED:].reshape(3, -1)

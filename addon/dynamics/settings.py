@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..params import Settings, integer, number
+from ..params import choice, curve, integer, number, toggle
+from .wind_settings import WindSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class DynamicsSettings(Settings):
+class DynamicsSettings(WindSettings):
     """How guides move, keep their style and meet colliders.
 
     Stiffness is given as the number of swings a second that a strand would make if this stiffness
@@ -19,8 +20,18 @@ class DynamicsSettings(Settings):
     section: ClassVar[str] = "dynamics"
     title: ClassVar[str] = "Dynamics"
 
+    form: str = choice(
+        "automatic",
+        (
+            ("automatic", "Automatic", "The GPU where Blender has one to compute with, else numpy"),
+            ("numpy", "CPU (numpy)", "Needs no GPU; the same result to the last bit in every run"),
+            ("compute", "GPU (compute)", "Fastest; guides stay on the GPU between frames"),
+        ),
+        label="Computed On",
+        description="What carries out the simulation; both give the same motion within rounding",
+    )
     substep_rate: float = number(
-        240.0,
+        180.0,
         label="Substeps",
         description="Steps of the simulation in a second, whatever the frame rate",
         soft=(60.0, 480.0),
@@ -52,14 +63,32 @@ class DynamicsSettings(Settings):
         hard=(0.0, 1.0),
         unit="factor",
     )
+    buoyancy: float = number(
+        0.0,
+        label="Buoyancy",
+        description="Share of the weight that the medium carries: 0 in air; at 1 hair floats",
+        soft=(0.0, 1.0),
+        hard=(0.0, 2.0),
+        source="Archimedes",
+    )
     damping: float = number(
         0.5,
         label="Air Damping",
-        description="How fast still air takes the speed out of the hair",
+        description="How fast still air, or water, takes the speed out of the hair, and how fast "
+        "wind gives it its own",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
         source="Jakobsen 2001",
+    )
+    drag: float = number(
+        0.0,
+        label="Drag",
+        description="Braking by the square of the speed through air or water, for each metre of "
+        "way; in water a few",
+        soft=(0.0, 10.0),
+        hard=(0.0, 1000.0),
+        source="Rayleigh's drag equation",
     )
     style_damping: float = number(
         5.0,
@@ -87,6 +116,13 @@ class DynamicsSettings(Settings):
         unit="rate",
         source="Global shape constraint, Han and Harada 2012",
     )
+    style_along: tuple[float, ...] = curve(
+        (1.0, 0.75, 0.5, 0.25, 0.0),
+        label="Stiffness Along",
+        description="How the style's stiffness goes along the strand, from that of the root (1) "
+        "to that of the tip (0)",
+        hard=(0.0, 1.0),
+    )
     bend: float = number(
         1.5,
         label="Bend Stiffness",
@@ -97,12 +133,47 @@ class DynamicsSettings(Settings):
         unit="rate",
         source="Local shape constraint, Han and Harada 2012",
     )
+    bend_along: tuple[float, ...] = curve(
+        (1.0, 1.0, 1.0, 1.0, 1.0),
+        label="Bend Along",
+        description="Share of the bend stiffness along the strand, from root to tip",
+        hard=(0.0, 1.0),
+    )
+    length_solver: str = choice(
+        "direct",
+        (
+            ("direct", "Direct", "All segments of a guide at once: no visible stretch"),
+            (
+                "relaxation",
+                "Relaxation",
+                "One segment after the other, again and again: stretches when jerked",
+            ),
+        ),
+        label="Length Solver",
+        description="How segments keep their length",
+        source="Direct: Goldenthal et al. 2007. Relaxation: Jakobsen 2001",
+    )
+    relaxations: int = integer(
+        8,
+        label="Relaxations",
+        description="Sweeps along the guide in each substep, if lengths are kept by relaxation",
+        soft=(1, 32),
+        hard=(1, 256),
+        source="Jakobsen 2001",
+    )
+    long_range: bool = toggle(
+        True,
+        label="Long-range Attachment",
+        description="With relaxation, no point goes farther from its root than its length along "
+        "the strand",
+        source="Kim, Chentanez and Mueller 2012",
+    )
     length_tolerance: float = number(
         0.002,
         label="Length Tolerance",
         description="Guides are solved again until no segment is off by more than this share",
         soft=(0.0005, 0.01),
-        hard=(0.0001, 1.0),
+        hard=(0.0001, 0.02),
     )
     length_iterations: int = integer(
         8,

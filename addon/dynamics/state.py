@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from ..errors import HairloomError
 from .constraints import PINNED
 from .style import LocalShape, local_shape
@@ -24,11 +24,23 @@ class Rest:
     position: (3, cv_count, guide_count) float32 world [m].
     length: (cv_count - 1, guide_count) float32 [m] of each segment.
     shape: what is kept of it wherever the guides swing.
+    tip_held: (guide_count,) float32, 1 where the style holds the tip as it does the root, as in a
+        tied braid, else 0; None where all tips are free.
     """
 
     position: Floats
     length: Floats
     shape: LocalShape
+    tip_held: Floats | None = None
+
+    def part(self, guides: slice) -> Rest:
+        """The rest of these guides, as views."""
+        return Rest(
+            self.position[:, :, guides],
+            self.length[:, guides],
+            self.shape.part(guides),
+            None if self.tip_held is None else self.tip_held[guides],
+        )
 
 
 @dataclass(frozen=True)
@@ -39,6 +51,7 @@ class DynamicsState:
     rest: the style and the lengths to keep.
     substep: length [s] of the last substep; 0 when there was none.
     time_left: time [s] that has passed but is shorter than a substep, so not yet simulated.
+    time: [s] simulated since the start; gusts hang on it.
     """
 
     position: Floats
@@ -46,6 +59,7 @@ class DynamicsState:
     rest: Rest
     substep: float = 0.0
     time_left: float = 0.0
+    time: float = 0.0
 
     def __post_init__(self) -> None:
         self.position.flags.writeable = False
@@ -65,11 +79,12 @@ class DynamicsState:
         return np.ascontiguousarray(self.position.transpose(2, 1, 0))
 
 
-def start(guide_grid: Floats) -> DynamicsState:
+def start(guide_grid: Floats, tip_held: Bools | None = None) -> DynamicsState:
     """Guides at rest in their style.
 
     Args:
         guide_grid: (guide_count, cv_count, 3) world [m], cv_count at least 2.
+        tip_held: (guide_count,) the guides that are held at their tips too; these need four CVs.
 
     Raises:
         HairloomError: another shape, or a CV that is not finite.
@@ -84,14 +99,42 @@ def start(guide_grid: Floats) -> DynamicsState:
         position=position,
         length=np.sqrt((segment * segment).sum(axis=0)),
         shape=local_shape(position),
+        tip_held=_held(tip_held, position.shape[1], position.shape[2]),
     )
     for array in (rest.length, rest.shape.curvature, rest.shape.hold, rest.shape.twist_cv):
         array.flags.writeable = False
     return DynamicsState(position, position, rest)
 
 
+def _held(tip_held: Bools | None, cv_count: int, guide_count: int) -> Floats | None:
+    if tip_held is None or not np.any(tip_held):
+        return None
+    if np.shape(tip_held) != (guide_count,) or cv_count < PINNED + 2:
+        raise HairloomError(
+            f"{guide_count} guides of {cv_count} CVs cannot be held at their tips by an array of "
+            f"shape {np.shape(tip_held)}",
+            place="guides",
+            remedy="Give one value a guide, and guides of four CVs or more",
+        )
+    return np.asarray(tip_held, np.float32)
+
+
 def rows_of(grid: Floats, place: str) -> Floats:
     """(guide_count, cv_count, 3) points as contiguous rows (3, cv_count, guide_count) float32.
+
+    Raises:
+        HairloomError: another shape, or a value that is not finite.
+    """
+    return as_rows(checked_grid(grid, place))
+
+
+def as_rows(grid: Floats) -> Floats:
+    """The same without a check."""
+    return np.ascontiguousarray(grid.transpose(2, 1, 0), np.float32)
+
+
+def checked_grid(grid: Floats, place: str) -> Floats:
+    """The grid itself.
 
     Raises:
         HairloomError: another shape, or a value that is not finite.
@@ -102,9 +145,8 @@ def rows_of(grid: Floats, place: str) -> Floats:
             place=place,
             remedy="Resample the guides to one CV count",
         )
-    rows = np.ascontiguousarray(grid.transpose(2, 1, 0), np.float32)
-    if not np.isfinite(rows).all():
+    if not np.isfinite(grid).all():
         raise HairloomError(
             "a CV is not a finite number", place=place, remedy="Check what moves the surface"
         )
-    return rows
+    return grid

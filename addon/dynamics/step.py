@@ -1,10 +1,11 @@
 """One frame of motion, in fixed substeps.
 
     repeat substep_rate times a second:
-        predict      Verlet: inertia, damping, gravity
+        brake        drag by the square of the speed through the air
+        predict      Verlet: inertia, damping, gravity, wind
         pin          the head carries the first two CVs
         style        global and local shape, one direct solve
-        lengths      one direct solve
+        lengths      one direct solve, or relaxation
         contacts     found once, then in turn:  push out  |  keep lengths
         absorb       what was pushed out does not bounce
 
@@ -12,58 +13,35 @@ References: Jakobsen 2001, "Advanced Character Physics"; Nguyen and Donnelly 200
 and Rendering in the Nalu Demo", GPU Gems 2, chapter 23; Han and Harada 2012. `reference.py` holds
 the same, one CV after the other.
 
+Guides do not feel each other, so they are advanced in blocks that fit into the cache; a guide's
+motion is the same to the last bit in any block.
+
 Time that is shorter than a substep waits in the state for the next frame, so the result does not
 depend on the frame rate; `grid_at_frame_end` bridges it for drawing.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from ..arrays import Floats
-from ..errors import HairloomError
-from .colliders import PosedCollider
-from .constraints import finish_lengths, keep_lengths, pin
-from .contacts import Contacts, find_contacts, touched_normals
-from .forces import carried_share, felt_gravity, predict, speed_kept
+from .constraints import PINNED, finish_lengths, hold_within_reach, keep_lengths, pin, relax_lengths
+from .contacts import find_contacts, touched_normals
+from .forces import air_share, brake, predict, speed_kept
+from .frame import Block, Drive, Frame, check_drive
+from .schedule import due_substeps
 from .settings import DynamicsSettings
-from .state import DynamicsState, rows_of
-from .style import restore_style, style_band
+from .state import DynamicsState, Rest
+from .style import restore_style
 
-#: A substep is due when all but this share of it has passed, so that 4 / 240 s is one 60th.
-_DUE = 1.0e-6
+__all__ = ["Drive", "advance", "grid_at_frame_end"]
 
-
-@dataclass(frozen=True)
-class Drive:
-    """What acts on the guides during one frame.
-
-    target_before, target_now: (guide_count, cv_count, 3) world [m], the style carried by the head
-        at the frame's begin and end.
-    colliders: with their way during the frame.
-    gravity: (3,) world [m/s^2].
-    """
-
-    target_before: Floats
-    target_now: Floats
-    colliders: tuple[PosedCollider, ...]
-    gravity: Floats
-
-
-@dataclass(frozen=True)
-class _Frame:
-    """A drive made ready: rows (3, cv_count, guide_count), and what is constant over the frame."""
-
-    style_before: Floats
-    style_way: Floats
-    impulse: Floats  # [m] that a substep adds to each CV
-    duration: float
-
-    def style_at(self, moment: float) -> Floats:
-        return self.style_before + self.style_way * np.float32(moment)
+#: Guides that are advanced together, at most. Fewer, and numpy's calls cost more than the numbers;
+#: more, and the arrays of a substep leave the cache.
+BLOCK = 12_000
 
 
 def advance(
@@ -75,31 +53,48 @@ def advance(
         HairloomError: a drive that does not fit the state or is not finite, or a bad duration.
     """
     dt = 1.0 / settings.substep_rate
-    duration, count, left = _schedule(state, settings, duration, dt)
+    longest = settings.longest_frame
+    duration, count, left = due_substeps(state.time_left, duration, longest, dt)
     if not count:
         return replace(state, time_left=left)
-    frame = _prepare(state, drive, settings, duration, dt)
-    matrix = style_band(settings, state.cv_count, dt)
-    rest = state.rest
-    position, previous = state.position.copy(), state.previous.copy()
-    spare = np.empty_like(position)
-    kept = speed_kept(settings, dt) * (dt / state.substep if state.substep else 1.0)
+    check_drive(state, drive)
+    frame = Frame.of(state, drive, settings, duration, dt)
+    position, previous = np.empty_like(state.position), np.empty_like(state.position)
+    for guides in _blocks(state.guide_count):
+        block = Block.of(state, frame, guides)
+        position[:, :, guides], previous[:, :, guides] = _advance_block(block, frame, count)
+    return DynamicsState(position, previous, state.rest, dt, left, state.time + count * dt)
 
+
+def _blocks(guide_count: int) -> list[slice]:
+    """All guides in blocks of nearly the same size."""
+    count = -(-guide_count // BLOCK)
+    ends = [guide_count * number // count for number in range(count + 1)] if count else [0]
+    return [slice(first, last) for first, last in pairwise(ends)]
+
+
+def _advance_block(block: Block, frame: Frame, count: int) -> tuple[Floats, Floats]:
+    """Position and previous position after the frame's substeps; takes the block's own arrays."""
+    settings, dt, rest = frame.settings, frame.dt, block.rest
+    position, previous, spare = block.position, block.previous, np.empty_like(block.position)
+    kept, blown = speed_kept(settings, dt), air_share(settings, dt)
     for number in range(count):
-        begin = (number * dt - state.time_left) / duration
-        span = (begin, begin + dt / duration)
-        style = frame.style_at(span[1])
-        predict(position, previous, frame.impulse, kept, out=spare)
+        span = frame.span(number)
+        style = block.style_at(span[1])
+        impulse = block.impulse_at(span)
+        air_way = frame.air_way(position[:, 0], number)
+        if settings.drag:
+            brake(position, previous, settings.drag, air_way)
+        if air_way is not None:
+            impulse = impulse + air_way[:, None] * np.float32(blown)
+        predict(position, previous, impulse, kept, out=spare)
         previous, position, spare = position, spare, previous
-        pin(position, style)
-        restore_style(position, style, rest.shape, matrix)
-        keep_lengths(position, rest.length, None)
-        contacts = find_contacts(position, previous, drive.colliders, span, settings, dt)
-        _keep_outside(position, rest.length, contacts, settings)
-        for one in contacts:
-            one.absorb(position, previous)
-        kept = speed_kept(settings, dt)
-    return DynamicsState(position, previous, rest, substep=dt, time_left=left)
+        pin(position, style, rest.length, rest.tip_held)
+        restore_style(position, style, rest.shape, frame.matrix)
+        pin(position, style, rest.length, rest.tip_held)
+        _keep_lengths(position, rest, None, settings)
+        _keep_outside(position, previous, block, frame, span)
+    return position, previous
 
 
 def grid_at_frame_end(state: DynamicsState, drive: Drive) -> Floats:
@@ -111,56 +106,34 @@ def grid_at_frame_end(state: DynamicsState, drive: Drive) -> Floats:
     return (state.grid + root_way).astype(np.float32)
 
 
-def _keep_outside(
-    position: Floats, length: Floats, contacts: list[Contacts], settings: DynamicsSettings
+def _keep_lengths(
+    position: Floats, rest: Rest, normals: Floats | None, settings: DynamicsSettings
 ) -> None:
-    """Contacts and lengths in turn; lengths come last, and slide along what touches."""
-    normals = None
-    for _ in range(settings.contact_passes if contacts else 0):
-        touching = [one.push_out(position, settings.friction) for one in contacts]
+    if settings.length_solver == "direct":
+        keep_lengths(position, rest.length, normals, rest.tip_held)
+        return
+    relax_lengths(position, rest.length, rest.tip_held, settings.relaxations)
+    if settings.long_range:
+        hold_within_reach(position, rest.length)
+
+
+def _keep_outside(
+    position: Floats, previous: Floats, block: Block, frame: Frame, span: tuple[float, float]
+) -> None:
+    """Contacts and lengths in turn; lengths come last, and slide along what touches.
+
+    Guides that touch nothing take part, so that none depends on what others do.
+    """
+    settings, rest, normals = frame.settings, block.rest, None
+    free, was = (rows[:, PINNED:].reshape(3, -1) for rows in (position, previous))
+    colliders, led_out = frame.drive.colliders, settings.push_speed * frame.dt
+    contacts = find_contacts(free, was, block.radius, colliders, span, led_out)
+    for _ in range(settings.contact_passes if colliders else 0):
+        touching = [one.push_out(free, settings.friction) for one in contacts]
         normals = touched_normals(contacts, touching, position)
-        keep_lengths(position, length, normals)
-    tolerance, iterations = settings.length_tolerance, settings.length_iterations
-    finish_lengths(position, length, normals, tolerance, iterations)
-
-
-def _schedule(
-    state: DynamicsState, settings: DynamicsSettings, duration: float, dt: float
-) -> tuple[float, int, float]:
-    """The simulated duration [s], how many substeps are due, and the time left after them [s]."""
-    if not math.isfinite(duration) or duration < 0.0:
-        raise HairloomError(
-            f"a frame of {duration} seconds cannot be simulated",
-            place="dynamics",
-            remedy="Check the scene's frame rate",
-        )
-    duration = min(duration, settings.longest_frame)
-    time = state.time_left + duration
-    count = math.floor(time / dt + _DUE) if duration else 0
-    left = time - count * dt
-    return duration, count, 0.0 if left < _DUE * dt else left
-
-
-def _prepare(
-    state: DynamicsState, drive: Drive, settings: DynamicsSettings, duration: float, dt: float
-) -> _Frame:
-    before, now = rows_of(drive.target_before, "style"), rows_of(drive.target_now, "style")
-    gravity = np.asarray(drive.gravity, np.float32)
-    if before.shape != state.position.shape or now.shape != state.position.shape:
-        raise HairloomError(
-            f"the style has {before.shape[2]} guides of {before.shape[1]} CVs, "
-            f"the simulation {state.guide_count} of {state.cv_count}",
-            place="dynamics",
-            remedy="Start the simulation again",
-        )
-    if gravity.shape != (3,) or not np.isfinite(gravity).all():
-        raise HairloomError(
-            "gravity is not three finite numbers",
-            place="dynamics",
-            remedy="Check the scene's gravity",
-        )
-    way = now - before
-    felt = felt_gravity(gravity, settings, state.rest.position, before + way * np.float32(0.5))
-    impulse = way * np.float32(carried_share(settings, dt) * dt / duration)
-    impulse += felt * np.float32(dt * dt)
-    return _Frame(before, way, impulse, duration)
+        _keep_lengths(position, rest, normals, settings)
+    if settings.length_solver == "direct":
+        tolerance, iterations = settings.length_tolerance, settings.length_iterations
+        finish_lengths(position, rest.length, normals, rest.tip_held, tolerance, iterations)
+    for one in contacts:
+        one.absorb(free, was)

@@ -5,15 +5,15 @@ curvature between segments, so that waves and curls keep their form wherever the
 (both: Han and Harada 2012, "Real-time Hair Simulation with Efficient Hair Style Preservation").
 There both are relaxed CV after CV. Here they are the energies of one quadratic problem,
 
-    minimise  1/2 |x - x_free|^2 + 1/2 sum g_c |x_c - style_c|^2 + s/2 sum |b_i(x) - k_i|^2
+    minimise  1/2 |x - x_free|^2 + 1/2 sum g_c |x_c - style_c|^2 + 1/2 sum s_i |b_i(x) - k_i|^2
 
     b_i(x) = (x_{i+1} - x_i) - (x_i - x_{i-1})            second difference at CV i
     k_i                                                   the same at rest, carried along by
                                                           the frame of segment i-1
     g = (omega_global dt)^2,  s = (omega_bend dt)^2       backward Euler of springs
 
-whose matrix I + diag(g) + s B^T B is banded, constant, and the same for all guides: one solve with
-scalar factors brings the stiffest style back without iterations, stable for any dt.
+whose matrix I + diag(g) + B^T diag(s) B is banded, constant, and the same for all guides: one solve
+with scalar factors brings the stiffest style back without iterations, stable for any dt.
 
 Frames: on each segment a tangent t and a normal u, carried from segment to segment by the smallest
 rotation (Bishop 1975). With unit tangents that rotation is  u' = u - (u.t') / (1 + t.t') (t + t').
@@ -30,13 +30,14 @@ swings less, because its kinks want to keep their direction; a strand that folds
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..params.curve import along as curve_along
 from .banded import SharedBand
-from .constraints import PINNED, TINY, dot
+from .constraints import PINNED, TINY, dot, unit
 from .settings import DynamicsSettings
 
 #: A cantilever's first mode: omega = 1.8751^2 sqrt(EI / (rho A)) / L^2 (Euler-Bernoulli).
@@ -61,14 +62,36 @@ class LocalShape:
     hold: Floats
     twist_cv: Ints
 
+    def part(self, guides: slice) -> LocalShape:
+        """The shape of these guides, as views."""
+        return LocalShape(self.curvature[:, :, guides], self.hold[:, guides], self.twist_cv[guides])
+
+    @cached_property
+    def turning(self) -> Floats:
+        """The share of the curvature that turns with the strand."""
+        return self.curvature * self.hold
+
+    @cached_property
+    def staying(self) -> Floats | None:
+        """1 - hold; None where no guide has sharp kinks."""
+        staying = np.float32(1.0) - self.hold
+        return staying if staying.any() else None
+
 
 @dataclass(frozen=True)
 class StyleBand:
-    """pull: g of each free CV. bend: s. band: the factored matrix."""
+    """band: the factored matrix.
+
+    pull: (cv_count - 2, 1), g of each free CV. bend: (cv_count - 2, 1), s of each inner CV.
+    """
 
     pull: Floats
-    bend: float
+    bend: Floats
     band: SharedBand
+
+    @cached_property
+    def is_bending(self) -> bool:
+        return bool(self.bend.any())
 
 
 @lru_cache(maxsize=8)
@@ -76,14 +99,17 @@ def style_band(settings: DynamicsSettings, cv_count: int, dt: float) -> StyleBan
     """The matrix of the style solve for all free CVs of any guide."""
     free = cv_count - PINNED
     along = np.arange(PINNED, cv_count) / max(cv_count - 1, 1)
-    frequency = settings.style_root + (settings.style_tip - settings.style_root) * along
+    stiff = curve_along(settings.style_along, along)
+    frequency = settings.style_tip + (settings.style_root - settings.style_tip) * stiff
     pull = (2.0 * np.pi * frequency * dt) ** 2
     segments = cv_count - 1
-    bend = (2.0 * np.pi * settings.bend * segments**2 / _CANTILEVER * dt) ** 2
+    inner = np.arange(1, cv_count - 1) / max(segments, 1)
+    swings = settings.bend * curve_along(settings.bend_along, inner)
+    bend = (2.0 * np.pi * swings * segments**2 / _CANTILEVER * dt) ** 2
     second = np.eye(free) - 2.0 * np.eye(free, k=-1) + np.eye(free, k=-2)
-    matrix = np.eye(free) + np.diag(pull) + bend * second.T @ second
-    column = pull.astype(np.float32)[:, None]
-    return StyleBand(column, float(bend), SharedBand(matrix))
+    matrix = np.eye(free) + np.diag(pull) + second.T @ (bend[:, None] * second)
+    column, bends = (values.astype(np.float32)[:, None] for values in (pull, bend))
+    return StyleBand(column, bends, SharedBand(matrix))
 
 
 def restore_style(position: Floats, style: Floats, shape: LocalShape, matrix: StyleBand) -> None:
@@ -93,9 +119,9 @@ def restore_style(position: Floats, style: Floats, shape: LocalShape, matrix: St
     """
     right = style[:, PINNED:] - position[:, PINNED:]
     right *= matrix.pull
-    if matrix.bend:
+    if matrix.is_bending:
         residual = _curvature_residual(position, style, shape)
-        residual *= np.float32(matrix.bend)
+        residual *= matrix.bend
         right += residual
         right[:, :-1] -= residual[:, 1:]
         right[:, :-1] -= residual[:, 1:]
@@ -118,7 +144,7 @@ def local_shape(position: Floats) -> LocalShape:
 
 def twist_reference(position: Floats) -> Ints:
     """The CV that lies farthest beside the line of the root segment, (guide_count,)."""
-    beside = _across(position - position[:, :1], _unit(position[:, 1] - position[:, 0])[:, None])
+    beside = _across(position - position[:, :1], unit(position[:, 1] - position[:, 0])[:, None])
     squared: Floats = (beside * beside).sum(axis=0)
     return squared.argmax(axis=0)
 
@@ -138,31 +164,39 @@ def frames(position: Floats, style: Floats, twist_cv: Ints) -> tuple[Floats, Flo
     zero on a straight guide, which has no curvature to turn.
     """
     segment = position[:, 1:] - position[:, :-1]
-    tangent = _unit(segment)
-    normal = np.empty_like(tangent)
+    tangent = unit(segment)
     guide = np.arange(position.shape[2])
-    normal[:, 0] = _unit(_across(style[:, twist_cv, guide] - style[:, 0], tangent[:, 0]))
+    first = unit(_across(style[:, twist_cv, guide] - style[:, 0], tangent[:, 0]))
     middle = tangent[:, 1:] + tangent[:, :-1]
-    share = tangent[:, 1:] * middle  # 1 + t.t' = t'.(t + t')
-    scale = share[0] + share[1]
-    scale += share[2]
+    scale = dot(tangent[:, 1:], middle)  # 1 + t.t' = t'.(t + t')
     scale += np.float32(1.0e-6)
-    middle_scaled = middle / scale
-    product = np.empty_like(normal[:, 0])
-    along = np.empty_like(product[0])
-    for i in range(1, tangent.shape[1]):
-        np.multiply(normal[:, i - 1], tangent[:, i], out=product)
-        np.add(product[0], product[1], out=along)
-        along += product[2]
-        np.multiply(middle_scaled[:, i - 1], along, out=product)
-        np.subtract(normal[:, i - 1], product, out=normal[:, i])
+    middle /= scale
+    normal = _carried_on(first, tangent, middle)
     return tangent, normal, segment
+
+
+def _carried_on(first: Floats, tangent: Floats, middle: Floats) -> Floats:
+    """The first normal (3, guide_count) carried from segment to segment, (3, n, guide_count):
+    u' = u - (u.t') m, with m (3, n - 1, guide_count)."""
+    along, turn = (np.ascontiguousarray(rows.transpose(1, 0, 2)) for rows in (tangent, middle))
+    normal = np.empty_like(along)
+    normal[0] = first
+    here = list(normal)
+    product, share = np.empty_like(first), np.empty_like(first[0])
+    x, y, z = product
+    for i in range(1, len(here)):
+        np.multiply(here[i - 1], along[i], product)
+        np.add(x, y, share)
+        share += z
+        np.multiply(turn[i - 1], share, product)
+        np.subtract(here[i - 1], product, here[i])
+    return np.ascontiguousarray(normal.transpose(1, 0, 2))
 
 
 def _curvature_residual(position: Floats, style: Floats, shape: LocalShape) -> Floats:
     """k - b(x), (3, cv_count - 2, guide_count)."""
     tangent, normal, segment = frames(position, style, shape.twist_cv)
-    curvature = shape.curvature
+    curvature = shape.turning
     tangent, normal = tangent[:, :-1], normal[:, :-1]
     residual = _cross(tangent, normal)
     residual *= curvature[2]
@@ -170,8 +204,8 @@ def _curvature_residual(position: Floats, style: Floats, shape: LocalShape) -> F
     residual += normal
     tangent *= curvature[0]
     residual += tangent
-    residual *= shape.hold
-    residual += (np.float32(1.0) - shape.hold) * np.diff(style, n=2, axis=1)
+    if shape.staying is not None:
+        residual += shape.staying * np.diff(style, n=2, axis=1)
     residual -= segment[:, 1:]
     residual += segment[:, :-1]
     return residual
@@ -179,10 +213,6 @@ def _curvature_residual(position: Floats, style: Floats, shape: LocalShape) -> F
 
 def _across(vector: Floats, unit: Floats) -> Floats:
     return vector - unit * dot(vector, unit)
-
-
-def _unit(vector: Floats) -> Floats:
-    return vector / np.maximum(np.sqrt(dot(vector, vector)), TINY)
 
 
 def _cross(one: Floats, two: Floats) -> Floats:

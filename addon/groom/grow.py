@@ -1,7 +1,8 @@
 """Growing a groom on a head: out of the scalp, along the comb, down with gravity, around the head.
 
-Growth along the normals with segments that lengthen towards the tip is Nguyen and Donnelly's
-(2005, GPU Gems 2, chapter 23); the comb, the fall around the head and the locks are Hairloom's.
+Segments that lengthen towards the tip are Nguyen and Donnelly's (2005, GPU Gems 2, chapter 23), as
+is growth along the normals (`normal_growth`); the comb, the fall around the head and the locks are
+Hairloom's.
 
 Limitations: the head is upright (Z up) and faces -Y, and strands do not push each other.
 """
@@ -14,7 +15,9 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands import StrandSet, Surface
+from .grown import at_roots, bound_strands, checked_weights, segment_shares
 from .locks import assign_locks, style_locks
+from .normal_growth import grow_along_normals, somewhere
 from .scalp import find_cranium, sample_roots, scalp_density
 from .settings import GrowSettings
 from .skin import Skin, unit
@@ -24,30 +27,56 @@ __all__ = ["grow", "scalp_density"]
 _DOWN = np.array([0.0, 0.0, -1.0])
 #: The step for which `GrowSettings.droop` says how much the hair turns [m].
 _DROOP_STEP = 0.02
+#: The sharpest turn from one segment to the next that a lock or a wave may make [rad].
+_SHARPEST_TURN = np.radians(60.0)
 
 
-def grow(surface: Surface, settings: GrowSettings, density: Floats | None = None) -> StrandSet:
-    """A groom on a head, bound to it, all strands of one CV count, in the surface's space.
+def grow(
+    surface: Surface,
+    settings: GrowSettings,
+    density: Floats | None = None,
+    length: Floats | None = None,
+) -> StrandSet:
+    """A groom, bound to its surface, all strands of one CV count, in the surface's space.
 
     Args:
-        surface: world space, upright, facing -Y.
+        surface: world space; to be combed it must be upright and face -Y.
         density: (vertex_count,), how densely hair grows, not negative; None: everywhere alike.
+        length: (vertex_count,), factor on the length, usually 0 to 1; None: 1 everywhere. No hair
+            grows where it is 0.
 
     Raises:
-        HairloomError: the surface has no triangles, or nowhere to grow.
+        HairloomError: the surface has no triangles, weights that do not fit it or are not finite,
+            or nowhere to grow.
     """
+    if settings.way == "normals":
+        return grow_along_normals(surface, settings, density, length)
+    return _grow_combed(
+        surface,
+        settings,
+        checked_weights(density, surface, "density"),
+        checked_weights(length, surface, "length"),
+    )
+
+
+def _grow_combed(
+    surface: Surface, settings: GrowSettings, density: Floats | None, length: Floats | None
+) -> StrandSet:
+    """A groom on a head; the weights are checked."""
     random = np.random.default_rng(settings.seed)
-    triangle, barycentric = sample_roots(surface, settings.strand_count, density, random)
+    where = somewhere(density, length)
+    triangle, barycentric = sample_roots(surface, settings.strand_count, where, random)
     corners = surface.corners[triangle].astype(np.float64)
     root = np.einsum("sk,skj->sj", barycentric, corners)
     lock = assign_locks(root, settings, random)
-    plan = _plan(surface, lock, settings, random)
+    factor = None if length is None else at_roots(length, surface, triangle, barycentric)
+    plan = _plan(surface, lock, factor, settings, random)
 
     normal = plan.skin.normal(triangle, barycentric)
     comb = _combed(surface, root, normal, settings)
     grid = _fallen(root, normal, comb, plan, settings)
     grid = _laid(style_locks(grid, lock, settings, random), plan)
-    return _as_strands(grid, triangle, barycentric, surface, settings)
+    return bound_strands(grid, triangle, barycentric, surface, settings.radius)
 
 
 @dataclass(frozen=True)
@@ -66,9 +95,15 @@ class _Plan:
 
 
 def _plan(
-    surface: Surface, lock: Ints, settings: GrowSettings, random: np.random.Generator
+    surface: Surface,
+    lock: Ints,
+    factor: Floats | None,
+    settings: GrowSettings,
+    random: np.random.Generator,
 ) -> _Plan:
     segment = _segments(lock, settings, random)
+    if factor is not None:
+        segment *= factor[:, None]
     height = _heights(lock, settings, random)
     return _Plan(segment, height, Skin(surface, reach=float((segment + height).max(initial=0.0))))
 
@@ -78,8 +113,7 @@ def _segments(lock: Ints, settings: GrowSettings, random: np.random.Generator) -
     count = len(lock)
     shorter = 0.6 * random.random(count)[lock] + 0.4 * random.random(count)
     length = settings.length * (1.0 - settings.length_variation * shorter)
-    share = settings.segment_ratio ** np.arange(settings.cv_count - 1)
-    return length[:, None] * (share / share.sum())
+    return length[:, None] * segment_shares(settings.cv_count, settings.segment_ratio)
 
 
 def _heights(lock: Ints, settings: GrowSettings, random: np.random.Generator) -> Floats:
@@ -120,29 +154,25 @@ def _fallen(
 
 
 def _laid(styled: Floats, plan: _Plan) -> Floats:
-    """The styled strands with their own segment lengths again, and outside of the skin."""
+    """The styled strands with their own segment lengths again, unfolded, and outside of the skin.
+
+    A strand that its lock draws to the other side of the head would otherwise turn back on itself.
+    """
     grid = styled.copy()
     for cv in range(1, grid.shape[1]):
-        grid[:, cv] = plan.step(cv, grid[:, cv - 1], styled[:, cv] - grid[:, cv - 1])
+        way = unit(styled[:, cv] - grid[:, cv - 1])
+        if cv > 1:
+            way = _turned_at_most(unit(grid[:, cv - 1] - grid[:, cv - 2]), way)
+        grid[:, cv] = plan.step(cv, grid[:, cv - 1], way)
     # keeping the length may have drawn a point in again; half of its height is always kept
     free = plan.skin.outside(grid[:, 1:].reshape(-1, 3), 0.5 * plan.height.ravel())
     grid[:, 1:] = free.reshape(grid[:, 1:].shape)
     return grid
 
 
-def _as_strands(
-    grid: Floats, triangle: Ints, barycentric: Floats, surface: Surface, settings: GrowSettings
-) -> StrandSet:
-    strand_count, cv_count = grid.shape[:2]
-    root_uv = None
-    if surface.corner_uv is not None:
-        root_uv = np.einsum("sk,skj->sj", barycentric, surface.corner_uv[triangle])
-    return StrandSet(
-        points=grid.reshape(-1, 3),
-        offsets=np.arange(strand_count + 1) * cv_count,
-        radius=np.full(strand_count * cv_count, settings.radius),
-        group=np.zeros(strand_count, np.int32),
-        root_uv=root_uv,
-        root_triangle=triangle,
-        root_barycentric=barycentric,
-    )
+def _turned_at_most(before: Floats, way: Floats) -> Floats:
+    """Unit directions (n, 3), those that turn too sharply from the ones before turned back."""
+    cosine = np.einsum("ij,ij->i", before, way)[:, None]
+    beside = unit(way - before * cosine)
+    sharpest = before * np.cos(_SHARPEST_TURN) + beside * np.sin(_SHARPEST_TURN)
+    return np.where(cosine < np.cos(_SHARPEST_TURN), sharpest, way)

@@ -71,7 +71,7 @@ def sample_roots(
     """Roots spread by area x density: triangle (count,) and barycentric (count, 3).
 
     Stratified along a space-filling curve through the triangles (Morton order), so that roots
-    keep their distance as blue noise does, for any count.
+    keep their distance as blue noise does, for any count. Density is linear within a triangle.
 
     Raises:
         HairloomError: the surface has no area on which hair may grow.
@@ -91,14 +91,38 @@ def sample_roots(
     order = np.argsort(_morton(corners.mean(axis=1)), kind="stable")
     along = np.cumsum(area[order])
     stratum = (np.arange(count) + random.random(count)) / count * along[-1]
-    triangle = order[np.minimum(np.searchsorted(along, stratum, side="right"), len(order) - 1)]
-    return triangle, _inside_triangles(count, random)
+    last = np.flatnonzero(area[order])[-1]  # rounding must not lead to a triangle without area
+    place = np.minimum(np.searchsorted(along, stratum, side="right"), last)
+    triangle = order[place]
+    barycentric = _inside_triangles(count, random)
+    if density is None:
+        return triangle, barycentric
+    share = np.clip((along[place] - stratum) / area[triangle], 0.0, 1.0)  # left of the triangle
+    return triangle, _towards_density(
+        barycentric, np.maximum(density, 0.0)[surface.triangles[triangle]], share
+    )
 
 
 def _inside_triangles(count: int, random: np.random.Generator) -> Floats:
     """Uniform barycentric coordinates, (count, 3) (Turk 1990, Graphics Gems)."""
     root, other = np.sqrt(random.random(count)), random.random(count)
     return np.stack([1.0 - root, root * (1.0 - other), root * other], axis=1)
+
+
+def _towards_density(barycentric: Floats, density: Floats, chance: Floats) -> Floats:
+    """Uniform points of triangles turned to ones that follow a density linear between corners.
+
+    A uniform point's three cyclic turns are uniform too, and their densities always add up to that
+    of the corners; taking one by its density therefore gives exactly that density.
+
+    Args:
+        barycentric, density: (count, 3), of the points, and at the corners of their triangles.
+        chance: (count,) uniform from 0 to 1.
+    """
+    turns = np.stack([np.roll(barycentric, turn, axis=1) for turn in range(3)], axis=1)
+    reached = np.einsum("ntk,nk->nt", turns, density).cumsum(axis=1)
+    taken = (reached[:, :2] < (chance * reached[:, 2])[:, None]).sum(axis=1)
+    return turns[np.arange(len(turns)), taken]
 
 
 def _morton(points: Floats) -> Ints:

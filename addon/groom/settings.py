@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..params import Settings, integer, number
+from ..params import Settings, choice, integer, number, toggle
 
 _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
 
@@ -17,6 +17,30 @@ class GrowSettings(Settings):
     section: ClassVar[str] = "grow"
     title: ClassVar[str] = "Grow"
 
+    way: str = choice(
+        "combed",
+        (
+            ("combed", "Combed", "A groom on an upright head, combed and fallen around it"),
+            ("normals", "Along Normals", "Straight out of any mesh, as guides to be styled"),
+        ),
+        label="Way",
+        description="How hair leaves the mesh",
+        source=_NALU,
+    )
+    per_vertex: bool = toggle(
+        False,
+        label="One a Vertex",
+        description="Along the normals: one strand from each vertex instead of a number of strands",
+        source=_NALU,
+    )
+    threshold: float = number(
+        0.5,
+        label="Threshold",
+        description="With one strand a vertex: density above which a vertex grows it",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+    )
     strand_count: int = integer(
         4095,
         label="Strands",

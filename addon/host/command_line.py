@@ -7,19 +7,26 @@ Exit codes: 0 done, 1 bad input (one line on stderr says what, where and what to
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
-from typing import Any
 
 from ..errors import HairloomError
 from ..parameters import ALL_SETTINGS
 from ..params import Settings
+from .bake_job import bake
 from .inputs import Sources
 from .jobs import Job, cards, demo, export, render, simulate
+from .overrides import overrides
 from .presets import named_preset
 
-VERBS = {"simulate": simulate, "render": render, "cards": cards, "export": export, "demo": demo}
+VERBS = {
+    "simulate": simulate,
+    "bake": bake,
+    "render": render,
+    "cards": cards,
+    "export": export,
+    "demo": demo,
+}
 
 
 def run(arguments: list[str]) -> int:
@@ -45,9 +52,34 @@ def parser() -> argparse.ArgumentParser:
     for name, flow in VERBS.items():
         about = (flow.__doc__ or "").strip().splitlines()[0]
         verb = verbs.add_parser(name, help=about, description=about)
-        _add_source_options(verb)
+        if name == "bake":
+            _add_bake_options(verb)
+        else:
+            _add_source_options(verb)
         _add_job_options(verb, name)
     return top
+
+
+def _add_bake_options(verb: argparse.ArgumentParser) -> None:
+    what = verb.add_argument_group("what to bake")
+    what.add_argument("--scene", metavar="FILE.blend", help="scene (default: the open one)")
+    what.add_argument(
+        "--object",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="hair curves or a fin; can be given again (default: all that are to be simulated)",
+    )
+    what.add_argument(
+        "--frames",
+        nargs=2,
+        type=int,
+        metavar=("FIRST", "LAST"),
+        help="(default: those of the objects, else of the scene)",
+    )
+    what.add_argument(
+        "--save", action="store_true", help="save the scene, so that it plays what was baked"
+    )
 
 
 def _add_source_options(verb: argparse.ArgumentParser) -> None:
@@ -56,6 +88,18 @@ def _add_source_options(verb: argparse.ArgumentParser) -> None:
     sources.add_argument("--head", help="mesh that the hair grows from (default: built in)")
     sources.add_argument("--collider", help="closed mesh that hair stays out of (default: head)")
     sources.add_argument("--groom-scale", type=float, default=1.0, help="scale a groom file")
+    sources.add_argument(
+        "--density-group",
+        default="",
+        metavar="NAME",
+        help="vertex group or attribute of the head: how densely hair grows",
+    )
+    sources.add_argument(
+        "--length-group",
+        default="",
+        metavar="NAME",
+        help="the same for how long hair grows, as a share of grow.length",
+    )
     sources.add_argument("--groom-up", choices=("Y", "Z"), default="Y", help="up in a groom file")
     sources.add_argument("--no-uv", action="store_true", help="accept a head without UVs")
     sources.add_argument(
@@ -65,7 +109,14 @@ def _add_source_options(verb: argparse.ArgumentParser) -> None:
 
 def _add_job_options(verb: argparse.ArgumentParser, name: str) -> None:
     job = verb.add_argument_group("the job")
-    job.add_argument("--output", required=name != "demo", default="out", help=_OUTPUTS[name])
+    optional = {"demo": Path("out"), "bake": None}
+    job.add_argument(
+        "--output",
+        required=name not in optional,
+        type=Path,
+        default=optional.get(name),
+        help=_OUTPUTS[name],
+    )
     job.add_argument("--report", help="write a JSON report to this file")
     job.add_argument(
         "--set",
@@ -100,6 +151,7 @@ def _add_job_options(verb: argparse.ArgumentParser, name: str) -> None:
 
 _OUTPUTS = {
     "simulate": "take to write (.npz)",
+    "bake": "folder for the bake, of several objects one below it each (default: their own)",
     "render": "picture to write (.png)",
     "cards": "hair cards to write (.glb)",
     "export": "strands to write (.tfx)",
@@ -111,18 +163,24 @@ def _job(options: argparse.Namespace) -> Job:
     _check_numbers(options)
     return Job(
         verb=options.verb,
-        sources=Sources(
-            groom=options.groom,
-            head=options.head,
-            collider=options.collider,
-            groom_scale=options.groom_scale,
-            groom_up=options.groom_up,
-            need_head=options.verb in ("simulate", "demo"),
-            need_uv=not options.no_uv,
-        ),
+        sources=Sources() if options.verb == "bake" else _sources(options),
         settings=_settings(options),
-        output=Path(options.output),
+        output=Path() if options.output is None else options.output,
         options=options,
+    )
+
+
+def _sources(options: argparse.Namespace) -> Sources:
+    return Sources(
+        groom=options.groom,
+        head=options.head,
+        collider=options.collider,
+        groom_scale=options.groom_scale,
+        groom_up=options.groom_up,
+        need_head=options.verb in ("simulate", "demo"),
+        need_uv=not options.no_uv,
+        density_group=options.density_group,
+        length_group=options.length_group,
     )
 
 
@@ -155,33 +213,6 @@ def _settings(options: argparse.Namespace) -> dict[str, Settings]:
         preset = named_preset(name)
         chosen[preset.settings.section] = preset.settings
     return {
-        section: type(values).from_dict(
-            values.as_dict() | _overrides(options.set, section), "--set"
-        )
+        section: type(values).from_dict(values.as_dict() | overrides(options.set, section), "--set")
         for section, values in chosen.items()
     }
-
-
-def _overrides(assignments: list[str], section: str) -> dict[str, Any]:
-    """The values that --set gives to one section."""
-    values: dict[str, Any] = {}
-    for assignment in assignments:
-        name, equals, text = assignment.partition("=")
-        owner, dot, parameter = name.partition(".")
-        if not equals or not dot or owner not in ALL_SETTINGS:
-            raise HairloomError(
-                f"'{assignment}' does not name a parameter",
-                place="--set",
-                remedy="Write SECTION.NAME=VALUE with a section of " + ", ".join(ALL_SETTINGS),
-            )
-        if owner == section:
-            values[parameter] = _value(text)
-    return values
-
-
-def _value(text: str) -> Any:
-    """A JSON value, or the text itself (the name of a choice)."""
-    try:
-        return json.loads(text)
-    except ValueError:
-        return text

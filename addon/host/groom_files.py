@@ -24,6 +24,7 @@ from .curves import write_curves
 from .properties import settings_of
 from .source import read_source
 from .surfaces import read_surface
+from .vertex_weights import read_weights
 
 
 @dataclass(frozen=True)
@@ -63,17 +64,28 @@ def grow_on(
     depsgraph: bpy.types.Depsgraph,
     collection: bpy.types.Collection,
     values: Any,
+    *,
+    density_group: str = "",
+    length_group: str = "",
 ) -> bpy.types.Object:
     """Hair curves grown on a mesh.
 
     Args:
         values: an operator or group with the properties of GrowSettings.
+        density_group, length_group: vertex groups or float attributes on points, by name. Without
+            a density combed hair grows on the scalp of an upright head, hair along the normals
+            everywhere; without a length all is as long as the settings say.
 
     Raises:
-        HairloomError: it has no faces to grow on.
+        HairloomError: it has no faces to grow on, there is no group of this name, or all is 0.
     """
+    settings = settings_of(values, GrowSettings)
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
-    strands = grow(surface, settings_of(values, GrowSettings), scalp_density(surface))
+    density = read_weights(head, depsgraph, density_group) if density_group else None
+    length = read_weights(head, depsgraph, length_group) if length_group else None
+    if density is None and settings.way == "combed":
+        density = scalp_density(surface)
+    strands = grow(surface, settings, density, length)
     return write_curves(f"{head.name} Hair", strands, head, collection)
 
 

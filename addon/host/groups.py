@@ -5,18 +5,21 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, PointerProperty
+from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
 
 from ..parameters import ALL_SETTINGS
-from . import live
+from . import reactions
+from .bake_group import HAIRLOOM_PG_bake
+from .fin_group import FIN_PROPERTIES
+from .obstacle_reader import SHAPES
 from .properties import property_annotations, property_group
 
 GROOM_SECTIONS = ("guides", "strands", "shading", "ambient", "cards", "card_texture")
-CHARACTER_SECTIONS = ("dynamics",)
+CHARACTER_SECTIONS = ("dynamics", "fin")
 
 
 def _changed(owner: bpy.types.ID) -> None:
-    live.settings_changed(owner)
+    reactions.settings_changed(owner)
 
 
 def _pointers(sections: tuple[str, ...]) -> dict[str, Any]:
@@ -38,6 +41,7 @@ SECTION_GROUPS = {
     section: property_group(ALL_SETTINGS[section], _changed)
     for section in (*GROOM_SECTIONS, *CHARACTER_SECTIONS)
 }
+SECTION_GROUPS["fin"].__annotations__ |= FIN_PROPERTIES
 
 
 def operator_properties(section: str) -> dict[str, Any]:
@@ -48,7 +52,14 @@ def operator_properties(section: str) -> dict[str, Any]:
 class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
     """Everything about one groom that goes with its curves."""
 
-    __annotations__ = _pointers(GROOM_SECTIONS)
+    __annotations__ = {
+        **_pointers(GROOM_SECTIONS),
+        "baked_in": StringProperty(
+            name="Baked In",
+            description="Folder of the bake that these curves show in renders",
+            options={"HIDDEN"},
+        ),
+    }
 
 
 class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
@@ -56,22 +67,35 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
 
     __annotations__ = {
         **_pointers(CHARACTER_SECTIONS),
+        "bake": PointerProperty(
+            type=HAIRLOOM_PG_bake, name="Bake", description="How and where this object is baked"
+        ),
         "collider": PointerProperty(
             type=bpy.types.Object,
             name="Collider",
             description="Closed mesh that the hair stays out of; empty: the surface it grows from",
             poll=_is_mesh,
         ),
+        "collider_collection": PointerProperty(
+            type=bpy.types.Collection,
+            name="Colliders",
+            description="Collection of more objects that hair stays out of; read as Play begins",
+        ),
+        "collider_shape": EnumProperty(
+            items=SHAPES,
+            name="Collides As",
+            description="As what this object collides with hair and cloth",
+        ),
         "hide_original": BoolProperty(
             name="Hide Blender's Strands",
             description="While previewing, show Blender's own drawing of these curves as a box",
             default=True,
-            update=lambda self, _context: live.display_changed(self.id_data),
+            update=lambda self, _context: reactions.display_changed(self.id_data),
         ),
     }
 
 
-CLASSES = (*SECTION_GROUPS.values(), HAIRLOOM_PG_groom, HAIRLOOM_PG_character)
+CLASSES = (*SECTION_GROUPS.values(), HAIRLOOM_PG_bake, HAIRLOOM_PG_groom, HAIRLOOM_PG_character)
 
 
 def register() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from . import live
+from . import live, playback, reactions
 
 _is_reacting = False
 
@@ -25,23 +25,45 @@ def on_load_post(*_: Any) -> None:
 
 @persistent
 def on_undo_post(*_: Any) -> None:
-    live.undone()
+    reactions.undone()
 
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    _react(live.updated, depsgraph)
+    _react(reactions.updated, depsgraph)
 
 
 @persistent
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    _react(live.frame_changed, depsgraph)
+    _react(reactions.frame_changed, depsgraph)
+
+
+@persistent
+def on_frame_change_begin(scene: bpy.types.Scene, *_: Any) -> None:
+    """Runs in renders too, there in the render's thread: only what is baked is written."""
+    if live.is_suspended():
+        return
+    playback.show_fins(scene)
+    if playback.needs_copies():
+        playback.show_in_copies(scene)
+
+
+@persistent
+def on_render_begin(*_: Any) -> None:
+    playback.rendering(True)
+
+
+@persistent
+def on_render_end(*_: Any) -> None:
+    playback.rendering(False)
 
 
 def _react(reaction: Callable[[bpy.types.Depsgraph], None], depsgraph: bpy.types.Depsgraph) -> None:
     """Once at a time, and not for a render, which has its own copy of the scene and its thread."""
     global _is_reacting
-    if _is_reacting or not live.sessions() or depsgraph.mode != "VIEWPORT":
+    if _is_reacting or live.is_suspended() or not live.simulated():
+        return
+    if depsgraph.mode != "VIEWPORT":
         return
     _is_reacting = True
     try:
@@ -56,7 +78,11 @@ HANDLERS = (
     (bpy.app.handlers.undo_post, on_undo_post),
     (bpy.app.handlers.redo_post, on_undo_post),
     (bpy.app.handlers.depsgraph_update_post, on_depsgraph_update),
+    (bpy.app.handlers.frame_change_pre, on_frame_change_begin),
     (bpy.app.handlers.frame_change_post, on_frame_change),
+    (bpy.app.handlers.render_init, on_render_begin),
+    (bpy.app.handlers.render_complete, on_render_end),
+    (bpy.app.handlers.render_cancel, on_render_end),
 )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import bpy
 
+from ..arrays import Floats
 from ..errors import HairloomError
 from ..exchange.tressfx import read_tfx
 from ..groom.grow import grow, scalp_density
@@ -17,6 +18,7 @@ from .curves import read_curves
 from .mesh_files import read_mesh_file
 from .objects import head_of
 from .surfaces import read_surface
+from .vertex_weights import read_weights
 
 BUILT_IN = "built-in"
 
@@ -29,6 +31,8 @@ class Sources:
     surface; the built-in one where a groom is grown. collider None: the head itself.
     need_head: whether a groom without a head is refused.
     need_uv: whether a head without UVs is refused.
+    density_group, length_group: vertex groups or attributes of a head in the open scene, by name,
+        for hair that is grown here.
     """
 
     groom: str | None = None
@@ -38,6 +42,8 @@ class Sources:
     groom_up: str = "Y"
     need_head: bool = True
     need_uv: bool = True
+    density_group: str = ""
+    length_group: str = ""
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,10 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     else:
         head, dropped = _read_head(head_name, sources), {}
         assert head is not None, "the built-in one is always there"
-        strands = grow(head, grow_settings, scalp_density(head))
+        density = _weights(sources.density_group, head_name)
+        if density is None and grow_settings.way == "combed":
+            density = scalp_density(head)
+        strands = grow(head, grow_settings, density, _weights(sources.length_group, head_name))
     collider = head
     if sources.collider is not None:
         collider = _read_mesh(sources.collider, need_uv=False)
@@ -87,6 +96,20 @@ def _read_head(name: str | None, sources: Sources) -> Surface | None:
             remedy="Name the head with --head FILE_OR_OBJECT",
         )
     return None
+
+
+def _weights(group: str, head_name: str | None) -> Floats | None:
+    """The weights of this name on the head, (vertex_count,); None without a name."""
+    if not group:
+        return None
+    head = bpy.data.objects.get(head_name or "")
+    if head is None:
+        raise HairloomError(
+            "only a mesh object of the open scene has vertex groups",
+            place=group,
+            remedy="Name one with --head OBJECT, or leave the group out",
+        )
+    return read_weights(head, bpy.context.evaluated_depsgraph_get(), group)
 
 
 def _surface_name(groom: str | None) -> str | None:

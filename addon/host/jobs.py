@@ -6,7 +6,6 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-import bpy
 import numpy as np
 
 from .. import pipeline
@@ -27,7 +26,7 @@ from .images import contact_sheet, write_png
 from .inputs import Inputs, Sources, read_inputs
 from .report import Progress, Report
 from .studio import Studio
-from .take import Take, read_take, scene_poses, shaken_poses, write_take
+from .take import Take, TakeDrive, read_take, scene_drive, shaken_poses, write_take
 from .take import simulate as simulate_take
 
 SHEET_COLUMNS, SHEET_ROWS = 4, 3
@@ -151,40 +150,38 @@ def _tell_drops(job: Job, inputs: Inputs) -> None:
 
 def _simulate(job: Job, rig: Rig, inputs: Inputs, report: Report) -> Take:
     """Run the dynamics under the scene's animation or the shake."""
-    rate = float(job.options.frame_rate)
     with report.stage("collider"):
         assert inputs.collider is not None, "simulate and demo refuse a groom without a head"
         name = job.sources.collider or job.sources.head or "built-in head"
         collider = DistanceField.from_surface(
             inputs.collider, job.set(DynamicsSettings), place=name
         )
-    poses, rate = _poses(job, rig, inputs, rate)
-    progress = Progress("simulating", len(poses) - 1)
+    drive = _drive(job, rig, inputs)
+    progress = Progress("simulating", len(drive.poses) - 1)
     take, worst = simulate_take(
-        rig, collider, poses, rate, job.set(DynamicsSettings), report.stage, progress.show
+        rig, collider, drive, job.set(DynamicsSettings), report.stage, progress.show
     )
     report.facts.update(
-        frames=len(poses),
-        frame_rate=rate,
+        frames=len(drive.poses),
+        frame_rate=drive.frame_rate,
         stretch_max_percent=round(worst.stretch * 100.0, 4),
         penetration_max_mm=round(worst.penetration * 1000.0, 4),
     )
     return take
 
 
-def _poses(job: Job, rig: Rig, inputs: Inputs, rate: float) -> tuple[list[Pose], float]:
-    """The head's poses, and their rate: the scene's, when its animation is asked for."""
+def _drive(job: Job, rig: Rig, inputs: Inputs) -> TakeDrive:
+    """What moves the hair: the scene, when its animation is asked for, else the shake."""
     if not job.options.scene:
-        return shaken_poses(rig, round(job.options.seconds * rate) + 1, rate), rate
+        rate = float(job.options.frame_rate)
+        return TakeDrive(shaken_poses(rig, round(job.options.seconds * rate) + 1, rate), rate)
     if inputs.head_object is None:
         raise HairloomError(
             "only an object of the open scene is animated",
             place="--scene",
             remedy="Name the head's object with --head, or leave out --scene",
         )
-    scene = bpy.context.scene
-    frames = range(scene.frame_start, scene.frame_end + 1)
-    return list(scene_poses(inputs.head_object, frames)), scene.render.fps / scene.render.fps_base
+    return scene_drive(inputs.head_object)
 
 
 def _rest(rig: Rig) -> tuple[Pose, Floats]:

@@ -1,82 +1,170 @@
-"""What previewed hair stays out of: a mesh as a distance field, and where it is."""
+"""What the hair of one groom, or one cloth fin, stays out of.
+
+That is the surface it grows from, or in its place the one collider that the artist has chosen, and
+every object of a collection of colliders. An object collides as its `hairloom.collider_shape`
+says: as a mesh (signed distance), as a ball or a capsule around its bounding box, or not at all.
+What cannot be used is left out with a warning, and the others go on.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import bpy
-import numpy as np
 
-from ..arrays import Floats
-from ..dynamics.colliders import DistanceField, PosedCollider
+from ..arrays import Ints
+from ..dynamics.colliders import PosedCollider
 from ..dynamics.settings import DynamicsSettings
+from ..errors import HairloomError
 from ..strands import Surface
+from .carriers import is_left_out
 from .objects import Body
-from .surfaces import read_surface
-
-#: A mesh that came back to within this of its rest is the same mesh [m].
-_SAME_SHAPE = 1.0e-5
+from .obstacle_balls import Ball, BallsPart
+from .obstacle_parts import FieldPart, Part, ShapePart
+from .obstacle_reader import Reader, left_out, shape_of
 
 
 @dataclass
-class Obstacle:
-    """A rigid collider that goes with an object.
+class Obstacles:
+    """The colliders of one groom or fin, and what the artist should know about them."""
 
-    surface, field: in world space, with the body at rest; the field takes seconds to make.
-    matrix: (4, 4) from the body at rest to where it was in the last frame.
-    """
-
-    body: Body
-    surface: Surface
-    field: DistanceField
-    resolution: int
-    matrix: Floats
+    parts: list[Part]
+    head_uid: int | None
+    _unusable: dict[str, str] = field(default_factory=dict)
+    _failed: dict[str, str] = field(default_factory=dict)
 
     @classmethod
-    def new(cls, body: Body, surface: Surface, settings: DynamicsSettings) -> Obstacle:
-        field = DistanceField.from_surface(surface, settings, place=body.handle.name)
-        return cls(body, surface, field, settings.collider_resolution, np.eye(4))
+    def of(
+        cls,
+        owner: bpy.types.Object,
+        head: Body | None,
+        head_at_rest: Surface | None,
+        settings: DynamicsSettings,
+        depsgraph: bpy.types.Depsgraph,
+        known: Obstacles | None,
+        roots: Ints | None = None,
+    ) -> Obstacles:
+        """All that collides with `owner`, at rest where it is now.
 
-    def move(self, depsgraph: bpy.types.Depsgraph) -> PosedCollider:
-        """Go to where the body is now; the way there is one frame's motion."""
-        before, self.matrix = self.matrix, self.body.moved(depsgraph)
-        return PosedCollider(self.field, before, self.matrix)
+        Args:
+            owner: the hair curves, or a fin.
+            head: what it grows from, and head_at_rest: its mesh in world space at rest; or None.
+            known: its distance fields are used again where nothing has changed.
+            roots: vertices of the head that hair grows from; they tell how it moves.
+        """
+        found = cls([], None if head is None else head.handle.uid)
+        fields = {} if known is None else known._fields()
+        balls: dict[object, list[Ball]] = {}
+        for obj in sources_of(owner, None if head is None else head.handle.find()):
+            is_head = head is not None and head.handle.uid == obj.session_uid
+            reader = Reader(obj, depsgraph, settings, fields.get(obj.session_uid))
+            try:
+                if is_head and head is not None and head_at_rest is not None:
+                    made = reader.part_of_head(head, head_at_rest, roots)
+                else:
+                    made = reader.part()
+            except HairloomError as error:
+                found._unusable[obj.name] = str(_named(obj.name, error))
+                continue
+            if isinstance(made, Ball):
+                balls.setdefault(_carried_by(obj), []).append(made)
+            elif made is not None:
+                found.parts.append(made)
+        found.parts += [BallsPart.new(group, depsgraph) for group in balls.values()]
+        found.rest(depsgraph)
+        return found
 
-    def was_made_from(self, surface: Surface, matrix: Floats, settings: DynamicsSettings) -> bool:
-        """Whether it was made from this mesh, before `matrix` (4, 4) moved it from its rest."""
-        if self.resolution != settings.collider_resolution:
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is left out at the moment and why, and what is not followed well."""
+        seen = [text for part in self.parts for text in part.warnings.values()]
+        return tuple(dict.fromkeys([*self._unusable.values(), *self._failed.values(), *seen]))
+
+    def move(self, depsgraph: bpy.types.Depsgraph, duration: float) -> tuple[PosedCollider, ...]:
+        """Go to where things are now, within `duration` [s]; their ways there.
+
+        Raises:
+            HairloomError: the head is gone, or its mesh is another one.
+        """
+        posed = []
+        for part in self._there(depsgraph):
+            try:
+                posed.append(part.track.go(*part.now(depsgraph), duration))
+            except HairloomError as error:
+                self._fail(part, error)
+        return tuple(posed)
+
+    def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Be where things are now, at no speed.
+
+        Raises:
+            HairloomError: as `move`.
+        """
+        for part in self._there(depsgraph):
+            try:
+                collider, matrix = part.now(depsgraph)
+                PosedCollider(collider, matrix, matrix)
+                part.track.rest(matrix)
+            except HairloomError as error:
+                self._fail(part, error)
+
+    def _there(self, depsgraph: bpy.types.Depsgraph) -> Iterator[Part]:
+        """The parts that Blender evaluates; the others begin at rest when they come back."""
+        self._failed.clear()
+        for part in self.parts:
+            if self._is_left_out(part, depsgraph):
+                part.track.before = None
+                name = part.name
+                self._failed[name] = str(left_out(name))
+            else:
+                yield part
+
+    def _is_left_out(self, part: Part, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Balls look after themselves; a head that is hidden still wears its hair."""
+        if isinstance(part, BallsPart) or self._is_head(part):
             return False
-        moved = self.surface.transformed(matrix)
-        return moved.positions.shape == surface.positions.shape and np.allclose(
-            moved.positions, surface.positions, rtol=0.0, atol=_SAME_SHAPE
-        )
+        assert isinstance(part, FieldPart | ShapePart)
+        obj = part.carrier.body.handle.find()
+        return obj is not None and is_left_out(obj, depsgraph)
+
+    def _is_head(self, part: Part) -> bool:
+        return part.uid is not None and part.uid == self.head_uid
+
+    def _fail(self, part: Part, error: HairloomError) -> None:
+        if self._is_head(part):
+            raise _named(part.name, error) from error
+        part.track.before = None
+        self._failed[part.name] = str(_named(part.name, error))
+
+    def _fields(self) -> dict[int, FieldPart]:
+        made = [part for part in self.parts if isinstance(part, FieldPart)]
+        return {part.carrier.body.handle.uid: part for part in made}
 
 
-def obstacle_of(
-    hair: bpy.types.Object,
-    head: Body | None,
-    head_at_rest: Surface | None,
-    settings: DynamicsSettings,
-    depsgraph: bpy.types.Depsgraph,
-    known: Obstacle | None,
-) -> Obstacle | None:
-    """The collider that the artist chose for this hair, else its head, else none.
+def sources_of(
+    owner: bpy.types.Object, head: bpy.types.Object | None
+) -> tuple[bpy.types.Object, ...]:
+    """The objects that may collide with `owner`, each once: the chosen collider or else the head,
+    then the collection's."""
+    chosen, collection = owner.hairloom.collider, owner.hairloom.collider_collection
+    first = chosen if chosen is not None else head
+    objects = [] if first is None else [first]
+    if collection is not None:
+        objects += collection.all_objects
+    return tuple(obj for obj in dict.fromkeys(objects) if obj != owner)
 
-    Args:
-        known: used again if nothing has changed.
 
-    Raises:
-        HairloomError: no faces, or no volume.
-    """
-    chosen = hair.hairloom.collider
-    if chosen is not None:
-        surface = read_surface(chosen, depsgraph, need_uv=False, place=chosen.name)
-        known = known if known is not None and known.body.handle.find() == chosen else None
-        if known is None or not known.was_made_from(surface, known.body.moved(depsgraph), settings):
-            known = Obstacle.new(Body.at_rest(chosen, depsgraph), surface, settings)
-    elif head is None or head_at_rest is None:
+def _carried_by(obj: bpy.types.Object) -> object:
+    """Balls with the same answer move as one: what hangs on the same mesh or bone does."""
+    if obj.parent is None:
         return None
-    elif known is None or not known.was_made_from(head_at_rest, np.eye(4), settings):
-        known = Obstacle.new(head, head_at_rest, settings)
-    known.move(depsgraph)
-    return known
+    return obj.parent.session_uid, obj.parent_bone if obj.parent_type == "BONE" else ""
+
+
+def _named(name: str, error: HairloomError) -> HairloomError:
+    """The error with the object's name in place of what part of it was found bad."""
+    return HairloomError(error.problem, place=name, remedy=error.remedy)
+
+
+__all__ = ["Obstacles", "shape_of", "sources_of"]

@@ -9,6 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 
 from ..params import Parameter, Settings
+from ..params.curve import PLACES
 
 type Changed = Callable[[bpy.types.ID], None]
 
@@ -72,6 +73,8 @@ def _property(parameter: Parameter, changed: Changed | None) -> Any:
         return IntProperty(**common)
     if parameter.kind == "color":
         return FloatVectorProperty(size=3, subtype="COLOR", **common)
+    if parameter.kind == "curve":
+        return FloatVectorProperty(size=len(PLACES), precision=2, **common)
     precision = _PRECISION.get(parameter.unit, 3)
     return FloatProperty(precision=precision, **_SHOWN_AS[parameter.unit], **common)
 
@@ -97,7 +100,7 @@ def _update(changed: Changed) -> Callable[[Any, bpy.types.Context], None]:
 
 def _value(group: Any, parameter: Parameter) -> Any:
     value = getattr(group, parameter.name)
-    if parameter.kind == "color":
+    if parameter.kind in {"color", "curve"}:
         return tuple(_as_typed(channel) for channel in value)
     return _as_typed(value) if parameter.kind == "number" else value
 

@@ -5,72 +5,73 @@ A session holds numbers and arrays, never a reference into Blender's data.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 import numpy as np
 
 from .. import pipeline
 from ..arrays import Floats
-from ..dynamics.settings import DynamicsSettings
 from ..errors import HairloomError
-from ..groom.settings import GuideSettings
-from ..pipeline import Motion, Pose, Rig
+from ..pipeline import Pose, Rig
 from ..render.snapshot import Snapshot
-from ..shading.ambient import AmbientSettings
-from ..shading.settings import ShadingSettings, StrandSettings
 from ..strands import StrandSet
+from .baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays, used_vertices
+from .choices import Choices
+from .fingerprints import collider_places, groom_fingerprint
 from .lights import read_ambient, read_lights
 from .objects import Body, head_of, matrix_of
-from .obstacles import Obstacle, obstacle_of
-from .properties import settings_of
-from .source import read_source, usable_curves
-from .surfaces import read_positions
+from .obstacles import Obstacles
+from .poses import check_finite, read_pose
+from .simulated import Arrays, hashes
+from .solvers import Solver, form_of, solver_of
+from .source import dynamics_warnings, read_source, refuse_own_dynamics, usable_curves
+from .studio import gpu_in_use
+from .wind import scene_wind
 
-
-@dataclass(frozen=True)
-class Choices:
-    """All that the artist has set for one groom."""
-
-    guides: GuideSettings
-    ambient: AmbientSettings
-    shading: ShadingSettings
-    strands: StrandSettings
-    dynamics: DynamicsSettings
-
-    @classmethod
-    def of(cls, hair: bpy.types.Object) -> Choices:
-        groom, character = hair.data.hairloom, hair.hairloom
-        return cls(
-            settings_of(groom.guides, GuideSettings),
-            settings_of(groom.ambient, AmbientSettings),
-            settings_of(groom.shading, ShadingSettings),
-            settings_of(groom.strands, StrandSettings),
-            settings_of(character.dynamics, DynamicsSettings),
-        )
+#: Blender's names of what it draws and computes by -> those that artists know
+_BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal"}
 
 
 class Session:
-    """One groom while it is previewed.
+    """One groom while it is previewed or baked; fulfils `simulated.Simulated`.
 
     Args:
         hair: a hair curves object.
+        baked: the rig of a bake of this very groom, to be the same to the bit.
+        is_drawn: False leaves out what only drawing needs.
 
     Raises:
         HairloomError: no hair curves, none that can be used, or of another scale than the head.
     """
 
-    def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    def __init__(
+        self,
+        hair: bpy.types.Object,
+        depsgraph: bpy.types.Depsgraph,
+        *,
+        baked: BakedRig | None = None,
+        is_drawn: bool = True,
+    ) -> None:
         head = head_of(hair)
         self.hair = Body.at_rest(hair, depsgraph)
         self.source = read_source(hair, depsgraph)
         uses_head = self.source.head is not None and head is not None
         self.head = Body.at_rest(head, depsgraph) if uses_head else None
         self.head_uid = head and head.session_uid
-        self.obstacle: Obstacle | None = None
+        self.obstacles: Obstacles | None = None
         self.is_playing = False
         self.is_stale = False
-        self._prepare(hair, depsgraph)
+        self._is_drawn = is_drawn
+        self.choices = Choices.of(hair)
+        check_finite(hair.name, self.hair.rest)
+        if baked is not None and (baked.rests.head is None) == (self.head is None):
+            rig = self._rig_of(baked)
+        else:
+            rig = pipeline.prepare(
+                self.source.strands, self.source.head, self.choices.guides, place=self.name
+            )
+        self._take_rig(rig, depsgraph)
 
     @property
     def uid(self) -> int:
@@ -80,24 +81,56 @@ class Session:
     def name(self) -> str:
         return self.hair.handle.name
 
-    def _prepare(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the artist should know about hair, head and colliders."""
+        hair = self.hair.handle.find()
+        doubled = () if hair is None else dynamics_warnings(hair)
+        found = () if self.obstacles is None else self.obstacles.warnings
+        return (*self.source.warnings, *doubled, *found)
+
+    @property
+    def computed_on(self) -> str:
+        """Such as "GPU (OpenGL, llvmpipe)"."""
+        if self.solver.form == "numpy":
+            return "CPU (numpy)"
+        used = gpu_in_use()
+        backend = _BACKENDS.get(used["backend"], used["backend"])
+        return f"GPU ({backend}, {used['renderer'].partition(' (')[0]})"
+
+    @property
+    def strands(self) -> Floats:
+        """All strands as they are shown, (strand_count, cv_count, 3) [m]; reads back from a GPU."""
+        return self.solver.strands()
+
+    def _take_rig(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> None:
         """Everything that hangs on the strands and on the choice of guides."""
-        self.choices = Choices.of(hair)
-        self.rig: Rig = pipeline.prepare(
-            self.source.strands, self.source.head, self.choices.guides, place=self.name
-        )
-        rig = self.rig
-        self.motion: Motion = pipeline.begin(rig, rig.rest_pose)
+        self.rig = rig
+        self._used = used_vertices(rig)
+        self.solver: Solver = solver_of(rig, self.choices.dynamics.form)
+        occlusion = None
+        if self._is_drawn:
+            occlusion = pipeline.rest_occlusion(rig, self.choices.ambient)
         self.snapshot = Snapshot(
             strands=rig.strands.grid,
             radius=rig.strands.radius.reshape(rig.strands.strand_count, -1),
-            occlusion=pipeline.rest_occlusion(rig, self.choices.ambient),
+            occlusion=occlusion,
             shading=self.choices.shading,
             strand_settings=self.choices.strands,
         )
         self.light(depsgraph)
         self.rest(depsgraph)
         self.is_stale = False
+
+    def _rig_of(self, baked: BakedRig) -> Rig:
+        """The rig of a bake; rest is where hair and head were then."""
+        back = baked.rests.hair @ np.linalg.pinv(self.hair.rest)
+        strands = self.source.strands.transformed(back)
+        self.source = replace(self.source, strands=strands, head=baked.rig.head)
+        self.hair.rest = baked.rests.hair
+        if self.head is not None and baked.rests.head is not None:
+            self.head.rest = baked.rests.head
+        return baked.rig
 
     def has_another_head(self) -> bool:
         """Whether the artist has set another surface since the session began."""
@@ -123,10 +156,16 @@ class Session:
             self.take_settings()
             return
         self.source = replace(self.source, strands=strands, dropped=read.dropped)
-        self._prepare(hair, depsgraph)
+        self.choices = choices
+        rig = pipeline.prepare(strands, self.source.head, choices.guides, place=self.name)
+        self._take_rig(rig, depsgraph)
 
     def take_settings(self) -> None:
-        """Take over what acts at once; guide and ambient settings make the session stale."""
+        """Take over what acts at once; guide and ambient settings make the session stale.
+
+        Raises:
+            HairloomError: the form of computing that was chosen is not to be had here.
+        """
         choices = Choices.of(self.hair.found())
         before = self.choices
         self.is_stale |= (choices.guides, choices.ambient) != (before.guides, before.ambient)
@@ -134,6 +173,14 @@ class Session:
         self.snapshot = replace(
             self.snapshot, shading=choices.shading, strand_settings=choices.strands
         )
+        if choices.dynamics.form != before.dynamics.form:
+            self._change_form(choices.dynamics.form)
+
+    def _change_form(self, form: str) -> None:
+        """Go on where the hair is now, with another solver."""
+        if form_of(form) != self.solver.form:
+            self.solver = solver_of(self.rig, form, self.solver.motion)
+            self._show()
 
     def light(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Take over the scene's lights and world."""
@@ -149,25 +196,43 @@ class Session:
         Raises:
             HairloomError: the hair or its head is gone, or the head's mesh is another one.
         """
-        pose = self._pose(depsgraph)
-        self.motion = pipeline.begin(self.rig, pose)
-        if self.is_playing and self.obstacle is not None:
-            self.obstacle.move(depsgraph)
-        self._show(pipeline.carried(self.rig, pose))
+        self.solver.rest(self._pose(depsgraph))
+        if self.is_playing and self.obstacles is not None:
+            self.obstacles.rest(depsgraph)
+        self._show()
 
-    def play(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Get ready to simulate from the style on; makes the collider, which can take a second.
+    def has_moved(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether the body is elsewhere than in what is shown.
 
         Raises:
-            HairloomError: as `rest`, or the collider is no closed mesh.
+            HairloomError: as `rest`.
         """
+        now, shown = self._pose(depsgraph), self.solver.pose
+        if now.head_positions is None or shown.head_positions is None:
+            return not np.array_equal(now.matrix, shown.matrix)
+        return not np.array_equal(now.head_positions, shown.head_positions)
+
+    def play(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Get ready to simulate from the style on; makes the colliders, which can take a second.
+
+        Raises:
+            HairloomError: as `rest`, or Blender's own hair dynamics is on.
+        """
+        hair = self.hair.found()
+        self.is_playing = False
+        refuse_own_dynamics(hair)
         self.take_settings()
-        self.rest(depsgraph)
-        self.is_playing = True
-        known, self.obstacle = self.obstacle, None
-        self.obstacle = obstacle_of(
-            self.hair.found(), self.head, self.rig.head, self.choices.dynamics, depsgraph, known
+        self.obstacles = Obstacles.of(
+            hair,
+            self.head,
+            self.rig.head,
+            self.choices.dynamics,
+            depsgraph,
+            self.obstacles,
+            self._used,
         )
+        self.is_playing = True
+        self.rest(depsgraph)
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Back to the style."""
@@ -181,35 +246,67 @@ class Session:
             HairloomError: as `rest`.
         """
         pose = self._pose(depsgraph)
-        self.motion = pipeline.advance(
-            self.rig,
-            self.motion,
+        self.solver.advance(
             pose,
-            () if self.obstacle is None else (self.obstacle.move(depsgraph),),
+            () if self.obstacles is None else self.obstacles.move(depsgraph, duration),
             self.choices.dynamics,
             gravity_of(depsgraph.scene),
             duration,
+            scene_wind(depsgraph),
         )
-        self._show(pipeline.strands_now(self.rig, self.motion))
+        self._show()
+
+    def constants(self) -> Arrays:
+        """See `baked_rig.rig_arrays`."""
+        rests = RestMatrices(self.hair.rest, None if self.head is None else self.head.rest)
+        return rig_arrays(self.rig, rests)
+
+    def recorded(self) -> Arrays:
+        """See `baked_rig.frame_arrays`."""
+        return frame_arrays(self.solver.pose, self.solver.guides(), self._used)
+
+    def show_recorded(self, frame: Arrays) -> None:
+        """Hair as it was recorded, on the head as that was.
+
+        Raises:
+            HairloomError: the frame is of another groom.
+        """
+        rig = self.rig
+        baked = BakedRig(rig, RestMatrices(self.hair.rest, None), self._used)
+        shapes = [len(rig.guides), rig.strands.grid.shape[1], 3], len(self._used)
+        found = list(frame["guides"].shape), len(frame.get("head", ()))
+        if found != shapes:
+            raise HairloomError(
+                "its bake is of another groom, or of other guides",
+                place=self.name,
+                remedy="Bake again, or delete the bake",
+            )
+        self.solver.carry(baked.pose(frame), frame["guides"])
+        self._show()
+
+    def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """See `simulated.Simulated`."""
+        hair = self.hair.found()
+        head = None if self.head is None else self.head.found()
+        return groom_fingerprint(hair, head, self.choices.guides, depsgraph.scene)
+
+    def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """See `simulated.Simulated`."""
+        pose, hair = self._pose(depsgraph), self.hair.found()
+        head = None if self.head is None else self.head.found()
+        return hashes(
+            pose=pose.matrix if pose.head_positions is None else pose.head_positions,
+            settings=replace(Choices.of(hair).dynamics, form="automatic"),
+            colliders=collider_places(hair, head, depsgraph),
+            forces=(gravity_of(depsgraph.scene), scene_wind(depsgraph)),
+        )
 
     def _pose(self, depsgraph: bpy.types.Depsgraph) -> Pose:
-        self.hair.found()
-        if self.head is None:
-            return Pose(None, self.hair.moved(depsgraph))
-        head = self.head.found()
-        positions = read_positions(head, depsgraph, place=head.name)
-        assert self.rig.head is not None
-        if len(positions) != len(self.rig.head.positions):
-            raise HairloomError(
-                f"its mesh now has {len(positions):,} vertices instead of "
-                f"{len(self.rig.head.positions):,}, so the hair has lost its hold",
-                place=head.name,
-                remedy="Press Preview again",
-            )
-        return Pose(positions, self.head.moved(depsgraph))
+        vertex_count = None if self.rig.head is None else len(self.rig.head.positions)
+        return read_pose(self.hair, self.head, vertex_count, depsgraph)
 
-    def _show(self, points: Floats) -> None:
-        self.snapshot = replace(self.snapshot, strands=points)
+    def _show(self) -> None:
+        self.snapshot = self.solver.shown(self.snapshot)
 
 
 def gravity_of(scene: bpy.types.Scene) -> Floats:

@@ -39,20 +39,57 @@ def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sourc
     """
     read = usable_curves(hair, depsgraph)
     head, head_warning = _read_head(hair, depsgraph)
-    warnings = tuple(filter(None, (head_warning, _dynamics_warning(hair))))
-    return Source(read.strands, read.dropped, head, warnings)
+    return Source(read.strands, read.dropped, head, tuple(filter(None, (head_warning,))))
 
 
-def _dynamics_warning(hair: bpy.types.Object) -> str | None:
-    """Blender's own hair dynamics would move what ours moves as well."""
-    for modifier in hair.modifiers:
-        nodes = modifier.node_group if modifier.type == "NODES" else None
-        if nodes is not None and modifier.show_viewport and nodes.name.startswith(_OWN_DYNAMICS):
-            return (
-                f"{hair.name}: its modifier {modifier.name} simulates too. "
-                "Turn it off in the viewport."
+def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """The object's modifiers with Blender's own hair dynamics that are on, in viewport or render.
+
+    They would move what ours moves as well.
+    """
+    groups = [
+        (modifier, modifier.node_group) for modifier in hair.modifiers if modifier.type == "NODES"
+    ]
+    return [
+        modifier
+        for modifier, nodes in groups
+        if nodes is not None
+        and nodes.name.startswith(_OWN_DYNAMICS)
+        and (modifier.show_viewport or modifier.show_render)
+    ]
+
+
+def refuse_own_dynamics(hair: bpy.types.Object) -> None:
+    """Never simulate twice.
+
+    Raises:
+        HairloomError: Blender's own hair dynamics moves this hair already.
+    """
+    for modifier in own_dynamics(hair):
+        if modifier.show_viewport:
+            raise HairloomError(
+                f"its modifier {modifier.name} simulates it already",
+                place=hair.name,
+                remedy="Press Mute Hair Dynamics, which turns that modifier off",
             )
-    return None
+
+
+def dynamics_warnings(hair: bpy.types.Object) -> tuple[str, ...]:
+    """What the artist should know about Blender's own hair dynamics."""
+    return tuple(
+        f"{hair.name}: its modifier {modifier.name} simulates it too, so Hairloom does not. "
+        "Press Mute Hair Dynamics."
+        for modifier in own_dynamics(hair)
+        if modifier.show_viewport
+    )
+
+
+def mute_own_dynamics(hair: bpy.types.Object) -> int:
+    """Turn Blender's own hair dynamics off, in viewport and render; returns how many."""
+    modifiers = own_dynamics(hair)
+    for modifier in modifiers:
+        modifier.show_viewport = modifier.show_render = False
+    return len(modifiers)
 
 
 def usable_curves(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,11 +17,15 @@ from ..arrays import Floats
 from ..dynamics.colliders import Collider, PosedCollider
 from ..dynamics.measure import deepest_penetration, max_stretch
 from ..dynamics.settings import DynamicsSettings
+from ..dynamics.way import bow
 from ..errors import HairloomError
 from ..exchange.atomic import atomic_write
 from ..pipeline import Pose, Rig
+from .fingerprints import frame_rate
 from .objects import Body
+from .session import gravity_of
 from .surfaces import read_positions
+from .wind import scene_wind
 
 #: the shake: how far the head turns and sways, and how often
 SHAKE_ANGLE = np.radians(25.0)
@@ -59,33 +63,55 @@ class Worst:
     penetration: float
 
 
+@dataclass(frozen=True)
+class TakeDrive:
+    """What moves the hair of a take.
+
+    poses: of the head, one a frame. frame_rate: [1/s].
+    winds: (3,) [m/s] a frame, of the scene's force fields; none: still air.
+    gravity: (3,) [m/s^2], world space.
+    """
+
+    poses: list[Pose]
+    frame_rate: float
+    winds: tuple[Floats, ...] = ()
+    gravity: Floats = field(default_factory=lambda: GRAVITY)
+
+
 def simulate(
     rig: Rig,
     collider: Collider,
-    poses: list[Pose],
-    frame_rate: float,
+    drive: TakeDrive,
     settings: DynamicsSettings,
     stage: Callable[[str], AbstractContextManager[None]],
     each_frame: Callable[[int], object],
 ) -> tuple[Take, Worst]:
     """Run the dynamics through the poses, the first being where the hair starts at rest.
 
+    Roots and collider go smoothly through the poses, see `dynamics.way`.
+
     Args:
         stage: gives a context in which a named stage is timed.
         each_frame: told the number of each finished frame.
     """
-    motion = pipeline.begin(rig, poses[0])
+    poses, rate = drive.poses, drive.frame_rate
+    motion, earlier = pipeline.begin(rig, poses[0]), None
     guides, stretch, penetration = [motion.guides], 0.0, 0.0
     for frame, (before, now) in enumerate(pairwise(poses), start=1):
-        posed = (PosedCollider(collider, before.matrix, now.matrix),)
+        bent = None if earlier is None else bow(earlier.matrix, before.matrix, now.matrix, 1.0)
+        posed = (PosedCollider(collider, before.matrix, now.matrix, bent),)
+        wind = drive.winds[frame] if drive.winds else pipeline.NO_WIND
         with stage("simulate frame"):
-            motion = pipeline.advance(rig, motion, now, posed, settings, GRAVITY, 1.0 / frame_rate)
+            motion = pipeline.advance(
+                rig, motion, now, posed, settings, drive.gravity, 1.0 / rate, wind
+            )
+        earlier = before
         guides.append(motion.guides)
         stretch = max(stretch, max_stretch(motion.dynamics))
         penetration = max(penetration, deepest_penetration(motion.dynamics, posed))
         each_frame(frame)
     heads = np.stack([_head_of(pose) for pose in poses])
-    return Take(np.stack(guides), heads, frame_rate), Worst(stretch, penetration)
+    return Take(np.stack(guides), heads, rate), Worst(stretch, penetration)
 
 
 def shaken_poses(rig: Rig, frame_count: int, frame_rate: float) -> list[Pose]:
@@ -105,22 +131,25 @@ def shaken_poses(rig: Rig, frame_count: int, frame_rate: float) -> list[Pose]:
     return poses
 
 
-def scene_poses(head_object: str, frames: range) -> Iterator[Pose]:
-    """The head as the scene animates it, one pose a frame; leaves the scene where it was.
+def scene_drive(head_object: str) -> TakeDrive:
+    """The head, wind and gravity as the open scene animates them, over its frame range.
 
-    Rest is where the head is now: what was read from the scene was read in this frame.
+    Leaves the scene where it was. Rest is where the head is now: what was read from the scene was
+    read in this frame.
     """
     scene, head = bpy.context.scene, bpy.data.objects[head_object]
-    shown = scene.frame_current
+    shown, poses, winds = scene.frame_current, [], []
     body = Body.at_rest(head, bpy.context.evaluated_depsgraph_get())
     try:
-        for frame in frames:
+        for frame in range(scene.frame_start, scene.frame_end + 1):
             scene.frame_set(frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
             positions = read_positions(head, depsgraph, place=head_object)
-            yield Pose(positions, body.moved(depsgraph))
+            poses.append(Pose(positions, body.moved(depsgraph)))
+            winds.append(scene_wind(depsgraph))
     finally:
         scene.frame_set(shown)
+    return TakeDrive(poses, frame_rate(scene), tuple(winds), gravity_of(scene))
 
 
 def write_take(path: Path, take: Take) -> None:

@@ -5,6 +5,6 @@ checked value object (here), the Blender property (`host.properties`), the GLSL 
 bytes (`params.glsl`), the preset check (`params.preset`) and the row in the docs (`params.docs`).
 """
 
-from .field import Parameter, Settings, choice, color, integer, number, toggle
+from .field import Parameter, Settings, choice, color, curve, integer, number, toggle
 
-__all__ = ["Parameter", "Settings", "choice", "color", "integer", "number", "toggle"]
+__all__ = ["Parameter", "Settings", "choice", "color", "curve", "integer", "number", "toggle"]

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
 from ..errors import HairloomError
+from .curve import PLACES, Curve
 
-Kind = Literal["number", "integer", "toggle", "color", "choice"]
+Kind = Literal["number", "integer", "toggle", "color", "choice", "curve"]
 #: length [m], angle [rad], time [s], rate [1/s], speed [m/s], factor [0..1], acceleration [m/s^2]
 Unit = Literal["none", "length", "angle", "time", "rate", "speed", "factor", "acceleration"]
 Range = tuple[float, float]
@@ -58,6 +59,11 @@ class Parameter:
         if self.kind == "color":
             red, green, blue = (self._in_range(_finite(channel)) for channel in value)
             return (red, green, blue)
+        if self.kind == "curve":
+            values = tuple(self._in_range(_finite(place)) for place in value)
+            if len(values) != len(PLACES):
+                raise ValueError(f"it must be {len(PLACES)} values from root to tip")
+            return values
         if self.kind == "integer":
             if isinstance(value, bool) or int(value) != value:
                 raise TypeError("it must be a whole number")
@@ -195,6 +201,15 @@ def choice(
 ) -> Any:
     """Declare one of several named options, each (identifier, label, description)."""
     return _declare(Parameter("", "choice", default, label, description, source, choices=choices))
+
+
+def curve(
+    default: Curve, *, label: str, description: str, hard: Range, source: str = "Hairloom"
+) -> Any:
+    """Declare values along the strand, see `curve.along`."""
+    return _declare(
+        Parameter("", "curve", tuple(default), label, description, source, "none", hard, hard)
+    )
 
 
 def _declare(parameter: Parameter) -> Any:

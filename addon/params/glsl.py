@@ -15,12 +15,14 @@ _SCALAR_TYPES = {"number": "float", "integer": "int", "toggle": "int", "choice":
 
 def struct_source(settings: type[Settings], struct_name: str) -> str:
     """GLSL declaration of the struct, one member a parameter, in declaration order."""
+    _check_kinds(settings)
     members = [f"  {_SCALAR_TYPES.get(p.kind, 'vec3')} {p.name};" for p in settings.parameters()]
     return "\n".join([f"struct {struct_name} {{", *members, "};", ""])
 
 
 def struct_values(settings: Settings) -> np.ndarray:
     """The values as std140 bytes, (n,) float32; integers are stored by their bit pattern."""
+    _check_kinds(type(settings))
     words: list[float | np.int32] = []
     for parameter in settings.parameters():
         value = getattr(settings, parameter.name)
@@ -38,6 +40,12 @@ def struct_values(settings: Settings) -> np.ndarray:
         else:
             packed[index] = word
     return packed
+
+
+def _check_kinds(settings: type[Settings]) -> None:
+    """A curve has no place in a struct: whoever needs one evaluates it into a texture."""
+    curves = [p.name for p in settings.parameters() if p.kind == "curve"]
+    assert not curves, f"{settings.section}: {', '.join(curves)}"
 
 
 def _scalar(parameter: Parameter, value: float | bool | str) -> float | np.int32:

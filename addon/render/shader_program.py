@@ -24,6 +24,9 @@ from ..params import Settings
 from ..params.glsl import struct_source
 from .shader_source import SHADER_FOLDER, ShaderError, ShaderText, compose
 
+#: what a compute shader may do with an image, and Blender's words for it
+ACCESSES = {"WRITE": {"WRITE"}, "READ": {"READ"}, "READ_WRITE": {"READ", "WRITE"}}
+
 
 @dataclass(frozen=True)
 class ShaderRecipe:
@@ -33,11 +36,14 @@ class ShaderRecipe:
     structs: files with the structs that blocks use; they come before everything else.
     settings: parameter sets whose structs, named after the classes, blocks use as well.
     blocks: (struct, name) of each uniform block.
-    textures: (sampler type, name); images: (format, name), written to by compute shaders.
+    textures: (sampler type, name).
+    images: (format, name) of what compute shaders write; (format, name, access) with an access of
+        ACCESSES for those that they read as well.
     integers: names of INT push constants (UINT ones stay 0 on OpenGL); numbers: (type, name).
     inputs: (type, name) of vertex attributes; varyings: (interpolation, type, name).
     outputs: (type, name) of fragment outputs.
-    group_size: compute local size in x and y.
+    group_size: compute local size in x, or in x and y.
+    defines: (name, value) of preprocessor names: one file, several programs.
     """
 
     name: str
@@ -48,14 +54,20 @@ class ShaderRecipe:
     settings: tuple[type[Settings], ...] = ()
     blocks: tuple[tuple[str, str], ...] = ()
     textures: tuple[tuple[str, str], ...] = ()
-    images: tuple[tuple[str, str], ...] = ()
+    images: tuple[tuple[str, ...], ...] = ()
     integers: tuple[str, ...] = ()
     numbers: tuple[tuple[str, str], ...] = ()
     inputs: tuple[tuple[str, str], ...] = ()
     varyings: tuple[tuple[str, str, str], ...] = ()
     outputs: tuple[tuple[str, str], ...] = ()
-    group_size: tuple[int, int] = (8, 8)
+    group_size: tuple[int, ...] = (8, 8)
+    defines: tuple[tuple[str, int], ...] = ()
     folders: tuple[Path, ...] = (SHADER_FOLDER,)
+
+    def __post_init__(self) -> None:
+        for _, name, *access in self.images:
+            if access and tuple(access) not in {(known,) for known in ACCESSES}:
+                raise ShaderError(f"{self.name}: image {name} is none of {', '.join(ACCESSES)}")
 
     @property
     def texts(self) -> dict[str, ShaderText]:
@@ -91,7 +103,7 @@ class ShaderProgram:
         recipe = self.recipe
         self._require("block", [name for _, name in recipe.blocks], blocks)
         self._require("texture", [name for _, name in recipe.textures], textures)
-        self._require("image", [name for _, name in recipe.images], images)
+        self._require("image", [name for _, name, *_ in recipe.images], images)
         self._require("integer", recipe.integers, integers)
         self._require("number", [name for _, name in recipe.numbers], numbers)
         self.shader.bind()
@@ -162,6 +174,8 @@ def _compiled(recipe: ShaderRecipe) -> Any:
 
 def _create_info(recipe: ShaderRecipe, texts: Mapping[str, ShaderText]) -> Any:
     info = gpu.types.GPUShaderCreateInfo()
+    for name, value in recipe.defines:
+        info.define(name, str(value))
     structs = [compose(file, recipe.folders).source for file in recipe.structs]
     structs += [struct_source(settings, settings.__name__) for settings in recipe.settings]
     if structs:
@@ -170,8 +184,9 @@ def _create_info(recipe: ShaderRecipe, texts: Mapping[str, ShaderText]) -> Any:
         info.uniform_buf(slot, kind, name)
     for slot, (kind, name) in enumerate(recipe.textures):
         info.sampler(slot, kind, name)
-    for slot, (image_format, name) in enumerate(recipe.images):
-        info.image(slot, image_format, "FLOAT_2D", name, qualifiers={"WRITE"})
+    for slot, (image_format, name, *access) in enumerate(recipe.images):
+        qualifiers = ACCESSES[access[0] if access else "WRITE"]
+        info.image(slot, image_format, "FLOAT_2D", name, qualifiers=qualifiers)
     for name in recipe.integers:
         info.push_constant("INT", name)
     for kind, name in recipe.numbers:

@@ -15,12 +15,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
+from ..dynamics.constraints import CONTACT_WEIGHT, HELD, PINNED
+from ..dynamics.contacts import SKIN
+from ..dynamics.wind import MODES
 from ..shading.lights import LIGHT_CAPACITY, NEAREST_DISTANCE
 
 SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
 
 #: A texture side may be 16384 texels on every GPU that Blender supports.
 STRAND_ROWS = 16384
+#: Texels of the dynamics' table of moments: of the substep itself, and of each collider.
+MOMENT_TEXELS, COLLIDER_TEXELS = 1 + -(-MODES // 4), 9
+#: Round solids, and nodes of distance fields, in one row of their textures.
+ROUNDS_ACROSS, FIELD_ROW = 512, 4096
 #: how a pass writes its colour; see encoded() in lib_output.glsl
 OUTPUTS = ("scene_linear", "viewport")
 
@@ -29,6 +36,15 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "light_capacity": str(LIGHT_CAPACITY),
         "nearest_distance": repr(NEAREST_DISTANCE),
         "strand_rows": str(STRAND_ROWS),
+        "pinned": str(PINNED),
+        "contact_weight": repr(float(CONTACT_WEIGHT)),
+        "held_weight": repr(float(HELD)),
+        "contact_skin": repr(float(SKIN)),
+        "wind_modes": str(MODES),
+        "moment_texels": str(MOMENT_TEXELS),
+        "collider_texels": str(COLLIDER_TEXELS),
+        "rounds_across": str(ROUNDS_ACROSS),
+        "field_row": str(FIELD_ROW),
         **{f"output_{name}": str(index) for index, name in enumerate(OUTPUTS)},
     }
 )

@@ -6,6 +6,7 @@ Pure numpy: importable without gpu.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +46,27 @@ class MeshSnapshot:
         return cls(surface, surface.vertex_normals(), color, occlusion)
 
 
+@dataclass(eq=False)
+class DevicePoints:
+    """CVs that are computed on the GPU and stay there.
+
+    Whoever computes them writes the next moment into the same texture, so a picture shows them as
+    they are when it is drawn, and lets go of it when the GPU goes.
+
+    shape: (strand_count, cv_count).
+    texture: RGBA32F in the layout of textures.strand_rows, xyz position [m, world] and w radius
+        [m]; None before the first moment and after the release.
+    center: (3,) [m], the middle of all roots.
+    """
+
+    shape: tuple[int, int]
+    texture: Any = None
+    center: Floats = field(default_factory=lambda: np.zeros(3, np.float32))
+
+    def release(self) -> None:
+        self.texture = None
+
+
 @dataclass(frozen=True, eq=False)
 class Snapshot:
     """One moment of hair, the meshes around it, and the light.
@@ -56,6 +78,8 @@ class Snapshot:
         each strand's index.
     ambient: the world's colour [W/(m^2 sr)].
     volume_center: (3,) [m], what strands look away from; None is the middle of all roots.
+    device_points: the same strands where the GPU has moved them; they are drawn in place of
+        `strands` and `radius`, which then only say how many there are.
 
     A pass uploads an array again only when it is another object than before: hand the same array
     on where nothing changed, and a new array (not the old one rewritten) where something did.
@@ -74,6 +98,7 @@ class Snapshot:
     shading: ShadingSettings = field(default_factory=ShadingSettings)
     strand_settings: StrandSettings = field(default_factory=StrandSettings)
     volume_center: Floats | None = None
+    device_points: DevicePoints | None = None
 
     def __post_init__(self) -> None:
         if self.strands.ndim != 3 or self.strands.shape[1] < 2 or self.strands.shape[2] != 3:
@@ -88,6 +113,10 @@ class Snapshot:
             value = getattr(self, name)
             if value is not None and np.shape(value) != shape:
                 raise ValueError(f"{name} has shape {np.shape(value)}, not {shape}")
+        if self.device_points is not None and self.device_points.shape != expected["radius"]:
+            raise ValueError(
+                f"device_points has shape {self.device_points.shape}, not {expected['radius']}"
+            )
 
     @property
     def strand_count(self) -> int:
@@ -102,6 +131,8 @@ class Snapshot:
         """What strands look away from, (3,) [m]."""
         if self.volume_center is not None:
             return np.asarray(self.volume_center, np.float32)
+        if self.device_points is not None:
+            return self.device_points.center
         if not self.strand_count:
             return np.zeros(3, np.float32)
         return self.strands[:, 0].mean(axis=0, dtype=np.float64).astype(np.float32)

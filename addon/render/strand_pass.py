@@ -1,7 +1,8 @@
 """Draws strands as ribbons that face the eye, shaded per pixel, into whatever target is bound.
 
 Packed textures, one row a strand (column blocks beyond 16384 rows, see textures.strand_rows):
-    cv_points RGBA32F: xyz position [m, world], w radius [m]     new with every new pose
+    cv_points RGBA32F: xyz position [m, world], w radius [m]     new with every new pose, unless
+                                                                 it lies on the GPU already
     cv_looks  RG32F:   x ambient occlusion, y seed as a number   constant
 """
 
@@ -19,7 +20,7 @@ from ..shading.settings import ShadingSettings, StrandSettings
 from ..shading.strand_noise import SEED_LIMIT
 from .camera import Camera
 from .shader_program import ShaderRecipe, program, released_with_shaders
-from .shader_source import output_index
+from .shader_source import ShaderError, output_index
 from .snapshot import Snapshot
 from .textures import UniformBlock, drawing_state, strand_rows, texture_from
 from .view_block import view_values
@@ -80,7 +81,7 @@ class StrandPass:
                 counts in the latter.
 
         Raises:
-            ShaderError: the shader does not compile here.
+            ShaderError: the shader does not compile here, or points on the GPU were released.
         """
         if not snapshot.strand_count:
             return
@@ -120,7 +121,12 @@ class StrandPass:
 
     def _upload(self, snapshot: Snapshot) -> None:
         points = (snapshot.strands, snapshot.radius)
-        if self._is_new("cv_points", points):
+        if snapshot.device_points is not None:
+            if snapshot.device_points.texture is None:
+                raise ShaderError("strand: what the GPU has computed was released")
+            self._textures["cv_points"] = snapshot.device_points.texture
+            self._uploaded.pop("cv_points", None)
+        elif self._is_new("cv_points", points):
             packed = np.concatenate([snapshot.strands, snapshot.radius[..., None]], axis=-1)
             self._textures["cv_points"] = texture_from(strand_rows(packed), "RGBA32F")
             self._uploaded["cv_points"] = points

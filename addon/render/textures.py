@@ -27,7 +27,7 @@ def texture_from(pixels: Floats, texture_format: str) -> Any:
 
 def texture_to_array(texture: Any) -> Floats:
     """A float texture as (height, width, channels) float32, row 0 at the bottom."""
-    pixels = np.array(texture.read(), np.float32)
+    pixels = np.asarray(texture.read(), np.float32)  # the memory that was read, without a copy
     return pixels.reshape(texture.height, texture.width, -1)
 
 
@@ -50,6 +50,13 @@ def strand_rows(values: Floats) -> Floats:
     padded[:strand_count] = values
     columns = padded.reshape(blocks, STRAND_ROWS, cv_count, channels).swapaxes(0, 1)
     return np.ascontiguousarray(columns).reshape(STRAND_ROWS, blocks * cv_count, channels)
+
+
+def from_strand_rows(pixels: Floats, strand_count: int, cv_count: int) -> Floats:
+    """What `strand_rows` has laid out, again as (strand_count, cv_count, channels)."""
+    height, width, channels = pixels.shape
+    blocks = pixels.reshape(height, width // cv_count, cv_count, channels).swapaxes(0, 1)
+    return blocks.reshape(-1, cv_count, channels)[:strand_count]
 
 
 class UniformBlock:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import bpy
 from bpy.props import CollectionProperty, EnumProperty, FloatProperty, StringProperty
@@ -11,6 +12,8 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper, poll_file_object_dro
 from ..errors import HairloomError
 from ..host import groom_files
 from ..host.groups import operator_properties
+from ..host.objects import head_of
+from ..host.vertex_weights import weight_names
 from .reports import reporting, tell, waiting
 from .selection import active_mesh, chosen_hair, needs_hair
 
@@ -20,6 +23,31 @@ UP_AXES = (
 )
 
 
+#: settings that say nothing about hair that stands straight along the normals, and the other way
+_COMBED_ONLY: tuple[str, ...] = (
+    "lift",
+    "comb_back",
+    "comb_share",
+    "droop",
+    "clump",
+    "clump_size",
+    "wave",
+    "wave_length",
+    "frizz",
+    "clearance",
+    "volume",
+)
+_NORMALS_ONLY: tuple[str, ...] = ("per_vertex", "threshold")
+
+
+def _weight_names(_operator: Any, context: bpy.types.Context, typed: str) -> list[str]:
+    # while the operator is adjusted the hair that it has grown is active
+    chosen = chosen_hair(context)
+    mesh = active_mesh(context) or (head_of(chosen[0]) if chosen else None)
+    names = [] if mesh is None else weight_names(mesh)
+    return [name for name in names if typed.lower() in name.lower()]
+
+
 class HAIRLOOM_OT_grow(bpy.types.Operator):
     """Grow hair curves on the active mesh"""
 
@@ -27,7 +55,23 @@ class HAIRLOOM_OT_grow(bpy.types.Operator):
     bl_label = "Grow Hair"
     bl_options = {"REGISTER", "UNDO"}
 
-    __annotations__ = operator_properties("grow")
+    __annotations__ = {
+        **operator_properties("grow"),
+        "density_group": StringProperty(
+            name="Density",
+            description="Vertex group or float attribute on points that says how densely hair "
+            "grows; empty: on the scalp if combed, else everywhere",
+            search=_weight_names,
+            search_options={"SUGGESTION"},
+        ),
+        "length_group": StringProperty(
+            name="Length Factor",
+            description="Vertex group or float attribute on points that the length is multiplied "
+            "by; empty: all as long as said",
+            search=_weight_names,
+            search_options={"SUGGESTION"},
+        ),
+    }
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -40,9 +84,27 @@ class HAIRLOOM_OT_grow(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         head, depsgraph = active_mesh(context), context.evaluated_depsgraph_get()
         with waiting(context):
-            hair = groom_files.grow_on(head, depsgraph, context.collection, self)
+            hair = groom_files.grow_on(
+                head,
+                depsgraph,
+                context.collection,
+                self,
+                density_group=self.density_group,
+                length_group=self.length_group,
+            )
         _make_active(context, [hair])
         return {"FINISHED"}
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        hidden = _NORMALS_ONLY if self.way == "combed" else _COMBED_ONLY
+        if self.way == "normals" and self.per_vertex:
+            hidden += ("strand_count",)
+        elif self.way == "normals":
+            hidden += ("threshold",)
+        for name in self.__annotations__:
+            if name not in hidden:
+                self.layout.prop(self, name)
 
 
 class HAIRLOOM_OT_import_tfx(bpy.types.Operator, ImportHelper):

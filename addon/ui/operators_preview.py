@@ -1,4 +1,9 @@
-"""Preview, Play and Reset: hair in the 3D viewport. None of them changes the file."""
+"""Preview, Play, Pause and Reset: hair in the 3D viewport. None of them changes the file.
+
+Play is free of the timeline: hair swings by the clock, at the scene's rate, while the artist moves
+the head or the sliders. Blender's own playback moves hair too, frame by frame; when it starts while
+hair plays, it takes over. No key is taken but Esc, which stops: Space stays Blender's.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +11,18 @@ import time
 
 import bpy
 
-from ..host import live
+from ..host import fins, live
+from ..host.fingerprints import frame_rate
 from ..host.groom_files import Outcome
+from ..host.pace import Pace
+from ..host.source import mute_own_dynamics, own_dynamics
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
 
-TICKS_PER_SECOND = 60.0
+#: Ticks are at least this often [1/s], so that a frame is late by a fraction of itself.
+TICKS_PER_SECOND = 120.0
 STATUS = "Hairloom plays. Move the head or the sliders. Esc: stop, the hair returns to its style"
+PAUSED = "Hairloom is paused: press Resume in its panel. Esc: stop"
 
 
 #: ticks while hair plays; kept here because Blender does not tell an operator that it is disabled
@@ -41,19 +51,23 @@ class HAIRLOOM_OT_preview(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_play(bpy.types.Operator):
-    """Let previewed hair move: it follows the head, falls and swings. Esc stops it"""
+    """Let previewed hair and fins move by the clock: they follow, fall and swing. Esc stops them"""
 
     bl_idname = "hairloom.play"
     bl_label = "Play"
 
-    _last_tick: float = 0.0
+    _pace: Pace
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if bpy.app.background:
-            cls.poll_message_set("Play needs a window; use the command line's simulate")
+            cls.poll_message_set("Play needs a window; use the command line's simulate or bake")
             return False
-        return bool(live.sessions()) or needs_hair(cls, context)
+        return (
+            fins.any_enabled(context.view_layer)
+            or bool(live.simulated())
+            or needs_hair(cls, context)
+        )
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         return self._start_or_stop(context)
@@ -64,12 +78,15 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
             live.rest(context.evaluated_depsgraph_get(), keep_playing=False)
             return {"FINISHED"}  # the operator that plays sees it and ends
         with waiting(context):
-            if not live.sessions():
+            if not live.simulated():
                 start_preview(self, context, chosen_hair(context))
-            for warning in live.play(context.evaluated_depsgraph_get()):
+            depsgraph = context.evaluated_depsgraph_get()
+            for warning in (*fins.start_enabled(depsgraph), *live.play(depsgraph)):
                 self.report({"WARNING"}, warning)
+        if not live.is_playing():
+            return {"CANCELLED"}
         start_ticking(context)
-        self._last_tick = time.perf_counter()
+        self._pace = Pace(time.perf_counter())
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -90,12 +107,56 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
         stop_ticking()
 
     def _tick(self, context: bpy.types.Context) -> None:
-        """Simulate the time that really passed; other timers' ticks in between are left out."""
-        now = time.perf_counter()
-        if now - self._last_tick < 0.5 / TICKS_PER_SECOND:
+        """Simulate the scene's frames that are due, in one go: the head has moved but once."""
+        now, rate = time.perf_counter(), frame_rate(context.scene)
+        if live.is_paused() or live.is_suspended():
+            self._pace.skip(now)
             return
-        live.advance(context.evaluated_depsgraph_get(), now - self._last_tick)
-        self._last_tick = now
+        frames = self._pace.due(now, rate)
+        if frames:
+            live.advance(context.evaluated_depsgraph_get(), frames / rate)
+
+
+class HAIRLOOM_OT_pause(bpy.types.Operator):
+    """Hold hair that plays where it is, or let it go on from there"""
+
+    bl_idname = "hairloom.pause"
+    bl_label = "Pause"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if live.is_playing():
+            return True
+        cls.poll_message_set("No hair plays: press Play first")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        live.pause(not live.is_paused())
+        if _timer is not None:
+            context.workspace.status_text_set(PAUSED if live.is_paused() else STATUS)
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_mute_hair_dynamics(bpy.types.Operator):
+    """Turn off Blender's own Hair Dynamics on the selected hair, so that only Hairloom moves it"""
+
+    bl_idname = "hairloom.mute_hair_dynamics"
+    bl_label = "Mute Hair Dynamics"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not needs_hair(cls, context):
+            return False
+        if any(own_dynamics(hair) for hair in chosen_hair(context)):
+            return True
+        cls.poll_message_set("The selected hair has no Hair Dynamics modifier that is on")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        count = sum(mute_own_dynamics(hair) for hair in chosen_hair(context))
+        self.report({"INFO"}, f"Turned off {count} Hair Dynamics modifiers")
+        return {"FINISHED"}
 
 
 class HAIRLOOM_OT_reset(bpy.types.Operator):
@@ -106,7 +167,7 @@ class HAIRLOOM_OT_reset(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if live.sessions():
+        if live.simulated():
             return True
         cls.poll_message_set("No hair is previewed: press Preview first")
         return False
@@ -144,7 +205,7 @@ def start_preview(
             session = live.start(each, depsgraph)
             rig = session.rig
             counts = f"{rig.strands.strand_count:,} strands, {len(rig.guides):,} guides"
-            tell(operator, Outcome(counts, session.source.dropped, session.source.warnings))
+            tell(operator, Outcome(counts, session.source.dropped, session.warnings))
 
 
 def stop_preview(hair: list[bpy.types.Object]) -> None:
@@ -154,4 +215,10 @@ def stop_preview(hair: list[bpy.types.Object]) -> None:
             live.stop(session)
 
 
-CLASSES = (HAIRLOOM_OT_preview, HAIRLOOM_OT_play, HAIRLOOM_OT_reset)
+CLASSES = (
+    HAIRLOOM_OT_preview,
+    HAIRLOOM_OT_play,
+    HAIRLOOM_OT_pause,
+    HAIRLOOM_OT_reset,
+    HAIRLOOM_OT_mute_hair_dynamics,
+)

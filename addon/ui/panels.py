@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import bpy
 
-from ..host import live
+from ..host import live, timeline
 from ..host.groom_files import dropped_phrase
 from ..host.session import Session
+from ..host.source import own_dynamics
+from ..params import Parameter
+from .messages import draw_lines, draw_message
+from .operators_bake import draw_bake
+from .operators_colliders import draw_colliders
 from .selection import chosen_hair
 
 type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
 
-#: width of a letter in pixels at UI scale 1, for breaking lines
-_LETTER_WIDTH = 7.0
+#: places of a curve's five values
+_PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
 
 
 def _hair(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -33,39 +37,46 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     column.scale_y = 1.3
     text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
     column.operator("hairloom.preview", text=text, icon=icon, depress=session is not None)
-    playing = live.is_playing()
+    playing, paused = live.is_playing(), live.is_paused()
     row = column.row(align=True)
     text, icon = ("Stop", "SNAP_FACE") if playing else ("Play", "PLAY")
     row.operator("hairloom.play", text=text, icon=icon, depress=playing)
+    text, icon = ("Resume", "PLAY") if paused else ("Pause", "PAUSE")
+    row.operator("hairloom.pause", text=text, icon=icon, depress=paused)
     row.operator("hairloom.reset", text="Reset", icon="FILE_REFRESH")
+    if hair is not None:
+        layout.prop(hair.hairloom.bake, "follows")
     if session is not None:
-        _draw_counts(layout, context, session)
+        _draw_state(layout, context, session)
     if live.notice():
-        _draw_message(layout, context, live.notice(), "ERROR")
+        draw_message(layout, context, live.notice(), "ERROR")
     if hair is None:
         layout.operator("hairloom.grow", icon="OUTLINER_OB_CURVES")
         layout.operator("hairloom.import_tfx", icon="IMPORT")
-    else:
-        layout.prop(hair.hairloom, "hide_original")
+        return
+    layout.prop(hair.hairloom, "hide_original")
+    if own_dynamics(hair):
+        layout.operator("hairloom.mute_hair_dynamics", icon="MUTE_IPO_ON")
 
 
-def _draw_counts(layout: bpy.types.UILayout, context: bpy.types.Context, session: Session) -> None:
+def _draw_state(layout: bpy.types.UILayout, context: bpy.types.Context, session: Session) -> None:
     rig = session.rig
     layout.label(text=f"{rig.strands.strand_count:,} strands, {len(rig.guides):,} guides")
+    draw_lines(layout.column(align=True), context, _moved_by(session))
     if session.source.dropped:
-        _draw_message(layout, context, dropped_phrase(session.source.dropped).capitalize(), "INFO")
-    for warning in session.source.warnings:
-        _draw_message(layout, context, warning, "ERROR")
+        draw_message(layout, context, dropped_phrase(session.source.dropped).capitalize(), "INFO")
+    trouble = timeline.trouble(session.uid)
+    for warning in dict.fromkeys((*session.warnings, *((trouble,) if trouble else ()))):
+        draw_message(layout, context, warning, "ERROR")
 
 
-def _draw_message(
-    layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str
-) -> None:
-    """A text in as many lines as the region needs."""
-    letters = context.region.width / (_LETTER_WIDTH * context.preferences.system.ui_scale)
-    column = layout.box().column(align=True)
-    for index, line in enumerate(textwrap.wrap(text, max(int(letters) - 6, 16))):
-        column.label(text=line, icon=icon if index == 0 else "BLANK1")
+def _moved_by(session: Session) -> str:
+    """What moves the hair at the moment, such as "Simulated on the GPU (OpenGL, llvmpipe)"."""
+    baked = timeline.baked(session.uid)
+    if baked is not None and baked.is_shown:
+        return "Shown from the bake" + (", which is out of date" if baked.changed else "")
+    computed = "Simulated" if session.is_playing else "To be simulated"
+    return f"{computed} on the {session.computed_on}"
 
 
 def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -83,9 +94,24 @@ def draw_guides(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """What the sections below leave out."""
     layout.menu("HAIRLOOM_MT_dynamics")
-    layout.prop(hair.hairloom, "collider")
-    _draw_group(layout, hair.hairloom.dynamics)
+    group = hair.hairloom.dynamics
+    below = {name for names in DYNAMICS.values() for name in names}
+    names = [p.name for p in group.settings.parameters() if p.name not in below]
+    _draw_named(layout, group, names)
+
+
+def draw_collisions(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    draw_colliders(layout, hair)
+    _draw_named(layout, hair.hairloom.dynamics, DYNAMICS["Collisions"])
+
+
+def _dynamics_section(label: str) -> Draw:
+    def draw(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+        _draw_named(layout, hair.hairloom.dynamics, DYNAMICS[label])
+
+    return draw
 
 
 def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -101,11 +127,37 @@ def _draw_titled(layout: bpy.types.UILayout, group: Any) -> None:
 
 
 def _draw_group(layout: bpy.types.UILayout, group: Any) -> None:
+    _draw_named(layout, group, [parameter.name for parameter in group.settings.parameters()])
+
+
+def _draw_named(layout: bpy.types.UILayout, group: Any, names: Sequence[str]) -> None:
+    """The parameters of these names; a curve as one slider a place, from root to tip."""
     column = layout.column()
     for parameter in group.settings.parameters():
-        column.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
+        if parameter.name not in names:
+            continue
+        if parameter.kind == "curve":
+            _draw_curve(column, group, parameter)
+        else:
+            column.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
 
 
+def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter) -> None:
+    sliders = layout.column(align=True, heading=parameter.label)
+    for index, place in enumerate(_PLACES):
+        sliders.prop(group, parameter.name, index=index, text=place, slider=True)
+
+
+#: section below Dynamics -> its parameters; all others stand in Dynamics itself
+DYNAMICS: dict[str, tuple[str, ...]] = {
+    "Style": ("style_root", "style_tip", "style_along", "style_damping", "bend", "bend_along"),
+    "Medium & Wind": ("buoyancy", "damping", "drag", "wind_speed", "wind_direction", "wind_rise")
+    + ("gusts", "gust_size", "gust_seed"),
+    "Lengths": ("length_solver", "relaxations", "long_range", "length_tolerance")
+    + ("length_iterations",),
+    "Collisions": ("contact_passes", "friction", "radius_root", "radius_tip", "push_speed")
+    + ("collider_resolution",),
+}
 SECTIONS: tuple[tuple[str, str, Draw], ...] = (
     ("look", "Look", draw_look),
     ("strands", "Strands", draw_strands),
@@ -113,6 +165,16 @@ SECTIONS: tuple[tuple[str, str, Draw], ...] = (
     ("dynamics", "Dynamics", draw_dynamics),
     ("export", "Export", draw_export),
 )
+#: section -> those below it
+SUB_SECTIONS: dict[str, tuple[tuple[str, str, Draw], ...]] = {
+    "dynamics": (
+        ("style", "Style", _dynamics_section("Style")),
+        ("medium", "Medium & Wind", _dynamics_section("Medium & Wind")),
+        ("lengths", "Lengths", _dynamics_section("Lengths")),
+        ("collisions", "Collisions", draw_collisions),
+        ("bake", "Bake", draw_bake),
+    )
+}
 
 
 class HAIRLOOM_PT_sidebar(bpy.types.Panel):
@@ -146,7 +208,10 @@ class HAIRLOOM_PT_data(bpy.types.Panel):
 
 def _sub_panels(parent: type[bpy.types.Panel]) -> Iterable[type[Any]]:
     for name, label, draw_section in SECTIONS:
-        yield _sub_panel(parent, name, label, draw_section)
+        section = _sub_panel(parent, name, label, draw_section)
+        yield section
+        for below in SUB_SECTIONS.get(name, ()):
+            yield _sub_panel(section, *below)
 
 
 def _sub_panel(

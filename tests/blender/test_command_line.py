@@ -14,10 +14,10 @@ pytest.importorskip("bpy", reason="the command line runs inside Blender")
 
 import bpy
 
-from hairloom.addon.exchange.tressfx import write_tfx
+from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
 from hairloom.addon.host import command_line
 from hairloom.addon.host.curves import write_curves
-from hairloom.addon.host.take import scene_poses
+from hairloom.addon.host.take import scene_drive
 from hairloom.addon.strands import StrandSet
 
 HEAD_OBJ = """
@@ -206,6 +206,32 @@ def test_single_bad_strands_are_counted_or_refused(
     assert not (tmp_path / "out.tfx").exists()
 
 
+def test_hair_grows_where_and_as_long_as_the_groups_say(
+    sphere: bpy.types.Object, head: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    place = np.array([vertex.co[:] for vertex in sphere.data.vertices])
+    for name, value in (("Right", place[:, 0] > 0.0), ("Half", np.full(len(place), 0.5))):
+        group = sphere.vertex_groups.new(name=name)
+        for weight in np.unique(value):
+            chosen = np.flatnonzero(value == weight).tolist()
+            group.add(chosen, float(weight), "REPLACE")
+    arguments = ["export", "--set", "grow.way=normals", "--set", "grow.length=0.1"]
+    arguments += ["--set", "grow.length_variation=0", "--set", "grow.strand_count=200"]
+    arguments += ["--no-uv", "--output", str(tmp_path / "hair.tfx")]
+    groups = ["--density-group", "Right", "--length-group", "Half"]
+    assert command_line.run([*arguments, "--head", sphere.name, *groups]) == 0
+    strands = read_tfx(tmp_path / "hair.tfx", up="Y").strands
+    spacing = np.ptp(np.unique(place[:, 0])) / 8
+    assert strands.strand_count == 200 and (strands.roots[:, 0] > -spacing).all()
+    np.testing.assert_allclose(strands.lengths(), 0.05, rtol=1e-3)
+
+    capfd.readouterr()
+    assert command_line.run([*arguments, "--head", sphere.name, "--length-group", "Left"]) == 1
+    assert "Left" in capfd.readouterr().err
+    assert command_line.run([*arguments, "--head", str(head), *groups]) == 1
+    assert "vertex groups" in capfd.readouterr().err
+
+
 def test_simulate_render_and_export_agree_on_the_take(
     groom: Path, head: Path, tmp_path: Path, gpu_context: object
 ) -> None:
@@ -288,6 +314,6 @@ def test_the_scene_moves_the_head(tmp_path: Path, walking_head: bpy.types.Object
 
 def test_rest_is_where_the_scene_was_read(walking_head: bpy.types.Object) -> None:
     """The collider is made from the head as it was read, so its motion must count from there."""
-    poses = list(scene_poses(walking_head.name, range(1, 6)))
+    poses = scene_drive(walking_head.name).poses
     np.testing.assert_allclose(poses[2].matrix, np.eye(4), atol=1e-6)
     assert poses[0].matrix[0, 3] == pytest.approx(-0.25, abs=1e-5)

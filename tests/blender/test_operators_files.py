@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
+from hairloom.addon.host.curves import read_curves
+from hairloom.addon.host.vertex_weights import weight_names
 from hairloom.addon.strands import StrandSet
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -52,6 +54,106 @@ def test_grown_hair_stands_on_its_mesh_and_is_ready_for_blenders_tools(sphere):
     assert np.linalg.norm(roots - np.array(sphere.location), axis=1) == pytest.approx(
         np.full(200, 0.1), rel=0.05
     )
+
+
+def paint_upper_half(mesh, name, weight=1.0):
+    """A vertex group with the sphere's upper half; returns the weights, (vertex_count,)."""
+    upper = [vertex.index for vertex in mesh.data.vertices if vertex.co.z > 0.02]
+    mesh.vertex_groups.new(name=name).add(upper, weight, "REPLACE")
+    weights = np.zeros(len(mesh.data.vertices))
+    weights[upper] = weight
+    return weights
+
+
+def strands_of(hair):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return read_curves(hair, depsgraph).strands
+
+
+def test_guides_grow_along_the_normals_where_and_as_long_as_painted(sphere):
+    sphere.location = (1.0, 2.0, 3.0)
+    weights = paint_upper_half(sphere, "Scalp")
+    attribute = sphere.data.attributes.new("long", "FLOAT", "POINT")
+    attribute.data.foreach_set("value", np.full(len(weights), 0.5, np.float32))
+    hair = grown(
+        sphere,
+        way="normals",
+        per_vertex=True,
+        length=0.1,
+        length_variation=0.0,
+        density_group="Scalp",
+        length_group="long",
+    )
+    strands = strands_of(hair)
+    assert strands.strand_count == (weights > 0.5).sum()
+    assert strands.lengths() == pytest.approx(np.full(strands.strand_count, 0.05), rel=1e-4)
+    outward = strands.grid - np.array(sphere.location)
+    assert outward[:, 0, 2].min() > 0.02
+    tip = np.linalg.norm(outward[:, -1], axis=1)
+    assert tip == pytest.approx(np.full(len(tip), 0.15), abs=1e-3)
+
+
+def test_a_group_is_read_after_the_modifiers(sphere):
+    """One strand from each vertex that Blender shows, twice as many behind a mirror."""
+    weights = paint_upper_half(sphere, "Scalp")
+    modifier = sphere.modifiers.new("Mirror", "MIRROR")
+    modifier.use_axis, modifier.use_mirror_merge = (True, False, False), False
+    hair = grown(sphere, way="normals", per_vertex=True, density_group="Scalp")
+    assert len(hair.data.curves) == 2 * (weights > 0.5).sum()
+
+
+def test_combed_hair_takes_groups_too(sphere):
+    paint_upper_half(sphere, "Crown", 0.5)
+    hair = grown(sphere, strand_count=50, density_group="Crown", length_group="Crown", length=0.1)
+    strands = strands_of(hair)
+    assert strands.strand_count == 50
+    assert strands.roots[:, 2].min() > 0.0
+    assert strands.lengths().max() < 0.052
+
+
+@pytest.mark.parametrize("option", ["density_group", "length_group"])
+def test_a_group_that_cannot_be_used_is_named_and_grows_nothing(option, sphere, told):
+    paint_upper_half(sphere, "Scalp")
+    sphere.vertex_groups.new(name="Empty")
+    sphere.data.attributes.new("on_faces", "FLOAT", "FACE")
+    broken = sphere.data.attributes.new("broken", "FLOAT", "POINT")
+    broken.data[3].value = float("nan")
+    for name, message in (
+        ("Scalpp", "neither a vertex group nor an attribute named 'Scalpp'.*Use one of: Scalp"),
+        ("Empty", "0 on every vertex"),
+        ("on_faces", "FLOAT on FACE, not FLOAT on POINT"),
+        ("broken", "not a finite number"),
+    ):
+        with pytest.raises(RuntimeError, match=message):
+            grown(sphere, way="normals", **{option: name})
+        told()
+    assert [obj.name for obj in bpy.data.objects] == ["Head"]
+    assert len(bpy.data.hair_curves) == 0
+
+
+def test_growing_is_undone_in_one_step(sphere):
+    paint_upper_half(sphere, "Scalp")
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.hairloom.grow("EXEC_DEFAULT", True, way="normals", density_group="Scalp")
+    assert len(bpy.data.hair_curves) == 1
+    bpy.ops.ed.undo()
+    assert [obj.name for obj in bpy.data.objects] == ["Head"]
+    assert len(bpy.data.hair_curves) == 0
+
+
+def test_the_weights_of_a_mesh_are_offered_by_name(sphere):
+    paint_upper_half(sphere, "Scalp")
+    sphere.data.attributes.new("long", "FLOAT", "POINT")
+    sphere.data.attributes.new("on_faces", "FLOAT", "FACE")
+    assert weight_names(sphere) == ["Scalp", "long"]
+
+
+def test_growing_on_a_mesh_without_faces_is_told(sphere, told):
+    sphere.data.clear_geometry()
+    for way in ("combed", "normals"):
+        with pytest.raises(RuntimeError, match="no faces"):
+            grown(sphere, way=way)
+    told()
 
 
 def test_growing_needs_a_mesh(told):

@@ -7,9 +7,10 @@ import pytest
 
 from hairloom import register, unregister
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import groups, live
+from hairloom.addon.host import groups, reactions
 from hairloom.addon.host.properties import property_group, settings_of
 from hairloom.addon.parameters import ALL_SETTINGS
+from hairloom.addon.params.curve import PLACES
 
 SECTIONS = [*groups.GROOM_SECTIONS, *groups.CHARACTER_SECTIONS]
 PARAMETERS = [
@@ -60,10 +61,11 @@ def test_every_value_that_blender_takes_is_one_that_settings_take(section, param
     group, settings = group_of(section), ALL_SETTINGS[section]
     for wanted in (-math.inf, *parameter.hard_range, math.inf):
         limited = max(-(2**31), min(wanted, 2**31 - 1)) if parameter.kind == "integer" else wanted
-        setattr(group, parameter.name, (limited,) * 3 if parameter.kind == "color" else limited)
+        values = {"color": 3, "curve": len(PLACES)}.get(parameter.kind)
+        setattr(group, parameter.name, (limited,) * values if values else limited)
         value = getattr(settings_of(group, settings), parameter.name)
         if math.isfinite(wanted):
-            assert value == pytest.approx((wanted,) * 3 if parameter.kind == "color" else wanted)
+            assert value == pytest.approx((wanted,) * values if values else wanted)
 
 
 def test_a_changed_value_reaches_the_settings_as_it_was_typed(group_of):
@@ -74,7 +76,7 @@ def test_a_changed_value_reaches_the_settings_as_it_was_typed(group_of):
 
 def test_an_edit_names_the_data_block_at_once(new_hair, monkeypatch):
     hair, named = new_hair(), []
-    monkeypatch.setattr(live, "settings_changed", named.append)
+    monkeypatch.setattr(reactions, "settings_changed", named.append)
     hair.data.hairloom.shading.ambient = 0.5
     hair.hairloom.dynamics.damping = 2.0
     hair.hairloom.hide_original = False

@@ -224,6 +224,57 @@ def test_two_frames_are_identical_and_passes_may_be_kept(frame: Any) -> None:
     assert 0.1 < (small[..., 3].sum() / first[..., 3].sum()) < 0.5
 
 
+def test_points_on_the_gpu_look_like_uploaded_ones(frame: Any) -> None:
+    """Bit for bit at rest; turned, when rounding moves edges by 1e-7 m, in nearly all pixels."""
+    from hairloom.addon.groom.weights import GuideWeights
+    from hairloom.addon.render.ride_pass import RidePass
+    from hairloom.addon.render.strand_pass import StrandPass
+    from hairloom.addon.strands import StrandSet
+
+    sphere = hairy_sphere(frame, primary_strength=2.0)
+    count, cv_count = sphere.strands.shape[:2]
+    strands = StrandSet(
+        points=sphere.strands.reshape(-1, 3),
+        offsets=np.arange(count + 1) * cv_count,
+        radius=sphere.radius.ravel(),
+        group=np.zeros(count, np.int32),
+    )
+    no_guide = GuideWeights(np.zeros((count, 3), np.int32), np.zeros((count, 3), np.float32))
+    ride = RidePass(strands, None, np.zeros(1, np.int32), no_guide)
+    turn = np.eye(4)
+    turn[:3, :3] = [[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]
+    camera = frame.frame_camera(
+        (np.full(3, -1.0), np.full(3, 1.0)), (0.2, -1, 0.3), np.radians(30), 1.0
+    )
+    passes = frame.MeshPass(), StrandPass()
+    for matrix, largest, share in ((np.eye(4), 0.0, 0.0), (turn, 1.0e-3, 1.0e-3)):
+        ride.carry(None, matrix)
+        moved = (sphere.strands @ matrix[:3, :3].T).astype(np.float32)
+        on_gpu = dataclasses.replace(sphere, device_points=ride.points)
+        uploaded = dataclasses.replace(sphere, strands=moved)
+        pictures = [
+            frame.render_image(shown, camera, 200, 200, 1, passes=passes)
+            for shown in (uploaded, on_gpu, uploaded)
+        ]
+        assert (pictures[0] == pictures[2]).all(), "the array is uploaded again after the texture"
+        apart = np.abs(pictures[1] - pictures[0]).max(axis=-1)
+        assert (apart > largest).mean() <= share
+    assert np.abs(on_gpu.center - uploaded.center).max() < 1e-6
+    assert pictures[0][..., 3].mean() > 0.3
+
+
+def test_points_on_the_gpu_that_do_not_fit_or_are_gone_are_refused(frame: Any, front: Any) -> None:
+    from hairloom.addon.render.shader_source import ShaderError
+    from hairloom.addon.render.snapshot import DevicePoints
+
+    strands, radius = uprights(np.array([0.5, 0.6]), 0.1)
+    with pytest.raises(ValueError, match="device_points"):
+        frame.Snapshot(strands, radius, device_points=DevicePoints((3, 2)))
+    gone = frame.Snapshot(strands, radius, device_points=DevicePoints((2, 2)))
+    with pytest.raises(ShaderError, match="released"):
+        frame.render_image(gone, front, 8, 8)
+
+
 def test_thin_strands_get_the_minimum_width(frame: Any, front: Any) -> None:
     """Widths count in pixels of the finished picture, whatever the samples."""
     strands, radius = uprights(np.array([0.25, 0.75]), 1e-6)

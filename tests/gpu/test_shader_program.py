@@ -51,6 +51,37 @@ def test_missing_and_unknown_resources_are_refused(recipes: Any) -> None:
         )
 
 
+def test_an_image_may_be_read_and_written(recipes: Any, gpu_context: Any) -> None:
+    """In one dimension, and with a define: each texel of a row is multiplied in place."""
+    import numpy as np
+
+    from hairloom.addon.render.textures import texture_from, texture_to_array
+
+    recipe = recipes.ShaderRecipe(
+        name="times",
+        compute="times.glsl",
+        images=(("RGBA32F", "numbers", "READ_WRITE"),),
+        group_size=(16,),
+        defines=(("FACTOR", 3),),
+        folders=(SHADERS,),
+    )
+    numbers = np.arange(80, dtype=np.float32).reshape(1, 20, 4)
+    texture = texture_from(numbers, "RGBA32F")
+    for times in (3, 9):
+        shader = recipes.program(recipe)
+        shader.bind(images={"numbers": texture})
+        gpu_context.compute.dispatch(shader.shader, 2, 1, 1)
+        gpu_context.shader.unbind()
+        assert (texture_to_array(texture) == numbers * times).all()
+
+
+def test_an_unknown_access_is_refused(recipes: Any) -> None:
+    from hairloom.addon.render.shader_source import ShaderError
+
+    with pytest.raises(ShaderError, match="READ_WRITE"):
+        recipes.ShaderRecipe(name="odd", images=(("RGBA32F", "numbers", "APPEND"),))
+
+
 def test_release_forgets_all_and_shaders_come_back(recipes: Any) -> None:
     from hairloom.addon.render.mesh_pass import MESH_RECIPE
 

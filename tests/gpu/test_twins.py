@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from hairloom.addon.dynamics.colliders import CapsuleCollider, DistanceField, SphereCollider
 from hairloom.addon.params import Settings, choice, color, integer, number, toggle
 from hairloom.addon.params.glsl import struct_values
 from hairloom.addon.shading.kajiya_kay import kajiya_kay, strand_base, strand_normal
@@ -175,3 +176,57 @@ def test_glsl_reads_every_parameter_right(compute: Callable[..., np.ndarray]) ->
     assert found[4, :2].tolist() == [1.0, 0.0]
     assert found[5, :3] == pytest.approx([0.4, 0.5, 0.6])
     assert found[6, :2].tolist() == [2.0, 0.875]
+
+
+def test_sine(compute: Callable[..., np.ndarray]) -> None:
+    angles = np.zeros((60, 64, 4), np.float32)
+    angles[..., 0] = np.linspace(-60.0, 60.0, 60 * 64).reshape(60, 64)
+    found = compute("sine.glsl", (64, 60), textures={"angles": angles})[..., 0]
+    assert np.abs(found - np.sin(angles[..., 0].astype(np.float64))).max() < 2e-6
+    edges = np.zeros((1, 8, 4), np.float32)
+    edges[0, :, 0] = np.arange(8) * np.pi / 2.0
+    found = compute("sine.glsl", (8, 1), textures={"angles": edges})[0, :, 0]
+    assert found == pytest.approx([0.0, 1.0, 0.0, -1.0, 0.0, 1.0, 0.0, -1.0], abs=2e-6)
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        SphereCollider(np.array([0.1, -0.2, 0.05]), 0.3),
+        CapsuleCollider(np.array([-0.2, 0.1, 0.0]), np.array([0.3, 0.2, -0.1]), 0.15),
+        CapsuleCollider(np.array([0.1, 0.1, 0.1]), np.array([0.1, 0.1, 0.1]), 0.2),
+        DistanceField(
+            np.random.default_rng(2).random((7, 5, 9)), np.array([-0.3, -0.2, -0.4]), 0.1
+        ),
+    ],
+    ids=["ball", "capsule", "capsule without length", "field"],
+)
+def test_collider_distance(
+    compute: Callable[..., np.ndarray], solid: SphereCollider | CapsuleCollider | DistanceField
+) -> None:
+    """Also outside of a field's grid, at its border, and at a ball's very center."""
+    from hairloom.addon.render.collider_textures import field_texels, round_texels
+
+    random = np.random.default_rng(4)
+    points = random.uniform(-0.7, 0.7, (40, 32, 4)).astype(np.float32)
+    points[0, 0, :3] = solid.start if isinstance(solid, CapsuleCollider) else solid.bounds[0]
+    rounds, fields = np.zeros((1, 2, 4), np.float32), np.zeros((1, 1, 4), np.float32)
+    own = np.zeros((1, 2, 4), np.float32)
+    points[..., 3] = is_field = float(isinstance(solid, DistanceField))
+    if isinstance(solid, DistanceField):
+        points[1, :3, :3] = solid.low, solid.low + 0.1, solid.low + 0.1 * np.array([6, 4, 8])
+        fields = field_texels(solid.values)[None]
+        own[0, 0], own[0, 1, :3] = (*solid.low, solid.cell), solid.values.shape
+    else:
+        rounds = round_texels(solid)
+    found = compute(
+        "collider_distance.glsl",
+        (32, 40),
+        textures={"points": points, "own": own, "rounds": rounds, "fields": fields},
+        defines=(("HAS_ROUNDS", 1), ("HAS_FIELDS", 1)),
+    )
+    distance, gradient = solid.distance(np.ascontiguousarray(points[..., :3].reshape(-1, 3).T))
+    assert np.abs(found[..., 3].ravel() - distance).max() < 1e-6
+    # steps at the borders of cells, where rounding decides which cell a point is in
+    off = np.abs(found[..., :3].reshape(-1, 3).T - gradient).max(axis=0)
+    assert (off > (2e-3 if is_field else 1e-5)).sum() <= 4 * is_field

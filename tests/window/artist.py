@@ -16,8 +16,9 @@ from mathutils import Euler
 #: width, y in pixels from its top at UI scale 1.
 SIDEBAR_BUTTONS = {
     "hairloom.preview": (0.45, 46),
-    "hairloom.play": (0.25, 72),
-    "hairloom.reset": (0.65, 72),
+    "hairloom.play": (0.2, 72),
+    "hairloom.pause": (0.5, 72),
+    "hairloom.reset": (0.8, 72),
 }
 
 

@@ -153,7 +153,7 @@ def sliders_act_at_once():
 def play_and_stop():
     """Play by the button, move the head meanwhile, stop by ESC."""
     head = bpy.data.objects["Head"]
-    at_rest = live().sessions()[0].snapshot.strands
+    at_rest = live().sessions()[0].strands
     before = pixels("play-before")
     yield from click(*sidebar_button("hairloom.play"))
     yield 40  # the collider is made
@@ -162,7 +162,7 @@ def play_and_stop():
     for frame in range(20):
         head.location.x = 0.06 if frame < 10 else 0.08
         yield 1
-        strands = live().sessions()[0].snapshot.strands
+        strands = live().sessions()[0].strands
         carried = at_rest + np.array([head.location.x, 0.0, 0.0])
         offsets.append(float((strands - carried)[:, -1, 0].mean()))
     moving = pixels("play-moving")
@@ -173,7 +173,7 @@ def play_and_stop():
     yield from press("ESC")
     yield 15
     assert not live().is_playing()
-    strands = live().sessions()[0].snapshot.strands
+    strands = live().sessions()[0].strands
     assert np.abs(strands - at_rest).max() < 1e-5, "ESC did not restore the style"
     left = changed(before, pixels("play-stopped"))
     assert left < 0.1 * changed(before, moving), "the picture is not the one before"
@@ -181,19 +181,19 @@ def play_and_stop():
 
 def undo():
     """A moved head, undone and redone; our buttons are no undo steps of their own."""
-    at_rest = live().sessions()[0].snapshot.strands
+    at_rest = live().sessions()[0].strands
     bpy.ops.ed.undo_push(message="before the move")
     bpy.data.objects["Head"].location.z = 0.05
     bpy.ops.ed.undo_push(message="the move")
     yield 5
-    moved = live().sessions()[0].snapshot.strands
+    moved = live().sessions()[0].strands
     assert np.abs(moved - at_rest - np.float32([0, 0, 0.05])).max() < 1e-5
     bpy.ops.ed.undo()
     yield 10
-    assert np.abs(live().sessions()[0].snapshot.strands - at_rest).max() < 1e-5
+    assert np.abs(live().sessions()[0].strands - at_rest).max() < 1e-5
     bpy.ops.ed.redo()
     yield 10
-    assert np.abs(live().sessions()[0].snapshot.strands - moved).max() < 1e-5
+    assert np.abs(live().sessions()[0].strands - moved).max() < 1e-5
     bpy.ops.ed.undo()
     yield 10
     driver.screenshot("undone")

@@ -13,6 +13,7 @@ from hairloom.addon.dynamics.colliders import Collider, PosedCollider
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.way import bow
 from hairloom.addon.strands import Surface
 
 EARTH = np.array([0.0, 0.0, -9.81])
@@ -105,9 +106,37 @@ def box(size: tuple[float, float, float]) -> Surface:
     return Surface((corners * size).astype(np.float32), np.array(triangles))
 
 
+def random_settings(random: np.random.Generator, **fixed: Any) -> DynamicsSettings:
+    """Hard ranges at random, half of the values at an end of theirs; `fixed` ones as given."""
+    values: dict[str, Any] = {}
+    for parameter in DynamicsSettings.parameters():
+        if parameter.kind == "toggle":
+            values[parameter.name] = bool(random.integers(2))
+        elif parameter.kind == "choice":
+            values[parameter.name] = random.choice([name for name, _, _ in parameter.choices])
+        else:
+            low, high = parameter.hard_range
+
+            def one(parameter=parameter, low=low, high=high):
+                default = parameter.default if parameter.kind != "curve" else parameter.default[0]
+                return float(random.choice([low, high, random.uniform(low, high), default]))
+
+            if parameter.kind == "curve":
+                values[parameter.name] = tuple(one() for _ in parameter.default)
+            else:
+                values[parameter.name] = round(one()) if parameter.kind == "integer" else one()
+    values["substep_rate"] = min(values["substep_rate"], 300.0)  # for the test's own time
+    values["relaxations"] = min(values["relaxations"], 32)
+    values["length_iterations"] = min(values["length_iterations"], 16)
+    return DynamicsSettings(**values | fixed)
+
+
 @dataclass
 class Scene:
-    """Guides on a head that moves by matrices, with colliders that go with it or stand still."""
+    """Guides on a head that moves by matrices, with colliders that go with it or stand still.
+
+    bowed: whether the ways within a frame are smooth, as the pipeline makes them.
+    """
 
     grid: np.ndarray
     settings: DynamicsSettings
@@ -116,24 +145,26 @@ class Scene:
     standing: tuple[Collider, ...] = ()
     gravity: np.ndarray = field(default_factory=lambda: EARTH)
     advance: Callable[..., DynamicsState] = advance
+    tip_held: Any = None
+    bowed: bool = False
+    wind: Any = (0.0, 0.0, 0.0)
 
     def start(self) -> DynamicsState:
-        return start(moved(self.motion(0.0), self.grid))
+        return start(moved(self.motion(0.0), self.grid), self.tip_held)
 
     def colliders(self, before: float, now: float) -> tuple[PosedCollider, ...]:
         matrices = self.motion(before), self.motion(now)
         still = np.eye(4)
-        return tuple(PosedCollider(one, *matrices) for one in self.on_head) + tuple(
+        bend = bow(self.motion(2 * before - now), *matrices, 1.0) if self.bowed else None
+        return tuple(PosedCollider(one, *matrices, bend) for one in self.on_head) + tuple(
             PosedCollider(one, still, still) for one in self.standing
         )
 
     def drive(self, before: float, now: float) -> Drive:
-        return Drive(
-            moved(self.motion(before), self.grid),
-            moved(self.motion(now), self.grid),
-            self.colliders(before, now),
-            self.gravity,
-        )
+        targets = [moved(self.motion(t), self.grid) for t in (2 * before - now, before, now)]
+        bend = bow(*targets, 1.0) if self.bowed else None
+        colliders = self.colliders(before, now)
+        return Drive(*targets[1:], colliders, self.gravity, bend, np.asarray(self.wind))
 
     def play(self, seconds: float, fps: float = 60.0) -> list[DynamicsState]:
         """The states at all frames, the start first."""
@@ -157,6 +188,7 @@ class Kit:
     curly = staticmethod(curly)
     icosphere = staticmethod(icosphere)
     box = staticmethod(box)
+    random_settings = staticmethod(random_settings)
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.constraints import PINNED, directions, finish_lengths, keep_lengths
+from hairloom.addon.dynamics.constraints import (
+    PINNED,
+    directions,
+    finish_lengths,
+    hold_within_reach,
+    keep_lengths,
+    pin,
+    relax_lengths,
+)
 
 
 @pytest.fixture
@@ -24,7 +32,7 @@ def test_newton_converges_quadratically(disturbed):
     position, length = disturbed
     errors = [error(position, length)]
     for _ in range(4):
-        keep_lengths(position, length, None)
+        keep_lengths(position, length, None, None)
         errors.append(error(position, length))
     assert errors[0] > 0.5
     assert errors[2] < 0.03
@@ -35,7 +43,7 @@ def test_newton_converges_quadratically(disturbed):
 def test_pinned_cvs_stay(disturbed):
     position, length = disturbed
     before = position.copy()
-    keep_lengths(position, length, None)
+    keep_lengths(position, length, None, None)
     np.testing.assert_array_equal(position[:, :PINNED], before[:, :PINNED])
 
 
@@ -44,7 +52,7 @@ def test_momentum_comes_only_through_the_root(disturbed):
     position, length = disturbed
     before = position.copy()
     direction, _ = directions(position)
-    keep_lengths(position, length, None)
+    keep_lengths(position, length, None, None)
     total = (position - before).astype(np.float64).sum(axis=1)
     across = np.cross(total, direction[:, PINNED - 1], axis=0)
     assert np.linalg.norm(total, axis=0).max() > 1e-3
@@ -57,8 +65,8 @@ def test_contact_slides(disturbed):
     normal = np.zeros_like(position[:, PINNED:])
     normal[2, 5] = 1.0
     free, held = position.copy(), position.copy()
-    keep_lengths(free, length, None)
-    keep_lengths(held, length, normal)
+    keep_lengths(free, length, None, None)
+    keep_lengths(held, length, normal, None)
     cv = 5 + PINNED
     rise = np.abs(held[2, cv] - position[2, cv]).mean()
     assert rise < 0.3 * np.abs(free[2, cv] - position[2, cv]).mean()
@@ -70,9 +78,9 @@ def test_finish_reaches_the_tolerance_only_where_needed(disturbed):
     position, length = disturbed
     good = position[:, :, :3].copy()
     for _ in range(5):
-        keep_lengths(good, length[:, :3], None)
+        keep_lengths(good, length[:, :3], None, None)
     position[:, :, :3] = good
-    finish_lengths(position, length, None, 0.002, 8)
+    finish_lengths(position, length, None, None, 0.002, 8)
     np.testing.assert_array_equal(position[:, :, :3], good)
     assert error(position, length) <= 0.002 * 1.001
 
@@ -81,11 +89,86 @@ def test_finish_never_gives_up_on_lengths(disturbed):
     """One Newton step cannot mend this; laying the guide out anew does."""
     position, length = disturbed
     position[:, PINNED:] *= np.random.default_rng(2).uniform(-30, 30, position[:, PINNED:].shape)
-    finish_lengths(position, length, None, 0.002, 1)
+    finish_lengths(position, length, None, None, 0.002, 1)
     assert error(position, length) <= 0.002 * 1.001
+
+
+def test_relaxation_converges(disturbed):
+    position, length = disturbed
+    errors = []
+    for _ in range(5):
+        relax_lengths(position, length, None, 20)
+        errors.append(error(position, length))
+    assert errors[-1] < 0.01
+    assert errors[-1] < 0.3 * errors[0]
+
+
+def test_relaxation_leaves_held_tips_where_they_are(disturbed):
+    position, length = disturbed
+    before, held = position.copy(), np.arange(40) % 2 == 0
+    relax_lengths(position, length, held.astype(np.float32), 8)
+    np.testing.assert_array_equal(position[:, -1, held], before[:, -1, held])
+    assert np.abs(position[:, -1, ~held] - before[:, -1, ~held]).max() > 1e-4
+
+
+def test_long_range_attachment_bounds_the_way_from_the_root(disturbed):
+    position, length = disturbed
+    position[:, PINNED:] *= 3.0
+    hold_within_reach(position, length)
+    away = np.linalg.norm(position[:, PINNED:] - position[:, PINNED - 1 : PINNED], axis=0)
+    reach = np.cumsum(length[PINNED - 1 :], axis=0)
+    assert (away <= reach * 1.00001).all()
+    assert (away > 0.99 * reach).any()
+
+
+def test_long_range_attachment_leaves_what_is_near(disturbed):
+    position, length = disturbed
+    position[:, PINNED:] = position[:, PINNED - 1 : PINNED] + 0.2 * (
+        position[:, PINNED:] - position[:, PINNED - 1 : PINNED]
+    )
+    before = position.copy()
+    hold_within_reach(position, length)
+    np.testing.assert_allclose(position, before, atol=1e-7)
+
+
+@pytest.mark.parametrize("far", [1.0, 5.0])
+def test_a_held_tip_is_held_as_far_as_the_strand_reaches(disturbed, far):
+    position, length = disturbed
+    carried = position.copy()
+    root = carried[:, PINNED - 1]
+    direction = np.array([0.0, 0.6, 0.8], np.float32)[:, None]
+    reach = length[PINNED - 1 :].sum(axis=0)
+    carried[:, -1] = root + direction * reach * np.float32(0.5 * far)
+    pin(position, carried, length, np.ones(40, np.float32))
+    expected = root + direction * reach * min(0.5 * far, 1.0)
+    np.testing.assert_allclose(position[:, -1], expected, atol=1e-6)
+
+
+def test_newton_keeps_a_held_tip_and_all_lengths(disturbed):
+    position, length = disturbed
+    tip = position[:, -1].copy()
+    for _ in range(8):
+        keep_lengths(position, length, None, np.ones(40, np.float32))
+    np.testing.assert_array_equal(position[:, -1], tip)
+    assert error(position, length) < 1e-3
+
+
+def test_finish_lays_guides_with_held_tips_out_towards_them(disturbed):
+    """Where Newton gives up lengths still hold, and the tip ends nearer to its place than free."""
+    position, length = disturbed
+    tip = position[:, -1].copy()
+    noise = np.random.default_rng(2).normal(0.0, 0.02, position[:, 3:].shape).astype(np.float32)
+    position[:, PINNED:-1] += noise
+    away = {}
+    for held in (None, np.ones(40, np.float32)):
+        laid_out = position.copy()
+        finish_lengths(laid_out, length, None, held, 0.002, 1)
+        assert error(laid_out, length) <= 0.002 * 1.02
+        away[held is None] = np.median(np.linalg.norm(laid_out[:, -1] - tip, axis=0))
+    assert away[False] < away[True]
 
 
 def test_coincident_cvs_stay_finite():
     position = np.zeros((3, 6, 2), np.float32)
-    keep_lengths(position, np.zeros((5, 2), np.float32), None)
+    keep_lengths(position, np.zeros((5, 2), np.float32), None, None)
     assert np.isfinite(position).all()

@@ -3,12 +3,19 @@
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.colliders import DistanceField, PosedCollider, SphereCollider
+from hairloom.addon.dynamics.colliders import (
+    CapsuleCollider,
+    DistanceField,
+    PosedCollider,
+    SphereCollider,
+    SphereSetCollider,
+)
 from hairloom.addon.dynamics.contacts import cv_radius
 from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.way import bow
 from hairloom.addon.errors import HairloomError
 
 BARE = {"radius_root": 0.0, "radius_tip": 0.0}
@@ -31,12 +38,12 @@ def lying(kit, guide_count=40, cv_count=16, length=0.25):
 
 
 def test_limp_hair_lies_on_a_ball(kit):
-    """CV centers stay within 0.1 mm of the surface, without any collision radius to help."""
+    """CV centers stay within 0.2 mm of the surface, without any collision radius to help."""
     settings = DynamicsSettings(**kit.LIMP | BARE | {"damping": 2.0})
     scene = kit.Scene(lying(kit), settings, on_head=(SphereCollider((0, 0, 0), 0.1),))
     states = scene.play(2.0)
     assert np.linalg.norm(states[-1].grid[:, 6], axis=1).max() < 0.13  # it did fall down
-    assert max(depths(scene, states)) < 1e-4
+    assert max(depths(scene, states)) < 2e-4
     assert max(max_stretch(state) for state in states) < 0.01
 
 
@@ -97,7 +104,7 @@ def test_hair_that_starts_inside_is_led_out(kit):
 def test_push_speed_is_the_limit(kit):
     """A single free CV deep inside walks out along the normal at push_speed, and stays calm."""
     settings = DynamicsSettings(
-        **kit.LIMP | BARE | {"push_speed": 0.2, "friction": 0.0, "length_tolerance": 1.0}
+        **kit.LIMP | BARE | {"push_speed": 0.2, "friction": 0.0, "length_tolerance": 0.02}
     )
     grid = kit.straight(1, 3, 200.0, (0.0, 1.0, 0.0))  # a long arm: nearly free to rise
     scene = kit.Scene(
@@ -148,6 +155,63 @@ def test_a_scaled_ball_is_an_ellipsoid(kit, mirror):
     level = np.linalg.norm(state.grid[:, 2:] / np.diag(matrix)[:3], axis=2) / 0.1
     assert level.min() > 0.99
     assert deepest_penetration(state, posed) < 2e-4
+
+
+@pytest.mark.parametrize("bowed", [False, True])
+def test_a_scaled_collider_that_moves_keeps_hair_out(kit, bowed):
+    """An ellipsoid that tumbles through hanging hair, on straight and on smooth ways."""
+    scale = np.diag([0.5, 1.5, -1.0, 1.0])
+
+    def matrix(time):
+        place = kit.translation(0.05, -0.25 + 0.8 * time, -0.15)
+        return place @ kit.rotation(2, 3.0 * time) @ kit.rotation(0, 2.0 * time) @ scale
+
+    grid = kit.straight(12, 16, 0.25)
+    state, settings, swept = start(grid), DynamicsSettings(**kit.LIMP | {"damping": 1.0}), 0.0
+    for frame in range(36):
+        ways = [matrix(k / 60) for k in (frame - 1, frame, frame + 1)]
+        posed = PosedCollider(
+            SphereCollider((0, 0, 0), 0.07), *ways[1:], bow(*ways, 1.0) if bowed else None
+        )
+        state = advance(state, Drive(grid, grid, (posed,), kit.EARTH), settings, 1 / 60)
+        assert deepest_penetration(state, (posed,)) < 1e-4
+        assert max_stretch(state) < 0.01
+        swept = max(swept, float(np.abs(state.grid[:, :, 1]).max()))
+    assert swept > 0.05
+
+
+def test_two_balls_that_touch_each_other(kit):
+    """Limp hair that falls into the groove between them stays out of both, within a millimetre."""
+    balls = tuple(SphereCollider((0.0, y, 0.0), 0.06) for y in (-0.058, 0.058))
+    settings = DynamicsSettings(**kit.LIMP | {"damping": 2.0})
+    grid = kit.straight(9, 16, 0.2, (0.0, 0.1, 1.0)) + np.float32([-0.04, 0.0, 0.05])
+    scene = kit.Scene(grid, settings, standing=balls)
+    states = scene.play(2.0)
+    assert (states[-1].grid[:, -1, 2] < 0.12).all()  # it did fall
+    assert max(depths(scene, states)) < 1e-3
+    calm = np.abs(states[-1].position - states[-1].previous).max() * settings.substep_rate
+    assert calm < 0.2
+
+
+@pytest.mark.parametrize(
+    "collider",
+    [
+        CapsuleCollider((-0.05, 0.08, 0.2), (0.05, 0.08, 0.2), 0.05),
+        SphereSetCollider(((-0.03, 0.08, 0.2), (0.03, 0.08, 0.2)), (0.05, 0.05)),
+    ],
+    ids=["capsule", "sphere set"],
+)
+def test_any_solid_leads_out_what_starts_inside(kit, collider):
+    """Over frames, no faster than a fall; what is out stays out."""
+    settings = DynamicsSettings()
+    scene = kit.Scene(lying(kit, length=0.2), settings, standing=(collider,))
+    states = scene.play(2.0)
+    depth = depths(scene, states)
+    assert depth[0] > 0.015
+    assert depth[-1] < 1e-4
+    assert max(np.diff(depth)) < 1e-3
+    fastest = max(np.abs(s.position - s.previous).max() * settings.substep_rate for s in states[1:])
+    assert fastest < 3.0
 
 
 def test_penetration_is_measured_in_the_world(kit):

@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.colliders import DistanceField, SphereCollider
+from hairloom.addon.dynamics.colliders import (
+    CapsuleCollider,
+    DistanceField,
+    SphereCollider,
+    SphereSetCollider,
+)
 from hairloom.addon.dynamics.measure import deepest_penetration
 from hairloom.addon.dynamics.reference import advance_slowly
 from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.step import advance
 
 #: [m] in 0.4 s of float32 against float64: limp strands enlarge what rounding starts about
 #: seventyfold (the slow form does it too, started one rounding apart), contacts more.
@@ -39,6 +45,71 @@ def test_without_colliders(kit, shake, values):
         assert one.time_left == pytest.approx(other.time_left, abs=1e-9)
 
 
+#: Each feature alone and what it acts together with.
+FEATURES = {
+    "curves": {"style_along": (1.0, 0.1, 0.9, 0.9, 0.2), "bend_along": (1.0, 1.0, 0.5, 0.0, 0.3)},
+    "drag": {"drag": 8.0},
+    "water": {"buoyancy": 0.8, "drag": 4.0, "damping": 2.0},
+    "wind": {"wind_speed": 6.0, "gusts": 1.0, "damping": 4.0, "wind_direction": 1.0},
+    "wind with drag": {"wind_speed": 6.0, "drag": 2.0, "wind_rise": 0.4},
+    "relaxation": {"length_solver": "relaxation", "relaxations": 5},
+    "relaxation alone": {"length_solver": "relaxation", "relaxations": 3, "long_range": False},
+}
+
+
+@pytest.mark.parametrize("bowed", [False, True])
+@pytest.mark.parametrize("values", FEATURES.values(), ids=FEATURES)
+def test_each_feature(kit, shake, values, bowed):
+    scene = kit.Scene(
+        kit.curly(4, 10),
+        DynamicsSettings(**TIGHT | values),
+        shake,
+        bowed=bowed,
+        wind=(0.0, 2.0, 0.0) if "drag" in values else (0.0, 0.0, 0.0),
+    )
+    fast, slow = both(kit, scene, 0.2)
+    plain = kit.Scene(**scene.__dict__ | {"settings": DynamicsSettings(**TIGHT)}).play(0.2, 50.0)
+    assert np.abs(fast[-1].position - plain[-1].position).max() > 1e-4  # the feature does act
+    for one, other in zip(fast, slow, strict=True):
+        np.testing.assert_allclose(one.position, other.position, atol=FREE)
+        assert one.time == pytest.approx(other.time, abs=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["direct", "relaxation"])
+def test_held_tips(kit, shake, solver):
+    grid = kit.curly(6, 10)
+    held = np.arange(6) % 2 == 0
+    settings = DynamicsSettings(**TIGHT | {"length_solver": solver, "style_tip": 0.5})
+    fast, slow = both(kit, kit.Scene(grid, settings, shake, tip_held=held))
+    expected = kit.moved(shake(0.4), grid)[held, -1]
+    np.testing.assert_allclose(fast[-1].grid[held, -1], expected, atol=1e-4)
+    for one, other in zip(fast, slow, strict=True):
+        np.testing.assert_allclose(one.position, other.position, atol=FREE)
+
+
+@pytest.mark.parametrize("iterations", [1, 8])
+def test_held_tips_that_tear(kit, iterations):
+    """Heads that turn by a right angle in a frame: both forms lay the same guides out anew."""
+    grid = kit.curly(6, 10)
+    settings = DynamicsSettings(**TIGHT | {"length_iterations": iterations, "substep_rate": 50.0})
+    scene = kit.Scene(
+        grid, settings, lambda time: kit.rotation(0, 70.0 * time), tip_held=np.arange(6) % 2 == 0
+    )
+    fast, slow = both(kit, scene, seconds=0.06)
+    for one, other in zip(fast, slow, strict=True):
+        np.testing.assert_allclose(one.position, other.position, atol=TOUCHING)
+
+
+def test_a_changed_substep(kit, shake):
+    """The speed is kept, and quadratic drag sees it as it is."""
+    one, other = (DynamicsSettings(**TIGHT | {"drag": 3.0, "substep_rate": r}) for r in (200, 100))
+    scene = kit.Scene(kit.curly(4, 8), one, shake)
+    state = scene.play(0.2, 50.0)[-1]
+    drive = scene.drive(0.2, 0.22)
+    fast, slow = (step(state, drive, other, 0.02) for step in (advance, advance_slowly))
+    np.testing.assert_allclose(fast.position, slow.position, atol=FREE)
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_with_a_ball_and_a_mesh(kit, shake, friction):
     settings = DynamicsSettings(
@@ -50,6 +121,33 @@ def test_with_a_ball_and_a_mesh(kit, shake, friction):
     scene = kit.Scene(grid, settings, shake, on_head=(mesh,), standing=(ball,))
     fast, slow = both(kit, scene)
     assert deepest_penetration(fast[0], scene.colliders(0, 0)) > 0.0  # some start inside
+    for one, other in zip(fast, slow, strict=True):
+        np.testing.assert_allclose(one.position, other.position, atol=TOUCHING)
+
+
+def balls() -> SphereSetCollider:
+    random = np.random.default_rng(5)
+    centers = random.normal(size=(9, 3))
+    centers *= 0.06 / np.linalg.norm(centers, axis=1, keepdims=True)
+    return SphereSetCollider(centers, random.uniform(0.03, 0.05, 9))
+
+
+@pytest.mark.parametrize(
+    "collider",
+    [balls(), CapsuleCollider((0.12, 0.0, 0.05), (0.05, 0.1, 0.16), 0.04)],
+    ids=["sphere set", "capsule"],
+)
+@pytest.mark.parametrize("bowed", [False, True])
+def test_with_a_sphere_set_and_a_capsule(kit, shake, collider, bowed):
+    """Moving, turned and scaled unevenly."""
+    settings = DynamicsSettings(**kit.LIMP | TIGHT | {"damping": 1.0})
+    stretched = np.diag([1.1, 0.9, 1.2, 1.0])
+    scene = kit.Scene(
+        kit.curly(6, 10), settings, lambda t: shake(t) @ stretched, on_head=(collider,), bowed=bowed
+    )
+    fast, slow = both(kit, scene)
+    alone = kit.Scene(**scene.__dict__ | {"on_head": ()}).play(0.4, 50.0)
+    assert np.abs(fast[-1].position - alone[-1].position).max() > 5e-3
     for one, other in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one.position, other.position, atol=TOUCHING)
 

@@ -105,6 +105,16 @@ def test_locks_draw_tips_together(egg: Surface) -> None:
     assert nearest_tips(0.95) < 0.5 * nearest_tips(0.0)
 
 
+def test_no_strand_folds_back_on_itself(egg: Surface) -> None:
+    """Not even where its lock lies on the other side of the head; the skin may add a little."""
+    for clump_size in (30, 200):
+        settings = GrowSettings(strand_count=400, clump=1.0, clump_size=clump_size)
+        segment = np.diff(grow(egg, settings).grid, axis=1)
+        segment /= np.linalg.norm(segment, axis=2, keepdims=True)
+        cosine = np.einsum("scj,scj->sc", segment[:, 1:], segment[:, :-1])
+        assert np.degrees(np.arccos(cosine.min())) < 90.0
+
+
 def test_the_seed_decides_and_nothing_else_does(egg: Surface) -> None:
     def points(seed: int) -> np.ndarray:
         return grow(egg, GrowSettings(strand_count=50, seed=seed)).points

@@ -11,7 +11,8 @@ import pytest
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
-from hairloom.addon.params import Parameter, Settings, choice, color, integer, number, toggle
+from hairloom.addon.params import Parameter, Settings, choice, color, curve, integer, number, toggle
+from hairloom.addon.params.curve import PLACES
 
 ADDON = Path(__file__).parents[3] / "addon"
 PURE_ROOMS = ("groom", "dynamics", "refine", "shading", "cards", "exchange")
@@ -34,6 +35,9 @@ class Sample(Settings):
         label="Kind",
         description="Which",
     )
+    taper: tuple[float, ...] = curve(
+        (1.0, 1.0, 1.0, 0.5, 0.0), label="Taper", description="How it ends", hard=(0.0, 1.0)
+    )
 
 
 @pytest.mark.parametrize(
@@ -55,6 +59,11 @@ class Sample(Settings):
         ("tint", 0.5),
         ("kind", "square"),
         ("kind", 0),
+        ("taper", (1.0, 0.5, 0.0)),
+        ("taper", (1.0, 0.5, 0.5, 0.5, 1.1)),
+        ("taper", (1.0, 0.5, float("nan"), 0.5, 0.0)),
+        ("taper", "abcde"),
+        ("taper", 1.0),
     ],
 )
 def test_a_bad_value_is_refused_by_name_value_and_remedy(name: str, value: Any) -> None:
@@ -78,7 +87,7 @@ def test_values_take_their_canonical_type() -> None:
 
 
 def test_plain_data_comes_back_and_missing_names_keep_their_default() -> None:
-    sample = Sample(width=0.75, kind="flat")
+    sample = Sample(width=0.75, kind="flat", taper=(0.0, 0.25, 0.5, 0.75, 1.0))
     assert Sample.from_dict(sample.as_dict(), "here") == sample
     assert Sample.from_dict({"kind": "flat"}, "here") == Sample(kind="flat")
 
@@ -106,7 +115,8 @@ def _all_parameters() -> list[tuple[type[Settings], Parameter]]:
 
 
 def test_the_table_of_parameter_sets_is_complete() -> None:
-    assert {kind.__qualname__ for kind in _all_settings()} == {
+    """All but the bases that sets share, which name no section."""
+    assert {kind.__qualname__ for kind in _all_settings() if kind.section} == {
         kind.__qualname__ for kind in ALL_SETTINGS.values()
     }
 
@@ -135,5 +145,8 @@ def test_each_parameter_is_declared_in_full(kind: type[Settings], parameter: Par
         (soft_low, soft_high), (low, high) = parameter.soft_range, parameter.hard_range
         assert low <= soft_low < soft_high <= high
         assert soft_low <= parameter.default <= soft_high
+    if parameter.kind == "curve":
+        assert len(parameter.default) == len(PLACES)
+        assert parameter.hard_range is not None
     if parameter.kind == "choice":
         assert all(label and text for _, label, text in parameter.choices)

@@ -1,0 +1,117 @@
+"""Contacts of cloth: planes that are found once in a substep, and go along through its small steps.
+
+They are looked for where the substep would lead, and move from where the collider was to where it
+will be, so that edges and contacts are solved in turn in every small step: cloth that is drawn
+tight around a collider lies on it without being stretched. What is drawn into a collider after all,
+by its edges, is pushed out when the substep ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats
+from .colliders import PosedCollider
+from .constraints import dot
+from .contacts import Contacts, find_contacts
+
+
+@dataclass(frozen=True)
+class MovingPlanes:
+    """Planes of one collider on their way through a substep, m of them.
+
+    contacts: as they are at the substep's end.
+    begin: (m,) [m], their offsets at its begin: where the collider was, or, for a vertex inside
+        of it, where the vertex was.
+    way: (3, m) [m], of the collider at each vertex.
+    """
+
+    contacts: Contacts
+    begin: Floats
+    way: Floats
+
+    @classmethod
+    def of(cls, contacts: Contacts, before: Floats) -> MovingPlanes:
+        """before: (3, n) world [m], vertices at the substep's begin."""
+        here = before.take(contacts.index, axis=1)
+        way = contacts.origin - here
+        begin = contacts.offset - dot(contacts.normal, way)
+        return cls(contacts, np.minimum(begin, dot(contacts.normal, here)), way)
+
+    def press(
+        self, position: Floats, previous: Floats, number: int, steps: int, friction: float
+    ) -> None:
+        """Keep vertices out in small step `number` of `steps`, in place, without a bounce."""
+        known = self.contacts
+        share = np.float32((number + 1) / steps)
+        origin = previous.take(known.index, axis=1)
+        origin += self.way * np.float32(1.0 / steps)
+        now = replace(
+            known,
+            offset=self.begin + (known.offset - self.begin) * share,
+            origin=origin,
+            push=np.zeros_like(self.begin),
+        )
+        now.push_out(position, friction)
+        now.absorb(position, previous)
+
+
+def planes_ahead(
+    position: Floats,
+    previous: Floats,
+    fall: Floats,
+    steps: int,
+    radius: Floats,
+    colliders: tuple[PosedCollider, ...],
+    span: tuple[float, float],
+    led_out: float,
+) -> list[MovingPlanes]:
+    """Planes near where the substep of `steps` small ones would lead.
+
+    Args:
+        position, previous: (3, n) world [m], one small step apart.
+        fall: (3, 1) [m] that gravity adds in a small step.
+        radius, span, led_out: see `find_contacts`.
+    """
+    ahead = (position - previous) * np.float32(steps)
+    ahead += position
+    ahead += fall * np.float32(steps * (steps + 1) / 2)
+    found = find_contacts(ahead, position, radius, colliders, span, led_out)
+    return [MovingPlanes.of(one, position) for one in found]
+
+
+def push_out_at_end(
+    position: Floats,
+    previous: Floats,
+    before: Floats,
+    contacts: list[Contacts],
+    friction: float,
+    share: float,
+) -> None:
+    """Push vertices out of colliders as the substep ends, in place.
+
+    Args:
+        before: (3, n) world [m], vertices at the substep's begin.
+        share: of the substep that a small step is. Contacts span a substep, the speed in
+            `previous` only a small step: it gets that share of the push.
+    """
+    pushed, unbounced = position.copy(), before.copy()
+    for one in contacts:
+        one.push_out(position, friction)
+    for one in contacts:
+        one.absorb(position, unbounced)
+    np.subtract(position, pushed, out=pushed)
+    unbounced -= before
+    unbounced -= pushed
+    previous += pushed
+    previous += unbounced * np.float32(share)
+
+
+def seen_from(origin: Floats, posed: PosedCollider) -> PosedCollider:
+    """A collider moved so that `origin` (3, 1) world [m] becomes the origin."""
+    matrices = [posed.matrix_before.copy(), posed.matrix_now.copy()]
+    for matrix in matrices:
+        matrix[:3, 3:] -= origin
+    return replace(posed, matrix_before=matrices[0], matrix_now=matrices[1])

@@ -1,0 +1,247 @@
+"""What a fin is made of, and what its simulation remembers from one frame to the next.
+
+Any mesh becomes cloth: the edges of its triangles keep their length (Nguyen and Donnelly 2005),
+and of two faces the outer vertices keep their distance, which resists folding. Flat cloth resists
+a small fold little and a sharp one much, as this distance changes with the fold's square.
+
+Rows are (3, vertex_count) in world space, in the mesh's own order of vertices: float64, as small
+steps are a few millionths of a metre long, which float32 cannot tell apart far from the origin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..errors import HairloomError
+from .coloring import greedy_colors, opposite_pairs, unique_edges, ways_along_edges
+
+#: From this pin weight on a vertex has infinite mass; Blender's weights are rounded.
+PINNED_FROM = 0.9999
+
+
+@dataclass(frozen=True)
+class Color:
+    """Pairs that keep their distance and of which no two share a vertex, so that all move at once.
+
+    Each pair stands in it twice, once from each of its vertices: nothing needs to be scattered.
+
+    vertices: (m,) which move; None where that is all of them, with those that are in no pair being
+        their own mates.
+    mates: (m,) the other vertex of each one's pair.
+    length: (m,) float32 [m] to keep.
+    """
+
+    vertices: Ints | None
+    mates: Ints
+    length: Floats
+
+
+@dataclass(frozen=True)
+class Fabric:
+    """The cloth itself, as it was when the simulation started; constant.
+
+    position: (3, vertex_count) float64 world [m].
+    triangles: (triangle_count, 3) int64.
+    pin: (vertex_count,) float32, how firmly the animation holds a vertex: 1 infinitely, 0 not.
+    pairs, length: the edges that can move (edge_count, 2), and their lengths [m], float64.
+    edges, folds: edges and pairs across them, by colour.
+    anchor, reach: (vertex_count,) the nearest pinned vertex of each, and the way there along the
+        edges [m]; those that no way leads to are their own.
+    """
+
+    position: Floats
+    triangles: Ints
+    pin: Floats
+    pairs: Ints
+    length: Floats
+    edges: tuple[Color, ...]
+    folds: tuple[Color, ...]
+    anchor: Ints
+    reach: Floats
+
+    @property
+    def pinned(self) -> Bools:
+        """(vertex_count,) which vertices have infinite mass."""
+        return self.pin >= PINNED_FROM
+
+
+@dataclass(frozen=True)
+class ClothState:
+    """A fin in motion.
+
+    position, previous: (3, vertex_count) float64 world [m], one small step apart.
+    small_step: length [s] of the last small step; 0 when there was none.
+    time_left: time [s] that has passed but is shorter than a substep, so not yet simulated.
+    time: [s] simulated since the start; gusts hang on it.
+    """
+
+    position: Floats
+    previous: Floats
+    fabric: Fabric
+    small_step: float = 0.0
+    time_left: float = 0.0
+    time: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.position.flags.writeable = False
+        self.previous.flags.writeable = False
+
+    @property
+    def vertex_count(self) -> int:
+        return int(self.position.shape[1])
+
+    def normals(self) -> Floats:
+        """Unit vertex normals (vertex_count, 3), see `vertex_normals`."""
+        middle = self.position.mean(axis=1, keepdims=True)
+        near = (self.position - middle).astype(np.float32)
+        return np.ascontiguousarray(vertex_normals(near, self.fabric.triangles).T)
+
+
+def start_cloth(
+    positions: Floats, triangles: Ints, pin: Floats, edges: Ints | None = None
+) -> ClothState:
+    """Cloth at rest, as it is now.
+
+    Args:
+        positions: (vertex_count, 3) world [m].
+        triangles: (triangle_count, 3).
+        pin: (vertex_count,) weights, 0 free to 1 carried by the animation.
+        edges: (n, 2) edges that belong to no triangle, such as those of a string.
+
+    A vertex without any edge is carried, whatever its weight: it would only fall.
+
+    Raises:
+        HairloomError: no vertices, arrays that do not fit, values that are not finite.
+    """
+    position = vertex_rows(positions)
+    count = position.shape[1]
+    triangles = _indices(triangles, 3, count)
+    pairs = unique_edges(triangles, None if edges is None else _indices(edges, 2, count))
+    pin = _pin_weights(pin, count).copy()
+    pin[np.setdiff1d(np.arange(count), pairs)] = 1.0
+    pinned = pin >= PINNED_FROM
+
+    length = distances(position, pairs)
+    way, nearest = ways_along_edges(pairs, length, np.flatnonzero(pinned), count)
+    tied = nearest >= 0
+    moving = ~pinned[pairs].all(axis=1)
+    pairs, length = pairs[moving], length[moving]
+    folds = opposite_pairs(triangles)
+    folds = folds[~pinned[folds].all(axis=1)]
+    fabric = Fabric(
+        position,
+        triangles,
+        pin,
+        pairs,
+        length,
+        _colors(position, pairs),
+        _colors(position, folds),
+        np.where(tied, nearest, np.arange(count)),
+        np.where(tied, way, 0.0).astype(np.float32),
+    )
+    return ClothState(position, position, fabric)
+
+
+def vertex_rows(positions: Floats) -> Floats:
+    """Points (n, 3) as contiguous rows (3, n) float64.
+
+    Raises:
+        HairloomError: no points, another shape, or a value that is not finite.
+    """
+    positions = np.asarray(positions)
+    if positions.ndim != 2 or positions.shape[1] != 3 or not len(positions):
+        raise _broken(f"vertices have shape {positions.shape} instead of (n, 3)")
+    rows = np.ascontiguousarray(positions.T, np.float64)
+    if not np.isfinite(rows).all():
+        raise _broken("a vertex is not a finite number")
+    return rows
+
+
+def distances(position: Floats, pairs: Ints) -> Floats:
+    """[m] between the two vertices of each pair (n, 2), (n,)."""
+    way = position[:, pairs[:, 1]] - position[:, pairs[:, 0]]
+    length: Floats = np.sqrt(np.einsum("ij,ij->j", way, way))
+    return length
+
+
+def vertex_normals(position: Floats, triangles: Ints) -> Floats:
+    """Unit normals (3, vertex_count) float32, weighted by angle (Thuermer and Wuethrich 1998).
+
+    The same as `Surface.vertex_normals`, on rows; zero where there is no area.
+    """
+    corner = position[:, triangles.T]  # (3, corner, triangle)
+    side = _unit(corner[:, [1, 2, 0]] - corner)
+    cosine = -np.einsum("ijk,ijk->jk", side, side[:, [2, 0, 1]])
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+    face = _unit(_cross(side[:, 0], side[:, 1]))
+    return _unit(_gathered(face[:, None] * angle, triangles, position))
+
+
+def broadside_normals(position: Floats, triangles: Ints) -> Floats:
+    """Unit normals (3, vertex_count) float32, weighted by the area that faces show to the air."""
+    corner = position[:, triangles.T]
+    area = _cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return _unit(_gathered(np.repeat(area[:, None], 3, axis=1), triangles, position))
+
+
+def _gathered(corners: Floats, triangles: Ints, position: Floats) -> Floats:
+    """The sum at each vertex of what its corners (3, corner, triangle) bring."""
+    index, total = triangles.T.reshape(-1), np.empty_like(position)
+    for row, out in zip(corners.reshape(3, -1), total, strict=True):
+        out[:] = np.bincount(index, row, minlength=len(out))
+    return total
+
+
+def _cross(one: Floats, other: Floats) -> Floats:
+    """Cross products of rows (3, n)."""
+    result = np.empty_like(one)
+    for axis in range(3):
+        after, last = (axis + 1) % 3, (axis + 2) % 3
+        np.subtract(one[after] * other[last], one[last] * other[after], out=result[axis])
+    return result
+
+
+def _unit(rows: Floats) -> Floats:
+    length = np.sqrt(np.einsum("i...,i...->...", rows, rows))
+    return np.divide(rows, length, out=np.zeros_like(rows), where=length > 0.0)
+
+
+def _colors(position: Floats, pairs: Ints) -> tuple[Color, ...]:
+    """Pairs (n, 2) by colour, with their lengths in `position`."""
+    count = position.shape[1]
+    length, colors = distances(position, pairs), greedy_colors(pairs)
+    result = []
+    for color in range(int(colors.max(initial=-1)) + 1):
+        chosen = colors == color
+        one, other = pairs[chosen].T
+        vertices, mates = np.concatenate([one, other]), np.concatenate([other, one])
+        both = np.tile(length[chosen], 2).astype(np.float32)
+        if len(vertices) * 2 > count:  # cheaper for all than for some
+            everyone, lengths = np.arange(count), np.zeros(count, np.float32)
+            everyone[vertices], lengths[vertices] = mates, both
+            result.append(Color(None, everyone, lengths))
+        else:
+            result.append(Color(vertices, mates, both))
+    return tuple(result)
+
+
+def _indices(rows: Ints, width: int, count: int) -> Ints:
+    rows = np.asarray(rows, np.int64).reshape(-1, width)
+    if rows.size and not 0 <= rows.min() <= rows.max() < count:
+        raise _broken("a face or an edge names a vertex that does not exist")
+    return rows
+
+
+def _pin_weights(pin: Floats, count: int) -> Floats:
+    pin = np.asarray(pin, np.float32)
+    if pin.shape != (count,) or not np.isfinite(pin).all():
+        raise _broken(f"{count} vertices cannot be pinned by weights of shape {pin.shape}")
+    weights: Floats = np.clip(pin, 0.0, 1.0)
+    return weights
+
+
+def _broken(problem: str) -> HairloomError:
+    return HairloomError(problem, place="fin", remedy="Check the mesh (Mesh > Clean Up)")

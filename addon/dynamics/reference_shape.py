@@ -1,0 +1,53 @@
+"""Geometry of one guide for the scalar reference: frames, kinks, and how lengths change.
+
+All float64; x is (cv_count, 3) world [m].
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from ..arrays import Floats
+from .constraints import PINNED
+from .style import GENTLE, SHARP
+
+
+def hold(rest_second: Floats, length: float) -> float:
+    """1 for gentle bends, 0 for sharp kinks, straight in between."""
+    sharpness = float(np.linalg.norm(rest_second)) / length if length else 2.0
+    return min(max((SHARP - sharpness) / (SHARP - GENTLE), 0.0), 1.0)
+
+
+def jacobian_of(x: Floats) -> Floats:
+    """Of the lengths of all segments beyond the pinned ones, by the free CVs: (n, 3 n)."""
+    free = len(x) - PINNED
+    jacobian = np.zeros((free, 3 * free))
+    for row in range(free):
+        way = x[row + PINNED] - x[row + PINNED - 1]
+        unit = way / np.linalg.norm(way)
+        jacobian[row, 3 * row : 3 * row + 3] = unit
+        if row:
+            jacobian[row, 3 * row - 3 : 3 * row] = -unit
+    return jacobian
+
+
+def frames(x: Floats, style: Floats, twist_cv: int) -> list[Floats]:
+    """Rotation of each segment, columns tangent, normal, binormal, carried without twist."""
+    tangents = [(b - a) / np.linalg.norm(b - a) for a, b in pairwise(x)]
+    beside = style[twist_cv] - style[0]
+    beside = beside - tangents[0] * (tangents[0] @ beside)
+    normal = beside / max(float(np.linalg.norm(beside)), 1.0e-9)
+    turns = [np.stack([tangents[0], normal, np.cross(tangents[0], normal)], axis=1)]
+    for one, other in pairwise(tangents):
+        turns.append(smallest_rotation(one, other) @ turns[-1])
+    return turns
+
+
+def smallest_rotation(one: Floats, other: Floats) -> Floats:
+    """The rotation (3, 3) that turns one unit vector into another (Rodrigues)."""
+    x, y, z = np.cross(one, other)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: Floats = np.eye(3) + cross + cross @ cross / (1.0 + one @ other)
+    return rotation

@@ -1,0 +1,36 @@
+"""The clock of a simulation: how many fixed substeps are due, and what time is left over."""
+
+from __future__ import annotations
+
+import math
+
+from ..errors import HairloomError
+
+#: A substep is due when all but this share of it has passed, so that 4 / 240 s is one 60th.
+_DUE = 1.0e-6
+
+
+def due_substeps(
+    time_left: float, duration: float, longest_frame: float, dt: float
+) -> tuple[float, int, float]:
+    """The simulated duration [s], how many substeps are due, and the time left after them [s].
+
+    Args:
+        time_left: [s] that passed before and was not yet simulated.
+        duration: [s] of this frame; no more than `longest_frame` of it is simulated.
+        dt: [s] of a substep.
+
+    Raises:
+        HairloomError: a duration that is negative or not finite.
+    """
+    if not math.isfinite(duration) or duration < 0.0:
+        raise HairloomError(
+            f"a frame of {duration} seconds cannot be simulated",
+            place="dynamics",
+            remedy="Check the scene's frame rate",
+        )
+    duration = min(duration, longest_frame)
+    time = time_left + duration
+    count = math.floor(time / dt + _DUE) if duration else 0
+    left = time - count * dt
+    return duration, count, 0.0 if left < _DUE * dt else left

@@ -1,0 +1,91 @@
+"""Points spread evenly over a mesh, and which of its faces are its outside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats
+from ..errors import HairloomError
+from ..strands import Surface
+from .holes import close_holes
+from .winding import winding_number
+
+#: How far beside a face it is looked for what is in and out, as a share of the mesh's longest side.
+_BESIDE = 1.0e-4
+#: Steps of the R2 sequence (Roberts 2018), which fills a square evenly: 1 / g and 1 / g^2, where
+#: g^3 = g + 1.
+_R2 = (0.7548776662466927, 0.5698402909980532)
+
+
+@dataclass(frozen=True)
+class SurfaceSamples:
+    """point: (n, 3) float64 [m]. normal: (n, 3) float64, unit, outwards."""
+
+    point: Floats
+    normal: Floats
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """The outside of a mesh. surface: closed, its triangles turned outwards.
+    is_mesh: (triangle_count,) False for those that only close a hole.
+    """
+
+    surface: Surface
+    is_mesh: Bools
+
+    @property
+    def mesh(self) -> Surface:
+        """Without what closes holes."""
+        return Surface(self.surface.positions, self.surface.triangles[self.is_mesh])
+
+
+def boundary_of(surface: Surface, place: str) -> Boundary:
+    """Those faces that part inside from outside; not what lies within others. Holes are closed.
+
+    Args:
+        place: names the mesh in messages.
+
+    Raises:
+        HairloomError: no faces, no size, or no face with an inside.
+    """
+    closed, fans = close_holes(surface)
+    corners = closed.corners.astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    if not area.sum() > 0.0:
+        raise _broken(place, "it has no faces, or they have no area")
+    size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    solid = np.flatnonzero(area > 1.0e-12 * size * size)
+    beside = cross[solid] / area[solid, None] * (_BESIDE * size)
+    middle = corners[solid].mean(axis=1)
+    ahead = np.abs(winding_number(middle + beside, closed)) > 0.5
+    behind = np.abs(winding_number(middle - beside, closed)) > 0.5
+    outward, inward = solid[behind & ~ahead], solid[ahead & ~behind]
+    is_mesh = ~np.isin(np.concatenate([outward, inward]), fans)
+    if not is_mesh.any():
+        raise _broken(place, "it encloses no volume")
+    triangles = np.concatenate([closed.triangles[outward], closed.triangles[inward][:, ::-1]])
+    return Boundary(Surface(closed.positions, triangles), is_mesh)
+
+
+def samples_of(surface: Surface, count: int) -> SurfaceSamples:
+    """`count` points spread by area, the same ones each time."""
+    corners = surface.corners.astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    along = np.cumsum(area)
+    place = (np.arange(count) + 0.5) / count * along[-1]
+    triangle = np.minimum(np.searchsorted(along, place, side="right"), len(area) - 1)
+    one, other = (np.mod(0.5 + step * np.arange(1, count + 1), 1.0) for step in _R2)
+    root = np.sqrt(one)  # uniform within a triangle (Turk 1990, Graphics Gems)
+    share = np.stack([1.0 - root, root * (1.0 - other), root * other], axis=1)
+    point = np.einsum("nk,nkj->nj", share, corners[triangle])
+    normal = cross[triangle] / np.maximum(area[triangle, None], 1.0e-300)
+    return SurfaceSamples(point, normal)
+
+
+def _broken(place: str, problem: str) -> HairloomError:
+    return HairloomError(problem, place=place, remedy="Choose a closed mesh, or close its holes")

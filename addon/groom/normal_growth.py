@@ -1,0 +1,118 @@
+"""Strands that stand straight on a mesh, along its normals: the guides of the Nalu demo.
+
+"The control hairs are grown from a dedicated mesh, one from each vertex, along the normal; the
+segments get longer towards the tip" (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23). Here they
+may also grow from any number of points, spread over the mesh by area and density.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..errors import HairloomError
+from ..strands import StrandSet, Surface
+from .grown import at_roots, bound_strands, checked_weights, segment_shares
+from .scalp import sample_roots
+from .settings import GrowSettings
+
+#: A mean of normals shorter than this points nowhere, as on two faces back to back.
+_NO_DIRECTION = 1.0e-3
+
+
+def grow_along_normals(
+    surface: Surface,
+    settings: GrowSettings,
+    density: Floats | None = None,
+    length: Floats | None = None,
+) -> StrandSet:
+    """Straight strands along the normals, bound, all of one CV count, in the surface's space.
+
+    From `settings.strand_count` points, or with `settings.per_vertex` from each vertex whose
+    density is above `settings.threshold`. The same input and seed give the same strands.
+
+    Args:
+        surface: world space.
+        density: (vertex_count,), how densely hair grows, not negative; None: everywhere alike.
+        length: (vertex_count,), factor on the length, usually 0 to 1; None: 1 everywhere. No hair
+            grows where it is 0.
+
+    Raises:
+        HairloomError: the surface has no triangles, weights that do not fit it or are not finite,
+            or nowhere to grow.
+    """
+    density = checked_weights(density, surface, "density")
+    length = checked_weights(length, surface, "length")
+    random = np.random.default_rng(settings.seed)
+    if settings.per_vertex:
+        triangle, barycentric = _vertex_roots(surface, _grows(surface, settings, density, length))
+    else:
+        where = somewhere(density, length)
+        triangle, barycentric = sample_roots(surface, settings.strand_count, where, random)
+    root = np.einsum("nk,nkj->nj", barycentric, surface.corners[triangle].astype(np.float64))
+    strand_length = settings.length * (
+        1.0 - settings.length_variation * random.random(len(triangle))
+    )
+    if length is not None:
+        strand_length *= at_roots(length, surface, triangle, barycentric)
+    along = np.zeros(settings.cv_count)
+    along[1:] = segment_shares(settings.cv_count, settings.segment_ratio).cumsum()
+    reach = strand_length[:, None] * along
+    grid = root[:, None] + reach[..., None] * _normals(surface, triangle, barycentric)[:, None]
+    return bound_strands(grid, triangle, barycentric, surface, settings.radius)
+
+
+def somewhere(density: Floats | None, length: Floats | None) -> Floats | None:
+    """The density, and none where hair would have no length."""
+    if length is None:
+        return density
+    grows = (length > 0.0).astype(np.float64)
+    return grows if density is None else density * grows
+
+
+def _grows(
+    surface: Surface, settings: GrowSettings, density: Floats | None, length: Floats | None
+) -> Bools:
+    """Whether a strand grows from each vertex, (vertex_count,)."""
+    grows = np.ones(len(surface.positions), bool)
+    if density is not None:
+        grows &= density > settings.threshold
+    if length is not None:
+        grows &= length > 0.0
+    return grows
+
+
+def _vertex_roots(surface: Surface, grows: Bools) -> tuple[Ints, Floats]:
+    """Roots on the vertices, in their order: triangle (n,) and barycentric (n, 3).
+
+    Each is held by its largest triangle. A vertex of no triangle, or only of ones without area,
+    has no normal and grows none.
+    """
+    edge = np.diff(surface.corners.astype(np.float64), axis=1)
+    area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
+    order = np.argsort(area, kind="stable")
+    order = order[area[order] > 0.0]
+    holder = np.full(len(surface.positions), -1, np.int64)
+    holder[surface.triangles[order]] = order[:, None]  # the last one written, the largest, stays
+    vertex = np.flatnonzero(grows & (holder >= 0))
+    if not len(vertex):
+        raise HairloomError(
+            "there is no vertex on which hair may grow",
+            place="mesh",
+            remedy="Choose a mesh with faces, and lower the threshold below the density",
+        )
+    corner = (surface.triangles[holder[vertex]] == vertex[:, None]).argmax(axis=1)
+    return holder[vertex], np.eye(3)[corner]
+
+
+def _normals(surface: Surface, triangle: Ints, barycentric: Floats) -> Floats:
+    """Smooth unit normals at points of the surface, (n, 3); the triangle's own where they cancel
+    each other."""
+    corner_normals = surface.vertex_normals()[surface.triangles[triangle]].astype(np.float64)
+    normal = np.einsum("nk,nkj->nj", barycentric, corner_normals)
+    a, b, c = np.moveaxis(surface.corners[triangle].astype(np.float64), 1, 0)
+    flat = np.cross(b - a, c - a)
+    size = np.linalg.norm(normal, axis=1, keepdims=True)
+    chosen = np.where(size > _NO_DIRECTION, normal, flat)
+    result: Floats = chosen / np.linalg.norm(chosen, axis=1, keepdims=True)
+    return result

@@ -1,0 +1,36 @@
+"""What Blender has evaluated anew, as a groom sees it."""
+
+from __future__ import annotations
+
+import bpy
+
+from .session import Session
+
+
+def changes(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
+    """Session numbers of what has moved or changed shape, of changed shapes; if lights changed."""
+    moved, edited, is_lit_anew = set(), set(), False
+    for update in depsgraph.updates:
+        changed = update.id.original  # the evaluated copy has no session number
+        if update.is_updated_geometry or update.is_updated_transform:
+            moved.add(changed.session_uid)
+        if update.is_updated_geometry:
+            edited.add(changed.session_uid)
+        is_light = isinstance(changed, bpy.types.Object) and changed.type == "LIGHT"
+        is_lit_anew |= is_light or isinstance(changed, bpy.types.Light | bpy.types.World)
+    return moved, edited, is_lit_anew
+
+
+def is_edited(session: Session, edited: set[int]) -> bool:
+    """Whether the curves changed by themselves, not because modifiers carry them with the head."""
+    if session.uid not in edited:
+        return False
+    hair = session.hair.handle.find()
+    is_carried = session.head is not None and session.head.handle.uid in edited
+    return hair is not None and not (is_carried and len(hair.modifiers))
+
+
+def is_among(session: Session, moved: set[int]) -> bool:
+    """Whether the groom or its head has moved."""
+    bodies = (session.hair, session.head)
+    return any(body is not None and body.handle.uid in moved for body in bodies)

@@ -1,0 +1,25 @@
+"""Blender's own drawing of the hair that is previewed: out of the way, and back again."""
+
+from __future__ import annotations
+
+import bpy
+
+
+def show_originals(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, show: bool) -> None:
+    """Solid view leaves out what is shown as its bounds, EEVEE what no camera can see.
+
+    Touches the evaluated copy only.
+    """
+    evaluated = hair.evaluated_get(depsgraph)
+    if not evaluated.is_evaluated:
+        return
+    display, is_seen = (hair.display_type, hair.visible_camera) if show else ("BOUNDS", False)
+    if evaluated.display_type != display:
+        evaluated.display_type = display
+    if evaluated.visible_camera != is_seen:
+        evaluated.visible_camera = is_seen
+
+
+def refresh_views() -> None:
+    """Solid view shows the samples it has collected until it hears of an update."""
+    bpy.context.scene.update_tag()

@@ -1,0 +1,42 @@
+"""A parameter along the strand: five values from root to tip, joined by a smooth curve.
+
+Monotone cubic interpolation (Fritsch and Carlson 1980, SIAM J. Numer. Anal. 17, 238): between two
+values the curve never leaves their range, so that an artist gets no stiffness below zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats
+
+#: Places of the values, 0 at the root and 1 at the tip.
+PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+type Curve = tuple[float, ...]
+
+
+def along(curve: Curve, place: Floats) -> Floats:
+    """The curve's values float64 at these places (n,), 0 at the root and 1 at the tip."""
+    knots, values = np.array(PLACES), np.asarray(curve, np.float64)
+    step = np.diff(knots)
+    secant = np.diff(values) / step
+    slope = _slopes(secant)
+    place = np.clip(np.asarray(place, np.float64), 0.0, 1.0)
+    left = np.clip(np.searchsorted(knots, place, side="right") - 1, 0, len(step) - 1)
+    width = step[left]
+    t = (place - knots[left]) / width
+    rise = t * t * (3.0 - 2.0 * t)
+    result: Floats = values[left] * (1.0 - rise) + values[left + 1] * rise
+    result += width * t * (1.0 - t) * ((1.0 - t) * slope[left] - t * slope[left + 1])
+    return result
+
+
+def _slopes(secant: Floats) -> Floats:
+    """Slopes at the knots: harmonic means inside, the secants at both ends."""
+    slope = np.concatenate([secant[:1], np.zeros(len(secant) - 1), secant[-1:]])
+    before, after = secant[:-1], secant[1:]
+    same = before * after > 0.0
+    total = np.where(same, before + after, 1.0)
+    slope[1:-1] = np.where(same, 2.0 * before * after / total, 0.0)
+    return slope

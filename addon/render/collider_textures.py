@@ -1,0 +1,150 @@
+"""Colliders on the GPU: their solids, uploaded once, and how they are posed in each substep.
+
+rounds RGBA32F: two texels a round solid: xyz start [m], w radius; xyz axis to the end, w one
+                over its squared length, 0 for a ball. A set of balls is several of them.
+fields RGBA32F: a texel a node of a distance field [m]: its value and those of its neighbours
+                along z, along y, and along both. z runs fastest, then y; a field begins a row.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..dynamics.colliders import (
+    CapsuleCollider,
+    Collider,
+    DistanceField,
+    PosedCollider,
+    SphereCollider,
+    SphereSetCollider,
+)
+from ..errors import HairloomError
+from .shader_source import COLLIDER_TEXELS, FIELD_ROW, ROUNDS_ACROSS, STRAND_ROWS
+from .textures import texture_from
+
+
+@dataclass(frozen=True)
+class ColliderTextures:
+    """The solids of some colliders.
+
+    colliders: those that lie in the textures, in their order.
+    own: (collider_count, 2, 4) what the table of moments says of each. Of a field: nodes along x,
+        y and z, and the row where it begins; low and cell. Of others: first round solid, and how
+        many; 0; -1.
+    bounds: center and radius [m] of a sphere around each.
+    rounds, fields: see above; None where there are none.
+    """
+
+    colliders: tuple[Collider, ...]
+    own: Floats
+    bounds: tuple[tuple[Floats, float], ...]
+    rounds: Any
+    fields: Any
+
+    @classmethod
+    def of(cls, colliders: tuple[Collider, ...]) -> ColliderTextures:
+        """Upload the solids.
+
+        Raises:
+            HairloomError: more of them than a texture holds.
+        """
+        rounds: list[Floats] = []
+        fields: list[Floats] = []
+        own = np.zeros((len(colliders), 2, 4), np.float32)
+        row = 0
+        for place, collider in enumerate(colliders):
+            if isinstance(collider, DistanceField):
+                own[place] = (*collider.values.shape, row), (*collider.low, collider.cell)
+                fields.append(field_texels(collider.values))
+                row += len(fields[-1]) // FIELD_ROW
+            else:
+                solids = round_texels(collider)
+                own[place, 0] = sum(map(len, rounds)), len(solids), 0.0, -1.0
+                rounds.append(solids)
+        bounds = tuple(collider.bounds for collider in colliders)
+        textures = _texture(rounds, ROUNDS_ACROSS), _texture(fields, FIELD_ROW)
+        return cls(colliders, own, bounds, *textures)
+
+    def are_of(self, posed: tuple[PosedCollider, ...]) -> bool:
+        """Whether these are the colliders that lie in the textures."""
+        return len(posed) == len(self.colliders) and all(
+            one.collider is other for one, other in zip(posed, self.colliders, strict=True)
+        )
+
+    def moments(self, posed: tuple[PosedCollider, ...], spans: Floats, reach: float) -> Floats:
+        """Rows of the table of moments, (substep_count, collider_count * COLLIDER_TEXELS, 4).
+
+        A collider's texels: three rows of its inverse matrix at the substep's end; three of how
+        much the substep changes its matrix; those of `own`; a sphere around it that holds all
+        points within reach.
+
+        Args:
+            spans: (substep_count, 2) begin and end of each substep as shares of the frame.
+            reach: [m] from a collider in which contacts may be.
+        """
+        table = np.zeros((len(spans), len(posed), COLLIDER_TEXELS, 4), np.float32)
+        table[:, :, 6:8] = self.own
+        moments: Any = spans.T[..., None, None]  # in matrix_at an array does for a number
+        for place, one in enumerate(posed):
+            before, now = one.matrix_at(moments)
+            table[:, place, 0:3] = np.linalg.inv(now)[:, :3]
+            table[:, place, 3:6] = (now - before)[:, :3]
+            turned = now[:, :3, :3]
+            stretch = np.sqrt(np.einsum("nij,nij->n", turned, turned))  # no less than the largest
+            center, radius = self.bounds[place]
+            table[:, place, 8, :3] = turned @ center + now[:, :3, 3]
+            table[:, place, 8, 3] = radius * stretch + reach
+        return table.reshape(len(spans), -1, 4)
+
+
+def round_texels(collider: Collider) -> Floats:
+    """Two texels for each round solid, (n, 2, 4)."""
+    if isinstance(collider, SphereSetCollider):
+        solids = np.zeros((len(collider.radii), 2, 4), np.float32)
+        solids[:, 0, :3], solids[:, 0, 3] = collider.centers, collider.radii
+        return solids
+    solids = np.zeros((1, 2, 4), np.float32)
+    if isinstance(collider, SphereCollider):
+        solids[0, 0] = *collider.center, collider.radius
+    elif isinstance(collider, CapsuleCollider):
+        axis = collider.end - collider.start
+        square = float((axis * axis).sum())
+        solids[0, 0] = *collider.start, collider.radius
+        solids[0, 1] = *axis, 1.0 / square if square > 1.0e-18 else 0.0
+    else:
+        raise HairloomError(
+            f"a {type(collider).__name__} cannot be computed on the GPU",
+            place="collider",
+            remedy="Compute dynamics on the CPU",
+        )
+    return solids
+
+
+def field_texels(values: Floats) -> Floats:
+    """A field (nx, ny, nz) as full rows of texels, (n * FIELD_ROW, 4)."""
+    padded = np.pad(values, ((0, 0), (0, 1), (0, 1)), mode="edge")
+    corners = padded[:, :-1, :-1], padded[:, :-1, 1:], padded[:, 1:, :-1], padded[:, 1:, 1:]
+    nodes = np.zeros((-(-values.size // FIELD_ROW) * FIELD_ROW, 4), np.float32)
+    nodes[: values.size] = np.stack(corners, axis=-1).reshape(-1, 4)
+    return nodes
+
+
+def _texture(parts: list[Floats], across: int) -> Any:
+    if not parts:
+        return None
+    texels = np.concatenate(parts)
+    texels = texels.reshape(len(texels), -1)
+    height = -(-len(texels) // across)
+    if height > STRAND_ROWS:
+        raise HairloomError(
+            f"colliders of {len(texels)} parts do not fit into the GPU's textures",
+            place="collider",
+            remedy="Use fewer colliders, or a lower collider resolution",
+        )
+    rows = np.zeros((height * across, texels.shape[1]), np.float32)
+    rows[: len(texels)] = texels
+    return texture_from(rows.reshape(height, -1, 4), "RGBA32F")

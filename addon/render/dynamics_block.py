@@ -1,0 +1,113 @@
+"""The numbers of a frame of dynamics as its shader reads them: a uniform block (struct_dynamics)
+and a table of moments, one row a substep.
+
+A row of the table, texels of RGBA32F:
+    0     x the substep's end s as a share of the frame, y s (s - 1), z and w shares of the style's
+          way and bow that swing damping gives to each CV
+    1, 2  phases of the gusts' modes [rad]
+    then  COLLIDER_TEXELS for each collider, see collider_textures.py
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..arrays import Floats
+from ..dynamics.constraints import PINNED
+from ..dynamics.contacts import REACH, cv_radius
+from ..dynamics.forces import air_share, carried_share, speed_kept
+from ..dynamics.frame import Frame
+from ..dynamics.settings import DynamicsSettings
+from ..dynamics.style import style_band
+from ..dynamics.wind import MODES
+from .shader_source import MOMENT_TEXELS
+
+#: Numbers before the vectors, and vectors before those of the CVs, of the uniform block.
+_NUMBERS, _VECTORS = 16, 3 + 2 * MODES
+
+
+def spans_of(frame: Frame, first: int, count: int) -> Floats:
+    """Begin and end of some substeps as shares of the frame, (count, 2) float64."""
+    return np.array([frame.span(number) for number in range(first, first + count)]).reshape(-1, 2)
+
+
+def moments_of(frame: Frame, first: int, spans: Floats) -> Floats:
+    """The table's texels but those of colliders, (substep_count, MOMENT_TEXELS, 4) float32."""
+    table = np.zeros((len(spans), MOMENT_TEXELS, 4), np.float32)
+    begin, end = spans.T
+    table[:, 0, 0] = end
+    table[:, 0, 2] = part = carried_share(frame.settings, frame.dt) * (end - begin)
+    if frame.drive.target_bow is not None:
+        table[:, 0, 1] = end * (end - 1.0)
+        table[:, 0, 3] = part * (begin + end - 1.0)
+    if frame.air is not None and len(frame.air.phase):
+        time = frame.time + np.arange(first, first + len(spans)) * frame.dt
+        turns = np.mod(frame.air.phase - frame.air.rate * time[:, None], 2.0 * np.pi)
+        table[:, 1:] = turns.reshape(len(spans), MOMENT_TEXELS - 1, 4)
+    return table
+
+
+def block_of(
+    frame: Frame, guide_count: int, cv_count: int, substep_count: int, speed_ratio: float
+) -> Floats:
+    """`Dynamics` in std140, float32.
+
+    Args:
+        substep_count: of this dispatch.
+        speed_ratio: of its first substep to the one before it.
+    """
+    settings, dt = frame.settings, frame.dt
+    values = np.zeros(_NUMBERS + 4 * _VECTORS + 8 * cv_count, np.float32)
+    values[:7].view(np.int32)[:] = (
+        guide_count,
+        substep_count,
+        len(frame.drive.colliders),
+        settings.contact_passes,
+        settings.length_iterations,
+        settings.relaxations,
+        settings.long_range,
+    )
+    values[7:_NUMBERS] = (
+        settings.length_tolerance,
+        dt,
+        speed_kept(settings, dt),
+        air_share(settings, dt),
+        settings.drag,
+        settings.friction,
+        settings.push_speed * dt,
+        speed_ratio,
+        REACH,
+    )
+    _fill_forces(values[_NUMBERS:].reshape(-1, 4), frame)
+    values[_NUMBERS + 4 * _VECTORS :] = _cv_values(settings, cv_count, dt)
+    return values
+
+
+def _fill_forces(vectors: Floats, frame: Frame) -> None:
+    settings, air = frame.settings, frame.air
+    pull = np.asarray(frame.drive.gravity, np.float32) * np.float32(settings.gravity)
+    square = np.float32(frame.dt * frame.dt)
+    vectors[0, :3] = pull * np.float32(1.0 - settings.buoyancy) * square
+    combed = (frame.turn @ pull.astype(np.float64)).astype(np.float32)
+    vectors[1, :3] = combed * (np.float32(settings.weight_held) * square)
+    if air is not None:
+        vectors[2, :3] = air.velocity
+        vectors[3 : 3 + len(air.swing), :3] = air.swing
+        vectors[3 + MODES : 3 + MODES + len(air.wave), :3] = air.wave
+
+
+@lru_cache(maxsize=8)
+def _cv_values(settings: DynamicsSettings, cv_count: int, dt: float) -> Floats:
+    """`band` and `own` of the block, flat."""
+    band, own = values = np.zeros((2, cv_count, 4), np.float32)
+    if cv_count > PINNED:
+        matrix = style_band(settings, cv_count, dt)
+        band[PINNED:, 0] = matrix.band.near
+        band[PINNED:, 1] = matrix.band.far
+        band[PINNED:, 2] = matrix.band.inverse_pivot
+        band[PINNED:, 3] = matrix.pull[:, 0]
+        own[1:-1, 0] = matrix.bend[:, 0]
+        own[PINNED:, 1] = cv_radius(settings, cv_count)
+    return values.ravel()

@@ -1,0 +1,238 @@
+"""Dynamics on the GPU: `dynamics.step.advance` as a compute shader, one invocation a guide.
+
+The guides stay on the GPU from frame to frame, in the textures of guide_textures.py.
+
+Limitations: a CV keeps two contacts at once, the most pressing ones, where numpy keeps one for each
+collider. A set of balls has each of its balls asked, numpy only near ones. Two forms that round
+differently drift apart where limp hair enlarges what rounding starts. Beyond 34 CVs Mesa's software
+driver is seven times slower for each CV, as it unrolls no loop that long.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats
+from ..dynamics.constraints import PINNED
+from ..dynamics.contacts import REACH
+from ..dynamics.frame import Drive, Frame, check_drive
+from ..dynamics.schedule import due_substeps
+from ..dynamics.settings import DynamicsSettings
+from ..dynamics.state import DynamicsState, as_rows
+from .collider_textures import ColliderTextures
+from .dynamics_block import block_of, moments_of, spans_of
+from .guide_textures import points_texture, rest_lengths, rest_shapes
+from .shader_program import ShaderRecipe, program, released_with_shaders
+from .textures import (
+    UniformBlock,
+    from_strand_rows,
+    strand_rows,
+    texture_from,
+    texture_to_array,
+)
+
+#: Substeps of one dispatch at most: operating systems reset a GPU that does not answer for seconds.
+SUBSTEPS_AT_ONCE = 64
+#: Contacts that a CV may have at once.
+CONTACT_SLOTS = 2
+GROUP_SIZE = 32
+
+
+BRIDGE_RECIPE = ShaderRecipe(
+    name="dynamics_bridge",
+    compute="dynamics_bridge.comp.glsl",
+    textures=(("FLOAT_2D", "positions"), ("FLOAT_2D", "styles_now")),
+    images=(("RGBA32F", "bridged"),),
+    integers=("cv_count", "guide_count"),
+    group_size=(16, 4),
+)
+
+
+@lru_cache(maxsize=32)
+def dynamics_recipe(
+    cv_count: int,
+    *,
+    relaxation: bool = False,
+    tips_held: bool = False,
+    air: bool = False,
+    collider_count: int = 0,
+    rounds: bool = False,
+    fields: bool = False,
+) -> ShaderRecipe:
+    """The program for guides of so many CVs; what a scene does not need is left out of it."""
+    flags = {
+        "RELAXATION": relaxation,
+        "TIPS_HELD": tips_held,
+        "HAS_AIR": air,
+        "HAS_ROUNDS": rounds,
+        "HAS_FIELDS": fields,
+    }
+    textures = ["styles_before", "styles_now", "style_bows", "rest_shapes", "rest_lengths"]
+    textures += ["moments"]
+    textures += ["rounds"] * rounds + ["fields"] * fields
+    return ShaderRecipe(
+        name="dynamics",
+        compute="dynamics.comp.glsl",
+        structs=("struct_dynamics.glsl",),
+        blocks=(("Dynamics", "frame"),),
+        textures=tuple(("FLOAT_2D", name) for name in textures),
+        images=(
+            ("RGBA32F", "positions", "READ_WRITE"),
+            ("RG32F", "previous_positions", "READ_WRITE"),
+        ),
+        group_size=(GROUP_SIZE,),
+        defines=(
+            ("CV_COUNT", cv_count),
+            ("CONTACT_SLOTS", min(collider_count, CONTACT_SLOTS) if cv_count > PINNED else 0),
+            *((name, 1) for name, is_set in flags.items() if is_set),
+        ),
+    )
+
+
+class DynamicsPass:
+    """Guides in motion on the GPU. Making one touches no GPU; the first frame does.
+
+    Args:
+        state: where the motion begins, or goes on.
+    """
+
+    def __init__(self, state: DynamicsState) -> None:
+        self._state = state  # positions as they were given or read last, the clock as it is now
+        self.release()
+        released_with_shaders(self)
+
+    @property
+    def guides(self) -> Any:
+        """Texture RGBA32F in the layout of textures.strand_rows, xyz the CVs [m, world] at the
+        end of the last frame, w anything; None before the first frame."""
+        return self._textures.get("bridged" if self._is_bridged else "positions")
+
+    def advance(self, drive: Drive, settings: DynamicsSettings, duration: float) -> None:
+        """Move the guides by a frame of `duration` seconds, as step.advance does.
+
+        Raises:
+            HairloomError: as step.advance; or a collider that the GPU cannot have.
+            ShaderError: the shader does not compile here.
+        """
+        state, dt, longest = self._state, 1.0 / settings.substep_rate, settings.longest_frame
+        duration, count, left = due_substeps(state.time_left, duration, longest, dt)
+        check_drive(state, drive)
+        if state.guide_count:
+            self._upload(drive)
+            if count:
+                frame = Frame.of(state, drive, settings, duration, dt)
+                self._advance(frame, count, dt / state.substep if state.substep else 1.0)
+            self._is_bridged = left > 0.0 or not count
+            if self._is_bridged:
+                self._bridge()
+        self._state = replace(
+            state,
+            substep=dt if count else state.substep,
+            time_left=left,
+            time=state.time + count * dt,
+        )
+
+    def read(self) -> DynamicsState:
+        """The state as it is now, read back; step.advance and another pass can go on from it."""
+        if "positions" in self._textures:
+            here, beside = (self._grid(name) for name in ("positions", "previous_positions"))
+            previous = np.concatenate([beside, here[..., 3:]], axis=-1)
+            self._state = replace(
+                self._state, position=as_rows(here[..., :3]), previous=as_rows(previous)
+            )
+        return self._state
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU; goes on from the state that was read last."""
+        self._textures: dict[str, Any] = {}
+        self._is_bridged = False
+        self._block = UniformBlock()
+        self._colliders: ColliderTextures | None = None
+        self._styles: tuple[Floats | None, Floats | None] = (None, None)
+
+    def _upload(self, drive: Drive) -> None:
+        state, textures = self._state, self._textures
+        if "positions" not in textures:
+            here, previous = (rows.transpose(2, 1, 0) for rows in (state.position, state.previous))
+            textures["positions"] = points_texture(here, previous[..., 2])
+            textures["previous_positions"] = texture_from(strand_rows(previous[..., :2]), "RG32F")
+            textures["bridged"] = points_texture(here)
+            textures["rest_shapes"] = texture_from(strand_rows(rest_shapes(state.rest)), "RGBA32F")
+            textures["rest_lengths"] = texture_from(strand_rows(rest_lengths(state.rest)), "R32F")
+        before, now = self._styles
+        if drive.target_before is now:
+            textures["styles_before"] = textures["styles_now"]
+        elif drive.target_before is not before:
+            textures["styles_before"] = points_texture(drive.target_before)
+        if drive.target_now is drive.target_before:
+            textures["styles_now"] = textures["styles_before"]
+        elif drive.target_now is not now:
+            textures["styles_now"] = points_texture(drive.target_now)
+        self._styles = drive.target_before, drive.target_now
+        textures["style_bows"] = (
+            textures["styles_now"]  # its share is 0 in the table of moments
+            if drive.target_bow is None
+            else points_texture(drive.target_bow)
+        )
+        if self._colliders is None or not self._colliders.are_of(drive.colliders):
+            self._colliders = ColliderTextures.of(tuple(one.collider for one in drive.colliders))
+
+    def _advance(self, frame: Frame, count: int, speed_ratio: float) -> None:
+        """All substeps of a frame; the first is `speed_ratio` as long as the one before it."""
+        for first in range(0, count, SUBSTEPS_AT_ONCE):
+            part = min(count - first, SUBSTEPS_AT_ONCE)
+            self._dispatch(frame, first, part, 1.0 if first else speed_ratio)
+
+    def _dispatch(self, frame: Frame, first: int, count: int, speed_ratio: float) -> None:
+        colliders, settings, state = self._colliders, frame.settings, self._state
+        assert colliders is not None
+        posed = frame.drive.colliders
+        spans = spans_of(frame, first, count)
+        table = moments_of(frame, first, spans)
+        if posed:
+            reach = REACH + max(settings.radius_root, settings.radius_tip)
+            table = np.concatenate([table, colliders.moments(posed, spans, reach)], axis=1)
+        textures = {**self._textures, "moments": texture_from(table, "RGBA32F")}
+        textures |= {"rounds": colliders.rounds, "fields": colliders.fields}
+        recipe = dynamics_recipe(
+            state.cv_count,
+            relaxation=settings.length_solver == "relaxation",
+            tips_held=state.rest.tip_held is not None,
+            air=frame.air is not None,
+            collider_count=len(posed),
+            rounds=colliders.rounds is not None,
+            fields=colliders.fields is not None,
+        )
+        block = block_of(frame, state.guide_count, state.cv_count, count, speed_ratio)
+        shader = program(recipe)
+        shader.bind(
+            blocks={"frame": self._block.holding(block)},
+            textures={name: textures[name] for _, name in recipe.textures},
+            images={name: textures[name] for _, name, *_ in recipe.images},
+        )
+        gpu.compute.dispatch(shader.shader, -(-state.guide_count // GROUP_SIZE), 1, 1)
+        gpu.shader.unbind()
+
+    def _bridge(self) -> None:
+        """Fill `bridged`."""
+        state, shader = self._state, program(BRIDGE_RECIPE)
+        names = "positions", "styles_now"
+        shader.bind(
+            textures={name: self._textures[name] for name in names},
+            images={"bridged": self._textures["bridged"]},
+            integers={"cv_count": state.cv_count, "guide_count": state.guide_count},
+        )
+        across, down = BRIDGE_RECIPE.group_size
+        groups = -(-state.cv_count // across), -(-state.guide_count // down)
+        gpu.compute.dispatch(shader.shader, *groups, 1)
+        gpu.shader.unbind()
+
+    def _grid(self, name: str) -> Floats:
+        """A texture as (guide_count, cv_count, channels)."""
+        pixels = texture_to_array(self._textures[name])
+        return from_strand_rows(pixels, self._state.guide_count, self._state.cv_count)

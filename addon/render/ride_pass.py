@@ -1,0 +1,253 @@
+"""Strands that ride on guides, computed on the GPU: what StrandPass draws without an upload.
+
+The same as pipeline.strands_at, in three dispatches over textures in the layout of
+textures.strand_rows:
+
+    vertices ------> ride_roots ------> root_motions                    one invocation a strand
+    guides_now ----> ride_guides -----> guide_motions                   one a CV of the guides
+                     ride ------------> cv_points                       one a strand
+
+New with every frame are the head's vertices that hold a root, or a matrix, and the guides.
+
+    root_holds    RGBA32F: first texel xyz the triangle's vertices, second xy weights of b and c
+    rest_frames   RGBA32F: xyz of four texels origin, tangent, bitangent, normal at rest
+    rest_points   RGBA32F: xyz position at rest [m, world], w radius [m]
+    guide_strands R32F:    the strand that each guide is
+    guide_weights RGBA32F: first texel xyz the three guides, second xyz their weights
+    cv_points     RGBA32F: xyz position now [m, world], w radius [m]
+
+Whole numbers lie in them as floats, exact below 2^24.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..refine.interpolate import Weights
+from ..strands import StrandSet, Surface
+from .root_holds import RootHolds, matrix_motion
+from .shader_program import ShaderRecipe, program, released_with_shaders
+from .snapshot import DevicePoints
+from .textures import from_strand_rows, strand_rows, texture_from, texture_to_array
+
+ROOTS_RECIPE = ShaderRecipe(
+    name="ride_roots",
+    compute="ride_roots.comp.glsl",
+    textures=(("FLOAT_2D", "vertices"), ("FLOAT_2D", "root_holds"), ("FLOAT_2D", "rest_frames")),
+    images=(("RGBA32F", "frames"), ("RGBA32F", "root_motions")),
+    integers=("strand_count",),
+    group_size=(64, 1),
+)
+GUIDES_RECIPE = ShaderRecipe(
+    name="ride_guides",
+    compute="ride_guides.comp.glsl",
+    textures=(
+        ("FLOAT_2D", "guides_now"),
+        ("FLOAT_2D", "guide_strands"),
+        ("FLOAT_2D", "root_motions"),
+        ("FLOAT_2D", "rest_points"),
+    ),
+    images=(("RGBA32F", "guide_motions"),),
+    integers=("cv_count", "guide_count", "mover_count"),
+    group_size=(16, 4),
+)
+RIDE_RECIPE = ShaderRecipe(
+    name="ride",
+    compute="ride.comp.glsl",
+    textures=(
+        ("FLOAT_2D", "root_motions"),
+        ("FLOAT_2D", "guide_weights"),
+        ("FLOAT_2D", "rest_points"),
+        ("FLOAT_2D", "guide_motions"),
+    ),
+    images=(("RGBA32F", "cv_points"),),
+    integers=("cv_count", "strand_count", "mover_count"),
+    group_size=(64, 1),
+)
+
+
+class RidePass:
+    """The strands of one groom on the GPU. Making one touches no GPU; `carry` and `ride` do.
+
+    Args:
+        strands: uniform, world space at rest; bound when there is a head.
+        head: world space at rest, or None for hair that one matrix carries.
+        guides: (guide_count,) indices of the strands that are simulated.
+        weights: of all strands.
+    """
+
+    def __init__(
+        self, strands: StrandSet, head: Surface | None, guides: Ints, weights: Weights
+    ) -> None:
+        self._strands = strands
+        self._guides = guides
+        self._weights = weights
+        self._holds = None if head is None else RootHolds(strands, head)
+        self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
+        self.points = DevicePoints((strands.strand_count, self._cv_count))
+        self.release()
+        released_with_shaders(self)
+        released_with_shaders(self.points)  # a snapshot may outlive this pass
+
+    def carry(self, head_positions: Floats | None, matrix: Floats) -> None:
+        """Show every strand in its rest shape, carried rigidly by its own root.
+
+        Args:
+            head_positions: (vertex_count, 3) [m], world space; None for hair without a head.
+            matrix: (4, 4), moves rest world space to now; carries hair without a head.
+
+        Raises:
+            ShaderError: a shader does not compile here.
+        """
+        self._take_pose(head_positions, matrix)
+        self._textures["guide_motions"].clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+        self._run_ride()
+
+    def ride(self, head_positions: Floats | None, matrix: Floats, guides_now: Any) -> None:
+        """Show every strand carried by its root and moved with its guides.
+
+        Args:
+            head_positions, matrix: as in `carry`.
+            guides_now: (guide_count, cv_count, 3) [m], world space, or a texture RGBA32F that
+                holds them in the layout of textures.strand_rows.
+
+        Raises:
+            ShaderError: a shader does not compile here.
+            ValueError: guides of another shape.
+        """
+        self._take_pose(head_positions, matrix)
+        if isinstance(guides_now, np.ndarray):
+            wanted = (len(self._guides), self._cv_count, 3)
+            if guides_now.shape != wanted:
+                raise ValueError(f"guides have shape {guides_now.shape}, not {wanted}")
+            guides_now = texture_from(strand_rows(_padded(guides_now)), "RGBA32F")
+        self._run_guides(guides_now)
+        self._run_ride()
+
+    def read(self) -> Floats:
+        """The strands as they are shown, (strand_count, cv_count, 3) float32 [m], world space."""
+        assert self.points.texture is not None, "nothing is shown yet"
+        pixels = texture_to_array(self.points.texture)
+        return from_strand_rows(pixels, self._strands.strand_count, self._cv_count)[..., :3]
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU; the next frame uploads it again."""
+        self._textures: dict[str, Any] = {}
+        self.points.release()
+
+    @property
+    def _cv_count(self) -> int:
+        return int(self._strands.grid.shape[1])
+
+    @property
+    def _mover_count(self) -> int:
+        """How many root motions there are: one for each strand, or one for all."""
+        return 1 if self._holds is None else self._strands.strand_count
+
+    def _take_pose(self, head_positions: Floats | None, matrix: Floats) -> None:
+        """Write root_motions, and the middle of all roots."""
+        if not self._textures:
+            self._upload()
+        if self._holds is None or head_positions is None:
+            self._textures["root_motions"] = texture_from(matrix_motion(matrix), "RGBA32F")
+            middle = matrix[:3, :3] @ self._root_mean + matrix[:3, 3]
+            self.points.center = middle.astype(np.float32)
+            return
+        self.points.center = self._holds.center(head_positions)
+        self._run_roots(head_positions)
+
+    def _upload(self) -> None:
+        """Everything that is constant, and the textures that the shaders write."""
+        strands, textures = self._strands, self._textures
+        grid, count = strands.grid, strands.strand_count
+        points = np.concatenate([grid, strands.radius.reshape(count, -1, 1)], axis=-1)
+        textures["rest_points"] = texture_from(strand_rows(points), "RGBA32F")
+        guide_strands = self._guides[:, None, None].astype(np.float32)
+        textures["guide_strands"] = texture_from(strand_rows(guide_strands), "R32F")
+        riding = np.stack([self._weights.guide, self._weights.weight], axis=1)
+        textures["guide_weights"] = texture_from(strand_rows(_padded(riding)), "RGBA32F")
+        textures["guide_motions"] = _empty(len(self._guides), self._cv_count)
+        self.points.texture = _empty(count, self._cv_count)
+        if self._holds is not None:
+            holds = strand_rows(self._holds.texels)
+            textures["root_holds"] = texture_from(holds, "RGBA32F")
+            textures["root_motions"] = _empty(count, 4)
+            textures["frames"] = _empty(count, 4)
+            textures["rest_frames"] = _empty(count, 4)
+            self._run_roots(self._holds.rest_positions)
+            rest_frames = textures.pop("frames")
+            textures |= {"frames": textures["rest_frames"], "rest_frames": rest_frames}
+
+    def _run_roots(self, head_positions: Floats) -> None:
+        assert self._holds is not None
+        taken = head_positions[self._holds.vertices][:, None]
+        vertices = texture_from(strand_rows(_padded(taken)), "RGBA32F")
+        textures, count = self._textures, self._strands.strand_count
+        shader = program(ROOTS_RECIPE)
+        shader.bind(
+            textures={"vertices": vertices, **_named(textures, "root_holds", "rest_frames")},
+            images=_named(textures, "frames", "root_motions"),
+            integers={"strand_count": count},
+        )
+        _dispatch(shader, count, 1)
+
+    def _run_guides(self, guides_now: Any) -> None:
+        textures, count = self._textures, len(self._guides)
+        shader = program(GUIDES_RECIPE)
+        shader.bind(
+            textures={
+                "guides_now": guides_now,
+                **_named(textures, "guide_strands", "root_motions", "rest_points"),
+            },
+            images=_named(textures, "guide_motions"),
+            integers={
+                "cv_count": self._cv_count,
+                "guide_count": count,
+                "mover_count": self._mover_count,
+            },
+        )
+        _dispatch(shader, self._cv_count, count)
+
+    def _run_ride(self) -> None:
+        textures, count = self._textures, self._strands.strand_count
+        shader = program(RIDE_RECIPE)
+        taken = "root_motions", "guide_weights", "rest_points", "guide_motions"
+        shader.bind(
+            textures=_named(textures, *taken),
+            images={"cv_points": self.points.texture},
+            integers={
+                "cv_count": self._cv_count,
+                "strand_count": count,
+                "mover_count": self._mover_count,
+            },
+        )
+        _dispatch(shader, count, 1)
+
+
+def _padded(values: Floats) -> Floats:
+    """Three channels (n, m, 3) as four, the last 0, float32: textures have no three."""
+    padded = np.zeros((*values.shape[:2], 4), np.float32)
+    padded[..., :3] = values
+    return padded
+
+
+def _empty(strand_count: int, column_count: int) -> Any:
+    """A texture RGBA32F of the size that strand_rows gives, zero everywhere."""
+    height, width, _ = strand_rows(np.zeros((strand_count, column_count, 1), np.float32)).shape
+    texture = gpu.types.GPUTexture((width, height), format="RGBA32F")
+    texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+    return texture
+
+
+def _named(textures: dict[str, Any], *names: str) -> dict[str, Any]:
+    return {name: textures[name] for name in names}
+
+
+def _dispatch(shader: Any, width: int, height: int) -> None:
+    across, down = shader.recipe.group_size
+    gpu.compute.dispatch(shader.shader, -(-width // across), -(-height // down), 1)
+    gpu.shader.unbind()

@@ -1,0 +1,145 @@
+"""What hair stays out of: spheres fitted to a mesh, and what the panels show of colliders."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty
+
+from ..host import spheres
+from ..host.groups import operator_properties
+from ..host.objects import head_of
+from ..host.properties import settings_of
+from ..host.spheres import FittedSpheres, SphereFitSettings
+from .reports import reporting, waiting
+from .selection import active_mesh, chosen_hair
+
+_MILLIMETRES = 1000.0
+
+
+class HAIRLOOM_OT_fit_spheres(bpy.types.Operator):
+    """Fit spheres to the active mesh, or to the mesh that the active hair grows on. They follow it,
+    also when an armature deforms it, and hair collides with them faster than with a mesh"""
+
+    bl_idname = "hairloom.fit_spheres"
+    bl_label = "Fit Spheres"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = {
+        **operator_properties("sphere_fit"),
+        "replace_mesh": BoolProperty(
+            name="In Place of the Mesh",
+            description="The mesh itself collides no longer, so that Play need not prepare it",
+            default=True,
+        ),
+    }
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_mesh(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        mesh = _mesh(context)
+        assert mesh is not None
+        with waiting(context):
+            fitted = spheres.fit_spheres_to(mesh, context, settings_of(self, SphereFitSettings))
+        for hair in spheres.grown_on(mesh, context.view_layer):
+            spheres.use_spheres(hair, fitted.collection)
+        if self.replace_mesh:
+            mesh.hairloom.collider_shape = "none"
+        self._tell(mesh, fitted)
+        return {"FINISHED"}
+
+    def _tell(self, mesh: bpy.types.Object, fitted: FittedSpheres) -> None:
+        error, count = fitted.fit.error, len(fitted.fit.radii)
+        if fitted.hanging and mesh.modifiers:
+            self.report(
+                {"WARNING"},
+                f"{fitted.hanging} of {count} spheres follow {mesh.name} as an object but not its "
+                "shape: apply the modifiers that copy vertices, and fit again",
+            )
+        self.report(
+            {"INFO"},
+            f"{count} spheres in {fitted.collection.name}: "
+            f"{error.gap_mean * _MILLIMETRES:.1f} mm of the mesh stick out of them on average "
+            f"({error.gap_max * _MILLIMETRES:.1f} mm at most), they stick out of the mesh by "
+            f"{error.outside_mean * _MILLIMETRES:.1f} mm "
+            f"({error.outside_max * _MILLIMETRES:.1f} mm at most)",
+        )
+
+
+class HAIRLOOM_OT_remove_spheres(bpy.types.Operator):
+    """Remove the spheres that were fitted to the active mesh, or to the mesh that the active hair
+    grows on, which then collides by itself again"""
+
+    bl_idname = "hairloom.remove_spheres"
+    bl_label = "Remove Spheres"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not _has_mesh(cls, context):
+            return False
+        if spheres.fitted_collections(_mesh(context)):
+            return True
+        cls.poll_message_set("No spheres were fitted to this mesh")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        mesh = _mesh(context)
+        assert mesh is not None
+        count = spheres.remove_spheres(mesh)
+        self.report({"INFO"}, f"{count} spheres removed; {mesh.name} collides by itself again")
+        return {"FINISHED"}
+
+
+def draw_colliders(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """What these hair curves, or this fin, collide with."""
+    column = layout.column()
+    column.prop(hair.hairloom, "collider")
+    column.prop(hair.hairloom, "collider_collection")
+    solid = hair.hairloom.collider or (head_of(hair) if hair.type == "CURVES" else None)
+    if solid is not None:
+        column.prop(solid.hairloom, "collider_shape", text=f"{solid.name} As")
+    row = layout.row(align=True)
+    row.operator("hairloom.fit_spheres", icon="META_BALL")
+    row.operator("hairloom.remove_spheres", text="", icon="X")
+
+
+class HAIRLOOM_PT_collider(bpy.types.Panel):
+    """How this object collides with hair whose colliders it is among"""
+
+    bl_label = "Hairloom Collider"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "physics"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.object is not None and context.object.type in {"MESH", "EMPTY"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.prop(context.object.hairloom, "collider_shape")
+
+
+def _mesh(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The active mesh, or the one that the chosen hair grows on."""
+    mesh = active_mesh(context)
+    hair = chosen_hair(context)
+    return mesh if mesh is not None or not hair else head_of(hair[0])
+
+
+def _has_mesh(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """For `poll`: whether there is one; says what to do on the greyed-out button."""
+    if context.mode != "OBJECT":
+        operator.poll_message_set("Go to Object Mode first")
+        return False
+    if _mesh(context) is not None:
+        return True
+    operator.poll_message_set("Select a mesh, or hair that grows on one")
+    return False
+
+
+CLASSES = (HAIRLOOM_OT_fit_spheres, HAIRLOOM_OT_remove_spheres, HAIRLOOM_PT_collider)

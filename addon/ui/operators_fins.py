@@ -1,0 +1,205 @@
+"""Fins: a mesh that becomes cloth; its buttons, and its panels (Physics, and the sidebar)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..host import fins, live
+from ..host.fin_modifier import add_modifier, clear, fin_modifier, is_shown, remove_modifier
+from .messages import draw_message
+from .reports import reporting, waiting
+from .selection import active_mesh
+
+
+class HAIRLOOM_OT_fin_add(bpy.types.Operator):
+    """Let the active mesh move as cloth, pinned by a vertex group"""
+
+    bl_idname = "hairloom.fin_add"
+    bl_label = "Make Fin"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _can_change(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj = active_mesh(context)
+        assert obj is not None
+        add_modifier(obj)
+        fin = obj.hairloom.fin
+        if not fin.pin_group and obj.vertex_groups.active is not None:
+            fin.pin_group = obj.vertex_groups.active.name
+            self.report({"INFO"}, f"Pinned by the vertex group {fin.pin_group}")
+        elif not fin.pin_group:
+            self.report({"WARNING"}, "Nothing is pinned yet: choose a Pin Group, or it will fall")
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_fin_remove(bpy.types.Operator):
+    """Make the active fin a plain mesh again; its shape is as it was"""
+
+    bl_idname = "hairloom.fin_remove"
+    bl_label = "Remove Fin"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _can_change(cls, context) and _needs_fin(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj = active_mesh(context)
+        assert obj is not None
+        session = live.simulated_of(obj)
+        if session is not None:
+            live.stop(session)
+        remove_modifier(obj)
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_fin_preview(bpy.types.Operator):
+    """Let Play and Blender's playback move the active fin, or no longer"""
+
+    bl_idname = "hairloom.fin_preview"
+    bl_label = "Preview Fin"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _needs_fin(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj, depsgraph = active_mesh(context), context.evaluated_depsgraph_get()
+        assert obj is not None
+        session = live.simulated_of(obj)
+        if session is not None:
+            session.stop(depsgraph)
+            live.stop(session)
+            return {"FINISHED"}
+        with waiting(context):
+            fins.start(obj, depsgraph)
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_fin_reset(bpy.types.Operator):
+    """Put the active fin back to where the animation carries it"""
+
+    bl_idname = "hairloom.fin_reset"
+    bl_label = "Reset Fin"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not _needs_fin(cls, context):
+            return False
+        obj = active_mesh(context)
+        if obj is not None and is_shown(obj):
+            return True
+        cls.poll_message_set("It is at rest")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj = active_mesh(context)
+        assert obj is not None
+        session = live.simulated_of(obj)
+        if session is None:
+            clear(obj.data)
+        else:
+            session.rest(context.evaluated_depsgraph_get())
+        return {"FINISHED"}
+
+
+def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
+    """Buttons and settings of a mesh that is, or may become, a fin."""
+    if fin_modifier(obj) is None:
+        layout.operator("hairloom.fin_add", icon="MOD_CLOTH")
+        return
+    fin, session = obj.hairloom.fin, live.simulated_of(obj)
+    layout.prop(fin, "enabled")
+    row = layout.row(align=True)
+    text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
+    row.operator("hairloom.fin_preview", text=text, icon=icon, depress=session is not None)
+    row.operator("hairloom.fin_reset", text="Reset", icon="FILE_REFRESH")
+    row.operator("hairloom.fin_remove", text="", icon="TRASH")
+    for warning in session.warnings if session is not None else ():
+        draw_message(layout, bpy.context, warning, "ERROR")
+    column = layout.column()
+    column.active = fin.enabled
+    column.prop_search(fin, "pin_group", obj, "vertex_groups")
+    column.prop(obj.hairloom, "collider")
+    column.prop(obj.hairloom, "collider_collection")
+    for parameter in fin.settings.parameters():
+        column.prop(fin, parameter.name, slider=parameter.kind in {"number", "integer"})
+
+
+class HAIRLOOM_PT_fin(bpy.types.Panel):
+    """A mesh that moves as cloth"""
+
+    bl_label = "Hairloom Fin"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "physics"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.object is not None and context.object.type == "MESH"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        draw_fin(self.layout, context.object)
+
+
+class HAIRLOOM_PT_sidebar_fin(bpy.types.Panel):
+    """A mesh that moves as cloth"""
+
+    bl_label = "Fin"
+    bl_parent_id = "HAIRLOOM_PT_sidebar"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Hairloom"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return active_mesh(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        draw_fin(self.layout, context.object)
+
+
+def _can_change(operator: type[Any], context: bpy.types.Context) -> bool:
+    """Whether there is an active mesh that may get or lose modifiers; says so on the button."""
+    obj = active_mesh(context)
+    if obj is None:
+        operator.poll_message_set("Select a mesh")
+    elif not obj.is_editable or not obj.data.is_editable:
+        operator.poll_message_set("It is linked from another file: make it local first")
+    elif obj.mode == "EDIT":
+        operator.poll_message_set("Leave Edit Mode first")
+    else:
+        return True
+    return False
+
+
+def _needs_fin(operator: type[Any], context: bpy.types.Context) -> bool:
+    obj = active_mesh(context)
+    if obj is not None and fin_modifier(obj) is not None:
+        return True
+    operator.poll_message_set("Select a fin (Make Fin, in the Physics tab of a mesh)")
+    return False
+
+
+CLASSES = (
+    HAIRLOOM_OT_fin_add,
+    HAIRLOOM_OT_fin_remove,
+    HAIRLOOM_OT_fin_preview,
+    HAIRLOOM_OT_fin_reset,
+    HAIRLOOM_PT_fin,
+    HAIRLOOM_PT_sidebar_fin,
+)

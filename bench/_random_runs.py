@@ -1,0 +1,295 @@
+"""Seeded runs that try to break the dynamics: any settings, any guides, wild heads and colliders.
+
+Every value is drawn from its whole hard range, and often from one of its ends. Only what would
+take minutes a run is held back: the substep rate and the number of relaxations. No Blender here,
+so that the tests can use it too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from hairloom.addon.dynamics.colliders import (
+    CapsuleCollider,
+    Collider,
+    DistanceField,
+    PosedCollider,
+    SphereCollider,
+    SphereSetCollider,
+)
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.state import DynamicsState
+from hairloom.addon.dynamics.step import Drive
+from hairloom.addon.dynamics.way import bow
+from hairloom.addon.params import Parameter
+
+CV_COUNTS = (2, 3, 4, 8, 16, 24)
+FRAME_RATES = (12.0, 24.0, 30.0, 60.0, 120.0)
+#: Left out: what no step reads.
+_NOT_DRAWN = {"form", "collider_resolution"}
+#: Sweeps over a segment in a second of simulation; with more of them a run takes minutes.
+_SWEEPS = 60_000
+#: Shorter than this a strand has no length to be compared with [m].
+_NO_LENGTH = 1.0e-4
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a thing moves: swaying, turning, pulsing; a function of time, with one jump at most.
+
+    sway, phase: (3,) [m], [rad]. rate: (3,) [1/s]. axis: (3,) unit. turn: [1/s]. scale: (3,).
+    pulse: share of the scale. jump_at: [s]. jump: (3,) [m].
+    """
+
+    place: np.ndarray
+    sway: np.ndarray
+    rate: np.ndarray
+    phase: np.ndarray
+    axis: np.ndarray
+    turn: float
+    scale: np.ndarray
+    pulse: float
+    jump_at: float
+    jump: np.ndarray
+
+    def matrix(self, time: float) -> np.ndarray:
+        """Object to world (4, 4) at a time [s]."""
+        matrix = np.eye(4)
+        swing = np.sin(2.0 * np.pi * self.rate * time + self.phase)
+        matrix[:3, :3] = _turned(self.axis, 2.0 * np.pi * self.turn * time)
+        matrix[:3, :3] *= self.scale * (1.0 + self.pulse * np.sin(6.0 * time))
+        matrix[:3, 3] = self.place + self.sway * swing + (time >= self.jump_at) * self.jump
+        return matrix
+
+
+@dataclass(frozen=True)
+class RandomRun:
+    """Guides (guide_count, cv_count, 3) at rest on a head, and all that happens to them."""
+
+    grid: np.ndarray
+    settings: DynamicsSettings
+    head: Way
+    colliders: tuple[tuple[Collider, Way], ...]
+    gravity: np.ndarray
+    scene_wind: np.ndarray
+    fps: float
+    is_bent: bool
+    tip_held: np.ndarray | None
+
+    def begin(self) -> np.ndarray:
+        """The guides where the head is at first."""
+        return _moved(self.head.matrix(0.0), self.grid)
+
+    def drives(self, seconds: float) -> Iterator[Drive]:
+        """One a frame."""
+        times = np.arange(round(seconds * self.fps) + 1) / self.fps
+        for number in range(1, len(times)):
+            moments = times[max(number - 2, 0) : number + 1].tolist()
+            targets = [_moved(self.head.matrix(time), self.grid) for time in moments]
+            bent = bow(*targets, 1.0) if self.is_bent and len(targets) == 3 else None
+            colliders = tuple(self._posed(one, way, moments) for one, way in self.colliders)
+            yield Drive(targets[-2], targets[-1], colliders, self.gravity, bent, self.scene_wind)
+
+    def _posed(self, collider: Collider, way: Way, moments: list[float]) -> PosedCollider:
+        matrices = [way.matrix(time) for time in moments]
+        bent = bow(*matrices, 1.0) if self.is_bent and len(matrices) == 3 else None
+        return PosedCollider(collider, matrices[-2], matrices[-1], bent)
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The farthest that a CV is from its root, as a share of its rest length along the strand.
+
+    straight: in a straight line. along: along the strand as it is. is_finite: no NaN anywhere.
+    """
+
+    straight: float
+    along: float
+    is_finite: bool
+
+
+def reach_of(state: DynamicsState) -> Reach:
+    """The worst of all CVs of a state."""
+    position = state.position.astype(np.float64)
+    if not np.isfinite(position).all() or not np.isfinite(state.previous).all():
+        return Reach(np.inf, np.inf, False)
+    rest = np.cumsum(state.rest.length.astype(np.float64), axis=0)
+    straight = np.linalg.norm(position[:, 1:] - position[:, :1], axis=0)
+    along = np.cumsum(np.linalg.norm(np.diff(position, axis=1), axis=0), axis=0)
+    allowed = np.maximum(rest, _NO_LENGTH)
+    worst = [float((way / allowed).max(initial=0.0)) for way in (straight, along)]
+    return Reach(worst[0], worst[1], True)
+
+
+def promises_length(settings: DynamicsSettings) -> bool:
+    """Whether these settings ask for hair that does not stretch: relaxation alone does not."""
+    return settings.length_solver == "direct" or settings.long_range
+
+
+def random_run(seed: int, guide_count: int = 12) -> RandomRun:
+    """The run of this seed; always the same."""
+    random = np.random.default_rng(seed)
+    cv_count = int(random.choice(CV_COUNTS))
+    settings = _settings(random, cv_count)
+    solids = tuple(
+        (_solid(random), _way(random, is_head=False)) for _ in range(random.integers(0, 5))
+    )
+    held = None
+    if cv_count >= 4 and random.random() < 0.2:
+        held = random.random(guide_count) < 0.5
+    return RandomRun(
+        grid=_guides(random, guide_count, cv_count),
+        settings=settings,
+        head=_way(random, is_head=True),
+        colliders=solids,
+        gravity=random.normal(size=3) * random.choice([0.0, 9.81, 100.0]),
+        scene_wind=random.normal(size=3) * random.choice([0.0, 0.0, 3.0, 100.0]),
+        fps=float(random.choice(FRAME_RATES)),
+        is_bent=bool(random.random() < 0.7),
+        tip_held=held,
+    )
+
+
+def shaken(guide_count: int) -> RandomRun:
+    """No random run, but default settings in gusts, on a ball that sways like a shaken head."""
+    random = np.random.default_rng(0)
+    still = np.zeros(3)
+    head = Way(
+        place=still,
+        sway=np.array([0.3, 0.1, 0.05]),
+        rate=np.array([1.0, 1.7, 0.6]),
+        phase=still,
+        axis=np.array([0.0, 0.0, 1.0]),
+        turn=0.1,
+        scale=np.ones(3),
+        pulse=0.0,
+        jump_at=np.inf,
+        jump=still,
+    )
+    return RandomRun(
+        grid=_curls(random, random.uniform(0.1, 0.3, (guide_count, 1, 1)), 16, 0.1),
+        settings=DynamicsSettings(wind_speed=3.0, gusts=0.5),
+        head=head,
+        colliders=((SphereCollider(still, 0.1), head),),
+        gravity=np.array([0.0, 0.0, -9.81]),
+        scene_wind=still,
+        fps=60.0,
+        is_bent=True,
+        tip_held=None,
+    )
+
+
+def _settings(random: np.random.Generator, cv_count: int) -> DynamicsSettings:
+    drawn = {
+        parameter.name: _drawn(parameter, random)
+        for parameter in DynamicsSettings.parameters()
+        if parameter.name not in _NOT_DRAWN
+    }
+    rate = 2000.0 if random.random() < 0.01 else 30.0 * 10.0 ** random.random()
+    sweeps = round(_SWEEPS / (rate * cv_count * (drawn["contact_passes"] + 2)))
+    drawn |= {"substep_rate": rate, "relaxations": max(1, min(drawn["relaxations"], sweeps))}
+    return DynamicsSettings(**drawn)
+
+
+def _drawn(parameter: Parameter, random: np.random.Generator) -> Any:
+    if parameter.kind == "toggle":
+        return bool(random.random() < 0.5)
+    if parameter.kind == "choice":
+        return str(random.choice([name for name, _, _ in parameter.choices]))
+    assert parameter.hard_range is not None
+    low, high = parameter.hard_range
+    if parameter.kind == "curve":
+        ends = random.choice([low, high], 5)
+        return tuple(np.where(random.random(5) < 0.5, ends, random.uniform(low, high, 5)))
+    small = max(low, 1.0e-4 * high) if low >= 0.0 else low
+    spread = small * (high / small) ** random.random() if low >= 0.0 else parameter.default
+    options = [parameter.default, parameter.default, low, high, random.uniform(low, high), spread]
+    value = options[random.integers(len(options))]
+    return round(value) if parameter.kind == "integer" else float(np.clip(value, low, high))
+
+
+def _guides(random: np.random.Generator, count: int, cv_count: int) -> np.ndarray:
+    """Curly, straight, folded, without length, with a segment without length; 1 cm to 2 m."""
+    length = 0.01 * 200.0 ** random.random((count, 1, 1))
+    grid = _curls(random, length, cv_count, float(random.choice([0.0, 0.2])))
+    if cv_count > 3:
+        grid[0, cv_count // 2 :] = grid[0, cv_count // 2 : cv_count // 2 + 1]
+        grid[1, 3] = grid[1, 1]  # folds back
+    grid[2] = grid[2, :1]
+    return grid
+
+
+def _curls(
+    random: np.random.Generator, length: np.ndarray, cv_count: int, wave: float
+) -> np.ndarray:
+    """Guides outwards from a ball of 0.1 m, waved by a share of their length (count, 1, 1) [m]."""
+    outward = random.normal(size=(len(length), 1, 3))
+    outward /= np.linalg.norm(outward, axis=2, keepdims=True)
+    share = np.linspace(0.0, 1.0, cv_count)[:, None] ** random.choice([1.0, 1.5])
+    waves = share * np.sin(share * random.uniform(2.0, 12.0, (len(length), 1, 3)))
+    return (outward * (0.1 + length * share) + waves * wave * length).astype(np.float32)
+
+
+def _way(random: np.random.Generator, *, is_head: bool) -> Way:
+    """A head keeps its size, as hair does not grow with it."""
+    scale = np.ones(3)
+    if not is_head and random.random() < 0.6:
+        scale = 0.2 * 15.0 ** random.random(3)
+        scale[0] *= random.choice([1.0, 1.0, 1.0, -1.0])  # mirrored
+    axis = random.normal(size=3)
+    return Way(
+        place=np.zeros(3) if is_head else random.normal(0.0, 0.15, 3),
+        sway=random.normal(size=3) * random.choice([0.0, 0.05, 0.5]),
+        rate=random.uniform(0.0, 5.0, 3),
+        phase=random.uniform(0.0, 2.0 * np.pi, 3),
+        axis=axis / np.linalg.norm(axis),
+        turn=random.uniform(-3.0, 3.0) * random.choice([0.0, 0.3, 1.0]),
+        scale=scale,
+        pulse=0.0 if is_head else float(random.choice([0.0, 0.3])),
+        jump_at=random.uniform(0.0, 2.0) if random.random() < 0.1 else np.inf,
+        jump=random.normal(size=3),
+    )
+
+
+def _solid(random: np.random.Generator) -> Collider:
+    size = 0.02 * 10.0 ** random.random()
+    kind = random.integers(4)
+    if kind == 0:
+        return SphereCollider(random.normal(0.0, 0.05, 3), size)
+    if kind == 1:
+        ends = random.normal(0.0, 0.15, (2, 3)) * random.choice([0.0, 1.0])
+        return CapsuleCollider(*ends, size)
+    if kind == 2:
+        count = int(random.integers(1, 30))
+        return SphereSetCollider(random.normal(0.0, 0.1, (count, 3)), size * random.random(count))
+    return _mesh(int(random.integers(2)))
+
+
+@lru_cache(maxsize=2)
+def _mesh(which: int) -> DistanceField:
+    """What a mesh becomes: a box with sharp edges, or a ring with a hole, sampled coarsely."""
+    low, cell, nodes = -0.25, 0.02, 26
+    axis = low + cell * np.arange(nodes)
+    points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    if which:
+        away = np.linalg.norm(points[..., :2], axis=-1) - 0.14
+        return DistanceField(np.hypot(away, points[..., 2]) - 0.05, np.full(3, low), cell)
+    beyond = np.abs(points) - np.array([0.15, 0.1, 0.12])
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
+    return DistanceField(outside + np.minimum(beyond.max(axis=-1), 0.0), np.full(3, low), cell)
+
+
+def _turned(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Rodrigues' formula, (3, 3)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+
+
+def _moved(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
+    return (points @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)

@@ -1,0 +1,102 @@
+"""The scene of the dynamics benchmarks: combed guides on a ball that swings to and fro.
+
+A UV sphere of radius 0.1 m goes 0.3 m to either side, once a second. It does not ease in: in the
+first frame it has its full speed of 1.9 m/s, which is as hard as it gets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from hairloom.addon.dynamics.colliders import Collider, PosedCollider
+from hairloom.addon.dynamics.step import Drive
+from hairloom.addon.dynamics.way import bow
+from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.settings import GrowSettings
+from hairloom.addon.host.surfaces import read_surface
+from hairloom.addon.host.take import GRAVITY
+from hairloom.addon.strands import StrandSet, Surface
+
+RADIUS, SWAY, RATE, LENGTH = 0.1, 0.3, 1.0, 0.24  # [m], [m], [1/s], [m]
+
+
+def new_head() -> bpy.types.Object:
+    """The ball as a mesh object, at rest in the origin of an empty scene."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=RADIUS, segments=48, ring_count=24)
+    return bpy.context.object
+
+
+def surface_of(head: bpy.types.Object) -> Surface:
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return read_surface(head, depsgraph, need_uv=False, place=head.name)
+
+
+def guides_on(surface: Surface, count: int, cv_count: int = 16) -> StrandSet:
+    """Combed hair of the scalp, every strand of it a guide."""
+    settings = GrowSettings(strand_count=count, cv_count=cv_count, length=LENGTH)
+    return grow(surface, settings, scalp_density(surface))
+
+
+def sway(time: float) -> float:
+    """Where the head is at a time [s], along x [m]."""
+    return float(SWAY * np.sin(2.0 * np.pi * RATE * time))
+
+
+@dataclass(frozen=True)
+class Shake:
+    """Guides (guide_count, cv_count, 3) at rest on the head, and what pushes them."""
+
+    grid: np.ndarray
+    colliders: tuple[Collider, ...]
+
+    def drives(self, fps: float, seconds: float) -> Iterator[Drive]:
+        """One a frame, with ways bent as `pipeline.advance` bends them."""
+        places = [sway(frame / fps) for frame in range(round(seconds * fps) + 1)]
+        before = self._carried(places[0])
+        for frame in range(1, len(places)):
+            # as in the pipeline the style at one frame's end is the same array at the next's begin
+            now = self._carried(places[frame])
+            yield self._drive(before, now, places[max(frame - 2, 0) : frame + 1])
+            before = now
+
+    def _carried(self, x: float) -> np.ndarray:
+        return self.grid + np.float32([x, 0.0, 0.0])
+
+    def _drive(self, before: np.ndarray, now: np.ndarray, places: list[float]) -> Drive:
+        """Of the last two or three places of the head."""
+        matrices = [_moved(x) for x in places]
+        bent = bow(matrices[0], matrices[1], matrices[2], 1.0) if len(places) == 3 else None
+        grid_bow = None
+        if bent is not None:
+            grid_bow = np.zeros_like(self.grid) + bent[:3, 3].astype(np.float32)
+        colliders = tuple(
+            PosedCollider(one, matrices[-2], matrices[-1], bent) for one in self.colliders
+        )
+        return Drive(before, now, colliders, GRAVITY, grid_bow)
+
+
+def depth_in(surface: Surface) -> Callable[[np.ndarray], float]:
+    """Gives how deep [m] the deepest of points (n, 3) lies in this convex mesh; exact."""
+    normals = surface.triangle_normals().astype(np.float64)
+    kept = np.linalg.norm(normals, axis=1) > 0.5
+    normals, corner = normals[kept], surface.corners[kept, 0].astype(np.float64)
+    offset = np.einsum("ij,ij->i", normals, corner)
+
+    def deepest(points: np.ndarray) -> float:
+        inside = points[np.linalg.norm(points, axis=1) < RADIUS]
+        if not len(inside):
+            return 0.0
+        return max(0.0, float(-(inside @ normals.T - offset).max(axis=1).min()))
+
+    return deepest
+
+
+def _moved(x: float) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[0, 3] = x
+    return matrix

@@ -1,0 +1,203 @@
+"""The dynamics against Blender's own: milliseconds a frame, stretch, penetration, frame rates.
+
+762 guides of 16 CVs on a ball that swings 0.3 m to either side once a second, at 60 frames a
+second, the ball's mesh as collider, bend and style on as by default. The peer is Blender's "Hair
+Dynamics" on the same guides in the same process (see `_hair_dynamics`). Every time is the least of
+the medians of several rounds, in which all contestants take turns, so that a busy moment of the
+machine meets all of them.
+
+make bench NAME=dynamics            about three minutes
+make bench NAME="dynamics --peer-10k"   the peer with 10,000 guides too: three minutes more
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import statistics
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import gpu
+import numpy as np
+from _forms import ComputeForm, Form, NumpyForm, has_compute, play
+from _hair_dynamics import HairDynamics, animate
+from _shaken_head import RADIUS, Shake, depth_in, guides_on, new_head, surface_of, sway
+
+from hairloom.addon.dynamics.colliders import DistanceField, SphereCollider
+from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.state import DynamicsState, start
+from hairloom.addon.dynamics.step import Drive
+from hairloom.addon.strands import StrandSet, Surface
+
+GUIDES, FPS, WARM_UP, ROUNDS = 762, 60.0, 10, 3
+SIZES = (1_000, 3_000, 10_000, 30_000, 50_000)
+FRAME_RATES = (24.0, 30.0, 60.0, 120.0)
+SETTINGS = DynamicsSettings()
+Forms = dict[str, Callable[[DynamicsState], Form]]
+
+
+def main() -> None:
+    options = argparse.ArgumentParser()
+    options.add_argument("--peer-10k", action="store_true", help="the peer with 10,000 guides too")
+    asked = options.parse_args()
+    forms: Forms = {"numpy": NumpyForm}
+    if has_compute():
+        forms["compute"] = ComputeForm
+    head = new_head()
+    surface = surface_of(head)
+    field = DistanceField.from_surface(surface, SETTINGS, place="head")
+    guides = guides_on(surface, GUIDES)
+
+    found: dict[str, Any] = dict.fromkeys(("compute_ms", "ratio_compute"))
+    found |= race(forms, head, guides, field)
+    for name in forms:
+        found[f"ratio_{name}"] = found["hair_dynamics_ms"] / found[f"{name}_ms"]
+    found |= accuracy(forms, guides, surface, field)
+    found |= scaling(forms, surface, field)
+    for name, make in forms.items():
+        found["framerate_tip_percent" if name == "numpy" else f"{name}_framerate_tip_percent"] = (
+            frame_rates(make, guides, field)
+        )
+    if asked.peer_10k:
+        found["hair_dynamics_10k_ms"] = peer_10k(head, surface)
+    show(found)
+    print(json.dumps({**{key: rounded(value) for key, value in found.items()}, **machine()}))
+
+
+def race(
+    forms: Forms, head: bpy.types.Object, guides: StrandSet, field: DistanceField
+) -> dict[str, float]:
+    """Milliseconds a frame of all contestants, and how far the medians of the rounds lie apart."""
+    shake = Shake(guides.grid, (field,))
+    balls = Shake(guides.grid, (SphereCollider((0.0, 0.0, 0.0), RADIUS),))
+    animate(head, [sway(frame / FPS) for frame in range(61)], int(FPS))
+    medians: dict[str, list[float]] = {}
+    peer_stretch = idle = 0.0
+
+    def note(name: str, times: list[float]) -> None:
+        medians.setdefault(name, []).append(statistics.median(times))
+
+    for number in range(ROUNDS):
+        for name, make in forms.items():
+            note(f"{name}_ms", timed(make, shake, 2.0))
+            note(f"{name}_sphere_ms", timed(make, balls, 1.0))
+        peer = HairDynamics(head, guides)
+        times, stretch = peer.play(40 if number else 60, WARM_UP)
+        note("hair_dynamics_ms", times)
+        peer_stretch, idle = max(peer_stretch, stretch), peer.idle_ms(30)
+        peer.remove()
+    found = {name: min(values) for name, values in medians.items()}
+    found |= {f"{name}_worst_round": max(values) for name, values in medians.items()}
+    return found | {
+        "hair_dynamics_stretch_percent": peer_stretch * 100.0,
+        "hair_dynamics_idle_ms": idle,
+    }
+
+
+def timed(make: Callable[[DynamicsState], Form], shake: Shake, seconds: float) -> list[float]:
+    form = make(start(shake.grid))
+    times = play(form, shake.drives(FPS, seconds), SETTINGS, FPS)
+    form.release()
+    return times[WARM_UP:]
+
+
+def accuracy(
+    forms: Forms, guides: StrandSet, surface: Surface, field: DistanceField
+) -> dict[str, float]:
+    """The worst stretch and penetration of both forms in every frame of two seconds.
+
+    In the ball as the sphere it is, and in the ball's mesh, of which the simulation knows only
+    the distance field: its depth is measured at the triangles themselves.
+    """
+    depth = depth_in(surface)
+    worst = {"stretch_max_percent": 0.0, "penetration_sphere_mm": 0.0, "penetration_mesh_mm": 0.0}
+
+    def note(key: str, value: float) -> None:
+        worst[key] = max(worst[key], value)
+
+    def watch_sphere(state: DynamicsState, drive: Drive) -> None:
+        note("stretch_max_percent", max_stretch(state) * 100.0)
+        note("penetration_sphere_mm", deepest_penetration(state, drive.colliders) * 1000.0)
+
+    def watch_mesh(state: DynamicsState, drive: Drive) -> None:
+        note("stretch_max_percent", max_stretch(state) * 100.0)
+        free = state.grid[:, 2:].reshape(-1, 3) - drive.colliders[0].matrix_now[:3, 3]
+        note("penetration_mesh_mm", depth(free) * 1000.0)
+
+    sphere = SphereCollider((0.0, 0.0, 0.0), RADIUS)
+    for make in forms.values():
+        for collider, watch in ((sphere, watch_sphere), (field, watch_mesh)):
+            form = make(start(guides.grid))
+            play(form, Shake(guides.grid, (collider,)).drives(FPS, 2.0), SETTINGS, FPS, watch)
+            form.release()
+    return worst
+
+
+def scaling(forms: Forms, surface: Surface, field: DistanceField) -> dict[str, float]:
+    """Milliseconds a frame for more and more guides, and the exponent that fits them best."""
+    most = guides_on(surface, SIZES[-1]).grid
+    chosen = np.random.default_rng(1).permutation(SIZES[-1])
+    shakes = {size: Shake(most[np.sort(chosen[:size])], (field,)) for size in SIZES}
+    medians: dict[str, list[float]] = {}
+    for _ in range(ROUNDS):
+        for name, make in forms.items():
+            for size, shake in shakes.items():
+                seconds = (WARM_UP + (20 if size <= 10_000 else 6)) / FPS
+                times = timed(make, shake, seconds)
+                medians.setdefault(f"{name}_{size // 1000}k_ms", []).append(
+                    statistics.median(times)
+                )
+    found = {name: min(values) for name, values in medians.items()}
+    for name in forms:
+        times = [found[f"{name}_{size // 1000}k_ms"] for size in SIZES]
+        found[f"{name}_scaling_exponent"] = float(np.polyfit(np.log(SIZES), np.log(times), 1)[0])
+    return found | {"scaling_exponent": max(found[f"{name}_scaling_exponent"] for name in forms)}
+
+
+def frame_rates(
+    make: Callable[[DynamicsState], Form], guides: StrandSet, field: DistanceField
+) -> float:
+    """How far any tip is after two seconds from where another frame rate has it, in percent of
+    its hair's length; the worst tip of all guides and pairs of rates."""
+    tips = []
+    for fps in FRAME_RATES:
+        form = make(start(guides.grid))
+        play(form, Shake(guides.grid, (field,)).drives(fps, 2.0), SETTINGS, fps)
+        tips.append(form.state().grid[:, -1])
+        form.release()
+    apart = [np.linalg.norm(one - other, axis=1) for one in tips for other in tips]
+    return float((np.max(apart, axis=0) / guides.lengths()).max() * 100.0)
+
+
+def peer_10k(head: bpy.types.Object, surface: Surface) -> float:
+    peer = HairDynamics(head, guides_on(surface, 10_000))
+    times, _ = peer.play(25, 5)
+    peer.remove()
+    return statistics.median(times)
+
+
+def show(found: dict[str, Any]) -> None:
+    for name, value in found.items():
+        print(f"{name:40} {'-' if value is None else format(value, '12.3f')}")
+
+
+def rounded(value: Any) -> Any:
+    return value if value is None else round(value, 4)
+
+
+def machine() -> dict[str, str]:
+    return {
+        "reference": "Hair Dynamics, Physics, surface collision, 10 x 15 (as shipped)",
+        "backend": gpu.platform.backend_type_get(),
+        "renderer": gpu.platform.renderer_get(),
+        "blender": bpy.app.version_string,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+
+
+main()

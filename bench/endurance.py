@@ -1,0 +1,136 @@
+"""Whether the dynamics can be broken: 1,000 seeded runs of two seconds, and a shake of ten minutes.
+
+A run fails if anything is not finite, or if a CV is farther from its root than 1.02 times its rest
+length along the strand; that holds for every setting but relaxation without long-range attachment,
+which asks for hair that stretches. The scenes are those of `_random_runs`. The last line is one
+JSON object; the exit status is 1 if anything failed.
+
+make bench NAME="endurance --runs 1000 --first 0 --minutes 10 --compute"
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import sys
+import time
+import traceback
+from dataclasses import dataclass, field
+
+import bpy  # noqa: F401  it must come before gpu, which lives inside it
+import gpu
+import numpy as np
+from _forms import ComputeForm, Form, NumpyForm, play
+from _random_runs import RandomRun, promises_length, random_run, reach_of, shaken
+
+from hairloom.addon.dynamics.state import DynamicsState, start
+from hairloom.addon.dynamics.step import Drive
+
+SECONDS, LIMIT = 2.0, 1.02
+
+
+@dataclass
+class Tally:
+    """What has been seen so far."""
+
+    runs: int = 0
+    worst_ratio: float = 0.0
+    worst_seed: int = -1
+    worst_along: float = 0.0
+    failures: dict[int, str] = field(default_factory=dict)
+
+
+def main() -> int:
+    options = argparse.ArgumentParser()
+    options.add_argument("--runs", type=int, default=1000, help="number of seeded runs")
+    options.add_argument("--first", type=int, default=0, help="the first seed")
+    options.add_argument("--guides", type=int, default=12, help="guides in each run")
+    options.add_argument("--minutes", type=float, default=10.0, help="of the shake; 0: none")
+    options.add_argument("--compute", action="store_true", help="on the GPU instead of in numpy")
+    asked = options.parse_args()
+    gpu.init()
+    found: dict[str, object] = {"form": "compute" if asked.compute else "numpy"}
+    tally, begin = Tally(), time.perf_counter()
+    for seed in range(asked.first, asked.first + asked.runs):
+        note(tally, seed, random_run(seed, asked.guides), compute=asked.compute)
+        if tally.runs % 50 == 0:
+            print(f"{tally.runs} runs, {len(tally.failures)} failed", flush=True)
+    found |= {
+        "runs": tally.runs,
+        "failures": len(tally.failures),
+        "failed_seeds": sorted(tally.failures),
+        "worst_ratio": round(tally.worst_ratio, 5),
+        "worst_seed": tally.worst_seed,
+        "worst_ratio_along": round(tally.worst_along, 5),
+    }
+    if asked.minutes:
+        found |= shake(ComputeForm if asked.compute else NumpyForm, asked.minutes)
+    found |= {
+        "seconds": round(time.perf_counter() - begin, 1),
+        "renderer": gpu.platform.renderer_get(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+    print(json.dumps(found))
+    return int(bool(tally.failures) or not found.get("shake_held", True))
+
+
+def note(tally: Tally, seed: int, run: RandomRun, *, compute: bool) -> None:
+    """Play a run and write down how it went."""
+    problem = None
+    ratio = along = 0.0
+
+    def watch(state: DynamicsState, _drive: Drive) -> None:
+        nonlocal ratio, along, problem
+        reach = reach_of(state)
+        if promises_length(run.settings) or not reach.is_finite:
+            ratio, along = max(ratio, reach.straight), max(along, reach.along)
+        if not reach.is_finite:
+            problem = "not finite"
+
+    begun = start(run.begin(), run.tip_held)
+    form: Form = ComputeForm(begun) if compute else NumpyForm(begun)
+    try:
+        play(form, run.drives(SECONDS), run.settings, run.fps, watch)
+    except Exception:  # whatever it is, it is a failure of this seed, and the others go on
+        traceback.print_exc()
+        problem = "raised"
+    form.release()
+    tally.runs += 1
+    if ratio > tally.worst_ratio:
+        tally.worst_ratio, tally.worst_seed = ratio, seed
+    tally.worst_along = max(tally.worst_along, along)
+    if problem or ratio > LIMIT:
+        tally.failures[seed] = problem or f"a CV at {ratio:.3f} of its rest length"
+        print(f"seed {seed}: {tally.failures[seed]}", flush=True)
+
+
+def shake(make: type[NumpyForm] | type[ComputeForm], minutes: float) -> dict[str, object]:
+    """A head that sways in gusts for minutes: the hair still has its length, and its fastest speed
+    has not grown from the first quarter of the time to the last."""
+    run = shaken(guide_count=60)
+    worst, speeds = 0.0, []
+
+    def watch(state: DynamicsState, _drive: Drive) -> None:
+        nonlocal worst
+        worst = max(worst, reach_of(state).straight)
+        way = state.position - state.previous
+        speeds.append(float(np.sqrt((way * way).sum(axis=0)).max()) / state.substep)
+
+    form = make(start(run.begin()))
+    play(form, run.drives(60.0 * minutes), run.settings, run.fps, watch)
+    form.release()
+    quarter = len(speeds) // 4
+    begin, end = max(speeds[:quarter]), max(speeds[-quarter:])
+    return {
+        "shake_minutes": minutes,
+        "shake_worst_ratio": round(worst, 5),
+        "shake_fastest_begin": round(begin, 3),
+        "shake_fastest_end": round(end, 3),
+        "shake_held": bool(worst <= LIMIT and np.isfinite(end) and end < 1.5 * begin),
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())

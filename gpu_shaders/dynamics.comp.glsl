@@ -1,0 +1,214 @@
+// One frame of dynamics: one invocation a guide, which goes through all substeps.
+//
+// Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION;
+// TIPS_HELD; HAS_AIR; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
+// kinds of colliders.
+//
+// Loops of an unknown number of turns ask at their end: drivers on CPUs go once more through the
+// body of one that asks at its begin, with nothing to do.
+#include "lib_strand_texel.glsl"
+#include "lib_guide.glsl"
+#include "lib_forces.glsl"
+#ifdef HAS_AIR
+#include "lib_wind.glsl"
+#endif
+#include "lib_style.glsl"
+#include "lib_lengths.glsl"
+#if CONTACT_SLOTS > 0
+#include "lib_contacts.glsl"
+#endif
+
+vec3 style_before[CV_COUNT];
+vec3 style_way[CV_COUNT];
+vec3 style_bow[CV_COUNT];
+vec3 twist_before;
+vec3 twist_way;
+vec3 twist_bow;
+vec3 fall[FREE_SIZE];  // [m] that gravity adds to each free CV in a substep
+
+void load_guide(int guide)
+{
+  for (int cv = 0; cv < CV_COUNT; cv++) {
+    ivec2 texel = strand_texel(guide, cv, CV_COUNT);
+    vec4 here = imageLoad(positions, texel);
+    position[cv] = here.xyz;
+    previous[cv] = vec3(imageLoad(previous_positions, texel).xy, here.w);
+    if (frame.speed_ratio != 1.0) {
+      previous[cv] = position[cv] - (position[cv] - previous[cv]) * frame.speed_ratio;
+    }
+    style_before[cv] = texelFetch(styles_before, texel, 0).xyz;
+    style_way[cv] = texelFetch(styles_now, texel, 0).xyz - style_before[cv];
+    style_bow[cv] = texelFetch(style_bows, texel, 0).xyz;
+  }
+#ifdef TIPS_HELD
+  tip_is_held = texelFetch(rest_lengths, strand_texel(guide, CV_COUNT - 1, CV_COUNT), 0).x > 0.0;
+  tip_reach = 0.0;
+#endif
+  for (int i = 0; i < FREE; i++) {
+    ivec2 texel = strand_texel(guide, i + 1, CV_COUNT);
+    shape[i] = texelFetch(rest_shapes, texel, 0);
+    segment_length[i] = texelFetch(rest_lengths, texel, 0).x;
+#ifdef TIPS_HELD
+    tip_reach += segment_length[i];
+#endif
+    band[i] = frame.band[i + 2];
+    bend[i] = frame.own[i + 1].x;
+    radius[i] = frame.own[i + 2].y;
+  }
+  int twist_cv = int(texelFetch(rest_shapes, strand_texel(guide, 0, CV_COUNT), 0).x);
+  ivec2 texel = strand_texel(guide, twist_cv, CV_COUNT);
+  twist_before = texelFetch(styles_before, texel, 0).xyz;
+  twist_way = texelFetch(styles_now, texel, 0).xyz - twist_before;
+  twist_bow = texelFetch(style_bows, texel, 0).xyz;
+}
+
+void find_fall()
+{
+  vec3 middle[FREE_SIZE];
+  for (int i = 0; i < FREE; i++) {
+    middle[i] = style_before[i + 2] + 0.5 * style_way[i + 2];
+  }
+  vec3 root = style_before[1] + 0.5 * style_way[1];
+  weight_on_style(frame.combed.xyz, root, middle, fall);
+  for (int i = 0; i < FREE; i++) {
+    fall[i] = frame.fall.xyz - fall[i];
+  }
+}
+
+void predict(vec4 moment, vec3 air_way)
+{
+  for (int i = 0; i < FREE; i++) {
+    vec3 here = position[i + 2];
+    vec3 before = previous[i + 2];
+    if (frame.drag > 0.0) {
+      before = braked(here, before, frame.drag, air_way);
+    }
+    vec3 impulse = style_way[i + 2] * moment.z + style_bow[i + 2] * moment.w;
+    impulse += fall[i] + air_way * frame.air_share;
+    position[i + 2] = (here - before) * frame.kept + here + impulse;
+    previous[i + 2] = here;
+  }
+}
+
+// A held tip goes no farther than its length along the strand reaches.
+void pin_tip()
+{
+#ifdef TIPS_HELD
+  vec3 way = style[CV_COUNT - 1] - style[1];
+  float share = min(tip_reach / max(length(way), TINY), 1.0);
+  position[CV_COUNT - 1] = tip_is_held ? style[1] + way * share : position[CV_COUNT - 1];
+#endif
+}
+
+void pin()
+{
+  previous[0] = position[0];
+  previous[1] = position[1];
+  position[0] = style[0];
+  position[1] = style[1];
+  pin_tip();
+}
+
+void keep_lengths(bool has_normals)
+{
+#ifdef RELAXATION
+  relax_lengths(frame.relaxations);
+  if (frame.long_range == 1) {
+    hold_within_reach();
+  }
+#else
+  newton_step(has_normals);
+#endif
+}
+
+// Contacts and lengths in turn, then lengths alone until they fit.
+void keep_outside()
+{
+#if CONTACT_SLOTS > 0
+  int passes = frame.contact_passes;  // one at least
+  bool is_off = true;
+#elif defined(RELAXATION)
+  int passes = 0;
+  bool is_off = false;
+#else
+  int passes = 0;
+  bool is_off = is_off_length(frame.length_tolerance);
+#endif
+#ifdef RELAXATION
+  int steps = passes;
+#else
+  int steps = passes + frame.length_iterations;
+#endif
+  int number = 0;
+  if (is_off) {
+    do {
+#if CONTACT_SLOTS > 0
+      if (number < passes) {
+        push_out(frame.friction);
+      }
+      keep_lengths(true);
+#else
+      keep_lengths(false);
+#endif
+      number++;
+#ifndef RELAXATION
+      is_off = is_off_length(frame.length_tolerance);
+#endif
+    } while (number < steps && (number < passes || is_off));
+  }
+#ifndef RELAXATION
+  if (is_off) {
+    lay_out();
+  }
+#endif
+}
+
+void do_substep(int number)
+{
+  vec4 moment = texelFetch(moments, ivec2(0, number), 0);
+#ifdef HAS_AIR
+  vec4 turns[{{wind_modes}} / 4];
+  for (int i = 0; i < {{wind_modes}} / 4; i++) {
+    turns[i] = texelFetch(moments, ivec2(1 + i, number), 0);
+  }
+  vec3 air_way = air_at(position[0], turns) * frame.dt;
+#else
+  vec3 air_way = vec3(0.0);
+#endif
+  for (int cv = 0; cv < CV_COUNT; cv++) {
+    style[cv] = style_before[cv] + style_way[cv] * moment.x + style_bow[cv] * moment.y;
+  }
+  style_twist = twist_before + twist_way * moment.x + twist_bow * moment.y;
+  predict(moment, air_way);
+  pin();
+  restore_style();
+  pin_tip();
+  keep_lengths(false);
+#if CONTACT_SLOTS > 0
+  find_contacts(number);
+#endif
+  keep_outside();
+#if CONTACT_SLOTS > 0
+  absorb();
+#endif
+}
+
+void main()
+{
+  int guide = int(gl_GlobalInvocationID.x);
+  if (guide >= frame.guide_count) {
+    return;
+  }
+  load_guide(guide);
+  find_fall();
+  int number = 0;
+  do {
+    do_substep(number);
+    number++;
+  } while (number < frame.substep_count);
+  for (int cv = 0; cv < CV_COUNT; cv++) {
+    ivec2 texel = strand_texel(guide, cv, CV_COUNT);
+    imageStore(positions, texel, vec4(position[cv], previous[cv].z));
+    imageStore(previous_positions, texel, vec4(previous[cv].xy, 0.0, 0.0));
+  }
+}

@@ -1,0 +1,80 @@
+// Signed distance to a collider in its own object space, and its gradient.
+//
+// Twin of addon/dynamics/shapes.py, sphere_set.py and distance_field.py. Defines: HAS_ROUNDS,
+// HAS_FIELDS. Needs the textures `rounds` and `fields`, see addon/render/collider_textures.py.
+
+struct Found {
+  float distance;  // [m], negative inside
+  vec3 gradient;
+};
+
+#ifdef HAS_ROUNDS
+struct Round {
+  vec3 start;
+  float radius;
+  vec3 axis;             // from start to end
+  float inverse_square;  // of the axis' length, 0 for a ball
+};
+
+Round round_at(int index)
+{
+  ivec2 texel = ivec2(2 * (index % {{rounds_across}}), index / {{rounds_across}});
+  vec4 start = texelFetch(rounds, texel, 0);
+  vec4 axis = texelFetch(rounds, texel + ivec2(1, 0), 0);
+  return Round(start.xyz, start.w, axis.xyz, axis.w);
+}
+
+// The way from the closest point of the axis.
+vec3 outward_of(Round solid, vec3 point)
+{
+  vec3 outward = point - solid.start;
+  float share = clamp(dot(outward, solid.axis) * solid.inverse_square, 0.0, 1.0);
+  return outward - solid.axis * share;
+}
+
+Found distance_from(vec3 outward, float radius)
+{
+  float way = length(outward);
+  vec3 gradient = outward / max(way, 1.0e-9);
+  gradient.z = way < 1.0e-9 ? 1.0 : gradient.z;  // on the very axis any way out is as good
+  return Found(way - radius, gradient);
+}
+#endif
+
+#ifdef HAS_FIELDS
+struct Field {
+  vec3 low;     // [m] place of node (0, 0, 0)
+  float cell;   // [m]
+  ivec3 nodes;  // along x, y and z
+  int row;      // of the texture, where it begins
+};
+
+// A texel holds the values of four nodes: this one and its neighbours along z, y, and both.
+vec4 nodes_at(Field field, ivec3 node)
+{
+  int index = (node.x * field.nodes.y + node.y) * field.nodes.z + node.z;
+  return texelFetch(fields,
+                    ivec2(index % {{field_row}}, field.row + index / {{field_row}}), 0);
+}
+
+Found distance_in(Field field, vec3 point)
+{
+  vec3 top = vec3(field.nodes - 1);
+  vec3 place = (point - field.low) / field.cell;
+  vec3 held = clamp(place, vec3(0.0), top);
+  float outside = length(place - held) * field.cell;
+  held = min(held, top - 1.0e-3);
+  ivec3 node = ivec3(held);
+  vec3 f = held - vec3(node);
+  vec4 near = nodes_at(field, node);
+  vec4 far = nodes_at(field, node + ivec3(1, 0, 0));
+  // along z, then y, then x; what is left over at each turn is a derivative
+  vec4 dz = vec4(near.yw - near.xz, far.yw - far.xz);
+  vec4 z = vec4(near.xz, far.xz) + f.z * dz;
+  vec2 dy = z.yw - z.xz;
+  vec2 y = z.xz + f.y * dy;
+  vec2 slope_z = dz.xz + f.y * (dz.yw - dz.xz);
+  vec3 gradient = vec3(y.y - y.x, mix(dy.x, dy.y, f.x), mix(slope_z.x, slope_z.y, f.x));
+  return Found(y.x + f.x * gradient.x + outside, gradient / field.cell);
+}
+#endif

@@ -1,0 +1,46 @@
+// What moves hair before its constraints act.
+//
+// Twin of addon/dynamics/forces.py, over the globals of lib_guide.glsl. Holds no
+// resources.
+#include "lib_guide.glsl"
+
+// Drag by the square of the speed, implicitly; changes `previous`, which holds the speed.
+vec3 braked(vec3 here, vec3 before, float drag, vec3 air_way)
+{
+  vec3 way = here - before - air_way;
+  way /= length(way) * drag + 1.0;
+  return here - (way + air_way);
+}
+
+// The part of gravity that the tension of the carried segments cannot hold, for each free CV.
+// `carried` is where the free CVs are carried, `root` where the last pinned one is.
+void weight_on_style(vec3 gravity, vec3 root, vec3 carried[FREE_SIZE], out vec3 weight[FREE_SIZE])
+{
+  vec3 direction[FREE_SIZE];
+  float ratio[FREE_SIZE];  // how much of the segment before goes into segment i
+  float tension[FREE_SIZE];
+  vec3 before = root;
+  vec3 direction_before = vec3(0.0);
+  float inverse_pivot = 0.0;
+  float tension_before = 0.0;
+  for (int i = 0; i < FREE; i++) {
+    direction[i] = unit_of(carried[i] - before);
+    before = carried[i];
+    float beside = -dot(direction[i], direction_before);
+    ratio[i] = beside * inverse_pivot;
+    inverse_pivot = 1.0 / ((i == 0 ? 1.0 : 2.0) - ratio[i] * beside);
+    float sum = (i == 0 ? dot(direction[i], gravity) : 0.0) - ratio[i] * tension_before;
+    tension_before = sum;
+    tension[i] = sum * inverse_pivot;
+    direction_before = direction[i];
+  }
+  vec3 above = vec3(0.0);
+  float taken = 0.0;  // of the tension, by the segment above
+  for (int i = FREE - 1; i >= 0; i--) {
+    float own = tension[i] - taken;
+    taken = ratio[i] * own;
+    vec3 pull = direction[i] * own;
+    weight[i] = gravity - (pull - above);
+    above = pull;
+  }
+}

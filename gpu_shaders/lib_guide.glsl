@@ -1,0 +1,38 @@
+// One guide in motion, as a compute shader holds it: each array has one entry a CV, a free CV or a
+// segment, all loops have constant bounds, so that compilers keep arrays in registers.
+//
+// Twin of addon/dynamics/state.py. Defines: CV_COUNT, at least 2; TIPS_HELD, where a guide's tip is
+// held. Holds no resources.
+
+#define PINNED {{pinned}}
+#define FREE (CV_COUNT - PINNED)
+#define FREE_SIZE (FREE > 0 ? FREE : 1)
+#define TINY 1.0e-9
+
+vec3 position[CV_COUNT];       // world [m]
+vec3 previous[CV_COUNT];       // the same a substep earlier
+vec3 style[CV_COUNT];          // where the head carries each CV at the substep's end
+vec3 style_twist;              // the same of the CV that tells the twist about the root
+vec4 shape[FREE_SIZE];         // of CV i + 1: xyz curvature at rest [m], w its hold
+float segment_length[FREE_SIZE];  // [m] from CV i + 1 to CV i + 2
+// the same for all guides; copied here because some drivers are slow at arrays in uniform blocks
+vec4 band[FREE_SIZE];          // of free CV i: near and far factor, inverse pivot, pull
+float bend[FREE_SIZE];         // of CV i + 1
+float radius[FREE_SIZE];       // of free CV i [m], in collisions
+#ifdef TIPS_HELD
+bool tip_is_held;
+float tip_reach;  // [m] of the tip from the last pinned CV
+#else
+const bool tip_is_held = false;
+#endif
+
+// Never zero; what is added is lost to rounding above 1e-5 m.
+float length_of(vec3 vector)
+{
+  return sqrt(dot(vector, vector) + TINY * TINY);
+}
+
+vec3 unit_of(vec3 vector)
+{
+  return vector / length_of(vector);
+}

@@ -1,0 +1,133 @@
+// Segments keep their length.
+//
+// Twin of addon/dynamics/constraints.py and of banded.solve_tridiagonal, over the globals of
+// lib_guide.glsl. References: Goldenthal et al. 2007; Jakobsen 2001; Kim, Chentanez and Mueller
+// 2012. Holds no resources.
+#include "lib_guide.glsl"
+
+#define CONTACT_WEIGHT {{contact_weight}}
+#define HELD {{held_weight}}
+
+vec3 touched_normal[FREE_SIZE];  // at each free CV that touches a collider, else zero
+
+// One Newton step on all segments at once; segment i here goes from CV i + 1 to CV i + 2.
+void newton_step(bool has_normals)
+{
+  vec3 direction[FREE_SIZE];
+  float ratio[FREE_SIZE];  // how much of the segment before goes into segment i
+  float tension[FREE_SIZE];
+  vec3 direction_before = vec3(0.0);
+  vec3 normal_before = vec3(0.0);
+  float inverse_pivot = 0.0;
+  float tension_before = 0.0;
+  for (int i = 0; i < FREE; i++) {
+    vec3 segment = position[i + 2] - position[i + 1];
+    float now = length_of(segment);
+    direction[i] = segment / now;
+    float diagonal = i == 0 ? 1.0 : 2.0;  // the last pinned CV does not move
+    float beside = -dot(direction[i], direction_before);
+    if (i == FREE - 1 && tip_is_held) {
+      diagonal -= HELD;
+      touched_normal[i] = vec3(0.0);  // it does not slide
+    }
+    if (has_normals) {
+      float lower = dot(normal_before, direction[i]);
+      float upper = dot(touched_normal[i], direction[i]);
+      beside += CONTACT_WEIGHT * (dot(normal_before, direction_before) * lower);
+      diagonal -= CONTACT_WEIGHT * (upper * upper);
+      diagonal -= CONTACT_WEIGHT * (lower * lower);
+      normal_before = touched_normal[i];
+    }
+    ratio[i] = beside * inverse_pivot;
+    inverse_pivot = 1.0 / (diagonal - ratio[i] * beside);
+    tension_before = now - segment_length[i] - ratio[i] * tension_before;
+    tension[i] = tension_before * inverse_pivot;
+    direction_before = direction[i];
+  }
+  vec3 above = vec3(0.0);  // direction times tension of the segment above
+  float taken = 0.0;       // of the tension, by the segment above
+  for (int i = FREE - 1; i >= 0; i--) {
+    float own = tension[i] - taken;
+    taken = ratio[i] * own;
+    vec3 pull = direction[i] * own;
+    vec3 move = pull - above;
+    above = pull;
+    if (has_normals) {
+      move -= touched_normal[i] * (CONTACT_WEIGHT * dot(touched_normal[i], move));
+    }
+    if (i == FREE - 1 && tip_is_held) {
+      move = vec3(0.0);
+    }
+    position[i + 2] -= move;
+  }
+}
+
+// Whether a segment is off by more than this share of its length; by squares, without a root.
+bool is_off_length(float tolerance)
+{
+  float low = max(1.0 - tolerance, 0.0) * max(1.0 - tolerance, 0.0);
+  float high = (1.0 + tolerance) * (1.0 + tolerance);
+  bool is_off = false;
+  for (int i = 0; i < FREE; i++) {
+    vec3 segment = position[i + 2] - position[i + 1];
+    float square = dot(segment, segment) + TINY * TINY;
+    float wanted = segment_length[i] * segment_length[i];
+    is_off = is_off || square < wanted * low || square > wanted * high;
+  }
+  return is_off;
+}
+
+// Lay the guide out anew from the root, with its segments' directions; one with a held tip from the
+// tip first.
+void lay_out()
+{
+#ifdef TIPS_HELD
+  vec3 after = position[CV_COUNT - 1];
+  vec3 from_tip = after;
+  for (int i = FREE - 1; i >= 0; i--) {
+    vec3 place = position[i + 1];
+    from_tip -= unit_of(after - place) * segment_length[i];
+    after = place;
+    if (i > 0 && tip_is_held) {
+      position[i + 1] = from_tip;
+    }
+  }
+#endif
+  vec3 before = position[1];
+  vec3 from_root = before;
+  for (int i = 0; i < FREE; i++) {
+    vec3 place = position[i + 2];
+    from_root += unit_of(place - before) * segment_length[i];
+    before = place;
+    position[i + 2] = from_root;
+  }
+}
+
+void relax_lengths(int sweeps)
+{
+  for (int sweep = 0; sweep < sweeps; sweep++) {
+    for (int i = 0; i < FREE; i++) {
+      vec3 segment = position[i + 2] - position[i + 1];
+      float now = length(segment);
+      segment *= (now - segment_length[i]) / max(now, TINY);
+      float lower = i == 0 ? 0.0 : 0.5;
+      float upper = 1.0 - lower;
+      if (i == FREE - 1 && tip_is_held) {
+        upper = 0.0;
+        lower = i == 0 ? 0.0 : 1.0;
+      }
+      position[i + 1] += segment * lower;
+      position[i + 2] -= segment * upper;
+    }
+  }
+}
+
+void hold_within_reach()
+{
+  float reach = 0.0;
+  for (int i = 0; i < FREE; i++) {
+    reach += segment_length[i];
+    vec3 way = position[i + 2] - position[1];
+    position[i + 2] = position[1] + way * min(reach / max(length(way), TINY), 1.0);
+  }
+}

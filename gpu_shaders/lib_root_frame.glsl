@@ -1,0 +1,75 @@
+// A frame where each strand is held by the surface, and how it carries the strand.
+//
+// Twin of addon/groom/roots.py (root_frames, follow). Holds no resources.
+//
+// Limits: with float32 a triangle whose first angle has a sine below 1e-6 counts as flat, where the
+// twin, with float64, still finds its normal.
+
+struct RootFrame {
+  vec3 origin;    // on the surface
+  mat3 rotation;  // columns: along the triangle's first edge, bitangent, normal
+};
+
+// How a strand moves from rest to now: point + turn * (point - rest_origin) + shift.
+struct RootMotion {
+  vec3 rest_origin;
+  mat3 turn;
+  vec3 shift;
+};
+
+// A unit vector across a unit tangent, as near to an axis of the world as can be.
+vec3 across(vec3 tangent)
+{
+  vec3 size = abs(tangent);
+  vec3 axis = vec3(0.0, 0.0, 1.0);
+  if (size.x <= size.y && size.x <= size.z) {
+    axis = vec3(1.0, 0.0, 0.0);
+  }
+  else if (size.y <= size.z) {
+    axis = vec3(0.0, 1.0, 0.0);
+  }
+  return normalize(axis - tangent * dot(axis, tangent));
+}
+
+// The frame in a triangle a, b, c. `weight` holds the barycentric coordinates of b and c. Without
+// area or first edge, axes of the world take the place of what is not known.
+RootFrame root_frame(vec3 a, vec3 b, vec3 c, vec2 weight)
+{
+  vec3 edge = b - a;
+  vec3 other = c - a;
+  RootFrame frame;
+  frame.origin = a + (weight.x * edge + weight.y * other);
+  float size = length(edge);
+  vec3 tangent = size > 0.0 ? edge / size : vec3(1.0, 0.0, 0.0);
+  vec3 normal = cross(tangent, other);
+  float sine = length(normal);
+  normal = sine > 1.0e-6 * length(other) ? normal / sine : across(tangent);
+  frame.rotation = mat3(tangent, cross(normal, tangent), normal);
+  return frame;
+}
+
+// Only the change, so that a root that did not move leaves its strand bit for bit.
+RootMotion root_motion(RootFrame rest, RootFrame now)
+{
+  RootMotion motion;
+  motion.rest_origin = rest.origin;
+  motion.turn = (now.rotation - rest.rotation) * transpose(rest.rotation);
+  motion.shift = now.origin - rest.origin;
+  return motion;
+}
+
+// The motion from four texels as ride_roots.comp.glsl writes them: xyz a column of the turn and w a
+// coordinate of the shift, three times, then xyz the rest origin.
+RootMotion unpacked_motion(vec4 x, vec4 y, vec4 z, vec4 origin)
+{
+  RootMotion motion;
+  motion.rest_origin = origin.xyz;
+  motion.turn = mat3(x.xyz, y.xyz, z.xyz);
+  motion.shift = vec3(x.w, y.w, z.w);
+  return motion;
+}
+
+vec3 follow(vec3 point, RootMotion motion)
+{
+  return motion.turn * (point - motion.rest_origin) + motion.shift + point;
+}

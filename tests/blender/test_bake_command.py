@@ -1,0 +1,114 @@
+"""The verb `bake`: scene in, bakes and report out, one line and exit code 1 for bad input."""
+
+import json
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.host import command_line, playback
+from hairloom.addon.host.cache import Cache
+
+LAST = 5
+
+
+@pytest.fixture
+def file(new_hair, sphere, tmp_path):
+    """A saved file with hair on a head that moves; the open scene is another one."""
+    hair = new_hair(sphere)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    for frame, x in ((1, 0.0), (LAST, 0.2)):
+        sphere.location.x = x
+        sphere.keyframe_insert("location", frame=frame)
+    hair.hairloom.dynamics.collider_resolution = 8
+    hair.hairloom.dynamics.form = "numpy"
+    path = tmp_path / "wig.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return path
+
+
+def test_a_scene_is_baked_and_saved(file, tmp_path):
+    report = tmp_path / "report.json"
+    arguments = ["bake", "--scene", str(file), "--save", "--report", str(report)]
+    assert command_line.run(arguments) == 0
+    folder = tmp_path / "hairloom_cache" / "Hair"
+    assert Cache(folder).facts.last == LAST
+    (baked,) = json.loads(report.read_text())["baked"]
+    assert baked == {
+        "object": "Hair",
+        "folder": str(folder),
+        "first": 1,
+        "last": LAST,
+        "frame_rate": 24.0,
+        "form": "numpy",
+    }
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    hair = bpy.data.objects["Hair"]
+    assert playback.cache_of(hair).facts.owner == "Hair"
+    assert hair.hide_render and hair.hairloom.bake.copy.name == "Hair Baked"
+
+
+def test_frames_output_and_settings_are_chosen(file, tmp_path):
+    curve = "dynamics.style_along=1,0.5,0.25,0.1,0"
+    arguments = ["bake", "--scene", str(file), "--frames", "2", "4", "--object", "Hair"]
+    arguments += ["--output", str(tmp_path / "out"), "--set", "dynamics.damping=4", "--set", curve]
+    assert command_line.run(arguments) == 0
+    facts = Cache(tmp_path / "out").facts
+    assert (facts.first, facts.last) == (2, 4)
+    dynamics = bpy.data.objects["Hair"].hairloom.dynamics
+    assert dynamics.damping == 4.0 and dynamics.collider_resolution == 8
+    assert list(dynamics.style_along) == pytest.approx([1, 0.5, 0.25, 0.1, 0])
+
+
+def test_a_second_bake_shows_nothing_of_its_own_copies(file):
+    for _ in range(2):
+        assert command_line.run(["bake", "--scene", str(file), "--save"]) == 0
+    assert sorted(o.name for o in bpy.data.objects if o.type == "CURVES") == ["Hair", "Hair Baked"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--scene", "nothing.blend"], "no such file"),
+        (["--object", "Nobody"], "Nobody"),
+        (["--frames", "5", "2"], "--frames"),
+        (["--set", "dynamics.damping=-1"], "damping"),
+        (["--set", "dynamics.style_along=1,2"], "style_along"),
+        (["--preset", "nobody/knows"], "no such preset"),
+        (["--scene", "broken.blend"], "broken.blend"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_1(arguments, message, file, tmp_path, capfd):
+    (tmp_path / "broken.blend").write_bytes(b"no blend file")
+    arguments = [str(tmp_path / a) if a.endswith(".blend") else a for a in arguments]
+    scene = [] if "--scene" in arguments else ["--scene", str(file)]
+    assert command_line.run(["bake", *scene, *arguments]) == 1
+    told = [line for line in capfd.readouterr().err.splitlines() if line.startswith("hairloom:")]
+    assert len(told) == 1 and message in told[0]
+    assert not (tmp_path / "hairloom_cache").exists()
+
+
+def test_an_empty_scene_has_nothing_to_bake(extension, capfd):
+    assert command_line.run(["bake"]) == 1
+    assert "nothing to bake" in capfd.readouterr().err
+
+
+def test_wrong_usage_exits_with_2(extension):
+    assert command_line.run(["bake", "--frames", "1"]) == 2
+    assert command_line.run(["bake", "--groom", "Hair"]) == 2
+
+
+def test_the_bake_of_the_command_line_is_that_of_the_button(file, tmp_path):
+    assert command_line.run(["bake", "--scene", str(file), "--output", str(tmp_path / "one")]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    hair = bpy.data.objects["Hair"]
+    bpy.context.view_layer.objects.active = hair
+    hair.hairloom.bake.folder = str(tmp_path / "two")
+    assert bpy.ops.hairloom.bake() == {"FINISHED"}
+    one, two = Cache(tmp_path / "one"), Cache(tmp_path / "two")
+    assert one.facts == two.facts
+    for frame in range(1, LAST + 1):
+        for name, array in one.frame(frame).items():
+            np.testing.assert_array_equal(two.frame(frame)[name], array)

@@ -1,0 +1,437 @@
+"""Fins in Blender: a mesh moves as cloth, and is bit for bit the same afterwards."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.host import fins, live, reactions
+from hairloom.addon.host.bake import Bake
+from hairloom.addon.host.fin_modifier import INDEX, POSITION, fin_modifier, is_shown
+
+FRAME = 1.0 / 60.0
+
+
+@pytest.fixture
+def flag(extension):
+    """A sheet of 11 x 11 vertices, 0.4 m wide, lying flat, made a fin, pinned at its edge at -x."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=10, y_subdivisions=10, size=0.4)
+    obj = bpy.context.object
+    obj.name = "Flag"
+    group = obj.vertex_groups.new(name="Pins")
+    group.add([v.index for v in obj.data.vertices if v.co.x < -0.19], 1.0, "REPLACE")
+    assert bpy.ops.hairloom.fin_add() == {"FINISHED"}
+    return obj
+
+
+def update():
+    bpy.context.view_layer.update()
+
+
+def rest_of(obj):
+    """The mesh's own coordinates, object space."""
+    rest = np.empty((len(obj.data.vertices), 3), np.float32)
+    obj.data.vertices.foreach_get("co", rest.ravel())
+    return rest
+
+
+def shown(obj, evaluated):
+    """The evaluated mesh as Blender draws it, world space, first the original vertices."""
+    there = obj.evaluated_get(evaluated())
+    points = np.empty((len(there.data.vertices), 3), np.float32)
+    there.data.vertices.foreach_get("co", points.ravel())
+    matrix = np.array(there.matrix_world)
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def play(session, evaluated, frames, each=lambda frame: None):
+    for frame in range(frames):
+        each(frame)
+        update()
+        session.advance(evaluated(), FRAME)
+        update()
+
+
+def started(obj, evaluated):
+    update()
+    session = fins.start(obj, evaluated())
+    session.play(evaluated())
+    return session
+
+
+def test_the_operator_adds_one_modifier_and_takes_the_active_group(flag):
+    assert fin_modifier(flag) == flag.modifiers[-1]
+    assert flag.hairloom.fin.pin_group == "Pins"
+    bpy.ops.hairloom.fin_add()
+    assert len(flag.modifiers) == 1
+    other = bpy.data.objects.new("Other", bpy.data.meshes.new("Other"))
+    bpy.context.collection.objects.link(other)
+    bpy.context.view_layer.objects.active = other
+    other.select_set(True)
+    bpy.ops.hairloom.fin_add()
+    assert other.modifiers[0].node_group == flag.modifiers[0].node_group
+    assert len(bpy.data.node_groups) == 1
+
+
+def test_removing_it_leaves_nothing(flag, evaluated):
+    rest = rest_of(flag)
+    session = started(flag, evaluated)
+    play(session, evaluated, 3)
+    assert bpy.ops.hairloom.fin_remove() == {"FINISHED"}
+    assert live.simulated() == ()
+    assert len(flag.modifiers) == len(bpy.data.node_groups) == 0
+    assert POSITION not in flag.data.attributes
+    assert np.array_equal(rest_of(flag), rest)
+
+
+def test_it_falls_from_its_pins_and_blender_shows_it(flag, evaluated):
+    rest = rest_of(flag)
+    session = started(flag, evaluated)
+    before = shown(flag, evaluated)
+    play(session, evaluated, 20)
+    now = shown(flag, evaluated)
+    pinned = rest[:, 0] < -0.19
+    assert now[pinned] == pytest.approx(before[pinned], abs=1e-6)
+    assert now[~pinned, 2].min() < -0.1
+    assert now == pytest.approx(session.state.position.T, abs=1e-5)
+    there = flag.evaluated_get(evaluated()).data
+    normals = np.empty((121, 3), np.float32)
+    there.vertex_normals.foreach_get("vector", normals.ravel())
+    cosine = (normals * session.normals()).sum(axis=1)
+    assert cosine.min() > 0.99, "normals are those of the cloth"
+    session.stop(evaluated())
+    assert np.array_equal(rest_of(flag), rest)
+    assert POSITION not in flag.data.attributes
+    update()
+    assert np.array_equal(shown(flag, evaluated), before)
+
+
+def test_pins_follow_an_animated_parent(flag, evaluated):
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.collection.objects.link(parent)
+    flag.parent = parent
+    flag.scale = (1.5, 1.0, 0.5)
+    for frame, x in ((1, 0.0), (13, 0.3)):
+        parent.location.x = x
+        parent.rotation_euler.z = x
+        parent.keyframe_insert("location", frame=frame)
+        parent.keyframe_insert("rotation_euler", frame=frame)
+    bpy.context.scene.frame_set(1)
+    session = started(flag, evaluated)
+    rest = rest_of(flag)
+    pinned = rest[:, 0] < -0.19
+    for frame in range(2, 14):
+        bpy.context.scene.frame_set(frame)
+        session.advance(evaluated(), 1.0 / 24.0)
+    update()
+    matrix = np.array(flag.matrix_world)
+    carried = rest @ matrix[:3, :3].T + matrix[:3, 3]
+    now = shown(flag, evaluated)
+    assert now[pinned] == pytest.approx(carried[pinned], abs=1e-5)
+    assert np.abs(now - carried)[~pinned].max() > 0.02
+
+
+def test_pins_follow_an_armature_and_shape_keys(flag, evaluated):
+    data = bpy.data.armatures.new("Rig")
+    rig = bpy.data.objects.new("Rig", data)
+    bpy.context.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    data.edit_bones.new("Bone").tail = (0.0, 0.0, 0.1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    flag.vertex_groups.new(name="Bone").add(range(121), 1.0, "REPLACE")
+    flag.modifiers.new("Armature", "ARMATURE").object = rig
+    flag.modifiers.move(1, 0)
+    flag.shape_key_add(name="Basis")
+    key = flag.shape_key_add(name="Up")
+    for point in key.data:
+        point.co.z += 0.05
+    session = started(flag, evaluated)
+    rest = rest_of(flag)
+    pinned = rest[:, 0] < -0.19
+
+    def pose(frame):
+        rig.pose.bones["Bone"].matrix_basis = Matrix.Translation((0.0, 0.02 * (frame + 1), 0.0))
+        key.value = (frame + 1) / 10.0
+
+    play(session, evaluated, 10, pose)
+    moved = rig.pose.bones["Bone"].matrix.translation
+    assert np.abs(np.array(moved)).max() > 0.1
+    expected = rest[pinned] + np.array(moved) + np.array([0.0, 0.0, 0.05])
+    assert shown(flag, evaluated)[pinned] == pytest.approx(expected, abs=1e-5)
+
+
+def test_a_frame_that_was_recorded_is_shown_again_exactly(flag, evaluated):
+    flag.rotation_euler = (0.3, 0.2, 0.1)
+    session = started(flag, evaluated)
+    play(session, evaluated, 8)
+    frame, drawn = session.recorded(), shown(flag, evaluated)
+    play(session, evaluated, 4)
+    assert not np.array_equal(shown(flag, evaluated), drawn)
+    session.show_recorded(frame)
+    update()
+    assert np.array_equal(shown(flag, evaluated), drawn)
+    assert np.array_equal(session.recorded()["position"], frame["position"])
+    assert all(array.dtype != object for array in (session.constants() | frame).values())
+    with pytest.raises(HairloomError, match="Bake again"):
+        session.show_recorded({"position": frame["position"][:-1]})
+
+
+def test_two_runs_are_alike(flag, evaluated):
+    ends = []
+    for _ in range(2):
+        session = started(flag, evaluated)
+        play(session, evaluated, 10)
+        ends.append(session.recorded()["position"])
+        session.stop(evaluated())
+        live.stop(session)
+    assert np.array_equal(*ends)
+
+
+def test_hashes_tell_what_has_changed(flag, evaluated):
+    session = started(flag, evaluated)
+    made, moment = session.fingerprint(evaluated()), session.moment(evaluated())
+    assert session.fingerprint(evaluated()) == made
+    assert session.moment(evaluated()) == moment
+    flag.location.x = 1.0
+    update()
+    assert session.fingerprint(evaluated()) == made
+    assert session.moment(evaluated()) != moment
+    flag.vertex_groups["Pins"].add([60], 0.5, "REPLACE")
+    update()
+    assert session.fingerprint(evaluated()) != made
+
+
+def test_it_stays_out_of_a_collider(flag, evaluated):
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0.0, 0.0, -0.12))
+    ball = bpy.context.object
+    ball.hairloom.collider_shape = "sphere"
+    flag.hairloom.collider = ball
+    session = started(flag, evaluated)
+    play(session, evaluated, 40)
+    assert session.obstacles.warnings == ()
+    away = np.linalg.norm(shown(flag, evaluated) - np.array(ball.location), axis=1)
+    assert away.min() > 0.1
+    assert away.min() < 0.105, "it lies on the ball"
+
+
+def test_the_wind_of_the_scene_blows(flag, evaluated):
+    bpy.ops.object.effector_add(type="WIND", rotation=(0.0, 0.0, 0.0))
+    bpy.context.object.field.strength = 20.0
+    flag.hairloom.fin.gravity = 0.0
+    session = started(flag, evaluated)
+    play(session, evaluated, 20)
+    assert shown(flag, evaluated)[:, 2].max() > 0.05
+
+
+def test_modifiers_below_go_on_from_the_cloth(flag, evaluated):
+    flag.modifiers.new("Smooth", "SUBSURF").levels = 1
+    flag.modifiers.new("Thick", "SOLIDIFY").thickness = 0.01
+    session = started(flag, evaluated)
+    play(session, evaluated, 10)
+    assert len(shown(flag, evaluated)) > 400
+    assert shown(flag, evaluated)[:, 2].min() < -0.02
+    assert len(session.recorded()["position"]) == 121
+
+
+@pytest.mark.parametrize(("kind", "place"), [("SUBSURF", 0), ("MIRROR", 0)])
+def test_a_modifier_above_that_makes_vertices_is_said(flag, evaluated, kind, place):
+    flag.modifiers.new("Culprit", kind)
+    flag.modifiers.move(1, place)
+    update()
+    with pytest.raises(HairloomError, match=r"Culprit.*below Hairloom Fin"):
+        fins.start(flag, evaluated())
+
+
+def test_a_modifier_below_that_reorders_vertices_is_said(flag, evaluated):
+    flag.modifiers.new("Fewer", "DECIMATE").ratio = 0.5
+    update()
+    with pytest.raises(HairloomError, match="Fewer"):
+        fins.start(flag, evaluated())
+
+
+def test_a_modifier_that_is_off_is_said(flag, evaluated):
+    fin_modifier(flag).show_viewport = False
+    update()
+    with pytest.raises(HairloomError, match="turned off"):
+        fins.start(flag, evaluated())
+
+
+def change_topology(flag):
+    flag.data.clear_geometry()
+    flag.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (change_topology, "Play again"),
+        (lambda flag: bpy.ops.object.mode_set(mode="EDIT"), "Edit Mode"),
+        (lambda flag: flag.modifiers.clear(), "no fin"),
+        (lambda flag: setattr(flag, "scale", (1.0, 0.0, 1.0)), "scale"),
+        (lambda flag: bpy.data.objects.remove(flag), "gone"),
+    ],
+)
+def test_what_breaks_in_mid_play_ends_it_with_a_notice(flag, evaluated, change, says):
+    session = started(flag, evaluated)
+    live.play(evaluated())
+    play(session, evaluated, 2)
+    bpy.context.view_layer.objects.active = flag
+    change(flag)
+    update()
+    live.advance(evaluated(), FRAME)
+    assert live.simulated() == ()
+    assert says in live.notice()
+    if bpy.context.object is not None and bpy.context.object.mode == "EDIT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_a_missing_pin_group_is_said_and_none_falls(flag, evaluated):
+    flag.hairloom.fin.pin_group = "Nowhere"
+    update()
+    with pytest.raises(HairloomError, match="Nowhere"):
+        fins.start(flag, evaluated())
+    flag.hairloom.fin.pin_group = ""
+    session = started(flag, evaluated)
+    assert "no vertex is pinned" in session.warnings[0]
+    before = shown(flag, evaluated)
+    play(session, evaluated, 5)
+    assert (shown(flag, evaluated) - before)[:, 2].max() < -0.01
+
+
+def test_a_mesh_of_two_fins_is_said(flag, evaluated):
+    twin = flag.copy()
+    bpy.context.collection.objects.link(twin)
+    update()
+    with pytest.raises(HairloomError, match="Single User"):
+        fins.start(flag, evaluated())
+
+
+def test_undo_and_redo_of_the_operator(extension, evaluated):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=3, y_subdivisions=3)
+    name = bpy.context.object.name
+    bpy.ops.ed.undo_push(message="begin")
+    bpy.ops.hairloom.fin_add()
+    bpy.ops.ed.undo_push(message="fin")
+    bpy.ops.ed.undo()
+    assert fin_modifier(bpy.data.objects[name]) is None
+    bpy.ops.ed.redo()
+    assert fin_modifier(bpy.data.objects[name]) is not None
+
+
+def test_undo_in_mid_play_goes_on_or_rests(flag, evaluated):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="begin")
+    session = started(flag, evaluated)
+    play(session, evaluated, 5)
+    flag.location.x = 0.1
+    bpy.ops.ed.undo_push(message="move")
+    bpy.ops.ed.undo()
+    reactions.catch_up(evaluated())
+    flag = bpy.data.objects["Flag"]
+    play(session, evaluated, 2)
+    assert live.simulated() == (session,)
+    session.stop(evaluated())
+    assert POSITION not in flag.data.attributes
+
+
+def test_a_saved_file_keeps_fin_and_settings(flag, evaluated, tmp_path):
+    rest = rest_of(flag)
+    flag.hairloom.fin.stretch = 0.25
+    session = started(flag, evaluated)
+    play(session, evaluated, 5)
+    drawn = shown(flag, evaluated)
+    file = str(tmp_path / "fin.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    flag = bpy.data.objects["Flag"]
+    assert live.simulated() == ()
+    assert flag.hairloom.fin.stretch == 0.25 and flag.hairloom.fin.pin_group == "Pins"
+    update()
+    assert shown(flag, evaluated) == pytest.approx(drawn, abs=1e-6), "the moment that was saved"
+    assert is_shown(flag)
+    bpy.context.view_layer.objects.active = flag
+    assert bpy.ops.hairloom.fin_reset() == {"FINISHED"}
+    assert not is_shown(flag)
+    assert np.array_equal(rest_of(flag), rest)
+    started(flag, evaluated)
+
+
+def test_buttons_say_why_they_are_grey(extension):
+    for operator in ("fin_add", "fin_remove", "fin_preview", "fin_reset"):
+        assert not getattr(bpy.ops.hairloom, operator).poll()
+    bpy.ops.mesh.primitive_grid_add()
+    assert bpy.ops.hairloom.fin_add.poll() and not bpy.ops.hairloom.fin_preview.poll()
+    bpy.ops.hairloom.fin_add()
+    assert bpy.ops.hairloom.fin_preview.poll() and not bpy.ops.hairloom.fin_reset.poll()
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not bpy.ops.hairloom.fin_remove.poll()
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_enabled_fins_start_together(flag, evaluated):
+    update()
+    assert fins.start_enabled(evaluated()) == []
+    assert [each.name for each in live.simulated()] == ["Flag"]
+    assert bpy.ops.hairloom.fin_preview() == {"FINISHED"}
+    assert live.simulated() == ()
+    flag.hairloom.fin.enabled = False
+    assert fins.start_enabled(evaluated()) == [] and live.simulated() == ()
+
+
+def test_attributes_of_the_modifier_stay_out_of_the_mesh(flag, evaluated):
+    started(flag, evaluated)
+    assert INDEX not in flag.data.attributes
+    assert INDEX in flag.evaluated_get(evaluated()).data.attributes
+
+
+def frames_of(obj, frames):
+    """What Blender shows in each frame, going there one after the other; object space."""
+    found = {}
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        there = obj.evaluated_get(bpy.context.view_layer.depsgraph).data
+        points = np.empty((len(there.vertices), 3), np.float32)
+        there.vertices.foreach_get("co", points.ravel())
+        found[frame] = points
+    return found
+
+
+def test_playback_simulates_it_and_a_bake_shows_exactly_that(flag, evaluated, tmp_path):
+    for frame, x in ((1, 0.0), (10, 0.2)):
+        flag.location.x = x
+        flag.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+    session = fins.start(flag, evaluated())
+    simulated = frames_of(flag, range(1, 9))
+    assert np.array_equal(simulated[1], rest_of(flag))
+    assert simulated[8][:, 2].min() < -0.1
+    session.stop(evaluated())
+    live.stop(session)
+    for _ in Bake.of([flag], bpy.context.scene, frames=range(1, 9), folder=tmp_path).steps():
+        pass
+    for preview in (False, True):
+        if preview:
+            fins.start(flag, evaluated())
+        for frame, points in frames_of(flag, (8, 3, 1, 5)).items():
+            assert np.array_equal(points, simulated[frame])
+
+
+def test_other_attributes_stay_as_they_are(flag, evaluated):
+    mesh = flag.data
+    for name, kind in (("A", "FLOAT"), ("B", "FLOAT_COLOR")):
+        mesh.attributes.new(name, kind, "POINT")
+    mesh.attributes.active = mesh.attributes["A"]
+
+    def known():
+        active = mesh.attributes.active.name, mesh.color_attributes.active_color_index
+        return active, [each.name for each in mesh.attributes], mesh.uv_layers.active_index
+
+    before = known()
+    session = started(flag, evaluated)
+    play(session, evaluated, 2)
+    assert known() != before
+    session.stop(evaluated())
+    assert known() == before

@@ -1,0 +1,529 @@
+"""Everything that hair collides with: kinds of objects, how they move, deform, scale and fail."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix, Vector
+
+from hairloom.addon.dynamics.colliders import (
+    CapsuleCollider,
+    DistanceField,
+    SphereCollider,
+    SphereSetCollider,
+    transform_points,
+)
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.host.objects import Body
+from hairloom.addon.host.obstacles import Obstacles
+from hairloom.addon.host.surfaces import read_surface
+from hairloom.addon.host.wind import scene_wind
+from hairloom.addon.strands import Surface
+
+FRAME = 1.0 / 60.0
+COARSE = DynamicsSettings(collider_resolution=16)
+
+
+@pytest.fixture
+def scene(extension):
+    """An owner without a head, whose colliders are in a collection."""
+    return Scene()
+
+
+class Scene:
+    def __init__(self):
+        self.colliders = bpy.data.collections.new("Colliders")
+        bpy.context.scene.collection.children.link(self.colliders)
+        self.owner = bpy.data.objects.new("Fin", bpy.data.meshes.new("Fin"))
+        bpy.context.collection.objects.link(self.owner)
+        self.owner.hairloom.collider_collection = self.colliders
+
+    def add(self, obj, shape="automatic"):
+        for collection in obj.users_collection:
+            collection.objects.unlink(obj)
+        self.colliders.objects.link(obj)
+        obj.hairloom.collider_shape = shape
+        return obj
+
+    def ball(self, radius=0.1, place=(0, 0, 0), name="Ball"):
+        empty = bpy.data.objects.new(name, None)
+        empty.empty_display_type, empty.empty_display_size = "SPHERE", radius
+        empty.location = place
+        bpy.context.collection.objects.link(empty)
+        return self.add(empty)
+
+    def cube(self, size=0.2, shape="automatic", name="Cube", place=(0, 0, 0)):
+        bpy.ops.mesh.primitive_cube_add(size=size, location=place)
+        bpy.context.object.name = name
+        return self.add(bpy.context.object, shape)
+
+    def obstacles(self, known=None):
+        return Obstacles.of(self.owner, None, None, COARSE, depsgraph(), known)
+
+
+def depsgraph():
+    bpy.context.view_layer.update()
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def distance_now(posed, point):
+    """Of one place (3,) in the world at the frame's end, to first order."""
+    inverse = np.linalg.inv(posed.matrix_now)
+    local = transform_points(inverse, np.array(point, np.float32)[:, None])
+    distance, gradient = posed.collider.distance(local)
+    return float(distance[0] / np.linalg.norm(inverse[:3, :3].T @ gradient[:, 0]))
+
+
+def moved(found, duration=FRAME):
+    return found.move(depsgraph(), duration)
+
+
+def rig(mesh, name="Rig"):
+    """A mesh carried by one bone of an armature, which stands still as an object does."""
+    armature = bpy.data.armatures.new(name)
+    obj = bpy.data.objects.new(name, armature)
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = armature.edit_bones.new("Bone")
+    bone.head, bone.tail = (0, 0, 0), (0, 0, 1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    mesh.vertex_groups.new(name="Bone").add(range(len(mesh.data.vertices)), 1.0, "REPLACE")
+    mesh.modifiers.new("Armature", "ARMATURE").object = obj
+
+    def pose(matrix):
+        obj.pose.bones["Bone"].matrix = matrix @ armature.bones["Bone"].matrix_local
+        bpy.context.view_layer.update()
+
+    return pose
+
+
+TURN = Matrix.Translation((0.1, -0.2, 0.3)) @ Matrix.Rotation(0.7, 4, (1, 2, 3))
+
+
+# --- kinds
+
+
+def test_nothing_to_collide_with(scene):
+    assert moved(scene.obstacles()) == ()
+    assert scene.obstacles().warnings == ()
+
+
+def test_each_object_collides_as_its_kind(scene):
+    scene.ball()
+    scene.cube(name="A")
+    scene.cube(shape="sphere", name="B", place=(1, 0, 0))
+    scene.cube(shape="capsule", name="C")
+    scene.cube(shape="none", name="D")
+    found = scene.obstacles()
+    kinds = sorted(type(posed.collider).__name__ for posed in moved(found))
+    assert kinds == ["CapsuleCollider", "DistanceField", "SphereSetCollider"]
+    assert found.warnings == ()
+    (balls,) = [p for p in moved(found) if isinstance(p.collider, SphereSetCollider)]
+    assert len(balls.collider.radii) == 2
+
+
+def test_an_empty_that_is_no_sphere_a_lamp_and_the_owner_are_left_alone(scene):
+    axes = bpy.data.objects.new("Axes", None)
+    light = bpy.data.objects.new("Light", bpy.data.lights.new("Light", "POINT"))
+    for obj in (axes, light):
+        bpy.context.collection.objects.link(obj)
+        scene.add(obj)
+    scene.add(scene.owner)
+    found = scene.obstacles()
+    assert moved(found) == () and found.warnings == ()
+
+
+def test_a_ball_is_as_large_as_blender_shows_it(scene):
+    ball = scene.ball(0.1, (1, 0, 0))
+    ball.scale = (2, 2, 2)
+    (posed,) = moved(scene.obstacles())
+    assert distance_now(posed, (1.0, 0.0, 0.5)) == pytest.approx(0.3, abs=1e-6)
+
+
+def test_a_mesh_as_sphere_holds_its_longest_side(scene):
+    cube = scene.cube(0.2, "sphere", place=(0, 0, 1))
+    for vertex in cube.data.vertices:
+        vertex.co.x *= 2.0
+    (posed,) = moved(scene.obstacles())
+    assert distance_now(posed, (0.0, 0.0, 1.5)) == pytest.approx(0.3, abs=1e-6)
+
+
+def test_a_stretched_ball_is_an_ellipsoid(scene):
+    scene.ball(0.1).scale = (3, 1, 1)
+    (posed,) = moved(scene.obstacles())
+    assert isinstance(posed.collider, SphereCollider)
+    assert distance_now(posed, (0.4, 0, 0)) == pytest.approx(0.1, abs=1e-6)
+    assert distance_now(posed, (0, 0.4, 0)) == pytest.approx(0.3, abs=1e-6)
+
+
+def test_a_capsule_lies_along_the_longest_side_with_round_ends(scene):
+    """A box of 0.2, made 0.8 long by its scale: its capsule ends at 0.4 and is 0.1 thick."""
+    cube = scene.cube(0.2, "capsule")
+    cube.scale = (1, 4, 1)
+    cube.rotation_euler.z = math.pi / 2  # its y becomes the world's x
+    (posed,) = moved(scene.obstacles())
+    assert isinstance(posed.collider, CapsuleCollider)
+    assert distance_now(posed, (0.5, 0, 0)) == pytest.approx(0.1, abs=1e-6)
+    assert distance_now(posed, (0.2, 0, 0.25)) == pytest.approx(0.15, abs=1e-6)
+    corner = 0.3 + 0.1 / math.sqrt(2.0)  # on the round end
+    assert distance_now(posed, (corner, corner - 0.3, 0)) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_an_empty_as_capsule_stands_along_z(scene):
+    empty = scene.ball(0.2)
+    empty.hairloom.collider_shape = "capsule"
+    (posed,) = moved(scene.obstacles())
+    assert distance_now(posed, (0, 0, 0.3)) == pytest.approx(0.1, abs=1e-6)
+    assert distance_now(posed, (0.3, 0, 0)) == pytest.approx(0.2, abs=1e-6)
+
+
+@pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1), (2, 2, -2)])
+def test_a_mesh_that_is_mirrored_or_scaled(scene, scale):
+    cube = scene.cube(0.2, place=(1, 0, 0))
+    cube.scale, cube.rotation_euler.z = scale, 0.4
+    (posed,) = moved(scene.obstacles())
+    assert isinstance(posed.collider, DistanceField)
+    half = 0.1 * abs(scale[2])
+    assert distance_now(posed, (1, 0, half + 0.02)) == pytest.approx(0.02, abs=2e-3)
+    assert distance_now(posed, (1, 0, half - 0.02)) == pytest.approx(-0.02, abs=2e-3)
+
+
+# --- motion
+
+
+def test_things_go_the_way_from_frame_to_frame_with_a_bow(scene):
+    ball, cube = scene.ball(), scene.cube()
+    found = scene.obstacles()
+    for posed in moved(found):
+        np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)
+    for place in (0.1, 0.3, 0.6):  # faster and faster
+        ball.location.x = cube.location.x = place
+        last = moved(found)
+    assert len(last) == 2
+    for posed in last:
+        went = posed.matrix_now[0, 3] - posed.matrix_before[0, 3]
+        assert went == pytest.approx(0.3, abs=1e-5)
+        # 0.1, 0.3, 0.6 lie on x = 0.3 + 0.25 s + 0.05 s^2 of this frame: its middle is at 0.4375
+        assert posed.matrix_at(0.5)[0, 3] - posed.matrix_before[0, 3] == pytest.approx(
+            0.1375, abs=1e-5
+        )
+
+
+def test_after_rest_there_is_no_speed_and_no_bow(scene):
+    ball = scene.ball()
+    found = scene.obstacles()
+    ball.location.x = 0.5
+    moved(found)
+    ball.location.x = 2.0
+    found.rest(depsgraph())
+    (posed,) = moved(found)
+    assert posed.matrix_before[0, 3] == posed.matrix_now[0, 3] == pytest.approx(2.0, abs=1e-6)
+    assert posed.matrix_bow is None
+
+
+def test_balls_that_move_apart_become_another_set(scene):
+    parent = scene.ball(0.1, name="A")
+    other = scene.ball(0.2, (0.5, 0, 0), name="B")
+    other.parent = None
+    found = scene.obstacles()
+    (before,) = moved(found)
+    (still,) = moved(found)
+    assert still.collider is before.collider, "its grid is made once"
+    other.location.x = 0.9
+    parent.scale = (2, 2, 2)
+    (posed,) = moved(found)
+    assert distance_now(posed, (1.2, 0, 0)) == pytest.approx(0.1, abs=1e-5)
+    assert distance_now(posed, (-0.3, 0, 0)) == pytest.approx(0.1, abs=1e-5)
+
+
+def test_balls_that_go_together_stay_one_set(scene):
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.collection.objects.link(parent)
+    for number in range(5):
+        scene.ball(0.05, (0.1 * number, 0, 0), name=f"B{number}").parent = parent
+    found = scene.obstacles()
+    (before,) = moved(found)
+    parent.matrix_world = TURN @ Matrix.Scale(2.0, 4)
+    (posed,) = moved(found)
+    assert posed.collider is before.collider
+    place = TURN @ Vector((0.8, 0, 0))
+    outward = TURN.to_3x3() @ Vector((1, 0, 0))
+    assert distance_now(posed, place + outward * 0.2) == pytest.approx(0.1, abs=1e-5)
+
+
+def test_one_ball_that_turns_turns_its_collider(scene):
+    ball = scene.ball()
+    found = scene.obstacles()
+    ball.rotation_euler.z = 0.5
+    (posed,) = moved(found)
+    np.testing.assert_allclose(posed.matrix_now[:2, 0], [math.cos(0.5), math.sin(0.5)], atol=1e-6)
+
+
+@pytest.mark.parametrize("subdivided", [False, True])
+def test_a_mesh_that_an_armature_turns_is_followed(scene, subdivided):
+    """The object stands still and its vertices move: within 0.1 mm."""
+    bpy.ops.mesh.primitive_monkey_add(size=0.2)
+    head = scene.add(bpy.context.object)
+    pose = rig(head)
+    if subdivided:
+        head.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    found = scene.obstacles()
+    pose(TURN)
+    (posed,) = moved(found)
+    np.testing.assert_allclose(posed.matrix_now, TURN, atol=1e-4)
+    assert found.warnings == ()
+
+
+def test_a_mesh_that_an_armature_turns_and_its_object_carries(scene):
+    cube = scene.cube()
+    pose = rig(cube)
+    found = scene.obstacles()
+    pose(Matrix.Rotation(0.5, 4, "Z"))
+    bpy.data.objects["Rig"].matrix_world = TURN
+    cube.parent = bpy.data.objects["Rig"]
+    (posed,) = moved(found)
+    np.testing.assert_allclose(posed.matrix_now, TURN @ Matrix.Rotation(0.5, 4, "Z"), atol=1e-5)
+
+
+def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
+    """A long body whose upper half turns: vertices at its top tell how the hair's collider goes."""
+    bpy.ops.mesh.primitive_cylinder_add(radius=0.1, depth=2.0, vertices=16)
+    body = bpy.context.object
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.subdivide(number_cuts=15)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    pose = rig(body)
+    for vertex in body.data.vertices:
+        body.vertex_groups["Bone"].add([vertex.index], float(vertex.co.z > 0.0), "REPLACE")
+    at_rest = read_surface(body, depsgraph(), need_uv=False, place="Body")
+    roots = np.flatnonzero(at_rest.positions[:, 2] > 0.9)
+    head = Body.at_rest(body, depsgraph())
+    scene.owner.hairloom.collider_collection = None
+    turn = Matrix.Rotation(0.8, 4, "X")
+
+    def place(chosen):
+        pose(Matrix.Identity(4))
+        found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None, chosen)
+        pose(turn)
+        return moved(found)[0].matrix_now, found.warnings
+
+    by_roots, warnings = place(roots)
+    np.testing.assert_allclose(by_roots, turn, atol=1e-5)
+    assert warnings == ()
+    by_all, warnings = place(None)
+    assert np.abs(by_all - np.array(turn)).max() > 0.05
+    assert "Cylinder" in warnings[0] and "bends" in warnings[0]
+
+
+# --- what is used again
+
+
+def test_fields_are_made_once_and_again_when_the_mesh_or_resolution_differs(scene):
+    cube = scene.cube()
+    pose = rig(cube)
+    found = scene.obstacles()
+    first = moved(found)[0].collider
+    pose(TURN)
+    cube.location.y = 2.0
+    again = scene.obstacles(found)
+    assert moved(again)[0].collider is first
+    cube.data.vertices[0].co.x += 0.1
+    other = scene.obstacles(again)
+    assert moved(other)[0].collider is not first
+    finer = Obstacles.of(
+        scene.owner, None, None, DynamicsSettings(collider_resolution=20), depsgraph(), other
+    )
+    assert moved(finer)[0].collider is not moved(other)[0].collider
+
+
+def test_a_mesh_of_other_vertices_is_made_anew_when_play_begins_again(scene):
+    cube = scene.cube()
+    found = scene.obstacles()
+    cube.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    again = scene.obstacles(found)
+    (posed,) = moved(again)
+    assert again.warnings == ()
+    assert posed.collider is not found.parts[0].distance
+
+
+def test_one_root_or_none_is_enough_to_follow_a_head(scene, sphere):
+    pose = rig(sphere)
+    at_rest = read_surface(sphere, depsgraph(), need_uv=False, place="Head")
+    head = Body.at_rest(sphere, depsgraph())
+    alone = Surface(at_rest.positions, at_rest.triangles[:0])
+    for surface, roots in ((at_rest, np.array([5])), (at_rest, np.zeros(0, int))):
+        found = Obstacles.of(scene.owner, head, surface, COARSE, depsgraph(), None, roots)
+        pose(TURN)
+        np.testing.assert_allclose(moved(found)[0].matrix_now, TURN, atol=1e-5)
+        pose(Matrix.Identity(4))
+    found = Obstacles.of(scene.owner, head, alone, COARSE, depsgraph(), None)
+    assert moved(found) == () and "no faces" in found.warnings[0]
+
+
+# --- what fails
+
+
+def plane(scene):
+    bpy.ops.mesh.primitive_plane_add(size=0.2)
+    return scene.add(bpy.context.object)
+
+
+def flat(scene):
+    cube = scene.cube(name="Flat")
+    cube.scale = (1, 1, 0)
+    return cube
+
+
+def curve(scene):
+    bpy.ops.curve.primitive_bezier_circle_add()
+    return scene.add(bpy.context.object)
+
+
+def empty_as_mesh(scene):
+    ball = scene.ball(name="NoMesh")
+    ball.hairloom.collider_shape = "mesh"
+    return ball
+
+
+def disabled(scene):
+    cube = scene.cube(name="Disabled")
+    cube.hide_viewport = True
+    return cube
+
+
+def not_finite(scene):
+    cube = scene.cube(name="NotFinite")
+    cube.data.vertices[0].co.x = math.nan
+    return cube
+
+
+@pytest.mark.parametrize("make", [plane, flat, curve, empty_as_mesh, disabled, not_finite])
+def test_what_cannot_be_used_is_told_by_name_and_the_others_go_on(scene, make):
+    bad = make(scene)
+    scene.ball()
+    found = scene.obstacles()
+    assert len(moved(found)) == 1
+    (warning,) = found.warnings
+    assert warning.startswith(bad.name + ":") and warning.count(".") >= 2
+
+
+def test_excluded_from_the_view_layer(scene):
+    away = bpy.data.collections.new("Away")
+    scene.colliders.children.link(away)
+    cube = scene.cube(name="Away")
+    scene.colliders.objects.unlink(cube)
+    away.objects.link(cube)
+    found = scene.obstacles()
+    assert len(moved(found)) == 1 and found.warnings == ()
+    layer = bpy.context.view_layer.layer_collection.children["Colliders"]
+    layer.children["Away"].exclude = True
+    assert moved(found) == ()
+    assert "Away" in found.warnings[0]
+    layer.children["Away"].exclude = False
+    cube.location.x = 3.0
+    (posed,) = moved(found)
+    assert found.warnings == ()
+    np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)  # back without a leap
+
+
+def test_hidden_with_the_eye_it_still_collides(scene):
+    ball = scene.ball()
+    ball.hide_set(True)
+    found = scene.obstacles()
+    assert len(moved(found)) == 1 and found.warnings == ()
+    ball.location.x = 1.0
+    assert moved(found)[0].matrix_now[0, 3] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_deleted_in_mid_play(scene):
+    cube, ball, other = scene.cube(), scene.ball(name="A"), scene.ball(0.1, (1, 0, 0), "B")
+    found = scene.obstacles()
+    assert len(moved(found)) == 2
+    bpy.data.objects.remove(cube)
+    bpy.data.objects.remove(ball)
+    (posed,) = moved(found)
+    assert len(posed.collider.radii) == 1
+    assert distance_now(posed, (1.3, 0, 0)) == pytest.approx(0.2, abs=1e-6)
+    assert ["Cube" in text or "A:" in text for text in found.warnings] == [True, True]
+    bpy.data.objects.remove(other)
+    assert moved(found) == ()
+
+
+def test_scaled_to_nothing_and_back_in_mid_play(scene):
+    cube, ball, stretched = scene.cube(), scene.ball(), scene.ball(name="Stretched")
+    stretched.scale = (1, 1, 2)
+    found = scene.obstacles()
+    assert len(moved(found)) == 3
+    for obj in (cube, ball, stretched):
+        obj.scale = (0, 0, 0)
+    assert moved(found) == ()
+    assert len(found.warnings) >= 3
+    for obj in (cube, ball, stretched):
+        obj.scale = (1, 1, 1)
+    assert len(moved(found)) == 3 and found.warnings == ()
+
+
+def test_another_mesh_in_mid_play(scene):
+    cube = scene.cube()
+    found = scene.obstacles()
+    cube.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    assert moved(found) == ()
+    assert "vertices" in found.warnings[0]
+    cube.modifiers.clear()
+    assert len(moved(found)) == 1 and found.warnings == ()
+
+
+def test_the_head_that_is_gone_is_an_error(scene, sphere):
+    head = Body.at_rest(sphere, depsgraph())
+    at_rest = read_surface(sphere, depsgraph(), need_uv=False, place="Head")
+    scene.ball()
+    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
+    assert len(moved(found)) == 2
+    bpy.data.objects.remove(sphere)
+    with pytest.raises(HairloomError, match="gone"):
+        moved(found)
+
+
+def test_a_head_without_volume_is_told_and_the_others_go_on(scene):
+    bpy.ops.mesh.primitive_grid_add(size=0.2)
+    cap = bpy.context.object
+    at_rest = read_surface(cap, depsgraph(), need_uv=False, place="Cap")
+    scene.ball()
+    head = Body.at_rest(cap, depsgraph())
+    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
+    assert len(moved(found)) == 1
+    assert "Grid" in found.warnings[0]
+
+
+def test_a_chosen_collider_stands_in_for_the_head(scene, sphere):
+    at_rest = read_surface(sphere, depsgraph(), need_uv=False, place="Head")
+    head = Body.at_rest(sphere, depsgraph())
+    scene.owner.hairloom.collider_collection = None
+    bpy.ops.mesh.primitive_cube_add(size=0.1, location=(0, 0, 1))
+    scene.owner.hairloom.collider = bpy.context.object
+    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
+    (posed,) = moved(found)
+    assert distance_now(posed, (0, 0, 1.1)) == pytest.approx(0.05, abs=2e-3)
+    sphere.hairloom.collider_shape = "none"
+    scene.owner.hairloom.collider = None
+    assert moved(Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)) == ()
+
+
+# --- wind
+
+
+def test_wind_fields_add_up_along_their_own_z(extension):
+    assert scene_wind(depsgraph()).tolist() == [0.0, 0.0, 0.0]
+    for strength, turn in ((3.0, (0, math.pi / 2, 0)), (-2.0, (0, 0, 0))):
+        bpy.ops.object.effector_add(type="WIND", rotation=turn)
+        bpy.context.object.field.strength = strength
+        bpy.context.object.scale = (5, 5, 5)
+    bpy.ops.object.effector_add(type="VORTEX")
+    np.testing.assert_allclose(scene_wind(depsgraph()), [3.0, 0.0, -2.0], atol=1e-6)
+    bpy.data.objects["Wind"].hide_viewport = True
+    np.testing.assert_allclose(scene_wind(depsgraph()), [0.0, 0.0, -2.0], atol=1e-6)
+    bpy.data.objects["Wind.001"].hide_set(True)
+    assert scene_wind(depsgraph()).tolist() == [0.0, 0.0, 0.0]

@@ -1,0 +1,263 @@
+"""Bakes in renders: what a render shows is what was baked, in this process and in a fresh one."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.host import live, playback
+from hairloom.addon.host.bake import Bake, bakeable, simulated_for
+from hairloom.addon.host.fin_modifier import POSITION, add_modifier
+
+LAST = 6
+SIZE = 64
+#: renders frames of a file as an artist's Blender does, with the extension enabled
+RENDER = """
+import sys
+sys.path.insert(0, {tools!r})
+from extension_loader import load_package
+import bpy
+load_package().register()
+bpy.ops.wm.open_mainfile(filepath={file!r})
+scene = bpy.context.scene
+scene.frame_start, scene.frame_end = 2, {last}
+bpy.ops.render.render(animation=True)
+"""
+
+
+@pytest.fixture
+def scene(new_hair, sphere, tmp_path):
+    """A white head with hair that is thrown to the right, seen from the front."""
+    new_hair(sphere)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    for frame, x in ((1, -0.2), (LAST, 0.2)):
+        sphere.location.x = x
+        sphere.keyframe_insert("location", frame=frame)
+    sphere.hide_render = True
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 0.8
+    camera.location, camera.rotation_euler.x = (0.0, -2.0, 0.0), np.pi / 2.0
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.rotation_euler.x = 10.0, 1.0
+    scene.collection.objects.link(sun)
+    scene.render.resolution_x = scene.render.resolution_y = SIZE
+    scene.render.engine, scene.cycles.samples = "CYCLES", 1
+    scene.cycles.use_denoising = False
+    scene.render.film_transparent = True
+    scene.render.filepath = str(tmp_path / "pictures" / "still_")
+    hair = bpy.data.objects["Hair"]
+    hair.data.attributes["radius"].data.foreach_set("value", np.full(480, 0.004, np.float32))
+    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.collider_resolution = 8
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    scene.frame_set(1)
+    return scene
+
+
+def in_another_blender(script, folder):
+    """The command that runs a script in a new process of the Blender that this is."""
+    if bpy.app.module:
+        return [sys.executable, "-c", script]
+    file = folder / "script.py"
+    file.write_text(script, encoding="utf-8")
+    start = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1"]
+    return [*start, "--python", str(file)]
+
+
+def coverage(path):
+    """(SIZE, SIZE) alpha of a picture, its lowest row first."""
+    picture = bpy.data.images.load(str(path), check_existing=False)
+    pixels = np.empty(SIZE * SIZE * 4, np.float32)
+    picture.pixels.foreach_get(pixels)
+    bpy.data.images.remove(picture)
+    return pixels.reshape(SIZE, SIZE, 4)[..., 3]
+
+
+def expected(strands):
+    """(SIZE, SIZE), 1 where these strands pass, as the camera sees them."""
+    along = np.linspace(0.0, 1.0, 64)[:, None]
+    between = strands[:, :-1, None] * (1.0 - along) + strands[:, 1:, None] * along
+    pixel = ((between.reshape(-1, 3)[:, [2, 0]] / 0.8 + 0.5) * SIZE).astype(int)
+    mask = np.zeros((SIZE, SIZE))
+    inside = ((pixel >= 0) & (pixel < SIZE)).all(axis=1)
+    mask[tuple(pixel[inside].T)] = 1.0
+    return mask
+
+
+def shows(picture, strands):
+    """The share of a picture's hair and of the strands that lie on each other."""
+    seen, wanted = picture > 0.3, expected(strands) > 0.0
+    return (seen & wanted).sum() / (seen | wanted).sum()
+
+
+def written(curves):
+    points = np.empty((len(curves.position_data), 3), np.float32)
+    curves.position_data.foreach_get("vector", points.ravel())
+    return points
+
+
+@pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_WORKBENCH"])
+def test_a_render_shows_the_baked_hair_of_its_frame(engine, scene, tmp_path):
+    if engine == "BLENDER_WORKBENCH":
+        pytest.importorskip("gpu").init()
+    assert bpy.ops.hairloom.bake() == {"FINISHED"}
+    scene.render.engine = engine
+    hair = bpy.data.objects["Hair"]
+    cache, copy = playback.cache_of(hair), hair.hairloom.bake.copy
+    assert hair.hide_render and not copy.hide_render and copy.hide_viewport
+    strands = {}
+    for frame in (2, 5):
+        scene.frame_current = frame  # F12 shows the frame that is set, without a frame change
+        scene.render.filepath = str(tmp_path / f"{engine}{frame}.png")
+        bpy.ops.render.render(write_still=True)
+        strands[frame] = playback.strands_in(cache, frame)
+        np.testing.assert_array_equal(written(copy.data), strands[frame].reshape(-1, 3))
+    pictures = {frame: coverage(tmp_path / f"{engine}{frame}.png") for frame in strands}
+    for frame, other in ((2, 5), (5, 2)):
+        assert shows(pictures[frame], strands[frame]) > 0.4
+        assert shows(pictures[frame], strands[other]) < 0.3
+
+
+def test_a_fresh_process_renders_the_bake_of_a_saved_file(scene, tmp_path):
+    bpy.data.objects["Hair"].hairloom.bake.folder = "//bake"
+    file = tmp_path / "wig.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    bpy.ops.hairloom.bake()
+    cache = playback.cache_of(bpy.data.objects["Hair"])
+    strands = [playback.strands_in(cache, frame) for frame in range(1, LAST + 1)]
+    bpy.ops.wm.save_mainfile()
+    tools = str(Path(__file__).parents[2] / "tools")
+    script = RENDER.format(tools=tools, file=str(file), last=LAST)
+    subprocess.run(in_another_blender(script, tmp_path), check=True, capture_output=True)
+    for frame in range(2, LAST + 1):
+        picture = coverage(tmp_path / "pictures" / f"still_{frame:04d}.png")
+        fits = [shows(picture, each) for each in strands]
+        assert np.argmax(fits) == frame - 1 and fits[frame - 1] > 0.4
+
+
+def test_a_render_changes_nothing_of_what_the_viewport_shows(scene, evaluated):
+    bpy.ops.hairloom.bake()
+    hair = bpy.data.objects["Hair"]
+    session = live.start(hair, evaluated())
+    scene.frame_set(4)
+    before = session.strands
+    bpy.ops.render.render()
+    np.testing.assert_array_equal(session.strands, before)
+    assert live.sessions() == (session,) and scene.frame_current == 4
+    assert not playback._is_rendering
+
+
+def test_between_two_frames_strands_go_straight_for_motion_blur(scene):
+    bpy.ops.hairloom.bake()
+    hair = bpy.data.objects["Hair"]
+    cache = playback.cache_of(hair)
+    here, there = (playback.strands_in(cache, frame) for frame in (3, 4))
+    scene.frame_set(3, subframe=0.25)
+    between = written(hair.hairloom.bake.copy.data).reshape(here.shape)
+    assert between == pytest.approx(0.75 * here + 0.25 * there, abs=1e-6)
+
+
+def test_beyond_its_frames_a_copy_shows_the_nearest(scene):
+    bpy.ops.hairloom.bake()
+    hair = bpy.data.objects["Hair"]
+    cache, curves = playback.cache_of(hair), hair.hairloom.bake.copy.data
+    for beyond, nearest in ((-3, 1), (LAST + 9, LAST)):
+        scene.frame_set(beyond)
+        strands = playback.strands_in(cache, nearest)
+        np.testing.assert_array_equal(written(curves), strands.reshape(-1, 3))
+
+
+def test_the_copy_has_the_look_of_the_hair(scene):
+    hair = bpy.data.objects["Hair"]
+    material = bpy.data.materials.new("Brown")
+    hair.data.materials.append(material)
+    hair.data.set_types(type="POLY")
+    bpy.ops.hairloom.bake()
+    copy = hair.hairloom.bake.copy
+    assert list(copy.data.materials) == [material]
+    assert {item.value for item in copy.data.attributes["curve_type"].data} == {1}
+    assert {item.value for item in copy.data.attributes["groom_group_id"].data} == {0, 1}
+    radius = [item.value for item in copy.data.attributes["radius"].data]
+    assert radius == pytest.approx([0.004] * len(radius))
+    assert copy.users_collection == hair.users_collection
+    assert copy.data.surface is None and copy.parent is None
+
+
+def test_hair_without_show_in_renders_is_rendered_as_it_stands(scene):
+    hair = bpy.data.objects["Hair"]
+    hair.hairloom.bake.in_renders = False
+    bpy.ops.hairloom.bake()
+    assert hair.hairloom.bake.copy is None and not hair.hide_render
+    assert not scene.render.use_lock_interface
+    hair.hairloom.bake.in_renders = True
+    bpy.ops.hairloom.bake()
+    assert hair.hide_render and scene.render.use_lock_interface
+    hair.hairloom.bake.in_renders = False
+    bpy.ops.hairloom.bake()
+    assert hair.hairloom.bake.copy is None and not hair.hide_render
+
+
+def test_a_copy_whose_bake_is_gone_is_told_once_and_stays(scene, tmp_path, capfd):
+    bpy.ops.hairloom.bake()
+    curves = bpy.data.objects["Hair"].hairloom.bake.copy.data
+    scene.frame_set(2)
+    before = written(curves)
+    (tmp_path / "bake").rename(tmp_path / "elsewhere")
+    for frame in (3, 4, 5):
+        scene.frame_set(frame)
+    np.testing.assert_array_equal(written(curves), before)
+    assert capfd.readouterr().out.count("there is no bake") == 1
+
+
+@pytest.fixture
+def fin(extension, tmp_path):
+    """A flag that hangs by its upper edge from an object that moves."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=6, y_subdivisions=6, size=0.4)
+    flag = bpy.context.object
+    group = flag.vertex_groups.new(name="Pins")
+    group.add([v.index for v in flag.data.vertices if v.co.y > 0.19], 1.0, "REPLACE")
+    flag.hairloom.fin.pin_group = "Pins"
+    flag.hairloom.bake.folder = str(tmp_path / "flag")
+    add_modifier(flag)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    for frame, x in ((1, 0.0), (LAST, 0.3)):
+        flag.location.x = x
+        flag.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    return flag
+
+
+def shown(flag):
+    """(vertex_count, 3) as evaluated, object space."""
+    bpy.context.view_layer.update()
+    mesh = flag.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    positions = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", positions.ravel())
+    return positions
+
+
+def test_a_baked_fin_equals_playback_and_plays_without_a_preview(fin, evaluated):
+    assert bakeable(fin)
+    live.add(simulated_for(fin, evaluated()), evaluated())
+    frames = range(1, LAST + 1)
+    played = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        played.append(shown(fin))
+    assert np.abs(played[-1] - played[0]).max() > 0.02
+    list(Bake.of([fin], bpy.context.scene).steps())
+    live.stop_all()
+    for frame in (4, 2, 6, 1, 3, 5):
+        bpy.context.scene.frame_set(frame)
+        np.testing.assert_array_equal(shown(fin), played[frame - 1])
+    bpy.context.scene.frame_set(LAST + 1)
+    np.testing.assert_array_equal(shown(fin), played[0])
+    bpy.ops.hairloom.bake_free()
+    assert fin.data.attributes.get(POSITION) is None

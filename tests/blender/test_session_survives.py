@@ -1,0 +1,189 @@
+"""Previews survive what artists do, or end with a reason; the file's data stay as they were."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.host import live, overlay, reactions
+
+
+@pytest.fixture
+def preview(new_hair, sphere, evaluated):
+    """Hair on a head, previewed: (hair, head, session)."""
+    hair = new_hair(sphere)
+    return hair, sphere, live.start(hair, evaluated())
+
+
+def drawn(session):
+    """The strands as they are drawn, whether they lie on the GPU or in an array."""
+    return session.strands
+
+
+def update():
+    bpy.context.view_layer.update()
+
+
+def test_a_defect_ends_the_preview_and_is_told_once(preview, monkeypatch, capfd):
+    _, head, session = preview
+
+    def fail(*_):
+        raise ZeroDivisionError("a defect")
+
+    monkeypatch.setattr(type(session), "rest", fail)
+    for x in (1.0, 2.0):
+        head.location.x = x
+        update()
+    assert live.sessions() == ()
+    assert "a defect" in live.notice()
+    assert capfd.readouterr().err.count("Traceback") == 1
+
+
+def test_curves_may_become_fewer_and_none(preview, evaluated):
+    hair, _, session = preview
+    hair.data.remove_curves(indices=list(range(50)))
+    update()
+    reactions.catch_up(evaluated())
+    assert drawn(session).shape[0] == 10
+    hair.data.remove_curves()
+    update()
+    reactions.catch_up(evaluated())
+    assert live.sessions() == ()
+    assert "Hair" in live.notice()
+    assert overlay.drawing_of(session.uid) is None
+
+
+def test_renaming_is_no_matter(preview):
+    hair, head, session = preview
+    before = drawn(session)
+    hair.name, head.name = "Wig", "Bust"
+    head.location.x = 1.0
+    update()
+    assert drawn(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
+
+
+@pytest.mark.parametrize("which", ["Hair", "Head"])
+def test_a_deleted_object_ends_the_preview_with_a_notice(which, preview):
+    bpy.data.objects.remove(bpy.data.objects[which])
+    update()
+    assert live.sessions() == ()
+    assert which in live.notice() and "gone" in live.notice()
+
+
+def test_a_head_with_other_vertices_ends_the_preview_with_a_notice(preview):
+    _, head, _ = preview
+    head.modifiers.new("Smooth", "SUBSURF").levels = 1
+    update()
+    assert live.sessions() == ()
+    assert "vertices" in live.notice()
+
+
+def test_undo_and_redo_of_a_moved_head_and_edited_hair(new_hair, sphere, evaluated):
+    bpy.context.preferences.edit.use_global_undo = True
+    hair = new_hair(sphere)
+    bpy.ops.ed.undo_push(message="begin")
+    session = live.start(hair, evaluated())
+    begin = drawn(session)
+    sphere.location.x = 1.0
+    hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
+    hair.data.hairloom.shading.ambient = 0.125
+    bpy.ops.ed.undo_push(message="change")
+
+    bpy.ops.ed.undo()
+    reactions.catch_up(evaluated())
+    assert live.sessions() == (session,)
+    assert drawn(session) == pytest.approx(begin, abs=1e-6)
+    assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 1.0
+
+    bpy.ops.ed.redo()
+    reactions.catch_up(evaluated())
+    assert drawn(session)[0, -1] == pytest.approx([1.0, 0.0, 0.5], abs=1e-5)
+    assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 0.125
+
+
+def test_loading_a_file_drops_all_previews_and_keeps_the_settings(preview, tmp_path):
+    hair, _, session = preview
+    hair.data.hairloom.shading.ambient = 0.125
+    file = str(tmp_path / "hair.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    assert live.sessions() == (session,)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    assert live.sessions() == ()
+    assert overlay.drawing_of(session.uid) is None
+    assert bpy.data.objects["Hair"].data.hairloom.shading.ambient == 0.125
+
+
+def test_another_scene_in_the_window_does_not_end_the_preview(preview):
+    _, head, session = preview
+    before, window, scene = drawn(session), bpy.context.window, bpy.context.scene
+    window.scene = bpy.data.scenes.new("Elsewhere")
+    window.scene.collection.objects.link(bpy.data.objects.new("Thing", None))
+    update()
+    bpy.context.scene.objects["Thing"].location.x = 1.0
+    update()
+    assert live.sessions() == (session,)
+    assert not overlay.drawing_of(session.uid).is_visible
+    window.scene = scene
+    head.location.x = 1.0
+    update()
+    assert overlay.drawing_of(session.uid).is_visible
+    assert drawn(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
+
+
+def test_sculpting_shows_blenders_own_strands(preview, evaluated):
+    hair, _, session = preview
+    bpy.ops.object.mode_set(mode="SCULPT_CURVES")
+    hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
+    update()
+    assert hair.evaluated_get(evaluated()).display_type == "TEXTURED"
+    reactions.catch_up(evaluated())
+    assert drawn(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    update()
+    assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
+
+
+def test_a_final_render_does_not_disturb_the_preview(preview):
+    _, _, session = preview
+    scene = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera, scene.render.engine = camera, "BLENDER_WORKBENCH"
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    before = drawn(session)
+    bpy.ops.render.render()
+    assert drawn(session) == pytest.approx(before, abs=1e-7)
+    assert live.sessions() == (session,)
+
+
+@pytest.mark.parametrize("groom", ["none", "one point each"])
+def test_hair_that_cannot_be_used_is_refused_with_a_remedy(groom, new_hair, evaluated):
+    hair = new_hair()
+    hair.data.remove_curves()
+    if groom != "none":
+        hair.data.add_curves([1, 1, 1])
+    with pytest.raises(HairloomError) as raised:
+        live.start(hair, evaluated())
+    assert raised.value.place == "Hair" and raised.value.remedy
+    assert live.sessions() == ()
+
+
+def test_a_groom_of_another_scale_is_refused(new_hair, sphere, evaluated):
+    hair = new_hair(sphere)
+    hair.scale = (100.0, 100.0, 100.0)
+    with pytest.raises(HairloomError, match="scale"):
+        live.start(hair, evaluated())
+
+
+def test_a_head_without_faces_or_uvs_is_a_warning(new_hair, sphere, evaluated):
+    hair = new_hair(sphere)
+    while sphere.data.uv_layers:
+        sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
+    sphere.data.update()
+    session = live.start(hair, evaluated())
+    assert "Unwrap" in session.source.warnings[0]
+    live.stop(session)
+    sphere.data.clear_geometry()
+    session = live.start(hair, evaluated())
+    assert "no faces" in session.source.warnings[0]
+    assert session.rig.head is None

@@ -1,0 +1,263 @@
+"""Hair follows Blender's timeline: each frame once, the same each time, at rest where it jumps."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from hairloom.addon.host import live, playback, timeline
+from hairloom.addon.host.pace import MOST_AT_ONCE, Pace
+
+LAST = 10
+
+
+@pytest.fixture
+def swinging(new_hair, sphere, evaluated):
+    """Previewed hair on a head that is thrown about: (hair, head, session)."""
+    hair = new_hair(sphere)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    for frame, x in ((1, 0.0), (4, 0.1), (LAST, -0.05)):
+        sphere.location.x = x
+        sphere.keyframe_insert("location", frame=frame)
+    hair.hairloom.dynamics.collider_resolution = 8
+    hair.hairloom.dynamics.form = "numpy"
+    scene.frame_set(5)
+    return hair, sphere, live.start(hair, evaluated())
+
+
+def go(*frames):
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+
+
+def lag(session):
+    """How far the tips are from where the style, carried by the head, would have them [m]."""
+    head = bpy.data.objects["Head"]
+    style = session.source.strands.grid[:, -1] - session.source.strands.grid[:, 0]
+    offset = session.strands[:, -1] - session.strands[:, 0] - style
+    assert np.isfinite(session.strands).all()
+    assert np.abs(session.strands[:, 0].mean(axis=0)[0] - head.matrix_world.translation.x) < 0.02
+    return float(np.linalg.norm(offset, axis=1).max())
+
+
+def test_playing_twice_from_the_first_frame_gives_identical_bits(swinging):
+    _, _, session = swinging
+    runs = []
+    for _ in range(2):
+        shown = []
+        for frame in range(1, LAST + 1):
+            go(frame)
+            shown.append(session.strands)
+        runs.append(np.array(shown))
+        go(7)
+    np.testing.assert_array_equal(runs[0], runs[1])
+    assert np.abs(np.diff(runs[0], axis=0)).max() > 0.01
+
+
+def test_hair_rests_at_the_first_frame_and_where_the_playhead_jumps(swinging):
+    _, _, session = swinging
+    go(1)
+    assert lag(session) < 1e-5
+    go(2, 3, 4, 5)
+    assert lag(session) > 0.005
+    go(8)
+    assert lag(session) < 1e-5, "forwards"
+    go(9)
+    assert lag(session) > 1e-4, "and on from there"
+    go(2)
+    assert lag(session) < 1e-5, "backwards"
+
+
+def test_the_same_frame_again_keeps_the_hair_as_it_is(swinging):
+    _, head, session = swinging
+    go(1, 2, 3)
+    before = session.strands
+    go(3)
+    head.update_tag()
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(session.strands, before)
+    go(4)
+    assert lag(session) > 0.005
+
+
+def test_a_head_that_is_moved_by_hand_takes_its_hair_along_at_rest(swinging):
+    _, head, session = swinging
+    go(1, 2, 3)
+    head.location.x += 0.3
+    bpy.context.view_layer.update()
+    assert lag(session) < 1e-5
+
+
+def test_frames_that_playback_drops_are_made_up_for(swinging, monkeypatch):
+    _, _, session = swinging
+    durations = []
+    advance = type(session).advance
+
+    def noted(session, depsgraph, duration):
+        durations.append(duration)
+        advance(session, depsgraph, duration)
+
+    monkeypatch.setattr(type(session), "advance", noted)
+    monkeypatch.setattr(playback, "is_played", lambda: True)
+    go(1, 2, 5, 6)
+    assert durations == pytest.approx([1 / 24, 3 / 24, 1 / 24])
+    go(1, 2)
+    assert len(durations) == 5 - 1, "a loop begins anew"
+
+
+def test_the_preview_range_begins_where_it_begins(swinging):
+    _, _, session = swinging
+    scene = bpy.context.scene
+    scene.use_preview_range, scene.frame_preview_start, scene.frame_preview_end = True, 4, 8
+    go(3, 4)
+    assert lag(session) < 1e-5
+    go(5)
+    assert lag(session) > 1e-4
+
+
+def test_without_simulate_on_playback_hair_only_follows(swinging):
+    hair, _, session = swinging
+    hair.hairloom.bake.follows = False
+    for frame in (1, 2, 3, 4):
+        go(frame)
+        assert lag(session) < 1e-5
+    assert not session.is_playing
+
+
+def test_free_play_is_shaken_by_dragging_and_handed_over_to_playback(
+    swinging, evaluated, monkeypatch
+):
+    _, _, session = swinging
+    go(1)
+    live.play(evaluated())
+    assert live.is_playing()
+    go(4)
+    live.advance(evaluated(), 1 / 24)
+    assert live.is_playing() and lag(session) > 0.005
+    monkeypatch.setattr(playback, "is_played", lambda: True)
+    go(5)
+    assert not live.is_playing() and session.is_playing
+    assert lag(session) > 0.005, "it goes on from where it was"
+    live.play(evaluated())
+    assert live.is_playing() and lag(session) < 1e-5
+
+
+def test_paused_hair_holds_and_goes_on(swinging, evaluated):
+    _, head, session = swinging
+    head.animation_data_clear()
+    live.play(evaluated())
+    assert not bpy.ops.hairloom.pause.poll() or live.is_playing()
+    head.location.x += 0.1
+    bpy.context.view_layer.update()
+    live.advance(evaluated(), 1 / 24)
+    held = session.strands
+    assert bpy.ops.hairloom.pause() == {"FINISHED"}
+    live.advance(evaluated(), 1 / 24)
+    np.testing.assert_array_equal(session.strands, held)
+    assert live.is_paused()
+    assert bpy.ops.hairloom.pause() == {"FINISHED"}
+    live.advance(evaluated(), 1 / 24)
+    assert np.abs(session.strands - held).max() > 1e-4
+    assert bpy.ops.hairloom.reset() == {"FINISHED"}
+    assert lag(session) < 1e-5 and live.is_playing()
+    live.rest(evaluated(), keep_playing=False)
+    assert not live.is_playing() and not bpy.ops.hairloom.pause.poll()
+
+
+def test_another_form_in_the_middle_goes_on_from_where_the_hair_is(swinging):
+    hair, _, session = swinging
+    hair.hairloom.dynamics.form = "automatic"
+    go(1, 2, 3, 4)
+    before = lag(session)
+    hair.hairloom.dynamics.form = "numpy"
+    assert session.solver.form == "numpy"
+    assert lag(session) == pytest.approx(before, abs=1e-5)
+    go(5)
+    assert lag(session) > 0.005
+
+
+@pytest.mark.parametrize("rate", [(1, 100.0), (240, 1.0), (24, 1.001)])
+def test_any_frame_rate_is_simulated(rate, swinging):
+    _, _, session = swinging
+    render = bpy.context.scene.render
+    render.fps, render.fps_base = rate
+    go(*range(1, LAST + 1))
+    assert lag(session) < 0.2
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, 1e-9])
+def test_a_head_of_no_size_or_turned_inside_out_gives_no_nonsense(scale, swinging):
+    hair, head, session = swinging
+    go(1, 2)
+    head.scale = (scale, scale, scale)
+    bpy.context.view_layer.update()
+    go(3, 4, 5)
+    assert live.session_of(hair) is session, live.notice()
+    assert np.isfinite(session.strands).all()
+    assert scale or "scale is zero" in timeline.trouble(session.uid)
+    head.scale = (1.0, 1.0, 1.0)
+    go(1, 2)
+    assert lag(session) < 0.05 and timeline.trouble(session.uid) == ""
+
+
+@pytest.mark.parametrize("what", ["a vertex", "the object"])
+@pytest.mark.parametrize("when", ["in playback", "while it plays freely"])
+def test_what_is_not_a_number_ends_the_preview_with_a_reason(what, when, swinging, evaluated):
+    hair, head, _ = swinging
+    go(1, 2)
+    if when == "while it plays freely":
+        live.play(evaluated())
+    curves = np.array([point.position for point in hair.data.points])
+    if what == "a vertex":
+        head.data.vertices[7].co.x = math.nan
+    else:
+        head.animation_data_clear()
+        head.matrix_world = Matrix(((math.nan,) * 4,) * 4)
+    head.data.update()
+    go(3)
+    live.advance(evaluated(), 1 / 24)
+    assert live.sessions() == ()
+    assert "Head" in live.notice() and "not a finite number" in live.notice()
+    np.testing.assert_array_equal(curves, [point.position for point in hair.data.points])
+
+
+def test_a_driver_that_gives_no_number_is_no_matter(swinging):
+    """Blender itself refuses it."""
+    _, head, session = swinging
+    head.driver_add("location", 1).driver.expression = "float('nan')"
+    go(1, 2, 3, 4)
+    assert lag(session) > 0.005
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "is_played", "frames"),
+    [
+        (None, 7, False, None),
+        (6, 7, False, 1),
+        (7, 7, False, 0),
+        (5, 7, False, None),
+        (5, 7, True, 2),
+        (9, 7, True, None),
+        (9, 1, True, None),
+        (0, 1, False, None),
+        (7, 40, True, None),
+    ],
+)
+def test_what_a_frame_change_means(before, now, is_played, frames):
+    assert timeline.move(before, now, 1, is_played, 24.0) == frames
+
+
+def test_play_keeps_the_scenes_rate_and_drops_what_it_cannot_make_up_for():
+    pace = Pace(10.0)
+    ticks = 10.0 + np.arange(1, 121) / 120.0
+    assert sum(pace.due(now, 24.0) for now in ticks) == 24
+    assert max(Pace(0.0).due(now, 24.0) for now in (5.0, 0.05)) == MOST_AT_ONCE
+    slow = Pace(0.0)
+    assert slow.due(5.0, 24.0) == MOST_AT_ONCE
+    assert slow.due(5.0 + 1.5 / 24.0, 24.0) == 1, "what was late is forgotten"
+    slow.skip(9.0)
+    assert slow.due(9.0 + 1.0 / 24.0, 24.0) == 1
+    assert Pace(0.0).due(0.5, 0.01) == 0

@@ -1,0 +1,20 @@
+// xyz: the gradient of the distance at a point; w: the distance. Points with w 0 ask the first round
+// solid, points with w 1 the field that begins in row 0.
+#include "lib_collider.glsl"
+
+void main()
+{
+  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(at, imageSize(result)))) {
+    return;
+  }
+  vec4 point = texelFetch(points, at, 0);
+  vec4 low_cell = texelFetch(own, ivec2(0, 0), 0);
+  ivec3 nodes = ivec3(texelFetch(own, ivec2(1, 0), 0).xyz);
+  Round solid = round_at(0);
+  Found found = distance_from(outward_of(solid, point.xyz), solid.radius);
+  if (point.w == 1.0) {
+    found = distance_in(Field(low_cell.xyz, low_cell.w, nodes, 0), point.xyz);
+  }
+  imageStore(result, at, vec4(found.gradient, found.distance));
+}

@@ -1,0 +1,400 @@
+"""Dynamics on the GPU against numpy's: the same motion within rounding, and the same promises."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.dynamics.colliders import (
+    CapsuleCollider,
+    Collider,
+    DistanceField,
+    PosedCollider,
+    SphereCollider,
+    SphereSetCollider,
+)
+from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.state import DynamicsState, start
+from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
+from hairloom.addon.dynamics.way import bow
+from hairloom.addon.errors import HairloomError
+
+#: [m] of difference in half a second, in free air and at colliders. Both forms round to float32 but
+#: sum in another order. What that starts, 1e-7 m, grows as long as hair is limp, and more where
+#: friction or a last Newton step is taken by one form and by a hair not by the other.
+FREE, TOUCHING = 1e-4, 5e-4
+#: Else that last Newton step is worth up to 0.2 % of a segment, and in longer substeps drift grows
+#: faster.
+TIGHT = {"length_tolerance": 0.0001, "substep_rate": 240.0}
+LIMP = {"style_root": 0.3, "style_tip": 0.0, "bend": 0.1, "style_damping": 0.5}
+
+
+def curly(guide_count: int, cv_count: int) -> np.ndarray:
+    """Guides of 20 cm from a ball of 10 cm outwards, each with its own waves."""
+    random = np.random.default_rng(guide_count)
+    out = random.normal([0.0, 0.0, 1.5], 1.0, (guide_count, 3))
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    share = np.linspace(0.0, 1.0, cv_count) ** 1.2
+    waves = np.sin(
+        share[:, None] * random.uniform(3.0, 9.0, (guide_count, 1, 3))
+        + random.uniform(0.0, 6.0, (guide_count, 1, 3))
+    )
+    grid = out[:, None] * (0.1 + 0.2 * share[:, None]) + 0.02 * share[:, None] * waves
+    return grid.astype(np.float32)
+
+
+def shaking(time: float) -> np.ndarray:
+    """A head that says no, 25 degrees about z, and goes 5 cm along x, once a second."""
+    swing = np.sin(np.pi * min(time, 0.5)) ** 2 * np.sin(2.0 * np.pi * time)
+    matrix = np.eye(4)
+    matrix[:2, :2] = [
+        [np.cos(0.44 * swing), -np.sin(0.44 * swing)],
+        [np.sin(0.44 * swing), np.cos(0.44 * swing)],
+    ]
+    matrix[0, 3] = 0.05 * swing
+    return matrix
+
+
+def ball_field(radius: float) -> DistanceField:
+    """A sampled ball with a flattened top, so that its gradient has an edge."""
+    cell = 0.01
+    axis = np.arange(-radius - 3 * cell, radius + 3 * cell, cell)
+    nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    round_part = np.linalg.norm(nodes, axis=-1) - radius
+    return DistanceField(np.maximum(round_part, nodes[..., 2] - 0.06), nodes[0, 0, 0], cell)
+
+
+@dataclass(eq=False)
+class Scene:
+    """Guides on a shaking head; `on_head` go with it, `standing` stand still."""
+
+    values: dict[str, Any] = field(default_factory=dict)
+    guide_count: int = 40
+    cv_count: int = 16
+    on_head: tuple[Collider, ...] = ()
+    standing: tuple[Collider, ...] = ()
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tips_held: bool = False
+    fps: float = 60.0
+    is_bent: bool = True
+
+    @property
+    def settings(self) -> DynamicsSettings:
+        return DynamicsSettings(**TIGHT | self.values)
+
+    def carried(self, frame: float) -> np.ndarray:
+        matrix = shaking(frame / self.fps)
+        grid = curly(self.guide_count, self.cv_count)
+        return (grid @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+
+    def start(self) -> DynamicsState:
+        held = np.arange(self.guide_count) % 2 == 0 if self.tips_held else None
+        return start(self.carried(0.0), held)
+
+    def colliders(self, frame: int) -> tuple[PosedCollider, ...]:
+        earlier, before, now = (shaking((frame + k) / self.fps) for k in (-1, 0, 1))
+        bent = bow(earlier, before, now, 1.0) if self.is_bent and frame else None
+        still = np.eye(4)
+        return (
+            *(PosedCollider(one, before, now, bent) for one in self.on_head),
+            *(PosedCollider(one, still, still) for one in self.standing),
+        )
+
+    def drives(self, seconds: float) -> list[Drive]:
+        grids = [self.carried(frame) for frame in range(round(seconds * self.fps) + 1)]
+        gravity, wind = np.array([0.0, 0.0, -9.81]), np.array(self.wind)
+        drives = []
+        for frame, (before, now) in enumerate(pairwise(grids)):
+            bent = bow(grids[frame - 1], before, now, 1.0) if self.is_bent and frame else None
+            drives.append(Drive(before, now, self.colliders(frame), gravity, bent, wind))
+        return drives
+
+
+BALL = SphereCollider(np.array([0.0, 0.0, 0.0]), 0.095)
+IN_THE_WAY = SphereCollider(np.array([0.05, 0.05, 0.2]), 0.05)
+AT_TIPS = SphereCollider(np.array([0.0, 0.05, 0.28]), 0.1)
+ROD = CapsuleCollider(np.array([-0.2, 0.05, 0.12]), np.array([0.2, 0.1, 0.16]), 0.03)
+CLUSTER = SphereSetCollider(
+    np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.02], [-0.04, 0.02, 0.0], [0.0, -0.03, 0.04]]),
+    np.array([0.09, 0.07, 0.06, 0.06]),
+)
+
+IN_AIR = {
+    "default": Scene(),
+    "straight way": Scene(is_bent=False),
+    "limp": Scene(LIMP),
+    "no bend": Scene({"bend": 0.0, "damping": 6.0, "style_tip": 3.0}),
+    "stiff": Scene({"style_root": 15.0, "style_tip": 8.0, "bend": 4.0}),
+    "wind with gusts": Scene({"wind_speed": 6.0, "gusts": 1.0, "wind_direction": 0.7}),
+    "steady wind of the scene": Scene({"gusts": 0.0}, wind=(0.0, 4.0, 1.0)),
+    "drag in a current": Scene({"drag": 4.0, "wind_speed": 1.0}),
+    "drag in still water": Scene({"drag": 6.0, "damping": 2.0}),
+    "buoyancy": Scene({"buoyancy": 0.8}),
+    "weight not held": Scene({"weight_held": 0.3, "gravity": 1.4}),
+    "curves along": Scene(
+        {"style_along": (1.0, 1.0, 0.2, 0.1, 0.3), "bend_along": (0.2, 1.0, 0.5, 0.0, 1.0)}
+    ),
+    "held tips": Scene(tips_held=True),
+    "relaxation": Scene({"length_solver": "relaxation"}),
+    "relaxation without reach": Scene(
+        {"length_solver": "relaxation", "relaxations": 3, "long_range": False}, tips_held=True
+    ),
+    "two Newton steps at most": Scene({"length_iterations": 2, "substep_rate": 60.0, **LIMP}),
+    "24 frames a second": Scene({"substep_rate": 100.0}, fps=24.0),
+    "more frames than substeps": Scene({"substep_rate": 50.0}, fps=60.0),
+    "many substeps": Scene({"substep_rate": 2000.0}, fps=24.0),
+    "2 CVs": Scene(cv_count=2),
+    "3 CVs": Scene(cv_count=3),
+    "4 CVs": Scene(cv_count=4, tips_held=True),
+    "32 CVs": Scene(cv_count=32),
+    "64 CVs": Scene(cv_count=64, guide_count=9),
+    "one guide": Scene(guide_count=1),
+}
+AT_COLLIDERS = {
+    "ball": Scene(LIMP, on_head=(BALL,)),
+    "ball without friction": Scene({"friction": 0.0, **LIMP}, on_head=(BALL,)),
+    "standing ball": Scene(standing=(IN_THE_WAY,)),
+    "capsule": Scene(LIMP, on_head=(ROD,)),
+    "set of balls": Scene(LIMP, on_head=(CLUSTER,)),
+    "mesh field": Scene(LIMP, on_head=(ball_field(0.095),)),
+    "head and ball": Scene(on_head=(ball_field(0.095),), standing=(IN_THE_WAY,)),
+    "three of all kinds": Scene(on_head=(CLUSTER, ball_field(0.08)), standing=(ROD,)),
+    "one pass": Scene({"contact_passes": 1, **LIMP}, on_head=(BALL,)),
+    "relaxation": Scene({"length_solver": "relaxation"}, on_head=(BALL,)),
+    "held tips": Scene(LIMP, on_head=(BALL,), standing=(IN_THE_WAY,), tips_held=True),
+    "out of reach": Scene(standing=(SphereCollider(np.array([0.0, 0.0, 9.0]), 0.1),)),
+    "64 CVs": Scene(cv_count=64, guide_count=9, on_head=(IN_THE_WAY,)),
+    "3 CVs": Scene(cv_count=3, on_head=(AT_TIPS,)),
+    "2 CVs": Scene(cv_count=2, on_head=(BALL,)),
+}
+UNTOUCHED = [AT_COLLIDERS["out of reach"], AT_COLLIDERS["2 CVs"]]
+
+
+@pytest.fixture
+def make_pass(gpu_context: Any) -> Callable[[DynamicsState], Any]:
+    from hairloom.addon.render.dynamics_pass import DynamicsPass
+
+    return DynamicsPass
+
+
+def guides_of(dynamics: Any, guide_count: int, cv_count: int) -> np.ndarray:
+    from hairloom.addon.render.textures import from_strand_rows, texture_to_array
+
+    return from_strand_rows(texture_to_array(dynamics.guides), guide_count, cv_count)[..., :3]
+
+
+def assert_equal(scene: Scene, make_pass: Any, tolerance: float, seconds: float = 0.5) -> None:
+    state = scene.start()
+    dynamics = make_pass(state)
+    moved = 0.0
+    for drive in scene.drives(seconds):
+        state = advance(state, drive, scene.settings, 1.0 / scene.fps)
+        dynamics.advance(drive, scene.settings, 1.0 / scene.fps)
+        found = dynamics.read()
+        assert np.abs(found.position - state.position).max() < tolerance
+        assert np.abs(found.previous - state.previous).max() < tolerance
+        shown = guides_of(dynamics, scene.guide_count, scene.cv_count)
+        assert np.abs(shown - grid_at_frame_end(state, drive)).max() < tolerance
+        assert found.time_left == state.time_left
+        assert (found.substep, found.time) == (state.substep, state.time)
+        moved = max(moved, float(np.abs(state.position - drive.target_now.T).max()))
+    assert moved > 0.002 or scene.cv_count == 2, "the hair must do something"
+
+
+@pytest.mark.parametrize("scene", IN_AIR.values(), ids=IN_AIR)
+def test_equals_numpy_in_air(make_pass: Any, scene: Scene) -> None:
+    assert_equal(scene, make_pass, FREE)
+
+
+@pytest.mark.parametrize("scene", AT_COLLIDERS.values(), ids=AT_COLLIDERS)
+def test_equals_numpy_at_colliders(make_pass: Any, scene: Scene) -> None:
+    assert_equal(scene, make_pass, TOUCHING)
+    alone = replace(scene, on_head=(), standing=())
+    difference = played(scene).position - played(alone).position
+    assert np.abs(difference).max() > 1e-3 or scene in UNTOUCHED, "the solids must be met"
+
+
+def played(scene: Scene) -> DynamicsState:
+    """The state of numpy after half a second."""
+    state = scene.start()
+    for drive in scene.drives(0.5):
+        state = advance(state, drive, scene.settings, 1.0 / scene.fps)
+    return state
+
+
+def test_more_guides_than_a_texture_has_rows(make_pass: Any) -> None:
+    scene = Scene(guide_count=20000, cv_count=4, on_head=(BALL,))
+    assert_equal(scene, make_pass, TOUCHING, seconds=0.1)
+
+
+def test_one_may_switch_the_form_in_mid_motion(make_pass: Any) -> None:
+    """Numpy, GPU, numpy, GPU: what each hands on is what it was, to the last bit."""
+    scene = Scene(on_head=(BALL,), fps=50.0)
+    state = mixed = scene.start()
+    for frame, drive in enumerate(scene.drives(0.5)):
+        state = advance(state, drive, scene.settings, 1.0 / 50.0)
+        if frame // 5 % 2:
+            mixed = advance(mixed, drive, scene.settings, 1.0 / 50.0)
+            continue
+        dynamics = make_pass(mixed)
+        assert dynamics.read() is mixed, "it has not moved yet"
+        dynamics.advance(drive, scene.settings, 1.0 / 50.0)
+        mixed = dynamics.read()
+    assert np.abs(mixed.position - state.position).max() < TOUCHING
+    assert (mixed.substep, mixed.time) == (state.substep, state.time)
+
+
+def test_the_substep_may_change_in_mid_motion(make_pass: Any) -> None:
+    scene = Scene()
+    state = scene.start()
+    dynamics = make_pass(state)
+    for frame, drive in enumerate(scene.drives(0.5)):
+        rate = (240.0, 100.0, 500.0)[frame // 8 % 3]
+        settings = replace(scene.settings, substep_rate=rate)
+        state = advance(state, drive, settings, 1.0 / 60.0)
+        dynamics.advance(drive, settings, 1.0 / 60.0)
+        assert np.abs(dynamics.read().position - state.position).max() < FREE
+        assert dynamics.read().time_left == state.time_left
+
+
+def test_a_frame_without_a_substep_moves_only_what_is_shown(make_pass: Any) -> None:
+    scene = Scene({"substep_rate": 30.0})
+    start_state, drive = scene.start(), scene.drives(0.5)[20]
+    dynamics = make_pass(start_state)
+    dynamics.advance(drive, scene.settings, 0.01)
+    found = dynamics.read()
+    assert (found.position == start_state.position).all()
+    assert (found.previous == start_state.previous).all()
+    assert (found.time_left, found.substep) == (0.01, 0.0)
+    shown = guides_of(dynamics, scene.guide_count, scene.cv_count)
+    np.testing.assert_allclose(shown[:, 0], drive.target_now[:, 0], atol=1e-6)
+
+
+def test_frames_shorter_than_a_substep(make_pass: Any) -> None:
+    """With all that the table of moments holds, which then has no rows."""
+    scene = Scene({"wind_speed": 6.0, "gusts": 1.0}, on_head=(BALL,), fps=1000.0)
+    assert_equal(scene, make_pass, TOUCHING, seconds=0.05)
+
+
+def test_twice_the_same_to_the_last_bit(make_pass: Any) -> None:
+    scene = Scene({"wind_speed": 3.0}, on_head=(ball_field(0.095),), standing=(IN_THE_WAY,))
+    passes = [make_pass(scene.start()) for _ in range(2)]
+    for drive in scene.drives(0.3):
+        for dynamics in passes:
+            dynamics.advance(drive, scene.settings, 1.0 / 60.0)
+    one, other = (dynamics.read() for dynamics in passes)
+    assert (one.position == other.position).all()
+    assert (one.previous == other.previous).all()
+
+
+@pytest.mark.parametrize("solid", [BALL, ball_field(0.095), CLUSTER], ids=["ball", "field", "set"])
+def test_no_stretch_and_no_penetration(make_pass: Any, solid: Collider) -> None:
+    """The promises of the numpy step, with default settings and limp hair alike."""
+    for values in ({}, LIMP):
+        scene = Scene(values, guide_count=100, on_head=(solid,))
+        settings = DynamicsSettings(**values)
+        dynamics = make_pass(scene.start())
+        for frame, drive in enumerate(scene.drives(1.0)):
+            dynamics.advance(drive, settings, 1.0 / 60.0)
+            found = dynamics.read()
+            assert max_stretch(found) < 0.01
+            if frame > 20:  # hair that starts inside has been led out
+                assert deepest_penetration(found, drive.colliders) < 0.001
+
+
+def test_any_settings_stay_finite(make_pass: Any) -> None:
+    """Values from all of the range that a parameter may have, and a head that jerks."""
+    random = np.random.default_rng(8)
+    for number in range(12):
+        values: dict[str, Any] = {}
+        for parameter in DynamicsSettings.parameters():
+            if parameter.kind == "number" and parameter.name != "longest_frame":
+                low, high = parameter.hard_range if number % 2 else parameter.soft_range
+                values[parameter.name] = random.choice([low, high, random.uniform(low, high)])
+        values["substep_rate"] = random.uniform(30.0, 300.0)
+        settings = DynamicsSettings(**values)
+        scene = Scene(on_head=(BALL,))
+        dynamics = make_pass(scene.start())
+        for drive in scene.drives(0.2):
+            jerk = random.normal(size=3).astype(np.float32)
+            drive = replace(drive, target_now=drive.target_now + jerk)
+            dynamics.advance(drive, settings, 1.0 / 24.0)
+        assert np.isfinite(dynamics.read().position).all(), settings
+
+
+def test_bad_drives_are_refused_as_numpy_refuses_them(make_pass: Any) -> None:
+    scene = Scene()
+    state, drive = scene.start(), scene.drives(0.1)[0]
+    dynamics = make_pass(state)
+    nowhere = drive.target_now.copy()
+    nowhere[3, 4, 1] = np.nan
+    for bad, duration in (
+        (replace(drive, target_now=drive.target_now[:5]), 0.02),
+        (replace(drive, target_before=drive.target_before[:, :9]), 0.02),
+        (replace(drive, target_now=nowhere), 0.02),
+        (replace(drive, gravity=np.array([0.0, np.inf, 0.0])), 0.02),
+        (drive, -1.0),
+        (drive, np.nan),
+    ):
+        with pytest.raises(HairloomError) as by_numpy:
+            advance(state, bad, scene.settings, duration)
+        with pytest.raises(HairloomError) as by_compute:
+            dynamics.advance(bad, scene.settings, duration)
+        assert str(by_compute.value) == str(by_numpy.value)
+    dynamics.advance(drive, scene.settings, 0.02)
+    assert np.isfinite(dynamics.read().position).all(), "it goes on after an error"
+
+
+def test_a_collider_that_the_gpu_does_not_know_is_refused(make_pass: Any) -> None:
+    class Cube:
+        bounds = (np.zeros(3), 1.0)
+
+    scene = Scene()
+    drive = scene.drives(0.1)[0]
+    cube: Any = Cube()
+    drive = replace(drive, colliders=(PosedCollider(cube, np.eye(4), np.eye(4)),))
+    with pytest.raises(HairloomError, match="Cube"):
+        make_pass(scene.start()).advance(drive, scene.settings, 0.02)
+
+
+def test_no_guides(make_pass: Any) -> None:
+    state = start(np.zeros((0, 8, 3), np.float32))
+    dynamics = make_pass(state)
+    drive = replace(Scene().drives(0.1)[0], target_before=state.grid, target_now=state.grid)
+    dynamics.advance(replace(drive, target_bow=None), DynamicsSettings(), 0.02)
+    assert dynamics.read().position.shape == (3, 8, 0)
+    assert dynamics.guides is None
+
+
+def test_release_goes_on_from_what_was_read(make_pass: Any) -> None:
+    scene = Scene(on_head=(BALL,))
+    drives = scene.drives(0.2)
+    kept, released = make_pass(scene.start()), make_pass(scene.start())
+    for drive in drives[:5]:
+        kept.advance(drive, scene.settings, 1.0 / 60.0)
+        released.advance(drive, scene.settings, 1.0 / 60.0)
+    shown = kept.guides
+    released.read()
+    released.release()
+    assert released.guides is None
+    for drive in drives[5:]:
+        kept.advance(drive, scene.settings, 1.0 / 60.0)
+        released.advance(drive, scene.settings, 1.0 / 60.0)
+    assert kept.guides is shown, "the same texture, frame after frame"
+    assert (released.read().position == kept.read().position).all()
+
+
+def test_release_with_all_shaders(make_pass: Any) -> None:
+    from hairloom.addon.render import shader_program
+
+    scene = Scene()
+    dynamics = make_pass(scene.start())
+    dynamics.advance(scene.drives(0.1)[0], scene.settings, 1.0 / 60.0)
+    shader_program.release()
+    assert dynamics.guides is None

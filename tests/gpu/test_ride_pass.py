@@ -1,0 +1,231 @@
+"""Strands that ride on guides: the GPU against the pipeline's numpy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon import pipeline
+from hairloom.addon.groom.roots import root_frames
+from hairloom.addon.groom.weights import GuideWeights
+from hairloom.addon.pipeline import Pose, Rig
+from hairloom.addon.strands import StrandSet, Surface
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+#: [m], for a head of 0.2 m that stands 1.6 m high; float32 steps are 1.2e-7 there
+TOLERANCE = 5.0e-7
+ABOVE_GROUND = np.array([0.1, -0.2, 1.6])
+
+
+def ball(rings: int = 12, segments: int = 24) -> Surface:
+    """A ball of radius 0.1 m above the ground, without its poles."""
+    polar = np.linspace(0.3, np.pi - 0.3, rings)[:, None]
+    around = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)[None]
+    outward = np.stack(
+        [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar + 0 * around)]
+    )
+    ring, segment = np.meshgrid(np.arange(rings - 1), np.arange(segments), indexing="ij")
+    a, b = (ring * segments + np.array([segment, (segment + 1) % segments])).reshape(2, -1)
+    triangles = np.concatenate(
+        [np.column_stack([a, a + segments, b]), np.column_stack([b, a + segments, b + segments])]
+    )
+    return Surface(outward.reshape(3, -1).T * 0.1 + ABOVE_GROUND, triangles)
+
+
+def rig_on(
+    head: Surface | None,
+    count: int,
+    cv_count: int = 6,
+    guide_count: int = 9,
+    above: tuple[float, float, float] = (0.001, 0.001, 0.001),
+) -> Rig:
+    """Bent strands of 0.2 m, with roots a little above their triangles in turn.
+
+    Guides and weights are at random.
+    """
+    random = np.random.default_rng(1)
+    triangle = barycentric = None
+    root = random.normal(size=(count, 3)) * 0.1 + ABOVE_GROUND
+    if head is not None:
+        triangle = np.arange(count) % len(head.triangles)
+        barycentric = random.dirichlet((1.0, 1.0, 1.0), count).astype(np.float32)
+        root = np.einsum("sk,skj->sj", barycentric, head.corners[triangle])
+    way = random.normal(size=(count, cv_count, 3)) * 0.2 / cv_count
+    way[:, 0] = above
+    strands = StrandSet(
+        points=(root[:, None] + way.cumsum(axis=1)).reshape(-1, 3),
+        offsets=np.arange(count + 1) * cv_count,
+        radius=random.random(count * cv_count) * 1.0e-4,
+        group=np.zeros(count, np.int32),
+        root_triangle=triangle,
+        root_barycentric=barycentric,
+    )
+    frames = None
+    if head is not None:
+        frames = root_frames(head.positions, head.triangles, triangle, barycentric)
+    guides = random.permutation(count)[:guide_count].astype(np.int32)
+    weights = GuideWeights(
+        random.integers(0, len(guides), (count, 3)).astype(np.int32),
+        random.dirichlet((1.0, 1.0, 1.0), count).astype(np.float32),
+    )
+    return Rig(strands, head, guides, weights, frames)
+
+
+def turned(angle: float, shift: tuple[float, float, float]) -> np.ndarray:
+    """A turn about a slanting axis through the head, and a shift, (4, 4)."""
+    axis = np.array([0.6, 0.0, 0.8])
+    cross = np.cross(np.eye(3), axis)
+    turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turn, ABOVE_GROUND - turn @ ABOVE_GROUND + shift
+    return matrix
+
+
+def deformed(head: Surface) -> Pose:
+    """The head turned, moved and dented."""
+    matrix = turned(1.1, (0.3, 0.1, -0.2))
+    dent = 0.01 * np.sin(40.0 * head.positions[:, [1, 2, 0]])
+    moved = (head.positions + dent) @ matrix[:3, :3].T + matrix[:3, 3]
+    return Pose(moved.astype(np.float32), matrix)
+
+
+def simulated(rig: Rig, pose: Pose, seed: int = 2) -> np.ndarray:
+    """Guides that have swung away from where their roots carry them, by up to some centimetres."""
+    guides = pipeline.carried(rig, pose, rig.guides)
+    swing = np.random.default_rng(seed).normal(scale=0.02, size=guides.shape)
+    swing[:, 0] = 0.0
+    return (guides + swing).astype(np.float32)
+
+
+def pass_of(rig: Rig) -> Any:
+    from hairloom.addon.render.ride_pass import RidePass
+
+    return RidePass(rig.strands, rig.head, rig.guides, rig.weights)
+
+
+def shown(ride: Any, pose: Pose, guides: Any) -> np.ndarray:
+    ride.ride(pose.head_positions, pose.matrix, guides)
+    return np.asarray(ride.read())
+
+
+def test_strands_ride_as_in_numpy_on_a_deformed_head() -> None:
+    rig = rig_on(ball(), 700)
+    ride, pose = pass_of(rig), deformed(rig.head)
+    for seed in (2, 3):
+        guides = simulated(rig, pose, seed)
+        expected = pipeline.strands_at(rig, pose, guides)
+        found = shown(ride, pose, guides)
+        assert np.abs(found - expected).max() < TOLERANCE
+    assert np.abs(found - rig.strands.grid).max() > 0.1, "it has gone a long way"
+    ride.carry(pose.head_positions, pose.matrix)
+    assert np.abs(ride.read() - pipeline.carried(rig, pose)).max() < TOLERANCE
+
+
+def test_more_strands_than_a_texture_has_rows() -> None:
+    rig = rig_on(ball(), 16384 + 700, cv_count=3, guide_count=40)
+    rig.guides[:2] = 16384, 16384 + 699
+    pose = deformed(rig.head)
+    guides = simulated(rig, pose)
+    expected = pipeline.strands_at(rig, pose, guides)
+    assert np.abs(shown(pass_of(rig), pose, guides) - expected).max() < TOLERANCE
+
+
+def test_hair_without_a_head_goes_with_a_matrix() -> None:
+    rig = rig_on(None, 300)
+    matrix = turned(2.5, (0.5, 0.0, 0.0))
+    matrix[:3, :3] *= 1.5
+    pose = Pose(None, matrix)
+    guides = simulated(rig, pose)
+    ride = pass_of(rig)
+    expected = pipeline.strands_at(rig, pose, guides)
+    # the matrix is rounded to float32, and strands are three metres from the origin
+    assert np.abs(shown(ride, pose, guides) - expected).max() < 4.0 * TOLERANCE
+    assert ride.points.center == pytest.approx(expected[:, 0].mean(axis=0), abs=2.0e-6)
+
+
+def test_hair_on_triangles_without_area() -> None:
+    """A point, an edge without length, three needles, a good one: the same axes of help."""
+    corner = np.array([0.1, 0.2, 1.5])
+    edge = np.array([0.25, 0.0, 0.0])
+    ends = [
+        (corner, corner, corner),
+        (corner, corner, corner + (0.0, 0.25, 0.125)),
+        (corner, corner + edge, corner + 2.0 * edge),
+        (corner, corner + edge, corner),
+        (corner, corner + (0.0, 0.0, -0.25), corner + (0.0, 0.0, 0.5)),
+        (corner, corner + edge, corner + (0.0, 0.25, 0.0)),
+    ]
+    head = Surface(np.reshape(ends, (-1, 3)), np.arange(18).reshape(6, 3))
+    rig = rig_on(head, 24)
+    good = head.positions.reshape(6, 3, 3)[np.array([5, 0, 1, 2, 3, 4])].reshape(-1, 3)
+    for positions in (head.positions, good):  # the flat ones become others
+        pose = Pose(positions, np.eye(4))
+        guides = simulated(rig, pose)
+        expected = pipeline.strands_at(rig, pose, guides)
+        assert np.isfinite(expected).all()
+        assert np.abs(shown(pass_of(rig), pose, guides) - expected).max() < TOLERANCE
+
+
+def test_strands_at_rest_stay_bit_for_bit() -> None:
+    for rig in (rig_on(ball(), 400), rig_on(None, 400)):
+        ride, pose = pass_of(rig), rig.rest_pose
+        ride.carry(pose.head_positions, pose.matrix)
+        assert np.array_equal(ride.read(), rig.strands.grid)
+        radius = rig.strands.radius.reshape(400, -1)
+        pixels = np.array(ride.points.texture.read()).reshape(400, -1, 4)
+        assert np.array_equal(pixels[..., 3], radius), "the fourth channel is the radius"
+        assert np.array_equal(shown(ride, pose, rig.strands.grid[rig.guides]), rig.strands.grid)
+        assert ride.points.center == pytest.approx(rig.strands.roots.mean(axis=0), abs=5.0e-7)
+
+
+def test_guides_may_lie_on_the_gpu_already() -> None:
+    from hairloom.addon.render.textures import strand_rows, texture_from
+
+    rig = rig_on(ball(), 300)
+    pose = deformed(rig.head)
+    guides = simulated(rig, pose)
+    texels = np.concatenate([guides, np.full((*guides.shape[:2], 1), 7.0)], axis=-1)
+    texture = texture_from(strand_rows(texels), "RGBA32F")
+    ride = pass_of(rig)
+    assert np.array_equal(shown(ride, pose, texture), shown(ride, pose, guides))
+
+
+@pytest.mark.parametrize(
+    ("above", "tolerance"), [((0.0, 0.0, 0.0), TOLERANCE), ((0.0, 0.0, 0.001), 0.002)]
+)
+def test_the_middle_of_all_roots_follows_the_head(
+    above: tuple[float, float, float], tolerance: float
+) -> None:
+    """Roots that all stand to one side of the surface lead it astray by no more than twice that."""
+    rig = rig_on(ball(), 2000, above=above)
+    pose = deformed(rig.head)
+    ride = pass_of(rig)
+    ride.carry(pose.head_positions, pose.matrix)
+    expected = pipeline.carried(rig, pose)[:, 0].mean(axis=0)
+    assert ride.points.center == pytest.approx(expected, abs=tolerance)
+
+
+def test_released_points_come_back_with_the_next_frame() -> None:
+    from hairloom.addon.render import shader_program
+
+    rig = rig_on(ball(), 100)
+    pose = deformed(rig.head)
+    guides = simulated(rig, pose)
+    ride = pass_of(rig)
+    before, points = shown(ride, pose, guides), ride.points
+    shader_program.release()
+    assert points.texture is None, "a snapshot that still holds the points keeps no GPU object"
+    assert np.array_equal(shown(ride, pose, guides), before)
+    del ride
+    shader_program.release()
+    assert points.texture is None, "also when the pass is gone"
+
+
+def test_guides_of_another_shape_are_refused() -> None:
+    rig = rig_on(ball(), 50)
+    pose = rig.rest_pose
+    with pytest.raises(ValueError, match="guides have shape"):
+        shown(pass_of(rig), pose, np.zeros((3, 6, 3), np.float32))

@@ -1,0 +1,213 @@
+"""Hair in motion: Play at the scene's rate, pause, Blender's playback, bake, cancel, render."""
+
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import click, look_from_front, open_our_sidebar, press, sidebar_button, viewport
+
+LAST = 40
+FOLDER = Path(bpy.app.tempdir) / "bake"
+
+
+def of_hairloom(module):
+    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
+
+
+def session():
+    (one,) = of_hairloom("host.live").sessions()
+    return one
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    yield from set_the_scene()
+    yield from play_keeps_the_scenes_rate()
+    yield from pause_resume_and_reset()
+    yield from playback_takes_over()
+    yield from bake_in_the_window()
+    yield from escape_cancels_a_bake()
+    yield from a_render_beside_the_window()
+    yield from loading_in_the_middle_of_a_bake()
+
+
+def set_the_scene():
+    for obj in list(bpy.data.objects):
+        if obj.type == "MESH":
+            bpy.data.objects.remove(obj)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    bpy.context.object.name = "Head"
+    bpy.ops.hairloom.grow(strand_count=600, length=0.12)
+    bpy.context.object.name = "Hair"
+    look_from_front(0.9)
+    yield from open_our_sidebar()
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield 10
+    assert session().rig.strands.strand_count > 100
+
+
+def play_keeps_the_scenes_rate():
+    """What is simulated is no more than passes, in whole frames; on slow machines it is less."""
+    rate, durations = 24.0, []
+    yield from click(*sidebar_button("hairloom.play"))
+    yield 40  # the collider is made
+    assert of_hairloom("host.live").is_playing(), "the Play button did nothing"
+    advance = type(session()).advance
+
+    def noted(self, depsgraph, duration):
+        durations.append(duration)
+        advance(self, depsgraph, duration)
+
+    type(session()).advance = noted
+    begin = time.perf_counter()
+    yield 30
+    passed = time.perf_counter() - begin
+    type(session()).advance = advance
+    frames = np.array(durations) * rate
+    assert np.allclose(frames, np.round(frames)) and frames.max() < 4.5, frames
+    assert 0.0 < sum(durations) < passed + 0.2, (passed, sum(durations))
+    print(f"simulated {sum(durations):.2f} s in {passed:.2f} s, {session().computed_on}")
+    driver.screenshot("playing")
+
+
+def pause_resume_and_reset():
+    live, head = of_hairloom("host.live"), bpy.data.objects["Head"]
+    yield from click(*sidebar_button("hairloom.pause"))
+    yield 3
+    assert live.is_paused()
+    held = session().strands
+    head.location.x = 0.05
+    yield 5
+    assert np.array_equal(session().strands, held), "paused hair moves"
+    driver.screenshot("paused")
+    yield from click(*sidebar_button("hairloom.pause"))
+    yield 5
+    assert not live.is_paused() and not np.array_equal(session().strands, held)
+    head.location.x = 0.0
+    yield from click(*sidebar_button("hairloom.reset"))
+    yield 3
+    assert live.is_playing()
+
+
+def playback_takes_over():
+    """Space while hair plays: from now on each frame of the animation moves it."""
+    live, head, scene = of_hairloom("host.live"), bpy.data.objects["Head"], bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    for frame, x in ((1, 0.0), (10, 0.1), (20, -0.1), (LAST, 0.0)):
+        head.location.x = x
+        head.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    yield 3
+    assert live.is_playing()
+    bpy.ops.screen.animation_play()
+    yield 12
+    assert not live.is_playing() and session().is_playing, "Blender's playback did not take over"
+    bpy.ops.screen.animation_cancel(restore_frame=False)
+    yield 3
+    assert scene.frame_current > 1
+    carried = session().source.strands.grid[:, -1] - session().source.strands.grid[:, 0]
+    lag = session().strands[:, -1] - session().strands[:, 0] - carried
+    assert 1e-4 < np.linalg.norm(lag, axis=1).max() < 0.2
+    driver.screenshot("playback-stopped")
+
+
+def run_bake():
+    bpy.data.objects["Hair"].hairloom.bake.folder = str(FOLDER)
+    with bpy.context.temp_override(window=bpy.context.window, area=viewport()):
+        assert bpy.ops.hairloom.bake("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+
+
+def is_baking():
+    return of_hairloom("ui.operators_bake")._running is not None
+
+
+def bake_in_the_window():
+    scene = bpy.context.scene
+    scene.frame_set(7)
+    run_bake()
+    yield 2
+    driver.screenshot("baking")
+    for _ in range(200):
+        if not is_baking():
+            break
+        yield 1
+    yield 3
+    assert not is_baking() and scene.frame_current == 7
+    cache = of_hairloom("host.playback").cache_of(bpy.data.objects["Hair"])
+    assert cache.facts.frame_count == LAST
+    baked = of_hairloom("host.timeline").baked(session().uid)
+    assert baked.is_shown and baked.changed == (), baked
+    driver.screenshot("baked")
+    bpy.ops.screen.animation_play()
+    yield 10
+    bpy.ops.screen.animation_cancel(restore_frame=False)
+    yield 2
+    strands = of_hairloom("host.playback").strands_in(cache, scene.frame_current)
+    assert np.abs(session().strands - strands).max() < 1e-5
+
+
+def escape_cancels_a_bake():
+    before = (FOLDER / "cache.json").stat().st_mtime_ns
+    bpy.context.scene.frame_end = 5000
+    run_bake()
+    yield 3
+    assert is_baking()
+    yield from press("ESC")
+    yield 3
+    assert not is_baking() and not of_hairloom("host.live").is_suspended()
+    assert (FOLDER / "cache.json").stat().st_mtime_ns == before
+    assert not FOLDER.with_name("bake.new").exists()
+    bpy.context.scene.frame_end = LAST
+
+
+def a_render_beside_the_window():
+    """F12 renders in a thread of its own, the window goes on."""
+    scene, hair = bpy.context.scene, bpy.data.objects["Hair"]
+    assert scene.render.use_lock_interface and hair.hide_render
+    camera = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
+    scene.collection.objects.link(camera)
+    camera.location, camera.rotation_euler.x = (0.0, -1.0, 0.0), np.pi / 2.0
+    scene.camera = camera
+    scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "CYCLES", 64, 64
+    scene.cycles.samples = 1
+    scene.frame_set(15)
+    finished = []
+    bpy.app.handlers.render_complete.append(lambda *_: finished.append(1))
+    bpy.ops.render.render("INVOKE_DEFAULT")
+    for _ in range(300):
+        if finished:
+            break
+        yield 1
+    yield 5
+    assert finished, "the render never ended"
+    bpy.app.handlers.render_complete.pop()
+    curves = hair.hairloom.bake.copy.data
+    points = np.empty((len(curves.position_data), 3), np.float32)
+    curves.position_data.foreach_get("vector", points.ravel())
+    cache = of_hairloom("host.playback").cache_of(hair)
+    strands = of_hairloom("host.playback").strands_in(cache, 15)
+    assert np.array_equal(points, strands.reshape(-1, 3))
+    assert len(of_hairloom("host.live").sessions()) == 1
+    driver.screenshot("rendered")
+
+
+def loading_in_the_middle_of_a_bake():
+    bpy.context.scene.frame_end = 5000
+    run_bake()
+    yield 3
+    assert is_baking()
+    bpy.ops.wm.read_homefile(use_factory_startup=False)
+    yield 10
+    assert not is_baking() and not of_hairloom("host.live").is_suspended()
+    assert of_hairloom("host.live").sessions() == ()
+    assert not FOLDER.with_name("bake.new").exists()
+    assert (FOLDER / "cache.json").is_file()
+
+
+driver.play(steps())
