@@ -162,6 +162,7 @@ def test_the_hair_of_the_mesh_uses_them(new_hair, sphere):
 
 
 def test_colliders_that_the_artist_has_chosen_stay(new_hair, sphere):
+    sphere.scale.z = 3.0  # one ball would do for a sphere
     hair = new_hair(sphere)
     own = bpy.data.collections.new("Own")
     hair.hairloom.collider_collection = own
