@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from .cards.settings import CardSettings
-from .dynamics.cloth_settings import FinSettings
+from .dynamics.cloth.settings import FinSettings
+from .dynamics.fitting.sphere_fit import SphereFitSettings
 from .dynamics.settings import DynamicsSettings
-from .dynamics.sphere_fit import SphereFitSettings
 from .groom.settings import GrowSettings, GuideSettings
 from .params import Settings
 from .shading.ambient import AmbientSettings

@@ -1,7 +1,8 @@
 // Signed distance to a collider in its own object space, and its gradient.
 //
-// Twin of addon/dynamics/shapes.py, sphere_set.py and distance_field.py. Defines: HAS_ROUNDS,
-// HAS_FIELDS. Needs the textures `rounds` and `fields`, see addon/render/collider_textures.py.
+// Twin of shapes.py, sphere_set.py and distance_field.py in addon/dynamics/colliders. Defines:
+// HAS_ROUNDS, HAS_FIELDS. Needs the textures `rounds` and `fields`, see
+// addon/render/collider_textures.py.
 
 struct Found {
   float distance;  // [m], negative inside

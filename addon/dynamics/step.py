@@ -10,7 +10,7 @@
         absorb       what was pushed out does not bounce
 
 References: Jakobsen 2001, "Advanced Character Physics"; Nguyen and Donnelly 2005, "Hair Animation
-and Rendering in the Nalu Demo", GPU Gems 2, chapter 23; Han and Harada 2012. `reference.py` holds
+and Rendering in the Nalu Demo", GPU Gems 2, chapter 23; Han and Harada 2012. `reference/` holds
 the same, one CV after the other.
 
 Guides do not feel each other, so they are advanced in blocks that fit into the cache; a guide's

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..dynamics.similarity import fit_similarity
+from ..dynamics.fitting.similarity import fit_similarity
 from ..errors import HairloomError
 from ..strands import Surface
 from ..strands.affine import moved

@@ -11,9 +11,9 @@ import bpy
 import numpy as np
 
 from ..arrays import Floats
-from ..dynamics.cloth import advance_cloth, cloth_at_frame_end
-from ..dynamics.cloth_settings import FinSettings
-from ..dynamics.cloth_state import ClothState, start_cloth
+from ..dynamics.cloth.settings import FinSettings
+from ..dynamics.cloth.state import ClothState, start_cloth
+from ..dynamics.cloth.step import advance_cloth, cloth_at_frame_end
 from ..dynamics.step import Drive
 from ..dynamics.way import bow
 from ..errors import HairloomError

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..dynamics.colliders import Collider, SphereSetCollider
-from ..dynamics.similarity import fit_similarity
+from ..dynamics.fitting.similarity import fit_similarity
 from ..errors import HairloomError
 from ..strands.affine import mean_scale, moved
 from .carriers import is_left_out

@@ -14,7 +14,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..arrays import Floats, Ints
-from ..dynamics.sphere_fit import SphereFit, SphereFitSettings, fit_spheres
+from ..dynamics.fitting.sphere_fit import SphereFit, SphereFitSettings, fit_spheres
 from .objects import head_of
 from .surfaces import read_positions, read_surface
 

@@ -8,9 +8,9 @@ import pytest
 from mathutils import Matrix
 
 from hairloom.addon.dynamics.colliders import SphereSetCollider
+from hairloom.addon.dynamics.fitting.sphere_fit import SphereFitSettings
 from hairloom.addon.dynamics.measure import deepest_penetration
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.dynamics.sphere_fit import SphereFitSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive, advance
 from hairloom.addon.host import spheres

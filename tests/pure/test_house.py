@@ -128,7 +128,7 @@ def test_importing_the_pure_rooms_needs_no_blender() -> None:
     modules = [
         module_name(file).removesuffix(".__init__")
         for room in sorted(PURE)
-        for file in sorted((ADDON / room).glob("*.py"))
+        for file in sorted((ADDON / room).rglob("*.py"))
     ]
     script = (
         "import sys, importlib\n"

@@ -5,18 +5,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.cloth import advance_cloth, cloth_at_frame_end
-from hairloom.addon.dynamics.cloth_constraints import max_cloth_stretch
-from hairloom.addon.dynamics.cloth_reference import advance_cloth_slowly
-from hairloom.addon.dynamics.cloth_settings import FinSettings
-from hairloom.addon.dynamics.cloth_state import start_cloth, vertex_normals
-from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
-from hairloom.addon.dynamics.coloring import (
+from hairloom.addon.dynamics.cloth.coloring import (
     greedy_colors,
     opposite_pairs,
     unique_edges,
     ways_along_edges,
 )
+from hairloom.addon.dynamics.cloth.constraints import max_cloth_stretch
+from hairloom.addon.dynamics.cloth.reference import advance_cloth_slowly
+from hairloom.addon.dynamics.cloth.settings import FinSettings
+from hairloom.addon.dynamics.cloth.state import start_cloth, vertex_normals
+from hairloom.addon.dynamics.cloth.step import advance_cloth, cloth_at_frame_end
+from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.step import Drive
 from hairloom.addon.dynamics.way import bow
 from hairloom.addon.errors import HairloomError

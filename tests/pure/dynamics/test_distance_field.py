@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.distance_field import DistanceField
+from hairloom.addon.dynamics.colliders.distance_field import DistanceField
+from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.dynamics.winding import winding_number
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.strands import Surface
 from hairloom.addon.strands.closest_point import closest_point

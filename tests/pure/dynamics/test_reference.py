@@ -10,7 +10,7 @@ from hairloom.addon.dynamics.colliders import (
     SphereSetCollider,
 )
 from hairloom.addon.dynamics.measure import deepest_penetration
-from hairloom.addon.dynamics.reference import advance_slowly
+from hairloom.addon.dynamics.reference.step import advance_slowly
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.step import advance
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from hairloom.addon.dynamics.colliders import DistanceField
+from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.dynamics.winding import winding_number
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.strands import Surface
 from hairloom.addon.strands.closest_point import closest_point

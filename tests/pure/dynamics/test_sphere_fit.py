@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.holes import close_holes
-from hairloom.addon.dynamics.similarity import fit_similarity
-from hairloom.addon.dynamics.sphere_error import measured_error, union_places
-from hairloom.addon.dynamics.sphere_fit import SphereFitSettings, fit_spheres, medial_balls
-from hairloom.addon.dynamics.sphere_set import SphereSetCollider
-from hairloom.addon.dynamics.surface_samples import boundary_of, samples_of
+from hairloom.addon.dynamics.colliders.sphere_set import SphereSetCollider
+from hairloom.addon.dynamics.fitting.holes import close_holes
+from hairloom.addon.dynamics.fitting.similarity import fit_similarity
+from hairloom.addon.dynamics.fitting.sphere_error import measured_error, union_places
+from hairloom.addon.dynamics.fitting.sphere_fit import SphereFitSettings, fit_spheres, medial_balls
+from hairloom.addon.dynamics.fitting.surface_samples import boundary_of, samples_of
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.strands import Surface
 from hairloom.addon.strands.closest_point import ClosestPointSearch

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.winding import triangle_angle, winding_number
+from hairloom.addon.dynamics.colliders.winding import triangle_angle, winding_number
 from hairloom.addon.strands import Surface
 
 

@@ -100,8 +100,9 @@ def test_an_unknown_name_is_refused_and_the_known_ones_are_told() -> None:
 def _all_settings() -> list[type[Settings]]:
     """Every Settings subclass of the pure rooms, found by importing all of their modules."""
     for room in PURE_ROOMS:
-        for file in sorted((ADDON / room).glob("*.py")):
-            importlib.import_module(f"hairloom.addon.{room}.{file.stem}")
+        for file in sorted((ADDON / room).rglob("[!_]*.py")):
+            module = ".".join(file.relative_to(ADDON).with_suffix("").parts)
+            importlib.import_module(f"hairloom.addon.{module}")
     found, waiting = [], [Settings]
     while waiting:
         subclasses = waiting.pop().__subclasses__()

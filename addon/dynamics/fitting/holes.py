@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Ints
-from ..strands import Surface
+from ...arrays import Ints
+from ...strands import Surface
 
 
 def close_holes(surface: Surface) -> tuple[Surface, Ints]:

@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from ..arrays import Floats
-from .cloth_settings import FinSettings
-from .cloth_state import ClothState, Color, Fabric, distances
-from .constraints import TINY
+from ...arrays import Floats
+from ..constraints import TINY
+from .settings import FinSettings
+from .state import ClothState, Color, Fabric, distances
 
 #: Gravity [m/s^2] and height [m] of the hanging sheet that the `stretch` parameter speaks of.
 _HANGING = 9.81 * 1.0

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
-from ..errors import HairloomError
+from ...arrays import Bools, Floats, Ints
+from ...errors import HairloomError
 from .coloring import greedy_colors, opposite_pairs, unique_edges, ways_along_edges
 
 #: From this pin weight on a vertex has infinite mass; Blender's weights are rounded.

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
-from .colliders import PosedCollider
-from .constraints import PINNED
-from .contacts import FLAT, REACH, SKIN
-from .settings import DynamicsSettings
+from ...arrays import Floats
+from ..colliders import PosedCollider
+from ..constraints import PINNED
+from ..contacts import FLAT, REACH, SKIN
+from ..settings import DynamicsSettings
 
 
 @dataclass(frozen=True)

@@ -22,14 +22,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..arrays import Floats
-from ..errors import HairloomError
-from ..params import Settings, integer, number
-from ..strands import Surface
-from ..strands.closest_point import ClosestPointSearch
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...params import Settings, integer, number
+from ...strands import Surface
+from ...strands.closest_point import ClosestPointSearch
+from ..colliders.winding import winding_number
 from .sphere_error import SphereError, measured_error
 from .surface_samples import Boundary, SurfaceSamples, boundary_of, samples_of
-from .winding import winding_number
 
 #: Surface samples for each ball asked for, and the least and most in all.
 _SAMPLES, _LEAST, _MOST = 40, 1200, 3000

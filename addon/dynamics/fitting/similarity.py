@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
+from ...arrays import Floats
 
 #: Points whose second widest direction is narrower than this share of the widest lie on a line.
 _LINE = 1.0e-3

@@ -1,5 +1,4 @@
-"""What hair runs into: balls, capsules, sets of balls and closed meshes, posed by matrices that
-move during a frame."""
+"""A solid that moves: what it is asked for, and its way during a frame."""
 
 from __future__ import annotations
 
@@ -8,21 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..errors import HairloomError
-from .distance_field import DistanceField
-from .shapes import CapsuleCollider, SphereCollider
-from .sphere_set import SphereSetCollider
-from .way import at
-
-__all__ = [
-    "CapsuleCollider",
-    "Collider",
-    "DistanceField",
-    "PosedCollider",
-    "SphereCollider",
-    "SphereSetCollider",
-]
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
+from ..way import at
 
 
 class Collider(Protocol):

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from .cloth_settings import FinSettings
-from .cloth_state import PINNED_FROM, ClothState
+from ...arrays import Floats, Ints
+from ..contacts import REACH
+from ..step import Drive
+from ..wind import air_of
 from .coloring import greedy_colors, opposite_pairs
-from .contacts import REACH
-from .step import Drive
-from .wind import air_of
+from .settings import FinSettings
+from .state import PINNED_FROM, ClothState
 
 
 def advance_cloth_slowly(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..params import integer, number, toggle
-from .settings import DynamicsSettings
-from .wind_settings import WindSettings
+from ...params import integer, number, toggle
+from ..settings import DynamicsSettings
+from ..wind_settings import WindSettings
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ import heapq
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ...arrays import Floats, Ints
 
 
 def unique_edges(triangles: Ints, more: Ints | None = None) -> Ints:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats
-from ..errors import HairloomError
-from ..strands import Surface
+from ...arrays import Bools, Floats
+from ...errors import HairloomError
+from ...strands import Surface
+from ..colliders.winding import winding_number
 from .holes import close_holes
-from .winding import winding_number
 
 #: How far beside a face it is looked for what is in and out, as a share of the mesh's longest side.
 _BESIDE = 1.0e-4

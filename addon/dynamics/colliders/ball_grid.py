@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ...arrays import Floats, Ints
 
 #: Cells along the longest side of the balls' box, and cells of a block along each side.
 RESOLUTION, BLOCK = 40, 4

@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..errors import HairloomError
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
 from .ball_grid import PAIR_LIMIT, BallGrid, ball_distances, ball_grid, box_of
 from .shapes import distance_from, is_solid
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
-from ..strands.closest_point import ClosestPointSearch
-from .sphere_set import SphereSetCollider
+from ...arrays import Floats
+from ...strands.closest_point import ClosestPointSearch
+from ..colliders.sphere_set import SphereSetCollider
+from ..colliders.winding import winding_number
 from .surface_samples import Boundary, samples_of
-from .winding import winding_number
 
 #: Places on the mesh, and on the balls, at which the error is measured.
 _PLACES = 6000

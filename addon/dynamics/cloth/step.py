@@ -16,7 +16,7 @@ for the same work (Macklin et al. 2019, "Small Steps in Physics Simulation"). Th
 same way each time: sweeps to and fro in turn were seen to blow up.
 
 References: Jakobsen 2001, "Advanced Character Physics"; Nguyen and Donnelly 2005, GPU Gems 2,
-chapter 23; Macklin et al. 2016, "XPBD". `cloth_reference.py` holds the same, one vertex after the
+chapter 23; Macklin et al. 2016, "XPBD". `reference.py` holds the same, one vertex after the
 other.
 
 Limitations: only vertices collide, neither edges nor faces; cloth does not collide with itself.
@@ -29,19 +29,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..errors import HairloomError
-from .cloth_constraints import edge_shares, fold_shares, hold_in_reach, keep_distances, pull_of
-from .cloth_contacts import MovingPlanes, planes_ahead, push_out_at_end, seen_from
-from .cloth_settings import FinSettings
-from .cloth_state import ClothState, Fabric, broadside_normals, vertex_rows
-from .colliders import PosedCollider
-from .constraints import dot
-from .contacts import find_contacts
-from .schedule import due_substeps
-from .step import Drive
-from .way import at
-from .wind import Air, air_of
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
+from ..colliders import PosedCollider
+from ..constraints import dot
+from ..contacts import find_contacts
+from ..schedule import due_substeps
+from ..step import Drive
+from ..way import at
+from ..wind import Air, air_of
+from .constraints import edge_shares, fold_shares, hold_in_reach, keep_distances, pull_of
+from .contacts import MovingPlanes, planes_ahead, push_out_at_end, seen_from
+from .settings import FinSettings
+from .state import ClothState, Fabric, broadside_normals, vertex_rows
 
 
 @dataclass(frozen=True)

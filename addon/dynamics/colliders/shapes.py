@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..errors import HairloomError
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
 
 #: Lengths below this count as zero [m].
 TINY = np.float32(1.0e-9)

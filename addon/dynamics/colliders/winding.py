@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..strands import Surface
-from ..strands.triangle_tree import TriangleTree, build_tree
+from ...arrays import Floats, Ints
+from ...strands import Surface
+from ...strands.triangle_tree import TriangleTree, build_tree
 
 #: A group of triangles is far at this many times its own radius from its centre.
 FAR = 2.5

@@ -17,11 +17,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
-from ..errors import HairloomError
-from ..strands import Surface
-from ..strands.closest_point import ClosestPointSearch
-from .settings import DynamicsSettings
+from ...arrays import Bools, Floats, Ints
+from ...errors import HairloomError
+from ...strands import Surface
+from ...strands.closest_point import ClosestPointSearch
+from ..settings import DynamicsSettings
 from .winding import winding_number
 
 #: Cells around the mesh's box, so that the nearest outside is sampled too.

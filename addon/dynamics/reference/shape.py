@@ -9,9 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Floats
-from .constraints import PINNED
-from .style import GENTLE, SHARP
+from ...arrays import Floats
+from ..constraints import PINNED
+from ..style import GENTLE, SHARP
 
 
 def hold(rest_second: Floats, length: float) -> float:

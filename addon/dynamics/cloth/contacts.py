@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Floats
-from .colliders import PosedCollider
-from .constraints import dot
-from .contacts import Contacts, find_contacts
+from ...arrays import Floats
+from ..colliders import PosedCollider
+from ..constraints import dot
+from ..contacts import Contacts, find_contacts
 
 
 @dataclass(frozen=True)

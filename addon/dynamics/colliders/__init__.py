@@ -1,0 +1,16 @@
+"""What hair runs into: balls, capsules, sets of balls and closed meshes, posed by matrices."""
+
+from .distance_field import DistanceField
+from .posed import Collider, PosedCollider, transform_points
+from .shapes import CapsuleCollider, SphereCollider
+from .sphere_set import SphereSetCollider
+
+__all__ = [
+    "CapsuleCollider",
+    "Collider",
+    "DistanceField",
+    "PosedCollider",
+    "SphereCollider",
+    "SphereSetCollider",
+    "transform_points",
+]
