@@ -6,8 +6,10 @@ from .cards.settings import CardSettings
 from .dynamics.cloth.settings import FinSettings
 from .dynamics.fitting.sphere_fit import SphereFitSettings
 from .dynamics.settings import DynamicsSettings
+from .groom.children_settings import ChildrenSettings
 from .groom.settings import GrowSettings, GuideSettings
 from .params import Settings
+from .refine.settings import DetailSettings
 from .shading.ambient import AmbientSettings
 from .shading.settings import ShadingSettings, StrandSettings
 from .shading.textures import TextureSettings
@@ -17,9 +19,11 @@ ALL_SETTINGS: dict[str, type[Settings]] = {
     for settings in (
         GrowSettings,
         GuideSettings,
+        ChildrenSettings,
         DynamicsSettings,
         FinSettings,
         SphereFitSettings,
+        DetailSettings,
         StrandSettings,
         ShadingSettings,
         AmbientSettings,

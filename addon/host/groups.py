@@ -14,7 +14,16 @@ from .fin_group import FIN_PROPERTIES
 from .obstacle_reader import SHAPES
 from .properties import property_annotations, property_group
 
-GROOM_SECTIONS = ("guides", "strands", "shading", "ambient", "cards", "card_texture")
+GROOM_SECTIONS = (
+    "guides",
+    "children",
+    "detail",
+    "strands",
+    "shading",
+    "ambient",
+    "cards",
+    "card_texture",
+)
 CHARACTER_SECTIONS = ("dynamics", "fin")
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..refine.settings import DetailSettings
 from ..shading.lights import Light
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..strands import Surface
@@ -97,6 +98,7 @@ class Snapshot:
     ambient: Color = (0.05, 0.05, 0.05)
     shading: ShadingSettings = field(default_factory=ShadingSettings)
     strand_settings: StrandSettings = field(default_factory=StrandSettings)
+    detail: DetailSettings = field(default_factory=DetailSettings)
     volume_center: Floats | None = None
     device_points: DevicePoints | None = None
 

@@ -1,0 +1,112 @@
+"""What the artist sets about children: the strands that are grown between guides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..params import Settings, choice, curve, integer, number
+
+_NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
+_TARIQ = "Tariq 2008, Real-time hair rendering on the GPU"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChildrenSettings(Settings):
+    """Strands between the artist's own, which all become guides or are chosen from."""
+
+    section: ClassVar[str] = "children"
+    title: ClassVar[str] = "Children"
+
+    way: str = choice(
+        "none",
+        (
+            ("none", "None", "The curves are all the hair there is"),
+            ("multi", "Between Guides", "Each child is a mixture of the three guides around it"),
+            ("single", "Around a Guide", "Each child runs beside one guide"),
+        ),
+        label="Children",
+        description="How strands are made from guides",
+        source=_TARIQ,
+    )
+    strand_count: int = integer(
+        4095,
+        label="Strands",
+        description="How many children there are; more adds some and moves none",
+        soft=(100, 20_000),
+        hard=(0, 500_000),
+        source=_NALU,
+    )
+    parting: float = number(
+        1.0472,
+        label="Parting",
+        description="Guides that go apart by more than this angle are not mixed",
+        unit="angle",
+        soft=(0.17, 1.57),
+        hard=(0.0, 3.1416),
+    )
+    length_variation: float = number(
+        0.1,
+        label="Length Variation",
+        description="How much shorter than its guides a child may be",
+        unit="factor",
+        soft=(0.0, 0.9),
+        hard=(0.0, 0.99),
+    )
+    clump: float = number(
+        0.3,
+        label="Clump",
+        description="How far children of a lock are drawn together",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+    )
+    clump_along: tuple[float, float, float, float, float] = curve(
+        (0.0, 0.25, 0.5, 0.75, 1.0),
+        label="Clump Along",
+        description="Share of the clump from root to tip",
+        hard=(0.0, 1.0),
+    )
+    clump_size: int = integer(
+        12,
+        label="Strands a Lock",
+        description="How many children make a lock, on average",
+        soft=(1, 100),
+        hard=(1, 100_000),
+    )
+    frizz: float = number(
+        0.001,
+        label="Frizz",
+        description="How far single children stray from their way",
+        unit="length",
+        soft=(0.0, 0.01),
+        hard=(0.0, 1.0),
+    )
+    frizz_along: tuple[float, float, float, float, float] = curve(
+        (0.0, 0.4, 0.7, 0.9, 1.0),
+        label="Frizz Along",
+        description="Share of the frizz from root to tip",
+        hard=(0.0, 1.0),
+    )
+    frizz_length: float = number(
+        0.03,
+        label="Frizz Length",
+        description="Length of hair from one stray to the next",
+        unit="length",
+        soft=(0.005, 0.2),
+        hard=(0.0001, 100.0),
+    )
+    width: float = number(
+        1.0,
+        label="Width",
+        description="Width of children as a factor of their guides' width",
+        soft=(0.1, 4.0),
+        hard=(0.001, 1000.0),
+    )
+    seed: int = integer(
+        1,
+        label="Seed",
+        description="Another seed gives other children of the same kind",
+        soft=(0, 100),
+        hard=(0, 2**31 - 1),
+    )

@@ -1,0 +1,90 @@
+"""What the artist sets about detail: how finely strands are divided, and how many are drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..params import Settings, choice, integer, number
+
+_SSALOD = "Rapp and Spielmann, Real-time hair rendering with screen space adaptive level of detail"
+_WANG = "Wang 1984, subdivision depth of Bezier curves"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DetailSettings(Settings):
+    """How finely each segment of a strand is divided in the picture, and what is left out."""
+
+    section: ClassVar[str] = "detail"
+    title: ClassVar[str] = "Detail"
+
+    mode: str = choice(
+        "adaptive",
+        (
+            ("adaptive", "Adaptive", "As few pieces as keep the curve within an error in pixels"),
+            ("heuristic", "By Size and Angle", "More pieces for long and for bent segments"),
+            ("fixed", "Fixed", "The same number of pieces everywhere"),
+        ),
+        label="Detail",
+        description="How many straight pieces each segment of a strand is drawn with",
+        source=_SSALOD,
+    )
+    error: float = number(
+        0.5,
+        label="Error",
+        description="Adaptive: how far from its curve a strand may be drawn, in pixels",
+        soft=(0.1, 2.0),
+        hard=(0.01, 100.0),
+        source=_WANG,
+    )
+    piece_length: float = number(
+        8.0,
+        label="Piece Length",
+        description="By size and angle: length of a piece in pixels where hair bends by 45 degrees "
+        "or more",
+        soft=(2.0, 32.0),
+        hard=(0.5, 1000.0),
+        source=_SSALOD,
+    )
+    subdivisions: int = integer(
+        2,
+        label="Pieces",
+        description="Fixed: pieces of each segment",
+        soft=(1, 8),
+        hard=(1, 64),
+    )
+    most: int = integer(
+        64,
+        label="Most Pieces",
+        description="Pieces of a segment at most",
+        soft=(1, 64),
+        hard=(1, 64),
+        source=_SSALOD,
+    )
+    culling: str = choice(
+        "hidden",
+        (
+            ("none", "Nothing", "Every strand is drawn"),
+            ("hidden", "Hidden", "Strands that lie wholly behind the head are not drawn"),
+            ("away", "Facing Away", "Strands whose root faces away from the eye are not drawn"),
+        ),
+        label="Leave Out",
+        description="Which strands are left out because the head hides them",
+        source=_SSALOD,
+    )
+    full_size: float = number(
+        300.0,
+        label="Full Size",
+        description="Height of the groom in pixels below which fewer strands are drawn, each wider "
+        "by as much; 0 draws all of them always",
+        soft=(0.0, 1000.0),
+        hard=(0.0, 100_000.0),
+    )
+    least_share: float = number(
+        0.125,
+        label="Least Share",
+        description="Share of the strands that is drawn in any distance",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+    )
