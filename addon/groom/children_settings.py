@@ -46,7 +46,7 @@ class ChildrenSettings(Settings):
         hard=(0.0, 3.1416),
     )
     length_variation: float = number(
-        0.1,
+        0.2,
         label="Length Variation",
         description="How much shorter than its guides a child may be",
         unit="factor",
@@ -54,7 +54,7 @@ class ChildrenSettings(Settings):
         hard=(0.0, 0.99),
     )
     clump: float = number(
-        0.3,
+        0.5,
         label="Clump",
         description="How far children of a lock are drawn together",
         unit="factor",
@@ -70,7 +70,7 @@ class ChildrenSettings(Settings):
     clump_size: int = integer(
         12,
         label="Strands a Lock",
-        description="How many children make a lock, on average",
+        description="How many children make a lock, on average; 1 makes none",
         soft=(1, 100),
         hard=(1, 100_000),
     )

@@ -6,21 +6,30 @@ The weights are those of Franke and Little (in Barnhill 1977; Franke 1982, Scatt
 interpolation): w = (R - d) / (R d) = 1/d - 1/R with R the distance of the fourth nearest guide,
 so that a guide fades out before another one takes its place. Their exponent is 1 here, where
 scattered data take 2, because strands shall blend rather than flock around the nearest guide.
+
+A child has no way of its own yet: it is on the side of its nearest guide, and guides that go apart
+from that one, or from each other, are left out (`child_weights`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import Floats, Ints
+from .near import nearest_points
 
 GUIDES_PER_STRAND = 3
 #: Guide spacings that a difference of 60 degrees in direction counts for.
 _SPACINGS_PER_TURN = 4.0
 #: Cosine between strand and guide at which the guide is out, and from which it counts fully.
 _DIVERGENT, _ALIKE = 0.0, 0.5
+#: Part of the parting's angle up to which a guide counts fully for a child.
+_SURELY_TOGETHER = 2.0 / 3.0
+#: The nearest guides of a child that are looked at; beyond a parting most of them drop out.
+_CHILD_CANDIDATES = 8
 #: Strands weighed at once, so that their table of distances stays in the cache.
 _CHUNK = 2048
 
@@ -59,28 +68,70 @@ def guide_weights(
     """
     guide = np.zeros((len(root), GUIDES_PER_STRAND), np.int32)
     weight = np.zeros((len(root), GUIDES_PER_STRAND), np.float32)
-    strand_way, guide_way = _directions(strand_grid, root), _directions(guide_grid, guide_root)
-    by_group = np.argsort(group, kind="stable")
-    guides_by_group = np.argsort(guide_group, kind="stable")
-    names, first = np.unique(group[by_group], return_index=True)
-    sorted_guide_group = guide_group[guides_by_group]
-    start = np.searchsorted(sorted_guide_group, names, side="left")
-    end = np.searchsorted(sorted_guide_group, names, side="right")
-    for index, strands in enumerate(np.split(by_group, first[1:]) if len(names) else []):
-        guides = guides_by_group[start[index] : end[index]]
+    strand_way, guide_way = directions(strand_grid, root), directions(guide_grid, guide_root)
+    for strands, guides in by_group(group, guide_group):
         assert len(guides), "a group without a guide"
         spread = _SPACINGS_PER_TURN * _spacing(guide_root[guides])
         features = np.concatenate([guide_root[guides], spread * guide_way[guides]], axis=1)
         for chunk in np.array_split(strands, -(-len(strands) // _CHUNK)):
             own = np.concatenate([root[chunk], spread * strand_way[chunk]], axis=1)
             candidates = _nearest(own, features, GUIDES_PER_STRAND + 1)
-            alike = _likeness(strand_way[chunk], guide_way[guides], candidates)
-            chosen, weight[chunk] = _weigh(own, features, candidates, alike)
-            guide[chunk] = guides[chosen]
+            alike = likeness(strand_way[chunk, None], guide_way[guides][candidates])
+            gap = np.linalg.norm(own[:, None] - features[candidates], axis=2)
+            chosen, weight[chunk] = _weigh(gap.astype(np.float64), alike)
+            guide[chunk] = guides[np.take_along_axis(candidates, chosen, axis=1)]
     return GuideWeights(guide, weight)
 
 
-def _directions(grid: Floats | None, root: Floats) -> Floats:
+def child_weights(
+    root: Floats, guide_root: Floats, guide_group: Ints, guide_grid: Floats, parting: float
+) -> GuideWeights:
+    """The three guides that a child at each root mixes: all of one group, all on one side.
+
+    The nearest guide decides about both.
+
+    Args:
+        root: (child_count, 3) [m].
+        guide_root: (guide_count, 3) [m], at least one.
+        guide_group: (guide_count,).
+        guide_grid: (guide_count, cv_count, 3) [m].
+        parting: guides that go apart by more than this are not mixed [rad].
+    """
+    guide = np.zeros((len(root), GUIDES_PER_STRAND), np.int32)
+    weight = np.zeros((len(root), GUIDES_PER_STRAND), np.float32)
+    guide_way = directions(guide_grid, guide_root)
+    for children, guides in by_group(_nearest_group(root, guide_root, guide_group), guide_group):
+        near, gap = nearest_points(root[children], guide_root[guides], _CHILD_CANDIDATES)
+        near = guides[near]
+        alike = likeness(guide_way[near[:, :1]], guide_way[near], parting)
+        mixable, away, alike = _usable_first(near, gap, alike)
+        alike = _agreeing(guide_way[mixable], alike, parting)
+        chosen, weight[children] = _weigh(away, alike)
+        guide[children] = np.take_along_axis(mixable, chosen, axis=1)
+    return GuideWeights(guide, weight)
+
+
+def _nearest_group(root: Floats, guide_root: Floats, guide_group: Ints) -> Ints:
+    """Group of the guide that is nearest to each root, (n,)."""
+    if (guide_group == guide_group[0]).all():
+        return np.full(len(root), guide_group[0])
+    nearest, _ = nearest_points(root, guide_root, 1)
+    return guide_group[nearest[:, 0]]
+
+
+def by_group(group: Ints, guide_group: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """For each group of strands: the strands of it, and the guides of it, as ascending indices."""
+    order = np.argsort(group, kind="stable")
+    guide_order = np.argsort(guide_group, kind="stable")
+    names, first = np.unique(group[order], return_index=True)
+    start = np.searchsorted(guide_group[guide_order], names, side="left")
+    end = np.searchsorted(guide_group[guide_order], names, side="right")
+    members = np.split(order, first[1:]) if len(names) else []
+    for strands, begin, stop in zip(members, start, end, strict=True):
+        yield strands, guide_order[begin:stop]
+
+
+def directions(grid: Floats | None, root: Floats) -> Floats:
     """Unit directions from the root to a third of the strand and to its tip, (n, 6); or (n, 0)."""
     if grid is None:
         return np.zeros((len(root), 0), np.float32)
@@ -113,20 +164,58 @@ def _nearest(own: Floats, features: Floats, count: int) -> Ints:
     return nearest
 
 
-def _likeness(strand_way: Floats, guide_way: Floats, candidates: Ints) -> Floats:
-    """1 for guides that go where the strand goes, 0 for those that diverge, smooth between."""
-    ways = guide_way[candidates].reshape(*candidates.shape, -1, 3)
-    cosine = np.einsum("nkwj,nwj->nkw", ways, strand_way.reshape(len(strand_way), -1, 3))
-    least = cosine.min(axis=2, initial=1.0)
-    x = np.clip((least - _DIVERGENT) / (_ALIKE - _DIVERGENT), 0.0, 1.0)
+def likeness(own_way: Floats, other_way: Floats, parting: float | None = None) -> Floats:
+    """1 for strands that go the same way, 0 for those that diverge, smooth between.
+
+    Args:
+        own_way, other_way: (n, k, 6) or (n, k, 0) `directions`, broadcast with each other.
+        parting: the angle from which they diverge [rad]; None: 90 degrees, alike up to 60.
+    """
+    divergent, alike = _DIVERGENT, _ALIKE
+    if parting is not None:
+        divergent, alike = np.cos(parting), np.cos(_SURELY_TOGETHER * parting)
+    least = np.ones(np.broadcast_shapes(own_way.shape, other_way.shape)[:2])
+    for chord in range(0, own_way.shape[2], 3):
+        parts = (own_way[..., axis] * other_way[..., axis] for axis in range(chord, chord + 3))
+        np.minimum(least, sum(parts), out=least)
+    x = np.clip((least - divergent) / max(alike - divergent, 1e-6), 0.0, 1.0)
     return x * x * (3.0 - 2.0 * x)
 
 
-def _weigh(own: Floats, features: Floats, candidates: Ints, alike: Floats) -> tuple[Ints, Floats]:
-    """The chosen guides (n, 3), indices into features, and their weights (n, 3), largest first."""
-    distance = np.linalg.norm(own[:, None] - features[candidates], axis=2).astype(np.float64)
+def _usable_first(near: Ints, gap: Floats, alike: Floats) -> tuple[Ints, Floats, Floats]:
+    """Of the candidates (n, k), nearest first, those that may be mixed, four columns at most.
+
+    What is over is filled up with others, put so far away that those that may be mixed all count.
+    """
+    order = np.argsort(alike <= 0.0, axis=1, kind="stable")[:, : GUIDES_PER_STRAND + 1]
+    near = np.take_along_axis(near, order, axis=1)
+    gap, alike = (np.take_along_axis(part, order, axis=1) for part in (gap, alike))
+    farthest = np.where(alike > 0.0, gap, 0.0).max(axis=1, keepdims=True)
+    return near, np.where(alike > 0.0, gap, 2.0 * farthest), alike
+
+
+def _agreeing(way: Floats, alike: Floats, parting: float) -> Floats:
+    """Likeness (n, k), less for a guide that goes apart from a nearer one that is mixed."""
+    agreed = alike.copy()
+    for later in range(2, alike.shape[1]):
+        for earlier in range(1, later):
+            both = likeness(way[:, [later]], way[:, [earlier]], parting)[:, 0]
+            is_mixed = agreed[:, earlier] > 0.0
+            agreed[:, later] = np.where(
+                is_mixed, np.minimum(agreed[:, later], both), agreed[:, later]
+            )
+    return agreed
+
+
+def _weigh(distance: Floats, alike: Floats) -> tuple[Ints, Floats]:
+    """Which three of the candidates (n, k) are chosen, and their weights, largest first.
+
+    Args:
+        distance: (n, k), k at most one more than are chosen.
+        alike: (n, k), 1 for a guide that counts fully.
+    """
     farthest = distance.max(axis=1, keepdims=True)
-    has_fourth = candidates.shape[1] > GUIDES_PER_STRAND
+    has_fourth = distance.shape[1] > GUIDES_PER_STRAND
     # at a tie of all four a hair more than 0, so that there is something to share
     reach = farthest * (1.0 + 1e-6) if has_fourth else 2.0 * farthest
     near = np.maximum(distance, np.maximum(1e-9 * reach, np.finfo(np.float64).tiny))
@@ -134,11 +223,11 @@ def _weigh(own: Floats, features: Floats, candidates: Ints, alike: Floats) -> tu
     # a strand that is a guide, or whose guides all diverge, rides on the nearest one alone
     nearest = distance.argmin(axis=1)
     alone = (distance.min(axis=1) == 0.0) | (weight.sum(axis=1) <= 0.0)
-    weight[alone] = np.eye(candidates.shape[1])[nearest[alone]]
+    weight[alone] = np.eye(distance.shape[1])[nearest[alone]]
 
     order = np.argsort(-weight, axis=1, kind="stable")[:, :GUIDES_PER_STRAND]
     order = np.pad(order, ((0, 0), (0, GUIDES_PER_STRAND - order.shape[1])), mode="edge")
-    is_repeated = np.arange(GUIDES_PER_STRAND) >= candidates.shape[1]
+    is_repeated = np.arange(GUIDES_PER_STRAND) >= distance.shape[1]
     weight = np.where(is_repeated, 0.0, np.take_along_axis(weight, order, axis=1))
     weight /= weight.sum(axis=1, keepdims=True)
-    return np.take_along_axis(candidates, order, axis=1), weight.astype(np.float32)
+    return order, weight.astype(np.float32)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hairloom.addon.arrays import Floats
-from hairloom.addon.groom.weights import guide_weights
+from hairloom.addon.groom.near import nearest_points
+from hairloom.addon.groom.weights import child_weights, guide_weights
 
 
 def square(count: int, seed: int) -> Floats:
@@ -120,3 +121,94 @@ def test_all_guides_in_one_point_and_no_strands() -> None:
     assert found.weight.sum(axis=1) == pytest.approx(np.ones(20))
     none = guide_weights(np.zeros((0, 3)), np.zeros(0), np.zeros((2, 3)), np.zeros(2))
     assert none.guide.shape == none.weight.shape == (0, 3)
+
+
+# --- of children ---------------------------------------------------------------------------------
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def straight(root: Floats, way: Floats) -> Floats:
+    """Straight strands of six CVs from these roots, (n, 6, 3)."""
+    return (root[:, None] + np.linspace(0.0, 0.1, 6)[:, None] * way[:, None]).astype(np.float32)
+
+
+def test_children_of_parallel_guides_are_weighed_by_their_roots_alone() -> None:
+    root, guide_root = square(300, 1), square(40, 2)
+    grid = straight(guide_root, np.tile(UP, (40, 1)))
+    of_children = child_weights(root, guide_root, np.zeros(40), grid, np.radians(60.0))
+    of_strands = guide_weights(root, np.zeros(300), guide_root, np.zeros(40))
+    assert (of_children.guide == of_strands.guide).all()
+    assert of_children.weight == pytest.approx(of_strands.weight, abs=1e-4)
+
+
+def test_children_take_the_group_of_their_nearest_guide() -> None:
+    root, guide_root = square(300, 3), square(40, 4)
+    group = np.arange(40) % 3
+    grid = straight(guide_root, np.tile(UP, (40, 1)))
+    found = child_weights(root, guide_root, group, grid, np.radians(60.0))
+    nearest = np.linalg.norm(root[:, None] - guide_root[None], axis=2).argmin(axis=1)
+    assert (group[found.guide] == group[nearest][:, None]).all()
+    own = guide_weights(root, group[nearest], guide_root, group)
+    assert (found.guide == own.guide).all()
+
+
+@pytest.mark.parametrize("parting", [20.0, 60.0, 100.0])
+def test_all_guides_of_a_child_go_together(parting: float) -> None:
+    """Each with each, and the nearest is always one of them."""
+    random = np.random.default_rng(5)
+    root, guide_root = square(2000, 6), square(200, 7)
+    way = random.normal(size=(200, 3)) * [0.6, 0.6, 0.1] + UP
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    grid = straight(guide_root, way)
+    found = child_weights(root, guide_root, np.zeros(200), grid, np.radians(parting))
+    nearest = np.linalg.norm(root[:, None] - guide_root[None], axis=2).argmin(axis=1)
+    assert (found.guide[:, 0] == nearest).mean() > 0.9
+    used = found.weight > 0.0
+    assert (used & (found.guide == nearest[:, None])).any(axis=1).all()
+    for one, two in ((0, 1), (0, 2), (1, 2)):
+        both = used[:, one] & used[:, two]
+        cosine = np.einsum("nj,nj->n", way[found.guide[both, one]], way[found.guide[both, two]])
+        assert cosine.min(initial=1.0) > np.cos(np.radians(parting)) - 1e-6
+    assert used.all(axis=1).any()
+
+
+def test_a_child_between_two_guides_of_its_side_mixes_both() -> None:
+    """The two guides beyond the parting are nearer than the second one of its own side."""
+    guide_root = np.array([[0.0, 0, 0], [3, 0, 0], [0, 1.5, 0], [1, 1.5, 0]])
+    side = np.array([[-1.0, 0, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0]])
+    root = np.array([[0.7, 0.0, 0.0]])
+    grid = straight(guide_root, side)
+    found = child_weights(root, guide_root, np.zeros(4), grid, np.radians(60.0))
+    assert found.guide[0, :2].tolist() == [0, 1]
+    assert found.weight[0, 2] == 0.0
+    # Franke and Little with twice the farthest guide as R, where there is no fourth one
+    raw = np.array([(4.6 - 0.7) / 0.7, (4.6 - 2.3) / 2.3])
+    assert found.weight[0, :2] == pytest.approx(raw / raw.sum(), abs=1e-5)
+
+
+@pytest.mark.parametrize("guide_count", [1, 2, 3, 4])
+def test_children_of_few_guides(guide_count: int) -> None:
+    root, guide_root = square(50, 8), square(guide_count, 9)
+    grid = straight(guide_root, np.tile(UP, (guide_count, 1)))
+    found = child_weights(root, guide_root, np.zeros(guide_count), grid, np.radians(60.0))
+    assert found.weight.sum(axis=1) == pytest.approx(np.ones(50))
+    assert (found.weight >= 0.0).all()
+    assert (found.weight[:, min(guide_count, 3) :] == 0.0).all()
+
+
+@pytest.mark.parametrize(("place_count", "point_count"), [(0, 5), (1, 1), (7, 3), (3000, 900)])
+def test_nearest_points_are_those_of_a_slow_search(place_count: int, point_count: int) -> None:
+    random = np.random.default_rng(10)
+    places = random.random((place_count, 3)) * [1.0, 2.0, 0.1] + 100.0
+    points = (random.random((point_count, 3)) * [1.0, 2.0, 0.1]).round(1) + 100.0  # with ties
+    index, distance = nearest_points(places, points, 4)
+    slow = np.linalg.norm(places[:, None] - points[None], axis=2)
+    kept = min(4, point_count)
+    assert index.shape == distance.shape == (place_count, kept)
+    assert distance == pytest.approx(np.sort(slow, axis=1)[:, :kept], abs=1e-12)
+    assert distance == pytest.approx(np.take_along_axis(slow, index, axis=1), abs=1e-12)
+    some = np.arange(0, place_count, 3)
+    fewer_index, fewer_distance = nearest_points(places[some], points, 4)
+    assert (fewer_index == index[some]).all()
+    assert (fewer_distance == distance[some]).all()

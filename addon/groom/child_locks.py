@@ -1,0 +1,81 @@
+"""Locks of children: those that grew later draw together around some that grew earlier.
+
+Children come in an order of which every beginning is spread evenly, so the first of them are the
+middles of locks. The first 4,096 children have one middle for each `clump_size` of them; whenever
+the number of children doubles, so does that of the middles, which are those of before and as many
+of the children since. So a lock of few strands becomes a lock of locks as strands are added, its
+strands stay as many on average, and no child ever changes its lock.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..params.curve import along
+from .children_settings import ChildrenSettings
+from .near import nearest_points
+from .weights import by_group, directions, likeness
+
+#: Children of the first level.
+_FIRST_LEVEL = 4096
+#: Middles that are looked at for each child; those that go elsewhere drop out.
+_CANDIDATES = 6
+#: How far a middle may be, in distances from one middle to the next.
+_REACH = 3.0
+_CHUNK = 2048
+
+
+def clump(grid: Floats, group: Ints, settings: ChildrenSettings) -> None:
+    """Draw the children of each lock towards its middle, in place; roots stay.
+
+    Args:
+        grid: (child_count, cv_count, 3) float32 [m], in the order in which they grew.
+        group: (child_count,).
+    """
+    if not settings.clump or settings.clump_size == 1:
+        return
+    share = settings.clump * along(settings.clump_along, np.linspace(0.0, 1.0, grid.shape[1]))
+    share[0] = 0.0
+    first, last = 0, _FIRST_LEVEL
+    while first < len(grid):
+        middle_count = max(1, round(last / settings.clump_size))
+        member = np.arange(max(first, middle_count), min(last, len(grid)))
+        if len(member):
+            middle, strength = _middles(grid, group, member, middle_count, settings.parting)
+            for start in range(0, len(member), _CHUNK):
+                chunk = slice(start, start + _CHUNK)
+                pull = (strength[chunk, None] * share).astype(np.float32)[..., None]
+                own = grid[member[chunk]]
+                grid[member[chunk]] = own + pull * (grid[middle[chunk]] - own)
+        first, last = last, 2 * last
+
+
+def _middles(
+    grid: Floats, group: Ints, member: Ints, middle_count: int, parting: float
+) -> tuple[Ints, Floats]:
+    """The middle of each member's lock (n,), and how far it draws the member, 0 to 1."""
+    root = grid[:, 0]
+    middle, strength = member.copy(), np.zeros(len(member))
+    member_way = directions(grid[member], root[member])
+    middle_way = directions(grid[:middle_count], root[:middle_count])
+    reach = _REACH * _apart(root[:middle_count])
+    for of_group, middles in by_group(group[member], group[:middle_count]):
+        if not len(middles):
+            continue
+        near, gap = nearest_points(root[member[of_group]], root[middles], _CANDIDATES)
+        near = middles[near]
+        alike = likeness(member_way[of_group, None], middle_way[near], parting)
+        alike[gap > reach] = 0.0
+        best = (alike > 0.0).argmax(axis=1)[:, None]
+        middle[of_group] = np.take_along_axis(near, best, axis=1)[:, 0]
+        strength[of_group] = np.take_along_axis(alike, best, axis=1)[:, 0]
+    return middle, strength
+
+
+def _apart(root: Floats) -> float:
+    """Typical distance from one root to the next [m]; infinite for a single one."""
+    if len(root) < 2:
+        return np.inf
+    _, gap = nearest_points(root, root, 2)
+    return float(np.median(gap[:, 1]))

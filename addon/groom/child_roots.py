@@ -1,0 +1,203 @@
+"""Where children grow: on the surface near guides, and where the artist wants them."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..strands import StrandSet, Surface
+from .blue_noise import require_area, spread_roots
+from .grown import checked_weights
+from .near import nearest_points
+from .pieces import Pieces
+
+#: How far from its nearest guide a root may be that guides surround, in their spacings there.
+_REACH = 1.75
+#: How far one may be that guides do not surround: the hair ends a little outside of its guides.
+_MARGIN = 0.4
+#: How far one may be where the artist gave a density.
+_REACH_WITH_DENSITY = 4.0
+#: Guides around a root, and how long the mean of the unit vectors to them is where they are all on
+#: one side: at a straight edge 2 / pi.
+_AROUND, _ONE_SIDED = 8, 0.6
+#: Least cosine between the surface's normals at a root and at its nearest guide: hair does not go
+#: on to the inside of a shell, or to an ear.
+_SAME_SIDE = 0.5
+#: The spacing of guides is the distance to this neighbour, but not more than some times the usual.
+_NEIGHBOUR, _WIDEST = 3, 4.0
+#: Spacing of guides that all start in one place, as a part of their length.
+_TUFT = 0.25
+#: Triangles are split until they are smaller than this part of the reach, or so often.
+_FINE, _SPLITS = 0.5, 8
+#: Triangles that splitting may add.
+_MOST_PIECES = 100_000
+#: Roots tried for each one wanted, before what was found has to do.
+_TRIES = 32
+#: With less than this part of the painted area near guides, the artist is told.
+_BARE = 0.95
+
+
+@dataclass(frozen=True)
+class ChildRoots:
+    """triangle: (n,). barycentric: (n, 3) float32. point: (n, 3) float32 [m], on the surface.
+    notes: what the artist should know.
+    """
+
+    triangle: Ints
+    barycentric: Floats
+    point: Floats
+    notes: tuple[str, ...]
+
+
+def child_roots(
+    guides: StrandSet, surface: Surface, count: int, density: Floats | None, seed: int
+) -> ChildRoots:
+    """Roots of children, at most `count`, those of a smaller count first.
+
+    Without a density they lie between guides, or beside the outermost by less than half of what
+    guides are apart there; with one they lie within 4 times of that.
+
+    Raises:
+        HairloomError: the surface has no area on which hair may grow, or a density that does not
+            fit it or is not finite.
+    """
+    density = checked_weights(density, surface, "density")
+    guided = _Guided.by(guides, surface, is_painted=density is not None)
+    everywhere = Pieces.of(surface, density)
+    require_area(everywhere.mass)
+    pieces = _near_guides(everywhere, guided)
+    is_near = guided.holds(pieces.point.mean(axis=1), pieces.normal)
+    mass_near, mass = float(pieces.mass[is_near].sum()), float(pieces.mass.sum())
+    tried = int(1.05 * count * min(_TRIES, mass / max(mass_near, 1e-300))) + 64
+    triangle, barycentric = _spread(pieces, guided, count, tried, seed)
+    is_bare = density is not None and mass_near < _BARE * float(everywhere.mass.sum())
+    notes = _notes(count, len(triangle), is_bare, len(guided.place) == 1)
+    return _on_surface(surface, triangle, barycentric, notes)
+
+
+@dataclass(frozen=True)
+class _Guided:
+    """Where guides are: what is among them, and what is not.
+
+    place: (place_count, 3) float64 [m], where guides are held, each place once.
+    normal: (place_count, 3) of the surface there.
+    spacing: (place_count,) how far others are from it [m], never 0.
+    is_painted: whether a density says where children grow, and guides only how far at the most.
+    """
+
+    place: Floats
+    normal: Floats
+    spacing: Floats
+    is_painted: bool
+
+    @classmethod
+    def by(cls, guides: StrandSet, surface: Surface, *, is_painted: bool) -> _Guided:
+        triangle, barycentric = guides.root_triangle, guides.root_barycentric
+        assert triangle is not None and barycentric is not None
+        root = np.einsum("nk,nkj->nj", barycentric, surface.corners[triangle].astype(np.float64))
+        place, first = np.unique(root, axis=0, return_index=True)
+        normal = surface.triangle_normals()[triangle[first]]
+        if len(place) == 1:
+            tuft = _TUFT * float(guides.lengths().mean())
+            return cls(place, normal, np.array([max(tuft, 1e-6)]), is_painted)
+        _, gap = nearest_points(place, place, _NEIGHBOUR + 1)
+        apart = gap[:, -1]
+        return cls(place, normal, np.minimum(apart, _WIDEST * np.median(apart)), is_painted)
+
+    @property
+    def reach(self) -> Floats:
+        """How far a root may be from each place if it is the nearest one, (place_count,) [m]."""
+        return self.spacing * (_REACH_WITH_DENSITY if self.is_painted else _REACH)
+
+    def holds(self, point: Floats, normal: Floats) -> Bools:
+        """Whether children may grow at points (n, 3), on a surface with these normals (n, 3)."""
+        near, gap = nearest_points(point, self.place, 1 if self.is_painted else _AROUND)
+        is_near: Bools = gap[:, 0] <= self.reach[near[:, 0]]
+        if self.is_painted:
+            return is_near
+        is_near &= (normal * self.normal[near[:, 0]]).sum(axis=1) >= _SAME_SIDE
+        middle = np.zeros(point.shape)
+        for rank in range(near.shape[1]):
+            middle += (self.place[near[:, rank]] - point) / np.maximum(gap[:, rank, None], 1e-12)
+        one_sided = np.linalg.norm(middle, axis=1) / near.shape[1]
+        is_beside = gap[:, 0] <= _MARGIN * self.spacing[near[:, 0]]
+        return is_near & ((one_sided <= _ONE_SIDED) | is_beside)
+
+
+def _near_guides(pieces: Pieces, guided: _Guided) -> Pieces:
+    """What may be near guides, large triangles split so that little else comes with it.
+
+    Roots that are thrown away cost as much as others, and guides may stand on a small part of a
+    large mesh, or of a large triangle.
+    """
+    done, most = [], len(pieces) + _MOST_PIECES
+    pieces = pieces.take(pieces.mass > 0.0)
+    for split in range(_SPLITS + 1):
+        center = pieces.point.mean(axis=1)
+        extent = np.linalg.norm(pieces.point - center[:, None], axis=2).max(axis=1)
+        nearest, gap = (part[:, 0] for part in nearest_points(center, guided.place, 1))
+        is_possible = gap <= extent + guided.reach.max()
+        reach = guided.reach[nearest]
+        is_fine = (extent <= _FINE * reach) | (gap + extent <= reach)
+        done.append(pieces.take(is_possible & is_fine))
+        pieces = pieces.take(is_possible & ~is_fine)
+        if split == _SPLITS or 4 * len(pieces) > most:
+            break
+        pieces = pieces.split()
+    return functools.reduce(Pieces.and_also, [*done, pieces])
+
+
+def _spread(
+    pieces: Pieces, guided: _Guided, count: int, tried: int, seed: int
+) -> tuple[Ints, Floats]:
+    """Roots near guides, at most `count`: triangle of the surface (n,), barycentric (n, 3).
+
+    Args:
+        tried: how many roots may be enough to find them; more are tried where not.
+    """
+    if not len(pieces):
+        return np.zeros(0, np.int64), np.zeros((0, 3))
+    surface, density, normal = pieces.surface, pieces.density.ravel(), pieces.normal
+    most = _TRIES * max(count, 1000)
+    while True:
+        piece, inside = spread_roots(surface, tried, density, seed)
+        point = np.einsum("nk,nkj->nj", inside, pieces.point[piece])
+        found = np.flatnonzero(guided.holds(point, normal[piece]))[:count]
+        if len(found) == count or tried >= most:
+            break
+        tried = min(most, 2 * tried)
+    piece, inside = piece[found], inside[found]
+    return pieces.parent[piece], np.einsum("nk,nkj->nj", inside, pieces.corner[piece])
+
+
+def _on_surface(
+    surface: Surface, triangle: Ints, barycentric: Floats, notes: tuple[str, ...]
+) -> ChildRoots:
+    """The roots exactly where `roots.root_frames` will find them."""
+    kept = barycentric.astype(np.float32)
+    a, b, c = np.moveaxis(surface.corners[triangle].astype(np.float64), 1, 0)
+    point = a + kept[:, 1:2] * (b - a) + kept[:, 2:3] * (c - a)
+    return ChildRoots(triangle, kept, point.astype(np.float32), notes)
+
+
+def _notes(wanted: int, found: int, is_bare: bool, is_tuft: bool) -> tuple[str, ...]:
+    notes = []
+    if is_tuft:
+        notes.append(
+            "All guides start in one place, so children grow only close to it."
+            " Draw guides wherever hair is to grow."
+        )
+    if found < wanted:
+        notes.append(
+            f"Only {found:,} of {wanted:,} children found room near guides."
+            " Draw guides wherever hair is to grow."
+        )
+    if is_bare:
+        notes.append(
+            "Part of the painted area is too far from all guides and stays bare."
+            " Draw guides there, or paint less."
+        )
+    return tuple(notes)

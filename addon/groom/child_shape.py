@@ -1,0 +1,126 @@
+"""The shape of children at rest: mixed from guides, cut to their lengths, and frizzed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..params.curve import along
+from .children_settings import ChildrenSettings
+from .weights import GuideWeights
+
+_TURN = 2.0 * np.pi
+#: Children shaped at once, so that they stay in the processor's cache.
+_CHUNK = 2048
+#: Segments of a strand in one wave of frizz, at least: shorter ones it could not show.
+_SEGMENTS_PER_WAVE = 3.0
+
+
+def mixed(root: Floats, guide_grid: Floats, weights: GuideWeights) -> Floats:
+    """root + sum over k of w_k (guide_k - root of guide_k), (child_count, cv_count, 3) float32.
+
+    Three-guide interpolation of rest shapes (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23),
+    taken from each root so that children start on the surface. A child of one guide runs beside
+    it, everywhere as far from it as at the root.
+
+    Args:
+        root: (child_count, 3) float32 [m].
+        guide_grid: (guide_count, cv_count, 3) float32 [m].
+    """
+    cv_count = guide_grid.shape[1]
+    way = (guide_grid - guide_grid[:, :1]).reshape(len(guide_grid), 3 * cv_count)
+    grid = np.tile(np.asarray(root, np.float32), (1, cv_count))
+    for start in range(0, len(grid), _CHUNK):
+        chunk = slice(start, start + _CHUNK)
+        for guide, weight in zip(weights.guide[chunk].T, weights.weight[chunk].T, strict=True):
+            grid[chunk] += way[guide] * weight[:, None]
+    return grid.reshape(len(grid), cv_count, 3)
+
+
+def shorten(grid: Floats, settings: ChildrenSettings) -> None:
+    """Cut each strand to a random length along its own way, in place, and space its CVs as before.
+
+    Args:
+        grid: (child_count, cv_count, 3) float32 [m].
+    """
+    if not settings.length_variation:
+        return
+    random = np.random.default_rng([settings.seed, 2])
+    kept = 1.0 - settings.length_variation * random.random(len(grid))
+    for start in range(0, len(grid), _CHUNK):
+        chunk = slice(start, start + _CHUNK)
+        grid[chunk] = _cut(grid[chunk], kept[chunk])
+
+
+def _cut(grid: Floats, kept: Floats) -> Floats:
+    """Strands (n, cv_count, 3) cut to this part of their length, (n,)."""
+    reached = arc_length(grid)
+    wanted = reached * kept[:, None]
+    last = grid.shape[1] - 2
+    left = np.zeros(wanted.shape, np.int64)
+    for cv in range(1, last + 1):
+        left += reached[:, cv, None] <= wanted
+    before = np.take_along_axis(reached, left, axis=1)
+    span = np.take_along_axis(reached, left + 1, axis=1) - before
+    inside = np.divide(wanted - before, span, out=np.zeros_like(span), where=span > 0.0)
+    return _on_curve(grid, left, np.clip(inside, 0.0, 1.0).astype(np.float32)[..., None])
+
+
+def _on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
+    """Points of the uniform Catmull-Rom curve through the CVs, which goes on straight at its ends.
+
+    Args:
+        left: (n, k) segments. t: (n, k, 1) places in them, 0 to 1.
+    """
+    ends = [2.0 * grid[:, :1] - grid[:, 1:2], grid, 2.0 * grid[:, -1:] - grid[:, -2:-1]]
+    extended = np.concatenate(ends, axis=1)
+    p0, p1, p2, p3 = (
+        np.take_along_axis(extended, left[..., None] + step, axis=1) for step in range(4)
+    )
+    way, bend = 0.5 * (p2 - p0), 0.5 * (p3 - p1)
+    chord = p2 - p1
+    return p1 + t * (way + t * (3.0 * chord - 2.0 * way - bend + t * (way + bend - 2.0 * chord)))
+
+
+def frizz(grid: Floats, settings: ChildrenSettings) -> None:
+    """Let each strand stray from its way on waves of its own, in place; roots stay.
+
+    Two waves across each other, each with a direction, phase and pitch of the child's own, and no
+    further than `settings.frizz` together.
+
+    Args:
+        grid: (child_count, cv_count, 3) float32 [m].
+    """
+    if not settings.frizz:
+        return
+    random = np.random.default_rng([settings.seed, 3])
+    own = random.random((len(grid), 2, 4))
+    share = settings.frizz * along(settings.frizz_along, np.linspace(0.0, 1.0, grid.shape[1]))
+    share[0] = 0.0
+    for start in range(0, len(grid), _CHUNK):
+        chunk = slice(start, start + _CHUNK)
+        reached = arc_length(grid[chunk])
+        shortest = _SEGMENTS_PER_WAVE / (grid.shape[1] - 1) * reached[:, -1:]
+        turns = reached / np.maximum(settings.frizz_length, shortest)
+        for wave in range(2):
+            height, around, phase, pitch = own[chunk, wave].T
+            swing = np.sin(_TURN * (turns * (0.75 + 0.5 * pitch)[:, None] + phase[:, None]))
+            direction = _on_sphere(height, around)[:, None]
+            grid[chunk] += (0.5 * share * swing)[..., None] * direction
+
+
+def arc_length(grid: Floats) -> Floats:
+    """From the root to each CV, (n, cv_count) [m]."""
+    reached = np.zeros(grid.shape[:2])
+    step = np.diff(grid, axis=1)
+    squared = step[..., 0] ** 2 + step[..., 1] ** 2 + step[..., 2] ** 2
+    np.cumsum(np.sqrt(squared), axis=1, out=reached[:, 1:])
+    return reached
+
+
+def _on_sphere(height: Floats, around: Floats) -> Floats:
+    """Uniform unit vectors (n, 3) from two uniform numbers each (Archimedes)."""
+    z = 2.0 * height - 1.0
+    flat = np.sqrt(np.maximum(1.0 - z * z, 0.0))
+    angle = _TURN * around
+    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)

@@ -1,0 +1,112 @@
+"""Children: strands grown between guides, once, at rest; from then on they are strands like others.
+
+Tariq (2008, Real-time hair rendering on the GPU) has two patterns: multi strand, mixed from three
+guides (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23), and single strand, around one guide.
+
+Children are progressive: those of a smaller number are exactly the first of a larger number. So
+roots come in an order of their own (`blue_noise`), what is random about a child hangs on its place
+in that order, and nothing is measured over all children.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import HairloomError
+from ..strands import StrandSet, Surface
+from .child_locks import clump
+from .child_roots import ChildRoots, child_roots
+from .child_shape import frizz, mixed, shorten
+from .children_settings import ChildrenSettings
+from .near import nearest_points
+from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights
+
+
+@dataclass(frozen=True)
+class Children:
+    """strands: bound, of the guides' CV count, in the space of the surface.
+    weights: guide (child_count, 3), indices into the guides.
+    notes: what the artist should know, each with a remedy; empty if all is well.
+    """
+
+    strands: StrandSet
+    weights: GuideWeights
+    notes: tuple[str, ...]
+
+
+def make_children(
+    guides: StrandSet,
+    surface: Surface,
+    settings: ChildrenSettings,
+    density: Floats | None = None,
+    *,
+    place: str,
+) -> Children:
+    """Strands between guides or around them, at rest; none of them crosses a group or a parting.
+
+    Args:
+        guides: of one CV count, bound, at rest in the surface's space.
+        density: (vertex_count,), how densely children grow, not negative; None: wherever guides
+            are near.
+        place: names the groom in error messages.
+
+    Raises:
+        HairloomError: there are no guides, the surface has no area on which hair may grow, or the
+            density does not fit it, is not finite or nowhere above zero.
+    """
+    if not guides.strand_count:
+        raise HairloomError(
+            "it has no guides to grow children from", place=place, remedy="Draw some strands"
+        )
+    roots = child_roots(guides, surface, settings.strand_count, density, settings.seed)
+    weights = _weights(roots, guides, settings)
+    group = guides.group[weights.guide[:, 0]]
+    grid = mixed(roots.point, guides.grid, weights)
+    clump(grid, group, settings)
+    shorten(grid, settings)
+    frizz(grid, settings)
+    cv_count = grid.shape[1]
+    strands = StrandSet(
+        points=grid.reshape(-1, 3),
+        offsets=np.arange(len(grid) + 1) * cv_count,
+        radius=_radius(guides, weights, settings),
+        group=group,
+        root_uv=_root_uv(roots, surface),
+        root_triangle=roots.triangle,
+        root_barycentric=roots.barycentric,
+    )
+    return Children(strands, weights, roots.notes + _notes(guides, settings))
+
+
+def _weights(roots: ChildRoots, guides: StrandSet, settings: ChildrenSettings) -> GuideWeights:
+    if settings.way != "single":
+        return child_weights(roots.point, guides.roots, guides.group, guides.grid, settings.parting)
+    nearest, _ = nearest_points(roots.point, guides.roots, 1)
+    weight = np.zeros((len(nearest), GUIDES_PER_STRAND), np.float32)
+    weight[:, 0] = 1.0
+    return GuideWeights(np.repeat(nearest, GUIDES_PER_STRAND, axis=1).astype(np.int32), weight)
+
+
+def _radius(guides: StrandSet, weights: GuideWeights, settings: ChildrenSettings) -> Floats:
+    """Mixed as the points are, (child_count x cv_count,) [m]."""
+    own = guides.radius.reshape(guides.strand_count, -1) * np.float32(settings.width)
+    total = np.zeros((len(weights.guide), own.shape[1]), np.float32)
+    for guide, weight in zip(weights.guide.T, weights.weight.T, strict=True):
+        total += own[guide] * weight[:, None]
+    return total.ravel()
+
+
+def _root_uv(roots: ChildRoots, surface: Surface) -> Floats | None:
+    if surface.corner_uv is None:
+        return None
+    return np.einsum("nk,nkj->nj", roots.barycentric, surface.corner_uv[roots.triangle])
+
+
+def _notes(guides: StrandSet, settings: ChildrenSettings) -> tuple[str, ...]:
+    few = guides.strand_count < GUIDES_PER_STRAND and settings.way != "single"
+    if few:
+        return ("There are fewer than three guides, so children are all alike. Draw more guides.",)
+    return ()

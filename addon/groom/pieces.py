@@ -1,0 +1,97 @@
+"""Triangles of a surface, whole or split, which know where in the surface they lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..strands import Surface
+from .skin import unit
+
+#: The four quarters of a triangle: for each the barycentric coordinates of its corners.
+_QUARTERS = np.array(
+    [
+        [[2, 0, 0], [1, 1, 0], [1, 0, 1]],
+        [[1, 1, 0], [0, 2, 0], [0, 1, 1]],
+        [[1, 0, 1], [0, 1, 1], [0, 0, 2]],
+        [[0, 1, 1], [1, 0, 1], [1, 1, 0]],
+    ]
+) / 2.0  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Triangles of a surface, whole or split: what roots are spread over.
+
+    parent: (n,) triangles of the surface.
+    corner: (n, 3, 3) barycentric coordinates in it, of each corner.
+    point: (n, 3, 3) [m], the corners.
+    density: (n, 3) at the corners.
+    """
+
+    parent: Ints
+    corner: Floats
+    point: Floats
+    density: Floats
+
+    @classmethod
+    def of(cls, surface: Surface, density: Floats | None) -> Pieces:
+        """All triangles, whole.
+
+        Args:
+            density: (vertex_count,); None: 1 everywhere.
+        """
+        count = len(surface.triangles)
+        weights = np.ones(len(surface.positions)) if density is None else density
+        return cls(
+            np.arange(count),
+            np.broadcast_to(np.eye(3), (count, 3, 3)),
+            surface.corners.astype(np.float64),
+            weights[surface.triangles],
+        )
+
+    @property
+    def surface(self) -> Surface:
+        """The pieces as a mesh of their own, three vertices each."""
+        return Surface(self.point.reshape(-1, 3), np.arange(3 * len(self)).reshape(-1, 3))
+
+    def __len__(self) -> int:
+        return len(self.parent)
+
+    @property
+    def mass(self) -> Floats:
+        """Area x density, (n,) [m^2]."""
+        return 0.5 * np.linalg.norm(self._cross, axis=1) * self.density.mean(axis=1)
+
+    @property
+    def normal(self) -> Floats:
+        """Unit normals, (n, 3); zero for one without area."""
+        return unit(self._cross)
+
+    @property
+    def _cross(self) -> Floats:
+        edge = self.point[:, 1:] - self.point[:, :1]
+        return np.cross(edge[:, 0], edge[:, 1])
+
+    def take(self, chosen: Bools) -> Pieces:
+        return Pieces(
+            self.parent[chosen], self.corner[chosen], self.point[chosen], self.density[chosen]
+        )
+
+    def and_also(self, other: Pieces) -> Pieces:
+        return Pieces(
+            np.concatenate([self.parent, other.parent]),
+            np.concatenate([self.corner, other.corner]),
+            np.concatenate([self.point, other.point]),
+            np.concatenate([self.density, other.density]),
+        )
+
+    def split(self) -> Pieces:
+        """Each in four."""
+        corner, point, density = (
+            np.einsum("qck,nk...->nqc...", _QUARTERS, part).reshape(-1, 3, *part.shape[2:])
+            for part in (self.corner, self.point, self.density)
+        )
+        return Pieces(np.repeat(self.parent, 4), corner, point, density)
