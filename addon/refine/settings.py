@@ -75,8 +75,8 @@ class DetailSettings(Settings):
     full_size: float = number(
         300.0,
         label="Full Size",
-        description="Height of the groom in pixels below which fewer strands are drawn, each wider "
-        "by as much; 0 draws all of them always",
+        description="Height of the groom in pixels below which fewer strands are drawn, wider to "
+        "make up for it; 0 draws all of them always",
         soft=(0.0, 1000.0),
         hard=(0.0, 100_000.0),
     )

@@ -1,0 +1,266 @@
+"""Strands that the head hides are not drawn.
+
+A ball inside the head hides from the eye what lies behind the plane of its horizon and within the
+cone of lines that touch it; from infinitely far, within the cylinder:
+
+                     .-'''-.
+    eye    _ _ - - - |  c   | - - _        a strand is left out when all control points
+     *<- - - - - - - | - - -| - - - - ->   of its segments are in here, behind one ball
+             - - _ _ |      | _ - -
+                   horizon-'
+
+That region is convex, so a Bezier curve whose control points lie in it, and every chord of it, lies
+in it wholly, and each of its points has the ball, and thus the head around it, before it.
+
+Limits: a head that is clipped away in front, or transparent, hides nothing; then culling must be
+off. Balls that reach before the near plane are not taken. Through a hole, such as the socket of an
+eye that is not there, one looks into the head and misses hair that has come through its back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..strands import Surface
+from ..strands.closest_point import ClosestPointSearch
+from .detail import PictureView
+from .smooth import bezier
+
+#: Strands looked at at once, so that they stay in the processor's cache.
+_CHUNK = 1024
+#: Places along each axis of the surface's box where a ball may begin to grow.
+_PLACES = 12
+#: Points on the surface that tell those places how far it is.
+_SAMPLES = 512
+#: Steps with which a ball moves away from the surface, and how much shorter each is.
+_STEPS, _SHORTER = 8, 0.65
+#: A ball must stand out of the others by this part of the largest one's radius.
+_LEAST_NEWS = 0.2
+#: A ball is shrunk to this part, so that it is well inside.
+INNER_PART = 0.95
+
+
+@dataclass(frozen=True)
+class Shades:
+    """The regions behind some balls: p with s = (p - origin) . axis is in one of them where
+
+        s >= nearest  and  |p - origin - s axis|^2 <= width + slope s^2
+
+    origin: (k, 3) [m, world], the eye, or the ball's centre for an orthographic picture.
+    axis: (k, 3), unit vectors away from the eye.
+    nearest: (k,) [m]. width: (k,) [m^2]. slope: (k,).
+    """
+
+    origin: Floats
+    axis: Floats
+    nearest: Floats
+    width: Floats
+    slope: Floats
+
+
+def shades_of(hiders: Floats, view: PictureView, half_width: float, radius: float) -> Shades:
+    """What balls hide in one view, at most as many as there are balls.
+
+    Args:
+        hiders: (k, 4) xyz centre and w radius [m, world].
+        half_width: of what is drawn, at most [pixels].
+        radius: of the strands, at most [m].
+    """
+    balls = np.asarray(hiders, np.float64).reshape(-1, 4)
+    eye = np.linalg.inv(np.asarray(view.view, np.float64))
+    scale = np.abs(np.diag(view.projection)[:2]) * view.half_size  # [pixels] for a metre, or slope
+    if view.projection[3, 3] == 0.0:
+        away = balls[:, :3] - eye[:3, 3]
+        distance = np.linalg.norm(away, axis=1)
+        size = balls[:, 3] - 2.0 * radius - half_width / scale.min() * distance
+        is_before = (size > 0.0) & (distance > size)
+        balls, away, distance, size = (part[is_before] for part in (balls, away, distance, size))
+        axis = away / distance[:, None]
+        squared = distance * distance - size * size
+        origin = np.tile(eye[:3, 3], (len(balls), 1))
+        shades = Shades(origin, axis, squared / distance, 0.0 * size, size * size / squared)
+    else:
+        size = balls[:, 3] - radius - half_width / scale.min()
+        balls, size = balls[size > 0.0], size[size > 0.0]
+        axis = np.tile(-eye[:3, 2], (len(balls), 1))
+        shades = Shades(balls[:, :3], axis, 0.0 * size, size * size, 0.0 * size)
+    front = balls[:, :3] - shades.axis * balls[:, 3:]
+    clip = np.column_stack([front, np.ones(len(front))]) @ view.view_projection.T
+    is_drawn = clip[:, 2] >= -clip[:, 3]
+    return Shades(*(part[is_drawn] for part in _parts(shades)))
+
+
+def hidden(points: Floats, shades: Shades) -> Bools:
+    """Which strands lie wholly in one of the regions, (strand_count,).
+
+    Args:
+        points: (strand_count, cv_count, 3) [m], world space.
+    """
+    result = np.zeros(len(points), bool)
+    for start in range(0, len(points), _CHUNK):
+        control = bezier(np.asarray(points[start : start + _CHUNK], np.float64))
+        control = control.reshape(len(control), -1, 3)
+        for origin, axis, nearest, width, slope in zip(*_parts(shades), strict=True):
+            away = control - origin
+            along = away @ axis
+            across = away - along[..., None] * axis
+            is_within = (across * across).sum(axis=-1) <= width + slope * along * along
+            result[start : start + _CHUNK] |= (is_within & (along >= nearest)).all(axis=1)
+    return result
+
+
+def faces_away(root: Floats, center: Floats, eye: Floats) -> Bools:
+    """Which strands grow on the far side of the head, (strand_count,).
+
+    Their roots look, from the middle of all, away from the eye.
+
+    Args:
+        root: (strand_count, 3) [m, world].
+        center: (3,) [m], the middle of all roots.
+        eye: (4,), homogeneous, as Camera.eye.
+    """
+    to_eye = eye[:3] - eye[3] * root
+    return np.einsum("ij,ij->i", root - center, to_eye) < 0.0
+
+
+def hiders_of(surface: Surface, count: int = 8, roots: Floats | None = None) -> Floats:
+    """The largest balls inside a mesh that differ, largest first, (k <= count, 4) float32.
+
+    xyz centre, w radius [m], in the space of the surface. Holes count as closed by a flat cap, so
+    a ball never stands out of one; a line through a ball still crosses the mesh, unless it comes in
+    by one hole and leaves by another. A mesh without an inside gives no balls.
+
+    Args:
+        roots: (n, 3), same space; only balls about where they are, so none in feet and hands.
+    """
+    surface = _capped(surface)
+    if not len(surface.triangles):
+        return np.zeros((0, 4), np.float32)
+    low, high = _box(surface, roots)
+    first = _first_places(surface, low, high, count + count // 2)
+    centers, distance = _grown(first, surface, float(np.max(high - low)) / _PLACES)
+    is_inside = _winding(centers, surface) > 0.5
+    balls = np.column_stack([centers, INNER_PART * distance])[is_inside]
+    return _different(balls, count).astype(np.float32)
+
+
+def moved_hiders(hiders: Floats, matrix: Floats) -> Floats:
+    """Balls (k, 4) moved by an affine (4, 4) matrix, no larger than what becomes of them."""
+    matrix = np.asarray(matrix, np.float64)
+    centers = hiders[:, :3] @ matrix[:3, :3].T + matrix[:3, 3]
+    least = np.linalg.svd(matrix[:3, :3], compute_uv=False).min()
+    return np.column_stack([centers, hiders[:, 3] * least]).astype(np.float32)
+
+
+def _box(surface: Surface, roots: Floats | None) -> tuple[Floats, Floats]:
+    """Where balls are looked for, two corners: the roots and half their size around them."""
+    low, high = surface.bounds()
+    if roots is None or not len(roots):
+        return low, high
+    first, last = roots.min(axis=0), roots.max(axis=0)
+    room = np.max(last - first) / 2.0
+    return np.clip(first - room, low, high), np.clip(last + room, low, high)
+
+
+def _first_places(surface: Surface, low: Floats, high: Floats, count: int) -> Floats:
+    """Places (n <= count, 3) in a box for about the largest balls, by some of the triangles."""
+    shares = (np.arange(_PLACES) + 0.5) / _PLACES
+    cells = np.stack(np.meshgrid(shares, shares, shares, indexing="ij"), axis=-1).reshape(-1, 3)
+    places = low + cells * (high - low)
+    points, normals = _samples(surface)
+    squared = sum((places[:, None, axis] - points[:, axis]) ** 2 for axis in range(3))
+    nearest = np.asarray(squared).argmin(axis=1)
+    away = places - points[nearest]
+    is_inside = np.einsum("ij,ij->i", away, normals[nearest]) < 0.0
+    balls = np.column_stack([places, np.linalg.norm(away, axis=1)])[is_inside]
+    return _different(balls, count)[:, :3]
+
+
+def _samples(surface: Surface) -> tuple[Floats, Floats]:
+    """Triangles spread evenly over the surface: middles and normals, (n <= _SAMPLES, 3) each."""
+    corners = surface.corners.astype(np.float64)
+    area = np.linalg.norm(_area_vectors(corners), axis=1).cumsum()
+    chosen = np.searchsorted(area, area[-1] * (np.arange(_SAMPLES) + 0.5) / _SAMPLES)
+    chosen = np.unique(np.minimum(chosen, len(corners) - 1))
+    return corners[chosen].mean(axis=1), surface.triangle_normals()[chosen]
+
+
+def _grown(centers: Floats, surface: Surface, step: float) -> tuple[Floats, Floats]:
+    """Balls after steps away from the surface, each where it was largest: centres and radii."""
+    search = ClosestPointSearch(surface)
+    best, largest = centers, np.zeros(len(centers))
+    for _ in range(_STEPS):
+        closest = search.closest(centers)
+        is_larger = closest.distance > largest
+        best = np.where(is_larger[:, None], centers, best)
+        largest = np.maximum(closest.distance, largest)
+        away = centers - closest.point
+        centers = centers + away * (step / np.maximum(closest.distance, 1.0e-9))[:, None]
+        step *= _SHORTER
+    return best, largest
+
+
+def _winding(centers: Floats, surface: Surface) -> Floats:
+    """How often a closed mesh winds around points far from it, (n,): each triangle as a dipole.
+
+    The first-order term of Barill et al. 2018, for triangles small beside their distance.
+    """
+    corners = surface.corners.astype(np.float64)
+    away = corners.mean(axis=1) - centers[:, None]
+    flux = np.einsum("nij,ij->ni", away, _area_vectors(corners))
+    return (flux / np.linalg.norm(away, axis=2) ** 3).sum(axis=1) / (4.0 * np.pi)
+
+
+def _capped(surface: Surface) -> Surface:
+    """The mesh with each hole closed by triangles from its edges to its middle."""
+    # vertices in one place are one, so that a seam is no hole
+    positions, vertex = np.unique(surface.positions, axis=0, return_inverse=True)
+    triangles = vertex.ravel()[surface.triangles]
+    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    code = edges.min(axis=1) * len(positions) + edges.max(axis=1)
+    _, first, count = np.unique(code, return_index=True, return_counts=True)
+    rim = edges[first[count == 1]]
+    hole = _connected(rim, len(positions))[rim[:, 0]]
+    holes, hole = np.unique(hole, return_inverse=True)
+    middles = [positions[rim[hole == index]].mean(axis=(0, 1)) for index in range(len(holes))]
+    caps = np.column_stack([rim[:, ::-1], len(positions) + hole])
+    return Surface(np.vstack([positions, *middles]), np.vstack([triangles, caps]))
+
+
+def _connected(edges: Ints, vertex_count: int) -> Ints:
+    """For each vertex the least vertex that edges (n, 2) join it to, (vertex_count,)."""
+    label = np.arange(vertex_count)
+    while True:
+        least = label.copy()
+        for one, two in (edges.T, edges.T[::-1]):
+            np.minimum.at(least, one, label[two])
+        least = least[least]
+        if (least == label).all():
+            return label
+        label = least
+
+
+def _different(balls: Floats, count: int) -> Floats:
+    """The largest ball, then always the one that stands out most, (n <= count, 4)."""
+    chosen: list[int] = []
+    news = balls[:, 3].copy()
+    while len(chosen) < min(count, len(balls)):
+        best = int(news.argmax())
+        if not news[best] > _LEAST_NEWS * balls[:, 3].max():
+            break
+        chosen.append(best)
+        apart = np.linalg.norm(balls[:, :3] - balls[best, :3], axis=1)
+        news = np.minimum(news, apart + balls[:, 3] - balls[best, 3])
+    return balls[chosen]
+
+
+def _area_vectors(corners: Floats) -> Floats:
+    """Area times normal of triangles (n, 3, 3), (n, 3)."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2.0
+
+
+def _parts(shades: Shades) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    return shades.origin, shades.axis, shades.nearest, shades.width, shades.slope

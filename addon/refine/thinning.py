@@ -1,0 +1,192 @@
+"""Fewer and wider strands where the groom is small in the picture.
+
+Each strand has a rank in [0, 1) once and for all. The strands whose rank is below the share are
+drawn; the last fifth of them grows thin before it is gone, so that nothing pops. All others are
+widened so that the groom covers as much of the picture as before.
+
+How much wider: the width is made up after the least width in pixels, because far hair is as wide as
+that, whatever its radius. But n times fewer strands must not be n times wider where they lie over
+each other many times, and wide strands stand out over the outline. With s the share, f the factor
+of the width, L the layers of hair (what all strands cover side by side, over the area of the
+groom), and q what half a strand's width all around adds to that area, the groom covers
+
+    c(s, f) = s f L / (s f L + 1) (1 + f q)
+
+of its area: a layer count that is distributed exponentially over the groom, as it about is, leaves
+1 / (L + 1) uncovered. c(s, f) = c(1, 1) is a quadratic equation for f. For a sparse groom of thin
+strands f is 1 / s.
+
+Error, measured with down to an eighth of the strands and grooms of 150 to 30 pixels: what the groom
+covers in all stays within 2.2 % of what all strands cover for 11,400 and 2,000 strands combed by
+hand; grown and curled ones are off by 3 % in most views and by 5.6 % at worst, 30 pixels high; 500
+strands by 6.6 %. Widths made up by 1 / s would be off by up to 40 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .detail import NEAREST, PictureView
+from .settings import DetailSettings
+
+#: From this share on every strand is drawn and as wide as it is.
+WHOLE = 1.25
+#: A share below is taken to be this, which is no strand or one.
+SMALLEST_SHARE = 1.0e-6
+#: How fast a strand gets its width once the share exceeds its rank: all of it at rank * WHOLE.
+FADE = WHOLE / (WHOLE - 1.0)
+#: Steps of the cells that tell where on the head a root is, along each axis: 2^10.
+_CELL_BITS = 10
+
+
+@dataclass(frozen=True)
+class Thinning:
+    """What of a groom is drawn. share: see `drawn_share`. widening: factor of the width."""
+
+    share: float = WHOLE
+    widening: float = 1.0
+
+
+def thinning(
+    bounds: tuple[Floats, Floats],
+    total_length: float,
+    radius: float,
+    minimum_width: float,
+    view: PictureView,
+    settings: DetailSettings,
+) -> Thinning:
+    """How a groom is thinned out in one view.
+
+    Args:
+        bounds: lowest and highest corner of all strands, each (3,) [m], world space.
+        total_length: of all strands together [m].
+        radius: of a strand [m].
+        minimum_width: strands are drawn no thinner [pixels].
+    """
+    size = groom_size(bounds, view)
+    share = drawn_share(size[1], settings)
+    if share >= WHOLE:
+        return Thinning()
+    pixels_per_metre = size[1] / max(_height(bounds, view), 1.0e-9)
+    width = max(2.0 * radius * pixels_per_metre, minimum_width)
+    across, up = (max(side, 1.0) for side in size)
+    layers = total_length * pixels_per_metre * width / (across * up)
+    overhang = width * (1.0 / across + 1.0 / up)
+    return Thinning(share, widening(share, layers, overhang))
+
+
+def groom_size(bounds: tuple[Floats, Floats], view: PictureView) -> tuple[float, float]:
+    """Width and height [pixels] of a box in the picture; infinite where it reaches the eye.
+
+    Args:
+        bounds: lowest and highest corner, each (3,) [m], world space.
+    """
+    clip = _corners(bounds) @ view.view_projection.T
+    if clip[:, 3].min() < NEAREST:
+        return np.inf, np.inf
+    across, up = np.ptp(clip[:, :2] / clip[:, 3:], axis=0) * view.half_size
+    return float(across), float(up)
+
+
+def drawn_share(height_px: float, settings: DetailSettings) -> float:
+    """Strands of a lower rank than this are drawn: WHOLE is all of them in full width.
+
+    Args:
+        height_px: of the groom in the picture.
+    """
+    if settings.full_size <= 0.0 or settings.least_share >= 1.0:
+        return WHOLE
+    share = WHOLE * height_px / settings.full_size
+    return float(min(max(share, settings.least_share), WHOLE))
+
+
+def width_factor(rank: Floats, share: float, widening: float = 1.0) -> Floats:
+    """Factor of the width of strands (n,); 0 is not drawn.
+
+    It applies to the width after its lower limit in pixels.
+    """
+    left = 1.0 - rank / max(share, SMALLEST_SHARE)
+    return widening * np.clip(FADE * left, 0.0, 1.0)
+
+
+def widening(share: float, layers: float, overhang: float) -> float:
+    """The width of thinned strands as a factor: f in c(s, f) = c(1, 1), see above.
+
+    Args:
+        share: as from `drawn_share`.
+        layers: L, of all strands.
+        overhang: q.
+    """
+    kept = _mean_factor(max(share, SMALLEST_SHARE))
+    second = kept * overhang * (layers + 1.0)
+    first = kept * (1.0 - layers * overhang)
+    constant = 1.0 + overhang
+    return float(2.0 * constant / (first + np.sqrt(first * first + 4.0 * second * constant)))
+
+
+def even_ranks(roots: Floats, seed: int = 1) -> Floats:
+    """Ranks in [0, 1), each k / n once, so that low ranks alone are the same groom, but sparser.
+
+    Roots are sorted along a curve that fills space (Morton 1966). Of each two neighbours on it one
+    has a rank below 1/2, of each four one has a rank below 1/4, and so on (the radical inverse of
+    their place, scrambled after Owen 1995): so each place on the head keeps its share.
+
+    Args:
+        roots: (strand_count, 3) [m].
+
+    Returns:
+        (strand_count,) float32.
+    """
+    count = len(roots)
+    random = np.random.default_rng(seed)
+    place = _order(_morton_code(roots))
+    inverse = np.zeros(count, np.int64)
+    for bit in range(count.bit_length()):
+        flip = random.integers(0, 2, (count >> (bit + 1)) + 1)
+        inverse = 2 * inverse + (((place >> bit) & 1) ^ flip[place >> (bit + 1)])
+    ranks: Floats = (_order(inverse) / max(count, 1)).astype(np.float32)
+    return ranks
+
+
+def _morton_code(points: Floats) -> Ints:
+    """The place of each point on a curve through the cells of their box, (n,) int64."""
+    if not len(points):
+        return np.zeros(0, np.int64)
+    low = points.min(axis=0)
+    step = max(float(np.ptp(points, axis=0).max()), 1.0e-9) / ((1 << _CELL_BITS) - 1)
+    cell = ((points - low) / step).astype(np.int64)
+    code = np.zeros(len(points), np.int64)
+    for bit in range(_CELL_BITS):
+        for axis in range(3):
+            code |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return code
+
+
+def _order(keys: Ints) -> Ints:
+    """Which place each key takes among all, (n,)."""
+    place = np.empty(len(keys), np.int64)
+    place[np.argsort(keys, kind="stable")] = np.arange(len(keys))
+    return place
+
+
+def _corners(bounds: tuple[Floats, Floats]) -> Floats:
+    """The eight corners of a box, homogeneous, (8, 4) float64."""
+    low, high = (np.asarray(corner, np.float64) for corner in bounds)
+    is_high = (np.arange(8)[:, None] >> np.arange(3)) & 1
+    return np.hstack([np.where(is_high, high, low), np.ones((8, 1))])
+
+
+def _height(bounds: tuple[Floats, Floats], view: PictureView) -> float:
+    """Of a box along the picture's upright [m]."""
+    return float(np.ptp(_corners(bounds) @ np.asarray(view.view, np.float64)[1]))
+
+
+def _mean_factor(share: float) -> float:
+    """The mean of `width_factor` over ranks from 0 to 1, before strands are widened."""
+    full = share / WHOLE
+    drawn = min(share, 1.0)
+    at_last = FADE * (1.0 - drawn / share)
+    return full + (drawn - full) * (1.0 + at_last) / 2.0
