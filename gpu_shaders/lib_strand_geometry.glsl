@@ -4,12 +4,12 @@
 // Holds no resources.
 //
 // A ribbon is a triangle strip of two vertices a station. Stations 0, 1, 2 ... go from root to tip,
-// `subdivisions` of them to each segment between two CVs:
+// as many of them to each segment between two CVs as it has pieces:
 //
 //   side +1   1---3---5---7---9      gl_VertexID
 //             | \ | \ | \ | \ |
 //   side -1   0---2---4---6---8
-//            CV 0    CV 1    CV 2    with 2 subdivisions
+//            CV 0    CV 1    CV 2    with 2 pieces each
 //
 // Limits: where the curve turns sharply in the picture, the ribbon narrows in the bend.
 
@@ -17,8 +17,9 @@
 
 vec3 catmull_rom_point(vec3 p0, vec3 p1, vec3 p2, vec3 p3, float u)
 {
-  return 0.5 * (2.0 * p1 + u * (p2 - p0 + u * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 +
-                                               u * (3.0 * (p1 - p2) + p3 - p0))));
+  // relative to p1, which is more exact far from the origin of the world
+  vec3 a = p0 - p1, b = p2 - p1, c = p3 - p1;
+  return p1 + 0.5 * u * (b - a + u * (2.0 * a + 4.0 * b - c + u * (c - a - 3.0 * b)));
 }
 
 // The curve's derivative; the chord where it vanishes.

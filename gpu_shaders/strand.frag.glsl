@@ -1,20 +1,46 @@
-// Strands, fragment stage: all lights and the world's, without shadows but the occlusion.
+// Strands, fragment stage: all lights and the world's, without shadows but the occlusion. With a
+// DEBUG view colours that show numbers, just enough shaded that strands stay apart.
 #include "lib_lights.glsl"
 #include "lib_strand_noise.glsl"
 #include "lib_kajiya_kay.glsl"
 #include "lib_output.glsl"
+#if DEBUG
+#  include "lib_debug_color.glsl"
+#  include "lib_detail_packing.glsl"
+#  include "lib_strand_texel.glsl"
+#endif
+
+#if DEBUG
+vec3 debug_color()
+{
+#  if DEBUG != {{debug_detail}}
+  return index_color(int(texelFetch(debug_numbers, strand_texel(strand_index, 0, 1), 0).x));
+#  elif ADAPTIVE
+  int segment = clamp(int(strand_along_and_occlusion.x * float(cv_count - 1)), 0, cv_count - 2);
+  int texel = segment / FACTORS_IN_TEXEL;
+  ivec2 at = strand_texel(strand_index, texel, factor_texels(cv_count));
+  uvec4 words = floatBitsToUint(texelFetch(factors, at, 0));
+  return detail_color(unpacked_factor(words, segment - texel * FACTORS_IN_TEXEL));
+#  else
+  return detail_color(subdivisions);
+#  endif
+}
+#endif
 
 void main()
 {
   uint seed = uint(strand_seed);
+  vec3 tangent = unit_or(strand_tangent, vec3(0.0, 0.0, 1.0));
+  vec3 normal = strand_normal(strand_point, tangent, volume_center);
+  vec3 to_eye = unit_or(view.eye.xyz - view.eye.w * strand_point, normal);
+#if DEBUG
+  float shade = 0.55 + 0.3 * hash_unit(seed, 0u) + 0.15 * dot(normal, to_eye);
+  vec3 radiance = debug_color() * shade;
+#else
   float cells = strand_along_and_occlusion.x * shading.noise_cells;
   float shift_noise = strand_noise(seed, 0u, cells);
   float sparkle_noise = strand_noise(seed, 1u, cells);
   float color_noise = strand_noise(seed, 2u, 0.0);
-
-  vec3 tangent = unit_or(strand_tangent, vec3(0.0, 0.0, 1.0));
-  vec3 normal = strand_normal(strand_point, tangent, volume_center);
-  vec3 to_eye = unit_or(view.eye.xyz - view.eye.w * strand_point, normal);
 
   vec3 light = shading.ambient * lights.ambient_and_count.xyz;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
@@ -24,5 +50,6 @@ void main()
              kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
   }
   vec3 radiance = light * strand_base(color_noise, shading) * strand_along_and_occlusion.y;
+#endif
   color = vec4(output_encoded(radiance, output_encoding), 1.0);
 }

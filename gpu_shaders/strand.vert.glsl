@@ -1,14 +1,33 @@
 // Strands, vertex stage: one instance a strand, no vertex attributes.
+//
+// ADAPTIVE 0: every segment has `subdivisions` pieces. ADAPTIVE 1: instances are strands in the
+// order of detail_pass.py, their stations as its factors say.
 #include "lib_strand_geometry.glsl"
+#include "lib_detail_packing.glsl"
 
 void main()
 {
-  int strand = gl_InstanceID;
   int station = gl_VertexID >> 1;
   float side = float(gl_VertexID & 1) * 2.0 - 1.0;
   int last = cv_count - 1;
-  int segment = min(station / strands.subdivisions, last - 1);
-  float u = float(station - segment * strands.subdivisions) / float(strands.subdivisions);
+#if ADAPTIVE
+  // x the strand, y its pieces, z factor of its width
+  vec4 drawn = texelFetch(order, strand_texel(first_instance + gl_InstanceID, 0, 1), 0);
+  int strand = int(drawn.x);
+  float widening = drawn.z;
+  int texels = factor_texels(cv_count);
+  StationSearch search = start_search(station, int(drawn.y));
+  for (int texel = 0; texel < texels; texel++) {
+    search_factors(search, texelFetch(factors, strand_texel(strand, texel, texels), 0));
+  }
+  int segment = search.found;
+  float u = found_u(search);
+#else
+  int strand = gl_InstanceID;
+  float widening = 1.0;
+  int segment = min(station / subdivisions, last - 1);
+  float u = float(station - segment * subdivisions) / float(subdivisions);
+#endif
 
   // xyz position, w radius
   vec4 from = texelFetch(cv_points, strand_texel(strand, segment, cv_count), 0);
@@ -33,10 +52,13 @@ void main()
   strand_tangent = tangent;
   strand_along_and_occlusion = vec2(along, mix(from_look.x, to_look.x, u));
   strand_seed = int(from_look.y);
+#if DEBUG
+  strand_index = strand;
+#endif
 
   vec4 clip = view.view_projection * vec4(point, 1.0);
   vec4 clip_tangent = view.view_projection * vec4(tangent, 0.0);
   float minimum = strands.minimum_width * float(samples_across);
-  float half_width = ribbon_half_width(radius, taper, minimum, clip, view);
+  float half_width = ribbon_half_width(radius, taper, minimum, clip, view) * widening;
   gl_Position = ribbon_edge(clip, clip_tangent, side, half_width, view);
 }

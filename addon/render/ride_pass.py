@@ -32,7 +32,13 @@ from ..strands import StrandSet, Surface
 from .root_holds import RootHolds, matrix_motion
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .snapshot import DevicePoints
-from .textures import from_strand_rows, strand_rows, texture_from, texture_to_array
+from .textures import (
+    from_strand_rows,
+    strand_rows,
+    strand_rows_size,
+    texture_from,
+    texture_to_array,
+)
 
 ROOTS_RECIPE = ShaderRecipe(
     name="ride_roots",
@@ -226,6 +232,7 @@ class RidePass:
             },
         )
         _dispatch(shader, count, 1)
+        self.points.serial += 1
 
 
 def _padded(values: Floats) -> Floats:
@@ -237,8 +244,8 @@ def _padded(values: Floats) -> Floats:
 
 def _empty(strand_count: int, column_count: int) -> Any:
     """A texture RGBA32F of the size that strand_rows gives, zero everywhere."""
-    height, width, _ = strand_rows(np.zeros((strand_count, column_count, 1), np.float32)).shape
-    texture = gpu.types.GPUTexture((width, height), format="RGBA32F")
+    size = strand_rows_size(strand_count, column_count)
+    texture = gpu.types.GPUTexture(size, format="RGBA32F")
     texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
     return texture
 

@@ -18,6 +18,8 @@ from types import MappingProxyType
 from ..dynamics.constraints import CONTACT_WEIGHT, HELD, PINNED
 from ..dynamics.contacts import SKIN
 from ..dynamics.wind import MODES
+from ..refine import detail
+from ..refine.settings import DetailSettings
 from ..shading.lights import LIGHT_CAPACITY, NEAREST_DISTANCE
 
 SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
@@ -28,8 +30,18 @@ STRAND_ROWS = 16384
 MOMENT_TEXELS, COLLIDER_TEXELS = 1 + -(-MODES // 4), 9
 #: Round solids, and nodes of distance fields, in one row of their textures.
 ROUNDS_ACROSS, FIELD_ROW = 512, 4096
+#: Regions behind the head that culling looks into, at most; a strand's are bits of one number.
+SHADE_CAPACITY = 16
 #: how a pass writes its colour; see encoded() in lib_output.glsl
 OUTPUTS = ("scene_linear", "viewport")
+#: what strands may be coloured by in place of their shading, see lib_debug_color.glsl
+DEBUG_VIEWS = ("none", "detail", "guide", "group")
+#: the choices of DetailSettings, by the numbers under which shaders know them
+DETAIL_CHOICES = {
+    parameter.name: tuple(name for name, _, _ in parameter.choices)
+    for parameter in DetailSettings.parameters()
+    if parameter.kind == "choice"
+}
 
 CONSTANTS: Mapping[str, str] = MappingProxyType(
     {
@@ -45,6 +57,15 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "collider_texels": str(COLLIDER_TEXELS),
         "rounds_across": str(ROUNDS_ACROSS),
         "field_row": str(FIELD_ROW),
+        "shade_capacity": str(SHADE_CAPACITY),
+        "detail_nearest": repr(float(detail.NEAREST)),
+        "detail_margin": repr(float(detail.MARGIN)),
+        **{
+            f"{choice}_{name}": str(index)
+            for choice, names in DETAIL_CHOICES.items()
+            for index, name in enumerate(names)
+        },
+        **{f"debug_{name}": str(index) for index, name in enumerate(DEBUG_VIEWS)},
         **{f"output_{name}": str(index) for index, name in enumerate(OUTPUTS)},
     }
 )

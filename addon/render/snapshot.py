@@ -15,6 +15,7 @@ from ..refine.settings import DetailSettings
 from ..shading.lights import Light
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..strands import Surface
+from .shader_source import DEBUG_VIEWS
 
 type Color = tuple[float, float, float]
 
@@ -58,14 +59,17 @@ class DevicePoints:
     texture: RGBA32F in the layout of textures.strand_rows, xyz position [m, world] and w radius
         [m]; None before the first moment and after the release.
     center: (3,) [m], the middle of all roots.
+    serial: grows whenever the texture is written, so that others know what is out of date.
     """
 
     shape: tuple[int, int]
     texture: Any = None
     center: Floats = field(default_factory=lambda: np.zeros(3, np.float32))
+    serial: int = 0
 
     def release(self) -> None:
         self.texture = None
+        self.serial += 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +84,13 @@ class Snapshot:
     ambient: the world's colour [W/(m^2 sr)].
     volume_center: (3,) [m], what strands look away from; None is the middle of all roots.
     device_points: the same strands where the GPU has moved them; they are drawn in place of
-        `strands` and `radius`, which then only say how many there are.
+        `strands` and `radius`, which then only say how many there are and how large.
+    guide, group: (strand_count,) whole numbers, what debug_view shows; None is 0 everywhere.
+    rank: (strand_count,) in 0..1, below 1: when a groom gets small, strands of high rank go first
+        (refine/thinning.py); None draws all of them always.
+    hiders: (k, 4) xyz center and w radius [m, world] of balls inside the head, behind which
+        strands are not seen (refine/culling.py), of which the first 16 count; None hides nothing.
+    debug_view: one of DEBUG_VIEWS.
 
     A pass uploads an array again only when it is another object than before: hand the same array
     on where nothing changed, and a new array (not the old one rewritten) where something did.
@@ -101,6 +111,11 @@ class Snapshot:
     detail: DetailSettings = field(default_factory=DetailSettings)
     volume_center: Floats | None = None
     device_points: DevicePoints | None = None
+    guide: Ints | None = None
+    group: Ints | None = None
+    rank: Floats | None = None
+    hiders: Floats | None = None
+    debug_view: str = "none"
 
     def __post_init__(self) -> None:
         if self.strands.ndim != 3 or self.strands.shape[1] < 2 or self.strands.shape[2] != 3:
@@ -110,6 +125,10 @@ class Snapshot:
             "occlusion": self.strands.shape[:2],
             "seed": self.strands.shape[:1],
             "volume_center": (3,),
+            "guide": self.strands.shape[:1],
+            "group": self.strands.shape[:1],
+            "rank": self.strands.shape[:1],
+            "hiders": (0 if self.hiders is None else len(self.hiders), 4),
         }
         for name, shape in expected.items():
             value = getattr(self, name)
@@ -119,6 +138,8 @@ class Snapshot:
             raise ValueError(
                 f"device_points has shape {self.device_points.shape}, not {expected['radius']}"
             )
+        if self.debug_view not in DEBUG_VIEWS:
+            raise ValueError(f"debug_view {self.debug_view!r} is none of {', '.join(DEBUG_VIEWS)}")
 
     @property
     def strand_count(self) -> int:
@@ -133,6 +154,11 @@ class Snapshot:
         """What strands look away from, (3,) [m]."""
         if self.volume_center is not None:
             return np.asarray(self.volume_center, np.float32)
+        return self.root_center
+
+    @property
+    def root_center(self) -> Floats:
+        """The middle of all roots, (3,) [m]."""
         if self.device_points is not None:
             return self.device_points.center
         if not self.strand_count:

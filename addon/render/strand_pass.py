@@ -4,10 +4,15 @@ Packed textures, one row a strand (column blocks beyond 16384 rows, see textures
     cv_points RGBA32F: xyz position [m, world], w radius [m]     new with every new pose, unless
                                                                  it lies on the GPU already
     cv_looks  RG32F:   x ambient occlusion, y seed as a number   constant
+    debug_numbers R32F: the guide or the group that a debug view shows
+
+How many pieces each segment has comes from detail_pass.py, unless all have equally many.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import gpu
@@ -19,35 +24,64 @@ from ..shading.lights import pack_lights
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..shading.strand_noise import SEED_LIMIT
 from .camera import Camera
+from .detail_pass import DetailOrder, DetailPass
 from .shader_program import ShaderRecipe, program, released_with_shaders
-from .shader_source import ShaderError, output_index
+from .shader_source import DEBUG_VIEWS, ShaderError, output_index
 from .snapshot import Snapshot
 from .textures import UniformBlock, drawing_state, strand_rows, texture_from
 from .view_block import view_values
 
-STRAND_RECIPE = ShaderRecipe(
-    name="strand",
-    vertex="strand.vert.glsl",
-    fragment="strand.frag.glsl",
-    structs=("struct_view.glsl", "struct_lights.glsl"),
-    settings=(StrandSettings, ShadingSettings),
-    blocks=(
-        ("View", "view"),
-        ("Lights", "lights"),
-        ("StrandSettings", "strands"),
-        ("ShadingSettings", "shading"),
-    ),
-    textures=(("FLOAT_2D", "cv_points"), ("FLOAT_2D", "cv_looks")),
-    integers=("cv_count", "samples_across", "output_encoding"),
-    numbers=(("VEC3", "volume_center"),),
-    varyings=(
-        ("smooth", "VEC3", "strand_point"),
-        ("smooth", "VEC3", "strand_tangent"),
-        ("smooth", "VEC2", "strand_along_and_occlusion"),
-        ("flat", "INT", "strand_seed"),
-    ),
-    outputs=(("VEC4", "color"),),
-)
+#: debug views that show a number of each strand
+NUMBERED_VIEWS = ("guide", "group")
+
+
+def strand_recipe(*, is_adaptive: bool, debug_view: str = "none") -> ShaderRecipe:
+    """The program that draws every segment in equally many pieces, or each in its own."""
+    textures = ["cv_points", "cv_looks"]
+    textures += ["order", "factors"] if is_adaptive else []
+    textures += ["debug_numbers"] if debug_view in NUMBERED_VIEWS else []
+    return ShaderRecipe(
+        name=f"strand_{'adaptive' if is_adaptive else 'fixed'}_{debug_view}",
+        vertex="strand.vert.glsl",
+        fragment="strand.frag.glsl",
+        structs=("struct_view.glsl", "struct_lights.glsl"),
+        settings=(StrandSettings, ShadingSettings),
+        blocks=(
+            ("View", "view"),
+            ("Lights", "lights"),
+            ("StrandSettings", "strands"),
+            ("ShadingSettings", "shading"),
+        ),
+        textures=tuple(("FLOAT_2D", name) for name in textures),
+        integers=(
+            "cv_count",
+            "samples_across",
+            "output_encoding",
+            "first_instance" if is_adaptive else "subdivisions",
+        ),
+        numbers=(("VEC3", "volume_center"),),
+        varyings=(
+            ("smooth", "VEC3", "strand_point"),
+            ("smooth", "VEC3", "strand_tangent"),
+            ("smooth", "VEC2", "strand_along_and_occlusion"),
+            ("flat", "INT", "strand_seed"),
+            *((("flat", "INT", "strand_index"),) if debug_view != "none" else ()),
+        ),
+        outputs=(("VEC4", "color"),),
+        defines=(("ADAPTIVE", int(is_adaptive)), ("DEBUG", DEBUG_VIEWS.index(debug_view))),
+    )
+
+
+STRAND_RECIPE = strand_recipe(is_adaptive=False)
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a draw has drawn: strands, their straight pieces, and the vertices of all instances."""
+
+    strands: int = 0
+    pieces: int = 0
+    vertices: int = 0
 
 
 class StrandPass:
@@ -55,9 +89,14 @@ class StrandPass:
 
     Making one touches no GPU; the first draw does. Arrays of a snapshot are uploaded only when
     they are other objects than in the draw before.
+
+    statistics: of the last draw.
     """
 
     def __init__(self) -> None:
+        self._detail = DetailPass()
+        self._points_serial = 0
+        self.statistics = Statistics()
         self.release()
         released_with_shaders(self)
 
@@ -78,82 +117,122 @@ class StrandPass:
             output: "scene_linear" for a picture of ours; "viewport" for a POST_VIEW handler in
                 Blender's viewport, where it looks as under the view transform "Standard".
             samples: pixels of the target across one pixel of the final picture; the least width
-                counts in the latter.
+                and the settings of detail count in the latter.
 
         Raises:
             ShaderError: the shader does not compile here, or points on the GPU were released.
         """
+        self.statistics = Statistics()
         if not snapshot.strand_count:
             return
         self._upload(snapshot)
-        shader = program(STRAND_RECIPE)
+        size = width // samples, height // samples
+        points, serial = self._textures["cv_points"], self._points_serial
+        order = self._detail.order(snapshot, points, serial, camera, size)
+        if not order.classes:
+            return
+        is_adaptive = order.factors is not None
+        shader = program(strand_recipe(is_adaptive=is_adaptive, debug_view=snapshot.debug_view))
+        integers = {
+            "cv_count": snapshot.cv_count,
+            "samples_across": samples,
+            "output_encoding": output_index(output),
+            "first_instance" if is_adaptive else "subdivisions": order.subdivisions,
+        }
+        blocks = {
+            "view": view_values(camera, width, height),
+            "lights": pack_lights(snapshot.lights, snapshot.ambient),
+            "strands": struct_values(snapshot.strand_settings),
+            "shading": struct_values(snapshot.shading),
+        }
         with drawing_state():
             shader.bind(
-                blocks={
-                    "view": self._blocks["view"].holding(view_values(camera, width, height)),
-                    "lights": self._blocks["lights"].holding(
-                        pack_lights(snapshot.lights, snapshot.ambient)
-                    ),
-                    "strands": self._blocks["strands"].holding(
-                        struct_values(snapshot.strand_settings)
-                    ),
-                    "shading": self._blocks["shading"].holding(struct_values(snapshot.shading)),
-                },
-                textures=self._textures,
-                integers={
-                    "cv_count": snapshot.cv_count,
-                    "samples_across": samples,
-                    "output_encoding": output_index(output),
-                },
+                blocks={name: self._blocks[name].holding(blocks[name]) for name in blocks},
+                textures=self._bound(order, snapshot.debug_view),
+                integers=integers,
                 numbers={"volume_center": snapshot.center.tolist()},
             )
-            self._ribbon_of(snapshot).draw_instanced(
-                shader.shader, instance_start=0, instance_count=snapshot.strand_count
-            )
+            for drawn in order.classes:
+                if is_adaptive:
+                    shader.shader.uniform_int("first_instance", drawn.first)
+                self._ribbon(drawn.capacity).draw_instanced(
+                    shader.shader, instance_start=0, instance_count=drawn.count
+                )
+        self.statistics = Statistics(
+            strands=sum(drawn.count for drawn in order.classes),
+            pieces=order.pieces,
+            vertices=sum(drawn.vertex_count for drawn in order.classes),
+        )
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
         self._blocks = {name: UniformBlock() for _, name in STRAND_RECIPE.blocks}
         self._textures: dict[str, Any] = {}
         self._uploaded: dict[str, tuple[Any, ...]] = {}
-        self._ribbon: Any = None
-        self._ribbon_length = 0
+        self._ribbons: dict[int, Any] = {}
+        self._detail.release()
+
+    def _bound(self, order: DetailOrder, debug_view: str) -> dict[str, Any]:
+        """Textures by the names of strand_recipe."""
+        names = ["cv_points", "cv_looks"]
+        names += ["debug_numbers"] if debug_view in NUMBERED_VIEWS else []
+        bound = {name: self._textures[name] for name in names}
+        if order.factors is not None:
+            bound |= {"order": order.order, "factors": order.factors}
+        return bound
 
     def _upload(self, snapshot: Snapshot) -> None:
-        points = (snapshot.strands, snapshot.radius)
-        if snapshot.device_points is not None:
-            if snapshot.device_points.texture is None:
+        points: tuple[Any, ...] = (snapshot.strands, snapshot.radius)
+        device = snapshot.device_points
+        if device is not None:
+            if device.texture is None:
                 raise ShaderError("strand: what the GPU has computed was released")
-            self._textures["cv_points"] = snapshot.device_points.texture
-            self._uploaded.pop("cv_points", None)
-        elif self._is_new("cv_points", points):
-            packed = np.concatenate([snapshot.strands, snapshot.radius[..., None]], axis=-1)
-            self._textures["cv_points"] = texture_from(strand_rows(packed), "RGBA32F")
-            self._uploaded["cv_points"] = points
+            points = (device, (device.serial,))
+        if self._take("cv_points", points, lambda: _points_texture(snapshot)):
+            self._points_serial += 1
         looks = (snapshot.occlusion, snapshot.seed, snapshot.strands.shape)
-        if self._is_new("cv_looks", looks):
-            self._textures["cv_looks"] = texture_from(strand_rows(_looks(snapshot)), "RG32F")
-            self._uploaded["cv_looks"] = looks
+        self._take("cv_looks", looks, lambda: texture_from(strand_rows(_looks(snapshot)), "RG32F"))
+        if snapshot.debug_view in NUMBERED_VIEWS:
+            numbers = getattr(snapshot, snapshot.debug_view)
+            shown = (numbers, snapshot.strands.shape[:1])
+            self._take("debug_numbers", shown, lambda: _numbers_texture(snapshot))
 
-    def _is_new(self, name: str, arrays: tuple[Any, ...]) -> bool:
-        """Whether any of these is another object than last time (for shapes: another value)."""
-        before = self._uploaded.get(name)
-        return before is None or not all(
+    def _take(self, name: str, sources: tuple[Any, ...], make: Callable[[], Any]) -> bool:
+        """Make a texture anew if a source is another object than before; tuples count by value."""
+        before = self._uploaded.get(name, ())
+        if len(before) == len(sources) and all(
             old is new or (isinstance(old, tuple) and old == new)
-            for old, new in zip(before, arrays, strict=True)
-        )
+            for old, new in zip(before, sources, strict=True)
+        ):
+            return False
+        self._textures[name] = make()
+        self._uploaded[name] = sources
+        return True
 
-    def _ribbon_of(self, snapshot: Snapshot) -> Any:
+    def _ribbon(self, capacity: int) -> Any:
         """A strip of vertices without attributes: two a station, see lib_strand_geometry.glsl."""
-        pieces = (snapshot.cv_count - 1) * snapshot.strand_settings.subdivisions
-        length = 2 * (pieces + 1)
-        if self._ribbon is None or self._ribbon_length != length:
+        if capacity not in self._ribbons:
             layout = gpu.types.GPUVertFormat()
             layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-            vertices = gpu.types.GPUVertBuf(layout, length)
-            self._ribbon = gpu.types.GPUBatch(type="TRI_STRIP", buf=vertices)
-            self._ribbon_length = length
-        return self._ribbon
+            vertices = gpu.types.GPUVertBuf(layout, 2 * (capacity + 1))
+            self._ribbons[capacity] = gpu.types.GPUBatch(type="TRI_STRIP", buf=vertices)
+        return self._ribbons[capacity]
+
+
+def _points_texture(snapshot: Snapshot) -> Any:
+    if snapshot.device_points is not None:
+        return snapshot.device_points.texture
+    packed = np.concatenate([snapshot.strands, snapshot.radius[..., None]], axis=-1)
+    return texture_from(strand_rows(packed), "RGBA32F")
+
+
+def _numbers_texture(snapshot: Snapshot) -> Any:
+    """The number of each strand that the debug view shows, exact below 2^24; 0 without any."""
+    numbers = getattr(snapshot, snapshot.debug_view)
+    shown = np.zeros((snapshot.strand_count, 1, 1), np.float32)
+    if numbers is not None:
+        shown[:, 0, 0] = numbers
+    return texture_from(strand_rows(shown), "R32F")
 
 
 def _looks(snapshot: Snapshot) -> Floats:

@@ -41,15 +41,26 @@ def strand_rows(values: Floats) -> Floats:
         ValueError: more strands than blocks of columns can hold.
     """
     strand_count, cv_count, channels = values.shape
-    blocks = max(-(-strand_count // STRAND_ROWS), 1)
-    if blocks * cv_count > STRAND_ROWS:
-        raise ValueError(f"{strand_count} strands of {cv_count} CVs do not fit a texture")
-    if blocks == 1:
+    width, _ = strand_rows_size(strand_count, cv_count)
+    if width == cv_count:
         return values
+    blocks = width // cv_count
     padded = np.zeros((blocks * STRAND_ROWS, cv_count, channels), np.float32)
     padded[:strand_count] = values
     columns = padded.reshape(blocks, STRAND_ROWS, cv_count, channels).swapaxes(0, 1)
     return np.ascontiguousarray(columns).reshape(STRAND_ROWS, blocks * cv_count, channels)
+
+
+def strand_rows_size(strand_count: int, cv_count: int) -> tuple[int, int]:
+    """Width and height of a texture in that layout.
+
+    Raises:
+        ValueError: more strands than blocks of columns can hold.
+    """
+    blocks = max(-(-strand_count // STRAND_ROWS), 1)
+    if blocks * cv_count > STRAND_ROWS:
+        raise ValueError(f"{strand_count} strands of {cv_count} CVs do not fit a texture")
+    return blocks * cv_count, strand_count if blocks == 1 else STRAND_ROWS
 
 
 def from_strand_rows(pixels: Floats, strand_count: int, cv_count: int) -> Floats:

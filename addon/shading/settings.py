@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..params import Settings, color, integer, number
+from ..params import Settings, color, number
 
 _SCHEUERMANN = "Scheuermann 2004, hair shading"
 
@@ -126,7 +126,7 @@ class ShadingSettings(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class StrandSettings(Settings):
-    """How wide and how smooth strands are drawn."""
+    """How wide strands are drawn."""
 
     section: ClassVar[str] = "strands"
     title: ClassVar[str] = "Strands"
@@ -152,11 +152,4 @@ class StrandSettings(Settings):
         description="Strands are never drawn thinner than this many pixels at the root",
         soft=(0.0, 4.0),
         hard=(0.0, 100.0),
-    )
-    subdivisions: int = integer(
-        2,
-        label="Subdivisions",
-        description="Straight pieces that each segment of a strand is drawn with",
-        soft=(1, 8),
-        hard=(1, 64),
     )

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.shading.settings import StrandSettings
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -38,8 +39,9 @@ def covered(snapshot, camera, width: int, height: int, samples: int = 1) -> np.n
     """Whether each pixel's centre lies in any ribbon, (height, width) bool; no meshes."""
     settings = snapshot.strand_settings
     points = np.asarray(snapshot.strands, np.float64)
-    pixels, depth = _to_pixels(stations(points, settings.subdivisions), camera, width, height)
-    onward, _ = _to_pixels(stations(points, settings.subdivisions, 1e-4), camera, width, height)
+    pieces = snapshot.detail.subdivisions
+    pixels, depth = _to_pixels(stations(points, pieces), camera, width, height)
+    onward, _ = _to_pixels(stations(points, pieces, 1e-4), camera, width, height)
     along = onward - pixels
     along /= np.linalg.norm(along, axis=-1, keepdims=True)
     across = np.stack([-along[..., 1], along[..., 0]], axis=-1)
@@ -114,11 +116,10 @@ def test_coverage_is_that_of_the_definition(
     frame: Any, subdivisions: int, minimum_width: float, samples: int
 ) -> None:
     strands = curly_groom(400)
-    settings = StrandSettings(
-        width_scale=2.0, tip_width=0.4, minimum_width=minimum_width, subdivisions=subdivisions
-    )
+    settings = StrandSettings(width_scale=2.0, tip_width=0.4, minimum_width=minimum_width)
+    detail = DetailSettings(mode="fixed", subdivisions=subdivisions)
     radius = np.full(strands.shape[:2], 1e-3, np.float32)
-    snapshot = frame.Snapshot(strands, radius, strand_settings=settings)
+    snapshot = frame.Snapshot(strands, radius, strand_settings=settings, detail=detail)
     camera = frame.frame_camera(
         (strands.min((0, 1)), strands.max((0, 1))), (-0.5, -1.0, 0.4), np.radians(35.0), 1.2
     )
@@ -138,7 +139,7 @@ def test_coverage_of_the_real_groom(frame: Any, shared_data: Path) -> None:
     groom = read_tfx(shared_data / "sintel" / "SintelHairOriginal-sintel_hair.16points.tfx")
     strands = groom.strands.grid[::5]
     radius = np.full(strands.shape[:2], 2e-4, np.float32)
-    snapshot = frame.Snapshot(strands, radius)
+    snapshot = frame.Snapshot(strands, radius, detail=DetailSettings(mode="fixed"))
     camera = frame.frame_camera(groom.strands.bounds(), (-0.55, -1, 0.18), np.radians(30), 4 / 3)
     drawn = frame.render_coverage(snapshot, camera, 480, 360)
     expected = covered(snapshot, camera, 480, 360)

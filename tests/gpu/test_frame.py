@@ -22,7 +22,7 @@ PLAIN = ShadingSettings(
     shift_noise=0.0,
     color_variation=0.0,
 )
-RIBBON = StrandSettings(width_scale=1.0, tip_width=1.0, minimum_width=0.0, subdivisions=1)
+RIBBON = StrandSettings(width_scale=1.0, tip_width=1.0, minimum_width=0.0)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,6 @@ def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
     strand = np.array([[[-0.1, 0.0, 0.0], [0.1, 0.0, 0.02]]], np.float32)
     radius, occlusion = np.full((1, 2), 0.05, np.float32), np.array([[0.4, 0.8]], np.float32)
     shading = ShadingSettings(noise_cells=7.0)
-    settings = dataclasses.replace(RIBBON, subdivisions=2)
     lights = (
         Light.sun((0.2, 0.7, -1.0), (1.0, 0.9, 0.8), 3.0),
         Light.point((0.3, -0.4, 0.5), (0.5, 0.7, 1.0), 8.0),
@@ -67,7 +66,7 @@ def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
         lights=lights,
         ambient=ambient,
         shading=shading,
-        strand_settings=settings,
+        strand_settings=RIBBON,
         volume_center=center,
     )
     eye = np.array([0.05, -0.6, 0.2])

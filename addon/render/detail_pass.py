@@ -1,0 +1,263 @@
+"""How finely each strand is drawn in one view, and which are: computed on the GPU.
+
+Two steps, with textures in the layout of textures.strand_rows:
+
+    cv_points ----> detail ----> factors, totals             one invocation a strand
+    totals -------> numpy -----> order, classes              read back, 8 bytes a strand
+
+    factors RGBA32F: the pieces of sixteen segments as bytes, see lib_detail_packing.glsl
+    totals  RG32F:   x pieces of the whole strand, 0 where it is not drawn; y its mean depth
+    order   RGBA32F: x a strand that is drawn, y its pieces, z factor of its width; those of a class
+                     lie side by side
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..params.glsl import struct_values
+from ..refine.culling import shades_of
+from ..refine.detail import PictureView
+from ..refine.settings import DetailSettings
+from ..refine.thinning import Thinning, thinning, width_factor
+from .camera import Camera
+from .detail_classes import DetailClass, detail_classes
+from .shader_program import ShaderRecipe, program
+from .shader_source import DETAIL_CHOICES, SHADE_CAPACITY
+from .snapshot import Snapshot
+from .textures import (
+    UniformBlock,
+    from_strand_rows,
+    strand_rows,
+    strand_rows_size,
+    texture_from,
+    texture_to_array,
+)
+
+#: Segments whose factors lie in one texel.
+FACTORS_IN_TEXEL = 16
+_BLOCKS = (("DetailView", "seen"), ("DetailSettings", "detail"))
+
+
+def detail_recipe(mode: str, culling: str) -> ShaderRecipe:
+    """The program of one choice of each: a software driver computes all branches of a shader."""
+    return ShaderRecipe(
+        name=f"detail_{mode}_{culling}",
+        compute="detail.comp.glsl",
+        structs=("struct_detail.glsl",),
+        settings=(DetailSettings,),
+        blocks=_BLOCKS,
+        textures=(("FLOAT_2D", "cv_points"),),
+        images=(("RGBA32F", "factors"), ("RG32F", "totals")),
+        integers=("cv_count", "strand_count"),
+        group_size=(64, 1),
+        defines=(
+            ("MODE", DETAIL_CHOICES["mode"].index(mode)),
+            ("CULLING", DETAIL_CHOICES["culling"].index(culling)),
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class DetailOrder:
+    """What is drawn of a groom in one view.
+
+    factors, order: textures as above; None where all segments have equally many pieces.
+    classes: the draws that it needs.
+    pieces: of all strands.
+    subdivisions: pieces of each segment, where all have equally many; else 0.
+    """
+
+    factors: Any
+    order: Any
+    classes: tuple[DetailClass, ...]
+    pieces: int
+    subdivisions: int = 0
+
+
+class DetailPass:
+    """The detail of one groom in the view that was asked for last. Making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self._asked: tuple[Any, ...] = ()
+        self._order: DetailOrder | None = None
+        self._totals: Any = None
+        self._extent: GroomExtent | None = None
+        self.release()
+
+    def order(
+        self, snapshot: Snapshot, cv_points: Any, serial: int, camera: Camera, size: tuple[int, int]
+    ) -> DetailOrder:
+        """What is to be drawn; computed only where something is new since the last time.
+
+        Args:
+            cv_points: texture of the snapshot's CVs, see strand_pass.py.
+            serial: grows whenever that texture is another one or is written.
+            size: width and height of the final picture [pixels].
+
+        Raises:
+            ShaderError: the shader does not compile here.
+        """
+        view = PictureView(camera.view, camera.projection, *size)
+        thinned = self._thinned(snapshot, view)
+        shades = _shades(snapshot, view, thinned.widening)
+        culling = "none" if snapshot.detail.culling == "hidden" else snapshot.detail.culling
+        culling = "hidden" if len(shades) else culling
+        if snapshot.detail.mode == "fixed" and culling == "none" and thinned == Thinning():
+            return _even_order(snapshot)
+        seen = _view_values(view, camera, snapshot.root_center, shades)
+        asked = (serial, seen.tobytes(), snapshot.detail, thinned, self._extent)
+        if self._order is None or self._asked != asked:
+            recipe = detail_recipe(snapshot.detail.mode, culling)
+            factors, totals = self._computed(recipe, snapshot, cv_points, seen)
+            self._order = _ordered(factors, totals, _widths(snapshot, thinned))
+            self._asked = asked
+        return self._order
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU; the next order is computed anew."""
+        self._blocks = {name: UniformBlock() for _, name in _BLOCKS}
+        self._asked, self._order, self._totals = (), None, None
+
+    def _thinned(self, snapshot: Snapshot, view: PictureView) -> Thinning:
+        if snapshot.rank is None or snapshot.detail.full_size <= 0.0:
+            return Thinning()
+        if self._extent is None or self._extent.rank is not snapshot.rank:
+            self._extent = GroomExtent.of(snapshot)
+        return self._extent.thinning(snapshot, view)
+
+    def _computed(
+        self, recipe: ShaderRecipe, snapshot: Snapshot, cv_points: Any, seen: Floats
+    ) -> tuple[Any, Floats]:
+        """The texture of factors, and pieces and depth of each strand (strand_count, 2)."""
+        count, cv_count = snapshot.strand_count, snapshot.cv_count
+        factors, totals = self._targets(count, factor_texels(cv_count))
+        shader = program(recipe)
+        shader.bind(
+            blocks={
+                "seen": self._blocks["seen"].holding(seen),
+                "detail": self._blocks["detail"].holding(struct_values(snapshot.detail)),
+            },
+            textures={"cv_points": cv_points},
+            images={"factors": factors, "totals": totals},
+            integers={"cv_count": cv_count, "strand_count": count},
+        )
+        across, _ = recipe.group_size
+        gpu.compute.dispatch(shader.shader, -(-count // across), 1, 1)
+        gpu.shader.unbind()
+        return factors, from_strand_rows(texture_to_array(totals), count, 1).reshape(count, 2)
+
+    def _targets(self, strand_count: int, texels: int) -> tuple[Any, Any]:
+        """Textures that the shader writes, those of the last time if they fit."""
+        sizes = [strand_rows_size(strand_count, columns) for columns in (texels, 1)]
+        if self._order is not None:
+            kept = self._order.factors, self._totals
+            if [(texture.width, texture.height) for texture in kept] == sizes:
+                return kept
+        factors = gpu.types.GPUTexture(sizes[0], format="RGBA32F")
+        self._totals = gpu.types.GPUTexture(sizes[1], format="RG32F")
+        return factors, self._totals
+
+
+@dataclass(frozen=True, eq=False)
+class GroomExtent:
+    """How large a groom is, which hardly changes as it moves: found once for its ranks.
+
+    rank: those of the groom that this is of.
+    low, high: (3,) corners of all strands around its center [m].
+    total_length: of all strands [m]. radius: the mean [m].
+    """
+
+    rank: Floats
+    low: Floats
+    high: Floats
+    total_length: float
+    radius: float
+
+    @classmethod
+    def of(cls, snapshot: Snapshot) -> GroomExtent:
+        assert snapshot.rank is not None
+        points, roots = snapshot.strands, snapshot.strands[:, 0].mean(axis=0, dtype=np.float64)
+        length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(dtype=np.float64)
+        low, high = points.min(axis=(0, 1)) - roots, points.max(axis=(0, 1)) - roots
+        return cls(snapshot.rank, low, high, float(length), float(snapshot.radius.mean()))
+
+    def thinning(self, snapshot: Snapshot, view: PictureView) -> Thinning:
+        """How the groom is thinned out where it is now."""
+        settings, roots = snapshot.strand_settings, snapshot.root_center
+        return thinning(
+            (self.low + roots, self.high + roots),
+            self.total_length,
+            self.radius * settings.width_scale,
+            settings.minimum_width,
+            view,
+            snapshot.detail,
+        )
+
+
+def read_factors(order: DetailOrder, strand_count: int, cv_count: int) -> Ints:
+    """The factors of an uneven order, read back, (strand_count, cv_count - 1)."""
+    texels = from_strand_rows(
+        texture_to_array(order.factors), strand_count, factor_texels(cv_count)
+    )
+    factors = np.ascontiguousarray(texels).view(np.uint8).reshape(strand_count, -1)
+    return factors[:, : cv_count - 1].astype(np.int32)
+
+
+def factor_texels(cv_count: int) -> int:
+    """How many texels the factors of a strand take; as in lib_detail_packing.glsl."""
+    return (cv_count - 2) // FACTORS_IN_TEXEL + 1
+
+
+def _even_order(snapshot: Snapshot) -> DetailOrder:
+    """All strands in the pieces of the fixed mode, which no pass has to find out."""
+    subdivisions = min(snapshot.detail.subdivisions, snapshot.detail.most)
+    pieces = (snapshot.cv_count - 1) * subdivisions
+    drawn = DetailClass(pieces, 0, snapshot.strand_count)
+    return DetailOrder(None, None, (drawn,), pieces * snapshot.strand_count, subdivisions)
+
+
+def _widths(snapshot: Snapshot, thinned: Thinning) -> Floats:
+    """Factor of each strand's width (strand_count,); 0 where it is not drawn."""
+    if snapshot.rank is None or thinned == Thinning():
+        return np.ones(snapshot.strand_count, np.float32)
+    return width_factor(snapshot.rank, thinned.share, thinned.widening)
+
+
+def _ordered(factors: Any, totals: Floats, widths: Floats) -> DetailOrder:
+    """The strands that have pieces and a width, in classes."""
+    pieces = np.where(widths > 0.0, totals[:, 0], 0.0)
+    drawn, classes = detail_classes(pieces.astype(np.int32), totals[:, 1])
+    order = np.zeros((len(drawn), 1, 4), np.float32)
+    order[:, 0, 0], order[:, 0, 1], order[:, 0, 2] = drawn, pieces[drawn], widths[drawn]
+    texture = texture_from(strand_rows(order), "RGBA32F") if classes else None
+    return DetailOrder(factors, texture, classes, int(pieces.sum(dtype=np.int64)))
+
+
+def _shades(snapshot: Snapshot, view: PictureView, widening: float) -> Floats:
+    """What the hiders hide from view, (k, 12) as in lib_culling.glsl; k is 0 where nothing is."""
+    if snapshot.detail.culling != "hidden" or snapshot.hiders is None:
+        return np.zeros((0, 12), np.float32)
+    settings = snapshot.strand_settings
+    radius = float(snapshot.radius.max()) * settings.width_scale * widening
+    half_width = settings.minimum_width / 2.0 * widening
+    shades = shades_of(snapshot.hiders[:SHADE_CAPACITY], view, half_width, radius)
+    packed = np.zeros((len(shades.nearest), 12), np.float32)
+    packed[:, 0:3], packed[:, 3] = shades.origin, shades.nearest
+    packed[:, 4:7], packed[:, 7] = shades.axis, shades.width
+    packed[:, 8] = shades.slope
+    return packed
+
+
+def _view_values(view: PictureView, camera: Camera, center: Floats, shades: Floats) -> Floats:
+    """`DetailView` in std140, (28 + 12 SHADE_CAPACITY,); GLSL's matrices are stored by columns."""
+    space = np.zeros(12 * SHADE_CAPACITY)
+    space[: shades.size] = shades.ravel()
+    picture, middle = [*view.half_size, 0.0, 0.0], [*center, len(shades)]
+    values: list[Any] = [view.view_projection.T.ravel(), camera.eye, picture, middle, space]
+    return np.concatenate(values).astype(np.float32)

@@ -1,0 +1,86 @@
+// The detail factors of each strand's segments in one view, and its pieces in all, 0 where the head
+// hides it, and how far it is on average; one invocation a strand. MODE and CULLING are the
+// choices of DetailSettings.
+#include "lib_strand_texel.glsl"
+#include "lib_culling.glsl"
+#include "lib_detail.glsl"
+#include "lib_detail_packing.glsl"
+
+void main()
+{
+  int strand = int(gl_GlobalInvocationID.x);
+  if (strand >= strand_count) {
+    return;
+  }
+  int last = cv_count - 1;
+  vec3 root = texelFetch(cv_points, strand_texel(strand, 0, cv_count), 0).xyz;
+  vec3 from = root;
+  vec3 to = texelFetch(cv_points, strand_texel(strand, 1, cv_count), 0).xyz;
+  vec3 before = 2.0 * from - to;  // beyond its ends the strand goes on straight
+  vec4 clip_before = seen.view_projection * vec4(before, 1.0);
+  vec4 clip_from = seen.view_projection * vec4(from, 1.0);
+  vec4 clip_to = seen.view_projection * vec4(to, 1.0);
+  float angle_from = 0.0;
+  int total = 0;
+  float depth = clip_from.z + clip_to.z;
+#if CULLING == {{culling_hidden}}
+  uint hiding = shades_over(from, (1u << uint(seen.center.w)) - 1u, seen);
+#endif
+
+  int texels = factor_texels(cv_count);
+  for (int texel = 0; texel < texels; texel++) {
+    uvec4 words = uvec4(0x01010101u);
+    for (int index = 0; index < FACTORS_IN_TEXEL; index++) {
+      int segment = texel * FACTORS_IN_TEXEL + index;
+      if (segment >= last) {
+        break;
+      }
+      vec3 after = 2.0 * to - from;
+      if (segment + 2 <= last) {
+        after = texelFetch(cv_points, strand_texel(strand, segment + 2, cv_count), 0).xyz;
+      }
+#if CULLING == {{culling_hidden}}
+      hiding = shades_over(from + (to - before) / 6.0, hiding, seen);
+      hiding = shades_over(to - (after - from) / 6.0, hiding, seen);
+      hiding = shades_over(to, hiding, seen);
+      before = from;
+#endif
+      vec4 clip_after = seen.view_projection * vec4(after, 1.0);
+      Control control = segment_control(clip_before, clip_from, clip_to, clip_after);
+
+#if MODE == {{mode_adaptive}}
+      float wanted = wang_pieces(control, seen.picture.xy, detail.error, float(detail.most));
+#elif MODE == {{mode_heuristic}}
+      float angle_to = angle_between(to - from, after - to);
+      float wanted = heuristic_pieces(
+          clip_from, clip_to, max(angle_from, angle_to), seen.picture.xy, detail.piece_length);
+      angle_from = angle_to;
+#else
+      float wanted = float(detail.subdivisions);
+#endif
+      int pieces = wanted > 1.0 ? int(min(wanted, float(detail.most))) : 1;
+#if MODE != {{mode_fixed}}
+      pieces = is_outside(control) ? 1 : pieces;
+#endif
+      total += pieces;
+      words[index >> 2] += uint(pieces - 1) << uint((index & 3) << 3);
+
+      from = to;
+      to = after;
+      clip_before = clip_from;
+      clip_from = clip_to;
+      clip_to = clip_after;
+      depth += segment + 2 <= last ? clip_after.z : 0.0;
+    }
+    imageStore(factors, strand_texel(strand, texel, texels), uintBitsToFloat(words));
+  }
+#if CULLING == {{culling_hidden}}
+  total = hiding != 0u ? 0 : total;
+#elif CULLING == {{culling_away}}
+  total = faces_away(root, seen) ? 0 : total;
+#endif
+#if MODE == {{mode_fixed}}
+  depth = 0.0;  // where no strand is left out there is one draw, in which strands keep their order
+#endif
+  imageStore(totals, strand_texel(strand, 0, 1), vec4(float(total), depth / float(cv_count), 0.0, 0.0));
+}

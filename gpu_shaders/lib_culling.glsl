@@ -1,0 +1,34 @@
+// Strands that the head hides.
+//
+// Twin of addon/refine/culling.py, which has the figure. Needs the struct DetailView. Holds no
+// resources.
+
+// Whether a point lies in the region behind a ball: with s = (point - origin) . axis,
+// s >= nearest and |point - origin - s axis|^2 <= width + slope s^2.
+bool is_shaded(vec3 point, int index, DetailView seen)
+{
+  vec4 origin_nearest = seen.shades[3 * index];
+  vec4 axis_width = seen.shades[3 * index + 1];
+  float slope = seen.shades[3 * index + 2].x;
+  vec3 away = point - origin_nearest.xyz;
+  float along = dot(away, axis_width.xyz);
+  vec3 across = away - along * axis_width.xyz;
+  return along >= origin_nearest.w && dot(across, across) <= axis_width.w + slope * along * along;
+}
+
+// Those of the regions, bits of a number, that a point lies in.
+uint shades_over(vec3 point, uint regions, DetailView seen)
+{
+  for (int index = 0; index < int(seen.center.w) && regions != 0u; index++) {
+    uint region = 1u << uint(index);
+    regions &= is_shaded(point, index, seen) ? ~0u : ~region;
+  }
+  return regions;
+}
+
+// Whether a strand grows on the far side of the head.
+bool faces_away(vec3 root, DetailView seen)
+{
+  vec3 to_eye = seen.eye.xyz - seen.eye.w * root;
+  return dot(root - seen.center.xyz, to_eye) < 0.0;
+}

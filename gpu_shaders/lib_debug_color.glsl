@@ -1,0 +1,27 @@
+// Colours that tell whole numbers apart, for the debug views.
+//
+// Holds no resources.
+#include "lib_strand_noise.glsl"
+
+// Fully saturated, of a hue in 0..1.
+vec3 hue_color(float hue)
+{
+  vec3 away = abs(fract(hue + vec3(0.0, 2.0, 1.0) / 3.0) * 6.0 - 3.0);
+  return clamp(away - 1.0, 0.0, 1.0);
+}
+
+// A detail factor of 1 to 64 by its logarithm: from dark blue over green and yellow to red.
+vec3 detail_color(int pieces)
+{
+  float share = clamp(log2(float(pieces)) / 6.0, 0.0, 1.0);
+  vec3 color = hue_color(0.66 * (1.0 - share));
+  return color * mix(0.5, 1.0, sqrt(share));
+}
+
+// Of a guide or a group: neighbours in number are far apart in hue, a golden section each.
+vec3 index_color(int index)
+{
+  float hue = fract(float(index % 4096) * 0.61803398875);
+  float paler = 0.45 * hash_unit(uint(index), 0u);
+  return mix(hue_color(hue), vec3(1.0), paler) * (1.0 - 0.5 * hash_unit(uint(index), 1u));
+}
