@@ -7,6 +7,7 @@ artist's buttons and from the command line alike.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -22,11 +23,14 @@ from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance as advance_dynamics
 from .dynamics.way import bow
 from .errors import HairloomError
+from .groom.children import make_children
+from .groom.children_settings import ChildrenSettings
 from .groom.guides import choose_guides
 from .groom.roots import RootFrames, bind_roots, follow, root_frames
 from .groom.settings import GuideSettings
-from .groom.weights import GuideWeights, guide_weights
+from .groom.weights import GUIDES_PER_STRAND, GuideWeights, guide_weights
 from .refine.interpolate import ride
+from .refine.thinning import even_ranks
 from .shading.ambient import AmbientSettings, ambient_occlusion, skin_occlusion
 from .strands import StrandSet, Surface
 from .strands.resample import resample
@@ -51,8 +55,10 @@ class Rig:
     """A groom made ready to move: all strands at one CV count, their guides and weights.
 
     strands: uniform, world space at rest; bound when there is a head.
-    guides: (guide_count,) indices of the strands that are simulated.
+    guides: (guide_count,) indices of the strands that are simulated; where children are made they
+        are the first ones, and the children follow in the order in which they are grown.
     rest_frames: of all strands, or None without a head.
+    notes: what the artist should know, each with its remedy.
     """
 
     strands: StrandSet
@@ -60,6 +66,7 @@ class Rig:
     guides: Ints
     weights: GuideWeights
     rest_frames: RootFrames | None
+    notes: tuple[str, ...] = ()
 
     @property
     def rest_pose(self) -> Pose:
@@ -91,14 +98,24 @@ class Motion:
 
 
 def prepare(
-    strands: StrandSet, head: Surface | None, settings: GuideSettings, *, place: str
+    strands: StrandSet,
+    head: Surface | None,
+    settings: GuideSettings,
+    *,
+    place: str,
+    children: ChildrenSettings | None = None,
+    density: Floats | None = None,
 ) -> Rig:
     """Bind strands to the head, choose the guides, weigh them for every strand.
+
+    Where children are wanted, they and the guides are all the hair there is.
 
     Args:
         strands: world space at rest.
         head: world space at rest, or None for hair that only follows its object.
         place: names the groom in error messages.
+        children: None is none.
+        density: (vertex_count,) how densely children grow; None: wherever guides are near.
 
     Raises:
         HairloomError: no strands, or a groom of another scale than the head.
@@ -110,6 +127,8 @@ def prepare(
     bound = strands if head is None else bind_roots(strands, head, place=place).strands
     uniform = resample(bound, settings.cv_count)
     guides = choose_guides(uniform, settings)
+    if children is not None and children.way != "none":
+        return _with_children(uniform.take(guides), head, children, density, place)
     grid, group = uniform.grid, uniform.group
     weights = guide_weights(
         uniform.roots,
@@ -120,6 +139,43 @@ def prepare(
         guide_grid=grid[guides],
     )
     return Rig(uniform, head, guides, weights, _frames(uniform, head))
+
+
+def _with_children(
+    guides: StrandSet,
+    head: Surface | None,
+    settings: ChildrenSettings,
+    density: Floats | None,
+    place: str,
+) -> Rig:
+    """Guides, each of which rides on itself, and what grows between them."""
+    own = np.arange(guides.strand_count, dtype=np.int32)
+    each = np.repeat(own[:, None], GUIDES_PER_STRAND, axis=1)
+    alone = np.zeros(each.shape, np.float32)
+    alone[:, 0] = 1.0
+    if head is None:
+        note = (
+            "Children need a surface to grow from, so only the guides are shown. Give the hair a "
+            "surface, or set Children to None."
+        )
+        return Rig(guides, None, own, GuideWeights(each, alone), None, (note,))
+    made = make_children(guides, head, settings, density, place=place)
+    strands = _joined(guides, made.strands)
+    weights = GuideWeights(
+        np.concatenate([each, made.weights.guide]), np.concatenate([alone, made.weights.weight])
+    )
+    return Rig(strands, head, own, weights, _frames(strands, head), made.notes)
+
+
+def _joined(one: StrandSet, other: StrandSet) -> StrandSet:
+    """Both, one after the other; what only one of them knows of its roots is left out."""
+    both: dict[str, Any] = {}
+    for name in ("points", "radius", "group", "root_uv", "root_triangle", "root_barycentric"):
+        parts = [getattr(one, name), getattr(other, name)]
+        both[name] = None if any(part is None for part in parts) else np.concatenate(parts)
+    return StrandSet(
+        offsets=np.concatenate([one.offsets, other.offsets[1:] + one.offsets[-1]]), **both
+    )
 
 
 def _frames(strands: StrandSet, head: Surface | None) -> RootFrames | None:
@@ -201,6 +257,20 @@ def rest_occlusion(rig: Rig, settings: AmbientSettings) -> Floats:
 def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:
     """The light that the hair lets through to the head, (vertex_count,); None without a head."""
     return None if rig.head is None else skin_occlusion(rig.strands, rig.head, settings)
+
+
+def strand_ranks(rig: Rig) -> Floats:
+    """Where each strand stands in an even order, (strand_count,) in 0 to 1: the strands of low
+    rank alone are the same hair, only sparser.
+
+    Children come in the order in which they were grown, which is such an order, after the guides.
+    """
+    guide_count, count = len(rig.guides), rig.strands.strand_count
+    if not np.array_equal(rig.guides, np.arange(guide_count)):
+        return even_ranks(rig.strands.roots)
+    ranks = np.arange(count, dtype=np.float32) / np.float32(count)
+    ranks[:guide_count] = even_ranks(rig.strands.roots[:guide_count]) * (guide_count / count)
+    return ranks
 
 
 def cards_of(rig: Rig, settings: CardSettings, ambient: AmbientSettings) -> CardMesh:

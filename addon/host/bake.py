@@ -23,6 +23,7 @@ from .objects import Handle
 from .report import environment
 from .session import Session
 from .simulated import Simulated
+from .source import wanted_density
 
 
 @dataclass
@@ -35,6 +36,7 @@ class _Part:
     session: Simulated | None = None
     writer: CacheWriter | None = None
     fingerprint: str = ""
+    notes: tuple[str, ...] = ()
 
     def go(self, frame: int, depsgraph: bpy.types.Depsgraph) -> None:
         """Simulate and write this frame, if it is one of its own."""
@@ -44,6 +46,7 @@ class _Part:
             session = self.session = simulated_for(self.found(), depsgraph)
             session.play(depsgraph)
             self.fingerprint = session.fingerprint(depsgraph)
+            self.notes = session.rig.notes if isinstance(session, Session) else ()
             self.writer = CacheWriter(self.folder)
             self.writer.add_constants(session.constants())
         else:
@@ -100,7 +103,8 @@ class Bake:
             folder: in place of the objects' own folders; several objects get one below it each.
 
         Raises:
-            HairloomError: nothing to bake, no frames, or no place to write to.
+            HairloomError: nothing to bake, no frames, no place to write to, or no such weights as
+                children are to grow by.
         """
         if not objects:
             raise HairloomError(
@@ -108,6 +112,8 @@ class Bake:
             )
         parts = []
         for obj in objects:
+            if obj.type == "CURVES":
+                wanted_density(obj, bpy.context.evaluated_depsgraph_get())
             if folder is not None:
                 obj.hairloom.bake.folder = str(folder / obj.name if len(objects) > 1 else folder)
             own = frames_of(obj, scene) if frames is None else frames
@@ -125,6 +131,11 @@ class Bake:
     @property
     def _last(self) -> int:
         return max(part.frames.stop - 1 for part in self.parts)
+
+    @property
+    def notes(self) -> list[str]:
+        """What the artist should know about what was baked so far."""
+        return [f"{part.handle.name}: {note}" for part in self.parts for note in part.notes]
 
     def objects(self) -> list[bpy.types.Object]:
         return [part.found() for part in self.parts]

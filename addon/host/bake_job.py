@@ -13,7 +13,7 @@ from ..params import Settings
 from . import playback
 from .bake import Bake, bakeable, show_in_renders
 from .bake_settings import folder_of
-from .jobs import Job
+from .jobs import Job, tell_notes
 from .overrides import overrides
 from .presets import named_preset
 from .properties import settings_of
@@ -39,6 +39,7 @@ def bake(job: Job) -> None:
     for _ in steps:  # what is left is to put the bakes in place
         raise AssertionError("a bake has as many steps as frames")
     show_in_renders(objects, bpy.context.evaluated_depsgraph_get())
+    tell_notes(plan.notes, report)
     _tell(objects, report)
     if options.save:
         bpy.ops.wm.save_mainfile()

@@ -77,6 +77,7 @@ def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
         "weight_guide": rig.weights.guide,
         "weight": rig.weights.weight,
         "hair_rest": rests.hair,
+        "notes": np.array(rig.notes, np.str_),
     }
     if rig.head is not None and rests.head is not None:
         assert strands.root_triangle is not None and strands.root_barycentric is not None
@@ -125,7 +126,8 @@ def _rig_of(arrays: Arrays) -> BakedRig:
     _check_indices(arrays["guides"], count)
     _check_indices(arrays["weight_guide"], len(arrays["guides"]))
     weights = GuideWeights(arrays["weight_guide"], arrays["weight"])
-    rig = Rig(strands, head, arrays["guides"], weights, frames)
+    notes = tuple(str(note) for note in arrays.get("notes", ()))
+    rig = Rig(strands, head, arrays["guides"], weights, frames, notes)
     rests = RestMatrices(arrays["hair_rest"], arrays.get("head_rest"))
     return BakedRig(rig, rests, used_vertices(rig))
 

@@ -30,6 +30,14 @@ def is_edited(session: Session, edited: set[int]) -> bool:
     return hair is not None and not (is_carried and len(hair.modifiers))
 
 
+def is_weighted_anew(session: Session, edited: set[int]) -> bool:
+    """Whether the head's own mesh changed, and with it maybe the weights that children grow by."""
+    if session.head is None or not session.choices.children_density:
+        return False
+    head = session.head.handle.find()
+    return head is not None and head.data.session_uid in edited
+
+
 def is_among(session: Session, moved: set[int]) -> bool:
     """Whether the groom or its head has moved."""
     bodies = (session.hair, session.head)

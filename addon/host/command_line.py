@@ -100,6 +100,12 @@ def _add_source_options(verb: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="the same for how long hair grows, as a share of grow.length",
     )
+    sources.add_argument(
+        "--children-density",
+        default="",
+        metavar="NAME",
+        help="the same for how densely children grow (--set children.way=multi)",
+    )
     sources.add_argument("--groom-up", choices=("Y", "Z"), default="Y", help="up in a groom file")
     sources.add_argument("--no-uv", action="store_true", help="accept a head without UVs")
     sources.add_argument(
@@ -181,6 +187,7 @@ def _sources(options: argparse.Namespace) -> Sources:
         need_uv=not options.no_uv,
         density_group=options.density_group,
         length_group=options.length_group,
+        children_density=options.children_density,
     )
 
 

@@ -10,29 +10,34 @@ import bpy
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..groom.settings import GuideSettings
 from .carriers import is_deforming
+from .choices import Choices
 from .curves import GROUP_ATTRIBUTES
 from .objects import matrix_of
 from .obstacles import shape_of, sources_of
-from .simulated import SOLVER_VERSION, hashes
+from .simulated import SOLVER_VERSION, Hashed, hashes
 from .surfaces import read_positions
+from .vertex_weights import weight_names, weights_on
 
 #: What of the fingerprint makes the rig.
-RIG_PARTS = ("hair", "head", "guides")
+RIG_PARTS = ("hair", "head", "guides", "children")
 
 
 def groom_fingerprint(
     hair: bpy.types.Object,
     head: bpy.types.Object | None,
-    guides: GuideSettings,
+    choices: Choices,
     scene: bpy.types.Scene,
 ) -> str:
     """Named hashes, see `simulated.hashes`; their names are what an artist is told has changed."""
+    grown: dict[str, tuple[Hashed, ...]] = {}
+    if choices.children.way != "none":  # bakes of older versions know of no children
+        grown["children"] = choices.children, _density_before_modifiers(head, choices)
     return hashes(
         hair=_curves_parts(hair),
         head=() if head is None else mesh_parts(head),
-        guides=guides,
+        guides=choices.guides,
+        **grown,
         colliders=collider_shapes(hair, head),
         frame_rate=frame_rate(scene),
         solver=str(SOLVER_VERSION),
@@ -68,6 +73,14 @@ def collider_shapes(
 def frame_rate(scene: bpy.types.Scene) -> float:
     """[1/s]"""
     return float(scene.render.fps) / float(scene.render.fps_base)
+
+
+def _density_before_modifiers(head: bpy.types.Object | None, choices: Choices) -> Hashed:
+    """What children grow by on the head; the name alone where modifiers make it."""
+    name = choices.children_density
+    if head is None or name not in weight_names(head):
+        return name
+    return weights_on(head, head.data, name)
 
 
 def _curves_parts(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:

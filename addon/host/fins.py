@@ -24,10 +24,9 @@ from .fingerprints import collider_places, collider_shapes, frame_rate, mesh_par
 from .objects import Body, matrix_of
 from .obstacles import Obstacles
 from .properties import settings_of
-from .session import gravity_of
 from .simulated import SOLVER_VERSION, Arrays, hashes
 from .vertex_weights import read_weights
-from .wind import scene_wind
+from .wind import gravity_of, scene_wind
 
 
 class FinSession:

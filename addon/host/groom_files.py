@@ -12,9 +12,11 @@ import bpy
 from .. import pipeline
 from ..cards.settings import CardSettings
 from ..exchange.tressfx import read_tfx, write_tfx
+from ..groom.children_settings import ChildrenSettings
 from ..groom.grow import grow, scalp_density
 from ..groom.roots import bind_roots
 from ..groom.settings import GrowSettings, GuideSettings
+from ..pipeline import Rig
 from ..shading.ambient import AmbientSettings
 from ..shading.settings import ShadingSettings
 from ..shading.textures import TextureSettings
@@ -22,7 +24,7 @@ from ..strands import StrandSet
 from .card_files import CardChoices, write_cards
 from .curves import write_curves
 from .properties import settings_of
-from .source import read_source
+from .source import Source, read_source
 from .surfaces import read_surface
 from .vertex_weights import read_weights
 
@@ -96,8 +98,7 @@ def export_cards(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, path: P
         HairloomError: no hair that can be used, or the file cannot be written.
     """
     source, groom = read_source(hair, depsgraph), hair.data.hairloom
-    guides = settings_of(groom.guides, GuideSettings)
-    rig = pipeline.prepare(source.strands, source.head, guides, place=hair.name)
+    rig = _rig(hair, source)
     choices = CardChoices(
         settings_of(groom.cards, CardSettings),
         settings_of(groom.card_texture, TextureSettings),
@@ -106,24 +107,43 @@ def export_cards(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, path: P
     )
     mesh, sidecar = write_cards(path, rig, choices)
     result = f"Wrote {mesh.card_count:,} cards to {path.name} and {sidecar.name}"
-    return Outcome(result, source.dropped, source.warnings)
+    return Outcome(result, source.dropped, (*source.warnings, *_told(hair, rig)))
 
 
 def export_tfx(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, path: Path, *, up: str, scale: float
 ) -> Outcome:
-    """Write all strands as Blender shows them as TressFX.
+    """Write all strands as TressFX: as Blender shows them, or guides and children if there are any.
 
     Raises:
         HairloomError: no strands, or the file cannot be written.
     """
     source = read_source(hair, depsgraph)
-    strands = source.strands
-    if source.head is not None and strands.strand_count:
+    strands, notes = source.strands, tuple[str, ...]()
+    if hair.data.hairloom.children.way != "none":
+        rig = _rig(hair, source)
+        strands, notes = rig.strands, _told(hair, rig)
+    elif source.head is not None and strands.strand_count:
         strands = bind_roots(strands, source.head, place=hair.name).strands
     write_tfx(path, strands, up=up, scale=scale)
     result = f"Wrote {strands.strand_count:,} strands to {path.name}"
-    return Outcome(result, source.dropped, source.warnings)
+    return Outcome(result, source.dropped, (*source.warnings, *notes))
+
+
+def _rig(hair: bpy.types.Object, source: Source) -> Rig:
+    groom = hair.data.hairloom
+    return pipeline.prepare(
+        source.strands,
+        source.head,
+        settings_of(groom.guides, GuideSettings),
+        place=hair.name,
+        children=settings_of(groom.children, ChildrenSettings),
+        density=source.density,
+    )
+
+
+def _told(hair: bpy.types.Object, rig: Rig) -> tuple[str, ...]:
+    return tuple(f"{hair.name}: {note}" for note in rig.notes)
 
 
 def dropped_phrase(dropped: dict[str, int]) -> str:

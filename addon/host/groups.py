@@ -11,8 +11,10 @@ from ..parameters import ALL_SETTINGS
 from . import reactions
 from .bake_group import HAIRLOOM_PG_bake
 from .fin_group import FIN_PROPERTIES
+from .objects import head_of
 from .obstacle_reader import SHAPES
 from .properties import property_annotations, property_group
+from .vertex_weights import weight_names
 
 GROOM_SECTIONS = (
     "guides",
@@ -25,6 +27,14 @@ GROOM_SECTIONS = (
     "card_texture",
 )
 CHARACTER_SECTIONS = ("dynamics", "fin")
+
+
+_DEBUG_VIEWS = (
+    ("none", "Hair", "Hair as it is shaded"),
+    ("detail", "Detail", "Each segment by the number of pieces it is divided into"),
+    ("guide", "Guides", "Each strand by the guide that it follows most"),
+    ("group", "Groups", "Each strand by its group"),
+)
 
 
 def _changed(owner: bpy.types.ID) -> None:
@@ -44,6 +54,14 @@ def _pointers(sections: tuple[str, ...]) -> dict[str, Any]:
 
 def _is_mesh(_group: Any, obj: bpy.types.Object) -> bool:
     return obj.type == "MESH"
+
+
+def _densities(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+    """What children may grow by on the head of this hair."""
+    hair = group.id_data
+    head = head_of(hair) if hair.type == "CURVES" else None
+    names = [] if head is None else weight_names(head)
+    return [name for name in names if typed.lower() in name.lower()]
 
 
 SECTION_GROUPS = {
@@ -78,6 +96,27 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         **_pointers(CHARACTER_SECTIONS),
         "bake": PointerProperty(
             type=HAIRLOOM_PG_bake, name="Bake", description="How and where this object is baked"
+        ),
+        "children_density": StringProperty(
+            name="Density",
+            description="Vertex group or float attribute on points of the surface that says how "
+            "densely children grow; empty: wherever guides are near",
+            search=_densities,
+            search_options={"SUGGESTION"},
+            update=lambda self, _context: reactions.settings_changed(self.id_data),
+        ),
+        "debug_view": EnumProperty(
+            items=_DEBUG_VIEWS,
+            name="Show",
+            description="What the strands of the preview are coloured by",
+            update=lambda self, _context: reactions.settings_changed(self.id_data),
+        ),
+        "show_counts": BoolProperty(
+            name="Counts",
+            description="Write into the viewport how many guides, strands, pieces and vertices are "
+            "drawn; with a colouring they are always there",
+            default=False,
+            update=lambda self, _context: reactions.settings_changed(self.id_data),
         ),
         "collider": PointerProperty(
             type=bpy.types.Object,

@@ -33,6 +33,7 @@ class Sources:
     need_uv: whether a head without UVs is refused.
     density_group, length_group: vertex groups or attributes of a head in the open scene, by name,
         for hair that is grown here.
+    children_density: the same for the children between guides.
     """
 
     groom: str | None = None
@@ -44,11 +45,15 @@ class Sources:
     need_uv: bool = True
     density_group: str = ""
     length_group: str = ""
+    children_density: str = ""
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """What was found, in world space at rest."""
+    """What was found, in world space at rest.
+
+    density: (vertex_count,) how densely children grow on the head, or None.
+    """
 
     strands: StrandSet
     dropped: dict[str, int]
@@ -56,6 +61,7 @@ class Inputs:
     head: Surface | None
     head_object: str | None
     collider: Surface | None
+    density: Floats | None
 
 
 def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
@@ -80,7 +86,9 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
         collider = _read_mesh(sources.collider, need_uv=False)
     head_object = bpy.data.objects.get(head_name or "")
     name = sources.groom or BUILT_IN
-    return Inputs(strands, dropped, name, head, head_object and head_object.name, collider)
+    children = _weights(sources.children_density, head_name)
+    found = head_object and head_object.name
+    return Inputs(strands, dropped, name, head, found, collider, children)
 
 
 def _read_head(name: str | None, sources: Sources) -> Surface | None:

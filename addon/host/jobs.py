@@ -15,9 +15,11 @@ from ..dynamics.colliders import DistanceField
 from ..dynamics.settings import DynamicsSettings
 from ..errors import HairloomError
 from ..exchange.tressfx import write_tfx
+from ..groom.children_settings import ChildrenSettings
 from ..groom.settings import GrowSettings, GuideSettings
 from ..params import Settings
 from ..pipeline import Pose, Rig
+from ..refine.settings import DetailSettings
 from ..shading.ambient import AmbientSettings
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..shading.textures import TextureSettings
@@ -25,7 +27,7 @@ from .card_files import CardChoices, write_cards
 from .images import contact_sheet, write_png
 from .inputs import Inputs, Sources, read_inputs
 from .report import Progress, Report
-from .studio import Studio
+from .studio import Look, Studio
 from .take import Take, TakeDrive, read_take, scene_drive, shaken_poses, write_take
 from .take import simulate as simulate_take
 
@@ -119,8 +121,14 @@ def _rig(job: Job, report: Report) -> tuple[Rig, Inputs]:
     _tell_drops(job, inputs)
     with report.stage("bind roots, choose guides"):
         rig = pipeline.prepare(
-            inputs.strands, inputs.head, job.set(GuideSettings), place=inputs.groom_name
+            inputs.strands,
+            inputs.head,
+            job.set(GuideSettings),
+            place=inputs.groom_name,
+            children=job.set(ChildrenSettings),
+            density=inputs.density,
         )
+    tell_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
     low, high = rig.strands.bounds()
     report.facts.update(
         groom=Path(inputs.groom_name).name,
@@ -146,6 +154,13 @@ def _tell_drops(job: Job, inputs: Inputs) -> None:
             remedy="Mend the groom, or leave out --strict",
         )
     print(f"hairloom: {inputs.groom_name}: dropped strands: {reasons}", flush=True)
+
+
+def tell_notes(notes: list[str], report: Report) -> None:
+    """Say what the artist should know, and put it into the report."""
+    for note in notes:
+        print(f"hairloom: {note}", flush=True)
+    report.facts["notes"] = notes
 
 
 def _simulate(job: Job, rig: Rig, inputs: Inputs, report: Report) -> Take:
@@ -207,7 +222,8 @@ def _studio(job: Job, rig: Rig, report: Report) -> Studio:
     with report.stage("ambient occlusion"):
         occlusion = pipeline.rest_occlusion(rig, job.set(AmbientSettings))
         head_occlusion = pipeline.head_occlusion(rig, job.set(AmbientSettings))
-    return Studio(rig, occlusion, head_occlusion, job.set(ShadingSettings), job.set(StrandSettings))
+    look = Look(job.set(ShadingSettings), job.set(StrandSettings), job.set(DetailSettings))
+    return Studio(rig, occlusion, head_occlusion, look)
 
 
 def _write_still(
@@ -217,6 +233,12 @@ def _write_still(
     options = job.options
     with report.stage("draw still"):
         picture = studio.picture(pose, points, options.width, options.height, options.samples)
+    drawn = studio.statistics
+    report.facts["drawn"] = {
+        "strands": drawn.strands,
+        "pieces": drawn.pieces,
+        "vertices": drawn.vertices,
+    }
     with report.stage("write still"):
         write_png(path, picture)
     report.add_output(path)

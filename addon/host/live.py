@@ -14,10 +14,11 @@ import bpy
 
 from ..errors import HairloomError
 from . import overlay, playback, timeline
-from .objects import spaces_without
+from .objects import is_solid, spaces_without
 from .originals import refresh_views, show_originals
 from .overlay import Drawing
 from .session import Session
+from .shown import with_all_strands
 from .simulated import Simulated
 
 _sessions: dict[int, Simulated] = {}
@@ -237,7 +238,23 @@ def _publish(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     if not isinstance(session, Session):
         return
     hair = session.hair.found()
-    overlay.show(session.uid, Drawing(session.snapshot, hair.visible_get(), spaces_without(hair)))
+    overlay.show(session.uid, _drawing(session, hair))
     is_replaced = hair.mode == "OBJECT" and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original
     show_originals(hair, depsgraph, show=not hides)
+
+
+def _drawing(session: Session, hair: bpy.types.Object) -> Drawing:
+    snapshot, head = session.snapshot, None
+    if session.head is not None:
+        head = session.head.handle.find()
+    if head is None or not is_solid(head):
+        snapshot = with_all_strands(snapshot)
+    return Drawing(
+        snapshot,
+        hair.visible_get(),
+        hidden_in=spaces_without(hair),
+        bare_in=frozenset() if head is None else spaces_without(head),
+        guide_count=len(session.rig.guides),
+        counts_of=hair.name if hair.hairloom.show_counts or snapshot.debug_view != "none" else "",
+    )

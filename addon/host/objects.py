@@ -86,6 +86,11 @@ def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
     return parent if parent is not None and parent.type == "MESH" else None
 
 
+def is_solid(obj: bpy.types.Object) -> bool:
+    """Whether the 3D views show it as something that hides what is behind it."""
+    return bool(obj.visible_get() and obj.display_type in {"SOLID", "TEXTURED"})
+
+
 def spaces_without(obj: bpy.types.Object) -> frozenset[int]:
     """The 3D views in which an object cannot be seen, by address: local view, local collections."""
     return frozenset(

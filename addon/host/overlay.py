@@ -1,6 +1,6 @@
-"""Strands in the 3D viewport: one draw handler for all grooms, drawing from snapshots only.
+"""Strands in the 3D viewport, and their counts: drawn for all grooms, from snapshots only.
 
-It never reads a data-block: all it asks Blender for is which view is being drawn.
+Drawing never reads a data-block: all it asks Blender for is which view is being drawn.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from ..render.camera import Camera
 from ..render.snapshot import Snapshot
 from ..render.strand_pass import StrandPass
 from ..shading.lights import three_point_lights
+from .overlay_text import counts_line, write_lines
+from .shown import with_all_strands
 
 
 @dataclass(frozen=True)
@@ -25,34 +27,43 @@ class Drawing:
     """One groom as it is now.
 
     hidden_in: addresses of the 3D views that do not show it.
+    bare_in: of those that do not show its head, which hides nothing there.
+    counts_of: the name under which its counts are written; empty: they are not.
     """
 
     snapshot: Snapshot
     is_visible: bool = True
     hidden_in: frozenset[int] = frozenset()
+    bare_in: frozenset[int] = frozenset()
+    guide_count: int = 0
+    counts_of: str = ""
 
 
 _drawings: dict[int, Drawing] = {}
 _passes: dict[int, StrandPass] = {}
-_handle: Any = None
+_handles: tuple[Any, ...] = ()
 _failure = ""
 
 
 def show(uid: int, drawing: Drawing) -> None:
     """Draw this groom from now on, in place of what was drawn for it before."""
-    global _handle
+    global _handles
     _drawings[uid] = drawing
-    if _handle is None and not _failure and not bpy.app.background:
-        _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")
+    if not _handles and not _failure and not bpy.app.background:
+        add = bpy.types.SpaceView3D.draw_handler_add
+        _handles = tuple(
+            add(_draw, (draw,), "WINDOW", kind)
+            for draw, kind in ((_draw_strands, "POST_VIEW"), (_draw_counts, "POST_PIXEL"))
+        )
     redraw()
 
 
 def drop(uid: int) -> None:
-    """No longer draw this groom; with the last one the draw handler goes."""
+    """No longer draw this groom; with the last one the draw handlers go."""
     _drawings.pop(uid, None)
     _passes.pop(uid, None)
     if not _drawings:
-        _remove_handler()
+        _remove_handlers()
     redraw()
 
 
@@ -91,24 +102,58 @@ def _redraw(places: set[tuple[str, str]]) -> None:
                     region.tag_redraw()
 
 
-def _draw() -> None:
+def _draw(what: Callable[[Any], None]) -> None:
     """Called by Blender for each 3D view; an error is told once, not at every redraw."""
     if _failure:
         return
     try:
-        _draw_all(bpy.context.space_data, bpy.context.region, bpy.context.region_data)
+        what(bpy.context)
     except Exception as error:
         _fail(error)
 
 
-def _draw_all(space: Any, region: Any, view: Any) -> None:
+def _draw_strands(context: Any) -> None:
+    space, view = context.space_data, context.region_data
     camera = Camera(np.array(view.view_matrix), np.array(view.window_matrix))
     address, light = space.as_pointer(), _lighting(space, camera)
     _, _, width, height = gpu.state.viewport_get()
-    for uid, drawing in _drawings.items():
-        if drawing.is_visible and address not in drawing.hidden_in:
-            strand_pass = _passes.setdefault(uid, StrandPass())
-            strand_pass.draw(light(drawing.snapshot), camera, width, height, output="viewport")
+    for uid, drawing in _shown_in(space):
+        snapshot = drawing.snapshot
+        if is_seen_through(space.shading) or address in drawing.bare_in:
+            snapshot = with_all_strands(snapshot)
+        strand_pass = _passes.setdefault(uid, StrandPass())
+        strand_pass.draw(light(snapshot), camera, width, height, output="viewport")
+
+
+def _draw_counts(context: Any) -> None:
+    """What was drawn of each groom just before, into the same view."""
+    if not context.space_data.overlay.show_overlays:
+        return
+    lines = [
+        counts_line(
+            drawing.counts_of,
+            drawing.guide_count,
+            drawing.snapshot.strand_count,
+            strand_pass.statistics,
+        )
+        for uid, drawing in _shown_in(context.space_data)
+        if drawing.counts_of and (strand_pass := _passes.get(uid)) is not None
+    ]
+    write_lines(context, lines)
+
+
+def _shown_in(space: Any) -> list[tuple[int, Drawing]]:
+    address = space.as_pointer()
+    return [
+        (uid, drawing)
+        for uid, drawing in _drawings.items()
+        if drawing.is_visible and address not in drawing.hidden_in
+    ]
+
+
+def is_seen_through(shading: Any) -> bool:
+    """Whether a view shows what is behind heads."""
+    return shading.type == "WIREFRAME" or (shading.type == "SOLID" and shading.show_xray)
 
 
 def _lighting(space: Any, camera: Camera) -> Callable[[Snapshot], Snapshot]:
@@ -138,14 +183,14 @@ def _fail(error: Exception) -> None:
 
 def _tell_failure() -> None:
     """Outside of drawing, where the handler may be removed and the window be told."""
-    _remove_handler()
+    _remove_handlers()
     bpy.context.workspace.status_text_set(_failure.splitlines()[0])
     bpy.context.scene.update_tag()  # Blender's own strands are to be seen again
     redraw_panels()
 
 
-def _remove_handler() -> None:
-    global _handle
-    if _handle is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
-        _handle = None
+def _remove_handlers() -> None:
+    global _handles
+    for handle in _handles:
+        bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
+    _handles = ()

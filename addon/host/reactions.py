@@ -14,7 +14,7 @@ from functools import partial
 import bpy
 
 from . import live, overlay, playback, timeline
-from .changes import changes, is_among, is_edited
+from .changes import changes, is_among, is_edited, is_weighted_anew
 from .originals import refresh_views
 from .session import Session
 from .simulated import Simulated
@@ -51,7 +51,7 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
     """Blender has evaluated the scene: follow what moved, read again what was edited."""
     moved, edited, is_lit_anew = changes(depsgraph)
     for session in live.sessions():
-        if is_edited(session, edited):
+        if is_edited(session, edited) or is_weighted_anew(session, edited):
             session.is_stale = True
             _read_again_soon()
         follows = not live.is_free(session) and is_among(session, moved)

@@ -1,7 +1,4 @@
-"""The live session of one groom: read once, then carried, simulated and drawn from arrays.
-
-A session holds numbers and arrays, never a reference into Blender's data.
-"""
+"""The live session of one groom: read once, then carried, simulated and drawn from arrays."""
 
 from __future__ import annotations
 
@@ -13,24 +10,19 @@ import numpy as np
 from .. import pipeline
 from ..arrays import Floats
 from ..errors import HairloomError
-from ..pipeline import Pose, Rig
-from ..render.snapshot import Snapshot
-from ..strands import StrandSet
+from ..pipeline import Motion, Pose, Rig
 from .baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays, used_vertices
 from .choices import Choices
-from .fingerprints import collider_places, groom_fingerprint
+from .hiders import Hiders
 from .lights import read_ambient, read_lights
-from .objects import Body, head_of, matrix_of
+from .objects import Body
 from .obstacles import Obstacles
-from .poses import check_finite, read_pose
-from .simulated import Arrays, hashes
-from .solvers import Solver, form_of, solver_of
-from .source import dynamics_warnings, read_source, refuse_own_dynamics, usable_curves
-from .studio import gpu_in_use
-from .wind import scene_wind
-
-#: Blender's names of what it draws and computes by -> those that artists know
-_BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal"}
+from .reading import Reading
+from .shown import snapshot_of, with_choices
+from .simulated import Arrays
+from .solvers import Solver, computed_on, form_of, solver_of
+from .source import Source, dynamics_warnings, refuse_own_dynamics
+from .wind import gravity_of, scene_wind
 
 
 class Session:
@@ -53,25 +45,12 @@ class Session:
         baked: BakedRig | None = None,
         is_drawn: bool = True,
     ) -> None:
-        head = head_of(hair)
-        self.hair = Body.at_rest(hair, depsgraph)
-        self.source = read_source(hair, depsgraph)
-        uses_head = self.source.head is not None and head is not None
-        self.head = Body.at_rest(head, depsgraph) if uses_head else None
-        self.head_uid = head and head.session_uid
+        self._reading = Reading(hair, depsgraph)
         self.obstacles: Obstacles | None = None
         self.is_playing = False
         self.is_stale = False
         self._is_drawn = is_drawn
-        self.choices = Choices.of(hair)
-        check_finite(hair.name, self.hair.rest)
-        if baked is not None and (baked.rests.head is None) == (self.head is None):
-            rig = self._rig_of(baked)
-        else:
-            rig = pipeline.prepare(
-                self.source.strands, self.source.head, self.choices.guides, place=self.name
-            )
-        self._take_rig(rig, depsgraph)
+        self._take_rig(self._reading.rig(baked), depsgraph)
 
     @property
     def uid(self) -> int:
@@ -79,102 +58,99 @@ class Session:
 
     @property
     def name(self) -> str:
-        return self.hair.handle.name
+        return self._reading.name
+
+    @property
+    def hair(self) -> Body:
+        return self._reading.hair
+
+    @property
+    def head(self) -> Body | None:
+        return self._reading.head
+
+    @property
+    def source(self) -> Source:
+        return self._reading.source
+
+    @property
+    def choices(self) -> Choices:
+        """What the artist has set, as far as it is taken over."""
+        return self._reading.choices
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the artist should know about hair, head and colliders."""
+        """What the artist should know about hair, head, children and colliders."""
         hair = self.hair.handle.find()
         doubled = () if hair is None else dynamics_warnings(hair)
         found = () if self.obstacles is None else self.obstacles.warnings
-        return (*self.source.warnings, *doubled, *found)
+        notes = (f"{self.name}: {note}" for note in self.rig.notes)
+        return (*self.source.warnings, *notes, *doubled, *found)
 
     @property
     def computed_on(self) -> str:
         """Such as "GPU (OpenGL, llvmpipe)"."""
-        if self.solver.form == "numpy":
-            return "CPU (numpy)"
-        used = gpu_in_use()
-        backend = _BACKENDS.get(used["backend"], used["backend"])
-        return f"GPU ({backend}, {used['renderer'].partition(' (')[0]})"
+        return computed_on(self.solver.form)
 
     @property
     def strands(self) -> Floats:
         """All strands as they are shown, (strand_count, cv_count, 3) [m]; reads back from a GPU."""
         return self.solver.strands()
 
-    def _take_rig(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> None:
-        """Everything that hangs on the strands and on the choice of guides."""
+    def _take_rig(
+        self, rig: Rig, depsgraph: bpy.types.Depsgraph, motion: Motion | None = None
+    ) -> None:
+        """Everything that hangs on the strands and on the choice of guides.
+
+        Args:
+            motion: to go on from; None: from rest.
+        """
         self.rig = rig
         self._used = used_vertices(rig)
-        self.solver: Solver = solver_of(rig, self.choices.dynamics.form)
-        occlusion = None
+        self.solver: Solver = solver_of(rig, self.choices.dynamics.form, motion)
+        occlusion, rank, self._hiders = None, None, None
         if self._is_drawn:
             occlusion = pipeline.rest_occlusion(rig, self.choices.ambient)
-        self.snapshot = Snapshot(
-            strands=rig.strands.grid,
-            radius=rig.strands.radius.reshape(rig.strands.strand_count, -1),
-            occlusion=occlusion,
-            shading=self.choices.shading,
-            strand_settings=self.choices.strands,
-        )
+            rank = pipeline.strand_ranks(rig)
+            self._hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
+        self.snapshot = with_choices(snapshot_of(rig, occlusion, rank), self.choices)
         self.light(depsgraph)
-        self.rest(depsgraph)
+        if motion is None:
+            self.rest(depsgraph)
+        else:
+            self._show()
         self.is_stale = False
-
-    def _rig_of(self, baked: BakedRig) -> Rig:
-        """The rig of a bake; rest is where hair and head were then."""
-        back = baked.rests.hair @ np.linalg.pinv(self.hair.rest)
-        strands = self.source.strands.transformed(back)
-        self.source = replace(self.source, strands=strands, head=baked.rig.head)
-        self.hair.rest = baked.rests.hair
-        if self.head is not None and baked.rests.head is not None:
-            self.head.rest = baked.rests.head
-        return baked.rig
 
     def has_another_head(self) -> bool:
         """Whether the artist has set another surface since the session began."""
-        head = head_of(self.hair.found())
-        return (head and head.session_uid) != self.head_uid
+        return self._reading.has_another_head()
 
     def read_again(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Take over edited curves and guide settings; what did not change stays as it is.
+        """Take over edited curves and settings of the rig; what did not change stays as it is.
 
-        The curves are taken to be in the pose in which the session began, as edits are.
+        Hair that plays goes on, unless its guides are others now.
         """
-        hair = self.hair.found()
         self.is_stale = False
-        read = usable_curves(hair, depsgraph)
-        back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
-        strands = read.strands if np.allclose(back, np.eye(4)) else read.strands.transformed(back)
-        choices = Choices.of(hair)
-        same_guides = (choices.guides, choices.ambient) == (
-            self.choices.guides,
-            self.choices.ambient,
-        )
-        if same_guides and _same(strands, self.source.strands):
+        if not self._reading.read_again(depsgraph):
             self.take_settings()
             return
-        self.source = replace(self.source, strands=strands, dropped=read.dropped)
-        self.choices = choices
-        rig = pipeline.prepare(strands, self.source.head, choices.guides, place=self.name)
-        self._take_rig(rig, depsgraph)
+        rig = self._reading.rig()
+        goes_on = self.is_playing and _same_guides(rig, self.rig)
+        self._take_rig(rig, depsgraph, self.solver.motion if goes_on else None)
 
     def take_settings(self) -> None:
-        """Take over what acts at once; guide and ambient settings make the session stale.
+        """Take over what acts at once; settings of guides, children and ambient light make the
+        session stale.
 
         Raises:
             HairloomError: the form of computing that was chosen is not to be had here.
         """
-        choices = Choices.of(self.hair.found())
         before = self.choices
-        self.is_stale |= (choices.guides, choices.ambient) != (before.guides, before.ambient)
-        self.choices = replace(choices, guides=before.guides, ambient=before.ambient)
-        self.snapshot = replace(
-            self.snapshot, shading=choices.shading, strand_settings=choices.strands
-        )
-        if choices.dynamics.form != before.dynamics.form:
-            self._change_form(choices.dynamics.form)
+        self.is_stale |= not self._reading.take_choices().acts_at_once(before)
+        self.snapshot = with_choices(self.snapshot, self.choices)
+        if self.choices.detail.culling != before.detail.culling:
+            self._show()
+        if self.choices.dynamics.form != before.dynamics.form:
+            self._change_form(self.choices.dynamics.form)
 
     def _change_form(self, form: str) -> None:
         """Go on where the hair is now, with another solver."""
@@ -258,8 +234,7 @@ class Session:
 
     def constants(self) -> Arrays:
         """See `baked_rig.rig_arrays`."""
-        rests = RestMatrices(self.hair.rest, None if self.head is None else self.head.rest)
-        return rig_arrays(self.rig, rests)
+        return rig_arrays(self.rig, self._reading.rests)
 
     def recorded(self) -> Arrays:
         """See `baked_rig.frame_arrays`."""
@@ -286,39 +261,24 @@ class Session:
 
     def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
-        hair = self.hair.found()
-        head = None if self.head is None else self.head.found()
-        return groom_fingerprint(hair, head, self.choices.guides, depsgraph.scene)
+        return self._reading.fingerprint(depsgraph)
 
     def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
-        pose, hair = self._pose(depsgraph), self.hair.found()
-        head = None if self.head is None else self.head.found()
-        return hashes(
-            pose=pose.matrix if pose.head_positions is None else pose.head_positions,
-            settings=replace(Choices.of(hair).dynamics, form="automatic"),
-            colliders=collider_places(hair, head, depsgraph),
-            forces=(gravity_of(depsgraph.scene), scene_wind(depsgraph)),
-        )
+        return self._reading.moment(self._pose(depsgraph), depsgraph)
 
     def _pose(self, depsgraph: bpy.types.Depsgraph) -> Pose:
-        vertex_count = None if self.rig.head is None else len(self.rig.head.positions)
-        return read_pose(self.hair, self.head, vertex_count, depsgraph)
+        return self._reading.pose(self.rig, depsgraph)
 
     def _show(self) -> None:
-        self.snapshot = self.solver.shown(self.snapshot)
+        hiders = None
+        if self._hiders is not None and self.choices.detail.culling == "hidden":
+            hiders = self._hiders.at(self.solver.pose)
+        self.snapshot = replace(self.solver.shown(self.snapshot), hiders=hiders)
 
 
-def gravity_of(scene: bpy.types.Scene) -> Floats:
-    """(3,) [m/s^2], world space."""
-    return np.array(scene.gravity) if scene.use_gravity else np.zeros(3)
-
-
-def _same(one: StrandSet, other: StrandSet) -> bool:
-    """Whether two readings give the same hair, but for rounding in the object's matrix."""
-    return (
-        np.array_equal(one.offsets, other.offsets)
-        and np.allclose(one.points, other.points, rtol=1e-6, atol=1e-7)
-        and np.allclose(one.radius, other.radius, rtol=1e-5)
-        and np.array_equal(one.group, other.group)
+def _same_guides(one: Rig, other: Rig) -> bool:
+    """Whether what moves the guides of one moves those of the other."""
+    return one.head is other.head and np.array_equal(
+        one.strands.grid[one.guides], other.strands.grid[other.guides]
     )

@@ -22,9 +22,12 @@ from ..render.snapshot import Snapshot
 from ..strands import StrandSet
 from .compute_solver import ComputeSolver
 from .numpy_solver import NumpySolver
+from .studio import gpu_in_use
 
 #: How far apart [m] the two may be after the frame that is tried out.
 _AGREEMENT = 1.0e-4
+#: Blender's names of what it draws and computes by -> those that artists know
+_BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal"}
 
 
 class Solver(Protocol):
@@ -102,6 +105,15 @@ def form_of(form: str) -> str:
     if form == "automatic":
         return "compute" if compute_available() else "numpy"
     return form
+
+
+def computed_on(form: str) -> str:
+    """What computes by a form: "CPU (numpy)", or such as "GPU (OpenGL, llvmpipe)"."""
+    if form == "numpy":
+        return "CPU (numpy)"
+    used = gpu_in_use()
+    backend = _BACKENDS.get(used["backend"], used["backend"])
+    return f"GPU ({backend}, {used['renderer'].partition(' (')[0]})"
 
 
 _problem: str | None = None

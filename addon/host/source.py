@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
+from ..arrays import Floats
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
 from ..strands.clean import Cleaned
 from .curves import read_curves
 from .objects import head_of
 from .surfaces import read_surface
+from .vertex_weights import read_weights
 
 #: node group of the modifier that Blender 5.2 gives to new hair
 _OWN_DYNAMICS = "Hair Dynamics"
@@ -22,13 +25,20 @@ class Source:
     """Hair and head as Blender shows them, in world space.
 
     dropped: reason -> number of curves that cannot be used.
-    warnings: what the artist should know, each with its remedy.
+    density: (vertex_count,) how densely children grow on the head, or None.
+    head_warning, density_warning: what the artist should know, with its remedy; or empty.
     """
 
     strands: StrandSet
     dropped: dict[str, int]
     head: Surface | None
-    warnings: tuple[str, ...]
+    density: Floats | None = None
+    head_warning: str = ""
+    density_warning: str = ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return tuple(filter(None, (self.head_warning, self.density_warning)))
 
 
 def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
@@ -39,7 +49,38 @@ def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sourc
     """
     read = usable_curves(hair, depsgraph)
     head, head_warning = _read_head(hair, depsgraph)
-    return Source(read.strands, read.dropped, head, tuple(filter(None, (head_warning,))))
+    density, density_warning = read_density(hair, head, depsgraph)
+    return Source(read.strands, read.dropped, head, density, head_warning, density_warning)
+
+
+def read_density(
+    hair: bpy.types.Object, head: Surface | None, depsgraph: bpy.types.Depsgraph
+) -> tuple[Floats | None, str]:
+    """How densely children grow on each vertex of the head; without usable weights they grow
+    everywhere, with a warning."""
+    try:
+        return (None if head is None else wanted_density(hair, depsgraph)), ""
+    except HairloomError as error:
+        return None, str(error)
+
+
+def wanted_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats | None:
+    """The weights that the artist wants children to grow by, (vertex_count,); None without.
+
+    Raises:
+        HairloomError: the head has no weights of this name, or none that can be used.
+    """
+    head, name = head_of(hair), hair.hairloom.children_density
+    if head is None or not name or hair.data.hairloom.children.way == "none":
+        return None
+    weights = read_weights(head, depsgraph, name)
+    if np.isfinite(weights).all() and (weights > 0.0).any():
+        return weights
+    raise HairloomError(
+        f"the weights '{name}' are above zero nowhere, or no finite numbers",
+        place=head.name,
+        remedy="Paint where children shall grow, or leave their Density empty",
+    )
 
 
 def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
@@ -111,8 +152,8 @@ def usable_curves(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cle
 
 def _read_head(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
-) -> tuple[Surface | None, str | None]:
-    """The head, if there is a usable one, and a warning."""
+) -> tuple[Surface | None, str]:
+    """The head, if there is a usable one, and a warning or nothing."""
     head = head_of(hair)
     if head is None:
         return None, (
@@ -128,4 +169,4 @@ def _read_head(
             f"{head.name}: it has no UVs, so exported strands know no place on its texture. "
             "Unwrap it (Edit Mode, UV > Unwrap)."
         )
-    return surface, None
+    return surface, ""

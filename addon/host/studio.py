@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import bpy
 import gpu
 import numpy as np
 
+from .. import pipeline
 from ..arrays import Floats
 from ..pipeline import Pose, Rig
+from ..refine.settings import DetailSettings
 from ..render.camera import Camera, frame_camera
 from ..render.frame import render_image
 from ..render.mesh_pass import MeshPass
-from ..render.snapshot import MeshSnapshot, Snapshot
-from ..render.strand_pass import StrandPass
+from ..render.snapshot import MeshSnapshot
+from ..render.strand_pass import Statistics, StrandPass
 from ..shading.lights import three_point_lights
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..strands import Surface
+from .hiders import Hiders
+from .shown import snapshot_of
 
 #: three-quarter view from the front; heads face -Y
 VIEW_DIRECTION = (-0.55, -1.0, 0.18)
@@ -25,6 +31,16 @@ HEAD_ROOM = 0.25
 #: below 1, because nothing fills the corners of the box that the camera holds
 MARGIN = 0.85
 BACKDROP = (0.045, 0.05, 0.058, 1.0)
+
+
+@dataclass(frozen=True)
+class Look:
+    """How strands are drawn. debug_view: what they are coloured by, see render.snapshot."""
+
+    shading: ShadingSettings
+    strands: StrandSettings
+    detail: DetailSettings
+    debug_view: str = "none"
 
 
 class Studio:
@@ -40,35 +56,52 @@ class Studio:
         rig: Rig,
         occlusion: Floats,
         head_occlusion: Floats | None,
-        shading: ShadingSettings,
-        strands: StrandSettings,
+        look: Look,
     ) -> None:
         ensure_gpu()
-        self._rig, self._occlusion, self._head_occlusion = rig, occlusion, head_occlusion
-        self._shading, self._strands = shading, strands
+        self._rig, self._head_occlusion = rig, head_occlusion
         self._passes = MeshPass(), StrandPass()
-        self._radius = rig.strands.radius.reshape(rig.strands.strand_count, -1)
+        self._hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
+        self._at_rest = replace(
+            snapshot_of(rig, occlusion, pipeline.strand_ranks(rig)),
+            shading=look.shading,
+            strand_settings=look.strands,
+            detail=look.detail,
+            debug_view=look.debug_view,
+        )
 
-    def picture(self, pose: Pose, points: Floats, width: int, height: int, samples: int) -> Floats:
+    def picture(
+        self,
+        pose: Pose,
+        points: Floats,
+        width: int,
+        height: int,
+        samples: int,
+        camera: Camera | None = None,
+    ) -> Floats:
         """Hair at these points on the head in this pose, (height, width, 4) scene-linear.
 
         Args:
             points: (strand_count, cv_count, 3) [m], world space.
             samples: sub-pixels along each side of a pixel.
+            camera: in place of the studio's own.
         """
-        camera = self._camera(width / height)
-        snapshot = Snapshot(
+        camera = camera or self._camera(width / height)
+        snapshot = replace(
+            self._at_rest,
             strands=points,
-            radius=self._radius,
-            occlusion=self._occlusion,
             meshes=self._meshes(pose),
             lights=three_point_lights(camera.view),
-            shading=self._shading,
-            strand_settings=self._strands,
+            hiders=None if self._hiders is None else self._hiders.at(pose),
         )
         return render_image(
             snapshot, camera, width, height, samples, background=BACKDROP, passes=self._passes
         )
+
+    @property
+    def statistics(self) -> Statistics:
+        """What was drawn of the hair in the last picture."""
+        return self._passes[1].statistics
 
     def _camera(self, aspect: float) -> Camera:
         """Holds the groom at rest and what of the head is near it, with room for the motion."""

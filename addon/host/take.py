@@ -23,9 +23,8 @@ from ..exchange.atomic import atomic_write
 from ..pipeline import Pose, Rig
 from .fingerprints import frame_rate
 from .objects import Body
-from .session import gravity_of
 from .surfaces import read_positions
-from .wind import scene_wind
+from .wind import gravity_of, scene_wind
 
 #: the shake: how far the head turns and sways, and how often
 SHAKE_ANGLE = np.radians(25.0)

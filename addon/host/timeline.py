@@ -176,7 +176,7 @@ def rig_for(hair: bpy.types.Object, scene: bpy.types.Scene) -> BakedRig | None:
         cache = playback.cache_of(hair)
         if cache is None:
             return None
-        now = groom_fingerprint(hair, head_of(hair), Choices.of(hair).guides, scene)
+        now = groom_fingerprint(hair, head_of(hair), Choices.of(hair), scene)
         changed = differences(cache.facts.fingerprint, now)
         return None if set(changed) & set(RIG_PARTS) else playback.rig_in(cache)
     except HairloomError:  # told when the bake is to be shown

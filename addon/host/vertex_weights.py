@@ -34,12 +34,13 @@ def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: st
     evaluated = obj.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
-        return _weights(obj, mesh, name)
+        return weights_on(obj, mesh, name)
     finally:
         evaluated.to_mesh_clear()
 
 
-def _weights(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> Floats:
+def weights_on(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> Floats:
+    """As `read_weights`, on a mesh of this object: before its modifiers or after them."""
     group = obj.vertex_groups.get(name)
     if group is not None:
         return _group_weights(mesh, group.index)

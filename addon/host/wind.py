@@ -1,4 +1,4 @@
-"""The wind of the scene's force fields."""
+"""The scene's gravity, and the wind of its force fields."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ import bpy
 import numpy as np
 
 from ..arrays import Floats
+
+
+def gravity_of(scene: bpy.types.Scene) -> Floats:
+    """(3,) [m/s^2], world space."""
+    return np.array(scene.gravity) if scene.use_gravity else np.zeros(3)
 
 
 def scene_wind(depsgraph: bpy.types.Depsgraph) -> Floats:

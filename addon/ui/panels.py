@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import bpy
@@ -11,16 +11,9 @@ from ..host import live, timeline
 from ..host.groom_files import dropped_phrase
 from ..host.session import Session
 from ..host.source import own_dynamics
-from ..params import Parameter
 from .messages import draw_lines, draw_message
-from .operators_bake import draw_bake
-from .operators_colliders import draw_colliders
+from .sections import SECTIONS, SUB_SECTIONS, Draw
 from .selection import chosen_hair
-
-type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
-
-#: places of a curve's five values
-_PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
 
 
 def _hair(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -54,6 +47,9 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
         layout.operator("hairloom.grow", icon="OUTLINER_OB_CURVES")
         layout.operator("hairloom.import_tfx", icon="IMPORT")
         return
+    row = layout.row(align=True)
+    row.prop(hair.hairloom, "debug_view")
+    row.prop(hair.hairloom, "show_counts", text="", icon="INFO")
     layout.prop(hair.hairloom, "hide_original")
     if own_dynamics(hair):
         layout.operator("hairloom.mute_hair_dynamics", icon="MUTE_IPO_ON")
@@ -77,104 +73,6 @@ def _moved_by(session: Session) -> str:
         return "Shown from the bake" + (", which is out of date" if baked.changed else "")
     computed = "Simulated" if session.is_playing else "To be simulated"
     return f"{computed} on the {session.computed_on}"
-
-
-def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    layout.menu("HAIRLOOM_MT_looks")
-    _draw_group(layout, hair.data.hairloom.shading)
-
-
-def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    _draw_group(layout, hair.data.hairloom.strands)
-    _draw_titled(layout, hair.data.hairloom.ambient)
-
-
-def draw_guides(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    _draw_group(layout, hair.data.hairloom.guides)
-
-
-def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """What the sections below leave out."""
-    layout.menu("HAIRLOOM_MT_dynamics")
-    group = hair.hairloom.dynamics
-    below = {name for names in DYNAMICS.values() for name in names}
-    names = [p.name for p in group.settings.parameters() if p.name not in below]
-    _draw_named(layout, group, names)
-
-
-def draw_collisions(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    draw_colliders(layout, hair)
-    _draw_named(layout, hair.hairloom.dynamics, DYNAMICS["Collisions"])
-
-
-def _dynamics_section(label: str) -> Draw:
-    def draw(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-        _draw_named(layout, hair.hairloom.dynamics, DYNAMICS[label])
-
-    return draw
-
-
-def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    layout.operator("hairloom.export_cards", icon="EXPORT")
-    layout.operator("hairloom.export_tfx", icon="EXPORT")
-    _draw_titled(layout, hair.data.hairloom.cards)
-    _draw_titled(layout, hair.data.hairloom.card_texture)
-
-
-def _draw_titled(layout: bpy.types.UILayout, group: Any) -> None:
-    layout.label(text=group.settings.title)
-    _draw_group(layout, group)
-
-
-def _draw_group(layout: bpy.types.UILayout, group: Any) -> None:
-    _draw_named(layout, group, [parameter.name for parameter in group.settings.parameters()])
-
-
-def _draw_named(layout: bpy.types.UILayout, group: Any, names: Sequence[str]) -> None:
-    """The parameters of these names; a curve as one slider a place, from root to tip."""
-    column = layout.column()
-    for parameter in group.settings.parameters():
-        if parameter.name not in names:
-            continue
-        if parameter.kind == "curve":
-            _draw_curve(column, group, parameter)
-        else:
-            column.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
-
-
-def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter) -> None:
-    sliders = layout.column(align=True, heading=parameter.label)
-    for index, place in enumerate(_PLACES):
-        sliders.prop(group, parameter.name, index=index, text=place, slider=True)
-
-
-#: section below Dynamics -> its parameters; all others stand in Dynamics itself
-DYNAMICS: dict[str, tuple[str, ...]] = {
-    "Style": ("style_root", "style_tip", "style_along", "style_damping", "bend", "bend_along"),
-    "Medium & Wind": ("buoyancy", "damping", "drag", "wind_speed", "wind_direction", "wind_rise")
-    + ("gusts", "gust_size", "gust_seed"),
-    "Lengths": ("length_solver", "relaxations", "long_range", "length_tolerance")
-    + ("length_iterations",),
-    "Collisions": ("contact_passes", "friction", "radius_root", "radius_tip", "push_speed")
-    + ("collider_resolution",),
-}
-SECTIONS: tuple[tuple[str, str, Draw], ...] = (
-    ("look", "Look", draw_look),
-    ("strands", "Strands", draw_strands),
-    ("guides", "Guides", draw_guides),
-    ("dynamics", "Dynamics", draw_dynamics),
-    ("export", "Export", draw_export),
-)
-#: section -> those below it
-SUB_SECTIONS: dict[str, tuple[tuple[str, str, Draw], ...]] = {
-    "dynamics": (
-        ("style", "Style", _dynamics_section("Style")),
-        ("medium", "Medium & Wind", _dynamics_section("Medium & Wind")),
-        ("lengths", "Lengths", _dynamics_section("Lengths")),
-        ("collisions", "Collisions", draw_collisions),
-        ("bake", "Bake", draw_bake),
-    )
-}
 
 
 class HAIRLOOM_PT_sidebar(bpy.types.Panel):

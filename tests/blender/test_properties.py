@@ -162,9 +162,9 @@ def test_everything_that_the_artist_can_set_has_a_description(extension):
 
 
 def test_settings_out_of_range_in_a_script_are_clamped_by_blender(group_of):
-    group = group_of("strands")
+    group = group_of("detail")
     group.subdivisions = 10**6
-    settings = settings_of(group, ALL_SETTINGS["strands"])
+    settings = settings_of(group, ALL_SETTINGS["detail"])
     assert settings.subdivisions == 64
     with pytest.raises(HairloomError, match="64"):
         type(settings)(subdivisions=10**6)

@@ -1,0 +1,159 @@
+"""The sections of the panels: the settings of the selected hair, and what belongs to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import bpy
+
+from ..params import Parameter
+from .operators_bake import draw_bake
+from .operators_colliders import draw_colliders
+
+type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
+
+#: places of a curve's five values
+_PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
+
+
+def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    layout.menu("HAIRLOOM_MT_looks")
+    _draw_group(layout, hair.data.hairloom.shading)
+
+
+def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    _draw_group(layout, hair.data.hairloom.strands)
+    _draw_titled(layout, hair.data.hairloom.ambient)
+
+
+def draw_guides(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    _draw_group(layout, hair.data.hairloom.guides)
+
+
+def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Where there are none, only how to get some."""
+    group = hair.data.hairloom.children
+    layout.prop(group, "way")
+    if group.way == "none":
+        return
+    layout.prop(hair.hairloom, "children_density")
+    idle = {
+        name for ruler, names in _RULED_BY.items() if not getattr(group, ruler) for name in names
+    }
+    if group.way == "single" and not group.clump:
+        idle.add("parting")
+    for parameter in group.settings.parameters():
+        if parameter.name != "way":
+            column = layout.column()
+            column.active = parameter.name not in idle
+            _draw_named(column, group, (parameter.name,))
+
+
+def draw_detail(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Only what acts in this mode."""
+    group = hair.data.hairloom.detail
+    hidden = {name for mode, names in DETAIL.items() if mode != group.mode for name in names}
+    hidden -= set(DETAIL[group.mode])
+    names = [p.name for p in group.settings.parameters() if p.name not in hidden]
+    if not group.full_size:
+        names.remove("least_share")
+    _draw_named(layout, group, names)
+
+
+def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """What the sections below leave out."""
+    layout.menu("HAIRLOOM_MT_dynamics")
+    group = hair.hairloom.dynamics
+    below = {name for names in DYNAMICS.values() for name in names}
+    names = [p.name for p in group.settings.parameters() if p.name not in below]
+    _draw_named(layout, group, names)
+
+
+def draw_collisions(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    draw_colliders(layout, hair)
+    _draw_named(layout, hair.hairloom.dynamics, DYNAMICS["Collisions"])
+
+
+def _dynamics_section(label: str) -> Draw:
+    def draw(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+        _draw_named(layout, hair.hairloom.dynamics, DYNAMICS[label])
+
+    return draw
+
+
+def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    layout.operator("hairloom.export_cards", icon="EXPORT")
+    layout.operator("hairloom.export_tfx", icon="EXPORT")
+    _draw_titled(layout, hair.data.hairloom.cards)
+    _draw_titled(layout, hair.data.hairloom.card_texture)
+
+
+def _draw_titled(layout: bpy.types.UILayout, group: Any) -> None:
+    layout.label(text=group.settings.title)
+    _draw_group(layout, group)
+
+
+def _draw_group(layout: bpy.types.UILayout, group: Any) -> None:
+    _draw_named(layout, group, [parameter.name for parameter in group.settings.parameters()])
+
+
+def _draw_named(layout: bpy.types.UILayout, group: Any, names: Sequence[str]) -> None:
+    """The parameters of these names; a curve as one slider a place, from root to tip."""
+    column = layout.column()
+    for parameter in group.settings.parameters():
+        if parameter.name not in names:
+            continue
+        if parameter.kind == "curve":
+            _draw_curve(column, group, parameter)
+        else:
+            column.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
+
+
+def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter) -> None:
+    layout.label(text=parameter.label)
+    sliders = layout.column(align=True)
+    for index, place in enumerate(_PLACES):
+        sliders.prop(group, parameter.name, index=index, text=place, slider=True)
+
+
+#: a parameter of children -> those that do nothing while it is 0
+_RULED_BY: dict[str, tuple[str, ...]] = {
+    "clump": ("clump_along", "clump_size"),
+    "frizz": ("frizz_along", "frizz_length"),
+}
+#: mode of detail -> the parameters that act in it alone
+DETAIL: dict[str, tuple[str, ...]] = {
+    "adaptive": ("error", "most"),
+    "heuristic": ("piece_length", "most"),
+    "fixed": ("subdivisions",),
+}
+#: section below Dynamics -> its parameters; all others stand in Dynamics itself
+DYNAMICS: dict[str, tuple[str, ...]] = {
+    "Style": ("style_root", "style_tip", "style_along", "style_damping", "bend", "bend_along"),
+    "Medium & Wind": ("buoyancy", "damping", "drag", "wind_speed", "wind_direction", "wind_rise")
+    + ("gusts", "gust_size", "gust_seed"),
+    "Lengths": ("length_solver", "relaxations", "long_range", "length_tolerance")
+    + ("length_iterations",),
+    "Collisions": ("contact_passes", "friction", "radius_root", "radius_tip", "push_speed")
+    + ("collider_resolution",),
+}
+SECTIONS: tuple[tuple[str, str, Draw], ...] = (
+    ("look", "Look", draw_look),
+    ("strands", "Strands", draw_strands),
+    ("detail", "Detail", draw_detail),
+    ("guides", "Guides", draw_guides),
+    ("children", "Children", draw_children),
+    ("dynamics", "Dynamics", draw_dynamics),
+    ("export", "Export", draw_export),
+)
+#: section -> those below it
+SUB_SECTIONS: dict[str, tuple[tuple[str, str, Draw], ...]] = {
+    "dynamics": (
+        ("style", "Style", _dynamics_section("Style")),
+        ("medium", "Medium & Wind", _dynamics_section("Medium & Wind")),
+        ("lengths", "Lengths", _dynamics_section("Lengths")),
+        ("collisions", "Collisions", draw_collisions),
+        ("bake", "Bake", draw_bake),
+    )
+}

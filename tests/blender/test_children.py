@@ -1,0 +1,354 @@
+"""Children between guides, from the artist's buttons to a bake and the command line."""
+
+import json
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon import pipeline
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.host import command_line, live, overlay, playback, reactions, timeline
+from hairloom.addon.host.bake import Bake
+from hairloom.addon.host.groom_files import export_cards, export_tfx
+
+LAST = 6
+
+
+@pytest.fixture
+def hair(new_hair, sphere):
+    """60 curves on a head, with 200 children between them."""
+    hair = new_hair(sphere)
+    children = hair.data.hairloom.children
+    children.way, children.strand_count = "multi", 200
+    hair.hairloom.dynamics.form = "numpy"
+    return hair
+
+
+@pytest.fixture
+def moving(hair, sphere, tmp_path):
+    """The same on a head that is thrown about for some frames."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    for frame, x in ((1, 0.0), (3, 0.1), (LAST, -0.05)):
+        sphere.location.x = x
+        sphere.keyframe_insert("location", frame=frame)
+    hair.hairloom.dynamics.collider_resolution = 8
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    scene.frame_set(1)
+    return hair
+
+
+def catch_up(evaluated):
+    """What a timer does once edits have settled."""
+    bpy.context.view_layer.update()
+    reactions.catch_up(evaluated())
+
+
+def bake(hair):
+    return list(Bake.of([hair], bpy.context.scene).steps())
+
+
+def played(session):
+    shown = []
+    for frame in range(1, LAST + 1):
+        bpy.context.scene.frame_set(frame)
+        shown.append(session.strands)
+    return np.array(shown)
+
+
+def upper_half(head, name):
+    """A vertex group of weight 1 above the middle of the head."""
+    group = head.vertex_groups.new(name=name)
+    group.add([v.index for v in head.data.vertices if v.co.z > 0.001], 1.0, "REPLACE")
+    return group
+
+
+@pytest.mark.parametrize("way", ["multi", "single"])
+def test_guides_come_first_and_children_after_them(way, hair, evaluated):
+    hair.data.hairloom.children.way = way
+    session = live.start(hair, evaluated())
+    rig = session.rig
+    assert (len(rig.guides), rig.strands.strand_count) == (60, 260)
+    np.testing.assert_array_equal(rig.guides, np.arange(60))
+    np.testing.assert_array_equal(rig.weights.guide[:60, 0], np.arange(60))
+    np.testing.assert_array_equal(rig.weights.weight[:60], np.tile([1.0, 0.0, 0.0], (60, 1)))
+    assert rig.weights.guide.max() < 60
+    np.testing.assert_allclose(rig.weights.weight.sum(axis=1), 1.0, atol=1e-5)
+    np.testing.assert_allclose(np.linalg.norm(rig.strands.roots, axis=1), 0.1, rtol=0.05)
+    assert session.warnings == ()
+    assert overlay.drawing_of(session.uid).snapshot.strand_count == 260
+
+
+def test_none_is_the_artists_own_hair(new_hair, sphere, evaluated):
+    hair = new_hair(sphere)
+    hair.data.hairloom.children.strand_count = 17
+    session = live.start(hair, evaluated())
+    choices = session.choices
+    plain = pipeline.prepare(
+        session.source.strands, session.source.head, choices.guides, place="Hair"
+    )
+    np.testing.assert_array_equal(session.rig.strands.points, plain.strands.points)
+    np.testing.assert_array_equal(session.rig.weights.weight, plain.weights.weight)
+    hair.data.hairloom.children.strand_count = 18
+    assert not session.is_stale, "settings of children that are not there change nothing"
+
+
+def test_more_children_leave_those_before_bit_for_bit(hair, evaluated):
+    session = live.start(hair, evaluated())
+    before = session.rig
+    hair.data.hairloom.children.strand_count = 300
+    assert session.is_stale
+    catch_up(evaluated)
+    assert session.rig.strands.strand_count == 360 and not session.is_stale
+    np.testing.assert_array_equal(session.rig.strands.grid[:260], before.strands.grid)
+    np.testing.assert_array_equal(session.rig.weights.guide[:260], before.weights.guide)
+    np.testing.assert_array_equal(session.rig.weights.weight[:260], before.weights.weight)
+
+
+def test_no_children_at_all_are_the_guides(hair, evaluated):
+    hair.data.hairloom.children.strand_count = 0
+    session = live.start(hair, evaluated())
+    assert session.rig.strands.strand_count == len(session.rig.guides) == 60
+
+
+def test_a_hundred_thousand_children_are_made(hair, evaluated):
+    session = live.start(hair, evaluated())
+    rig = pipeline.prepare(
+        session.source.strands,
+        session.source.head,
+        session.choices.guides,
+        place="Hair",
+        children=replace(session.choices.children, strand_count=100_000),
+    )
+    assert rig.strands.strand_count == 100_060
+    np.testing.assert_array_equal(rig.strands.grid[:260], session.rig.strands.grid)
+
+
+def test_without_a_surface_guides_are_shown_with_a_word(new_hair, evaluated):
+    hair = new_hair()
+    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.guides.guide_count = 20
+    session = live.start(hair, evaluated())
+    assert session.rig.strands.strand_count == len(session.rig.guides) == 20
+    (note,) = session.rig.notes
+    assert f"Hair: {note}" in session.warnings and "surface" in note
+
+
+def test_children_grow_where_the_artist_has_painted(hair, sphere, evaluated):
+    upper_half(sphere, "Top")
+    hair.hairloom.children_density = "Top"
+    session = live.start(hair, evaluated())
+    assert session.warnings == ()
+    assert session.rig.strands.roots[60:, 2].min() > -0.03
+    assert session.rig.strands.roots[:60, 2].min() < -0.05, "guides are the artist's"
+
+
+def test_painted_weights_are_followed(hair, sphere, evaluated):
+    group = upper_half(sphere, "Top")
+    hair.hairloom.children_density = "Top"
+    session = live.start(hair, evaluated())
+    rig = session.rig
+    sphere.data.update()
+    bpy.context.view_layer.update()
+    assert session.is_stale
+    catch_up(evaluated)
+    assert session.rig is rig, "touched but not changed"
+    group.add([v.index for v in sphere.data.vertices], 1.0, "REPLACE")
+    sphere.data.update()
+    catch_up(evaluated)
+    assert session.rig is not rig
+    assert session.rig.strands.roots[60:, 2].min() < -0.05
+
+
+def test_weights_that_cannot_be_used_are_said(hair, sphere, evaluated):
+    sphere.vertex_groups.new(name="Nowhere")
+    hair.hairloom.children_density = "Nowhere"
+    session = live.start(hair, evaluated())
+    (warning,) = session.warnings
+    assert warning.startswith("Head: ") and "'Nowhere'" in warning and "Paint" in warning
+    assert session.rig.strands.strand_count == 260
+    broken = sphere.data.attributes.new("Broken", "FLOAT", "POINT")
+    broken.data[0].value = float("nan")
+    hair.hairloom.children_density = "Broken"
+    catch_up(evaluated)
+    assert "'Broken'" in session.warnings[0] and session.rig.strands.strand_count == 260
+
+
+def test_an_unknown_density_is_said_and_a_bake_refuses_it(hair, sphere, evaluated):
+    upper_half(sphere, "Top")
+    session = live.start(hair, evaluated())
+    hair.hairloom.children_density = "Bottom"
+    catch_up(evaluated)
+    (warning,) = session.warnings
+    assert warning.startswith("Head: ") and "'Bottom'" in warning and "Top" in warning
+    assert session.rig.strands.strand_count == 260, "children grow everywhere until it is mended"
+    with pytest.raises(HairloomError, match="Bottom"):
+        Bake.of([hair], bpy.context.scene)
+    hair.hairloom.children_density = "Top"
+    catch_up(evaluated)
+    assert session.warnings == () and session.rig.strands.roots[60:, 2].min() > -0.03
+
+
+def test_a_bake_of_children_plays_back_bit_for_bit(moving, evaluated):
+    session = live.start(moving, evaluated())
+    shown = played(session)
+    assert np.ptp(shown[:, 60:, -1] - shown[:, 60:, 0], axis=0).max() > 0.01
+    bake(moving)
+    np.testing.assert_array_equal(played(session), shown)
+    cache = playback.cache_of(moving)
+    for frame in range(1, LAST + 1):
+        np.testing.assert_array_equal(playback.strands_in(cache, frame), shown[frame - 1])
+    live.stop(session)
+    bpy.context.scene.frame_set(4)
+    again = live.start(moving, evaluated())
+    np.testing.assert_array_equal(again.strands, shown[3])
+    assert timeline.baked(again.uid).changed == ()
+
+
+def test_a_bake_keeps_what_there_was_to_say(new_hair, evaluated, tmp_path):
+    hair = new_hair()
+    hair.data.hairloom.children.way = "multi"
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    hair.hairloom.dynamics.form = "numpy"
+    bpy.context.scene.frame_end = 2
+    plan = Bake.of([hair], bpy.context.scene)
+    list(plan.steps())
+    (note,) = live.start(hair, evaluated()).rig.notes
+    assert plan.notes == [f"Hair: {note}"]
+    assert playback.rig_in(playback.cache_of(hair)).rig.notes == (note,)
+
+
+def test_a_bake_says_when_children_have_changed(moving, sphere, evaluated):
+    upper_half(sphere, "Top")
+    session = live.start(moving, evaluated())
+    bake(moving)
+
+    def changed():
+        catch_up(evaluated)
+        return timeline.baked(session.uid).changed
+
+    children = moving.data.hairloom.children
+    assert changed() == ()
+    clump, children.clump = children.clump, 0.9
+    assert changed() == ("children",)
+    children.clump = clump
+    assert changed() == ()
+    moving.hairloom.children_density = "Top"
+    assert changed() == ("children",)
+    moving.hairloom.children_density = ""
+    children.way = "none"
+    assert changed() == ("children",)
+
+
+def test_hair_that_plays_goes_on_while_children_change(moving, sphere, evaluated):
+    session = live.start(moving, evaluated())
+    live.play(evaluated())
+
+    def go(frames):
+        for _ in range(frames):
+            sphere.location.x += 0.02
+            bpy.context.view_layer.update()
+            live.advance(evaluated(), 1.0 / 24.0)
+
+    go(4)
+    guides = session.solver.guides()
+    moving.data.hairloom.children.strand_count = 50
+    moving.data.hairloom.children.frizz = 0.004
+    catch_up(evaluated)
+    assert session.is_playing and session.rig.strands.strand_count == 110
+    np.testing.assert_array_equal(session.solver.guides(), guides)
+    np.testing.assert_allclose(session.strands[:60], guides, atol=1e-6)
+    go(2)
+    assert np.abs(session.solver.guides() - guides).max() > 0.01
+    moving.data.hairloom.guides.guide_count = 30
+    catch_up(evaluated)
+    assert session.is_playing and session.strands.shape[0] == 80, "other guides begin at rest"
+    go(1)
+    assert live.sessions() == (session,)
+
+
+def test_undo_brings_the_children_back(hair, evaluated):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="begin")
+    session = live.start(hair, evaluated())
+    before = session.strands
+    bpy.data.objects["Hair"].data.hairloom.children.strand_count = 90
+    bpy.ops.ed.undo_push(message="fewer")
+    catch_up(evaluated)
+    assert session.strands.shape[0] == 150
+    bpy.ops.ed.undo()
+    catch_up(evaluated)
+    assert live.sessions() == (session,)
+    np.testing.assert_allclose(session.strands, before, atol=1e-6)
+
+
+def test_cards_are_one_a_guide_and_tressfx_holds_all(hair, evaluated, tmp_path):
+    cards = export_cards(hair, evaluated(), tmp_path / "cards.glb")
+    assert "60 cards" in cards.result
+    outcome = export_tfx(hair, evaluated(), tmp_path / "hair.tfx", up="Z", scale=1.0)
+    assert "260 strands" in outcome.result
+    written = read_tfx(tmp_path / "hair.tfx", up="Z", scale=1.0).strands
+    session = live.start(hair, evaluated())
+    np.testing.assert_allclose(written.points, session.rig.strands.points, atol=1e-6)
+
+
+def on_the_command_line(sphere, tmp_path, verb, *more):
+    report = tmp_path / "report.json"
+    arguments = [
+        verb,
+        "--head",
+        sphere.name,
+        "--set",
+        "children.way=multi",
+        "--report",
+        str(report),
+    ]
+    arguments += ["--set", "grow.way=normals", "--set", "grow.strand_count=80"]
+    code = command_line.run([*arguments, "--output", str(tmp_path / "hair.tfx"), *more])
+    return code, json.loads(report.read_text()) if code == 0 else {}
+
+
+def test_the_command_line_makes_children(sphere, tmp_path, capfd):
+    upper_half(sphere, "Top")
+    code, report = on_the_command_line(
+        sphere, tmp_path, "export", "--set", "children.strand_count=500"
+    )
+    assert code == 0
+    assert (report["strands"], report["guides"], report["children"]) == (580, 80, 500)
+    everywhere = read_tfx(tmp_path / "hair.tfx", up="Y").strands
+    assert everywhere.strand_count == 580 and everywhere.roots[80:, 2].min() < -0.05
+    code, _ = on_the_command_line(sphere, tmp_path, "export", "--children-density", "Top")
+    painted = read_tfx(tmp_path / "hair.tfx", up="Y").strands
+    assert code == 0 and painted.roots[80:, 2].min() > -0.03
+    capfd.readouterr()
+    assert on_the_command_line(sphere, tmp_path, "export", "--children-density", "Left")[0] == 1
+    assert "Left" in capfd.readouterr().err
+
+
+def test_a_picture_of_children_says_what_was_drawn(sphere, tmp_path, gpu_context):
+    report = tmp_path / "report.json"
+    arguments = ["render", "--head", sphere.name, "--width", "96", "--height", "96"]
+    arguments += ["--set", "grow.way=normals", "--set", "grow.strand_count=80"]
+    arguments += ["--set", "children.way=multi", "--set", "children.strand_count=400"]
+    arguments += ["--output", str(tmp_path / "still.png"), "--report", str(report)]
+    drawn = {}
+    for full_size in (0, 300):
+        more = ["--set", f"detail.full_size={full_size}", "--set", "detail.culling=none"]
+        assert command_line.run([*arguments, *more]) == 0
+        drawn[full_size] = json.loads(report.read_text())["drawn"]
+    assert drawn[0]["strands"] == 480 and drawn[0]["pieces"] >= 480 * 15
+    assert drawn[300]["strands"] < 480 and drawn[300]["vertices"] < drawn[0]["vertices"]
+
+
+def test_the_command_line_says_what_is_missing(hair, sphere, tmp_path, capfd):
+    hair.data.surface = hair.parent = None
+    report = tmp_path / "report.json"
+    arguments = ["export", "--groom", "Hair", "--set", "children.way=multi"]
+    arguments += ["--report", str(report), "--output", str(tmp_path / "hair.tfx")]
+    assert command_line.run(arguments) == 0
+    assert "Hair: Children need a surface" in capfd.readouterr().out
+    facts = json.loads(report.read_text())
+    assert facts["children"] == 0 and len(facts["notes"]) == 1

@@ -1,0 +1,199 @@
+"""Detail, what is left out, and what the viewport shows of it: from the settings to the snapshot.
+
+That it is drawn is tested in tests/gpu, and in a window in tests/window.
+"""
+
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from hairloom.addon.host import live, overlay
+from hairloom.addon.host.hiders import Hiders
+from hairloom.addon.host.overlay_text import counts_line, free_corner
+from hairloom.addon.pipeline import Pose
+from hairloom.addon.render.camera import frame_camera
+from hairloom.addon.render.strand_pass import Statistics, StrandPass
+from hairloom.addon.strands import Surface
+
+
+@pytest.fixture
+def preview(new_hair, sphere, evaluated):
+    """Hair on a head, previewed: (hair, head, session)."""
+    hair = new_hair(sphere)
+    return hair, sphere, live.start(hair, evaluated())
+
+
+def drawing(session):
+    return overlay.drawing_of(session.uid)
+
+
+def update():
+    bpy.context.view_layer.update()
+
+
+def surface_of(head):
+    """The mesh of an object that has not been moved."""
+    mesh = head.data
+    mesh.calc_loop_triangles()
+    positions = np.array([vertex.co for vertex in mesh.vertices], np.float32)
+    return Surface(positions, np.array([each.vertices for each in mesh.loop_triangles]))
+
+
+def test_detail_acts_at_once(preview):
+    hair, _, session = preview
+    rig, before = session.rig, drawing(session).snapshot
+    detail = hair.data.hairloom.detail
+    detail.mode, detail.subdivisions, detail.full_size = "fixed", 7, 0.0
+    snapshot = drawing(session).snapshot
+    assert (snapshot.detail.mode, snapshot.detail.subdivisions) == ("fixed", 7)
+    assert session.rig is rig and not session.is_stale
+    assert snapshot.rank is before.rank and snapshot.guide is before.guide
+
+
+def test_the_snapshot_knows_guides_groups_and_ranks(preview):
+    _, _, session = preview
+    snapshot, rig = drawing(session).snapshot, session.rig
+    np.testing.assert_array_equal(snapshot.guide, rig.weights.guide[:, 0])
+    np.testing.assert_array_equal(snapshot.group, np.arange(60) % 2)
+    assert snapshot.rank.min() >= 0.0 and snapshot.rank.max() < 1.0
+    assert len(np.unique(snapshot.rank)) == 60
+
+
+def test_of_children_the_last_to_grow_are_the_first_to_go(new_hair, sphere, evaluated):
+    hair = new_hair(sphere)
+    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.strand_count = 240
+    rank = drawing(live.start(hair, evaluated())).snapshot.rank
+    assert (np.diff(rank[60:]) > 0.0).all() and rank[60] >= 60 / 300 and rank[-1] < 1.0
+    assert rank[:60].max() < 60 / 300 and len(np.unique(rank[:60])) == 60
+
+
+@pytest.mark.parametrize("view", ["detail", "guide", "group", "none"])
+def test_a_debug_view_reaches_the_snapshot_and_brings_its_counts(view, preview):
+    hair, _, session = preview
+    assert drawing(session).counts_of == ""
+    hair.hairloom.debug_view = view
+    assert drawing(session).snapshot.debug_view == view
+    assert drawing(session).counts_of == ("" if view == "none" else "Hair")
+    hair.hairloom.show_counts = True
+    assert drawing(session).counts_of == "Hair" and drawing(session).guide_count == 60
+
+
+def test_balls_inside_the_head_follow_it(preview):
+    _, head, session = preview
+    before = drawing(session).snapshot.hiders
+    assert (np.linalg.norm(before[:, :3], axis=1) + before[:, 3] < 0.1).all()
+    matrix = Matrix.LocRotScale((0.5, -1.0, 2.0), Matrix.Rotation(1.2, 3, (1, 2, 3)), (2, 2, 2))
+    head.matrix_world = matrix
+    update()
+    after = drawing(session).snapshot.hiders
+    expected = before[:, :3] @ np.array(matrix)[:3, :3].T + np.array(matrix)[:3, 3]
+    np.testing.assert_allclose(after[:, :3], expected, atol=1e-5)
+    np.testing.assert_allclose(after[:, 3], 2.0 * before[:, 3], rtol=1e-3)
+
+
+def test_balls_stay_inside_a_head_that_bends(sphere):
+    """Its front is pressed in by more and more; what is pressed in is never in a ball."""
+    surface = surface_of(sphere)
+    hiders = Hiders(surface, surface.positions)
+    radius = hiders.at(Pose(surface.positions, np.eye(4)))[:, 3].sum()
+    for depth in (0.01, 0.03, 0.08):
+        bent = surface.positions.copy()
+        bent[:, 1] = np.maximum(bent[:, 1], depth - 0.1)
+        balls = hiders.at(Pose(bent, np.eye(4)))
+        balls = np.zeros((0, 4)) if balls is None else balls
+        assert balls[:, 3].sum() < radius
+        away = np.linalg.norm(bent[:, None] - balls[None, :, :3], axis=2)
+        assert (away >= balls[:, 3]).all()
+
+
+@pytest.mark.parametrize("how", ["eye", "wire"])
+def test_a_head_that_is_not_seen_hides_nothing(how, preview):
+    hair, head, session = preview
+    assert drawing(session).snapshot.hiders is not None
+    if how == "eye":
+        head.hide_set(True)
+    else:
+        head.display_type = "WIRE"
+    for culling in ("hidden", "away"):
+        hair.data.hairloom.detail.culling = culling
+        update()
+        shown = drawing(session).snapshot
+        assert shown.hiders is None and shown.detail.culling == "none"
+    head.hide_set(False)
+    head.display_type = "TEXTURED"
+    update()
+    assert drawing(session).snapshot.detail.culling == "away"
+    hair.data.hairloom.detail.culling = "hidden"
+    assert drawing(session).snapshot.hiders is not None
+
+
+def test_hair_without_a_head_has_nothing_to_hide_it(new_hair, evaluated):
+    session = live.start(new_hair(), evaluated())
+    assert drawing(session).snapshot.hiders is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "xray", "expected"),
+    [
+        ("WIREFRAME", False, True),
+        ("SOLID", True, True),
+        ("SOLID", False, False),
+        ("RENDERED", True, False),
+    ],
+)
+def test_views_that_show_what_is_behind(kind, xray, expected):
+    assert overlay.is_seen_through(SimpleNamespace(type=kind, show_xray=xray)) is expected
+
+
+def test_the_counts_are_what_was_drawn(preview, gpu_context):
+    hair, _, session = preview
+    hair.data.hairloom.detail.mode = "fixed"
+    hair.data.hairloom.detail.subdivisions = 3
+    hair.data.hairloom.detail.culling = "none"
+    hair.data.hairloom.detail.full_size = 0.0
+    shown, strand_pass = drawing(session).snapshot, StrandPass()
+    low, high = shown.strands.min(axis=(0, 1)), shown.strands.max(axis=(0, 1))
+    camera = frame_camera((low, high), (0.0, -1.0, 0.0), 0.5, 1.0)
+    target = gpu_context.types.GPUOffScreen(64, 64)
+    with target.bind():
+        strand_pass.draw(shown, camera, 64, 64)
+    target.free()
+    drawn, segments = strand_pass.statistics, shown.cv_count - 1
+    assert (drawn.strands, drawn.pieces) == (60, 60 * 3 * segments)
+    assert drawn.vertices == 60 * 2 * (3 * segments + 1)
+    line = counts_line("Hair", 60, shown.strand_count, drawn)
+    shown = "Hairloom Hair   guides 60   strands 60 of 60   pieces 2,700   vertices 5,520"
+    assert line == shown
+
+
+def region(kind, alignment, x, y, width, height):
+    return SimpleNamespace(type=kind, alignment=alignment, x=x, y=y, width=width, height=height)
+
+
+def test_the_counts_stand_beside_what_lies_over_the_view():
+    view = region("WINDOW", "NONE", 100, 50, 800, 600)
+    tools = region("TOOLS", "LEFT", 100, 50, 60, 600)
+    shelf = region("ASSET_SHELF", "BOTTOM", 100, 50, 800, 90)
+    hidden = region("ASSET_SHELF_HEADER", "BOTTOM", 100, 50, 1, 1)
+    sidebar = region("UI", "RIGHT", 700, 50, 200, 600)
+    redo = region("HUD", "FLOAT", 170, 150, 200, 30)
+
+    def corner(*others):
+        return free_corner(SimpleNamespace(regions=[view, *others]), view)
+
+    assert corner() == (0, 0)
+    assert corner(tools, sidebar) == (60, 0)
+    assert corner(tools, hidden, shelf) == (60, 90)
+    assert corner(tools, redo) == (60, 130)
+    beside = region("TOOLS", "LEFT", 40, 50, 60, 600)
+    assert corner(beside) == (0, 0)
+
+
+def test_statistics_begin_with_nothing():
+    assert counts_line("Hair", 5, 10, Statistics()) == (
+        "Hairloom Hair   guides 5   strands 0 of 10   pieces 0   vertices 0"
+    )

@@ -1,0 +1,91 @@
+"""`pipeline.prepare` with children: what is a guide, what is a child, and what is said."""
+
+import numpy as np
+import pytest
+
+from hairloom.addon import pipeline
+from hairloom.addon.groom.children_settings import ChildrenSettings
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.strands import StrandSet, Surface
+
+GUIDES = GuideSettings(guide_count=30, cv_count=6)
+
+
+def sheet(*, has_uv: bool = True) -> Surface:
+    """A square of 0.2 m in the plane z = 0, 10 x 10 fields."""
+    step = np.linspace(-0.1, 0.1, 11)
+    x, y = np.meshgrid(step, step, indexing="xy")
+    positions = np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3).astype(np.float32)
+    corner = (np.arange(10)[:, None] * 11 + np.arange(10)).reshape(-1, 1)
+    fields = corner + np.array([0, 1, 12, 0, 12, 11])
+    triangles = fields.reshape(-1, 3).astype(np.int32)
+    uv = positions[triangles][..., :2] / 0.2 + 0.5
+    return Surface(positions, triangles, uv if has_uv else None)
+
+
+def curves(count: int = 60) -> StrandSet:
+    """Strands of five points that lean over to +X."""
+    root = np.random.default_rng(2).uniform(-0.09, 0.09, (count, 3)) * [1.0, 1.0, 0.0]
+    along = np.linspace(0.0, 1.0, 5)[:, None] * np.array([0.05, 0.0, 0.1])
+    points = (root[:, None] + along).reshape(-1, 3)
+    return StrandSet(points, np.arange(count + 1) * 5, np.full(5 * count, 1e-4), np.zeros(count))
+
+
+def rig_of(children: ChildrenSettings | None, head: Surface | None) -> pipeline.Rig:
+    return pipeline.prepare(curves(), head, GUIDES, place="a wig", children=children)
+
+
+def test_none_is_as_without_the_setting() -> None:
+    for head in (sheet(), None):
+        plain, none = rig_of(None, head), rig_of(ChildrenSettings(way="none"), head)
+        np.testing.assert_array_equal(none.strands.points, plain.strands.points)
+        np.testing.assert_array_equal(none.guides, plain.guides)
+        np.testing.assert_array_equal(none.weights.weight, plain.weights.weight)
+        assert none.strands.strand_count == 60 and none.notes == ()
+
+
+@pytest.mark.parametrize("way", ["multi", "single"])
+def test_guides_are_those_that_are_chosen_anyway(way: str) -> None:
+    plain = rig_of(None, sheet())
+    rig = rig_of(ChildrenSettings(way=way, strand_count=200), sheet())
+    assert (len(rig.guides), rig.strands.strand_count) == (30, 230)
+    np.testing.assert_array_equal(rig.strands.grid[:30], plain.strands.grid[plain.guides])
+    assert rig.strands.root_uv is not None and rig.rest_frames is not None
+    np.testing.assert_allclose(rig.strands.root_uv, rig.strands.roots[:, :2] / 0.2 + 0.5, atol=1e-5)
+    assert len(rig.rest_frames.origin) == len(rig.weights.guide) == 230
+
+
+def test_at_rest_nothing_moves_and_each_guide_moves_itself() -> None:
+    rig = rig_of(ChildrenSettings(way="multi", strand_count=200), sheet())
+    guides = rig.strands.grid[:30]
+    np.testing.assert_array_equal(pipeline.strands_at(rig, rig.rest_pose, guides), rig.strands.grid)
+    moved = guides + np.random.default_rng(3).normal(0.0, 0.01, guides.shape)
+    now = pipeline.strands_at(rig, rig.rest_pose, moved.astype(np.float32))
+    np.testing.assert_allclose(now[:30], moved, atol=1e-6)
+    shift = np.einsum("nk,nkcj->ncj", rig.weights.weight, (moved - guides)[rig.weights.guide])
+    np.testing.assert_allclose(now[30:], rig.strands.grid[30:] + shift[30:], atol=1e-6)
+
+
+def test_a_head_without_uvs_gives_children_without() -> None:
+    rig = rig_of(ChildrenSettings(way="multi", strand_count=20), sheet(has_uv=False))
+    assert rig.strands.root_uv is None and rig.strands.strand_count == 50
+
+
+def test_without_a_head_the_guides_are_all_there_is() -> None:
+    rig = rig_of(ChildrenSettings(way="multi"), None)
+    assert rig.strands.strand_count == len(rig.guides) == 30
+    (note,) = rig.notes
+    assert "surface" in note and note.count(". ") == 1, "what is missing, and a remedy"
+
+
+def test_low_ranks_are_an_even_sparser_groom() -> None:
+    """A quarter of the strands reaches every quarter of the sheet in about its share."""
+    for children in (None, ChildrenSettings(way="multi", strand_count=970)):
+        rig = pipeline.prepare(curves(1000), sheet(), GUIDES, place="a wig", children=children)
+        rank = pipeline.strand_ranks(rig)
+        assert sorted(rank) == pytest.approx(np.arange(1000) / 1000, abs=1e-6)
+        few = rig.strands.roots[rank < 0.25]
+        quarter = (few[:, 0] > 0.0) * 2 + (few[:, 1] > 0.0)
+        assert np.bincount(quarter, minlength=4).min() > 45
+    guides_first = rank[:30]
+    assert guides_first.max() < 0.03 and not (np.diff(guides_first) > 0.0).all()

@@ -1,0 +1,211 @@
+"""Refinement on screen: children, the debug views, counts, what the head hides, far and near."""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import (
+    changed,
+    click,
+    look_from_front,
+    open_our_sidebar,
+    press,
+    sidebar_button,
+    viewport,
+    viewport_pixels,
+)
+
+GUIDES, CHILDREN = 300, 2000
+
+
+def of_hairloom(module):
+    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
+
+
+def session():
+    (one,) = of_hairloom("host.live").sessions()
+    return one
+
+
+def statistics():
+    """Of the last draw in the viewport."""
+    return of_hairloom("host.overlay")._passes[session().uid].statistics
+
+
+def hair():
+    return bpy.data.objects["Hair"]
+
+
+def pixels(label):
+    return viewport_pixels(driver.screenshot(label))
+
+
+def corner(picture):
+    """Where the counts stand."""
+    return picture[-50:, :700]
+
+
+def saturation(picture):
+    """Share of the pixels that are strongly coloured, as debug views are and hair is not."""
+    return float((np.ptp(picture, axis=2) > 0.4).mean())
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    yield from set_the_scene()
+    yield from children_appear()
+    yield from debug_views_and_counts()
+    yield from what_the_head_hides()
+    yield from far_and_near()
+    yield from sliders_while_it_plays()
+    yield from two_grooms()
+    assert of_hairloom("host.overlay").failure() == ""
+
+
+def set_the_scene():
+    for obj in list(bpy.data.objects):
+        if obj.type == "MESH":
+            bpy.data.objects.remove(obj)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    bpy.context.object.name = "Head"
+    bpy.ops.object.shade_smooth()
+    bpy.ops.hairloom.grow(way="normals", strand_count=GUIDES, length=0.08)
+    bpy.context.object.name = "Hair"
+    overlays = viewport().spaces.active.overlay
+    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    look_from_front(0.7)
+    yield from open_our_sidebar()
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield 10
+    assert statistics().strands > 0
+
+
+def children_appear():
+    before = pixels("guides")
+    children = hair().data.hairloom.children
+    children.way, children.strand_count = "multi", CHILDREN
+    yield 20  # once edits have settled
+    assert session().rig.strands.strand_count == GUIDES + CHILDREN
+    assert changed(before, pixels("children")) > 0.05
+
+
+def debug_views_and_counts():
+    hair().hairloom.debug_view = "none"
+    yield 3
+    plain = pixels("plain")
+    hair().hairloom.show_counts = True
+    yield 3
+    counted = pixels("counts")
+    assert changed(corner(plain), corner(counted)) > 0.01, "no counts are to be seen"
+    assert changed(plain[:-60], counted[:-60]) < 0.003, "the counts lie over something"
+    hair().hairloom.show_counts = False
+    assert saturation(plain) < 0.01
+    for view in ("detail", "guide", "group"):
+        hair().hairloom.debug_view = view
+        yield 3
+        shown = pixels(view)
+        assert saturation(shown) > 0.02, view
+        assert changed(corner(plain), corner(shown)) > 0.01, "a debug view without its counts"
+    overlays = viewport().spaces.active.overlay
+    overlays.show_overlays = False
+    yield 3
+    assert changed(corner(plain), corner(pixels("without-overlays"))) < 0.003
+    overlays.show_overlays = True
+    hair().hairloom.debug_view = "none"
+    yield 3
+
+
+def what_the_head_hides():
+    detail, shading = hair().data.hairloom.detail, viewport().spaces.active.shading
+    detail.full_size = 0.0
+    detail.culling = "none"
+    yield 3
+    everything, count = pixels("nothing-left-out"), GUIDES + CHILDREN
+    assert statistics().strands == count
+    detail.culling = "hidden"
+    yield 3
+    assert 0.3 * count < statistics().strands < 0.95 * count
+    assert changed(everything, pixels("hidden-left-out")) < 0.0005, "what is seen was left out"
+    shading.show_xray = True
+    yield 3
+    assert statistics().strands == count, "the head hides hair in X-ray"
+    driver.screenshot("xray")
+    shading.show_xray = False
+    bpy.data.objects["Head"].hide_set(True)
+    yield 3
+    assert statistics().strands == count, "a hidden head hides hair"
+    driver.screenshot("hidden-head")
+    bpy.data.objects["Head"].hide_set(False)
+    yield 3
+    detail.full_size = 300.0
+    yield 3
+
+
+def far_and_near():
+    drawn = {}
+    hair().hairloom.show_counts = True
+    for distance in (0.15, 0.7, 5.0):
+        look_from_front(distance)
+        yield 3
+        drawn[distance] = statistics()
+        driver.screenshot(f"from-{distance}-m")
+    each = {distance: one.pieces / one.strands for distance, one in drawn.items()}
+    assert each[0.15] >= each[0.7] >= each[5.0], each
+    assert drawn[5.0].strands < 0.4 * drawn[0.7].strands, drawn
+    look_from_front(0.7)
+    yield 3
+
+
+def sliders_while_it_plays():
+    live, head = of_hairloom("host.live"), bpy.data.objects["Head"]
+    yield from click(*sidebar_button("hairloom.play"))
+    yield 30
+    assert live.is_playing(), "the Play button did nothing"
+    children = hair().data.hairloom.children
+    for count, x in ((500, 0.02), (3000, 0.04), (1000, 0.0)):
+        children.strand_count = count
+        head.location.x = x
+        yield 15
+        assert live.is_playing() and session().rig.strands.strand_count == GUIDES + count
+    children.way = "single"
+    yield 15
+    children.way = "none"
+    yield 15
+    assert session().rig.strands.strand_count == GUIDES
+    children.way = "multi"
+    yield 15
+    driver.screenshot("playing")
+    bpy.ops.ed.undo_push(message="playing")
+    children.strand_count = 700
+    bpy.ops.ed.undo_push(message="fewer")
+    yield 10
+    bpy.ops.ed.undo()
+    yield 15
+    assert live.is_playing() and session().rig.strands.strand_count == GUIDES + 1000
+    yield from press("ESC")
+    yield 5
+    assert not live.is_playing()
+
+
+def two_grooms():
+    """Counts of both stand one above the other."""
+    twin = bpy.data.objects.new("Twin", hair().data)
+    bpy.context.collection.objects.link(twin)
+    twin.hairloom.show_counts = True
+    live = of_hairloom("host.live")
+    live.start(twin, bpy.context.evaluated_depsgraph_get())
+    look_from_front(1.2)
+    yield 5
+    driver.screenshot("two-grooms")
+    assert len(live.sessions()) == 2
+    live.stop_all()
+    yield 3
+    assert of_hairloom("host.overlay")._handles == ()
+
+
+driver.play(steps())
