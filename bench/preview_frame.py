@@ -2,7 +2,7 @@
 
 The reference draws the same strands as plain lines with the gpu module's own shader, uploaded
 again each frame as a batch: what an add-on does that follows the module's examples. Ours draws
-ribbons with width and two subdivisions, lit by three lights and with two shifted highlights.
+ribbons with width and adaptive detail, lit by three lights and with two shifted highlights.
 
 The same frames once more with guides that stay on the GPU: `gpu_simulate_ms` and `gpu_ride_ms`
 end when the GPU has done it, `gpu_draw_ms` has nothing to pack and to upload. `cpu_frame_ms` and

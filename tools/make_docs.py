@@ -3,7 +3,7 @@
 python tools/make_docs.py [--check | --pictures]
 
 --check fails when docs/parameters.md is not what the code would write; --pictures also runs the
-demo and copies its pictures into docs/images.
+demo, copies its pictures into docs/images, and draws those of docs/refinement.md.
 """
 
 import argparse
@@ -47,6 +47,8 @@ def make_pictures() -> None:
         preset = ["--preset", "dynamics/under_water"]
         subprocess.run([*headless, "demo", *preset, "--output", folder], check=True)
         shutil.copyfile(Path(folder) / "motion.png", IMAGES / "under_water.png")
+    refinement = [sys.executable, str(REPOSITORY / "tools" / "refinement_pictures.py")]
+    subprocess.run([*refinement, str(IMAGES)], check=True)
 
 
 def main() -> int:

@@ -1,0 +1,190 @@
+"""Interpolation on the CPU beside Blender's node "Interpolate Hair Curves" and plain numpy.
+
+762 guides on a ball, combed, become 4,095, 20,000 and 100,000 strands of 30 points. The node gets
+guides of 30 points, and three of them for a strand; a frame of it is an evaluation of the
+depsgraph after the guides were tagged. It finds roots and weights anew in each, which cannot be
+turned off; ours has them since the groom was made, smooths 762 guides from 16 CVs to 30 points and
+mixes them, with the weights of the roots that the node chose. The forms of plain numpy only mix.
+"""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from _shaken_head import RADIUS, guides_on, surface_of
+
+from hairloom.addon.groom.weights import GuideWeights, guide_weights
+from hairloom.addon.host.curves import read_curves, write_curves
+from hairloom.addon.refine.interpolate import interpolate
+from hairloom.addon.refine.smooth import smoothed_at
+from hairloom.addon.strands import StrandSet
+
+GUIDES, POINTS, COUNTS = 762, 30, (4095, 20_000, 100_000)
+GROUP = "Interpolate Hair Curves"
+ASSETS = "assets/nodes/procedural_hair_node_assets.blend"
+NODE_ROUNDS, ROUNDS, CHUNK = 5, 25, 512
+
+Mix = Callable[[np.ndarray, GuideWeights], np.ndarray]
+
+
+class InterpolatedHair:
+    """Guides as hair curves on a ball, with Blender's node on them."""
+
+    def __init__(self, head: bpy.types.Object, guides: StrandSet) -> None:
+        self._hair = write_curves("Guides", guides, head, bpy.context.scene.collection)
+        self._modifier = self._hair.modifiers.new(GROUP, "NODES")
+        self._modifier.node_group = _node_group()
+        self._set(Input_10=3)  # Interpolation Guides
+
+    def strands(self, count: int) -> StrandSet:
+        """With the density at which the node makes about so many."""
+        density = count / (4.0 * np.pi * RADIUS**2)
+        for _ in range(4):
+            self._set(Input_15=density)
+            made = self._evaluated()
+            density *= count / made.strand_count
+        return made
+
+    def milliseconds(self) -> float:
+        begin = time.perf_counter()
+        self._evaluate()
+        return (time.perf_counter() - begin) * 1000.0
+
+    def remove(self) -> None:
+        bpy.data.objects.remove(self._hair)
+
+    def _set(self, **values: Any) -> None:
+        for name, value in values.items():
+            getattr(self._modifier.properties.inputs, name).value = value
+
+    def _evaluate(self) -> None:
+        self._hair.data.update_tag()
+        bpy.context.view_layer.update()
+
+    def _evaluated(self) -> StrandSet:
+        self._evaluate()
+        return read_curves(self._hair, bpy.context.evaluated_depsgraph_get()).strands
+
+
+def gathered(guides: np.ndarray, weights: GuideWeights) -> np.ndarray:
+    """Three takes and their sum."""
+    one, two, three = (guides[index] for index in weights.guide.T)
+    w = weights.weight[:, :, None, None]
+    return one * w[:, 0] + two * w[:, 1] + three * w[:, 2]
+
+
+def summed(guides: np.ndarray, weights: GuideWeights) -> np.ndarray:
+    """One einsum over all."""
+    return np.einsum("nk,nkpj->npj", weights.weight, guides[weights.guide])
+
+
+def summed_in_chunks(guides: np.ndarray, weights: GuideWeights) -> np.ndarray:
+    """The same in pieces that fit into the cache."""
+    flat = guides.reshape(len(guides), -1)
+    result = np.empty((len(weights.guide), flat.shape[1]), np.float32)
+    for start in range(0, len(result), CHUNK):
+        part = slice(start, start + CHUNK)
+        taken = flat[weights.guide[part]]
+        np.einsum("nk,nkj->nj", weights.weight[part], taken, out=result[part])
+    return result.reshape(-1, *guides.shape[1:])
+
+
+PLAIN: tuple[Mix, ...] = (gathered, summed, summed_in_chunks)
+
+
+def node_figures() -> dict[str, float]:
+    """Milliseconds (the least of some rounds) and ratios, see bench/refinement.py.
+
+    node_ratio_N: times faster than the node. numpy_ratio_N: mixing, as a factor of the fastest
+    plain form. peak_memory_ratio: the most memory that was taken, over that of the result.
+    """
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=RADIUS, segments=48, ring_count=24)
+    head = bpy.context.object
+    guides = guides_on(surface_of(head), GUIDES)
+    along = np.linspace(0.0, 1.0, POINTS)
+    smooth = smoothed_at(guides.grid, along)
+    node = InterpolatedHair(head, _strand_set(smooth, guides))
+    figures: dict[str, float] = {}
+    peaks = []
+    for count in COUNTS:
+        made = node.strands(count)
+        assert abs(made.strand_count / count - 1.0) < 0.02, made.strand_count
+        assert made.grid.shape[1] == POINTS
+        node_ms = min(node.milliseconds() for _ in range(NODE_ROUNDS))
+        node_ms *= count / made.strand_count
+        weights = _weights(made.grid[:, 0], guides, count)
+        whole, mixing, plain = _least(
+            [
+                lambda w=weights: interpolate(smoothed_at(guides.grid, along), w),
+                lambda w=weights: interpolate(smooth, w),
+                *(lambda m=mix, w=weights: m(smooth, w) for mix in PLAIN),
+            ]
+        )
+        figures |= {
+            f"node_ms_{count}": round(node_ms, 2),
+            f"interpolate_ms_{count}": round(whole, 3),
+            f"numpy_ms_{count}": round(plain, 3),
+            f"node_ratio_{count}": round(node_ms / whole, 1),
+            f"numpy_ratio_{count}": round(mixing / plain, 2),
+        }
+        peaks.append(_peak_ratio(lambda w=weights: interpolate(smoothed_at(guides.grid, along), w)))
+    node.remove()
+    bpy.data.objects.remove(head)
+    return figures | {"peak_memory_ratio": round(max(peaks), 2)}
+
+
+def _least(works: list[Callable[[], np.ndarray]]) -> tuple[float, float, float]:
+    """Milliseconds of the first, of the second, and of the fastest of the others.
+
+    In turns, so that a busy moment of the machine meets all of them.
+    """
+    times = np.empty((ROUNDS, len(works)))
+    for round_times in times:
+        for index, work in enumerate(works):
+            begin = time.perf_counter()
+            work()
+            round_times[index] = (time.perf_counter() - begin) * 1000.0
+    whole, mixing, *plain = times.min(axis=0)
+    return float(whole), float(mixing), float(min(plain))
+
+
+def _peak_ratio(work: Callable[[], np.ndarray]) -> float:
+    tracemalloc.start()
+    size = work().nbytes
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return peak / size
+
+
+def _weights(roots: np.ndarray, guides: StrandSet, count: int) -> GuideWeights:
+    """Those of `count` strands at these roots, some twice or none where there are not as many."""
+    roots = roots[np.linspace(0, len(roots) - 1, count).round().astype(int)]
+    group = np.zeros(GUIDES, np.int32)
+    return guide_weights(roots, np.zeros(count, np.int32), guides.grid[:, 0], group)
+
+
+def _strand_set(grid: np.ndarray, like: StrandSet) -> StrandSet:
+    count, points, _ = grid.shape
+    return StrandSet(
+        points=grid.reshape(-1, 3),
+        offsets=np.arange(count + 1) * points,
+        radius=np.full(count * points, 4.0e-5),
+        group=np.zeros(count),
+        root_uv=like.root_uv,
+    )
+
+
+def _node_group() -> bpy.types.NodeTree:
+    known = bpy.data.node_groups.get(GROUP)
+    if known is not None:
+        return known
+    path = Path(bpy.utils.system_resource("DATAFILES")) / ASSETS
+    with bpy.data.libraries.load(str(path)) as (_, wanted):
+        wanted.node_groups = [GROUP]
+    return bpy.data.node_groups[GROUP]

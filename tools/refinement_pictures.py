@@ -1,0 +1,97 @@
+"""Draws the pictures of docs/refinement.md: children, the debug view, and a close look at one curl.
+
+python tools/refinement_pictures.py FOLDER
+"""
+
+import importlib
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import bpy  # noqa: F401  it must come before gpu, which lives inside it
+import gpu
+import numpy as np
+from extension_loader import PACKAGE, load_package
+
+#: guides and hair of the Nalu demo
+GUIDES, CHILDREN = 762, 4095
+WIDTH, HEIGHT, SAMPLES = 640, 720, 3
+#: where the built-in head's hair falls over its temple [m]
+TEMPLE = np.array([-0.12, -0.01, 0.075])
+
+
+def of_addon(module: str) -> Any:
+    return importlib.import_module(f"{PACKAGE}.addon.{module}")
+
+
+def wig(children: str) -> Any:
+    """A rig of wavy guides on the built-in head, with or without children; each side is a group."""
+    settings = of_addon("parameters").ALL_SETTINGS
+    grown = settings["grow"](strand_count=GUIDES, wave=0.018, wave_length=0.06, clump=0.3)
+    head = of_addon("host.built_in_head").built_in_head()
+    grow = of_addon("groom.grow")
+    strands = grow.grow(head, grown, grow.scalp_density(head))
+    return of_addon("pipeline").prepare(
+        replace(strands, group=strands.roots[:, 0] > 0.0),
+        head,
+        settings["guides"](guide_count=GUIDES, cv_count=9),
+        place="the built-in groom",
+        children=settings["children"](way=children, strand_count=CHILDREN),
+    )
+
+
+def picture(rig: Any, look: dict[str, Any], camera: Any = None, samples: int = SAMPLES) -> Any:
+    """One picture of a rig at rest.
+
+    Args:
+        look: detail settings, and debug_view.
+    """
+    settings, pipeline, studio = (
+        of_addon("parameters").ALL_SETTINGS,
+        of_addon("pipeline"),
+        of_addon("host.studio"),
+    )
+    ambient = settings["ambient"]()
+    view = look.pop("debug_view", "none")
+    chosen = studio.Look(
+        settings["shading"](), settings["strands"](), settings["detail"](**look), view
+    )
+    occlusion = pipeline.rest_occlusion(rig, ambient)
+    made = studio.Studio(rig, occlusion, pipeline.head_occlusion(rig, ambient), chosen)
+    return made.picture(rig.rest_pose, rig.strands.grid, WIDTH, HEIGHT, samples, camera)
+
+
+def close_camera(rig: Any, reach: float) -> Any:
+    """Before the hair over the temple, showing `reach` [m] from bottom to top."""
+    camera = of_addon("render.camera")
+    points = rig.strands.points.astype(np.float64)
+    target = points[np.linalg.norm(points - TEMPLE, axis=1).argmin()]
+    eye = target + np.array([-0.3, -0.3, 0.05])
+    fov = 2.0 * np.arctan(reach / 2.0 / np.linalg.norm(eye - target))
+    projection = camera.perspective(fov, WIDTH / HEIGHT, 0.01, 2.0)
+    return camera.Camera(camera.look_at(eye, target), projection)
+
+
+def main(folder: Path) -> None:
+    gpu.init()
+    load_package().register()
+    images = of_addon("host.images")
+
+    def write(name: str, pictures: list[Any]) -> None:
+        images.write_png(folder / f"{name}.png", images.contact_sheet(pictures, len(pictures)))
+        print(f"Wrote {name}.png", flush=True)
+
+    guides, full = wig("none"), wig("multi")
+    close, closer = close_camera(full, reach=0.16), close_camera(full, reach=0.06)
+    undivided = {"mode": "fixed", "subdivisions": 1}
+    write("children", [picture(guides, {}), picture(full, {})])
+    write("close_up", [picture(full, dict(undivided), closer), picture(full, {}, closer)])
+    views = [dict(undivided), {"mode": "fixed", "subdivisions": 64}, {}]
+    shown = [picture(full, view | {"debug_view": "detail"}, close) for view in views]
+    write("detail_view", shown)
+    write("guide_view", [picture(full, {"debug_view": view}) for view in ("guide", "group")])
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
