@@ -21,7 +21,6 @@ from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, start
 from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance as advance_dynamics
-from .dynamics.way import bow
 from .errors import HairloomError
 from .groom.children import make_children
 from .groom.children_settings import ChildrenSettings
@@ -90,11 +89,19 @@ class Motion:
     carried_earlier: Floats | None = None
     duration: float = 0.0
 
-    def bow_to(self, target: Floats, duration: float) -> Floats | None:
-        """How the way to the carried guides (guide_count, cv_count, 3) after `duration` bends."""
-        if self.carried_earlier is None or not duration:
-            return None
-        return bow(self.carried_earlier, self.carried_guides, target, self.duration / duration)
+    def drive(
+        self,
+        target: Floats,
+        colliders: tuple[PosedCollider, ...],
+        gravity: Floats,
+        duration: float,
+        scene_wind: Floats,
+    ) -> Drive:
+        """What acts in a frame of `duration` [s] that carries the guides to `target`."""
+        earlier = self.carried_earlier if duration else None
+        ratio = self.duration / duration if duration else 1.0
+        before = self.carried_guides
+        return Drive(before, target, colliders, gravity, earlier, scene_wind, ratio)
 
 
 def prepare(
@@ -225,11 +232,10 @@ def advance(
         scene_wind: (3,) [m/s], world space.
     """
     target = carried(rig, pose, rig.guides)
-    before = motion.carried_guides
-    target_bow = motion.bow_to(target, duration)
-    drive = Drive(before, target, colliders, gravity, target_bow, scene_wind)
+    drive = motion.drive(target, colliders, gravity, duration, scene_wind)
     state = advance_dynamics(motion.dynamics, drive, settings, duration)
-    return Motion(state, grid_at_frame_end(state, drive), target, pose, before, duration)
+    guides, before = grid_at_frame_end(state, drive), motion.carried_guides
+    return Motion(state, guides, target, pose, before, duration)
 
 
 def strands_now(rig: Rig, motion: Motion) -> Floats:

@@ -91,9 +91,10 @@ class RandomRun:
         for number in range(1, len(times)):
             moments = times[max(number - 2, 0) : number + 1].tolist()
             targets = [_moved(self.head.matrix(time), self.grid) for time in moments]
-            bent = bow(*targets, 1.0) if self.is_bent and len(targets) == 3 else None
+            earlier = targets[0] if self.is_bent and len(targets) == 3 else None
             colliders = tuple(self._posed(one, way, moments) for one, way in self.colliders)
-            yield Drive(targets[-2], targets[-1], colliders, self.gravity, bent, self.scene_wind)
+            before, now = targets[-2:]
+            yield Drive(before, now, colliders, self.gravity, earlier, self.scene_wind)
 
     def _posed(self, collider: Collider, way: Way, moments: list[float]) -> PosedCollider:
         matrices = [way.matrix(time) for time in moments]

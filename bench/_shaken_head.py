@@ -57,27 +57,26 @@ class Shake:
     def drives(self, fps: float, seconds: float) -> Iterator[Drive]:
         """One a frame, with ways bent as `pipeline.advance` bends them."""
         places = [sway(frame / fps) for frame in range(round(seconds * fps) + 1)]
-        before = self._carried(places[0])
+        earlier, before = None, self._carried(places[0])
         for frame in range(1, len(places)):
             # as in the pipeline the style at one frame's end is the same array at the next's begin
             now = self._carried(places[frame])
-            yield self._drive(before, now, places[max(frame - 2, 0) : frame + 1])
-            before = now
+            yield self._drive((earlier, before, now), places[max(frame - 2, 0) : frame + 1])
+            earlier, before = before, now
 
     def _carried(self, x: float) -> np.ndarray:
         return self.grid + np.float32([x, 0.0, 0.0])
 
-    def _drive(self, before: np.ndarray, now: np.ndarray, places: list[float]) -> Drive:
+    def _drive(self, targets: tuple[np.ndarray | None, ...], places: list[float]) -> Drive:
         """Of the last two or three places of the head."""
         matrices = [_moved(x) for x in places]
         bent = bow(matrices[0], matrices[1], matrices[2], 1.0) if len(places) == 3 else None
-        grid_bow = None
-        if bent is not None:
-            grid_bow = np.zeros_like(self.grid) + bent[:3, 3].astype(np.float32)
         colliders = tuple(
             PosedCollider(one, matrices[-2], matrices[-1], bent) for one in self.colliders
         )
-        return Drive(before, now, colliders, GRAVITY, grid_bow)
+        earlier, before, now = targets
+        assert before is not None and now is not None
+        return Drive(before, now, colliders, GRAVITY, earlier)
 
 
 def depth_in(surface: Surface) -> Callable[[np.ndarray], float]:

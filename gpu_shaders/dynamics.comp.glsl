@@ -26,6 +26,12 @@ vec3 twist_way;
 vec3 twist_bow;
 vec3 fall[FREE_SIZE];  // [m] that gravity adds to each free CV in a substep
 
+// How the way of a point is bent, times r (r + 1); twin of bow in addon/dynamics/way.py.
+vec3 bow_of(vec3 earlier, vec3 before, vec3 way)
+{
+  return earlier - before + way * frame.fall.w;
+}
+
 void load_guide(int guide)
 {
   for (int cv = 0; cv < CV_COUNT; cv++) {
@@ -38,7 +44,7 @@ void load_guide(int guide)
     }
     style_before[cv] = texelFetch(styles_before, texel, 0).xyz;
     style_way[cv] = texelFetch(styles_now, texel, 0).xyz - style_before[cv];
-    style_bow[cv] = texelFetch(style_bows, texel, 0).xyz;
+    style_bow[cv] = bow_of(texelFetch(styles_earlier, texel, 0).xyz, style_before[cv], style_way[cv]);
   }
 #ifdef TIPS_HELD
   tip_is_held = texelFetch(rest_lengths, strand_texel(guide, CV_COUNT - 1, CV_COUNT), 0).x > 0.0;
@@ -59,7 +65,7 @@ void load_guide(int guide)
   ivec2 texel = strand_texel(guide, twist_cv, CV_COUNT);
   twist_before = texelFetch(styles_before, texel, 0).xyz;
   twist_way = texelFetch(styles_now, texel, 0).xyz - twist_before;
-  twist_bow = texelFetch(style_bows, texel, 0).xyz;
+  twist_bow = bow_of(texelFetch(styles_earlier, texel, 0).xyz, twist_before, twist_way);
 }
 
 void find_fall()

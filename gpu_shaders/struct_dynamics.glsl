@@ -17,7 +17,8 @@ struct Dynamics {
   float led_out;      // [m] in a substep
   float speed_ratio;  // of this substep to the one before the frame
   float reach;        // [m] from its plane in which a CV gets a contact
-  vec4 fall;          // xyz [m] that gravity adds in a substep
+  vec4 fall;          // xyz [m] that gravity adds in a substep; w duration of the frame before, over
+                      // that of this one
   vec4 combed;        // xyz the same of the gravity in which the style was combed, where it is held
   vec4 wind;          // xyz mean [m/s]
   vec4 swing[{{wind_modes}}];  // xyz [m/s]

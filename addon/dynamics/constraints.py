@@ -238,8 +238,8 @@ def unit(vector: Floats) -> Floats:
 
 def dot(one: Floats, two: Floats) -> Floats:
     """Dot products over the first axis, which is x, y, z."""
-    total = one[0] * two[0]
-    scratch = one[1] * two[1]
-    total += scratch
-    total += np.multiply(one[2], two[2], scratch)
+    product = one * two
+    total: Floats = product[0]
+    total += product[1]
+    total += product[2]
     return total

@@ -11,9 +11,6 @@ from .banded import solve_tridiagonal
 from .constraints import PINNED, chain_matrix, directions, dot
 from .settings import DynamicsSettings
 
-#: Guides at most that the mean rotation of a groom is taken from.
-SAMPLED_GUIDES = 256
-
 
 def speed_kept(settings: DynamicsSettings, dt: float) -> float:
     """Share of the speed that damping leaves after `dt` seconds."""
@@ -79,7 +76,7 @@ def felt_gravity(
     under water, where buoyancy carries the weight, the style lifts the hair, as hair does there.
 
     Args:
-        turn: (3, 3) how the groom has turned since, see `best_rotation`.
+        turn: (3, 3) how the groom has turned since, see `turn.best_rotation`.
         carried: (3, cv_count, guide_count) world [m], the style.
     """
     pull = np.asarray(gravity, np.float32) * np.float32(settings.gravity)
@@ -106,32 +103,3 @@ def weight_on_style(gravity: Floats, carried: Floats) -> Floats:
     direction *= tension
     direction[:, :-1] -= direction[:, 1:]
     return gravity[:, None, None] - direction
-
-
-def sampled(guide_count: int) -> slice:
-    """The guides that tell how the whole groom has turned: a few hundred, evenly chosen."""
-    return slice(None, None, max(-(-guide_count // SAMPLED_GUIDES), 1))
-
-
-def best_rotation(rest: Floats, carried: Floats) -> Floats:
-    """The one rotation (3, 3) float64 that turns the whole groom from rest to where it is carried.
-
-    Kabsch 1976, from the pinned CVs and the tips of sampled guides. A small share of the identity
-    picks the smallest rotation where the groom leaves one free, as a single straight guide does.
-
-    Limitation: fur on several limbs feels their mean rotation.
-    """
-    cvs = [*range(min(PINNED, rest.shape[1])), rest.shape[1] - 1]
-    guides = sampled(rest.shape[2])
-    before = rest[:, cvs, guides].reshape(3, -1).astype(np.float64)
-    now = carried[:, cvs, guides].reshape(3, -1).astype(np.float64)
-    before -= before.mean(axis=1, keepdims=True)  # the mean of `now` then adds nothing
-    # no BLAS: it would wake its threads for this
-    spread = np.einsum("in,jn->ij", now, before)
-    spread.flat[::4] += 1.0e-6 * np.einsum("in,in->", before, before) + 1.0e-12
-    left, _, right = np.linalg.svd(spread)
-    rotation: Floats = left @ right
-    if np.linalg.det(rotation) < 0.0:
-        left[:, 2] *= -1.0
-        rotation = left @ right
-    return rotation

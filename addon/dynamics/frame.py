@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Floats
 from ..errors import HairloomError
 from .colliders import PosedCollider
-from .constraints import PINNED
 from .contacts import cv_radius
-from .forces import best_rotation, carried_share, felt_gravity, sampled
+from .forces import carried_share, felt_gravity
 from .settings import DynamicsSettings
-from .state import DynamicsState, Rest, as_rows, checked_grid
+from .state import DynamicsState, Rest, StyleRows, as_rows, checked_grid
 from .style import StyleBand, style_band
-from .way import at
+from .turn import rotation_from, sample
+from .way import at, bow
 from .wind import Air, air_of
 
 
@@ -27,27 +28,47 @@ class Drive:
         at the frame's begin and end.
     colliders: with their way during the frame.
     gravity: (3,) world [m/s^2].
-    target_bow: (guide_count, cv_count, 3) [m], how the way between them is bent, see `way.bow`;
+    target_earlier: where that style was one frame earlier, so that its way is bent, see `way.bow`;
         None: straight.
     scene_wind: (3,) world [m/s], in addition to that of the settings.
+    earlier_ratio: duration of that frame, over that of this one.
+
+    Hand the same array on from frame to frame, now to before to earlier: what is known of it then
+    need not be worked out again.
     """
 
     target_before: Floats
     target_now: Floats
     colliders: tuple[PosedCollider, ...]
     gravity: Floats
-    target_bow: Floats | None = None
+    target_earlier: Floats | None = None
     scene_wind: Floats = field(default_factory=lambda: np.zeros(3))
+    earlier_ratio: float = 1.0
+
+    @property
+    def targets(self) -> tuple[Floats, ...]:
+        """Those that are there, the latest first."""
+        known = (self.target_now, self.target_before, self.target_earlier)
+        return tuple(target for target in known if target is not None)
+
+    @cached_property
+    def target_bow(self) -> Floats | None:
+        """How the way of the style is bent, in the shape of the targets [m]; None: straight."""
+        if self.target_earlier is None:
+            return None
+        return bow(self.target_earlier, self.target_before, self.target_now, self.earlier_ratio)
 
 
-def check_drive(state: DynamicsState, drive: Drive) -> None:
+def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = ()) -> None:
     """Raises:
     HairloomError: a drive that does not fit the state or is not finite.
+
+    Args:
+        known: arrays that were found right before.
     """
-    targets = [drive.target_before, drive.target_now]
-    if drive.target_bow is not None:
-        targets.append(drive.target_bow)
-    for target in targets:
+    for target in drive.targets:
+        if any(target is one for one in known):
+            continue
         guide_count, cv_count = checked_grid(target, "style").shape[:2]
         if (guide_count, cv_count) != (state.guide_count, state.cv_count):
             raise HairloomError(
@@ -63,6 +84,14 @@ def check_drive(state: DynamicsState, drive: Drive) -> None:
                 place="dynamics",
                 remedy=f"Check the scene's {name}",
             )
+
+
+def style_rows(state: DynamicsState, drive: Drive) -> tuple[StyleRows, ...]:
+    """The drive's targets in rows; those that the state knows from the frame before as they are."""
+    known = {id(style.grid): style for style in state.styles}
+    return tuple(
+        known.get(id(target)) or StyleRows(target, as_rows(target)) for target in drive.targets
+    )
 
 
 @dataclass(frozen=True)
@@ -90,10 +119,8 @@ class Frame:
     ) -> Frame:
         turn: Floats = np.eye(3)
         if state.guide_count:
-            ends, guides = [0, PINNED - 1, state.cv_count - 1], sampled(state.guide_count)
-            both = (drive.target_before, drive.target_now)
-            before, now = (np.asarray(grid)[guides][:, ends] for grid in both)
-            turn = best_rotation(state.rest.position[:, ends, guides], as_rows((before + now) / 2))
+            before, now = (sample(grid) for grid in (drive.target_before, drive.target_now))
+            turn = rotation_from(state.rest.sample, (before + now) / 2.0)
         matrix = style_band(settings, state.cv_count, dt)
         air = air_of(settings, drive.scene_wind)
         return cls(drive, settings, dt, duration, state.time, state.time_left, turn, matrix, air)
@@ -135,11 +162,16 @@ class Block:
     radius: Floats
 
     @classmethod
-    def of(cls, state: DynamicsState, frame: Frame, guides: slice) -> Block:
+    def of(
+        cls, state: DynamicsState, frame: Frame, styles: tuple[StyleRows, ...], guides: slice
+    ) -> Block:
+        """Args:
+        styles: as `style_rows` gives them.
+        """
         drive, settings, dt = frame.drive, frame.settings, frame.dt
-        before = as_rows(drive.target_before[guides])
-        way = as_rows(drive.target_now[guides]) - before
-        bow = None if drive.target_bow is None else as_rows(drive.target_bow[guides])
+        now, before, *earlier = (style.rows[:, :, guides] for style in styles)
+        way = now - before
+        bent = bow(earlier[0], before, now, drive.earlier_ratio) if earlier else None
         middle = before + way * np.float32(0.5)
         impulse = way * np.float32(frame.carried_share)
         impulse += felt_gravity(drive.gravity, settings, frame.turn, middle) * np.float32(dt * dt)
@@ -152,9 +184,9 @@ class Block:
             state.rest.part(guides),
             before,
             way,
-            bow,
+            bent,
             impulse,
-            None if bow is None else bow * np.float32(frame.carried_share),
+            None if bent is None else bent * np.float32(frame.carried_share),
             np.repeat(cv_radius(settings, state.cv_count), before.shape[2]),
         )
 

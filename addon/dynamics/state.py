@@ -8,6 +8,7 @@ times faster than an array of points.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ..arrays import Bools, Floats
 from ..errors import HairloomError
 from .constraints import PINNED
 from .style import LocalShape, local_shape
+from .turn import rest_sample
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,11 @@ class Rest:
     shape: LocalShape
     tip_held: Floats | None = None
 
+    @cached_property
+    def sample(self) -> Floats:
+        """See `turn.rest_sample`."""
+        return rest_sample(self.position.T)
+
     def part(self, guides: slice) -> Rest:
         """The rest of these guides, as views."""
         return Rest(
@@ -41,6 +48,15 @@ class Rest:
             self.shape.part(guides),
             None if self.tip_held is None else self.tip_held[guides],
         )
+
+
+@dataclass(frozen=True, eq=False)
+class StyleRows:
+    """A style as it was given, (guide_count, cv_count, 3), and as rows (3, cv_count, guide_count)
+    float32, world [m]."""
+
+    grid: Floats
+    rows: Floats
 
 
 @dataclass(frozen=True)
@@ -52,6 +68,7 @@ class DynamicsState:
     substep: length [s] of the last substep; 0 when there was none.
     time_left: time [s] that has passed but is shorter than a substep, so not yet simulated.
     time: [s] simulated since the start; gusts hang on it.
+    styles: what the last frame went by, so that the next need not turn and check it again.
     """
 
     position: Floats
@@ -60,6 +77,7 @@ class DynamicsState:
     substep: float = 0.0
     time_left: float = 0.0
     time: float = 0.0
+    styles: tuple[StyleRows, ...] = ()
 
     def __post_init__(self) -> None:
         self.position.flags.writeable = False

@@ -31,7 +31,7 @@ from ..arrays import Floats
 from .constraints import PINNED, finish_lengths, hold_within_reach, keep_lengths, pin, relax_lengths
 from .contacts import find_contacts, touched_normals
 from .forces import air_share, brake, predict, speed_kept
-from .frame import Block, Drive, Frame, check_drive
+from .frame import Block, Drive, Frame, check_drive, style_rows
 from .schedule import due_substeps
 from .settings import DynamicsSettings
 from .state import DynamicsState, Rest
@@ -57,13 +57,15 @@ def advance(
     duration, count, left = due_substeps(state.time_left, duration, longest, dt)
     if not count:
         return replace(state, time_left=left)
-    check_drive(state, drive)
+    check_drive(state, drive, tuple(style.grid for style in state.styles))
+    styles = style_rows(state, drive)
     frame = Frame.of(state, drive, settings, duration, dt)
     position, previous = np.empty_like(state.position), np.empty_like(state.position)
     for guides in _blocks(state.guide_count):
-        block = Block.of(state, frame, guides)
+        block = Block.of(state, frame, styles, guides)
         position[:, :, guides], previous[:, :, guides] = _advance_block(block, frame, count)
-    return DynamicsState(position, previous, state.rest, dt, left, state.time + count * dt)
+    time = state.time + count * dt
+    return DynamicsState(position, previous, state.rest, dt, left, time, styles)
 
 
 def _blocks(guide_count: int) -> list[slice]:

@@ -24,9 +24,14 @@ def bow(earlier: Floats, before: Floats, now: Floats, ratio: float) -> Floats:
         earlier, before, now: values one frame earlier, at the frame's begin and at its end.
         ratio: duration of the frame before, over that of this one.
     """
-    ratio = min(max(ratio, _RATIO[0]), _RATIO[1])
+    ratio = held_ratio(ratio)
     result: Floats = (earlier - before + (now - before) * ratio) / (ratio * (ratio + 1.0))
     return result
+
+
+def held_ratio(ratio: float) -> float:
+    """The ratio of durations that a bow is made with."""
+    return min(max(ratio, _RATIO[0]), _RATIO[1])
 
 
 def at(before: Floats, way: Floats, bow: Floats | None, moment: float) -> Floats:

@@ -11,7 +11,6 @@ from .. import pipeline
 from ..arrays import Floats
 from ..dynamics.colliders import PosedCollider
 from ..dynamics.settings import DynamicsSettings
-from ..dynamics.step import Drive
 from ..pipeline import Motion, Pose, Rig
 from ..render.dynamics_pass import DynamicsPass
 from ..render.ride_pass import RidePass
@@ -67,13 +66,15 @@ class ComputeSolver:
         motion = self._motion
         if self._dynamics is None:
             self._dynamics = DynamicsPass(motion.dynamics)
-        before = motion.carried_guides
         target = pipeline.carried(self._rig, pose, self._rig.guides)
-        bow = motion.bow_to(target, duration)
-        drive = Drive(before, target, colliders, gravity, bow, scene_wind)
+        drive = motion.drive(target, colliders, gravity, duration, scene_wind)
         self._dynamics.advance(drive, settings, duration)
         self._motion = replace(
-            motion, carried_guides=target, pose=pose, carried_earlier=before, duration=duration
+            motion,
+            carried_guides=target,
+            pose=pose,
+            carried_earlier=motion.carried_guides,
+            duration=duration,
         )
         self._is_resting = self._is_drawn = False
 

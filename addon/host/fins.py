@@ -15,7 +15,6 @@ from ..dynamics.cloth.settings import FinSettings
 from ..dynamics.cloth.state import ClothState, start_cloth
 from ..dynamics.cloth.step import advance_cloth, cloth_at_frame_end
 from ..dynamics.step import Drive
-from ..dynamics.way import bow
 from ..errors import HairloomError
 from . import live
 from .fin_mesh import check_usable, corners_of, loose_edges_of, triangles_of
@@ -107,16 +106,14 @@ class FinSession:
         earlier, before = self._earlier, self._carried
         self._shown, self._matrix = self._read(obj, depsgraph)
         now = self._world()
-        bent = None
-        if earlier is not None and duration:
-            bent = bow(earlier, before, now, self._duration / duration)
         drive = Drive(
             before,
             now,
             self.obstacles.move(depsgraph, duration),
             gravity_of(depsgraph.scene),
-            bent,
+            earlier if duration else None,
             scene_wind(depsgraph),
+            self._duration / duration if duration else 1.0,
         )
         self.state = self._named(lambda: advance_cloth(state, drive, self.settings, duration))
         self._earlier, self._carried, self._duration = before, now, duration

@@ -72,7 +72,7 @@ def dynamics_recipe(
         "HAS_ROUNDS": rounds,
         "HAS_FIELDS": fields,
     }
-    textures = ["styles_before", "styles_now", "style_bows", "rest_shapes", "rest_lengths"]
+    textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
     textures += ["moments"]
     textures += ["rounds"] * rounds + ["fields"] * fields
     return ShaderRecipe(
@@ -121,7 +121,7 @@ class DynamicsPass:
         """
         state, dt, longest = self._state, 1.0 / settings.substep_rate, settings.longest_frame
         duration, count, left = due_substeps(state.time_left, duration, longest, dt)
-        check_drive(state, drive)
+        check_drive(state, drive, tuple(style for style, _ in self._styles))
         if state.guide_count:
             self._upload(drive)
             if count:
@@ -153,7 +153,7 @@ class DynamicsPass:
         self._is_bridged = False
         self._block = UniformBlock()
         self._colliders: ColliderTextures | None = None
-        self._styles: tuple[Floats | None, Floats | None] = (None, None)
+        self._styles: list[tuple[Floats, Any]] = []  # those of the last frame, and their textures
 
     def _upload(self, drive: Drive) -> None:
         state, textures = self._state, self._textures
@@ -164,23 +164,16 @@ class DynamicsPass:
             textures["bridged"] = points_texture(here)
             textures["rest_shapes"] = texture_from(strand_rows(rest_shapes(state.rest)), "RGBA32F")
             textures["rest_lengths"] = texture_from(strand_rows(rest_lengths(state.rest)), "R32F")
-        before, now = self._styles
-        if drive.target_before is now:
-            textures["styles_before"] = textures["styles_now"]
-        elif drive.target_before is not before:
-            textures["styles_before"] = points_texture(drive.target_before)
-        if drive.target_now is drive.target_before:
-            textures["styles_now"] = textures["styles_before"]
-        elif drive.target_now is not now:
-            textures["styles_now"] = points_texture(drive.target_now)
-        self._styles = drive.target_before, drive.target_now
-        textures["style_bows"] = (
-            textures["styles_now"]  # its share is 0 in the table of moments
-            if drive.target_bow is None
-            else points_texture(drive.target_bow)
-        )
+        self._styles = [(style, self._style_texture(style)) for style in drive.targets]
+        now, before, *earlier = (texture for _, texture in self._styles)
+        textures |= {"styles_now": now, "styles_before": before}
+        textures["styles_earlier"] = earlier[0] if earlier else before  # which then counts nothing
         if self._colliders is None or not self._colliders.are_of(drive.colliders):
             self._colliders = ColliderTextures.of(tuple(one.collider for one in drive.colliders))
+
+    def _style_texture(self, style: Floats) -> Any:
+        known = (texture for other, texture in self._styles if other is style)
+        return next(known, None) or points_texture(style)
 
     def _advance(self, frame: Frame, count: int, speed_ratio: float) -> None:
         """All substeps of a frame; the first is `speed_ratio` as long as the one before it."""

@@ -4,7 +4,7 @@ positions      RGBA32F: xyz world [m], w the z of a substep earlier
 previous_positions   RG32F: x and y of a substep earlier; software drivers take time for each
                number that is written
 bridged        RGBA32F: xyz world [m], at the frame's very end (step.grid_at_frame_end)
-styles_before, styles_now, style_bows   RGBA32F: xyz world [m], see step.Drive
+styles_earlier, styles_before, styles_now   RGBA32F: xyz world [m], see frame.Drive
 rest_shapes    RGBA32F: of CV i xyz curvature [m] and w hold (style.LocalShape); of CV 0 x its
                twist CV
 rest_lengths   R32F: [m] to the next CV; at the tip whether it is held

@@ -102,9 +102,9 @@ def written(curves):
     return points
 
 
-@pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_WORKBENCH"])
+@pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_WORKBENCH", "BLENDER_EEVEE"])
 def test_a_render_shows_the_baked_hair_of_its_frame(engine, scene, tmp_path):
-    if engine == "BLENDER_WORKBENCH":
+    if engine != "CYCLES":
         pytest.importorskip("gpu").init()
     assert bpy.ops.hairloom.bake() == {"FINISHED"}
     scene.render.engine = engine
@@ -151,6 +151,27 @@ def test_a_render_changes_nothing_of_what_the_viewport_shows(scene, evaluated):
     np.testing.assert_array_equal(session.strands, before)
     assert live.sessions() == (session,) and scene.frame_current == 4
     assert not playback._is_rendering
+
+
+def test_motion_blur_smears_the_hair_between_two_frames(scene, tmp_path):
+    """Cycles asks for the hair at moments between frames: the picture covers the way of both."""
+    bpy.ops.hairloom.bake()
+    cache = playback.cache_of(bpy.data.objects["Hair"])
+    scene.cycles.samples = 64
+    scene.render.motion_blur_shutter = 1.0
+    scene.render.motion_blur_position = "START"
+    scene.frame_current = 3
+    pictures = []
+    for is_blurred in (False, True):
+        scene.render.use_motion_blur = is_blurred
+        scene.render.filepath = str(tmp_path / f"blur{is_blurred}.png")
+        bpy.ops.render.render(write_still=True)
+        pictures.append(coverage(tmp_path / f"blur{is_blurred}.png"))
+    sharp, blurred = pictures
+    ends = [expected(playback.strands_in(cache, frame)) > 0.0 for frame in (3, 4)]
+    only_later = ends[1] & ~ends[0]
+    assert blurred[only_later].mean() > 2.0 * sharp[only_later].mean() + 0.05
+    assert blurred.max() < 0.99 * sharp.max() or blurred[ends[0]].mean() < sharp[ends[0]].mean()
 
 
 def test_between_two_frames_strands_go_straight_for_motion_blur(scene):

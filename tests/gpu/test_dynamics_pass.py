@@ -111,8 +111,8 @@ class Scene:
         gravity, wind = np.array([0.0, 0.0, -9.81]), np.array(self.wind)
         drives = []
         for frame, (before, now) in enumerate(pairwise(grids)):
-            bent = bow(grids[frame - 1], before, now, 1.0) if self.is_bent and frame else None
-            drives.append(Drive(before, now, self.colliders(frame), gravity, bent, wind))
+            earlier = grids[frame - 1] if self.is_bent and frame else None
+            drives.append(Drive(before, now, self.colliders(frame), gravity, earlier, wind))
         return drives
 
 
@@ -367,7 +367,7 @@ def test_no_guides(make_pass: Any) -> None:
     state = start(np.zeros((0, 8, 3), np.float32))
     dynamics = make_pass(state)
     drive = replace(Scene().drives(0.1)[0], target_before=state.grid, target_now=state.grid)
-    dynamics.advance(replace(drive, target_bow=None), DynamicsSettings(), 0.02)
+    dynamics.advance(replace(drive, target_earlier=None), DynamicsSettings(), 0.02)
     assert dynamics.read().position.shape == (3, 8, 0)
     assert dynamics.guides is None
 

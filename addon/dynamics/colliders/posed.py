@@ -62,13 +62,8 @@ class PosedCollider:
 def transform_points(matrix: Floats, points: Floats) -> Floats:
     """Points (3, n) moved by an affine (4, 4) matrix, float32, without BLAS."""
     rows = np.asarray(matrix, np.float32)
-    result = np.empty_like(points)
-    scratch = np.empty_like(points[0])
-    for axis in range(3):
-        np.multiply(points[0], rows[axis, 0], out=result[axis])
-        result[axis] += np.multiply(points[1], rows[axis, 1], out=scratch)
-        result[axis] += np.multiply(points[2], rows[axis, 2], out=scratch)
-        result[axis] += rows[axis, 3]
+    result: Floats = np.einsum("ij,jn->in", rows[:3, :3], points)
+    result += rows[:3, 3:]
     return result
 
 

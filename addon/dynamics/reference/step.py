@@ -15,10 +15,10 @@ import numpy as np
 from ...arrays import Floats
 from ...params.curve import along as curve_along
 from ..constraints import CONTACT_WEIGHT, HELD, PINNED, ROUNDING
-from ..forces import best_rotation
 from ..settings import DynamicsSettings
 from ..state import DynamicsState
 from ..step import Drive
+from ..turn import best_rotation
 from ..wind import air_of
 from .contacts import Moment, planes_of, push_out
 from .shape import frames, hold, jacobian_of

@@ -162,9 +162,9 @@ class Scene:
 
     def drive(self, before: float, now: float) -> Drive:
         targets = [moved(self.motion(t), self.grid) for t in (2 * before - now, before, now)]
-        bend = bow(*targets, 1.0) if self.bowed else None
+        earlier = targets[0] if self.bowed else None
         colliders = self.colliders(before, now)
-        return Drive(*targets[1:], colliders, self.gravity, bend, np.asarray(self.wind))
+        return Drive(*targets[1:], colliders, self.gravity, earlier, np.asarray(self.wind))
 
     def play(self, seconds: float, fps: float = 60.0) -> list[DynamicsState]:
         """The states at all frames, the start first."""

@@ -18,7 +18,6 @@ from hairloom.addon.dynamics.cloth.state import start_cloth, vertex_normals
 from hairloom.addon.dynamics.cloth.step import advance_cloth, cloth_at_frame_end
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.step import Drive
-from hairloom.addon.dynamics.way import bow
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.strands import Surface
 
@@ -65,7 +64,7 @@ def play(state, seconds, settings, motion=still, fps=60.0, advance=advance_cloth
             before,
             now,
             gravity=EARTH,
-            target_bow=bow(earlier, before, now, 1.0),
+            target_earlier=earlier,
             **{"colliders": ()} | drive,
         )
         states.append(advance(states[-1], way, settings, 1.0 / fps))

@@ -5,11 +5,12 @@ import pytest
 
 from hairloom.addon.dynamics import step
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
-from hairloom.addon.dynamics.forces import best_rotation, weight_on_style
+from hairloom.addon.dynamics.forces import weight_on_style
 from hairloom.addon.dynamics.measure import farthest_reach, max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import rows_of, start
 from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
+from hairloom.addon.dynamics.turn import best_rotation
 from hairloom.addon.errors import HairloomError
 
 # --- style ---------------------------------------------------------------------------------------
@@ -316,8 +317,8 @@ def bad_drive(kit, **changes):
         ({"gravity": np.array([0.0, np.inf, 0.0])}, "gravity"),
         ({"gravity": np.zeros(2)}, "gravity"),
         ({"scene_wind": np.array([0.0, np.nan, 0.0])}, "wind"),
-        ({"target_bow": np.full((4, 8, 3), np.inf, np.float32)}, "not a finite number"),
-        ({"target_bow": np.zeros((4, 7, 3), np.float32)}, "Start the simulation again"),
+        ({"target_earlier": np.full((4, 8, 3), np.inf, np.float32)}, "not a finite number"),
+        ({"target_earlier": np.zeros((4, 7, 3), np.float32)}, "Start the simulation again"),
     ],
 )
 def test_a_bad_drive_is_named(kit, changes, message):

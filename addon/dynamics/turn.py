@@ -1,0 +1,59 @@
+"""How a whole groom has turned since rest: one rotation, from some places of some of its guides.
+
+Limitation: fur on several limbs feels their mean rotation.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats
+from .constraints import PINNED
+
+#: Guides at most that the rotation is taken from.
+SAMPLED_GUIDES = 256
+
+
+def best_rotation(rest: Floats, carried: Floats) -> Floats:
+    """The one rotation (3, 3) float64 that turns the whole groom from rest to where it is carried.
+
+    Args:
+        rest, carried: rows (3, cv_count, guide_count) [m].
+    """
+    return rotation_from(rest_sample(rest.T), sample(carried.T))
+
+
+def sample(grid: Floats) -> Floats:
+    """The pinned CVs and the tips of evenly chosen guides, rows (3, n) float64, of a grid
+    (guide_count, cv_count, 3)."""
+    cvs = [*range(min(PINNED, grid.shape[1])), grid.shape[1] - 1]
+    step = max(-(-len(grid) // SAMPLED_GUIDES), 1)
+    places = np.asarray(grid)[::step, cvs]
+    return np.ascontiguousarray(places.transpose(2, 1, 0), np.float64).reshape(3, -1)
+
+
+def rest_sample(grid: Floats) -> Floats:
+    """`sample` about its own middle."""
+    places = sample(grid)
+    return places - places.mean(axis=1, keepdims=True) if places.size else places
+
+
+def rotation_from(rest: Floats, now: Floats) -> Floats:
+    """The rotation (3, 3) float64 from `rest_sample` to `sample`.
+
+    Kabsch 1976. A small share of the identity picks the smallest rotation where the groom leaves
+    one free, as a single straight guide does.
+    """
+    spread = np.einsum("in,jn->ij", now, rest)  # no BLAS: it would wake its threads for this
+    spread.flat[::4] += 1.0e-6 * np.einsum("in,in->", rest, rest) + 1.0e-12
+    left, _, right = np.linalg.svd(spread)
+    rotation: Floats = left @ right
+    if _determinant(rotation) < 0.0:
+        left[:, 2] *= -1.0
+        rotation = left @ right
+    return rotation
+
+
+def _determinant(matrix: Floats) -> float:
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    return float(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
