@@ -61,7 +61,7 @@ vec4 nodes_at(Field field, ivec3 node)
 Found distance_in(Field field, vec3 point)
 {
   vec3 top = vec3(field.nodes - 1);
-  vec3 place = (point - field.low) / field.cell;
+  vec3 place = (point - field.low) * (1.0 / field.cell);
   vec3 held = clamp(place, vec3(0.0), top);
   float outside = length(place - held) * field.cell;
   held = min(held, top - 1.0e-3);
@@ -76,6 +76,6 @@ Found distance_in(Field field, vec3 point)
   vec2 y = z.xz + f.y * dy;
   vec2 slope_z = dz.xz + f.y * (dz.yw - dz.xz);
   vec3 gradient = vec3(y.y - y.x, mix(dy.x, dy.y, f.x), mix(slope_z.x, slope_z.y, f.x));
-  return Found(y.x + f.x * gradient.x + outside, gradient / field.cell);
+  return Found(y.x + f.x * gradient.x + outside, gradient * (1.0 / field.cell));
 }
 #endif

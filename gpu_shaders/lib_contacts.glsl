@@ -130,9 +130,9 @@ void find_contacts_with(Posed posed)
     vec3 gradient = found[i].gradient;
     vec3 normal = posed.inverse[0].xyz * gradient.x + posed.inverse[1].xyz * gradient.y +
                   posed.inverse[2].xyz * gradient.z;
-    float scale = max(length(normal), TINY);
-    normal /= scale;
-    float away = found[i].distance / scale;
+    float unscaled = 1.0 / max(length(normal), TINY);
+    normal *= unscaled;
+    float away = found[i].distance * unscaled;
     vec3 from = previous[i + 2] + moved(posed.change, local[i]);
     float height = dot(normal, position[i + 2]);
     float reached = away - dot(normal, position[i + 2] - from) + frame.led_out;
@@ -152,6 +152,9 @@ void find_contacts(int substep)
       pushed[slot][i] = 0.0;
     }
   }
+#if CONTACT_SLOTS == 1
+  find_contacts_with(posed_at(substep, 0));  // there is but one collider
+#else
   float squared = 0.0;
   for (int i = 0; i < FREE; i++) {
     vec3 way = position[i + 2] - position[1];
@@ -166,6 +169,7 @@ void find_contacts(int substep)
       collider = next_near(collider + 1, substep, guide_radius);
     } while (collider < frame.collider_count);
   }
+#endif
 }
 
 // Bring CVs back to their planes, and say which ones touch.

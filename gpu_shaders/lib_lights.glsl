@@ -1,5 +1,155 @@
-// Twin of addon/shading/lights.py: the radiometric convention is written there.
+// Twin of addon/shading/lights.py and area_lights.py: the radiometric convention is written there.
 // Needs struct_lights.glsl. Holds no resources.
+
+const float LIGHT_PI = 3.14159265358979;
+const float POINT_LIGHT = 1.0, SPOT_LIGHT = 2.0, RECTANGLE_LIGHT = 3.0, DISK_LIGHT = 4.0;
+const float ROUND_GRID_LIGHT = 6.0;
+// FAR and LEAST_HEIGHT of addon/shading/area_lights.py
+const float FAR_PANEL = 1.0e-5, LEAST_HEIGHT = 1.0e-6;
+// Gauss-Legendre, six nodes on -1 .. 1: these and their mirror images
+const vec3 PANEL_NODES = vec3(0.23861918608319692, 0.6612093864662645, 0.932469514203152);
+const vec3 PANEL_WEIGHTS = vec3(0.46791393457269104, 0.3607615730481386, 0.17132449237917036);
+
+// An angle from 0 to pi whose sine and cosine are known; GLSL promises little of its own atan.
+// The angle over its sine as a polynomial of the cosine, within 1e-7.
+float light_angle(float sine, float cosine)
+{
+  float x = abs(cosine);
+  float sum = -0.0979687049984932 + x * 0.01765366829931736;
+  sum = 0.2532384693622589 + x * sum;
+  sum = -0.4245661795139313 + x * sum;
+  sum = 0.5570220351219177 + x * sum;
+  sum = -0.6610894799232483 + x * sum;
+  sum = 0.7848962545394897 + x * sum;
+  sum = -0.9999822378158569 + x * sum;
+  sum = (1.570796251296997 + x * sum) * sine;
+  return cosine < 0.0 ? LIGHT_PI - sum : sum;
+}
+
+// What slats before a panel let through into a direction of this tangent to the panel's own.
+float panel_shade(Lights lights, int index, float tangent)
+{
+  return max(lights.along[index].w - tangent, 0.0) * lights.power[index].w;
+}
+
+// The angle of an edge from start to end, over its line's distance.
+float panel_edge(float height, float across, float start, float end)
+{
+  float squared = height * height + across * across;
+  float lengths = sqrt((squared + start * start) * (squared + end * end));
+  float reach = sqrt(squared);
+  return light_angle((end - start) * reach / lengths, (squared + start * end) / lengths) / reach;
+}
+
+vec3 panel_rectangle(vec2 half_sides, vec3 offset)
+{
+  float left = -half_sides.x - offset.x, right = half_sides.x - offset.x;
+  float bottom = -half_sides.y - offset.y, top = half_sides.y - offset.y;
+  float at_left = panel_edge(offset.z, left, bottom, top);
+  float at_right = panel_edge(offset.z, right, bottom, top);
+  float at_bottom = panel_edge(offset.z, bottom, left, right);
+  float at_top = panel_edge(offset.z, top, left, right);
+  vec3 total = vec3(offset.z * (at_left - at_right),
+                    offset.z * (at_bottom - at_top),
+                    left * at_left - right * at_right + bottom * at_bottom - top * at_top);
+  return total / (8.0 * LIGHT_PI * half_sides.x * half_sides.y);
+}
+
+vec3 panel_disk(float radius, vec3 offset)
+{
+  float height = offset.z;
+  float p = length(offset.xy);
+  float product = length(vec2(height, p - radius)) * length(vec2(height, p + radius));
+  float total = radius * radius + p * p + height * height + product;
+  float rest = radius * radius + height * height - p * p;
+  float facing = rest > 0.0 ? product + rest :
+                              4.0 * (p * height) * (p * height) / (product - rest);
+  return -vec3(2.0 * height * offset.xy, facing) / (LIGHT_PI * total * product);
+}
+
+// The part of one row of a panel, from low to high, by the sine of the angle at the point.
+vec3 panel_row(Lights lights, int index, float height, float v, float low, float high)
+{
+  float reach = length(vec2(height, v));
+  float first = low / length(vec2(reach, low));
+  float last = high / length(vec2(reach, high));
+  float middle = 0.5 * (first + last), half_width = max(0.5 * (last - first), 0.0);
+  vec3 total = vec3(0.0);
+  for (int node = 0; node < 6; node++) {
+    float sine = middle + (node % 2 == 0 ? -half_width : half_width) * PANEL_NODES[node / 2];
+    float cosine = sqrt(max(1.0 - sine * sine, 1e-12));
+    float shade = panel_shade(lights, index, length(vec2(reach * sine / cosine, v)) / height);
+    vec3 way = vec3(sine, v / reach * cosine, -height / reach * cosine);
+    total += PANEL_WEIGHTS[node / 2] * half_width * shade * way;
+  }
+  return total;
+}
+
+// Row by row over what of a panel lies in the cone into which it shines.
+vec3 panel_grid(Lights lights, int index, bool is_round, vec3 offset)
+{
+  float a = lights.across[index].w, b = lights.upward[index].w, height = offset.z;
+  float reach = height * lights.along[index].w;
+  float first = max(-b - offset.y, -reach) / height, last = min(b - offset.y, reach) / height;
+  float first_length = length(vec2(1.0, first)), last_length = length(vec2(1.0, last));
+  // angles from the panel's plane, which are those of numpy's arctan and a quarter turn
+  float low_angle = light_angle(1.0 / first_length, -first / first_length);
+  float high_angle = light_angle(1.0 / last_length, -last / last_length);
+  float middle = 0.5 * (low_angle + high_angle);
+  float half_width = max(0.5 * (high_angle - low_angle), 0.0);
+  vec3 total = vec3(0.0);
+  for (int node = 0; node < 6; node++) {
+    float angle = middle + (node % 2 == 0 ? -half_width : half_width) * PANEL_NODES[node / 2];
+    float v = -height * cos(angle) / sin(angle);
+    float place = (v + offset.y) / b;
+    float chord = is_round ? a * sqrt(max(1.0 - place * place, 0.0)) : a;
+    float cone = sqrt(max(reach * reach - v * v, 0.0));
+    float low = max(-chord - offset.x, -cone), high = min(chord - offset.x, cone);
+    total += PANEL_WEIGHTS[node / 2] * half_width *
+             panel_row(lights, index, height, v, low, high);
+  }
+  return total / (LIGHT_PI * 4.0 * a * b * (is_round ? 0.25 * LIGHT_PI : 1.0));
+}
+
+// What arrives of one watt of an area light, towards it; nought behind it [1/m^2].
+vec3 panel_vector_irradiance(Lights lights, int index, vec3 away)
+{
+  mat3 axes = mat3(lights.across[index].xyz, lights.upward[index].xyz, lights.along[index].xyz);
+  vec3 offset = -away * axes;
+  if (offset.z <= LEAST_HEIGHT) {
+    return vec3(0.0);
+  }
+  float form = lights.vector_and_kind[index].w;
+  vec2 half_sides = vec2(lights.across[index].w, lights.upward[index].w);
+  float squared = dot(offset, offset);
+  if (form == DISK_LIGHT) {
+    return axes * panel_disk(half_sides.x, offset);
+  }
+  if (dot(half_sides, half_sides) < FAR_PANEL * squared) {
+    float shade = panel_shade(lights, index, length(offset.xy) / offset.z);
+    return axes * (-offset * (offset.z * shade / (LIGHT_PI * squared * squared)));
+  }
+  if (form == RECTANGLE_LIGHT) {
+    return axes * panel_rectangle(half_sides, offset);
+  }
+  return axes * panel_grid(lights, index, form == ROUND_GRID_LIGHT, offset);
+}
+
+// What a spot's cone lets through; width is the squared sine of the angle that the light fills.
+float cone_share(Lights lights, int index, vec3 away, float width)
+{
+  float x = -dot(lights.across[index].xyz, away), y = -dot(lights.upward[index].xyz, away);
+  float ahead = dot(lights.along[index].xyz, away);
+  float aside = x * x + y * y;
+  float squared = max(aside + ahead * ahead, 1e-30);
+  float reach = sqrt(squared);
+  float off_axis = ahead > 0.0 ? aside / (reach * (reach + ahead)) : 1.0 - ahead / reach;
+  float rim = lights.along[index].w;
+  float half_width = sqrt(rim * rim + 1.25 * width * aside / squared);
+  float share = 0.5 * (lights.upward[index].w + half_width - off_axis) / half_width;
+  share = clamp(share, 0.0, 1.0);
+  return share * share * (3.0 - 2.0 * share);
+}
 
 vec3 light_direction(Lights lights, int index, vec3 point)
 {
@@ -8,6 +158,13 @@ vec3 light_direction(Lights lights, int index, vec3 point)
     return light.xyz;
   }
   vec3 away = light.xyz - point;
+  if (light.w >= RECTANGLE_LIGHT) {
+    vec3 arriving = panel_vector_irradiance(lights, index, away);
+    float strength = length(arriving);
+    if (strength > 0.0) {
+      return arriving / strength;
+    }
+  }
   return away / max(length(away), {{nearest_distance}});
 }
 
@@ -19,6 +176,15 @@ vec3 light_irradiance(Lights lights, int index, vec3 point)
   if (light.w == 0.0) {
     return power;
   }
-  float distance_to = max(length(light.xyz - point), {{nearest_distance}});
-  return power / (4.0 * 3.14159265358979 * distance_to * distance_to);
+  vec3 away = light.xyz - point;
+  if (light.w >= RECTANGLE_LIGHT) {
+    return power * length(panel_vector_irradiance(lights, index, away));
+  }
+  float added = lights.power[index].w, least = lights.across[index].w;
+  float squared = max(dot(away, away) + added, least);
+  float let_through = 1.0;
+  if (light.w == SPOT_LIGHT) {
+    let_through = cone_share(lights, index, away, min((added + least) / squared, 1.0));
+  }
+  return power * let_through / (4.0 * LIGHT_PI * squared);
 }

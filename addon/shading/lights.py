@@ -3,7 +3,11 @@
 Irradiance E is the power that falls on a square metre facing the light. A matt surface of albedo
 a sends out the radiance a E cos / pi, which is what a pixel shows.
 - A sun's strength is E itself [W/m^2], the same everywhere.
-- A point light of power P [W] shines evenly into all directions: E = P / (4 pi d^2).
+- A point light of power P [W] shines evenly into all directions: E = P / (4 pi d^2). With a radius
+  r it is a disk that faces whoever looks, E = P / (4 pi (d^2 + r^2)), or a ball, inside of which E
+  no longer grows; as Cycles has both.
+- A spot of power P is a point light of that power, of which only a cone is let through.
+- An area light of power P sends it out from one side of a panel, see area_lights.py.
 - The world is one colour [W/(m^2 sr)] from everywhere; a matt surface sends out a times it.
 Colours are scene-linear Rec.709. Shadows are no matter of the lights.
 """
@@ -18,6 +22,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import HairloomError
+from .area_lights import Panel, vector_irradiance
 
 type Color = tuple[float, float, float]
 type Vector = tuple[float, float, float]
@@ -26,19 +31,52 @@ LIGHT_CAPACITY = 8
 #: closer to a point light than this its irradiance no longer grows [m]
 NEAREST_DISTANCE = 1.0e-3
 
+#: forms by the numbers under which lib_lights.glsl knows them
+_FORMS = ("sun", "point", "spot", "rectangle", "disk", "grid", "round grid")
+
+
+@dataclass(frozen=True)
+class Cone:
+    """What a spot lets through, as Cycles has it: a smooth step of the angle's cosine.
+
+    axes: (3, 3) rows that turn a direction in world space into the spot's own axes, in which it
+        shines along -z; a scaled object squeezes its cone.
+    size: full angle [rad].
+    blend: share of the cone over which its rim fades, 0 to 1.
+    """
+
+    axes: tuple[Vector, Vector, Vector]
+    size: float
+    blend: float
+
+    @property
+    def fade(self) -> tuple[float, float]:
+        """Middle and half width of the rim, in 1 - cos of the angle to the axis."""
+        rim = 1.0 - float(np.cos(0.5 * self.size))
+        half = 0.5 * rim * max(self.blend, 1e-4)
+        return rim - half, half
+
 
 @dataclass(frozen=True)
 class Light:
     """One light in world space.
 
-    kind: "sun" or "point".
-    vector: for a sun the unit direction towards it, for a point its position [m].
-    power: rgb; for a sun irradiance [W/m^2], for a point radiant flux [W].
+    kind: "sun", "point", "spot" or "area".
+    vector: for a sun the unit direction towards it, for others their position [m].
+    power: rgb; for a sun irradiance [W/m^2], for others radiant flux [W].
+    radius: of a point or spot [m].
+    is_ball: a radius makes it a ball, not a disk that faces whoever looks.
+    cone: of a spot.
+    panel: of an area light.
     """
 
-    kind: Literal["sun", "point"]
+    kind: Literal["sun", "point", "spot", "area"]
     vector: Vector
     power: Color
+    radius: float = 0.0
+    is_ball: bool = False
+    cone: Cone | None = None
+    panel: Panel | None = None
 
     @classmethod
     def sun(
@@ -62,20 +100,62 @@ class Light:
 
     @classmethod
     def point(
-        cls, position: Sequence[float] | Floats, color: Sequence[float] | Floats, power: float
+        cls,
+        position: Sequence[float] | Floats,
+        color: Sequence[float] | Floats,
+        power: float,
+        radius: float = 0.0,
+        is_ball: bool = False,
     ) -> Light:
         """A point light at a position [m], of Blender's power [W]."""
-        return cls("point", _triple(position), _triple(np.multiply(color, power)))
+        rgb = _triple(np.multiply(color, power))
+        return cls("point", _triple(position), rgb, radius, is_ball)
+
+    @classmethod
+    def spot(
+        cls,
+        position: Sequence[float] | Floats,
+        color: Sequence[float] | Floats,
+        power: float,
+        cone: Cone,
+        radius: float = 0.0,
+        is_ball: bool = False,
+    ) -> Light:
+        """A spot at a position [m], of Blender's power [W]."""
+        rgb = _triple(np.multiply(color, power))
+        return cls("spot", _triple(position), rgb, radius, is_ball, cone)
+
+    @classmethod
+    def area(
+        cls,
+        position: Sequence[float] | Floats,
+        color: Sequence[float] | Floats,
+        power: float,
+        panel: Panel,
+    ) -> Light:
+        """An area light around a position [m], of Blender's power [W]."""
+        return cls("area", _triple(position), _triple(np.multiply(color, power)), panel=panel)
+
+    @property
+    def softening(self) -> tuple[float, float]:
+        """What a radius adds to the squared distance, and the least that this may be [m^2]."""
+        squared = self.radius * self.radius
+        nearest = NEAREST_DISTANCE * NEAREST_DISTANCE
+        return (0.0, max(squared, nearest)) if self.is_ball else (squared, nearest)
 
 
 def light_direction(light: Light, points: Floats) -> Floats:
-    """Unit vectors from points (..., 3) towards the light."""
+    """Unit vectors from points (..., 3) towards the light; of a panel, whence most light comes."""
     points = np.asarray(points)
     if light.kind == "sun":
         return np.broadcast_to(np.asarray(light.vector, points.dtype), points.shape)
     away = np.asarray(light.vector, points.dtype) - points
-    distance = np.linalg.norm(away, axis=-1, keepdims=True)
-    return away / np.maximum(distance, NEAREST_DISTANCE)
+    if light.panel is not None:
+        arriving = vector_irradiance(light.panel, -away)
+        strength = np.linalg.norm(arriving, axis=-1, keepdims=True)
+        mean = (arriving / np.maximum(strength, 1e-30)).astype(points.dtype)
+        return np.where(strength > 0.0, mean, _unit(away))
+    return _unit(away)
 
 
 def light_irradiance(light: Light, points: Floats) -> Floats:
@@ -85,8 +165,42 @@ def light_irradiance(light: Light, points: Floats) -> Floats:
     if light.kind == "sun":
         return np.broadcast_to(power, points.shape)
     away = np.asarray(light.vector, points.dtype) - points
-    distance = np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), NEAREST_DISTANCE)
-    return power / (4.0 * np.pi * distance * distance)
+    if light.panel is not None:
+        arriving = np.linalg.norm(vector_irradiance(light.panel, -away), axis=-1, keepdims=True)
+        return power * arriving.astype(points.dtype)
+    added, least = light.softening
+    squared = np.maximum(np.sum(away * away, axis=-1, keepdims=True) + added, least)
+    let_through = 1.0
+    if light.cone is not None:
+        width = (added + least) / squared
+        let_through = _cone_share(light.cone, away, np.minimum(width, 1.0))
+    return power * let_through / (4.0 * np.pi * squared)
+
+
+def _cone_share(cone: Cone, away: Floats, width: Floats) -> Floats:
+    """What a cone lets through towards the points from which the light is `away`, (..., 1).
+
+    A light with a radius blurs the rim. Its own smooth step and the disk, seen at an angle whose
+    squared sine is `width` (..., 1), are two spreads whose squares add up (a disk's cross-section
+    has 5 / 4 the variance of a smooth step of its width).
+    """
+    own = -away @ np.array(cone.axes, away.dtype).T
+    x, y, ahead = own[..., :1], own[..., 1:2], -own[..., 2:]
+    squared = np.maximum(np.sum(own * own, axis=-1, keepdims=True), 1e-30)
+    length = np.sqrt(squared)
+    aside = x * x + y * y
+    # 1 - cos, exact also where the cosine is nearly 1
+    off_axis = np.where(
+        ahead > 0.0, aside / (length * (length + np.maximum(ahead, 0.0))), 1.0 - ahead / length
+    )
+    middle, half = cone.fade
+    half = np.sqrt(half * half + 1.25 * width * aside / squared)
+    share = np.clip(0.5 * (middle + half - off_axis) / half, 0.0, 1.0)
+    return share * share * (3.0 - 2.0 * share)
+
+
+def _unit(away: Floats) -> Floats:
+    return away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), NEAREST_DISTANCE)
 
 
 def three_point_lights(view: Floats, strength: float = 1.0) -> tuple[Light, ...]:
@@ -112,18 +226,35 @@ _STUDIO = (
 
 
 def pack_lights(lights: Sequence[Light], ambient: Sequence[float]) -> Floats:
-    """The block `Lights` of gpu_shaders/lib_lights.glsl in std140, (68,) float32.
+    """The block `Lights` of gpu_shaders/struct_lights.glsl in std140, (164,) float32.
 
-    Lanes, in vec4: [0] xyz world colour, w light count; [1 .. 8] xyz direction or position,
-    w 1 for a point; [9 .. 16] xyz power. Lights beyond the capacity are left out, weakest first.
+    Lights beyond the capacity are left out, weakest first.
     """
     kept = sorted(lights, key=lambda light: -sum(light.power) * _reach(light))[:LIGHT_CAPACITY]
-    block = np.zeros((1 + 2 * LIGHT_CAPACITY, 4), np.float32)
+    block = np.zeros((1 + 5 * LIGHT_CAPACITY, 4), np.float32)
     block[0] = (*ambient, len(kept))
     for index, light in enumerate(kept):
-        block[1 + index] = (*light.vector, float(light.kind == "point"))
-        block[1 + LIGHT_CAPACITY + index, :3] = light.power
+        block[1 + index :: LIGHT_CAPACITY] = _lanes(light)
     return block.ravel()
+
+
+def _lanes(light: Light) -> Floats:
+    """One light's five vec4, see struct_lights.glsl."""
+    lanes = np.zeros((5, 4))
+    lanes[0, :3], lanes[1, :3] = light.vector, light.power
+    form: str = light.kind
+    if light.panel is not None:
+        panel = light.panel
+        form = "round grid" if panel.form == "grid" and panel.is_round else panel.form
+        lanes[2:, :3] = panel.right, panel.up, panel.shines_along
+        lanes[1:, 3] = panel.normalizer, *panel.half_sides, panel.tangent
+    elif light.kind != "sun":
+        lanes[1, 3], lanes[2, 3] = light.softening
+    if light.cone is not None:
+        lanes[2:, :3] = light.cone.axes
+        lanes[3:, 3] = light.cone.fade
+    lanes[0, 3] = _FORMS.index(form)
+    return lanes
 
 
 def _reach(light: Light) -> float:
