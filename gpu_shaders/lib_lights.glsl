@@ -5,7 +5,7 @@ const float LIGHT_PI = 3.14159265358979;
 const float POINT_LIGHT = 1.0, SPOT_LIGHT = 2.0, RECTANGLE_LIGHT = 3.0, DISK_LIGHT = 4.0;
 const float ROUND_GRID_LIGHT = 6.0;
 // FAR and LEAST_HEIGHT of addon/shading/area_lights.py
-const float FAR_PANEL = 1.0e-5, LEAST_HEIGHT = 1.0e-6;
+const float FAR_PANEL = 2.5e-3, LEAST_HEIGHT = 1.0e-6;
 // Gauss-Legendre, six nodes on -1 .. 1: these and their mirror images
 const vec3 PANEL_NODES = vec3(0.23861918608319692, 0.6612093864662645, 0.932469514203152);
 const vec3 PANEL_WEIGHTS = vec3(0.46791393457269104, 0.3607615730481386, 0.17132449237917036);
@@ -111,6 +111,21 @@ vec3 panel_grid(Lights lights, int index, bool is_round, vec3 offset)
   return total / (LIGHT_PI * 4.0 * a * b * (is_round ? 0.25 * LIGHT_PI : 1.0));
 }
 
+// Four points in the place of a panel far away, which lie as wide along each axis as it does.
+vec3 panel_four_points(Lights lights, int index, bool is_round, vec2 half_sides, vec3 offset)
+{
+  vec2 place = half_sides * (is_round ? 0.5 : 0.5773502691896257);
+  vec3 total = vec3(0.0);
+  for (int corner = 0; corner < 4; corner++) {
+    vec2 aside = vec2(corner % 2 == 0 ? -place.x : place.x, corner < 2 ? -place.y : place.y);
+    vec3 way = vec3(aside, 0.0) - offset;
+    float squared = dot(way, way);
+    float shade = panel_shade(lights, index, length(way.xy) / offset.z);
+    total += way * (offset.z * shade / (4.0 * LIGHT_PI * squared * squared));
+  }
+  return total;
+}
+
 // What arrives of one watt of an area light, towards it; nought behind it [1/m^2].
 vec3 panel_vector_irradiance(Lights lights, int index, vec3 away)
 {
@@ -121,18 +136,18 @@ vec3 panel_vector_irradiance(Lights lights, int index, vec3 away)
   }
   float form = lights.vector_and_kind[index].w;
   vec2 half_sides = vec2(lights.across[index].w, lights.upward[index].w);
-  float squared = dot(offset, offset);
+  bool is_round = form == ROUND_GRID_LIGHT;
   if (form == DISK_LIGHT) {
     return axes * panel_disk(half_sides.x, offset);
   }
-  if (dot(half_sides, half_sides) < FAR_PANEL * squared) {
-    float shade = panel_shade(lights, index, length(offset.xy) / offset.z);
-    return axes * (-offset * (offset.z * shade / (LIGHT_PI * squared * squared)));
+  float narrow = min(lights.along[index].w, 1.0);
+  if (dot(half_sides, half_sides) < FAR_PANEL * narrow * narrow * dot(offset, offset)) {
+    return axes * panel_four_points(lights, index, is_round, half_sides, offset);
   }
   if (form == RECTANGLE_LIGHT) {
     return axes * panel_rectangle(half_sides, offset);
   }
-  return axes * panel_grid(lights, index, form == ROUND_GRID_LIGHT, offset);
+  return axes * panel_grid(lights, index, is_round, offset);
 }
 
 // What a spot's cone lets through; width is the squared sine of the angle that the light fills.
@@ -144,6 +159,7 @@ float cone_share(Lights lights, int index, vec3 away, float width)
   float squared = max(aside + ahead * ahead, 1e-30);
   float reach = sqrt(squared);
   float off_axis = ahead > 0.0 ? aside / (reach * (reach + ahead)) : 1.0 - ahead / reach;
+  off_axis += 0.25 * width * (1.0 - off_axis);
   float rim = lights.along[index].w;
   float half_width = sqrt(rim * rim + 1.25 * width * aside / squared);
   float share = 0.5 * (lights.upward[index].w + half_width - off_axis) / half_width;

@@ -134,7 +134,7 @@ def _inverse(matrix: Matrix) -> tuple[Color, Color, Color]:
 
 def _emission(data: bpy.types.Light) -> Floats:
     """By what a light's nodes multiply it, as far as that is one plain Emission."""
-    node = _node(data.node_tree, "EMISSION") if data.use_nodes else None
+    node = _node(data.node_tree, "EMISSION")
     if node is None:
         return np.ones(3)
     color, strength = node.inputs["Color"], node.inputs["Strength"]

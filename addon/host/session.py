@@ -14,7 +14,7 @@ from ..pipeline import Motion, Pose, Rig
 from .baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays, used_vertices
 from .choices import Choices
 from .hiders import Hiders
-from .lights import read_ambient, read_lights
+from .lights import light_warnings, read_ambient, read_lights
 from .objects import Body
 from .obstacles import Obstacles
 from .reading import Reading
@@ -50,6 +50,7 @@ class Session:
         self.is_playing = False
         self.is_stale = False
         self._is_drawn = is_drawn
+        self._light_warnings: tuple[str, ...] = ()
         self._take_rig(self._reading.rig(baked), depsgraph)
 
     @property
@@ -79,12 +80,12 @@ class Session:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the artist should know about hair, head, children and colliders."""
+        """What the artist should know about hair, head, children, colliders and lights."""
         hair = self.hair.handle.find()
         doubled = () if hair is None else dynamics_warnings(hair)
         found = () if self.obstacles is None else self.obstacles.warnings
         notes = (f"{self.name}: {note}" for note in self.rig.notes)
-        return (*self.source.warnings, *notes, *doubled, *found)
+        return (*self.source.warnings, *notes, *doubled, *found, *self._light_warnings)
 
     @property
     def computed_on(self) -> str:
@@ -165,6 +166,7 @@ class Session:
             lights=read_lights(depsgraph, self.snapshot.center),
             ambient=read_ambient(depsgraph.scene),
         )
+        self._light_warnings = light_warnings(depsgraph)
 
     def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Hair in its style, carried by the head as it is posed now.

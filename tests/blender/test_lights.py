@@ -1,0 +1,114 @@
+"""What is read of a scene's lights; that they shine as in Cycles, tests/gpu/test_radiometry.py."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.host.lights import light_warnings, read_lights
+from hairloom.addon.host.session import Session
+from hairloom.addon.shading.lights import LIGHT_CAPACITY, Light, light_irradiance
+
+
+def add(kind: str, location: tuple[float, float, float] = (0, 0, 1), **settings: Any) -> Any:
+    lamp = bpy.data.objects.new(kind, bpy.data.lights.new(kind, kind))
+    lamp.location = location
+    for name, value in settings.items():
+        setattr(lamp.data, name, value)
+    bpy.context.collection.objects.link(lamp)
+    return lamp
+
+
+def lights() -> tuple[Light, ...]:
+    return read_lights(bpy.context.evaluated_depsgraph_get(), np.zeros(3))
+
+
+def warnings() -> tuple[str, ...]:
+    return light_warnings(bpy.context.evaluated_depsgraph_get())
+
+
+def test_eight_that_are_brightest_at_the_hair_are_kept_and_the_artist_is_told():
+    """Not the most powerful: a weak one near by counts for more than a strong one far away."""
+    for place in range(LIGHT_CAPACITY):
+        add("POINT", (0.0, 0.0, 1.0 + place), energy=10.0)
+    assert len(lights()) == LIGHT_CAPACITY
+    assert warnings() == ()
+    far = add("POINT", (0.0, 0.0, 100.0), energy=1000.0)
+    near = add("POINT", (0.0, 0.0, 0.1), energy=1.0)
+    away = add("AREA", (0.0, 0.0, 0.2), energy=1000.0)
+    away.rotation_euler.x = np.pi
+    found = lights()
+    assert len(found) == LIGHT_CAPACITY
+    assert found[0].vector == pytest.approx((0.0, 0.0, 0.1))
+    assert all(light.vector[2] < 8.0 and light.kind == "point" for light in found)
+    (warning,) = warnings()
+    assert warning.startswith("Lights: 11 shine") and "8" in warning and warning.endswith(".")
+    for lamp in (far, near, away):
+        lamp.hide_viewport = True
+    assert warnings() == ()
+
+
+def test_lights_that_are_hidden_or_dark_are_left_out():
+    hidden, switched_off = add("POINT"), add("POINT")
+    hidden.hide_set(True)
+    switched_off.hide_viewport = True
+    add("SPOT", energy=0.0)
+    add("AREA", color=(0.0, 0.0, 0.0))
+    portal = add("AREA")
+    if hasattr(portal.data, "cycles"):
+        portal.data.cycles.is_portal = True
+        assert lights() == ()
+    elsewhere = bpy.data.collections.new("Elsewhere")
+    bpy.context.scene.collection.children.link(elsewhere)
+    elsewhere.objects.link(bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN")))
+    before = len(lights())
+    bpy.context.view_layer.layer_collection.children["Elsewhere"].exclude = True
+    assert len(lights()) == before - 1
+
+
+def test_an_emission_node_colours_a_light():
+    lamp = add("POINT", energy=10.0)
+    node = next(node for node in lamp.data.node_tree.nodes if node.type == "EMISSION")
+    node.inputs["Color"].default_value = (1.0, 0.5, 0.25, 1.0)
+    node.inputs["Strength"].default_value = 2.0
+    assert lights()[0].power == pytest.approx((20.0, 10.0, 5.0))
+
+
+def test_parents_carry_and_scale_a_panel():
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.collection.objects.link(parent)
+    parent.rotation_euler.x, parent.scale = np.pi / 2.0, (3.0, 2.0, 1.0)
+    lamp = add("AREA", shape="RECTANGLE", size=1.0, size_y=0.5)
+    lamp.parent = parent
+    (light,) = lights()
+    assert light.panel is not None
+    assert (light.panel.half_width, light.panel.half_height) == pytest.approx((1.5, 0.5))
+    assert light.panel.shines_along == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
+    assert light.vector == pytest.approx((0.0, -1.0, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("scale", [(0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 0), (-1, 1, 1)])
+@pytest.mark.parametrize("kind", ["POINT", "SUN", "SPOT", "AREA"])
+def test_scales_of_nought_and_mirrored_ones_are_read(kind, scale):
+    add(kind, energy=10.0).scale = scale
+    for light in lights():
+        irradiance = light_irradiance(light, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+        assert np.isfinite(irradiance).all()
+    if min(np.abs(scale)) > 0.0:
+        assert light_irradiance(lights()[0], np.zeros(3)).min() > 0.0
+
+
+def test_a_preview_tells_of_lights_that_it_leaves_out(new_hair: Any, sphere: Any) -> None:
+    hair = new_hair(sphere)
+    for place in range(LIGHT_CAPACITY):
+        add("POINT", (0.0, 0.0, 1.0 + place), energy=10.0)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    session = Session(hair, depsgraph)
+    assert not any("Lights" in warning for warning in session.warnings)
+    add("POINT", energy=10.0)
+    session.light(bpy.context.evaluated_depsgraph_get())
+    assert any("Lights: 9 shine" in warning for warning in session.warnings)
+    assert len(session.snapshot.lights) == LIGHT_CAPACITY
