@@ -1,0 +1,196 @@
+"""N_p: how a fibre spreads light around itself, for each cone theta_d.
+
+Light that meets the fibre at h = sin gamma (h in [-1, 1] across its width) leaves it turned by
+
+    phi(p, h) = 2 p gamma_t - 2 gamma + p pi.
+
+N_p(phi) = sum over all h that lead to phi of A(p, h) / |2 dphi/dh|, so that the integral of N_p
+over the circle is the mean of A(p, h) over h, and the lobes of a clear fibre add up to 1. R and
+TT have one such h, in closed form. TRT has up to three, found by Newton's method between the
+turning points of phi(2, h), where its caustics are.
+
+References:
+    Marschner et al. 2003, section 5.2 and appendix A: N_p and the blurred caustics.
+    d'Eon et al. 2011, section 4: the lobes as an energy balance.
+
+What we do otherwise: Marschner estimates a caustic's energy from its curvature and a largest
+width; here it is what the fade takes out, integrated over h where it has no pole. So a glint
+strength of 1 keeps the energy, per colour.
+
+All functions take arrays that broadcast: cos theta_d and phi in [rad].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Bools, Floats
+from .fibre import LEAST_INDEX, Fibre
+from .interface import attenuation, bravais_index, fresnel, quarter_turn, refracted
+
+_NEWTON_STEPS = 12
+_LEAST_SLOPE = 1e-6
+
+
+def azimuthal_r(cos_d: Floats, phi: Floats, fibre: Fibre) -> Floats:
+    """N_R, (...): a mirror, gamma = -phi / 2, dphi/dh = -2 / cos gamma."""
+    gamma = 0.5 * _folded(phi)
+    bravais = bravais_index(fibre.index_of_refraction, cos_d)
+    return (
+        0.25 * np.maximum(np.cos(gamma), 0.0) * fresnel(gamma, fibre.index_of_refraction, bravais)
+    )
+
+
+def azimuthal_tt(cos_d: Floats, phi: Floats, fibre: Fibre) -> Floats:
+    """N_TT, (..., 3): straight on at phi = pi, and up to the angle at which h = 1 leaves.
+
+    gamma - gamma_t = (pi - phi) / 2 =: turn, and with Snell's law
+    tan gamma = eta' sin turn / (eta' cos turn - 1).
+    """
+    turn = 0.5 * (np.pi - _folded(phi))
+    bravais = bravais_index(fibre.index_of_refraction, cos_d)
+    reach = bravais * np.cos(turn) - 1.0
+    gamma = np.arctan2(bravais * np.sin(turn), np.maximum(reach, 0.0))
+    density = np.where(reach > 0.0, _density(1, gamma, bravais), 0.0)
+    kept = attenuation(1, gamma, cos_d, fibre.index_of_refraction, fibre.absorption)
+    return density[..., None] * kept
+
+
+def azimuthal_trt(
+    cos_d: Floats, phi: Floats, fibre: Fibre, half_azimuth: Floats | float | None = None
+) -> Floats:
+    """N_TRT, (..., 3), with its caustics blurred.
+
+    Args:
+        half_azimuth: phi_h, middle of the two directions' azimuths, from the longer axis of the
+            cross-section, [rad]. Without it, the mean over a strand that twists freely.
+    """
+    ratio = fibre.eccentricity
+    if ratio == 1.0:
+        return _blurred_trt(cos_d, phi, fibre, np.asarray(fibre.index_of_refraction))
+    if half_azimuth is not None:
+        index = elliptic_index(fibre.index_of_refraction, ratio, np.cos(2.0 * half_azimuth))
+        return _blurred_trt(cos_d, phi, fibre, index)
+    turns = np.cos((np.arange(4) + 0.5) * np.pi / 4.0)  # Gauss-Chebyshev, to degree 7
+    lobes = [
+        _blurred_trt(cos_d, phi, fibre, elliptic_index(fibre.index_of_refraction, ratio, turn))
+        for turn in turns
+    ]
+    return np.mean(lobes, axis=0)
+
+
+def elliptic_index(index: float, ratio: float, cos_double: Floats | float) -> Floats:
+    """The index with which TRT of an elliptic fibre is like that of a round one.
+
+    Marschner et al. 2003, section 5.2.3, at cos 2 phi_h; not less than LEAST_INDEX.
+    """
+    narrow = 2.0 * (index - 1.0) * ratio**2 - index + 2.0
+    wide = 2.0 * (index - 1.0) / ratio**2 - index + 2.0
+    middle = 0.5 * ((narrow + wide) + np.asarray(cos_double) * (narrow - wide))
+    return np.maximum(middle, LEAST_INDEX)
+
+
+def trt_turn(gamma: Floats, bravais: Floats) -> Floats:
+    """phi(2, h) - 2 pi = 4 gamma_t - 2 gamma, odd in gamma, within [-pi, pi]."""
+    return 4.0 * refracted(gamma, bravais) - 2.0 * gamma
+
+
+def trt_caustic(bravais: Floats) -> tuple[Floats, Floats]:
+    """gamma and phi of TRT's caustic, where phi(2, h) turns; both 0 from index 2 up."""
+    cosine = np.sqrt(np.clip((bravais**2 - 1.0) / 3.0, 0.0, 1.0))
+    gamma = np.arccos(cosine)
+    return gamma, np.maximum(trt_turn(gamma, bravais), 0.0)
+
+
+def _blurred_trt(cos_d: Floats, phi: Floats, fibre: Fibre, index: Floats) -> Floats:
+    phi = _folded(phi)
+    raw = _raw_trt(cos_d, phi, fibre, index)
+    width = fibre.glint_width
+    if width == 0.0:
+        return raw
+    bravais = bravais_index(index, cos_d)
+    caustic = trt_caustic(bravais)[1]
+    past = np.clip((bravais - 2.0) / max(fibre.glint_fade, 1e-9), 0.0, 1.0)
+    blur = 1.0 - past * past * (3.0 - 2.0 * past)
+    removed = _removed_energy(np.asarray(cos_d), caustic, blur, fibre, index)
+    fade = _fade(phi, caustic, blur, width)
+    glint = _bell(phi - caustic, width) + _bell(phi + caustic, width)
+    glint = glint * (fibre.glint_strength / (2.0 * np.sqrt(2.0 * np.pi) * width))
+    return raw * fade[..., None] + removed * glint[..., None]
+
+
+def _removed_energy(
+    cos_d: Floats, caustic: Floats, blur: Floats, fibre: Fibre, index: Floats
+) -> Floats:
+    """Energy that the fade takes out of N_TRT, (..., 3), summed over h."""
+    gamma, weight = quarter_turn()
+    cone = cos_d[..., None]
+    turn = trt_turn(gamma, bravais_index(index, cone))
+    fade = _fade(turn, caustic[..., None], blur[..., None], fibre.glint_width)
+    kept = attenuation(2, gamma, cone, index, fibre.absorption)
+    return np.sum(kept * ((1.0 - fade) * weight * np.cos(gamma))[..., None], axis=-2)
+
+
+def _fade(phi: Floats, caustic: Floats, blur: Floats, width: float) -> Floats:
+    near, far = _bell(phi - caustic, width), _bell(phi + caustic, width)
+    return (1.0 - blur * np.minimum(near, 1.0)) * (1.0 - blur * np.minimum(far, 1.0))
+
+
+def _bell(angle: Floats, width: float) -> Floats:
+    """exp(-angle^2 / 2 width^2) on the circle: with what comes around from both sides."""
+    turns = [angle + 2.0 * np.pi * turn for turn in (-1.0, 0.0, 1.0)]
+    return np.sum([np.exp(-0.5 * (turn / width) ** 2) for turn in turns], axis=0)
+
+
+def _raw_trt(cos_d: Floats, phi: Floats, fibre: Fibre, index: Floats) -> Floats:
+    """N_TRT with its poles, for phi in [0, pi]: the sum over the roots between turning points.
+
+    By symmetry, what the piece under -gamma_c sends to phi is what the piece
+    over gamma_c sends to -phi.
+    """
+    cone, azimuth = np.broadcast_arrays(cos_d, phi)
+    bravais = bravais_index(index, cone)
+    gamma_c, caustic = trt_caustic(bravais)
+    edge = np.full_like(gamma_c, 0.5 * np.pi)
+    last = trt_turn(edge, bravais)
+    pieces = (
+        (azimuth, np.zeros_like(gamma_c), gamma_c, azimuth < caustic),
+        (azimuth, gamma_c, edge, (azimuth < caustic) & (azimuth >= last)),
+        (-azimuth, gamma_c, edge, -azimuth >= last),
+    )
+    total = np.zeros((*cone.shape, 3))
+    for target, low, high, is_met in pieces:
+        place = np.nonzero(is_met)
+        gamma = _root(target[place], low[place], high[place], bravais[place])
+        kept = attenuation(2, gamma, cone[place], index, fibre.absorption)
+        total[place] += _density(2, gamma, bravais[place])[..., None] * kept
+    return total
+
+
+def _root(target: Floats, low: Floats, high: Floats, bravais: Floats) -> Floats:
+    """gamma in [low, high] at which trt_turn is the target, by Newton held in its bracket."""
+    rises = low == 0.0
+    rises &= trt_turn(high, bravais) > 0.0
+    gamma = 0.5 * (low + high)
+    for _ in range(_NEWTON_STEPS):
+        sine = np.sin(gamma)
+        cosine = np.sqrt(np.maximum(1.0 - (sine / bravais) ** 2, 1e-12))
+        excess = 4.0 * np.arcsin(sine / bravais) - 2.0 * gamma - target
+        slope = 4.0 * np.cos(gamma) / (bravais * cosine) - 2.0
+        is_right: Bools = (excess > 0.0) == rises
+        high, low = np.where(is_right, gamma, high), np.where(is_right, low, gamma)
+        step = gamma - excess / np.where(np.abs(slope) < _LEAST_SLOPE, _LEAST_SLOPE, slope)
+        gamma = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
+    return gamma
+
+
+def _density(order: int, gamma: Floats, bravais: Floats) -> Floats:
+    """1 / |2 dphi/dh|, from dphi/dgamma = 2 p cos gamma / (eta' cos gamma_t) - 2."""
+    cosine = np.maximum(np.cos(gamma), 0.0)
+    slope = 2.0 * order * cosine / (bravais * np.cos(refracted(gamma, bravais))) - 2.0
+    return 0.5 * cosine / np.maximum(np.abs(slope), _LEAST_SLOPE)
+
+
+def _folded(phi: Floats) -> Floats:
+    """|phi| after whole turns, in [0, pi]: the lobes of a round fibre are even."""
+    return np.abs(np.remainder(np.asarray(phi) + np.pi, 2.0 * np.pi) - np.pi)

@@ -1,0 +1,85 @@
+"""The surface of the fibre: how much light each way through it keeps.
+
+In the plane across the fibre a slanted ray behaves as if it lay in it, but for other indices of
+refraction (Bravais; Marschner et al. 2003, appendix B). They are exact: with them Fresnel's
+formulas in the plane are those of the ray in space.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ...arrays import Floats
+from .fibre import LEAST_INDEX
+
+#: cos theta_d below which a ray runs along the fibre and the effective index has no bounds
+LEAST_COSINE = 1e-4
+
+
+def bravais_index(index: Floats | float, cos_d: Floats) -> Floats:
+    """eta' of a cone of cos theta_d; Snell's law in the plane, and light polarised across it."""
+    index = np.maximum(index, LEAST_INDEX)
+    cosine = np.clip(cos_d, LEAST_COSINE, 1.0)
+    return np.sqrt(index**2 - 1.0 + cosine**2) / cosine
+
+
+def refracted(gamma: Floats, bravais: Floats) -> Floats:
+    """Angle to the normal inside, in the plane, of light that meets the surface at gamma, [rad]."""
+    return np.arcsin(np.clip(np.sin(gamma) / bravais, -1.0, 1.0))
+
+
+def fresnel(gamma: Floats, index: Floats | float, bravais: Floats) -> Floats:
+    """Reflected share of unpolarised light at gamma, from outside, and from inside on its way out.
+
+    eta'' = index^2 / eta' stands for the index of the light polarised in the plane.
+    """
+    cos_i = np.maximum(np.cos(gamma), 0.0)
+    cos_t = np.cos(refracted(gamma, bravais))
+    parallel = np.maximum(index, LEAST_INDEX) ** 2 / bravais
+    across = (cos_i - bravais * cos_t) / (cos_i + bravais * cos_t)
+    along = (parallel * cos_i - cos_t) / (parallel * cos_i + cos_t)
+    return 0.5 * (across**2 + along**2)
+
+
+def attenuation(
+    order: int,
+    gamma: Floats,
+    cos_d: Floats,
+    index: Floats | float,
+    absorption: tuple[float, float, float],
+) -> Floats:
+    """A(p, h): what is left of light that meets the fibre at gamma = asin h, (..., 3).
+
+    Args:
+        order: p, 0 for R, 1 for TT, 2 for TRT: passages through the inside.
+        gamma, cos_d, index: broadcast.
+        absorption: per radius. A passage is a chord of 2 cos gamma_t radii in the plane, and
+            longer by 1 / cos theta_t in space. (Marschner's 1 + cos 2 gamma_t is a misprint.)
+    """
+    bravais = bravais_index(index, cos_d)
+    mirrored = fresnel(gamma, index, bravais)[..., None]
+    if order == 0:
+        return np.broadcast_to(mirrored, (*mirrored.shape[:-1], 3))
+    inside = np.maximum(index, LEAST_INDEX)
+    cos_t = np.sqrt(1.0 - (1.0 - np.clip(cos_d, LEAST_COSINE, 1.0) ** 2) / inside**2)
+    chord = 2.0 * np.cos(refracted(gamma, bravais)) / cos_t
+    kept = np.exp(-chord[..., None] * (order * np.asarray(absorption)))
+    return (1.0 - mirrored) ** 2 * mirrored ** (order - 1) * kept
+
+
+def lobe_energy(
+    order: int, cos_d: Floats, index: float, absorption: tuple[float, float, float]
+) -> Floats:
+    """Share of the light on the fibre that leaves it in lobe p: the mean of A over h, (..., 3)."""
+    gamma, weight = quarter_turn()
+    kept = attenuation(order, gamma, np.asarray(cos_d)[..., None], index, absorption)
+    return np.sum(kept * (weight * np.cos(gamma))[:, None], axis=-2)
+
+
+@functools.cache
+def quarter_turn(count: int = 64) -> tuple[Floats, Floats]:
+    """Gauss-Legendre angles in [0, pi/2] and their weights."""
+    place, weight = np.polynomial.legendre.leggauss(count)
+    return 0.25 * np.pi * (place + 1.0), 0.25 * np.pi * weight
