@@ -113,18 +113,25 @@ def depth_is_tested(shading):
     plate = bpy.context.object
     plate.scale.y = 0.01
     look_at_hair_from_above()
-    yield 5
-    before = viewport_middle(driver.screenshot(f"{shading.lower()}-plate-before"))
+    before = yield from roughness(f"{shading.lower()}-plate-before", lambda found: found < 0.02)
     plate.location.y = 0.4
-    yield 5
-    behind = viewport_middle(driver.screenshot(f"{shading.lower()}-plate-behind"))
+    behind = yield from roughness(f"{shading.lower()}-plate-behind", lambda found: found > 0.05)
     bpy.data.objects.remove(plate)
     look_from_front(DISTANCE)
     select_hair()
     yield 5
-    roughness = [patch.std(axis=(0, 1)).max() for patch in (before, behind)]
-    assert roughness[0] < 0.02, f"hair shines through a plate before it: {roughness}"
-    assert roughness[1] > 0.05, f"a plate behind hides the hair: {roughness}"
+    assert before < 0.02, f"hair shines through a plate before it: {before}"
+    assert behind > 0.05, f"a plate behind hides the hair: {behind}"
+
+
+def roughness(name, is_expected):
+    """How much the middle of the view varies, once it is as expected; a busy machine draws late."""
+    for _ in range(8):
+        yield 5
+        found = viewport_middle(driver.screenshot(name)).std(axis=(0, 1)).max()
+        if is_expected(found):
+            break
+    return found
 
 
 def look_at_hair_from_above():
