@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from ..strands import Surface
+from ..strands.morton import morton_code
 
 #: The hairline in the cranium's own units (half its depth; y to the back, z up, from its middle):
 #: hair grows above the line from the forehead down to the nape, and between the ears.
@@ -88,7 +89,7 @@ def sample_roots(
             place="head",
             remedy="Choose a mesh with faces, and a density above 0 on some of them",
         )
-    order = np.argsort(_morton(corners.mean(axis=1)), kind="stable")
+    order = np.argsort(morton_code(corners.mean(axis=1)), kind="stable")
     along = np.cumsum(area[order])
     stratum = (np.arange(count) + random.random(count)) / count * along[-1]
     last = np.flatnonzero(area[order])[-1]  # rounding must not lead to a triangle without area
@@ -123,17 +124,6 @@ def _towards_density(barycentric: Floats, density: Floats, chance: Floats) -> Fl
     reached = np.einsum("ntk,nk->nt", turns, density).cumsum(axis=1)
     taken = (reached[:, :2] < (chance * reached[:, 2])[:, None]).sum(axis=1)
     return turns[np.arange(len(turns)), taken]
-
-
-def _morton(points: Floats) -> Ints:
-    """Interleaved bits of the coordinates, 10 each: near in space is mostly near in order."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    cells = ((points - low) / np.maximum((high - low).max(), 1e-30) * 1023.0).astype(np.int64)
-    code = np.zeros(len(points), np.int64)
-    for bit in range(10):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return code
 
 
 def _smooth_step(value: Floats) -> Floats:

@@ -29,6 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..strands.morton import morton_code
 from .detail import NEAREST, PictureView
 from .settings import DetailSettings
 
@@ -38,8 +39,6 @@ WHOLE = 1.25
 SMALLEST_SHARE = 1.0e-6
 #: How fast a strand gets its width once the share exceeds its rank: all of it at rank * WHOLE.
 FADE = WHOLE / (WHOLE - 1.0)
-#: Steps of the cells that tell where on the head a root is, along each axis: 2^10.
-_CELL_BITS = 10
 
 
 @dataclass(frozen=True)
@@ -142,27 +141,13 @@ def even_ranks(roots: Floats, seed: int = 1) -> Floats:
     """
     count = len(roots)
     random = np.random.default_rng(seed)
-    place = _order(_morton_code(roots))
+    place = _order(morton_code(roots))
     inverse = np.zeros(count, np.int64)
     for bit in range(count.bit_length()):
         flip = random.integers(0, 2, (count >> (bit + 1)) + 1)
         inverse = 2 * inverse + (((place >> bit) & 1) ^ flip[place >> (bit + 1)])
     ranks: Floats = (_order(inverse) / max(count, 1)).astype(np.float32)
     return ranks
-
-
-def _morton_code(points: Floats) -> Ints:
-    """The place of each point on a curve through the cells of their box, (n,) int64."""
-    if not len(points):
-        return np.zeros(0, np.int64)
-    low = points.min(axis=0)
-    step = max(float(np.ptp(points, axis=0).max()), 1.0e-9) / ((1 << _CELL_BITS) - 1)
-    cell = ((points - low) / step).astype(np.int64)
-    code = np.zeros(len(points), np.int64)
-    for bit in range(_CELL_BITS):
-        for axis in range(3):
-            code |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return code
 
 
 def _order(keys: Ints) -> Ints:
