@@ -5,107 +5,59 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..params import Settings, color, number
+from ..params import Settings, choice, color, number
+from .kajiya_kay_settings import KajiyaKaySettings
+from .marschner.settings import MarschnerSettings
 
-_SCHEUERMANN = "Scheuermann 2004, hair shading"
+MODELS = (
+    ("kajiya_kay", "Kajiya-Kay", "Two shifted highlights by Scheuermann: quick, and free to shape"),
+    ("marschner", "Marschner", "Light reflected and refracted by a fibre: as real hair has it"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShadingSettings(Settings):
-    """Kajiya-Kay with Scheuermann's two shifted highlights."""
+class SharedSettings(Settings):
+    """Act in both models."""
 
-    section: ClassVar[str] = "shading"
-    title: ClassVar[str] = "Shading"
-
+    model: str = choice(
+        "kajiya_kay",
+        MODELS,
+        label="Model",
+        description="How the light on a strand becomes its colour",
+    )
     base_color: tuple[float, float, float] = color(
         (0.055, 0.03, 0.018),
         label="Colour",
         description="Colour of the hair; it tints the highlights as well",
-        source=_SCHEUERMANN,
     )
-    primary_color: tuple[float, float, float] = color(
-        (0.75, 0.88, 1.0),
-        label="First Highlight",
-        description="Colour of the highlight on the surface of the hair, before the hair tints it",
-        source=_SCHEUERMANN,
+    tip_color: tuple[float, float, float] = color(
+        (0.23, 0.145, 0.065),
+        label="Tip Colour",
+        description="Colour at the tips, as far as Tip Tint lets it through",
     )
-    primary_strength: float = number(
-        9.0,
-        label="First Strength",
-        description="Brightness of the first highlight, as a factor of the diffuse light",
-        soft=(0.0, 20.0),
-        hard=(0.0, 100.0),
-        source=_SCHEUERMANN,
-    )
-    primary_exponent: float = number(
-        90.0,
-        label="First Sharpness",
-        description="Exponent of the first highlight; higher is narrower",
-        soft=(2.0, 300.0),
-        hard=(1.0, 2000.0),
-        source=_SCHEUERMANN,
-    )
-    primary_shift: float = number(
-        0.1,
-        label="First Shift",
-        description="Moves the first highlight to the tips, or to the roots when negative",
-        soft=(-0.5, 0.5),
-        hard=(-2.0, 2.0),
-        source=_SCHEUERMANN,
-    )
-    secondary_color: tuple[float, float, float] = color(
-        (1.0, 0.75, 0.5),
-        label="Second Highlight",
-        description="Colour of the highlight that has passed through the hair",
-        source=_SCHEUERMANN,
-    )
-    secondary_strength: float = number(
-        5.0,
-        label="Second Strength",
-        description="Brightness of the second highlight, as a factor of the diffuse light",
-        soft=(0.0, 20.0),
-        hard=(0.0, 100.0),
-        source=_SCHEUERMANN,
-    )
-    secondary_exponent: float = number(
-        22.0,
-        label="Second Sharpness",
-        description="Exponent of the second highlight; higher is narrower",
-        soft=(2.0, 300.0),
-        hard=(1.0, 2000.0),
-        source=_SCHEUERMANN,
-    )
-    secondary_shift: float = number(
-        -0.14,
-        label="Second Shift",
-        description="Moves the second highlight to the tips, or to the roots when negative",
-        soft=(-0.5, 0.5),
-        hard=(-2.0, 2.0),
-        source=_SCHEUERMANN,
-    )
-    shift_noise: float = number(
-        0.2,
-        label="Shift Noise",
-        description="How much the shift differs from strand to strand, which breaks up the bands",
-        soft=(0.0, 1.0),
-        hard=(0.0, 4.0),
-        source=_SCHEUERMANN,
-    )
-    sparkle: float = number(
-        0.6,
-        label="Sparkle",
-        description="How much noise breaks up the second highlight",
+    tip_tint: float = number(
+        0.0,
+        label="Tip Tint",
+        description="How much the tips have their own colour",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
-        source=_SCHEUERMANN,
     )
-    noise_cells: float = number(
-        4.0,
-        label="Noise Cells",
-        description="Cells of the shift and sparkle noise between root and tip",
-        soft=(0.0, 32.0),
-        hard=(0.0, 1000.0),
+    tint_start: float = number(
+        0.3,
+        label="Tint From",
+        description="Where between root and tip the colour begins to change",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+    )
+    tint_end: float = number(
+        0.9,
+        label="Tint To",
+        description="Where between root and tip the colour is that of the tips",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
     )
     color_variation: float = number(
         0.3,
@@ -115,6 +67,38 @@ class ShadingSettings(Settings):
         hard=(0.0, 1.0),
         unit="factor",
     )
+    grey_share: float = number(
+        0.0,
+        label="Grey Strands",
+        description="Share of the strands that have lost their colour",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+    )
+    shift_noise: float = number(
+        0.2,
+        label="Shift Noise",
+        description="How much the shift differs from strand to strand, which breaks up the bands",
+        soft=(0.0, 1.0),
+        hard=(0.0, 4.0),
+        source="Scheuermann 2004, specular shift texture",
+    )
+    sparkle: float = number(
+        0.6,
+        label="Sparkle",
+        description="How much noise breaks up the second highlight",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        source="Scheuermann 2004, specular noise texture",
+    )
+    noise_cells: float = number(
+        4.0,
+        label="Noise Cells",
+        description="Cells of the shift and sparkle noise between root and tip",
+        soft=(0.0, 32.0),
+        hard=(0.0, 1000.0),
+    )
     ambient: float = number(
         1.0,
         label="Ambient",
@@ -122,6 +106,14 @@ class ShadingSettings(Settings):
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShadingSettings(MarschnerSettings, KajiyaKaySettings, SharedSettings):
+    """How hair answers light: what both models share, then the parameters of each."""
+
+    section: ClassVar[str] = "shading"
+    title: ClassVar[str] = "Shading"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,75 @@
+"""The two highlights of Kajiya-Kay as Scheuermann has them; shading/settings.py holds the rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..params import Settings, color, number
+
+_SOURCE = "Scheuermann 2004, hair shading"
+
+
+@dataclass(frozen=True, kw_only=True)
+class KajiyaKaySettings(Settings):
+    """Act in the model Kajiya-Kay alone."""
+
+    primary_color: tuple[float, float, float] = color(
+        (0.75, 0.88, 1.0),
+        label="First Highlight",
+        description="Colour of the highlight on the surface of the hair, before the hair tints it",
+        source=_SOURCE,
+    )
+    primary_strength: float = number(
+        9.0,
+        label="First Strength",
+        description="Brightness of the first highlight, as a factor of the diffuse light",
+        soft=(0.0, 20.0),
+        hard=(0.0, 100.0),
+        source=_SOURCE,
+    )
+    primary_exponent: float = number(
+        90.0,
+        label="First Sharpness",
+        description="Exponent of the first highlight; higher is narrower",
+        soft=(2.0, 300.0),
+        hard=(1.0, 2000.0),
+        source=_SOURCE,
+    )
+    primary_shift: float = number(
+        0.1,
+        label="First Shift",
+        description="Moves the first highlight to the tips, or to the roots when negative",
+        soft=(-0.5, 0.5),
+        hard=(-2.0, 2.0),
+        source=_SOURCE,
+    )
+    secondary_color: tuple[float, float, float] = color(
+        (1.0, 0.75, 0.5),
+        label="Second Highlight",
+        description="Colour of the highlight that has passed through the hair",
+        source=_SOURCE,
+    )
+    secondary_strength: float = number(
+        5.0,
+        label="Second Strength",
+        description="Brightness of the second highlight, as a factor of the diffuse light",
+        soft=(0.0, 20.0),
+        hard=(0.0, 100.0),
+        source=_SOURCE,
+    )
+    secondary_exponent: float = number(
+        22.0,
+        label="Second Sharpness",
+        description="Exponent of the second highlight; higher is narrower",
+        soft=(2.0, 300.0),
+        hard=(1.0, 2000.0),
+        source=_SOURCE,
+    )
+    secondary_shift: float = number(
+        -0.14,
+        label="Second Shift",
+        description="Moves the second highlight to the tips, or to the roots when negative",
+        soft=(-0.5, 0.5),
+        hard=(-2.0, 2.0),
+        source=_SOURCE,
+    )

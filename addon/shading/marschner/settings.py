@@ -1,0 +1,208 @@
+"""What the artist sets about a fibre; shading/settings.py holds what both models share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...params import Settings, choice, color, number
+
+_MARSCHNER = "Marschner et al. 2003"
+_PIGMENT = "Chiang et al. 2016; Blender's Principled Hair"
+_WIDEST = float(np.radians(60.0))
+
+PIGMENTS = (
+    ("color", "Colour", "What absorbs light so much that a mass of hair has the colour above"),
+    ("melanin", "Melanin", "The pigments of natural hair"),
+    ("absorption", "Absorption", "Set outright"),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarschnerSettings(Settings):
+    """Act in the model Marschner alone. Angles are in radians."""
+
+    pigment: str = choice(
+        "color",
+        PIGMENTS,
+        label="Pigment",
+        description="What says how much light is absorbed inside the hair",
+        source=_PIGMENT,
+    )
+    melanin: float = number(
+        0.75,
+        label="Melanin",
+        description="Amount of pigment: white 0, blond 0.25, brown 0.75, black 1",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        source=_PIGMENT,
+    )
+    redness: float = number(
+        0.3,
+        label="Redness",
+        description="Share of the pigment that is red",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        source=_PIGMENT,
+    )
+    absorption: tuple[float, float, float] = color(
+        (0.25, 0.42, 0.83),
+        label="Absorption",
+        description="Of red, green and blue inside the hair, on the length of its radius",
+        maximum=100.0,
+        source=_PIGMENT,
+    )
+    index_of_refraction: float = number(
+        1.55,
+        label="IOR",
+        description="Index of refraction of the hair against what surrounds it; 1.17 under water",
+        soft=(1.2, 1.8),
+        hard=(1.0, 4.0),
+        source=_MARSCHNER,
+    )
+    eccentricity: float = number(
+        1.0,
+        label="Eccentricity",
+        description="One axis of the cross-section over the other; round hair has 1",
+        soft=(0.8, 1.25),
+        hard=(0.5, 2.0),
+        source=f"{_MARSCHNER}, section 5.2.3",
+    )
+    cuticle_tilt: float = number(
+        float(np.radians(3.0)),
+        label="Separation",
+        description="Tilt of the scales: the first highlight moves to the tips by this angle, "
+        "the second by twice as much to the roots",
+        soft=(0.0, float(np.radians(10.0))),
+        hard=(-float(np.radians(30.0)), float(np.radians(30.0))),
+        unit="angle",
+        source=_MARSCHNER,
+    )
+    strength_r: float = number(
+        1.0,
+        label="First Strength",
+        description="Factor of the light reflected at the surface; 1 is physical",
+        soft=(0.0, 2.0),
+        hard=(0.0, 100.0),
+        source=_MARSCHNER,
+    )
+    width_r: float = number(
+        float(np.radians(5.0)),
+        label="First Width",
+        description="Standard deviation of the half angle in the first highlight",
+        soft=(float(np.radians(1.0)), float(np.radians(20.0))),
+        hard=(0.0, _WIDEST),
+        unit="angle",
+        source=_MARSCHNER,
+    )
+    offset_r: float = number(
+        0.0,
+        label="First Offset",
+        description="Moves the first highlight to the tips, beyond Separation",
+        soft=(-float(np.radians(10.0)), float(np.radians(10.0))),
+        hard=(-float(np.radians(45.0)), float(np.radians(45.0))),
+        unit="angle",
+    )
+    strength_tt: float = number(
+        1.0,
+        label="Rim Strength",
+        description="Factor of the light that passes through, seen against the light",
+        soft=(0.0, 2.0),
+        hard=(0.0, 100.0),
+        source=_MARSCHNER,
+    )
+    width_tt: float = number(
+        float(np.radians(3.0)),
+        label="Rim Width",
+        description="Standard deviation of the half angle of the light that passes through",
+        soft=(float(np.radians(1.0)), float(np.radians(20.0))),
+        hard=(0.0, _WIDEST),
+        unit="angle",
+        source=_MARSCHNER,
+    )
+    offset_tt: float = number(
+        0.0,
+        label="Rim Offset",
+        description="Moves the light that passes through to the tips, beyond Separation",
+        soft=(-float(np.radians(10.0)), float(np.radians(10.0))),
+        hard=(-float(np.radians(45.0)), float(np.radians(45.0))),
+        unit="angle",
+    )
+    strength_trt: float = number(
+        1.0,
+        label="Second Strength",
+        description="Factor of the light reflected inside; 1 is physical",
+        soft=(0.0, 2.0),
+        hard=(0.0, 100.0),
+        source=_MARSCHNER,
+    )
+    width_trt: float = number(
+        float(np.radians(8.0)),
+        label="Second Width",
+        description="Standard deviation of the half angle in the second highlight",
+        soft=(float(np.radians(1.0)), float(np.radians(20.0))),
+        hard=(0.0, _WIDEST),
+        unit="angle",
+        source=_MARSCHNER,
+    )
+    offset_trt: float = number(
+        0.0,
+        label="Second Offset",
+        description="Moves the second highlight to the tips, beyond Separation",
+        soft=(-float(np.radians(10.0)), float(np.radians(10.0))),
+        hard=(-float(np.radians(45.0)), float(np.radians(45.0))),
+        unit="angle",
+    )
+    glint_strength: float = number(
+        1.0,
+        label="Glint Strength",
+        description="Factor of the glints beside the second highlight; 1 is physical",
+        soft=(0.0, 2.0),
+        hard=(0.0, 100.0),
+        source=f"{_MARSCHNER}, appendix A",
+    )
+    glint_width: float = number(
+        float(np.radians(10.0)),
+        label="Glint Width",
+        description="How far around the hair a glint is blurred",
+        soft=(float(np.radians(2.0)), float(np.radians(25.0))),
+        hard=(float(np.radians(0.5)), float(np.radians(90.0))),
+        unit="angle",
+        source=f"{_MARSCHNER}, appendix A",
+    )
+    azimuthal_width: float = number(
+        0.0,
+        label="Width Around",
+        description="How far a rough surface spreads light around the hair",
+        soft=(0.0, float(np.radians(40.0))),
+        hard=(0.0, _WIDEST),
+        unit="angle",
+        source="d'Eon et al. 2011",
+    )
+    strength_rest: float = number(
+        1.0,
+        label="Rest Strength",
+        description="Factor of the light that was reflected inside twice or more; 1 is physical",
+        soft=(0.0, 2.0),
+        hard=(0.0, 100.0),
+        source="d'Eon et al. 2011; Chiang et al. 2016",
+    )
+    scattered: float = number(
+        1.0,
+        label="Scattered",
+        description="Stands for light that comes from strand to strand, in the hair's own colour",
+        soft=(0.0, 2.0),
+        hard=(0.0, 100.0),
+    )
+    volume_shade: float = number(
+        1.0,
+        label="Volume Shade",
+        description="How much strands on the side of the groom that faces away are in the dark",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        source="Scheuermann 2004, highlights attenuated by the diffuse bias",
+    )
