@@ -16,30 +16,31 @@ vec3 braked(vec3 here, vec3 before, float drag, vec3 air_way)
 // `carried` is where the free CVs are carried, `root` where the last pinned one is.
 void weight_on_style(vec3 gravity, vec3 root, vec3 carried[FREE_SIZE], out vec3 weight[FREE_SIZE])
 {
-  vec3 direction[FREE_SIZE];
+  vec3 segment[FREE_SIZE];
   float ratio[FREE_SIZE];  // how much of the segment before goes into segment i
   float tension[FREE_SIZE];
   vec3 before = root;
-  vec3 direction_before = vec3(0.0);
+  vec3 segment_before = vec3(0.0);
   float inverse_pivot = 0.0;
   float tension_before = 0.0;
   for (int i = 0; i < FREE; i++) {
-    direction[i] = unit_of(carried[i] - before);
+    segment[i] = carried[i] - before;
     before = carried[i];
-    float beside = -dot(direction[i], direction_before);
+    float square = dot(segment[i], segment[i]) + TINY * TINY;
+    float beside = -dot(segment[i], segment_before);
     ratio[i] = beside * inverse_pivot;
-    inverse_pivot = 1.0 / ((i == 0 ? 1.0 : 2.0) - ratio[i] * beside);
-    float sum = (i == 0 ? dot(direction[i], gravity) : 0.0) - ratio[i] * tension_before;
+    inverse_pivot = 1.0 / ((i == 0 ? square : 2.0 * square) - ratio[i] * beside);
+    float sum = (i == 0 ? dot(segment[i], gravity) : 0.0) - ratio[i] * tension_before;
     tension_before = sum;
     tension[i] = sum * inverse_pivot;
-    direction_before = direction[i];
+    segment_before = segment[i];
   }
   vec3 above = vec3(0.0);
   float taken = 0.0;  // of the tension, by the segment above
   for (int i = FREE - 1; i >= 0; i--) {
     float own = tension[i] - taken;
     taken = ratio[i] * own;
-    vec3 pull = direction[i] * own;
+    vec3 pull = segment[i] * own;
     weight[i] = gravity - (pull - above);
     above = pull;
   }

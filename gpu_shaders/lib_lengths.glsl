@@ -13,43 +13,42 @@ vec3 touched_normal[FREE_SIZE];  // at each free CV that touches a collider, els
 // One Newton step on all segments at once; segment i here goes from CV i + 1 to CV i + 2.
 void newton_step(bool has_normals)
 {
-  vec3 direction[FREE_SIZE];
+  vec3 segment[FREE_SIZE];
   float ratio[FREE_SIZE];  // how much of the segment before goes into segment i
   float tension[FREE_SIZE];
-  vec3 direction_before = vec3(0.0);
+  vec3 segment_before = vec3(0.0);
   vec3 normal_before = vec3(0.0);
   float inverse_pivot = 0.0;
   float tension_before = 0.0;
   for (int i = 0; i < FREE; i++) {
-    vec3 segment = position[i + 2] - position[i + 1];
-    float now = length_of(segment);
-    direction[i] = segment / now;
-    float diagonal = i == 0 ? 1.0 : 2.0;  // the last pinned CV does not move
-    float beside = -dot(direction[i], direction_before);
+    segment[i] = position[i + 2] - position[i + 1];
+    float square = dot(segment[i], segment[i]) + TINY * TINY;
+    float diagonal = i == 0 ? square : 2.0 * square;  // the last pinned CV does not move
+    float beside = -dot(segment[i], segment_before);
     if (i == FREE - 1 && tip_is_held) {
-      diagonal -= HELD;
+      diagonal -= HELD * square;
       touched_normal[i] = vec3(0.0);  // it does not slide
     }
     if (has_normals) {
-      float lower = dot(normal_before, direction[i]);
-      float upper = dot(touched_normal[i], direction[i]);
-      beside += CONTACT_WEIGHT * (dot(normal_before, direction_before) * lower);
+      float lower = dot(normal_before, segment[i]);
+      float upper = dot(touched_normal[i], segment[i]);
+      beside += CONTACT_WEIGHT * (dot(normal_before, segment_before) * lower);
       diagonal -= CONTACT_WEIGHT * (upper * upper);
       diagonal -= CONTACT_WEIGHT * (lower * lower);
       normal_before = touched_normal[i];
     }
     ratio[i] = beside * inverse_pivot;
     inverse_pivot = 1.0 / (diagonal - ratio[i] * beside);
-    tension_before = now - segment_length[i] - ratio[i] * tension_before;
+    tension_before = square - sqrt(square) * segment_length[i] - ratio[i] * tension_before;
     tension[i] = tension_before * inverse_pivot;
-    direction_before = direction[i];
+    segment_before = segment[i];
   }
-  vec3 above = vec3(0.0);  // direction times tension of the segment above
+  vec3 above = vec3(0.0);  // the segment above times its tension
   float taken = 0.0;       // of the tension, by the segment above
   for (int i = FREE - 1; i >= 0; i--) {
     float own = tension[i] - taken;
     taken = ratio[i] * own;
-    vec3 pull = direction[i] * own;
+    vec3 pull = segment[i] * own;
     vec3 move = pull - above;
     above = pull;
     if (has_normals) {

@@ -1,13 +1,14 @@
 """Segments keep their length: Newton's method on all length constraints of a guide at once.
 
-For each segment j between CV j and CV j + 1 with unit direction d_j, the constraint is
-|x_{j+1} - x_j| = l_j. One Newton step solves  (J W J^T) lambda = |x_{j+1} - x_j| - l_j  and moves
-x by  -W J^T lambda  (Goldenthal et al. 2007, "Efficient Simulation of Inextensible Cloth", fast
-projection). On a chain the matrix is tridiagonal, so a step is exact up to the curvature of the
-constraint and costs as much as two relaxations:
+For each segment j between CV j and CV j + 1, s_j = x_{j+1} - x_j, the constraint is |s_j| = l_j.
+One Newton step solves  (J W J^T) lambda = |s_j| - l_j  and moves x by  -W J^T lambda  (Goldenthal
+et al. 2007, "Efficient Simulation of Inextensible Cloth", fast projection). On a chain the matrix
+is tridiagonal, so a step is exact up to the curvature of the constraint and costs as much as two
+relaxations. Each row and each unknown is multiplied by its |s_j|, which spares the unit vectors:
 
-    A_jj    =  d_j . (W_j + W_{j+1}) d_j          W_c = 0 for the pinned CVs,
-    A_j,j+1 = -d_j . W_{j+1} d_{j+1}              else I - b n n^T
+    A_jj    =  s_j . (W_j + W_{j+1}) s_j          W_c = 0 for the pinned CVs,
+    A_j,j+1 = -s_j . W_{j+1} s_{j+1}              else I - b n n^T
+    right_j =  |s_j| (|s_j| - l_j)
 
 where n is the normal of the collider that CV c touches, or zero. So a CV in contact is 1 / (1 - b)
 times heavier across the surface and slides along it, and keeping the length does not push it in.
@@ -15,6 +16,8 @@ A held tip has nearly W = 0.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,6 +39,32 @@ _TINY_SQUARED = TINY * TINY
 ROUNDING = np.float32(1.0e-6)
 
 
+@dataclass(frozen=True)
+class Touched:
+    """Free CVs that touch a collider; few do, so that lists are quicker here than whole grids.
+
+    index: (m,) rising, into (cv_count, guide_count) in C order.
+    normal: (3, m) unit, outwards, world.
+    """
+
+    index: Ints
+    normal: Floats
+
+    def part(self, guides: Ints, guide_count: int) -> Touched:
+        """Those of some guides (n,), rising, of all; their index is among these guides alone."""
+        cv, guide = np.divmod(self.index, guide_count)
+        place = np.searchsorted(guides, guide)
+        kept = np.flatnonzero(guides.take(place, mode="clip") == guide)
+        return Touched(cv[kept] * len(guides) + place[kept], self.normal[:, kept])
+
+    def without_tips(self, held: Floats, cv_count: int) -> Touched:
+        """Tips that are held, see `state.Rest`, do not slide: normals of zero."""
+        first = self.index.searchsorted((cv_count - 1) * len(held))
+        normal = self.normal.copy()
+        normal[:, first:] *= np.float32(1.0) - held.take(self.index[first:] % len(held))
+        return Touched(self.index, normal)
+
+
 def pin(position: Floats, carried: Floats, length: Floats, tip_held: Floats | None) -> None:
     """Put the pinned CVs where the head carries them; they have infinite mass.
 
@@ -51,20 +80,20 @@ def pin(position: Floats, carried: Floats, length: Floats, tip_held: Floats | No
 
 
 def keep_lengths(
-    position: Floats, length: Floats, normal: Floats | None, tip_held: Floats | None
+    position: Floats, length: Floats, touched: Touched | None, tip_held: Floats | None
 ) -> None:
-    """Bring all segments of `position` (3, cv_count, guide_count) towards their length, in place.
+    """Bring all segments of `position` towards their length, in place.
 
     One Newton step; exact but for the turn of the segments that it makes.
 
     Args:
+        position: (3, cv_count, guide_count) world [m], in C order.
         length: (cv_count - 1, guide_count) [m].
-        normal: (3, cv_count - 2, guide_count) unit normal at each free CV that touches a
-            collider, zero at the others; None where nothing touches.
+        touched: None where nothing touches.
         tip_held: see `state.Rest`.
     """
     if position.shape[1] > PINNED:
-        _newton_step(position, length[1:], normal, tip_held)
+        _newton_step(position, length[1:], touched, tip_held)
 
 
 def relax_lengths(position: Floats, length: Floats, tip_held: Floats | None, sweeps: int) -> None:
@@ -100,7 +129,7 @@ def hold_within_reach(position: Floats, length: Floats) -> None:
 def finish_lengths(
     position: Floats,
     length: Floats,
-    normal: Floats | None,
+    touched: Touched | None,
     tip_held: Floats | None,
     tolerance: float,
     iterations: int,
@@ -114,8 +143,8 @@ def finish_lengths(
         return
     guide = _off_length(position, length, tolerance)
     for _ in range(iterations if guide.size else 0):
-        some, some_length = position[:, :, guide], length[:, guide]
-        touching = None if normal is None else normal[:, :, guide]
+        some, some_length = position.take(guide, axis=2), length.take(guide, axis=1)
+        touching = None if touched is None else touched.part(guide, length.shape[1])
         held = None if tip_held is None else tip_held[guide]
         _newton_step(some, some_length[1:], touching, held)
         position[:, :, guide] = some
@@ -147,71 +176,87 @@ def _laid_out(position: Floats, length: Floats, tip_held: Floats | None) -> Floa
 def _off_length(position: Floats, length: Floats, tolerance: float) -> Ints:
     """Guides of which a segment is off by more than this share of its length."""
     segment = position[:, PINNED:] - position[:, PINNED - 1 : -1]
-    error = _length(segment)
+    error = dot(segment, segment)
+    np.sqrt(error, out=error)
     error -= length[PINNED - 1 :]
     np.abs(error, out=error)
     allowed = length[PINNED - 1 :] * np.float32(tolerance)
     allowed += ROUNDING
-    off: Ints = np.flatnonzero((error > allowed).any(axis=0))
+    off: Ints = (error > allowed).any(axis=0).nonzero()[0]
     return off
 
 
 def _newton_step(
-    position: Floats, length: Floats, normal: Floats | None, tip_held: Floats | None
+    position: Floats, length: Floats, touched: Touched | None, tip_held: Floats | None
 ) -> None:
-    direction, error = directions(position[:, 1:])
-    error -= length
-    diagonal, beside = chain_matrix(direction)
-    tip = None if tip_held is None else position[:, -1].copy()
+    segment, squared = segments(position[:, 1:])
+    diagonal, beside = chain_matrix(segment, squared)
+    right = np.sqrt(squared)
+    right *= length
+    np.subtract(squared, right, out=right)
     if tip_held is not None:
-        diagonal[-1] -= HELD * tip_held
-        if normal is not None:
-            normal = normal.copy()
-            normal[:, -1] *= np.float32(1.0) - tip_held  # it does not slide
-    _solve_and_move(position, direction, error, diagonal, beside, normal)
-    if tip is not None and tip_held is not None:
+        tip = position[:, -1].copy()
+        diagonal[-1] -= HELD * tip_held * squared[-1]
+        if touched is not None:
+            touched = touched.without_tips(tip_held, position.shape[1])
+    if touched is None:
+        solve_tridiagonal(diagonal, beside, right)
+    else:
+        _solve_and_slide(position, segment, (diagonal, beside, right), touched)
+    segment *= right
+    position[:, PINNED:] -= less_next(segment)
+    if tip_held is not None:
         np.copyto(position[:, -1], tip, where=tip_held > 0.0)
 
 
-def _solve_and_move(
-    position: Floats,
-    direction: Floats,
-    error: Floats,
-    diagonal: Floats,
-    beside: Floats,
-    normal: Floats | None,
+def _solve_and_slide(
+    position: Floats, segment: Floats, system: tuple[Floats, Floats, Floats], touched: Touched
 ) -> None:
-    if normal is None:
-        solve_tridiagonal(diagonal, beside, error)
-        direction *= error
-        move = direction
-        move[:, :-1] -= direction[:, 1:]
-        position[:, PINNED:] -= move
-        return
-    lower = dot(normal[:, :-1], direction[:, 1:])  # of each segment but the first, at its root end
-    upper = dot(normal, direction)  # of each segment, at its tip end
-    beside += CONTACT_WEIGHT * (upper[:-1] * lower)
-    diagonal -= CONTACT_WEIGHT * (upper * upper)
-    diagonal[1:] -= CONTACT_WEIGHT * (lower * lower)
-    solve_tridiagonal(diagonal, beside, error)
-    direction *= error
-    direction[:, :-1] -= direction[:, 1:]
-    across = dot(normal, direction)
-    across *= CONTACT_WEIGHT
-    direction -= normal * across
-    position[:, PINNED:] -= direction
+    """Solve with the weight of contacts, and take back what would push into them."""
+    diagonal, beside, right = (part.reshape(-1) for part in system)
+    rows, normal, guide_count = segment.reshape(3, -1), touched.normal, segment.shape[2]
+    upper = touched.index - PINNED * guide_count  # the segment that ends at the CV
+    count = upper.searchsorted(beside.size)  # of all but tips, where no segment begins
+    inner, lower = upper[:count], upper[:count] + guide_count  # and the one that begins there
+    along_upper = dot(normal, chosen(rows, upper))
+    along_lower = dot(normal[:, :count], chosen(rows, lower))
+    heavy_upper, heavy_lower = CONTACT_WEIGHT * along_upper, CONTACT_WEIGHT * along_lower
+    diagonal[upper] -= heavy_upper * along_upper
+    diagonal[lower] -= heavy_lower * along_lower
+    beside[inner] += heavy_upper[:count] * along_lower
+    solve_tridiagonal(*system)
+    heavy_upper *= right.take(upper)
+    heavy_upper[:count] -= heavy_lower * right.take(lower)
+    for row, value in zip(position.reshape(3, -1), normal * heavy_upper, strict=True):
+        row[touched.index] += value
 
 
-def chain_matrix(direction: Floats) -> tuple[Floats, Floats]:
+def segments(position: Floats) -> tuple[Floats, Floats]:
+    """Segments (3, n - 1, guide_count) [m] and their squared length, never zero [m^2]."""
+    segment = position[:, 1:] - position[:, :-1]
+    squared = dot(segment, segment)
+    squared += _TINY_SQUARED
+    return segment, squared
+
+
+def chain_matrix(segment: Floats, squared: Floats) -> tuple[Floats, Floats]:
     """A of a guide without contacts: its diagonal (n, guide_count), and the one beside it.
 
     Args:
-        direction: (3, n, guide_count) of the segments from the last pinned CV to the tip.
+        segment, squared: see `segments`, from the last pinned CV to the tip.
     """
-    diagonal = np.full(direction.shape[1:], 2.0, np.float32)
-    diagonal[0] = 1.0  # the last pinned CV does not move
-    beside = dot(direction[:, 1:], direction[:, :-1])
+    diagonal = squared + squared
+    diagonal[0] = squared[0]  # the last pinned CV does not move
+    beside = dot(segment[:, 1:], segment[:, :-1])
     return diagonal, np.negative(beside, out=beside)
+
+
+def less_next(rows: Floats) -> Floats:
+    """Each of (3, n, guide_count) less the next one, the last as it is: J^T, but for its sign."""
+    result = np.empty_like(rows)
+    np.subtract(rows[:, :-1], rows[:, 1:], out=result[:, :-1])
+    result[:, -1:] = rows[:, -1:]
+    return result
 
 
 def directions(position: Floats) -> tuple[Floats, Floats]:
@@ -243,3 +288,8 @@ def dot(one: Floats, two: Floats) -> Floats:
     total += product[1]
     total += product[2]
     return total
+
+
+def chosen(rows: Floats, index: Ints) -> Floats:
+    """The chosen columns (3, m) of rows (3, n), at their quickest where these are contiguous."""
+    return rows.take(index, axis=1, mode="clip")

@@ -16,21 +16,19 @@ last one wins.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from .colliders import PosedCollider, transform_points
-from .constraints import PINNED, TINY, dot
+from .colliders import Pose, transform_points
+from .constraints import PINNED, TINY, Touched, chosen, dot
 from .settings import DynamicsSettings
 
 #: How far a CV may be brought by the length solve after contacts were found [m].
 REACH = 0.002
 #: Closer than this to its plane a CV counts as touching, so that lengths do not push it in [m].
 SKIN = np.float32(1.0e-4)
-#: A collider that turns around within a frame is flat on its way; then it holds nothing out. Share
-#: of the largest scale.
-FLAT = 1.0e-3
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,7 @@ class Contacts:
 
     def push_out(self, position: Floats, friction: float) -> Bools:
         """Bring points (3, n) back to their planes, in place; returns which ones touch, (m,)."""
-        here = _chosen(position, self.index)
+        here = chosen(position, self.index)
         gap = dot(self.normal, here)
         np.subtract(self.offset, gap, out=gap)
         push = np.maximum(gap, np.float32(0.0))
@@ -77,37 +75,31 @@ class Contacts:
 
         Changes `previous` (3, n), so that no pushed point moves away from the collider.
         """
-        pushed = np.flatnonzero(self.push > 0.0)
-        index, normal = self.index[pushed], _chosen(self.normal, pushed)
-        moved = _chosen(position, index)
-        moved -= _chosen(self.origin, pushed)
-        away = np.maximum(dot(normal, moved), np.float32(0.0))
-        for row, value in zip(previous, normal * away, strict=True):
-            row[index] += value
+        moved = chosen(position, self.index)
+        moved -= self.origin
+        away = np.maximum(dot(self.normal, moved), np.float32(0.0))
+        away *= self.push > 0.0
+        for row, value in zip(previous, self.normal * away, strict=True):
+            row[self.index] += value
 
 
 def find_contacts(
     position: Floats,
     previous: Floats,
     radius: Floats,
-    colliders: tuple[PosedCollider, ...],
-    span: tuple[float, float],
+    poses: list[Pose],
     led_out: float,
 ) -> list[Contacts]:
     """Planes for all points near a collider.
 
     Args:
-        position, previous: (3, n) float32 world [m], a substep apart; views do.
-        radius: (n,) float32 [m], the distance that each point keeps.
-        span: begin and end of the substep as shares of the frame.
+        position, previous: (3, n) float32 world [m], a substep apart.
+        radius: (n,) float32 [m], the distance that each point keeps; -inf: it has no contacts.
+        poses: of the colliders at the substep's end.
         led_out: how far [m] a point that is inside may be led out in this substep.
     """
-    if not position.shape[1]:
-        return []
-    found = (
-        _contacts_with(posed, position, previous, radius, span, led_out) for posed in colliders
-    )
-    return [contacts for contacts in found if contacts is not None and len(contacts.index)]
+    found = (_contacts_with(pose, position, previous, radius, led_out) for pose in poses)
+    return [contacts for contacts in found if len(contacts.index)]
 
 
 def cv_radius(settings: DynamicsSettings, cv_count: int) -> Floats:
@@ -117,84 +109,69 @@ def cv_radius(settings: DynamicsSettings, cv_count: int) -> Floats:
     return radius.astype(np.float32)
 
 
-def touched_normals(contacts: list[Contacts], touching: list[Bools], like: Floats) -> Floats | None:
-    """Normal (3, cv_count - 2, guide_count) at each free CV that touches, zero elsewhere; None
-    where none does."""
-    chosen = [np.flatnonzero(is_touching) for is_touching in touching]
-    if not any(one.size for one in chosen):
-        return None
-    normals = np.zeros((3, like.shape[1] - PINNED, like.shape[2]), np.float32)
-    rows = normals.reshape(3, -1)
-    for one, which in zip(contacts, chosen, strict=True):
-        index = one.index[which]
-        for row, values in zip(rows, _chosen(one.normal, which), strict=True):
-            row[index] = values
-    return normals
+@lru_cache(maxsize=8)
+def radius_of_all(settings: DynamicsSettings, cv_count: int, guide_count: int) -> Floats:
+    """The same of all CVs of some guides, (cv_count * guide_count,); -inf for the pinned."""
+    pinned = np.full(PINNED, -np.inf, np.float32)
+    radius = np.repeat(np.concatenate([pinned, cv_radius(settings, cv_count)]), guide_count)
+    radius.flags.writeable = False
+    return radius
+
+
+def touched_by(contacts: list[Contacts], touching: list[Bools]) -> Touched | None:
+    """Free CVs that touch, each with the normal of the last collider that it touches; None where
+    none does."""
+    found = []
+    for one, is_touching in zip(contacts, touching, strict=True):
+        which = is_touching.nonzero()[0]  # sooner than by np.flatnonzero
+        if which.size:
+            found.append(Touched(one.index.take(which), chosen(one.normal, which)))
+    if len(found) < 2:
+        return found[0] if found else None
+    index = np.concatenate([one.index for one in found])[::-1]
+    normal = np.concatenate([one.normal for one in found], axis=1)[:, ::-1]
+    index, last = np.unique(index, return_index=True)
+    return Touched(index, normal[:, last])
 
 
 def _contacts_with(
-    posed: PosedCollider,
-    position: Floats,
-    previous: Floats,
-    radius: Floats,
-    span: tuple[float, float],
-    led_out: float,
-) -> Contacts | None:
-    before, now = (posed.matrix_at(moment) for moment in span)
-    scales = np.linalg.svd(now[:3, :3], compute_uv=False)
-    if scales[-1] <= FLAT * scales[0]:
-        return None
-    inverse = np.linalg.inv(now)
-    reach = float(radius.max()) + REACH
-    index, local = _near(posed, position, now, inverse, scales, reach)
-
-    distance, gradient = posed.collider.distance(local)
+    pose: Pose, position: Floats, previous: Floats, radius: Floats, led_out: float
+) -> Contacts:
+    index, local, reach = _near(pose, position, radius)
+    distance, gradient = pose.collider.distance(local)
     # distance and normal in the world: the gradient transforms by the inverse transposed, and its
     # length says how much the distance is scaled along it
-    steepness = np.eye(4)
-    steepness[:3, :3] = inverse[:3, :3].T
-    normal = transform_points(steepness, gradient)
+    normal = np.einsum("ji,jn->in", pose.inverse[:3, :3], gradient)
     scale = np.maximum(np.sqrt(dot(normal, normal)), TINY)
     normal /= scale
-    distance = distance / scale
-    own_radius = radius.take(index)
+    distance /= scale
 
-    close = np.flatnonzero(distance < own_radius + np.float32(REACH))
-    index, distance, own_radius = index[close], distance[close], own_radius[close]
-    local, normal = _chosen(local, close), _chosen(normal, close)
-    here, origin = _chosen(position, index), _chosen(previous, index)
-    origin += transform_points(now - before, local)
-    reached = distance - dot(normal, here - origin) + np.float32(led_out)
-    offset = dot(normal, here) - distance + np.minimum(own_radius, reached)
+    close = (distance < reach).nonzero()[0]
+    index, distance = index.take(close), distance.take(close)
+    local, normal = chosen(local, close), chosen(normal, close)
+    here, origin = chosen(position, index), chosen(previous, index)
+    origin += transform_points(pose.way, local)
+    reached = distance - dot(normal, here - origin)
+    reached += np.float32(led_out)
+    own_radius = radius.take(index)
+    offset = dot(normal, here)
+    offset -= distance
+    offset += np.minimum(own_radius, reached)
     is_out = reached >= own_radius
     return Contacts(index, normal, offset, origin, is_out, np.zeros_like(offset))
 
 
-def _near(
-    posed: PosedCollider,
-    position: Floats,
-    now: Floats,
-    inverse: Floats,
-    scales: Floats,
-    reach: float,
-) -> tuple[Ints, Floats]:
-    """Points that may be within `reach` [m], and where they are in object space (3, n).
+def _near(pose: Pose, position: Floats, radius: Floats) -> tuple[Ints, Floats, Floats]:
+    """Points that may be within their reach, their radius and a bit, where they are in object
+    space (3, n), and their reach [m] (n,).
 
     A bounding sphere first, then the collider's own quick answer.
     """
-    center, radius = posed.collider.bounds
-    center = (now[:3, :3] @ center + now[:3, 3]).astype(np.float32)
-    offset = position - center[:, None]
-    squared = dot(offset, offset)
-    index = np.flatnonzero(squared < np.float32((radius * scales[0] + reach) ** 2))
-    local = transform_points(inverse, _chosen(position, index))
-    kept = posed.collider.near(local, reach / float(scales[-1]))
-    return index[kept], _chosen(local, kept)
-
-
-def _chosen(rows: Floats, index: Ints) -> Floats:
-    """The chosen columns (3, m) of rows (3, n)."""
-    chosen = np.empty((3, len(index)), rows.dtype)
-    for row, out in zip(rows, chosen, strict=True):
-        row.take(index, out=out, mode="clip")  # the other modes buffer
-    return chosen
+    offset = position - pose.center[:, None]
+    farthest = pose.radius + float(radius.max()) + REACH
+    index = (dot(offset, offset) < np.float32(farthest * farthest)).nonzero()[0]
+    reach = radius.take(index)
+    reach += np.float32(REACH)
+    local = transform_points(pose.inverse, chosen(position, index))
+    kept = pose.collider.near(local, reach / np.float32(pose.scale))
+    return index.take(kept), chosen(local, kept), reach.take(kept)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats
 from .banded import solve_tridiagonal
-from .constraints import PINNED, chain_matrix, directions, dot
+from .constraints import PINNED, chain_matrix, dot, less_next, segments
 from .settings import DynamicsSettings
 
 
@@ -86,7 +86,9 @@ def felt_gravity(
     combed = (turn @ pull.astype(np.float64)).astype(np.float32)
     felt = np.empty_like(carried)
     felt[:] = left[:, None, None]
-    felt[:, PINNED:] -= np.float32(settings.weight_held) * weight_on_style(combed, carried)
+    held = weight_on_style(combed, carried)
+    held *= np.float32(settings.weight_held)
+    felt[:, PINNED:] -= held
     return felt
 
 
@@ -95,11 +97,10 @@ def weight_on_style(gravity: Floats, carried: Floats) -> Floats:
 
     g - J^T (J J^T)^-1 J g with the length constraints J of the free CVs.
     """
-    direction, _ = directions(carried[:, PINNED - 1 :])
-    diagonal, beside = chain_matrix(direction)
+    segment, squared = segments(carried[:, PINNED - 1 :])
+    diagonal, beside = chain_matrix(segment, squared)
     tension = np.zeros_like(diagonal)  # J g: only the segment at the pinned CV feels a difference
-    tension[0] = dot(direction[:, 0], gravity[:, None])
+    tension[0] = dot(segment[:, 0], gravity[:, None])
     solve_tridiagonal(diagonal, beside, tension)
-    direction *= tension
-    direction[:, :-1] -= direction[:, 1:]
-    return gravity[:, None, None] - direction
+    segment *= tension
+    return gravity[:, None, None] - less_next(segment)

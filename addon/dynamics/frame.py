@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import HairloomError
 from .colliders import PosedCollider
-from .contacts import cv_radius
+from .contacts import radius_of_all
 from .forces import carried_share, felt_gravity
 from .settings import DynamicsSettings
 from .state import DynamicsState, Rest, StyleRows, as_rows, checked_grid
@@ -148,7 +148,7 @@ class Block:
 
     impulse, impulse_bow: what gravity and the moving style add to each CV in a substep, and how
         that changes while the way of the style bends.
-    radius: (free CVs * n,) [m], the distance that each free CV keeps from colliders.
+    radius: (cv_count * n,) [m], the distance that each CV keeps from colliders; not to be written.
     """
 
     position: Floats
@@ -187,7 +187,7 @@ class Block:
             bent,
             impulse,
             None if bent is None else bent * np.float32(frame.carried_share),
-            np.repeat(cv_radius(settings, state.cv_count), before.shape[2]),
+            radius_of_all(settings, state.cv_count, before.shape[2]),
         )
 
     def style_at(self, moment: float) -> Floats:
@@ -197,4 +197,6 @@ class Block:
         """[m] that gravity and the moving style add to each CV in a substep; not to be written."""
         if self.impulse_bow is None:
             return self.impulse
-        return self.impulse + self.impulse_bow * np.float32(span[0] + span[1] - 1.0)
+        impulse = self.impulse_bow * np.float32(span[0] + span[1] - 1.0)
+        impulse += self.impulse
+        return impulse

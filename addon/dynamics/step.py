@@ -28,8 +28,16 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays import Floats
-from .constraints import PINNED, finish_lengths, hold_within_reach, keep_lengths, pin, relax_lengths
-from .contacts import find_contacts, touched_normals
+from .colliders import Pose, poses_through
+from .constraints import (
+    Touched,
+    finish_lengths,
+    hold_within_reach,
+    keep_lengths,
+    pin,
+    relax_lengths,
+)
+from .contacts import find_contacts, touched_by
 from .forces import air_share, brake, predict, speed_kept
 from .frame import Block, Drive, Frame, check_drive, style_rows
 from .schedule import due_substeps
@@ -60,10 +68,12 @@ def advance(
     check_drive(state, drive, tuple(style.grid for style in state.styles))
     styles = style_rows(state, drive)
     frame = Frame.of(state, drive, settings, duration, dt)
+    spans = [frame.span(number) for number in range(count)]
+    poses = poses_through(drive.colliders, spans)
     position, previous = np.empty_like(state.position), np.empty_like(state.position)
     for guides in _blocks(state.guide_count):
         block = Block.of(state, frame, styles, guides)
-        position[:, :, guides], previous[:, :, guides] = _advance_block(block, frame, count)
+        position[:, :, guides], previous[:, :, guides] = _advance_block(block, frame, spans, poses)
     time = state.time + count * dt
     return DynamicsState(position, previous, state.rest, dt, left, time, styles)
 
@@ -75,13 +85,14 @@ def _blocks(guide_count: int) -> list[slice]:
     return [slice(first, last) for first, last in pairwise(ends)]
 
 
-def _advance_block(block: Block, frame: Frame, count: int) -> tuple[Floats, Floats]:
+def _advance_block(
+    block: Block, frame: Frame, spans: list[tuple[float, float]], poses: list[list[Pose]]
+) -> tuple[Floats, Floats]:
     """Position and previous position after the frame's substeps; takes the block's own arrays."""
     settings, dt, rest = frame.settings, frame.dt, block.rest
     position, previous, spare = block.position, block.previous, np.empty_like(block.position)
     kept, blown = speed_kept(settings, dt), air_share(settings, dt)
-    for number in range(count):
-        span = frame.span(number)
+    for number, span in enumerate(spans):
         style = block.style_at(span[1])
         impulse = block.impulse_at(span)
         air_way = frame.air_way(position[:, 0], number)
@@ -95,7 +106,7 @@ def _advance_block(block: Block, frame: Frame, count: int) -> tuple[Floats, Floa
         restore_style(position, style, rest.shape, frame.matrix)
         pin(position, style, rest.length, rest.tip_held)
         _keep_lengths(position, rest, None, settings)
-        _keep_outside(position, previous, block, frame, span)
+        _keep_outside(position, previous, block, frame, poses[number])
     return position, previous
 
 
@@ -109,10 +120,10 @@ def grid_at_frame_end(state: DynamicsState, drive: Drive) -> Floats:
 
 
 def _keep_lengths(
-    position: Floats, rest: Rest, normals: Floats | None, settings: DynamicsSettings
+    position: Floats, rest: Rest, touched: Touched | None, settings: DynamicsSettings
 ) -> None:
     if settings.length_solver == "direct":
-        keep_lengths(position, rest.length, normals, rest.tip_held)
+        keep_lengths(position, rest.length, touched, rest.tip_held)
         return
     relax_lengths(position, rest.length, rest.tip_held, settings.relaxations)
     if settings.long_range:
@@ -120,22 +131,21 @@ def _keep_lengths(
 
 
 def _keep_outside(
-    position: Floats, previous: Floats, block: Block, frame: Frame, span: tuple[float, float]
+    position: Floats, previous: Floats, block: Block, frame: Frame, poses: list[Pose]
 ) -> None:
     """Contacts and lengths in turn; lengths come last, and slide along what touches.
 
     Guides that touch nothing take part, so that none depends on what others do.
     """
-    settings, rest, normals = frame.settings, block.rest, None
-    free, was = (rows[:, PINNED:].reshape(3, -1) for rows in (position, previous))
-    colliders, led_out = frame.drive.colliders, settings.push_speed * frame.dt
-    contacts = find_contacts(free, was, block.radius, colliders, span, led_out)
-    for _ in range(settings.contact_passes if colliders else 0):
-        touching = [one.push_out(free, settings.friction) for one in contacts]
-        normals = touched_normals(contacts, touching, position)
-        _keep_lengths(position, rest, normals, settings)
+    settings, rest, touched = frame.settings, block.rest, None
+    here, was = (rows.reshape(3, -1) for rows in (position, previous))
+    contacts = find_contacts(here, was, block.radius, poses, settings.push_speed * frame.dt)
+    for _ in range(settings.contact_passes if frame.drive.colliders else 0):
+        touching = [one.push_out(here, settings.friction) for one in contacts]
+        touched = touched_by(contacts, touching)
+        _keep_lengths(position, rest, touched, settings)
     if settings.length_solver == "direct":
         tolerance, iterations = settings.length_tolerance, settings.length_iterations
-        finish_lengths(position, rest.length, normals, rest.tip_held, tolerance, iterations)
+        finish_lengths(position, rest.length, touched, rest.tip_held, tolerance, iterations)
     for one in contacts:
-        one.absorb(free, was)
+        one.absorb(here, was)

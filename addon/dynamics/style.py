@@ -37,7 +37,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..params.curve import along as curve_along
 from .banded import SharedBand
-from .constraints import PINNED, TINY, dot, unit
+from .constraints import PINNED, TINY, dot, less_next, unit
 from .settings import DynamicsSettings
 
 #: A cantilever's first mode: omega = 1.8751^2 sqrt(EI / (rho A)) / L^2 (Euler-Bernoulli).
@@ -65,6 +65,11 @@ class LocalShape:
     def part(self, guides: slice) -> LocalShape:
         """The shape of these guides, as views."""
         return LocalShape(self.curvature[:, :, guides], self.hold[:, guides], self.twist_cv[guides])
+
+    @cached_property
+    def twist_place(self) -> Ints:
+        """Of the twist CVs in rows of all CVs, (guide_count,)."""
+        return self.twist_cv * len(self.twist_cv) + np.arange(len(self.twist_cv))
 
     @cached_property
     def turning(self) -> Floats:
@@ -122,10 +127,7 @@ def restore_style(position: Floats, style: Floats, shape: LocalShape, matrix: St
     if matrix.is_bending:
         residual = _curvature_residual(position, style, shape)
         residual *= matrix.bend
-        right += residual
-        right[:, :-1] -= residual[:, 1:]
-        right[:, :-1] -= residual[:, 1:]
-        right[:, :-2] += residual[:, 2:]
+        right += less_next(less_next(residual))
     matrix.band.solve(right)
     position[:, PINNED:] += right
 
@@ -151,28 +153,30 @@ def twist_reference(position: Floats) -> Ints:
 
 def rest_curvature(position: Floats, twist_cv: Ints) -> Floats:
     """Second differences in the frame of the segment before, (3, cv_count - 2, guide_count)."""
-    tangent, normal, _ = frames(position, position, twist_cv)
-    second = np.diff(position, n=2, axis=1)
+    twist = position[:, twist_cv, np.arange(position.shape[2])] - position[:, 0]
+    segment = position[:, 1:] - position[:, :-1]
+    tangent, normal = frames(segment, twist)
+    second = segment[:, 1:] - segment[:, :-1]
     axes = (tangent, normal, _cross(tangent, normal))
     return np.stack([(second * axis[:, :-1]).sum(axis=0) for axis in axes])
 
 
-def frames(position: Floats, style: Floats, twist_cv: Ints) -> tuple[Floats, Floats, Floats]:
-    """Tangent and normal (3, cv_count - 1, guide_count) of each segment, and the segment [m].
+def frames(segment: Floats, twist: Floats) -> tuple[Floats, Floats]:
+    """Tangent and normal (3, n, guide_count) of each segment of the same shape [m].
 
     The first normal points to the twist CV of the style, the others follow without twist. It is
     zero on a straight guide, which has no curvature to turn.
+
+    Args:
+        twist: (3, guide_count), the way from the style's root to its twist CV [m].
     """
-    segment = position[:, 1:] - position[:, :-1]
     tangent = unit(segment)
-    guide = np.arange(position.shape[2])
-    first = unit(_across(style[:, twist_cv, guide] - style[:, 0], tangent[:, 0]))
+    first = unit(_across(twist, tangent[:, 0]))
     middle = tangent[:, 1:] + tangent[:, :-1]
     scale = dot(tangent[:, 1:], middle)  # 1 + t.t' = t'.(t + t')
     scale += np.float32(1.0e-6)
     middle /= scale
-    normal = _carried_on(first, tangent, middle)
-    return tangent, normal, segment
+    return tangent, _carried_on(first, tangent, middle)
 
 
 def _carried_on(first: Floats, tangent: Floats, middle: Floats) -> Floats:
@@ -184,20 +188,24 @@ def _carried_on(first: Floats, tangent: Floats, middle: Floats) -> Floats:
     here = list(normal)
     product, share = np.empty_like(first), np.empty_like(first[0])
     x, y, z = product
-    for i in range(1, len(here)):
-        np.multiply(here[i - 1], along[i], product)
+    for before, after, next_along, next_turn in zip(
+        here[:-1], here[1:], along[1:], turn, strict=True
+    ):
+        np.multiply(before, next_along, product)
         np.add(x, y, share)
-        share += z
-        np.multiply(turn[i - 1], share, product)
-        np.subtract(here[i - 1], product, here[i])
+        np.add(share, z, share)
+        np.multiply(next_turn, share, product)
+        np.subtract(before, product, after)
     return np.ascontiguousarray(normal.transpose(1, 0, 2))
 
 
 def _curvature_residual(position: Floats, style: Floats, shape: LocalShape) -> Floats:
     """k - b(x), (3, cv_count - 2, guide_count)."""
-    tangent, normal, segment = frames(position, style, shape.twist_cv)
+    segment = position[:, 1:] - position[:, :-1]
+    twist = style.reshape(3, -1).take(shape.twist_place, axis=1)
+    twist -= style[:, 0]
+    tangent, normal = frames(segment[:, :-1], twist)
     curvature = shape.turning
-    tangent, normal = tangent[:, :-1], normal[:, :-1]
     residual = _cross(tangent, normal)
     residual *= curvature[2]
     normal *= curvature[1]
@@ -205,7 +213,10 @@ def _curvature_residual(position: Floats, style: Floats, shape: LocalShape) -> F
     tangent *= curvature[0]
     residual += tangent
     if shape.staying is not None:
-        residual += shape.staying * np.diff(style, n=2, axis=1)
+        straight = style[:, 1:] - style[:, :-1]
+        bent = straight[:, 1:] - straight[:, :-1]
+        bent *= shape.staying
+        residual += bent
     residual -= segment[:, 1:]
     residual += segment[:, :-1]
     return residual

@@ -25,7 +25,10 @@ def bow(earlier: Floats, before: Floats, now: Floats, ratio: float) -> Floats:
         ratio: duration of the frame before, over that of this one.
     """
     ratio = held_ratio(ratio)
-    result: Floats = (earlier - before + (now - before) * ratio) / (ratio * (ratio + 1.0))
+    result: Floats = now - before
+    result *= ratio
+    result += earlier - before
+    result /= ratio * (ratio + 1.0)
     return result
 
 
@@ -36,7 +39,11 @@ def held_ratio(ratio: float) -> float:
 
 def at(before: Floats, way: Floats, bow: Floats | None, moment: float) -> Floats:
     """Where a thing is at a moment of the frame, 0 its begin and 1 its end."""
-    here: Floats = before + way * before.dtype.type(moment)
-    if bow is not None:
-        here += bow * before.dtype.type(moment * (moment - 1.0))
+    number = before.dtype.type
+    if bow is None:
+        return before + way * number(moment)
+    here = bow * number(moment - 1.0)
+    here += way
+    here *= number(moment)
+    here += before
     return here

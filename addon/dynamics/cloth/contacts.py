@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import Floats
-from ..colliders import PosedCollider
+from ..colliders import Pose, PosedCollider
 from ..constraints import dot
 from ..contacts import Contacts, find_contacts
 
@@ -64,8 +64,7 @@ def planes_ahead(
     fall: Floats,
     steps: int,
     radius: Floats,
-    colliders: tuple[PosedCollider, ...],
-    span: tuple[float, float],
+    poses: list[Pose],
     led_out: float,
 ) -> list[MovingPlanes]:
     """Planes near where the substep of `steps` small ones would lead.
@@ -73,12 +72,12 @@ def planes_ahead(
     Args:
         position, previous: (3, n) world [m], one small step apart.
         fall: (3, 1) [m] that gravity adds in a small step.
-        radius, span, led_out: see `find_contacts`.
+        radius, poses, led_out: see `find_contacts`.
     """
     ahead = (position - previous) * np.float32(steps)
     ahead += position
     ahead += fall * np.float32(steps * (steps + 1) / 2)
-    found = find_contacts(ahead, position, radius, colliders, span, led_out)
+    found = find_contacts(ahead, position, radius, poses, led_out)
     return [MovingPlanes.of(one, position) for one in found]
 
 

@@ -31,7 +31,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
-from ..colliders import PosedCollider
+from ..colliders import PosedCollider, poses_through
 from ..constraints import dot
 from ..contacts import find_contacts
 from ..schedule import due_substeps
@@ -184,12 +184,11 @@ def _substep(
 ) -> tuple[Floats, Floats]:
     """Motion with edges and contacts; returns the new position and that one small step before."""
     steps, led_out = settings.small_steps, settings.push_speed * frame.dt
-    fall, colliders = frame.gravity * np.float32(frame.small**2), frame.colliders
+    fall, radius = frame.gravity * np.float32(frame.small**2), frame.radius
+    poses = poses_through(frame.colliders, [span])[0] if fabric.pairs.size else []
     planes: list[MovingPlanes] = []
-    if fabric.pairs.size and colliders:
-        planes = planes_ahead(
-            position, previous, fall, steps, frame.radius, colliders, span, led_out
-        )
+    if poses:
+        planes = planes_ahead(position, previous, fall, steps, radius, poses, led_out)
     before, spare, way = position.copy(), np.empty_like(position), np.empty_like(position)
     pinned, is_pulled = np.flatnonzero(fabric.pinned), bool(frame.pull.any())
     for number in range(steps):
@@ -206,8 +205,8 @@ def _substep(
         _keep_edges(position, fabric, frame, settings)
         for one in planes:
             one.press(position, previous, number, steps, settings.friction)
-    if fabric.pairs.size and colliders:
-        contacts = find_contacts(position, before, frame.radius, colliders, span, led_out)
+    if poses:
+        contacts = find_contacts(position, before, radius, poses, led_out)
         if contacts:
             push_out_at_end(position, previous, before, contacts, settings.friction, 1.0 / steps)
     return position, previous

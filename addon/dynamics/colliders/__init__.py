@@ -1,7 +1,7 @@
 """What hair runs into: balls, capsules, sets of balls and closed meshes, posed by matrices."""
 
 from .distance_field import DistanceField
-from .posed import Collider, PosedCollider, transform_points
+from .posed import Collider, Pose, PosedCollider, poses_through, transform_points
 from .shapes import CapsuleCollider, SphereCollider
 from .sphere_set import SphereSetCollider
 
@@ -9,8 +9,10 @@ __all__ = [
     "CapsuleCollider",
     "Collider",
     "DistanceField",
+    "Pose",
     "PosedCollider",
     "SphereCollider",
     "SphereSetCollider",
+    "poses_through",
     "transform_points",
 ]

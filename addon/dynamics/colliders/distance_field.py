@@ -47,6 +47,7 @@ class DistanceField:
         self._flat = self.values.ravel()
         self._strides = tuple(stride // 4 for stride in self.values.strides)
         self._top = np.array(self.values.shape, np.float32)[:, None] - np.float32(1.0)
+        self._below_top = self._top - np.float32(1.0e-3)  # so that there is a cell beyond
         # of each node the values of itself and its neighbours along z, y and both: what lies near
         # in space is then read from one place
         _, along_y, along_z = self._strides
@@ -95,7 +96,7 @@ class DistanceField:
         farthest = float(np.sqrt((inside * inside).sum(axis=1).max()))
         return self.low + center * np.float32(self.cell), (farthest + 3.0**0.5) * self.cell
 
-    def near(self, points: Floats, reach: float) -> Ints:
+    def near(self, points: Floats, reach: Floats | float) -> Ints:
         """Points whose nearest node is not farther than `reach` and the way to it: as distance
         changes by no more than the way, no point within `reach` is missed."""
         place = points - self.low[:, None]
@@ -105,9 +106,9 @@ class DistanceField:
         np.abs(place, out=place)
         outside = np.maximum(np.maximum(place[0], place[1]), place[2])  # along one axis will do
         held += np.float32(0.5)
-        limit = np.float32(reach + self.cell * 0.8661)  # half the diagonal of a cell
+        limit = reach + self.cell * 0.8661  # half the diagonal of a cell
         is_near = self._flat.take(self._index(held)) < limit
-        kept: Ints = np.flatnonzero(is_near & (outside < np.float32(reach / self.cell)))
+        kept: Ints = (is_near & (outside < reach / self.cell)).nonzero()[0]
         return kept
 
     def distance(self, points: Floats) -> tuple[Floats, Floats]:
@@ -116,9 +117,10 @@ class DistanceField:
         Outside of the grid the distance grows by the way to the grid's box.
         """
         place, outside = self._placed(points)
-        np.minimum(place, self._top - np.float32(1.0e-3), out=place)
+        np.minimum(place, self._below_top, out=place)
         index = self._index(place)
-        fx, fy, fz = place - np.floor(place)
+        place -= np.floor(place)
+        fx, fy, fz = place
         corner = np.empty((2, 2, 2, len(index)), np.float32)  # along x, y and z
         for side, step in zip(corner, (0, self._strides[0]), strict=True):
             side.reshape(4, -1)[:] = self._squares.take(index + step, axis=0).T

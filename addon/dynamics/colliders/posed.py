@@ -1,15 +1,19 @@
-"""A solid that moves: what it is asked for, and its way during a frame."""
+"""A solid that moves: what it is asked for, its way during a frame, and its poses on that way."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ..way import at
+
+#: A collider that turns around within a frame is flat on its way; then it holds nothing out. Share
+#: of the largest scale.
+FLAT = 1.0e-3
 
 
 class Collider(Protocol):
@@ -19,8 +23,9 @@ class Collider(Protocol):
     def bounds(self) -> tuple[Floats, float]:
         """Center (3,) and radius [m] of a sphere around it."""
 
-    def near(self, points: Floats, reach: float) -> Ints:
-        """Indices of the points (3, n) that may be closer than `reach` [m], quickly."""
+    def near(self, points: Floats, reach: Floats | float) -> Ints:
+        """Indices of the points (3, n) that may be closer than `reach` [m], one or (n,) float32,
+        quickly."""
 
     def distance(self, points: Floats) -> tuple[Floats, Floats]:
         """Signed distance [m] (n,) at the points (3, n), and its gradient (3, n)."""
@@ -57,6 +62,57 @@ class PosedCollider:
         """Object to world (4, 4) float64 at `moment`, 0 the frame's begin and 1 its end."""
         way = self.matrix_now - self.matrix_before
         return at(self.matrix_before, way, self.matrix_bow, moment)
+
+    def poses(self, spans: list[tuple[float, float]]) -> list[Pose | None]:
+        """Where it is after each substep; None where it is flat.
+
+        Args:
+            spans: begin and end of the substeps as shares of the frame.
+        """
+        moments: Any = np.array(spans).T[..., None, None]  # in matrix_at an array does for a number
+        before, now = self.matrix_at(moments)
+        center, radius = self.collider.bounds
+        centers = (now[:, :3, :3] @ center + now[:, :3, 3]).astype(np.float32)
+        scales = np.linalg.svd(now[:, :3, :3], compute_uv=False)
+        is_flat = scales[:, -1] <= FLAT * scales[:, 0]
+        ways = (now - before).astype(np.float32)
+        now[is_flat] = np.eye(4)
+        inverses = np.linalg.inv(now).astype(np.float32)
+        return [
+            None
+            if is_flat[i]
+            else Pose(self.collider, inverses[i], ways[i], centers[i], radius * largest, smallest)
+            for i, (largest, _, smallest) in enumerate(scales.tolist())
+        ]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A collider at the end of a substep.
+
+    inverse: (4, 4) float32, world to object. way: (4, 4) float32, what the substep has added to
+        the matrix from object to world.
+    center: (3,) float32 world [m]. radius: [m], of a sphere around it.
+    scale: the smallest of the matrix along any axis.
+    """
+
+    collider: Collider
+    inverse: Floats
+    way: Floats
+    center: Floats
+    radius: float
+    scale: float
+
+
+def poses_through(
+    colliders: tuple[PosedCollider, ...], spans: list[tuple[float, float]]
+) -> list[list[Pose]]:
+    """The poses of all colliders after each substep, but of those that are flat then."""
+    ways = [posed.poses(spans) for posed in colliders]
+    return [
+        [pose for pose in (way[number] for way in ways) if pose is not None]
+        for number in range(len(spans))
+    ]
 
 
 def transform_points(matrix: Floats, points: Floats) -> Floats:

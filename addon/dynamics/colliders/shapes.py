@@ -40,7 +40,7 @@ class SphereCollider:
     def bounds(self) -> tuple[Floats, float]:
         return self.center, float(self.radius)
 
-    def near(self, points: Floats, reach: float) -> Ints:
+    def near(self, points: Floats, reach: Floats | float) -> Ints:
         return np.arange(points.shape[1])
 
     def distance(self, points: Floats) -> tuple[Floats, Floats]:
@@ -77,7 +77,7 @@ class CapsuleCollider:
         half = (self.end - self.start) / np.float32(2.0)
         return self.start + half, float(np.linalg.norm(half)) + float(self.radius)
 
-    def near(self, points: Floats, reach: float) -> Ints:
+    def near(self, points: Floats, reach: Floats | float) -> Ints:
         return np.arange(points.shape[1])
 
     def distance(self, points: Floats) -> tuple[Floats, Floats]:

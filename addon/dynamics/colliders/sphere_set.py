@@ -54,12 +54,12 @@ class SphereSetCollider:
         way = np.sqrt(((self.centers - middle) ** 2).sum(axis=1))
         return middle, float((way + self.radii).max())
 
-    def near(self, points: Floats, reach: float) -> Ints:
+    def near(self, points: Floats, reach: Floats | float) -> Ints:
         """By the cell of each point, or the cell nearest to it: all balls lie within the grid's
         box, so that no point is nearer to one than the box's own nearest point is."""
         index, outside = self._cells(points)
         kept: Ints = np.flatnonzero(
-            (self._grid.nearest.take(index) < reach) & (outside < np.float32(reach * reach))
+            (self._grid.nearest.take(index) < reach) & (outside < reach * reach)
         )
         return kept
 

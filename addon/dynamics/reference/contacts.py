@@ -8,8 +8,9 @@ import numpy as np
 
 from ...arrays import Floats
 from ..colliders import PosedCollider
+from ..colliders.posed import FLAT
 from ..constraints import PINNED
-from ..contacts import FLAT, REACH, SKIN
+from ..contacts import REACH, SKIN
 from ..settings import DynamicsSettings
 
 

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from hairloom.addon.dynamics.constraints import (
+    CONTACT_WEIGHT,
     PINNED,
+    Touched,
     directions,
     finish_lengths,
     hold_within_reach,
@@ -62,16 +64,70 @@ def test_momentum_comes_only_through_the_root(disturbed):
 def test_contact_slides(disturbed):
     """With a normal, a CV moves along the surface ten times more easily than across it."""
     position, length = disturbed
-    normal = np.zeros_like(position[:, PINNED:])
-    normal[2, 5] = 1.0
+    cv, guides = 5 + PINNED, np.arange(40)
+    touched = Touched(cv * 40 + guides, np.float32([[0.0], [0.0], [1.0]]) + 0.0 * guides)
     free, held = position.copy(), position.copy()
     keep_lengths(free, length, None, None)
-    keep_lengths(held, length, normal, None)
-    cv = 5 + PINNED
+    keep_lengths(held, length, touched, None)
     rise = np.abs(held[2, cv] - position[2, cv]).mean()
     assert rise < 0.3 * np.abs(free[2, cv] - position[2, cv]).mean()
     before = error(position, length)
     assert error(held, length) < before
+
+
+def touching(position, seed=5):
+    """A third of the free CVs, tips among them, with random normals; and these as a grid."""
+    random = np.random.default_rng(seed)
+    normal = random.normal(size=position.shape).astype(np.float32)
+    normal /= np.linalg.norm(normal, axis=0)
+    normal *= random.random(position.shape[1:]) < 1.0 / 3.0
+    normal[:, :PINNED] = 0.0
+    index = np.flatnonzero(normal.any(axis=0))
+    return Touched(index, normal.reshape(3, -1)[:, index]), normal
+
+
+def test_a_step_with_contacts_is_newtons(disturbed):
+    """x - W J^T (J W J^T)^-1 C with the dense matrices of each guide."""
+    position, length = disturbed
+    touched, normal = touching(position)
+    before = position.astype(np.float64)
+    keep_lengths(position, length, touched, None)
+    for guide in range(40):
+        x, n = before[:, :, guide].T, normal[:, :, guide].T.astype(np.float64)
+        way = np.diff(x, axis=0)[PINNED - 1 :]
+        now = np.linalg.norm(way, axis=1)
+        jacobian = np.zeros((len(way), len(x), 3))
+        for j, direction in enumerate(way / now[:, None]):
+            jacobian[j, j + PINNED - 1], jacobian[j, j + PINNED] = -direction, direction
+        mobility = np.eye(3) - float(CONTACT_WEIGHT) * n[:, :, None] * n[:, None]
+        mobility[:PINNED] = 0.0
+        moved = np.einsum("cab,jcb->jca", mobility, jacobian)
+        matrix = np.einsum("jca,kca->jk", jacobian, moved)
+        pull = np.linalg.solve(matrix, now - length[PINNED - 1 :, guide])
+        expected = x - np.einsum("jca,j->ca", moved, pull)
+        np.testing.assert_allclose(position[:, :, guide].T, expected, atol=2e-6)
+
+
+def test_contacts_of_some_guides_are_those_of_all(disturbed):
+    position, length = disturbed
+    touched, _ = touching(position)
+    some = np.array([0, 3, 4, 17, 39])
+    part = position[:, :, some].copy()
+    keep_lengths(position, length, touched, None)
+    keep_lengths(part, length[:, some], touched.part(some, 40), None)
+    np.testing.assert_array_equal(part, position[:, :, some])
+
+
+def test_held_tips_do_not_slide(disturbed):
+    """The normals of tips that are held count for nothing, those of all others as they did."""
+    position, length = disturbed
+    touched, normal = touching(position)
+    held = (np.arange(40) % 2).astype(np.float32)
+    normal[:, -1] *= 1.0 - held
+    found = touched.without_tips(held, position.shape[1])
+    np.testing.assert_array_equal(found.normal, normal.reshape(3, -1)[:, touched.index])
+    keep_lengths(position, length, touched, held)
+    assert np.isfinite(position).all()
 
 
 def test_finish_reaches_the_tolerance_only_where_needed(disturbed):

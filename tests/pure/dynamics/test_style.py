@@ -10,10 +10,16 @@ from hairloom.addon.dynamics.style import frames, restore_style, style_band
 from hairloom.addon.strands.frames import transported_normals
 
 
+def frames_of(state):
+    """Tangents and normals (3, cv_count - 1, guide_count) of guides in their style."""
+    position, guide = state.position, np.arange(state.guide_count)
+    twist = position[:, state.rest.shape.twist_cv, guide] - position[:, 0]
+    return frames(np.diff(position, axis=1), twist)
+
+
 def test_frames_are_the_transported_normals(kit):
     """Against the frames of the strands room, which use Rodrigues' formula."""
-    state = start(kit.curly(30, 16))
-    tangent, normal, _ = frames(state.position, state.position, state.rest.shape.twist_cv)
+    tangent, normal = frames_of(start(kit.curly(30, 16)))
     expected = transported_normals(tangent.transpose(2, 1, 0), normal[:, 0].T)
     np.testing.assert_allclose(normal.transpose(2, 1, 0), expected, atol=2e-5)
     np.testing.assert_allclose(np.linalg.norm(normal, axis=0), 1.0, atol=1e-5)
@@ -70,7 +76,7 @@ def test_solve_is_the_minimum(kit):
 
 def test_straight_guides_have_no_twist_to_lose(kit):
     state = start(kit.straight(4, 10))
-    tangent, normal, _ = frames(state.position, state.position, state.rest.shape.twist_cv)
+    tangent, normal = frames_of(state)
     assert np.isfinite(normal).all()
     np.testing.assert_allclose(tangent[2], -1.0, atol=1e-6)
     np.testing.assert_allclose(state.rest.shape.curvature, 0.0, atol=1e-6)
