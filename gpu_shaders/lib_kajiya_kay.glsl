@@ -13,6 +13,10 @@
 //   root --+----> T tip   on towards the tip: a positive shift moves the highlight to the tip.
 //
 // Limits: no shadows but those in the occlusion; no energy conservation.
+#include "lib_tint.glsl"
+
+// GREY_COLOR of addon/shading/kajiya_kay.py
+const vec3 GREY_COLOR = vec3(0.42, 0.42, 0.43);
 
 vec3 unit_or(vec3 vector, vec3 fallback)
 {
@@ -74,8 +78,11 @@ vec3 kajiya_kay(vec3 tangent,
   return diffuse + diffuse * (primary + secondary);
 }
 
-// The colour of one strand: the base colour made darker or brighter by its own noise in 0..1.
-vec3 strand_base(float color_noise, ShadingSettings shading)
+// The hair's colour at a place of a strand: the base mixed to the tips', or grey, made darker or
+// brighter by the strand's noise in 0..1. Strands of the lowest grey noise are grey.
+vec3 strand_base(float along, float color_noise, float grey_noise, ShadingSettings shading)
 {
-  return shading.base_color * (1.0 + shading.color_variation * (2.0 * color_noise - 1.0));
+  vec3 color = mix(shading.base_color, shading.tip_color, tip_share(along, shading));
+  color = grey_noise < shading.grey_share ? GREY_COLOR : color;
+  return color * (1.0 + shading.color_variation * (2.0 * color_noise - 1.0));
 }

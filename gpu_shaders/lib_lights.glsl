@@ -1,5 +1,6 @@
 // Twin of addon/shading/lights.py and area_lights.py: the radiometric convention is written there.
 // Needs struct_lights.glsl. Holds no resources.
+#include "lib_angle.glsl"
 
 const float LIGHT_PI = 3.14159265358979;
 const float POINT_LIGHT = 1.0, SPOT_LIGHT = 2.0, RECTANGLE_LIGHT = 3.0, DISK_LIGHT = 4.0;
@@ -9,22 +10,6 @@ const float FAR_PANEL = 2.5e-3, LEAST_HEIGHT = 1.0e-6;
 // Gauss-Legendre, six nodes on -1 .. 1: these and their mirror images
 const vec3 PANEL_NODES = vec3(0.23861918608319692, 0.6612093864662645, 0.932469514203152);
 const vec3 PANEL_WEIGHTS = vec3(0.46791393457269104, 0.3607615730481386, 0.17132449237917036);
-
-// An angle from 0 to pi whose sine and cosine are known; GLSL promises little of its own atan.
-// The angle over its sine as a polynomial of the cosine, within 1e-7.
-float light_angle(float sine, float cosine)
-{
-  float x = abs(cosine);
-  float sum = -0.0979687049984932 + x * 0.01765366829931736;
-  sum = 0.2532384693622589 + x * sum;
-  sum = -0.4245661795139313 + x * sum;
-  sum = 0.5570220351219177 + x * sum;
-  sum = -0.6610894799232483 + x * sum;
-  sum = 0.7848962545394897 + x * sum;
-  sum = -0.9999822378158569 + x * sum;
-  sum = (1.570796251296997 + x * sum) * sine;
-  return cosine < 0.0 ? LIGHT_PI - sum : sum;
-}
 
 // What slats before a panel let through into a direction of this tangent to the panel's own.
 float panel_shade(Lights lights, int index, float tangent)
@@ -38,7 +23,7 @@ float panel_edge(float height, float across, float start, float end)
   float squared = height * height + across * across;
   float lengths = sqrt((squared + start * start) * (squared + end * end));
   float reach = sqrt(squared);
-  return light_angle((end - start) * reach / lengths, (squared + start * end) / lengths) / reach;
+  return angle_of((end - start) * reach / lengths, (squared + start * end) / lengths) / reach;
 }
 
 vec3 panel_rectangle(vec2 half_sides, vec3 offset)
@@ -93,8 +78,8 @@ vec3 panel_grid(Lights lights, int index, bool is_round, vec3 offset)
   float first = max(-b - offset.y, -reach) / height, last = min(b - offset.y, reach) / height;
   float first_length = length(vec2(1.0, first)), last_length = length(vec2(1.0, last));
   // angles from the panel's plane, which are those of numpy's arctan and a quarter turn
-  float low_angle = light_angle(1.0 / first_length, -first / first_length);
-  float high_angle = light_angle(1.0 / last_length, -last / last_length);
+  float low_angle = angle_of(1.0 / first_length, -first / first_length);
+  float high_angle = angle_of(1.0 / last_length, -last / last_length);
   float middle = 0.5 * (low_angle + high_angle);
   float half_width = max(0.5 * (high_angle - low_angle), 0.0);
   vec3 total = vec3(0.0);
@@ -167,34 +152,24 @@ float cone_share(Lights lights, int index, vec3 away, float width)
   return share * share * (3.0 - 2.0 * share);
 }
 
-vec3 light_direction(Lights lights, int index, vec3 point)
+// What comes from one light: the unit vector towards it (to a panel, whence most light comes), and
+// the irradiance on a surface that faces it [W/m^2].
+void light_at(Lights lights, int index, vec3 point, out vec3 to_light, out vec3 irradiance)
 {
   vec4 light = lights.vector_and_kind[index];
+  to_light = light.xyz;
+  irradiance = lights.power[index].xyz;
   if (light.w == 0.0) {
-    return light.xyz;
+    return;
   }
   vec3 away = light.xyz - point;
+  to_light = away / max(length(away), {{nearest_distance}});
   if (light.w >= RECTANGLE_LIGHT) {
     vec3 arriving = panel_vector_irradiance(lights, index, away);
     float strength = length(arriving);
-    if (strength > 0.0) {
-      return arriving / strength;
-    }
-  }
-  return away / max(length(away), {{nearest_distance}});
-}
-
-// Irradiance on a surface that faces the light [W/m^2].
-vec3 light_irradiance(Lights lights, int index, vec3 point)
-{
-  vec4 light = lights.vector_and_kind[index];
-  vec3 power = lights.power[index].xyz;
-  if (light.w == 0.0) {
-    return power;
-  }
-  vec3 away = light.xyz - point;
-  if (light.w >= RECTANGLE_LIGHT) {
-    return power * length(panel_vector_irradiance(lights, index, away));
+    to_light = strength > 0.0 ? arriving / strength : to_light;
+    irradiance *= strength;
+    return;
   }
   float added = lights.power[index].w, least = lights.across[index].w;
   float squared = max(dot(away, away) + added, least);
@@ -202,5 +177,5 @@ vec3 light_irradiance(Lights lights, int index, vec3 point)
   if (light.w == SPOT_LIGHT) {
     let_through = cone_share(lights, index, away, min((added + least) / squared, 1.0));
   }
-  return power * let_through / (4.0 * LIGHT_PI * squared);
+  irradiance *= let_through / (4.0 * LIGHT_PI * squared);
 }

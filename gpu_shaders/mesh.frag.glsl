@@ -12,8 +12,9 @@ void main()
 
   vec3 radiance = mesh_color * lights.ambient_and_count.xyz;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
-    vec3 to_light = light_direction(lights, index, mesh_point);
-    vec3 irradiance = light_irradiance(lights, index, mesh_point) / 3.14159265358979;
+    vec3 to_light, irradiance;
+    light_at(lights, index, mesh_point, to_light, irradiance);
+    irradiance /= LIGHT_PI;
     float facing = max(0.0, dot(normal, to_light));
     float across = max(0.0, dot(normal, normalize(to_light + to_eye)));
     // (n + 8) / 8 keeps the sheen's energy the same whatever its sharpness

@@ -3,6 +3,9 @@
 #include "lib_lights.glsl"
 #include "lib_strand_noise.glsl"
 #include "lib_kajiya_kay.glsl"
+#if MARSCHNER
+#  include "lib_marschner.glsl"
+#endif
 #include "lib_output.glsl"
 #if DEBUG
 #  include "lib_debug_color.glsl"
@@ -37,19 +40,45 @@ void main()
   float shade = 0.55 + 0.3 * hash_unit(seed, 0u) + 0.15 * dot(normal, to_eye);
   vec3 radiance = debug_color() * shade;
 #else
-  float cells = strand_along_and_occlusion.x * shading.noise_cells;
+  float along = strand_along_and_occlusion.x;
+  float cells = along * shading.noise_cells;
   float shift_noise = strand_noise(seed, 0u, cells);
   float sparkle_noise = strand_noise(seed, 1u, cells);
   float color_noise = strand_noise(seed, 2u, 0.0);
+  float grey_noise = strand_noise(seed, 3u, 0.0);
+#  if MARSCHNER
+  vec3 absorption = strand_absorption(fibre, along, color_noise, grey_noise, shading);
+  vec3 hair = strand_color(fibre, absorption);
+#  else
+  vec3 hair = strand_base(along, color_noise, grey_noise, shading);
+#  endif
 
-  vec3 light = shading.ambient * lights.ambient_and_count.xyz;
+  vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
-    vec3 to_light = light_direction(lights, index, strand_point);
-    vec3 irradiance = light_irradiance(lights, index, strand_point);
-    light += irradiance / 3.14159265358979 *
-             kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
+    vec3 to_light, irradiance;
+    light_at(lights, index, strand_point, to_light, irradiance);
+#  if MARSCHNER
+    float level = pixel_level(
+        longitudinal, tangent, normal, to_light, to_eye, shift_noise, shading);
+    radiance += irradiance * marschner_light(longitudinal,
+                                             azimuthal,
+                                             paths,
+                                             tangent,
+                                             normal,
+                                             to_light,
+                                             to_eye,
+                                             shift_noise,
+                                             sparkle_noise,
+                                             absorption,
+                                             fibre,
+                                             shading,
+                                             level);
+#  else
+    radiance += irradiance * hair / LIGHT_PI *
+                kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
+#  endif
   }
-  vec3 radiance = light * strand_base(color_noise, shading) * strand_along_and_occlusion.y;
+  radiance *= strand_along_and_occlusion.y;
 #endif
   color = vec4(output_encoded(radiance, output_encoding), 1.0);
 }

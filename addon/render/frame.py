@@ -1,4 +1,4 @@
-"""The recipe of one still frame: meshes, strands, and the samples averaged to pixels."""
+"""The recipe of one still frame: meshes, strands, cards, and the samples averaged to pixels."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import gpu
 
 from ..arrays import Floats
 from .camera import Camera, frame_camera, look_at, orthographic, perspective
+from .card_pass import CardPass
 from .mesh_pass import MeshPass
 from .shader_program import ShaderRecipe, program
 from .snapshot import MeshSnapshot, Snapshot
@@ -48,6 +49,7 @@ def render_image(
     *,
     background: tuple[float, float, float, float] = _TRANSPARENT,
     passes: tuple[MeshPass, StrandPass] | None = None,
+    card_pass: CardPass | None = None,
 ) -> Floats:
     """Draw a snapshot, (height, width, 4) float32 scene-linear, premultiplied, row 0 at the bottom.
 
@@ -55,7 +57,8 @@ def render_image(
         width, height: [pixels].
         samples: samples across a pixel: 3 draws 3 x 3 and averages them.
         background: premultiplied rgba.
-        passes: those of an earlier call, so that what did not change is not uploaded again.
+        passes, card_pass: those of an earlier call, so that what did not change is not uploaded
+            again.
 
     Raises:
         ValueError: a size that no GPU can draw.
@@ -73,6 +76,7 @@ def render_image(
         target.clear(color=background, depth=1.0)
         mesh_pass.draw(snapshot, camera, *size)
         strand_pass.draw(snapshot, camera, *size, samples=samples)
+        (card_pass or CardPass()).draw(snapshot, camera, *size)
     return texture_to_array(color if samples == 1 else _averaged(color, samples))
 
 

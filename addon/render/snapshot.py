@@ -13,8 +13,10 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..refine.settings import DetailSettings
 from ..shading.lights import Light
+from ..shading.marschner.tables import DEFAULT_SIZE
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..strands import Surface
+from .card_snapshot import CardSnapshot
 from .shader_source import DEBUG_VIEWS
 
 type Color = tuple[float, float, float]
@@ -91,6 +93,8 @@ class Snapshot:
     hiders: (k, 4) xyz center and w radius [m, world] of balls inside the head, behind which
         strands are not seen (refine/culling.py), of which the first 16 count; None hides nothing.
     debug_view: one of DEBUG_VIEWS.
+    table_size: texels across Marschner's look-up tables; PREVIEW_SIZE while their shape changes.
+    cards: hair cards, drawn after meshes and strands (render/card_pass.py).
 
     A pass uploads an array again only when it is another object than before: hand the same array
     on where nothing changed, and a new array (not the old one rewritten) where something did.
@@ -116,6 +120,8 @@ class Snapshot:
     rank: Floats | None = None
     hiders: Floats | None = None
     debug_view: str = "none"
+    table_size: int = DEFAULT_SIZE
+    cards: CardSnapshot | None = None
 
     def __post_init__(self) -> None:
         if self.strands.ndim != 3 or self.strands.shape[1] < 2 or self.strands.shape[2] != 3:

@@ -21,10 +21,13 @@ import numpy as np
 from ..arrays import Floats
 from ..params.glsl import struct_values
 from ..shading.lights import pack_lights
+from ..shading.marschner.look import pack_fibre
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..shading.strand_noise import SEED_LIMIT
 from .camera import Camera
 from .detail_pass import DetailOrder, DetailPass
+from .display import Display
+from .marschner_textures import MARSCHNER, MARSCHNER_TEXTURES
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .shader_source import DEBUG_VIEWS, ShaderError, output_index
 from .snapshot import Snapshot
@@ -33,33 +36,54 @@ from .view_block import view_values
 
 #: debug views that show a number of each strand
 NUMBERED_VIEWS = ("guide", "group")
+#: blocks of every strand program
+BLOCKS = (
+    ("View", "view"),
+    ("Lights", "lights"),
+    ("StrandSettings", "strands"),
+    ("ShadingSettings", "shading"),
+)
 
 
-def strand_recipe(*, is_adaptive: bool, debug_view: str = "none") -> ShaderRecipe:
-    """The program that draws every segment in equally many pieces, or each in its own."""
+def strand_recipe(
+    *,
+    is_adaptive: bool,
+    model: str = "kajiya_kay",
+    debug_view: str = "none",
+    has_display: bool = False,
+) -> ShaderRecipe:
+    """The program that draws every segment in equally many pieces, or each in its own.
+
+    It holds one model of MODELS alone. A debug view has none: it is the same with either.
+    With a display it looks up how the viewport shows a colour, see display.py.
+    """
+    is_marschner = model == "marschner"
+    kind = f"{'adaptive' if is_adaptive else 'fixed'}{'_display' if has_display else ''}"
     textures = ["cv_points", "cv_looks"]
     textures += ["order", "factors"] if is_adaptive else []
     textures += ["debug_numbers"] if debug_view in NUMBERED_VIEWS else []
     return ShaderRecipe(
-        name=f"strand_{'adaptive' if is_adaptive else 'fixed'}_{debug_view}",
+        name=f"strand_{kind}_{model}_{debug_view}",
         vertex="strand.vert.glsl",
         fragment="strand.frag.glsl",
-        structs=("struct_view.glsl", "struct_lights.glsl"),
+        structs=("struct_view.glsl", "struct_lights.glsl", "struct_fibre.glsl"),
         settings=(StrandSettings, ShadingSettings),
-        blocks=(
-            ("View", "view"),
-            ("Lights", "lights"),
-            ("StrandSettings", "strands"),
-            ("ShadingSettings", "shading"),
+        blocks=(*BLOCKS, *((("Fibre", "fibre"),) if is_marschner else ())),
+        textures=(
+            *(("FLOAT_2D", name) for name in textures),
+            *(MARSCHNER_TEXTURES if is_marschner else ()),
+            *((("FLOAT_3D", "display_table"),) if has_display else ()),
         ),
-        textures=tuple(("FLOAT_2D", name) for name in textures),
         integers=(
             "cv_count",
             "samples_across",
             "output_encoding",
             "first_instance" if is_adaptive else "subdivisions",
         ),
-        numbers=(("VEC3", "volume_center"),),
+        numbers=(
+            ("VEC3", "volume_center"),
+            *((("VEC4", "display_shaper"),) if has_display else ()),
+        ),
         varyings=(
             ("smooth", "VEC3", "strand_point"),
             ("smooth", "VEC3", "strand_tangent"),
@@ -68,11 +92,13 @@ def strand_recipe(*, is_adaptive: bool, debug_view: str = "none") -> ShaderRecip
             *((("flat", "INT", "strand_index"),) if debug_view != "none" else ()),
         ),
         outputs=(("VEC4", "color"),),
-        defines=(("ADAPTIVE", int(is_adaptive)), ("DEBUG", DEBUG_VIEWS.index(debug_view))),
+        defines=(
+            ("ADAPTIVE", int(is_adaptive)),
+            ("DEBUG", DEBUG_VIEWS.index(debug_view)),
+            ("MARSCHNER", int(is_marschner)),
+            *((("DISPLAY", 1),) if has_display else ()),
+        ),
     )
-
-
-STRAND_RECIPE = strand_recipe(is_adaptive=False)
 
 
 @dataclass(frozen=True)
@@ -108,6 +134,7 @@ class StrandPass:
         height: int,
         *,
         output: str = "scene_linear",
+        display: Display | None = None,
         samples: int = 1,
     ) -> None:
         """Draw all strands into the bound framebuffer, depth-tested against what is in it.
@@ -115,7 +142,8 @@ class StrandPass:
         Args:
             width, height: of the target [pixels].
             output: "scene_linear" for a picture of ours; "viewport" for a POST_VIEW handler in
-                Blender's viewport, where it looks as under the view transform "Standard".
+                Blender's viewport.
+            display: for "viewport", the view transform; None is the plain "Standard".
             samples: pixels of the target across one pixel of the final picture; the least width
                 and the settings of detail count in the latter.
 
@@ -132,7 +160,16 @@ class StrandPass:
         if not order.classes:
             return
         is_adaptive = order.factors is not None
-        shader = program(strand_recipe(is_adaptive=is_adaptive, debug_view=snapshot.debug_view))
+        shading, debug_view = snapshot.shading, snapshot.debug_view
+        model = shading.model if debug_view == "none" else "kajiya_kay"
+        shader = program(
+            strand_recipe(
+                is_adaptive=is_adaptive,
+                model=model,
+                debug_view=debug_view,
+                has_display=display is not None,
+            )
+        )
         integers = {
             "cv_count": snapshot.cv_count,
             "samples_across": samples,
@@ -143,14 +180,22 @@ class StrandPass:
             "view": view_values(camera, width, height),
             "lights": pack_lights(snapshot.lights, snapshot.ambient),
             "strands": struct_values(snapshot.strand_settings),
-            "shading": struct_values(snapshot.shading),
+            "shading": struct_values(shading),
         }
+        textures = self._bound(order, debug_view)
+        if model == "marschner":
+            blocks["fibre"] = pack_fibre(shading)
+            textures |= MARSCHNER.of(shading, snapshot.table_size)
+        numbers: dict[str, Any] = {"volume_center": snapshot.center.tolist()}
+        if display is not None:
+            textures["display_table"] = display.table.texture
+            numbers["display_shaper"] = display.shaper
         with drawing_state():
             shader.bind(
                 blocks={name: self._blocks[name].holding(blocks[name]) for name in blocks},
-                textures=self._bound(order, snapshot.debug_view),
+                textures=textures,
                 integers=integers,
-                numbers={"volume_center": snapshot.center.tolist()},
+                numbers=numbers,
             )
             for drawn in order.classes:
                 if is_adaptive:
@@ -166,14 +211,14 @@ class StrandPass:
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
-        self._blocks = {name: UniformBlock() for _, name in STRAND_RECIPE.blocks}
+        self._blocks = {name: UniformBlock() for name in (*(name for _, name in BLOCKS), "fibre")}
         self._textures: dict[str, Any] = {}
         self._uploaded: dict[str, tuple[Any, ...]] = {}
         self._ribbons: dict[int, Any] = {}
         self._detail.release()
 
     def _bound(self, order: DetailOrder, debug_view: str) -> dict[str, Any]:
-        """Textures by the names of strand_recipe."""
+        """This groom's own textures by the names of strand_recipe."""
         names = ["cv_points", "cv_looks"]
         names += ["debug_numbers"] if debug_view in NUMBERED_VIEWS else []
         bound = {name: self._textures[name] for name in names}

@@ -16,13 +16,22 @@ _CHANNELS = {"R32F": 1, "RG32F": 2, "RGBA32F": 4, "RGBA16F": 4}
 
 
 def texture_from(pixels: Floats, texture_format: str) -> Any:
-    """A 2D texture from (height, width, channels); float32, filtered by no one (use texelFetch)."""
+    """A 2D texture from (height, width, channels); float32, filtered linearly."""
     height, width, channels = pixels.shape
     assert channels == _CHANNELS[texture_format], (pixels.shape, texture_format)
     # The Buffer reads the array's memory as it lies: dtype and order must be right.
     pixels = np.ascontiguousarray(pixels, np.float32)
     data = gpu.types.Buffer("FLOAT", pixels.shape, pixels)
     return gpu.types.GPUTexture((width, height), format=texture_format, data=data)
+
+
+def volume_from(texels: Floats) -> Any:
+    """An RGBA32F 3D texture from (depth, height, width, 4); float32, filtered linearly."""
+    depth, height, width, channels = texels.shape
+    assert channels == 4, texels.shape
+    texels = np.ascontiguousarray(texels, np.float32)
+    data = gpu.types.Buffer("FLOAT", texels.shape, texels)
+    return gpu.types.GPUTexture((width, height, depth), format="RGBA32F", data=data)
 
 
 def texture_to_array(texture: Any) -> Floats:

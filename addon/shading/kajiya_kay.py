@@ -20,7 +20,10 @@ import numpy as np
 
 from ..arrays import Floats
 from .settings import ShadingSettings
+from .tint import tip_share
 
+#: of strands that have lost their colour; in lib_kajiya_kay
+GREY_COLOR = (0.42, 0.42, 0.43)
 _SMALLEST = 1.0e-6
 
 
@@ -82,10 +85,23 @@ def kajiya_kay(
     return diffuse + diffuse * specular
 
 
-def strand_base(color_noise: Floats, shading: ShadingSettings) -> Floats:
-    """Each strand's colour, (..., 3): the base made darker or brighter by its noise in [0, 1]."""
+def strand_base(
+    along: Floats, color_noise: Floats, grey_noise: Floats, shading: ShadingSettings
+) -> Floats:
+    """The hair's colour at places of strands, (..., 3).
+
+    The base mixed to the tips', or grey, made darker or brighter by each strand's noise.
+
+    Args:
+        along: 0 at the root, 1 at the tip.
+        color_noise, grey_noise: of each strand, in [0, 1]; strands of the lowest grey noise are
+            grey.
+    """
+    base, tip = np.array(shading.base_color), np.array(shading.tip_color)
+    color = base + (tip - base) * tip_share(along, shading)[..., None]
+    color = np.where((grey_noise < shading.grey_share)[..., None], GREY_COLOR, color)
     brightness = 1.0 + shading.color_variation * (2.0 * color_noise - 1.0)
-    return np.array(shading.base_color) * brightness[..., None]
+    return color * brightness[..., None]
 
 
 def _dot(one: Floats, other: Floats) -> Floats:

@@ -144,36 +144,41 @@ class Light:
         return (0.0, max(squared, nearest)) if self.is_ball else (squared, nearest)
 
 
-def light_direction(light: Light, points: Floats) -> Floats:
-    """Unit vectors from points (..., 3) towards the light; of a panel, whence most light comes."""
+def light_at(light: Light, points: Floats) -> tuple[Floats, Floats]:
+    """What comes from one light to points (..., 3): direction and irradiance, each (..., 3).
+
+    Unit vectors towards the light (to a panel, whence most light comes), and rgb on a surface
+    that faces it [W/m^2].
+    """
     points = np.asarray(points)
+    power = np.asarray(light.power, points.dtype)
+    vector = np.asarray(light.vector, points.dtype)
     if light.kind == "sun":
-        return np.broadcast_to(np.asarray(light.vector, points.dtype), points.shape)
-    away = np.asarray(light.vector, points.dtype) - points
+        return np.broadcast_to(vector, points.shape), np.broadcast_to(power, points.shape)
+    away = vector - points
+    to_light = _unit(away)
     if light.panel is not None:
         arriving = vector_irradiance(light.panel, -away)
         strength = np.linalg.norm(arriving, axis=-1, keepdims=True)
         mean = (arriving / np.maximum(strength, 1e-30)).astype(points.dtype)
-        return np.where(strength > 0.0, mean, _unit(away))
-    return _unit(away)
-
-
-def light_irradiance(light: Light, points: Floats) -> Floats:
-    """Irradiance at points (..., 3) on a surface facing the light, (..., 3) rgb [W/m^2]."""
-    points = np.asarray(points)
-    power = np.asarray(light.power, points.dtype)
-    if light.kind == "sun":
-        return np.broadcast_to(power, points.shape)
-    away = np.asarray(light.vector, points.dtype) - points
-    if light.panel is not None:
-        arriving = np.linalg.norm(vector_irradiance(light.panel, -away), axis=-1, keepdims=True)
-        return power * arriving.astype(points.dtype)
+        return np.where(strength > 0.0, mean, to_light), power * strength.astype(points.dtype)
     added, least = light.softening
     squared = np.maximum(np.sum(away * away, axis=-1, keepdims=True) + added, least)
     evenly = power / (4.0 * np.pi * squared)
     if light.cone is None:
-        return evenly
-    return evenly * _cone_share(light.cone, away, np.minimum((added + least) / squared, 1.0))
+        return to_light, evenly
+    width = np.minimum((added + least) / squared, 1.0)
+    return to_light, evenly * _cone_share(light.cone, away, width)
+
+
+def light_direction(light: Light, points: Floats) -> Floats:
+    """The first of light_at."""
+    return light_at(light, points)[0]
+
+
+def light_irradiance(light: Light, points: Floats) -> Floats:
+    """The second of light_at."""
+    return light_at(light, points)[1]
 
 
 def _cone_share(cone: Cone, away: Floats, width: Floats) -> Floats:

@@ -1,22 +1,36 @@
-"""Procedural textures of hair cards: stretched noise, and strands that thin out to the edges.
+"""The four procedural textures of hair cards, and a tangent map: Scheuermann 2004.
 
 A texture stands on its root: row 0 is v = 0, the root, and the last row is the tip. It holds
 several variants side by side, each a column that tiles with itself across.
 
-The alpha channel asks of each pixel whether the envelope of the strip (1 in the middle, 0 at the
-sides and the tip) exceeds a noise that is stretched along the hair. Noise evenly spread over
-[0, 1] makes the mean alpha follow the envelope, the middle fully opaque, as the four-pass drawing
-of Scheuermann 2004 wants it, and single strands survive towards the tip.
+    base     stretched noise that the hair's colour is multiplied by
+    alpha    asks of each pixel whether the envelope of the strip (1 in the middle, 0 at the sides
+             and the tip) exceeds a stretched noise. Noise evenly spread over [0, 1] makes the mean
+             alpha follow the envelope and the middle fully opaque, as the four-pass drawing wants
+             it, and single strands survive towards the tip
+    shift    how far each strand moves the highlights: s = shift + shift_noise (texture - 0.5)
+    noise    breaks up the second highlight into sparkles
+    tangent  the way of the strands, which may replace the shift, see HairTextures
+
+All of them follow the same strands, which wander a little to the sides.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Floats
-from ..params import Settings, integer, number
+from ..errors import HairloomError
+from ..params import Settings, choice, integer, number
+from .texture_noise import smooth, strand_drift, strand_slope, stretched_noise
+
+#: The textures by name; each may be replaced by a picture.
+TEXTURES = ("base", "alpha", "shift", "noise", "tangent")
+#: Cells of base and alpha along a strand: they hardly change from root to tip.
+_CELLS_ALONG = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +62,7 @@ class TextureSettings(Settings):
         hard=(2, 1024),
     )
     contrast: float = number(
-        0.6,
+        0.45,
         label="Contrast",
         description="How much darker than full the darkest strand is",
         unit="factor",
@@ -88,6 +102,39 @@ class TextureSettings(Settings):
         soft=(0.05, 1.0),
         hard=(0.001, 1.0),
     )
+    wander: float = number(
+        0.04,
+        label="Wander",
+        description="How far strands stray to the sides on their way, as a part of the width",
+        soft=(0.0, 0.1),
+        hard=(0.0, 0.1),
+    )
+    shift_cells: int = integer(
+        3,
+        label="Shift Cells",
+        description="Cells of the shift texture along a strand, from one shift to the next",
+        soft=(1, 16),
+        hard=(1, 256),
+        source="Scheuermann 2004, specular shift texture",
+    )
+    sparkle_cells: int = integer(
+        24,
+        label="Sparkle Cells",
+        description="Cells of the noise texture along a strand: sparkles of the second highlight",
+        soft=(1, 64),
+        hard=(1, 1024),
+        source="Scheuermann 2004, specular noise texture",
+    )
+    highlights: str = choice(
+        "shift",
+        (
+            ("shift", "Shift Texture", "Each strand moves the highlights along the hair"),
+            ("tangent", "Tangent Map", "The map says which way each strand runs"),
+        ),
+        label="Highlights By",
+        description="What breaks up the highlights",
+        source="Scheuermann 2004, hair shading",
+    )
     seed: int = integer(
         0,
         label="Seed",
@@ -97,27 +144,71 @@ class TextureSettings(Settings):
     )
 
 
-def card_texture(settings: TextureSettings, columns: int) -> Floats:
-    """A texture of `columns` strips of hair side by side.
+@dataclass(frozen=True)
+class HairTextures:
+    """The textures of hair cards, float32 in [0, 1], row 0 at the root; each of its own size.
 
-    Returns:
-        (height, columns * variant_width, 4) float32 in [0, 1], row 0 at the root: linear grey,
-        to be multiplied by the hair's colour, and straight alpha; the grey goes on where alpha
-        is 0, so that no dark fringe appears. Alpha is 0 along both sides of each strip.
+    base: (height, width, 3) linear, to be multiplied by the hair's colour; it goes on where alpha
+        is 0, so that no dark fringe appears.
+    alpha: (height, width) straight coverage, 0 along both sides of each column.
+    shift: (height, width) of the highlights, 0.5 is none; repeats in u and v.
+    noise: (height, width) factor of the second highlight; repeats in u and v.
+    tangent: (height, width, 3) direction d of the strand as 0.5 d + 0.5: x across the card, along
+        u; y along the card from root to tip; z away from the head. Where it replaces the shift, the
+        strand runs along x side + y tangent + shift_noise z normal. Its x holds for texels that
+        are square on the card.
     """
+
+    base: Floats
+    alpha: Floats
+    shift: Floats
+    noise: Floats
+    tangent: Floats
+
+    @property
+    def card(self) -> Floats:
+        """Base and alpha in one, (height, width, 4), of the larger size; pixels are repeated."""
+        height, width = np.maximum(self.base.shape[:2], self.alpha.shape)
+        row, column = np.arange(height)[:, None], np.arange(width)
+        base, alpha = (
+            image[row * len(image) // height, column * image.shape[1] // width]
+            for image in (self.base, self.alpha)
+        )
+        return np.concatenate([base, alpha[..., None]], axis=-1)
+
+    def with_pictures(self, pictures: Mapping[str, Floats]) -> HairTextures:
+        """The same with these in the place of those of their names, see `picture_as`."""
+        return replace(self, **pictures)
+
+
+def hair_textures(settings: TextureSettings, columns: int) -> HairTextures:
+    """Textures of `columns` strips of hair side by side, (height, columns * variant_width)."""
     random = np.random.default_rng(settings.seed)
-    return np.concatenate([_strip(settings, random) for _ in range(columns)], axis=1)
+    shape = settings.height, settings.variant_width
+    drifts = [strand_drift(random, shape, settings.wander) for _ in range(columns)]
+    strips = [_strip(settings, random, drift) for drift in drifts]
+    base, alpha = (np.concatenate(parts, axis=1) for parts in zip(*strips, strict=True))
+
+    drift, across = np.concatenate(drifts, axis=1), columns * settings.strand_count
+    shift = stretched_noise(random, drift / columns, across, settings.shift_cells)
+    noise = stretched_noise(random, drift / columns, across, settings.sparkle_cells)
+    tangent = tangent_map(strand_slope(drift, columns), shift)
+    grey = np.repeat(base[..., None], 3, axis=-1)
+    return HairTextures(
+        *(image.astype(np.float32) for image in (grey, alpha, shift, noise, tangent))
+    )
 
 
-def _strip(settings: TextureSettings, random: np.random.Generator) -> Floats:
-    shape = (settings.height, settings.variant_width)
-    shade = stretched_noise(random, shape, settings.strand_count)
-    strands = stretched_noise(random, shape, settings.strand_count)
+def _strip(
+    settings: TextureSettings, random: np.random.Generator, drift: Floats
+) -> tuple[Floats, Floats]:
+    """Base and alpha of one column."""
+    shade = stretched_noise(random, drift, settings.strand_count, _CELLS_ALONG)
+    strands = stretched_noise(random, drift, settings.strand_count, _CELLS_ALONG)
     softness = settings.softness
     alpha = np.clip((envelope(settings) - strands * (1.0 - softness)) / softness, 0.0, 1.0)
     alpha[:, [0, -1]] = 0.0
-    grey = 1.0 - settings.contrast * shade
-    return np.stack([grey, grey, grey, alpha], axis=-1).astype(np.float32)
+    return 1.0 - settings.contrast * shade, alpha
 
 
 def envelope(settings: TextureSettings) -> Floats:
@@ -130,43 +221,46 @@ def envelope(settings: TextureSettings) -> Floats:
     return (root * tip)[:, None] * sides
 
 
-def stretched_noise(
-    random: np.random.Generator, shape: tuple[int, int], strand_count: int
-) -> Floats:
-    """Noise that is fast across and slow along, (height, width), evenly spread over [0, 1].
+def tangent_map(slope: Floats, shift: Floats) -> Floats:
+    """The tangent map of strands, (..., 3): normalize(slope, 1, shift - 0.5), encoded.
 
-    Two octaves, strands and their fibres; it tiles across.
+    Without a slope it moves the highlights as the shift does, to first order.
     """
-    strands = _value_noise(random, shape, strand_count, along=2)
-    fibers = _value_noise(random, shape, 3 * strand_count, along=4)
-    noise = strands + 0.5 * fibers
-    rank = np.empty(noise.size)
-    rank[np.argsort(noise, axis=None, kind="stable")] = np.arange(noise.size)
-    return (rank / max(noise.size - 1, 1)).reshape(shape)
+    direction = np.stack([slope, np.ones_like(slope), shift - 0.5], axis=-1)
+    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+    return 0.5 * direction + 0.5
 
 
-def _value_noise(
-    random: np.random.Generator, shape: tuple[int, int], across: int, along: int
-) -> Floats:
-    """Random values on a grid of `across` columns, which wrap, and `along` + 1 rows, blended."""
-    values = random.random((along + 1, across))
-    height, width = shape
-    column = (np.arange(width) + 0.5) / width * across
-    row = np.linspace(0.0, along, height)
-    left, below = column.astype(int), np.minimum(row.astype(int), along - 1)
-    blend_across = _smooth(column - left)
-    blend_along = _smooth(row - below)[:, None]
-    lines = values[:, left % across] * (1.0 - blend_across)
-    lines += values[:, (left + 1) % across] * blend_across
-    return lines[below] * (1.0 - blend_along) + lines[below + 1] * blend_along
+def picture_as(name: str, picture: Floats, *, place: str) -> Floats:
+    """A picture as the texture of this name, float32 in [0, 1].
+
+    Args:
+        name: one of TEXTURES.
+        picture: (height, width, 1 to 4): grey, grey and alpha, rgb, rgb and straight alpha; base
+            linear, the others as they are stored. A texture of one channel is the picture's alpha
+            where that is not 1 throughout, else its first channel.
+        place: names it in error messages.
+
+    Raises:
+        HairloomError: it holds values that are not finite, or no pixels.
+    """
+    if not picture.size or not np.isfinite(picture).all():
+        raise HairloomError(
+            f"it cannot be the {name} texture, because it holds "
+            + ("values that are not finite" if picture.size else "no pixels"),
+            place=place,
+            remedy="Choose another picture, or save it again from where it was made",
+        )
+    picture = np.clip(picture, 0.0, 1.0).astype(np.float32)
+    color = np.repeat(picture[..., :1], 3, axis=-1) if picture.shape[-1] < 3 else picture[..., :3]
+    if name in ("base", "tangent"):
+        return np.ascontiguousarray(color)
+    has_alpha = picture.shape[-1] in (2, 4) and picture[..., -1].min() < 1.0
+    return np.ascontiguousarray(picture[..., -1 if has_alpha else 0])
 
 
 def _ramp(distance: Floats, length: float) -> Floats:
     """0 at distance 0, 1 from `length` on, smooth between; 1 everywhere for length 0."""
     if length == 0.0:
         return np.ones_like(distance)
-    return _smooth(np.clip(distance / length, 0.0, 1.0))
-
-
-def _smooth(t: Floats) -> Floats:
-    return t * t * (3.0 - 2.0 * t)
+    return smooth(np.clip(distance / length, 0.0, 1.0))

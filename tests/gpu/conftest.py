@@ -17,7 +17,7 @@ def compute(gpu_context: Any) -> Callable[..., np.ndarray]:
     """Run a compute shader of tests/gpu/shaders over a grid, back comes (height, width, 4)."""
     from hairloom.addon.render.shader_program import ShaderRecipe, program
     from hairloom.addon.render.shader_source import SHADER_FOLDER
-    from hairloom.addon.render.textures import texture_from, texture_to_array
+    from hairloom.addon.render.textures import texture_from, texture_to_array, volume_from
 
     def run(
         file: str,
@@ -27,12 +27,14 @@ def compute(gpu_context: Any) -> Callable[..., np.ndarray]:
         blocks: Mapping[str, tuple[str, np.ndarray]] | None = None,
         **recipe: Any,
     ) -> np.ndarray:
-        """`textures` are (h, w, 4) arrays by name, `blocks` (struct, std140 values) by name."""
+        """`textures` are arrays (h, w, 4) or (d, h, w, 4), `blocks` (struct, std140 values)."""
         shader = program(
             ShaderRecipe(
                 name=file,
                 compute=file,
-                textures=tuple(("FLOAT_2D", name) for name in textures or {}),
+                textures=tuple(
+                    (f"FLOAT_{array.ndim - 1}D", name) for name, array in (textures or {}).items()
+                ),
                 images=(("RGBA32F", "result"),),
                 blocks=tuple((struct, name) for name, (struct, _) in (blocks or {}).items()),
                 folders=(SHADERS, SHADER_FOLDER),
@@ -40,7 +42,10 @@ def compute(gpu_context: Any) -> Callable[..., np.ndarray]:
             )
         )
         result = gpu_context.types.GPUTexture(size, format="RGBA32F")
-        inputs = {name: texture_from(t, "RGBA32F") for name, t in (textures or {}).items()}
+        inputs = {
+            name: volume_from(array) if array.ndim == 4 else texture_from(array, "RGBA32F")
+            for name, array in (textures or {}).items()
+        }
         buffers = {
             name: gpu_context.types.GPUUniformBuf(values)
             for name, (_, values) in (blocks or {}).items()

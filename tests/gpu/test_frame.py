@@ -90,7 +90,8 @@ def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
                 tangent, normal, light_direction(lamp, point), to_eye, *noises, shading
             )
             light = light + light_irradiance(lamp, point) / np.pi * lit
-        base = strand_base(strand_noise(seed, 2, np.array(0.0)), shading)
+        own = [strand_noise(seed, c, np.array(0.0)) for c in (2, 3)]
+        base = strand_base(np.array(along), *own, shading)
         expected = light * base * (0.4 + along * 0.4)
         assert picture[row, column, :3] == pytest.approx(expected, rel=0.02)
         assert picture[row, column, 3] == 1.0

@@ -74,7 +74,9 @@ def test_kajiya_kay(compute: Callable[..., np.ndarray], settings: ShadingSetting
     # 1e-4 of the light that a highlight of strength 1 sends out; a strength magnifies rounding
     strength = max(1.0, settings.primary_strength, settings.secondary_strength)
     assert np.abs(found[..., :3] - expected).max() < 1e-4 * strength
-    assert np.abs(found[..., 3] - strand_base(light[..., 3], settings)[..., 0]).max() < 1e-6
+    along, grey = np.zeros(light.shape[:2]), np.ones(light.shape[:2])
+    base = strand_base(along, light[..., 3], grey, settings)
+    assert np.abs(found[..., 3] - base[..., 0]).max() < 1e-6
 
 
 def test_strand_normal(compute: Callable[..., np.ndarray]) -> None:

@@ -30,7 +30,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "refine": {"params", "strands"},
     "shading": {"params", "strands"},
     "cards": {"params", "strands"},
-    "exchange": {"params", "strands", "cards"},
+    "exchange": {"params", "strands", "cards", "OpenImageIO"},
     "pipeline": PURE,
     "parameters": PURE,
     "render": PURE | {"gpu"},

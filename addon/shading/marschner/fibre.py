@@ -32,6 +32,9 @@ LEAST_INDEX = 1.01
 #: Standard deviation of theta_h below which a lobe would be a spike, [rad]
 LEAST_WIDTH = np.radians(0.5)
 
+#: A tilt or an offset towards the root; what an artist can set ends at 45 degrees, [rad]
+_MOST_TURNED = -1.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class Fibre:
@@ -46,13 +49,15 @@ class Fibre:
             theta_r is twice as wide. Widths under LEAST_WIDTH count as that.
         offset_r, offset_tt, offset_trt: moves a highlight towards the tip, in theta_h, beyond
             what the tilt does.
-        strength_r, strength_tt, strength_trt: factor of a lobe; 1 is physical.
+        strength_r, strength_tt, strength_trt, strength_rest: factor of a lobe; 1 is physical. The
+            rest is light reflected inside twice or more.
         eccentricity: one axis of the cross-section over the other, 1 for a round hair. It acts
             on TRT through a changed index only (Marschner section 5.2.3).
         glint_width: w_c, standard deviation in phi of the blurred caustics of TRT; 0 leaves
             them as they are, with no bounds.
         glint_strength: k_G; 1 gives back the energy that blurring takes out.
         glint_fade: Delta eta', how far beyond index 2, where caustics end, glints fade out.
+        azimuthal_width: standard deviation in phi by which a rough surface spreads each lobe.
 
     Raises:
         HairloomError: a value has no meaning.
@@ -70,19 +75,22 @@ class Fibre:
     strength_r: float = 1.0
     strength_tt: float = 1.0
     strength_trt: float = 1.0
+    strength_rest: float = 1.0
     eccentricity: float = 1.0
     glint_width: float = np.radians(10.0)
     glint_strength: float = 1.0
     glint_fade: float = 0.3
+    azimuthal_width: float = 0.0
 
     def __post_init__(self) -> None:
         limits = {
             "index_of_refraction": 1.0,
             "eccentricity": 0.1,
             **dict.fromkeys(("width_r", "width_tt", "width_trt"), 0.0),
-            **dict.fromkeys(("strength_r", "strength_tt", "strength_trt"), 0.0),
+            **dict.fromkeys(("strength_r", "strength_tt", "strength_trt", "strength_rest"), 0.0),
             **dict.fromkeys(("glint_width", "glint_strength", "glint_fade"), 0.0),
-            **dict.fromkeys(("cuticle_tilt", "offset_r", "offset_tt", "offset_trt"), -np.pi / 4),
+            "azimuthal_width": 0.0,
+            **dict.fromkeys(("cuticle_tilt", "offset_r", "offset_tt", "offset_trt"), _MOST_TURNED),
         }
         for name, least in limits.items():
             _require(name, getattr(self, name), least)
@@ -115,9 +123,9 @@ class Fibre:
         )
 
     @property
-    def strengths(self) -> tuple[float, float, float]:
-        """Of R, TT, TRT."""
-        return (self.strength_r, self.strength_tt, self.strength_trt)
+    def strengths(self) -> tuple[float, float, float, float]:
+        """Of R, TT, TRT and the rest."""
+        return (self.strength_r, self.strength_tt, self.strength_trt, self.strength_rest)
 
 
 def directions_to_angles(

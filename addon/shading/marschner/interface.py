@@ -17,6 +17,9 @@ from .fibre import LEAST_INDEX
 #: cos theta_d below which a ray runs along the fibre and the effective index has no bounds
 LEAST_COSINE = 1e-4
 
+#: What a passage loses at least, in a quotient: at grazing light, where nothing comes in, it is 0.
+_LEAST_LOSS = 1e-9
+
 
 def bravais_index(index: Floats | float, cos_d: Floats) -> Floats:
     """eta' of a cone of cos theta_d; Snell's law in the plane, and light polarised across it."""
@@ -55,27 +58,48 @@ def attenuation(
     Args:
         order: p, 0 for R, 1 for TT, 2 for TRT: passages through the inside.
         gamma, cos_d, index: broadcast.
-        absorption: per radius. A passage is a chord of 2 cos gamma_t radii in the plane, and
-            longer by 1 / cos theta_t in space. (Marschner's 1 + cos 2 gamma_t is a misprint.)
+        absorption: per radius.
     """
     bravais = bravais_index(index, cos_d)
     mirrored = fresnel(gamma, index, bravais)[..., None]
     if order == 0:
         return np.broadcast_to(mirrored, (*mirrored.shape[:-1], 3))
-    inside = np.maximum(index, LEAST_INDEX)
-    cos_t = np.sqrt(1.0 - (1.0 - np.clip(cos_d, LEAST_COSINE, 1.0) ** 2) / inside**2)
-    chord = 2.0 * np.cos(refracted(gamma, bravais)) / cos_t
-    kept = np.exp(-chord[..., None] * (order * np.asarray(absorption)))
+    kept = np.exp(-chord(gamma, cos_d, index)[..., None] * (order * np.asarray(absorption)))
     return (1.0 - mirrored) ** 2 * mirrored ** (order - 1) * kept
 
 
+def chord(gamma: Floats, cos_d: Floats, index: Floats | float) -> Floats:
+    """Length of one passage through the inside, [radii], of light that meets the fibre at gamma.
+
+    2 cos gamma_t in the plane and longer by 1 / cos theta_t in space. (Marschner's
+    1 + cos 2 gamma_t is a misprint.)
+    """
+    inside = np.maximum(index, LEAST_INDEX)
+    cos_t = np.sqrt(1.0 - (1.0 - np.clip(cos_d, LEAST_COSINE, 1.0) ** 2) / inside**2)
+    return 2.0 * np.cos(refracted(gamma, bravais_index(index, cos_d))) / cos_t
+
+
 def lobe_energy(
-    order: int, cos_d: Floats, index: float, absorption: tuple[float, float, float]
+    order: int, cos_d: Floats, index: Floats | float, absorption: tuple[float, float, float]
 ) -> Floats:
     """Share of the light on the fibre that leaves it in lobe p: the mean of A over h, (..., 3)."""
     gamma, weight = quarter_turn()
     kept = attenuation(order, gamma, np.asarray(cos_d)[..., None], index, absorption)
     return np.sum(kept * (weight * np.cos(gamma))[:, None], axis=-2)
+
+
+def rest_energy(cos_d: Floats, index: float, absorption: tuple[float, float, float]) -> Floats:
+    """Share of the light that leaves after two or more reflections inside, (..., 3).
+
+    The lobes p = 3, 4, ... are a geometric series: each passage keeps F T of the one before.
+    """
+    gamma, weight = quarter_turn()
+    cone = np.asarray(cos_d)[..., None]
+    mirrored = fresnel(gamma, index, bravais_index(index, cone))[..., None]
+    passage = np.exp(-chord(gamma, cone, index)[..., None] * np.asarray(absorption))
+    left = (1.0 - mirrored) ** 2 * mirrored**2 * passage**3
+    left = left / np.maximum(1.0 - mirrored * passage, _LEAST_LOSS)
+    return np.sum(left * (weight * np.cos(gamma))[:, None], axis=-2)
 
 
 @functools.cache

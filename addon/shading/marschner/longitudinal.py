@@ -23,9 +23,9 @@ turned directions. In the measure of the true ones it gains on one side and lack
 angle, since S(a, b) = S(b, a) while the measure differs at a and b. (Spreading what lacks evenly,
 as Kelemen and Szirmay-Kalos 2001 do, shows as a haze over the head, so it stays lost.) Moreover
 Fresnel's terms change within the width of a lobe at grazing light. So in a fibre each M_p is
-multiplied by balance_i balance_r, the same both ways round: 1 / root of what the lobes of a clear
-fibre sum to, at theta or at -theta, whichever is more, and lowered until no theta sends out more
-than came in.
+multiplied by balance_i balance_r, the same both ways round: what makes the lobes of a clear fibre
+sum to 1 at theta or at -theta, whichever is more (Sinkhorn and Knopp 1967), and so little that no
+theta sends out more than came in.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ from .interface import lobe_energy
 
 _SMALLEST = 1e-12
 _BALANCE_STEPS = 120
+_BALANCE_ROUNDS = 8
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def longitudinal_lobe(width: float, shift: float) -> LongitudinalLobe:
 
 
 def longitudinal_lobes(fibre: Fibre) -> tuple[LongitudinalLobe, ...]:
-    """M_R, M_TT, M_TRT, balanced with one another."""
+    """M_R, M_TT and M_TRT, which the rest has too, balanced with one another."""
     pairs = zip(fibre.widths, fibre.highlight_shifts, strict=True)
     lobes = [longitudinal_lobe(width, shift) for width, shift in pairs]
     balance = _balance(lobes, fibre.index_of_refraction)
@@ -95,23 +96,23 @@ def marschner_gaussian(theta_h: Floats, width: float, shift: float) -> Floats:
 def _balance(lobes: list[LongitudinalLobe], index: float) -> Floats:
     """Factor of all lobes, by even steps of theta, from what a clear fibre would send out.
 
-    Its last line only lowers it, so no theta sends out more than is due.
+    The last line only lowers it. Without a tilt every theta then sends out all, to 1e-3.
     """
     theta = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _BALANCE_STEPS + 1)
     theta_r = 0.5 * (theta[1:] + theta[:-1])
     theta_d = 0.5 * (theta_r - theta[:, None])
     measure = np.cos(theta_r) ** 2 / np.cos(theta_d) ** 2 * (np.pi / _BALANCE_STEPS)
     steep = np.linspace(0.0, 0.5 * np.pi, 49)
-    energies = [
-        lobe_energy(order, np.cos(steep), index, (0.0, 0.0, 0.0))[:, 0] for order in (0, 1, 2)
-    ]
+    energies = [lobe_energy(order, np.cos(steep), index, (0.0, 0.0, 0.0))[:, 0] for order in (0, 1)]
+    energies.append(1.0 - energies[0] - energies[1])  # TRT and the rest
     kept = np.zeros_like(theta_d)
     for lobe, energy in zip(lobes, energies, strict=True):
         kept += lobe(theta[:, None], theta_r) * np.interp(np.abs(theta_d), steep, energy) * measure
-    due = np.interp(np.abs(theta), steep, np.sum(energies, axis=0))
-    share = kept.sum(axis=1) / due
-    balance = 1.0 / np.sqrt(np.maximum(share, share[::-1]))
-    share = balance * (kept @ np.interp(theta_r, theta, balance)) / due
+    balance = np.ones_like(theta)
+    for _ in range(_BALANCE_ROUNDS):
+        share = balance * (kept @ np.interp(theta_r, theta, balance))
+        balance = balance / np.sqrt(np.maximum(share, share[::-1]))
+    share = balance * (kept @ np.interp(theta_r, theta, balance))
     return balance / np.maximum(share, 1.0)
 
 

@@ -70,3 +70,7 @@ def roughness_widths(roughness: float) -> tuple[float, float, float]:
 
 def _color_fit(roughness: float) -> float:
     return sum(factor * roughness**power for power, factor in enumerate(_COLOR_FIT))
+
+
+#: By which a root of absorption is minus the logarithm of a colour, at Blender's usual roughness.
+COLOR_FACTOR = _color_fit(0.3)

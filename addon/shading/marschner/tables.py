@@ -1,31 +1,38 @@
-"""The two look-up tables of Nguyen and Donnelly 2005, and S itself to measure them by.
+"""The look-up tables of Nguyen and Donnelly 2005, for all colours at once.
 
 Reference: Nguyen and Donnelly 2005, "Hair Animation and Rendering in the Nalu Demo", GPU Gems 2,
 chapter 23: one table for M_p and cos theta_d, one for N_p.
 
-Layout; both are square, float32, bottom row first as the GPU has them:
-    longitudinal (size, size, 4): column theta_i, row theta_r, each from -pi/2 to pi/2;
-        r M_R, g M_TT, b M_TRT, a cos theta_d.
-    azimuthal, two textures (size, size, 4): column cos theta_d from 0 to 1, row phi from 0
-        (light comes back) to pi (it goes on);
-        transmitted: rgb N_TT, a N_R; internal: rgb N_TRT, a unused, 0.
-The first and last texels' CENTRES lie on the ends of an axis: u = ((size - 1) x + 0.5) / size.
+Theirs hold the lobes of one hair colour. Ours hold those of a CLEAR fibre and how far their light
+has gone inside, l, [radii], with its variance v where several ways lead to one phi:
+
+    N_p(absorption) = N_p(0) exp(-absorption l_p + absorption^2 v_p / 2),
+
+the first terms of the logarithm of a mean of exponentials. So colour, melanin, strands that differ,
+tips and strengths rebuild nothing; only the fibre's shape does.
+
+Layout, float32, bottom row first as the GPU has them:
+    longitudinal (LEVELS, size, size, 4): column theta_i, row theta_r, each from -pi/2 to pi/2;
+        M_R, M_TT, M_TRT, cos theta_d. Level k is the mean over 2^k texels along theta_h.
+    azimuthal (size, size, 4): column cos theta_d from 0 to 1, row phi from 0 (light comes back) to
+        pi (it goes on); N_R, N_TT, N_TRT, N_rest.
+    paths (size, size, 4): the same axes; l_TT, l_TRT, v_TRT, l_rest.
+The first and last texels' CENTRES lie on the ends of an axis: u = ((size - 1) x + 0.5) / size; a
+level lies at w = (level + 0.5) / LEVELS.
 
 Two axes differ from the paper's cosines. Angles keep narrow lobes equally sharp everywhere, where
 the sines starve grazing light. By cos phi a texel next to phi = 0 would be as wide as a glint, and
 N_R would end in a root at phi = pi.
-
-Strengths are left out: the shader multiplies them, and moving them rebuilds nothing.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...arrays import Floats, Ints
-from .azimuthal import azimuthal_r, azimuthal_trt, azimuthal_tt
+from .azimuthal import azimuthal_r, azimuthal_rest, azimuthal_trt, azimuthal_tt
 from .fibre import Fibre
 from .interface import LEAST_COSINE
 from .longitudinal import longitudinal_lobes
@@ -34,82 +41,196 @@ from .longitudinal import longitudinal_lobes
 PREVIEW_SIZE = 64
 DEFAULT_SIZE = 256
 
+#: Of the longitudinal table: means over 1, 2, 4, ... texels.
+LEVELS = 6
+
+#: The absorptions at which paths are fitted. Rays of TT are nearly alike, so the last one tells
+#: their length; those of the rest differ, and what is not absorbed at once matters most: the first.
+_FITTED = (0.0, 0.1, 1.0)
+
+#: What a lobe has at least where its ways are asked for, and in a logarithm.
+_LEAST_LIT = 1e-12
+_LEAST_LIGHT = 1e-100
+
+#: Keeps a quotient from 0 where all ways are equally long.
+_LEAST_VARIANCE = 1e-6
+
 
 @dataclass(frozen=True)
 class MarschnerTables:
-    """The textures, each (size, size, 4) float32 in [row, column]; the lanes are given above."""
+    """The textures, float32; shapes and lanes are given above."""
 
     longitudinal: Floats
-    transmitted: Floats
-    internal: Floats
+    azimuthal: Floats
+    paths: Floats
+
+
+def shape_of(fibre: Fibre) -> Fibre:
+    """The fibre without colour and strengths: what its tables hang on."""
+    return replace(
+        fibre,
+        absorption=(0.0, 0.0, 0.0),
+        strength_r=1.0,
+        strength_tt=1.0,
+        strength_trt=1.0,
+        strength_rest=1.0,
+    )
 
 
 def marschner_tables(fibre: Fibre, size: int = DEFAULT_SIZE) -> MarschnerTables:
-    """Both tables of a fibre."""
+    """All tables of a fibre's shape."""
     return MarschnerTables(longitudinal_table(fibre, size), *azimuthal_tables(fibre, size))
 
 
 def longitudinal_table(fibre: Fibre, size: int) -> Floats:
-    """M_R, M_TT, M_TRT and cos theta_d by the two inclinations."""
+    """M_R, M_TT, M_TRT and cos theta_d by the two inclinations, level by level."""
     theta = np.linspace(-0.5 * np.pi, 0.5 * np.pi, size)
     theta_i, theta_r = theta[None, :], theta[:, None]
-    table = np.empty((size, size, 4), np.float32)
+    table = np.empty((LEVELS, size, size, 4), np.float32)
     for lane, lobe in enumerate(longitudinal_lobes(fibre)):
-        table[..., lane] = lobe(theta_i, theta_r)
+        table[0, ..., lane] = lobe(theta_i, theta_r)
     table[..., 3] = np.cos(0.5 * (theta_r - theta_i))
+    for level in range(1, LEVELS):
+        table[level, ..., :3] = _twice_as_blurred(table[level - 1, ..., :3], level - 1)
     return table
 
 
 def azimuthal_tables(fibre: Fibre, size: int) -> tuple[Floats, Floats]:
-    """N_TT with N_R, and N_TRT, by cos theta_d and phi."""
+    """N_p of the clear fibre and the lengths of their ways, by cos theta_d and phi."""
     axis = np.linspace(0.0, 1.0, size)
     cos_d, phi = axis[None, :], np.pi * axis[:, None]
-    transmitted = np.empty((size, size, 4), np.float32)
-    transmitted[..., :3] = azimuthal_tt(cos_d, phi, fibre)
-    transmitted[..., 3] = azimuthal_r(cos_d, phi, fibre)
-    internal = np.zeros((size, size, 4), np.float32)
-    internal[..., :3] = azimuthal_trt(cos_d, phi, fibre)
-    return transmitted, internal
-
-
-def marschner(theta_i: Floats, theta_r: Floats, phi: Floats, fibre: Fibre) -> Floats:
-    """S(theta_i, theta_r, phi), (..., 3), without tables.
-
-    Times irradiance across the light and cos theta_i it is radiance of the fibre.
-    """
-    theta_i, theta_r = np.asarray(theta_i), np.asarray(theta_r)
-    cos_d = np.cos(0.5 * (theta_r - theta_i))
-    lobes = [lobe(theta_i, theta_r) for lobe in longitudinal_lobes(fibre)]
-    around = (
-        azimuthal_r(cos_d, phi, fibre)[..., None],
-        azimuthal_tt(cos_d, phi, fibre),
-        azimuthal_trt(cos_d, phi, fibre),
-    )
-    return _assembled(np.stack(lobes, axis=-1), around, cos_d, fibre)
+    fibre, width = replace(fibre, absorption=_FITTED), fibre.azimuthal_width
+    through = _spread(azimuthal_tt(cos_d, phi, fibre), width)
+    back = _spread(azimuthal_trt(cos_d, phi, fibre), width)
+    rest = azimuthal_rest(cos_d, fibre)
+    azimuthal, paths = np.empty((2, size, size, 4), np.float32)
+    azimuthal[..., 0] = _spread(azimuthal_r(cos_d, phi, fibre), width)
+    for lane, lobe in enumerate((through, back, rest), start=1):
+        azimuthal[..., lane] = lobe[..., 0]
+    paths[..., 0] = _evenly_on(_mean_path(through, 2), through)
+    length, variance = _path_and_variance(back)
+    paths[..., 1] = _evenly_on(length, back)
+    paths[..., 2] = _evenly_on(variance, back)
+    paths[..., 3] = _mean_path(rest, 1)
+    return azimuthal, paths
 
 
 def look_up(
-    tables: MarschnerTables, theta_i: Floats, theta_r: Floats, phi: Floats, fibre: Fibre
+    tables: MarschnerTables,
+    theta_i: Floats,
+    theta_r: Floats,
+    phi: Floats,
+    absorption: Floats,
+    strengths: Floats,
+    level: Floats | float = 0.0,
 ) -> Floats:
-    """S from the tables, (..., 3), as the shader reads them, for phi in [-pi, pi].
+    """S from the tables, (..., 3), as the shader reads them.
 
-    Of the fibre it asks only the strengths.
+    Args:
+        theta_i, theta_r, phi: [rad]; phi in [-pi, pi].
+        absorption: per radius, (..., 3).
+        strengths: of R, TT, TRT and the rest, (..., 4).
+        level: of the longitudinal table: log2 of the steps of theta_h, pi / (size - 1), in a pixel.
     """
-    along = bilinear(tables.longitudinal, theta_i / np.pi + 0.5, theta_r / np.pi + 0.5)
+    along = trilinear(tables.longitudinal, theta_i / np.pi + 0.5, theta_r / np.pi + 0.5, level)
     cos_d, turn = along[..., 3], np.abs(phi) / np.pi
-    transmitted = bilinear(tables.transmitted, cos_d, turn)
-    internal = bilinear(tables.internal, cos_d, turn)
-    around = (transmitted[..., 3:], transmitted[..., :3], internal[..., :3])
-    return _assembled(along[..., :3], around, cos_d, fibre)
+    clear = bilinear(tables.azimuthal, cos_d, turn)
+    kept = kept_light(bilinear(tables.paths, cos_d, turn), absorption)
+    factors = strengths * along[..., [0, 1, 2, 2]] * clear
+    squared = np.maximum(cos_d, LEAST_COSINE)[..., None] ** 2
+    return np.sum(factors[..., None] * kept, axis=-2) / squared
 
 
-def bilinear(table: Floats, x: Floats, y: Floats) -> Floats:
-    """A texture at x (columns) and y (rows) in [0, 1] between the centres of its end texels."""
-    rows, columns = table.shape[:2]
+def kept_light(paths: Floats, absorption: Floats) -> Floats:
+    """What absorption leaves of R, TT, TRT and the rest, (..., 4, 3).
+
+    Where the fitted parabola would rise again, it stays at its lowest.
+    """
+    l_tt, l_trt, v_trt, l_rest = np.moveaxis(paths[..., None], -2, 0)
+    reached = np.minimum(absorption, l_trt / np.maximum(v_trt, _LEAST_VARIANCE))
+    return np.stack(
+        [
+            np.ones(np.broadcast_shapes(l_tt.shape, absorption.shape)),
+            np.exp(-absorption * l_tt),
+            np.exp(-reached * (l_trt - 0.5 * reached * v_trt)),
+            np.exp(-absorption * l_rest),
+        ],
+        axis=-2,
+    )
+
+
+def _spread(lobes: Floats, width: float) -> Floats:
+    """Lobes (size of phi, ...) convolved with a Gaussian of phi over the circle.
+
+    The kernel sums to 1 over the circle's texels, of which the lobes, being even, hold one half.
+    """
+    if width == 0.0:
+        return lobes
+    half = len(lobes) - 1
+    turn = np.arange(2 * half) * (np.pi / half)
+    kernel = np.sum(
+        [np.exp(-0.5 * ((turn - 2.0 * np.pi * lap) / width) ** 2) for lap in range(-2, 4)], axis=0
+    )
+    row, column = np.arange(half + 1)[:, None], np.arange(half + 1)
+    matrix = kernel[np.abs(row - column)] + kernel[(row + column) % (2 * half)]
+    matrix[:, [0, -1]] *= 0.5
+    return np.tensordot(matrix / kernel.sum(), lobes, axes=1)
+
+
+def _mean_path(lobe: Floats, lane: int) -> Floats:
+    """l, (...), with which exp(-absorption l) is exact at one absorption of _FITTED."""
+    share = np.maximum(lobe[..., lane], _LEAST_LIGHT) / np.maximum(lobe[..., 0], _LEAST_LIGHT)
+    return -np.log(share) / _FITTED[lane]
+
+
+def _path_and_variance(lobe: Floats) -> tuple[Floats, Floats]:
+    """l and v, each (...), exact at both absorptions."""
+    near, far = _mean_path(lobe, 1), _mean_path(lobe, 2)
+    variance = np.maximum(2.0 * (near - far) / (_FITTED[2] - _FITTED[1]), 0.0)
+    return near + 0.5 * _FITTED[1] * variance, variance
+
+
+def _evenly_on(path: Floats, lobe: Floats) -> Floats:
+    """Paths (size of phi, size of cos theta_d) that go on where their lobe has no light.
+
+    The texture is read between texels, so beside the light a path must not jump.
+    """
+    is_lit = lobe[..., 0] > _LEAST_LIT
+    last = np.maximum.accumulate(np.where(is_lit, np.arange(len(path))[:, None], -1), axis=0)
+    return np.take_along_axis(path, np.where(last < 0, is_lit.argmax(axis=0), last), 0)
+
+
+def _twice_as_blurred(table: Floats, level: int) -> Floats:
+    """Means over twice as many texels along theta_h, the ends repeated.
+
+    Along theta_h both indices go on together. Two boxes of 2^level, side by side; the first is one
+    texel, and the box between texels' centres gives the outer two half of their weight.
+    """
+    reach = max(1 << level, 2) >> 1
+    padded = np.pad(table, [(reach, reach), (reach, reach), (0, 0)], mode="edge")
+    ends = padded[: -2 * reach, : -2 * reach] + padded[2 * reach :, 2 * reach :]
+    return 0.25 * ends + 0.5 * table if level == 0 else 0.5 * ends
+
+
+def trilinear(table: Floats, x: Floats, y: Floats, level: Floats | float) -> Floats:
+    """A texture of levels, (levels, rows, columns, 4), between two of its levels."""
+    place = np.clip(level, 0.0, len(table) - 1.0)
+    below = np.minimum(np.floor(place).astype(np.int64), len(table) - 2)
+    lower, upper = bilinear(table, x, y, below), bilinear(table, x, y, below + 1)
+    return lower + (upper - lower) * (place - below)[..., None]
+
+
+def bilinear(table: Floats, x: Floats, y: Floats, *level: Ints) -> Floats:
+    """A texture at x (columns) and y (rows) in [0, 1] between the centres of its end texels.
+
+    Of a texture of levels, the one asked for.
+    """
+    rows, columns = table.shape[-3:-1]
     column, right = _between(x, columns)
     row, up = _between(y, rows)
-    lower = table[row, column] * (1.0 - right) + table[row, column + 1] * right
-    upper = table[row + 1, column] * (1.0 - right) + table[row + 1, column + 1] * right
+    lower = table[*level, row, column] * (1.0 - right) + table[*level, row, column + 1] * right
+    row = row + 1
+    upper = table[*level, row, column] * (1.0 - right) + table[*level, row, column + 1] * right
     return lower * (1.0 - up) + upper * up
 
 
@@ -117,15 +238,3 @@ def _between(place: Floats, count: int) -> tuple[Ints, Floats]:
     scaled = np.clip(place, 0.0, 1.0) * (count - 1)
     index = np.minimum(scaled.astype(np.int64), count - 2)
     return index, (scaled - index)[..., None]
-
-
-def _assembled(
-    along: Floats, around: tuple[Floats, Floats, Floats], cos_d: Floats, fibre: Fibre
-) -> Floats:
-    """sum of strength M_p N_p / cos^2 theta_d."""
-    terms = [
-        strength * along[..., lane, None] * spread
-        for lane, (strength, spread) in enumerate(zip(fibre.strengths, around, strict=True))
-    ]
-    squared = np.maximum(cos_d, LEAST_COSINE)[..., None] ** 2
-    return (terms[0] + terms[1] + terms[2]) / squared

@@ -9,7 +9,8 @@ void main()
   }
   vec3 point = texelFetch(points, ivec2(at.x, 0), 0).xyz;
   int index = at.y / 2;
-  vec3 value = at.y % 2 == 0 ? light_direction(lights, index, point) :
-                               light_irradiance(lights, index, point);
+  vec3 to_light, irradiance;
+  light_at(lights, index, point, to_light, irradiance);
+  vec3 value = at.y % 2 == 0 ? to_light : irradiance;
   imageStore(result, at, vec4(value, lights.ambient_and_count.w));
 }

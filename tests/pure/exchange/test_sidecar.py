@@ -50,3 +50,18 @@ def test_passes_are_those_of_the_paper(tmp_path: Path) -> None:
     assert [p["blend"] != "off" for p in content["passes"]] == [False, False, True, True]
     assert len(content["passes_fallback"]) == 3
     assert "_AO" in content["attributes"]
+
+
+def test_textures_beside_are_named_with_how_they_are_read(tmp_path: Path) -> None:
+    files = {name: f"hair_{name}.png" for name in ("base", "alpha", "shift", "noise", "tangent")}
+    path = write_sidecar(
+        tmp_path / "hair.glb", one_triangle(), textures=files, highlights="tangent"
+    )
+    content = json.loads(path.read_text(encoding="utf-8"))["textures"]
+    assert {name: content[name]["file"] for name in files} == files
+    spaces = {name: content[name]["color_space"].split(":")[0] for name in files}
+    assert spaces == {name: "sRGB" if name == "base" else "linear" for name in files}
+    assert all({"r", "rgb"} & set(content[name]) for name in files)
+    assert content["highlights_by"] == "tangent"
+    alone = json.loads(write_sidecar(tmp_path / "hair.glb", one_triangle()).read_text())
+    assert "textures" not in alone

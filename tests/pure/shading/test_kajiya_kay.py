@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.shading.kajiya_kay import (
+    GREY_COLOR,
     diffuse_bias,
     kajiya_kay,
     shifted_tangent,
@@ -166,7 +167,16 @@ def test_shift_keeps_the_tangent_in_its_plane() -> None:
 
 def test_color_variation_keeps_the_mean() -> None:
     settings = ShadingSettings(color_variation=0.4)
-    base = strand_base(np.array([0.0, 0.5, 1.0]), settings)
+    root, colored = np.zeros(3), np.ones(3)
+    base = strand_base(root, np.array([0.0, 0.5, 1.0]), colored, settings)
     assert base / np.array(settings.base_color) == pytest.approx(
         np.array([[0.6] * 3, [1.0] * 3, [1.4] * 3])
     )
+
+
+def test_tips_and_grey_strands_have_their_own_colours() -> None:
+    settings = ShadingSettings(color_variation=0.0, tip_tint=1.0, grey_share=0.25)
+    along, middle = np.array([0.0, 0.6, 1.0, 1.0]), np.full(4, 0.5)
+    base = strand_base(along, middle, np.array([0.9, 0.9, 0.25, 0.24]), settings)
+    root, tip = np.array(settings.base_color), np.array(settings.tip_color)
+    assert base == pytest.approx(np.array([root, 0.5 * (root + tip), tip, GREY_COLOR]))

@@ -1,0 +1,40 @@
+"""What a card makes of the models of strands: the reference.
+
+Twin of gpu_shaders/lib_card.glsl: same names, same order. A card stands for many strands, so what
+differs from strand to strand is in its textures, and of its colours it has the mean.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats
+from .kajiya_kay import strand_base
+from .settings import ShadingSettings
+
+
+def mapped_tangent(texel: Floats, tangent: Floats, normal: Floats, shift_noise: float) -> Floats:
+    """The way of a strand by a tangent map, (..., 3) unit vectors, see textures.HairTextures.
+
+    Args:
+        texel: (..., 3) of the map.
+        tangent, normal: (..., 3) of the card, unit vectors.
+        shift_noise: how much the map tilts strands.
+    """
+    way = 2.0 * texel - 1.0
+    side = np.cross(tangent, normal)
+    strand = way[..., 0:1] * side + way[..., 1:2] * tangent
+    strand = strand + way[..., 2:3] * (shift_noise * normal)
+    length = np.linalg.norm(strand, axis=-1, keepdims=True)
+    return np.where(length > 1.0e-6, strand / np.maximum(length, 1.0e-6), tangent)
+
+
+def card_base(along: Floats, shading: ShadingSettings) -> Floats:
+    """Mean colour of the strands at places of a card, (..., 3); `along` is 0 at the root.
+
+    Times the base texture it is what `strand_base` is for a strand.
+    """
+    even = np.full(np.shape(along), 0.5)
+    colored = strand_base(along, even, even + 1.0, shading)
+    grey = strand_base(along, even, even - 1.0, shading)
+    return colored + (grey - colored) * shading.grey_share

@@ -1,0 +1,125 @@
+"""From the settings to a fibre, to each strand's absorption and to the light it sends out.
+
+Twin of gpu_shaders/lib_marschner.glsl: same names, same order.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Floats
+from ..kajiya_kay import diffuse_bias, shifted_tangent
+from ..settings import ShadingSettings
+from ..tint import tip_share
+from .fibre import Fibre, directions_to_angles
+from .pigment import COLOR_FACTOR, absorption_color, color_absorption, melanin_absorption
+from .tables import MarschnerTables, look_up
+
+#: Share of the pigment, evened out over the colours, that a grey strand still has: it is white, not
+#: glass.
+GREY_LEFT = 0.04
+
+
+def fibre_of(settings: ShadingSettings) -> Fibre:
+    """The fibre that the settings speak of; its absorption is that of the root."""
+    red, green, blue = (float(value) for value in root_absorption(settings))
+    return Fibre(
+        index_of_refraction=settings.index_of_refraction,
+        absorption=(red, green, blue),
+        cuticle_tilt=settings.cuticle_tilt,
+        width_r=settings.width_r,
+        width_tt=settings.width_tt,
+        width_trt=settings.width_trt,
+        offset_r=settings.offset_r,
+        offset_tt=settings.offset_tt,
+        offset_trt=settings.offset_trt,
+        strength_r=settings.strength_r,
+        strength_tt=settings.strength_tt,
+        strength_trt=settings.strength_trt,
+        strength_rest=settings.strength_rest,
+        eccentricity=settings.eccentricity,
+        glint_width=settings.glint_width,
+        glint_strength=settings.glint_strength,
+        azimuthal_width=settings.azimuthal_width,
+    )
+
+
+def pack_fibre(settings: ShadingSettings) -> Floats:
+    """`Fibre` of gpu_shaders/struct_fibre.glsl in std140, (12,) float32."""
+    root = [*root_absorption(settings), COLOR_FACTOR]
+    tip = [*tip_absorption(settings), GREY_LEFT]
+    return np.array([*root, *tip, *fibre_of(settings).strengths], np.float32)
+
+
+def root_absorption(settings: ShadingSettings) -> Floats:
+    """Per radius, (3,), by what the artist chose as pigment."""
+    match settings.pigment:
+        case "melanin":
+            return melanin_absorption(settings.melanin, settings.redness)
+        case "absorption":
+            return np.array(settings.absorption)
+        case _:
+            return color_absorption(np.array(settings.base_color))
+
+
+def tip_absorption(settings: ShadingSettings) -> Floats:
+    """Per radius, (3,), of the tips' own colour."""
+    return color_absorption(np.array(settings.tip_color))
+
+
+def strand_absorption(
+    settings: ShadingSettings, along: Floats, color_noise: Floats, grey_noise: Floats
+) -> Floats:
+    """Absorption at a place of a strand, (..., 3), per radius.
+
+    Args:
+        along: 0 at the root to 1 at the tip.
+        color_noise, grey_noise: the strand's own, in [0, 1].
+    """
+    root, tip = root_absorption(settings), tip_absorption(settings)
+    mixed = root + (tip - root) * tip_share(along, settings)[..., None]
+    amount = 1.0 + settings.color_variation * (1.0 - 2.0 * np.asarray(color_noise))
+    is_grey = (np.asarray(grey_noise) < settings.grey_share)[..., None]
+    grey = GREY_LEFT * mixed.mean(axis=-1, keepdims=True)
+    return np.where(is_grey, grey, mixed) * amount[..., None]
+
+
+def strand_color(absorption: Floats) -> Floats:
+    """Colour of a mass of such hair, (..., 3), for light that comes from strand to strand."""
+    return absorption_color(absorption)
+
+
+def marschner_light(
+    tables: MarschnerTables,
+    tangent: Floats,
+    normal: Floats,
+    to_light: Floats,
+    to_eye: Floats,
+    shift_noise: Floats,
+    sparkle_noise: Floats,
+    absorption: Floats,
+    shading: ShadingSettings,
+    level: Floats | float = 0.0,
+) -> Floats:
+    """What one light sends to the eye, (..., 3): times irradiance and occlusion it is radiance.
+
+    Args:
+        tangent, normal, to_light, to_eye: unit vectors, (..., 3), in one space; the normal is that
+            of the hair's volume.
+        shift_noise, sparkle_noise: in [0, 1].
+        absorption: per radius, (..., 3).
+        level: see `look_up`.
+    """
+    shift = shading.shift_noise * (shift_noise - 0.5)
+    shifted = shifted_tangent(tangent, normal, shift)
+    theta_i, theta_r, phi = directions_to_angles(shifted, to_light, to_eye)
+    strength_r, strength_tt, strength_trt, strength_rest = fibre_of(shading).strengths
+    sparkle = 1.0 + shading.sparkle * (np.asarray(sparkle_noise) - 1.0)
+    strengths = np.stack(
+        np.broadcast_arrays(strength_r, strength_tt, strength_trt * sparkle, strength_rest), axis=-1
+    )
+    scattered = look_up(tables, theta_i, theta_r, phi, absorption, strengths, level)
+    bias = diffuse_bias(normal, to_light)
+    shade = 1.0 + shading.volume_shade * (bias - 1.0)
+    direct = scattered * (np.cos(theta_i) * shade)[..., None]
+    return direct + strand_color(absorption) * (shading.scattered * bias / np.pi)[..., None]

@@ -1,0 +1,107 @@
+"""Rays traced in space through a glass cylinder: the truth that N_p is measured by.
+
+Nothing of the plane across the fibre is used here, no Bravais index and no closed form: hit points,
+normals, reflection and refraction are vectors, and Fresnel's formulas are those in space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ...arrays import Floats
+from .azimuthal import azimuthal_r, azimuthal_trt, azimuthal_tt, trt_caustic
+from .fibre import Fibre
+from .interface import bravais_index
+
+BIN_COUNT = 360
+
+#: On either side of TRT's caustic, where N_p has a pole, nothing is compared, [rad]
+_CAUSTIC_MARGIN = np.radians(3.0)
+
+
+def traced_lobes(
+    ray_count: int, theta: float, fibre: Fibre, order_count: int = 3, seed: int = 1
+) -> tuple[Floats, Floats]:
+    """Histograms of phi and energies of the lobes p = 0, 1, ...
+
+    The light comes from azimuth 0 and inclination theta, on a smooth cylinder around z. Of the
+    fibre, index and absorption count.
+
+    Returns:
+        (order_count, BIN_COUNT, 3) density over phi in [-pi, pi], and (order_count, 3) the share of
+        the light.
+    """
+    index = fibre.index_of_refraction
+    random = np.random.default_rng(seed)
+    h = 2.0 * (np.arange(ray_count) + random.random(ray_count)) / ray_count - 1.0
+    light = np.array([-np.cos(theta), 0.0, -np.sin(theta)])
+    point = np.stack([np.sqrt(1.0 - h * h), h, np.zeros_like(h)], axis=1)
+    cosine = -(point @ light)
+    mirrored, cos_in = _glass(cosine, 1.0 / index)
+    ways = light + 2.0 * cosine[:, None] * point
+    inside = light / index + (cosine / index - cos_in)[:, None] * point
+    energy = np.repeat((1.0 - mirrored)[:, None], 3, axis=1)
+    lobes = [(ways, np.repeat(mirrored[:, None], 3, axis=1))]
+    for _ in range(1, order_count):
+        flat = inside * [1.0, 1.0, 0.0]
+        length = -2.0 * _dot(point, flat) / _dot(flat, flat)
+        point = point + length[:, None] * flat
+        energy = energy * np.exp(-length[:, None] * np.array(fibre.absorption))
+        cosine = np.maximum(_dot(inside, point), 0.0)
+        mirrored, cos_out = _glass(cosine, index)
+        ways = inside * index + (cos_out - index * cosine)[:, None] * point
+        lobes.append((ways, energy * (1.0 - mirrored)[:, None]))
+        inside = inside - 2.0 * cosine[:, None] * point
+        energy = energy * mirrored[:, None]
+    histograms = np.stack([_histogram(ways, weight) for ways, weight in lobes])
+    return histograms, np.array([weight.mean(axis=0) for _, weight in lobes])
+
+
+def lobe_errors(traced: Floats, theta: float, fibre: Fibre) -> tuple[float, float, float]:
+    """Largest difference of R, TT, TRT from the traced lobes, over each lobe's and colour's peak.
+
+    Args:
+        traced: (3 or more, BIN_COUNT, 3).
+        fibre: round, its caustics not blurred (glint_width 0).
+    """
+    bravais = bravais_index(fibre.index_of_refraction, np.array(np.cos(theta)))
+    caustic = float(trt_caustic(bravais)[1])
+    phi = (np.arange(BIN_COUNT) + 0.5) / BIN_COUNT * 2.0 * np.pi - np.pi
+    is_near = np.abs(np.abs(phi) - caustic) < _CAUSTIC_MARGIN
+    errors = []
+    for order, function in enumerate((azimuthal_r, azimuthal_tt, azimuthal_trt)):
+        expected = _bin_means(np.array(np.cos(theta)), function, fibre)
+        kept = ~is_near if order == 2 else np.full(BIN_COUNT, True)
+        difference = np.abs(expected - traced[order])[kept].max(axis=0)
+        errors.append(float((difference / traced[order][kept].max(axis=0)).max()))
+    return (errors[0], errors[1], errors[2])
+
+
+def _bin_means(
+    cos_d: Floats, function: Callable[[Floats, Floats, Fibre], Floats], fibre: Fibre
+) -> Floats:
+    """Mean of N_p over each bin, (BIN_COUNT, 1 or 3)."""
+    count = BIN_COUNT * 32
+    phi = (np.arange(count) + 0.5) / count * 2.0 * np.pi - np.pi
+    return function(cos_d, phi, fibre).reshape(BIN_COUNT, 32, -1).mean(axis=1)
+
+
+def _histogram(ways: Floats, weight: Floats) -> Floats:
+    azimuth = (np.arctan2(ways[:, 1], ways[:, 0]) + np.pi) * (BIN_COUNT / (2.0 * np.pi))
+    place = np.minimum(azimuth.astype(np.int64), BIN_COUNT - 1)
+    counts = [np.bincount(place, channel, BIN_COUNT) for channel in weight.T]
+    return np.stack(counts, axis=1) * (BIN_COUNT / (2.0 * np.pi) / len(ways))
+
+
+def _glass(cos_in: Floats, ratio: float) -> tuple[Floats, Floats]:
+    """Fresnel's reflectance and the cosine behind, in space; ratio is n before over n behind."""
+    cos_out = np.sqrt(np.maximum(1.0 - ratio**2 * (1.0 - cos_in**2), 0.0))
+    across = (ratio * cos_in - cos_out) / (ratio * cos_in + cos_out)
+    along = (cos_in - ratio * cos_out) / (cos_in + ratio * cos_out)
+    return 0.5 * (across**2 + along**2), cos_out
+
+
+def _dot(one: Floats, other: Floats) -> Floats:
+    return np.einsum("ij,ij->i", one, other)

@@ -1,0 +1,75 @@
+// Cards, fragment stage: strands in textures, see addon/shading/textures.py.
+//
+// PRIME 1: depth alone, of opaque pixels. TANGENT_MAP 1: a map says which way strands run, in place
+// of the shift texture.
+#if PRIME
+void main()
+{
+  if (texture(alpha_texture, card_uv).x < opaque_alpha) {
+    discard;
+  }
+  color = vec4(0.0);
+}
+#else
+#  include "lib_lights.glsl"
+#  include "lib_card.glsl"
+#  if MARSCHNER
+#    include "lib_marschner.glsl"
+#  endif
+
+void main()
+{
+  vec3 normal = unit_or(card_normal, vec3(0.0, 0.0, 1.0));
+  vec3 tangent = unit_or(card_tangent, vec3(0.0, 0.0, 1.0));
+  vec3 to_eye = unit_or(view.eye.xyz - view.eye.w * card_point, normal);
+  float along = card_uv.y;
+#  if TANGENT_MAP
+  vec3 texel = texture(tangent_texture, card_uv).xyz;
+  tangent = mapped_tangent(texel, tangent, normal, shading.shift_noise);
+  float shift_noise = 0.5;
+#  else
+  float shift_noise = texture(shift_texture, card_uv).x;
+#  endif
+  float sparkle_noise = texture(noise_texture, card_uv).x;
+#  if MARSCHNER
+  vec3 colored = strand_absorption(fibre, along, 0.5, 1.5, shading);
+  vec3 grey = strand_absorption(fibre, along, 0.5, -0.5, shading);
+  vec3 absorption = mix(colored, grey, shading.grey_share);
+  vec3 hair = strand_color(fibre, absorption);
+#  else
+  vec3 hair = card_base(along, shading);
+#  endif
+
+  vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz;
+  for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
+    vec3 to_light, irradiance;
+    light_at(lights, index, card_point, to_light, irradiance);
+#  if MARSCHNER
+    float level = pixel_level(
+        longitudinal, tangent, normal, to_light, to_eye, shift_noise, shading);
+    radiance += irradiance * marschner_light(longitudinal,
+                                             azimuthal,
+                                             paths,
+                                             tangent,
+                                             normal,
+                                             to_light,
+                                             to_eye,
+                                             shift_noise,
+                                             sparkle_noise,
+                                             absorption,
+                                             fibre,
+                                             shading,
+                                             level);
+#  else
+    radiance += irradiance * hair / LIGHT_PI *
+                kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
+#  endif
+  }
+  radiance *= texture(base_texture, card_uv).xyz * card_occlusion;
+  float opacity = is_opaque == 1 ? 1.0 : texture(alpha_texture, card_uv).x;
+  if (opacity < least_alpha) {
+    discard;  // at the end, because derivatives want all pixels until then
+  }
+  color = vec4(radiance * opacity, opacity);
+}
+#endif

@@ -1,0 +1,21 @@
+// Angles whose sine and cosine are known; GLSL promises little of its own asin and atan, and Mesa's
+// are off by 2e-5, which a narrow highlight shows.
+//
+// Holds no resources.
+
+const float ANGLE_PI = 3.14159265358979;
+
+// From 0 to pi. The angle over its sine as a polynomial of the cosine, within 1e-7.
+float angle_of(float sine, float cosine)
+{
+  float x = abs(cosine);
+  float sum = -0.0979687049984932 + x * 0.01765366829931736;
+  sum = 0.2532384693622589 + x * sum;
+  sum = -0.4245661795139313 + x * sum;
+  sum = 0.5570220351219177 + x * sum;
+  sum = -0.6610894799232483 + x * sum;
+  sum = 0.7848962545394897 + x * sum;
+  sum = -0.9999822378158569 + x * sum;
+  sum = (1.570796251296997 + x * sum) * sine;
+  return cosine < 0.0 ? ANGLE_PI - sum : sum;
+}

@@ -1,0 +1,21 @@
+// What a card makes of the models of strands: a card stands for many of them.
+//
+// Twin of addon/shading/card_look.py: same names, same order. Holds no resources.
+#include "lib_kajiya_kay.glsl"
+
+// The way of a strand by a texel of a tangent map.
+vec3 mapped_tangent(vec3 texel, vec3 tangent, vec3 normal, float shift_noise)
+{
+  vec3 way = 2.0 * texel - 1.0;
+  vec3 side = cross(tangent, normal);
+  vec3 strand = way.x * side + way.y * tangent + way.z * (shift_noise * normal);
+  return unit_or(strand, tangent);
+}
+
+// Mean colour of the strands, of which some are grey: times the base texture it is the hair's.
+vec3 card_base(float along, ShadingSettings shading)
+{
+  vec3 colored = strand_base(along, 0.5, 1.5, shading);
+  vec3 grey = strand_base(along, 0.5, -0.5, shading);
+  return mix(colored, grey, shading.grey_share);
+}

@@ -1,0 +1,144 @@
+// Marschner's scattering from its look-up tables, and what a strand makes of it.
+//
+// Twin of addon/shading/marschner/{fibre,tables,look}.py: same names, same order; what angles and
+// tables mean is written there. Needs struct_fibre.glsl and the struct ShadingSettings.
+// References: Marschner et al. 2003; Nguyen and Donnelly 2005, GPU Gems 2, chapter 23.
+// Holds no resources.
+#include "lib_angle.glsl"
+#include "lib_kajiya_kay.glsl"
+#include "lib_tint.glsl"
+
+// LEAST_COSINE of addon/shading/marschner/interface.py
+const float LEAST_COSINE = 1.0e-4;
+// _LEAST_VARIANCE of addon/shading/marschner/tables.py
+const float LEAST_VARIANCE = 1.0e-6;
+
+// theta_i, theta_r and |phi| of unit vectors.
+vec3 directions_to_angles(vec3 tangent, vec3 to_light, vec3 to_eye)
+{
+  float sin_i = dot(tangent, to_light), sin_r = dot(tangent, to_eye);
+  vec3 across_light = to_light - tangent * sin_i, across_eye = to_eye - tangent * sin_r;
+  float cos_i = length(across_light), cos_r = length(across_eye);
+  vec2 turn = vec2(length(cross(across_light, across_eye)), dot(across_light, across_eye));
+  float size = length(turn);
+  turn = size > 0.0 ? turn / size : vec2(0.0, 1.0);
+  return vec3(0.5 * ANGLE_PI - angle_of(cos_i, sin_i),
+              0.5 * ANGLE_PI - angle_of(cos_r, sin_r),
+              angle_of(turn.x, turn.y));
+}
+
+// Where a texture has x in 0..1 between the centres of its end texels.
+vec2 table_place(vec2 x, vec2 size)
+{
+  return ((size - 1.0) * clamp(x, 0.0, 1.0) + 0.5) / size;
+}
+
+// The level at which the longitudinal table is blurred over an angle of theta_h.
+float table_level(float angle, sampler3D longitudinal)
+{
+  float step = ANGLE_PI / float(textureSize(longitudinal, 0).x - 1);
+  return log2(max(angle / step, 1.0));
+}
+
+// What absorption leaves of R, TT, TRT and the rest, a column each. Where the fitted parabola would
+// rise again, it stays at its lowest.
+mat4x3 kept_light(vec4 paths, vec3 absorption)
+{
+  vec3 reached = min(absorption, vec3(paths.y / max(paths.z, LEAST_VARIANCE)));
+  return mat4x3(vec3(1.0),
+                exp(-absorption * paths.x),
+                exp(-reached * (paths.y - 0.5 * reached * paths.z)),
+                exp(-absorption * paths.w));
+}
+
+// S of angles as directions_to_angles has them; strengths are of R, TT, TRT and the rest. For
+// the level see table_level.
+vec3 look_up(sampler3D longitudinal,
+             sampler2D azimuthal,
+             sampler2D paths,
+             vec3 angles,
+             vec3 absorption,
+             vec4 strengths,
+             float level)
+{
+  vec3 size = vec3(textureSize(longitudinal, 0));
+  vec2 place = table_place(angles.xy / ANGLE_PI + 0.5, size.xy);
+  vec4 along = textureLod(longitudinal, vec3(place, (level + 0.5) / size.z), 0.0);
+  place = table_place(vec2(along.w, angles.z / ANGLE_PI), vec2(textureSize(azimuthal, 0)));
+  vec4 clear = textureLod(azimuthal, place, 0.0);
+  mat4x3 kept = kept_light(textureLod(paths, place, 0.0), absorption);
+  vec4 factors = strengths * along.xyzz * clear;
+  float cos_d = max(along.w, LEAST_COSINE);
+  return kept * factors / (cos_d * cos_d);
+}
+
+// Absorption at a place of a strand, per radius; both noises are the strand's own, in 0..1.
+vec3 strand_absorption(
+    Fibre fibre, float along, float color_noise, float grey_noise, ShadingSettings shading)
+{
+  vec3 mixed = mix(fibre.root.xyz, fibre.tip.xyz, tip_share(along, shading));
+  float amount = 1.0 + shading.color_variation * (1.0 - 2.0 * color_noise);
+  vec3 grey = vec3(fibre.tip.w * dot(mixed, vec3(1.0 / 3.0)));
+  return amount * (grey_noise < shading.grey_share ? grey : mixed);
+}
+
+// The colour of a mass of such hair, for light that comes from strand to strand.
+vec3 strand_color(Fibre fibre, vec3 absorption)
+{
+  return exp(-sqrt(max(absorption, 0.0)) * fibre.root.w);
+}
+
+// The angles at a strand whose tangent is shifted by a noise in 0..1.
+vec3 strand_angles(vec3 tangent,
+                   vec3 normal,
+                   vec3 to_light,
+                   vec3 to_eye,
+                   float shift_noise,
+                   ShadingSettings shading)
+{
+  float shift = shading.shift_noise * (shift_noise - 0.5);
+  return directions_to_angles(shifted_tangent(tangent, normal, shift), to_light, to_eye);
+}
+
+#ifdef GPU_FRAGMENT_SHADER
+// The level at which a highlight does not flicker: blurred over what theta_h changes in a pixel.
+// Of a bend in the plane of a light from behind, theta_h hardly knows, and the light stays sharp.
+float pixel_level(sampler3D longitudinal,
+                  vec3 tangent,
+                  vec3 normal,
+                  vec3 to_light,
+                  vec3 to_eye,
+                  float shift_noise,
+                  ShadingSettings shading)
+{
+  vec3 angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading);
+  float theta_h = 0.5 * (angles.x + angles.y);
+  return table_level(max(abs(dFdx(theta_h)), abs(dFdy(theta_h))), longitudinal);
+}
+#endif
+
+// What one light sends to the eye: times irradiance and occlusion it is radiance. Both noises are
+// in 0..1; for the level see pixel_level.
+vec3 marschner_light(sampler3D longitudinal,
+                     sampler2D azimuthal,
+                     sampler2D paths,
+                     vec3 tangent,
+                     vec3 normal,
+                     vec3 to_light,
+                     vec3 to_eye,
+                     float shift_noise,
+                     float sparkle_noise,
+                     vec3 absorption,
+                     Fibre fibre,
+                     ShadingSettings shading,
+                     float level)
+{
+  vec3 angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading);
+  vec4 strengths = fibre.strengths;
+  strengths.z *= mix(1.0, sparkle_noise, shading.sparkle);
+  vec3 scattered = look_up(longitudinal, azimuthal, paths, angles, absorption, strengths, level);
+  float bias = diffuse_bias(normal, to_light);
+  float shade = mix(1.0, bias, shading.volume_shade);
+  return scattered * cos(angles.x) * shade +
+         strand_color(fibre, absorption) * (shading.scattered * bias / ANGLE_PI);
+}

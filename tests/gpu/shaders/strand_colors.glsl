@@ -1,0 +1,16 @@
+// places: along, colour noise, grey noise. Row 0 strand_absorption, 1 strand_color of it,
+// 2 strand_base with tip_share in w.
+#include "lib_marschner.glsl"
+
+void main()
+{
+  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(at, imageSize(result)))) {
+    return;
+  }
+  vec3 place = texelFetch(places, ivec2(at.x, 0), 0).xyz;
+  vec3 absorption = strand_absorption(fibre, place.x, place.y, place.z, shading);
+  vec3 base = strand_base(place.x, place.y, place.z, shading);
+  vec3 value = at.y == 0 ? absorption : at.y == 1 ? strand_color(fibre, absorption) : base;
+  imageStore(result, at, vec4(value, tip_share(place.x, shading)));
+}

@@ -1,0 +1,114 @@
+"""Highlights as they are drawn, on a ball of combed hair: where the reference has them.
+
+tests/pure/shading/test_highlights.py says why there are so many of them, and of what colour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hair_ball import ball_mesh, combed_strands
+
+from hairloom.addon.params.preset import read_preset
+from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.strands import Surface
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+LOOKS = Path(__file__).parents[2] / "presets" / "looks"
+#: the ball is a little smaller than the picture
+SIZE, HEIGHT = 160, 2.1
+BLACK = (0.0, 0.0, 0.0)
+FROM_THE_EYE = (0.0, 0.0, -1.0)
+
+
+@pytest.fixture(scope="module")
+def draw() -> Callable[..., np.ndarray]:
+    """Draw a look on the ball by a light that shines along a direction, (SIZE, SIZE, 4)."""
+    from hairloom.addon.render import frame
+
+    strands = combed_strands(12_000, cv_count=8, lift=0.004)
+    radius = np.full(strands.shape[:2], 0.006, np.float32)
+    ball = replace(frame.MeshSnapshot.of(Surface(*ball_mesh()), color=BLACK), sheen=0.0)
+    camera = frame.Camera(
+        frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),
+    )
+
+    def draw(shading: ShadingSettings, shines_along: tuple[float, ...]) -> np.ndarray:
+        snapshot = frame.Snapshot(
+            strands,
+            radius,
+            meshes=(ball,),
+            lights=(Light.sun(shines_along, (1.0, 1.0, 1.0), 1.0),),
+            ambient=BLACK,
+            shading=shading,
+            strand_settings=StrandSettings(tip_width=1.0, minimum_width=0.0),
+            volume_center=np.zeros(3, np.float32),
+        )
+        return frame.render_image(snapshot, camera, SIZE, SIZE, 3)
+
+    return draw
+
+
+def look(name: str, model: str) -> ShadingSettings:
+    shipped = read_preset(LOOKS / f"{name}.json", ShadingSettings).settings
+    return replace(
+        shipped, model=model, shift_noise=0.0, sparkle=0.0, color_variation=0.0, scattered=0.0
+    )
+
+
+def highlights(picture: np.ndarray) -> list[tuple[float, np.ndarray]]:
+    """From the root on: degrees beyond the equator, to the tip, and the colour of each maximum."""
+    middle = picture[:, SIZE // 2 - 8 : SIZE // 2 + 8, :3].mean(axis=1)
+    smooth = np.apply_along_axis(np.convolve, 0, middle, np.full(5, 0.2), "same")
+    bright = smooth.mean(axis=-1)
+    inner = bright[1:-1]
+    is_top = (inner > bright[:-2]) & (inner >= bright[2:]) & (inner > 0.1 * bright.max())
+    row = np.flatnonzero(is_top)[::-1] + 1  # row 0 is the bottom
+    height = (row + 0.5) / SIZE * HEIGHT - 0.5 * HEIGHT
+    return list(zip(-np.degrees(np.arcsin(height)), smooth[row], strict=True))
+
+
+@pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
+def test_blond_shows_two_and_black_one(draw: Any, model: str) -> None:
+    (second, second_color), (first, first_color) = highlights(
+        draw(look("blond", model), FROM_THE_EYE)
+    )
+    assert -20.0 < second < -5.0 and 3.0 < first < 10.0
+    assert second_color[0] / second_color[2] > 1.3 * first_color[0] / first_color[2]
+    ((place, color),) = highlights(draw(look("black", model), FROM_THE_EYE))
+    assert 1.0 < place < 10.0
+    assert color[0] / color[2] == pytest.approx(1.0, abs=0.25)
+
+
+def test_separation_sets_where_marschners_two_lie(draw: Any) -> None:
+    """R at one tilt beyond the equator, TRT at two before it; a pixel is 0.75 degrees."""
+    blond = look("blond", "marschner")
+    (second, _), (first, _) = highlights(draw(blond, FROM_THE_EYE))
+    tilt = np.degrees(blond.cuticle_tilt)
+    assert first == pytest.approx(tilt, abs=1.5)
+    assert second == pytest.approx(-2.0 * tilt, abs=1.5)
+
+
+def test_the_outline_shines_against_the_light_on_blond_alone(draw: Any) -> None:
+    """The third highlight, TT: as bright as the others without what lights the front."""
+    behind = (-0.5, 0.0, 0.87)
+    front = draw(look("blond", "marschner"), FROM_THE_EYE)[..., :3].max(axis=(0, 1)).mean()
+    row = slice(SIZE // 2 - 20, SIZE // 2 + 20)
+
+    def outline(name: str, **changes: float) -> np.ndarray:
+        picture = draw(replace(look(name, "marschner"), **changes), behind)
+        return picture[row, :, :3].mean(axis=0).max(axis=0)
+
+    blond = outline("blond")
+    assert blond.mean() > front
+    assert blond[0] > 1.1 * blond[2]
+    assert outline("blond", strength_tt=0.0).mean() < 0.3 * blond.mean()
+    assert outline("black", strength_r=0.0).mean() < 0.03 * blond.mean()

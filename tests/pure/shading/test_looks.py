@@ -1,0 +1,53 @@
+"""The looks that ship: complete, and each with a picture of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import struct
+from pathlib import Path
+
+import pytest
+
+from hairloom.addon.params.preset import read_preset
+from hairloom.addon.shading.settings import ShadingSettings
+
+FOLDER = Path(__file__).parents[3] / "presets" / "looks"
+LOOKS = sorted(FOLDER.glob("*.json"))
+ASKED_FOR = ["black", "brown", "blond", "red", "grey", "dyed", "wet", "under_water", "stylised"]
+#: as `make pictures` draws them: [pixels], and the most bytes
+SIDE, LARGEST = 192, 40_000
+
+every_look = pytest.mark.parametrize("path", LOOKS, ids=lambda path: path.stem)
+
+
+def test_all_that_were_asked_for_are_there() -> None:
+    assert {path.stem for path in LOOKS} >= set(ASKED_FOR)
+
+
+@every_look
+def test_a_look_names_every_value(path: Path) -> None:
+    """So it gives the same whatever was there before, also when defaults change."""
+    named = set(json.loads(path.read_text(encoding="utf-8"))["values"])
+    assert named == {field.name for field in dataclasses.fields(ShadingSettings)}
+
+
+@every_look
+def test_a_look_has_a_small_square_picture(path: Path) -> None:
+    picture = path.with_suffix(".png").read_bytes()
+    assert picture[:8] == b"\x89PNG\r\n\x1a\n"
+    assert struct.unpack(">II", picture[16:24]) == (SIDE, SIDE)
+    assert len(picture) < LARGEST
+
+
+def test_looks_differ_in_both_models() -> None:
+    """Turning the model leaves a look its colour: what either model asks for is set."""
+    settings = [read_preset(path, ShadingSettings).settings for path in LOOKS]
+    for asked in (("base_color", "primary_strength"), ("base_color", "strength_r", "width_r")):
+        assert len({tuple(getattr(look, name) for name in asked) for look in settings}) == len(
+            LOOKS
+        )
+
+
+def test_no_picture_lies_there_without_a_look() -> None:
+    assert {path.stem for path in FOLDER.glob("*.png")} == {path.stem for path in LOOKS}

@@ -1,0 +1,131 @@
+"""From the numbers of a Principled Hair node to our settings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.shading.marschner.look import root_absorption
+from hairloom.addon.shading.marschner.pigment import (
+    color_absorption,
+    melanin_absorption,
+    roughness_widths,
+)
+from hairloom.addon.shading.marschner.principled import (
+    PrincipledHair,
+    azimuthal_width,
+    settings_from,
+)
+from hairloom.addon.shading.settings import ShadingSettings
+
+
+@pytest.mark.parametrize("radial", [0.05, 0.3, 0.6])
+@pytest.mark.parametrize("color", [(0.2, 0.1, 0.05), (0.9, 0.5, 0.02)])
+def test_a_colour_absorbs_as_in_cycles_whatever_the_radial_roughness(
+    color: tuple[float, float, float], radial: float
+) -> None:
+    settings, notes = settings_from(PrincipledHair(color=color, radial_roughness=radial))
+    assert (settings.model, settings.pigment, notes) == ("marschner", "color", ())
+    wanted = color_absorption(np.array(color), radial)
+    assert root_absorption(settings) == pytest.approx(wanted, rel=1e-3)
+
+
+def test_melanin_is_taken_over_as_it_is_with_its_variation() -> None:
+    hair = PrincipledHair(
+        parametrization="MELANIN", melanin=0.4, melanin_redness=0.7, random_color=0.2
+    )
+    settings, notes = settings_from(hair)
+    assert (settings.pigment, settings.melanin, settings.redness) == ("melanin", 0.4, 0.7)
+    assert settings.color_variation == 0.2
+    assert notes == ()
+
+
+def test_a_tint_adds_to_the_melanin() -> None:
+    tint = (0.8, 0.2, 0.3)
+    hair = PrincipledHair(parametrization="MELANIN", melanin=0.4, melanin_redness=0.7, tint=tint)
+    settings, (note,) = settings_from(hair)
+    wanted = melanin_absorption(0.4, 0.7) + color_absorption(np.array(tint))
+    assert settings.pigment == "absorption" and "Tint" in note
+    assert root_absorption(settings) == pytest.approx(wanted)
+
+
+def test_an_absorption_is_taken_over_as_it_is() -> None:
+    hair = PrincipledHair(parametrization="ABSORPTION", absorption_coefficient=(0.1, 0.5, 2.0))
+    settings, notes = settings_from(hair)
+    assert settings.pigment == "absorption" and notes == ()
+    assert settings.absorption == pytest.approx((0.1, 0.5, 2.0))
+    assert settings.base_color == pytest.approx((0.1553, 0.0155, 0.0002), abs=1e-3)
+
+
+def test_roughness_makes_the_widths_and_a_coat_the_first_highlight_narrower() -> None:
+    plain, _ = settings_from(PrincipledHair(roughness=0.4))
+    coated, notes = settings_from(PrincipledHair(roughness=0.4, coat=0.5))
+    widths = (plain.width_r, plain.width_tt, plain.width_trt)
+    assert widths == pytest.approx(roughness_widths(0.4))
+    assert coated.width_r == pytest.approx(roughness_widths(0.2)[0])
+    assert (coated.width_tt, coated.width_trt) == (plain.width_tt, plain.width_trt)
+    assert notes == ()
+
+
+def test_the_width_around_is_the_standard_deviation_of_chiangs_logistic() -> None:
+    scale = np.sqrt(np.pi / 8.0) * (0.265 * 0.3 + 1.194 * 0.3**2 + 5.372 * 0.3**22)
+    x = np.linspace(-20.0, 20.0, 400001)
+    density = np.exp(-np.abs(x) / scale) / (scale * (1.0 + np.exp(-np.abs(x) / scale)) ** 2)
+    deviation = np.sqrt(np.trapezoid(density * x * x, x))
+    assert azimuthal_width(0.3) == pytest.approx(deviation, rel=1e-3)
+    settings, _ = settings_from(PrincipledHair(radial_roughness=0.3))
+    assert settings.azimuthal_width == pytest.approx(deviation, rel=1e-3)
+
+
+def test_the_offset_is_the_tilt() -> None:
+    """Measured against Cycles: a positive one moves the first highlight to the tip in both."""
+    before = ShadingSettings(offset_r=0.1, offset_trt=-0.1)
+    settings, _ = settings_from(PrincipledHair(offset=0.07), before)
+    assert settings.cuticle_tilt == pytest.approx(0.07)
+    assert (settings.offset_r, settings.offset_tt, settings.offset_trt) == (0.0, 0.0, 0.0)
+
+
+def test_huangs_lobes_and_cross_section_are_taken_over_with_a_note() -> None:
+    hair = PrincipledHair(
+        model="HUANG", aspect_ratio=0.7, reflection=0.5, transmission=0.25, secondary_reflection=2.0
+    )
+    settings, (note,) = settings_from(hair)
+    assert "Huang" in note
+    assert settings.eccentricity == 0.7
+    assert (settings.strength_r, settings.strength_tt, settings.strength_trt) == (0.5, 0.25, 2.0)
+
+
+def test_what_the_node_does_not_speak_of_stays_and_tips_and_grey_strands_go() -> None:
+    before = ShadingSettings(sparkle=0.1, scattered=0.4, tip_tint=1.0, grey_share=0.5)
+    settings, _ = settings_from(PrincipledHair(), before)
+    assert (settings.sparkle, settings.scattered) == (0.1, 0.4)
+    assert (settings.tip_tint, settings.grey_share) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("hair", "named"),
+    [
+        (PrincipledHair(ior=900.0), "IOR"),
+        (PrincipledHair(ior=0.2), "IOR"),
+        (PrincipledHair(offset=1.5), "Separation"),
+        (PrincipledHair(radial_roughness=1.0), "Width Around"),
+        (PrincipledHair(roughness=1.0), "Width"),
+        (
+            PrincipledHair(parametrization="ABSORPTION", absorption_coefficient=(1000.0, 0.0, 0.0)),
+            "Absorption",
+        ),
+        (PrincipledHair(random_roughness=0.5), "Random Roughness"),
+        (PrincipledHair(model="HUANG", aspect_ratio=0.01), "Eccentricity"),
+    ],
+)
+def test_what_lies_beyond_our_ranges_is_taken_into_them_and_told(
+    hair: PrincipledHair, named: str
+) -> None:
+    _, notes = settings_from(hair)
+    assert any(named in note for note in notes)
+
+
+def test_colours_outside_the_range_of_hair_are_finite() -> None:
+    for color in ((0.0, 0.0, 0.0), (7.0, 1.0, -1.0)):
+        settings, _ = settings_from(PrincipledHair(color=color))
+        assert np.isfinite(root_absorption(settings)).all()
