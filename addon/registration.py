@@ -10,9 +10,10 @@ from typing import Any
 
 import bpy
 
-from .host import groups, handlers, reactions
+from .host import groups, handlers, previews, reactions
 from .host.command_line import run
 from .ui import (
+    look,
     operators_bake,
     operators_colliders,
     operators_files,
@@ -33,6 +34,7 @@ CLASSES: tuple[type[Any], ...] = (
     *operators_colliders.CLASSES,
     *operators_files.CLASSES,
     *operators_presets.CLASSES,
+    *look.CLASSES,
     *panels.CLASSES,
     *operators_fins.CLASSES,
     *operators_bake.FIN_CLASSES,
@@ -70,6 +72,7 @@ def _steps() -> tuple[Step, ...]:
     return (
         *(_class_step(each) for each in CLASSES),
         (groups.register, groups.unregister),
+        (previews.register, previews.unregister),
         (panels.register, panels.unregister),
         (handlers.register, handlers.unregister),
         (_register_command, _unregister_command),

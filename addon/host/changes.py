@@ -6,6 +6,9 @@ import bpy
 
 from .session import Session
 
+#: what may light hair anew; a light that was hidden or deleted is told of as its scene's change
+_LIGHTING = (bpy.types.Light, bpy.types.World, bpy.types.Collection, bpy.types.Scene)
+
 
 def changes(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
     """Session numbers of what has moved or changed shape, of changed shapes; if lights changed."""
@@ -17,7 +20,7 @@ def changes(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
         if update.is_updated_geometry:
             edited.add(changed.session_uid)
         is_light = isinstance(changed, bpy.types.Object) and changed.type == "LIGHT"
-        is_lit_anew |= is_light or isinstance(changed, bpy.types.Light | bpy.types.World)
+        is_lit_anew |= is_light or isinstance(changed, _LIGHTING)
     return moved, edited, is_lit_anew
 
 

@@ -18,6 +18,7 @@ from .inputs import Sources
 from .jobs import Job, cards, demo, export, render, simulate
 from .overrides import overrides
 from .presets import named_preset
+from .principled import look_from_named
 
 VERBS = {
     "simulate": simulate,
@@ -138,6 +139,15 @@ def _add_job_options(verb: argparse.ArgumentParser, name: str) -> None:
         metavar="NAME",
         help="a preset such as looks/blond or dynamics/soft, or a preset file",
     )
+    if name in ("cards", "demo"):
+        job.add_argument(
+            "--texture",
+            action="append",
+            default=[],
+            metavar="NAME=FILE",
+            help="a picture in place of a generated texture of the cards: base, alpha, shift, "
+            "noise or tangent; can be given again",
+        )
     if name in ("simulate", "demo"):
         job.add_argument("--seconds", type=float, default=2.0, help="length of the head's shake")
         job.add_argument("--frame-rate", type=float, default=60.0, help="frames a second")
@@ -152,6 +162,11 @@ def _add_job_options(verb: argparse.ArgumentParser, name: str) -> None:
         job.add_argument("--height", type=int, default=720, help="pixels down")
         job.add_argument("--samples", type=int, default=3, help="sub-pixels along each side")
     if name == "render":
+        job.add_argument(
+            "--look-from-material",
+            action="store_true",
+            help="start from the Principled Hair of the material of --groom, a hair object",
+        )
         job.add_argument("--sheet", help="write a contact sheet of the take to this .png too")
 
 
@@ -214,11 +229,15 @@ _LIMITS = (
 
 
 def _settings(options: argparse.Namespace) -> dict[str, Settings]:
-    """All parameter sets: the defaults, changed by --preset, changed by --set."""
+    """All parameter sets: the defaults, changed by --preset or a material, changed by --set."""
     chosen = {section: made() for section, made in ALL_SETTINGS.items()}
     for name in options.preset:
         preset = named_preset(name)
         chosen[preset.settings.section] = preset.settings
+    if getattr(options, "look_from_material", False):
+        chosen["shading"], notes = look_from_named(options.groom, chosen["shading"])
+        for note in notes:
+            print(f"hairloom: {options.groom}: {note}", file=sys.stderr)
     return {
         section: type(values).from_dict(values.as_dict() | overrides(options.set, section), "--set")
         for section, values in chosen.items()

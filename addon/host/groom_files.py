@@ -19,9 +19,10 @@ from ..groom.settings import GrowSettings, GuideSettings
 from ..pipeline import Rig
 from ..shading.ambient import AmbientSettings
 from ..shading.settings import ShadingSettings
-from ..shading.textures import TextureSettings
+from ..shading.textures import TEXTURES, TextureSettings
 from ..strands import StrandSet
 from .card_files import CardChoices, write_cards
+from .card_images import chosen_pictures
 from .curves import write_curves
 from .properties import settings_of
 from .source import Source, read_source
@@ -92,22 +93,25 @@ def grow_on(
 
 
 def export_cards(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, path: Path) -> Outcome:
-    """Write the groom as hair cards (GLB and sidecar), one for each guide.
+    """Write the groom as hair cards (GLB, textures and sidecar), one for each guide.
 
     Raises:
         HairloomError: no hair that can be used, or the file cannot be written.
     """
     source, groom = read_source(hair, depsgraph), hair.data.hairloom
     rig = _rig(hair, source)
+    pictures, warnings = chosen_pictures(groom.card_images)
     choices = CardChoices(
         settings_of(groom.cards, CardSettings),
         settings_of(groom.card_texture, TextureSettings),
         settings_of(groom.ambient, AmbientSettings),
         settings_of(groom.shading, ShadingSettings),
+        pictures,
     )
-    mesh, sidecar = write_cards(path, rig, choices)
-    result = f"Wrote {mesh.card_count:,} cards to {path.name} and {sidecar.name}"
-    return Outcome(result, source.dropped, (*source.warnings, *_told(hair, rig)))
+    written = write_cards(path, rig, choices)
+    names = f"{path.name}, {len(TEXTURES)} textures and {written.files[-1].name}"
+    result = f"Wrote {written.mesh.card_count:,} cards to {names}"
+    return Outcome(result, source.dropped, (*source.warnings, *_told(hair, rig), *warnings))
 
 
 def export_tfx(

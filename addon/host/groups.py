@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringPropert
 from ..parameters import ALL_SETTINGS
 from . import reactions
 from .bake_group import HAIRLOOM_PG_bake
+from .card_images import HAIRLOOM_PG_card_images
 from .fin_group import FIN_PROPERTIES
 from .objects import head_of
 from .obstacle_reader import SHAPES
@@ -81,6 +82,11 @@ class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
 
     __annotations__ = {
         **_pointers(GROOM_SECTIONS),
+        "card_images": PointerProperty(
+            type=HAIRLOOM_PG_card_images,
+            name="Card Pictures",
+            description="Pictures in the place of generated textures of hair cards",
+        ),
         "baked_in": StringProperty(
             name="Baked In",
             description="Folder of the bake that these curves show in renders",
@@ -143,7 +149,13 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
     }
 
 
-CLASSES = (*SECTION_GROUPS.values(), HAIRLOOM_PG_bake, HAIRLOOM_PG_groom, HAIRLOOM_PG_character)
+CLASSES = (
+    *SECTION_GROUPS.values(),
+    HAIRLOOM_PG_bake,
+    HAIRLOOM_PG_card_images,
+    HAIRLOOM_PG_groom,
+    HAIRLOOM_PG_character,
+)
 
 
 def register() -> None:

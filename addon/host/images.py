@@ -1,4 +1,7 @@
-"""Pictures to disk through Blender's own image writer, and the contact sheet."""
+"""Pictures to and from files and Blender's images, and the contact sheet.
+
+Textures go through OpenImageIO where this Python has it, else through Blender's own images.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,10 @@ import bpy
 import numpy as np
 
 from ..arrays import Floats
+from ..errors import HairloomError
+from ..exchange import texture_files
 from ..exchange.atomic import atomic_write
+from ..exchange.srgb import srgb_decoded, srgb_encoded
 
 
 def write_png(path: Path, linear: Floats) -> None:
@@ -20,15 +26,84 @@ def write_png(path: Path, linear: Floats) -> None:
     Raises:
         HairloomError: the folder or file cannot be written.
     """
-    height, width = linear.shape[:2]
-    image = bpy.data.images.new("Hairloom", width, height, alpha=True)
+    _save_png(path, display_encoded(linear), has_alpha=True)
+
+
+def write_texture(path: Path, pixels: Floats, *, is_color: bool, depth: str) -> None:
+    """Write a texture as PNG, see `texture_files.write_texture`; without OpenImageIO in 8 bits.
+
+    Args:
+        pixels: (height, width) or (height, width, 3), row 0 at the bottom.
+        depth: "uint8" or "uint16".
+
+    Raises:
+        HairloomError: the folder or file cannot be written.
+    """
+    if texture_files.has_openimageio():
+        texture_files.write_texture(path, pixels, is_color=is_color, depth=depth)
+        return
+    colors = np.atleast_3d(pixels).astype(np.float32)
+    coded = np.ones((*colors.shape[:2], 4), np.float32)
+    coded[..., :3] = srgb_encoded(colors) if is_color else colors
+    _save_png(path, coded, has_alpha=False)
+
+
+def read_texture(path: Path, *, is_color: bool) -> Floats:
+    """Read a picture from a file, see `texture_files.read_texture`.
+
+    Raises:
+        HairloomError: no such file, or none that can be read as a picture.
+    """
+    if texture_files.has_openimageio():
+        return texture_files.read_texture(path, is_color=is_color)
     try:
-        image.pixels.foreach_set(display_encoded(linear).ravel())
-        image.file_format = "PNG"
-        with atomic_write(path) as temporary:
-            image.save(filepath=str(temporary))
+        image = bpy.data.images.load(str(path))
+    except RuntimeError as error:
+        raise HairloomError(
+            "there is no such file, or it cannot be read", place=str(path), remedy="Check the path"
+        ) from error
+    try:
+        return read_image(image, is_color=is_color, place=str(path))
     finally:
         bpy.data.images.remove(image)
+
+
+def read_image(image: bpy.types.Image, *, is_color: bool, place: str) -> Floats:
+    """The pixels of one of Blender's images as it is, saved or not, of its own size.
+
+    Args:
+        is_color: as scene-linear colour; else as it is stored, whatever its colour space says.
+        place: names it in error messages.
+
+    Returns:
+        (height, width, 4) float32, row 0 at the bottom, straight alpha.
+
+    Raises:
+        HairloomError: its file is missing or broken, or it is too large.
+    """
+    width, height = image.size  # loads it, if that has not happened
+    if not (width and height and image.has_data):
+        raise HairloomError(
+            "this picture has no pixels: its file is missing or broken",
+            place=place,
+            remedy="Find it by File > External Data > Find Missing Files, or choose another one",
+        )
+    texture_files.check_size(width, height, place)
+    pixels = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(height, width, 4)
+    is_coded = image.colorspace_settings.name == "sRGB"
+    if not image.is_float:  # stored as it is
+        if is_color and is_coded:
+            pixels[..., :3] = srgb_decoded(pixels[..., :3])
+        return pixels
+    # scene-linear already, and multiplied with alpha
+    if image.alpha_mode != "CHANNEL_PACKED":
+        alpha = pixels[..., 3:]
+        np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0.0)
+    if is_coded and not is_color:
+        pixels[..., :3] = srgb_encoded(pixels[..., :3])
+    return pixels
 
 
 def display_encoded(linear: Floats) -> Floats:
@@ -37,9 +112,7 @@ def display_encoded(linear: Floats) -> Floats:
     straight = np.divide(
         linear[..., :3], alpha, out=np.zeros_like(linear[..., :3]), where=alpha > 0.0
     )
-    straight = np.clip(straight, 0.0, 1.0)
-    curved = 1.055 * np.power(straight, 1.0 / 2.4) - 0.055
-    coded = np.where(straight <= 0.0031308, 12.92 * straight, curved)
+    coded = srgb_encoded(np.clip(straight, 0.0, 1.0))
     return np.concatenate([coded, alpha], axis=-1).astype(np.float32)
 
 
@@ -53,3 +126,16 @@ def contact_sheet(pictures: list[Floats], columns: int) -> Floats:
         top = (rows - 1 - row) * height  # row 0 of a picture is its bottom
         sheet[top : top + height, column * width : (column + 1) * width] = picture
     return sheet
+
+
+def _save_png(path: Path, coded: Floats, *, has_alpha: bool) -> None:
+    """Write values that are coded already, (height, width, 4), in 8 bits."""
+    height, width = coded.shape[:2]
+    image = bpy.data.images.new("Hairloom", width, height, alpha=has_alpha)
+    try:
+        image.pixels.foreach_set(np.ascontiguousarray(coded, np.float32).ravel())
+        image.file_format = "PNG"
+        with atomic_write(path) as temporary:
+            image.save(filepath=str(temporary))
+    finally:
+        bpy.data.images.remove(image)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,10 +21,12 @@ from ..groom.settings import GrowSettings, GuideSettings
 from ..params import Settings
 from ..pipeline import Pose, Rig
 from ..refine.settings import DetailSettings
+from ..render.card_snapshot import CardSnapshot
 from ..shading.ambient import AmbientSettings
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..shading.textures import TextureSettings
-from .card_files import CardChoices, write_cards
+from .card_files import CardChoices, WrittenCards, write_cards
+from .card_images import named_pictures
 from .images import contact_sheet, write_png
 from .inputs import Inputs, Sources, read_inputs
 from .report import Progress, Report
@@ -79,10 +82,11 @@ def render(job: Job) -> None:
 
 
 def cards(job: Job) -> None:
-    """Turn the guides into hair cards, sorted from inside to outside, and write a GLB."""
+    """Turn the guides into hair cards, sorted from inside to outside: a GLB and its textures."""
     report = Report(job.verb)
+    pictures = named_pictures(job.options.texture)
     rig, _ = _rig(job, report)
-    _write_cards(job, job.output, rig, report)
+    _write_cards(job, job.output, rig, pictures, report)
     _finish(job, report, job.output)
 
 
@@ -97,15 +101,16 @@ def export(job: Job) -> None:
 
 
 def demo(job: Job) -> None:
-    """Do it all: simulate, still, contact sheet, hair cards, strands and report.json."""
+    """Do it all: simulate, stills, contact sheet, hair cards, strands and report.json."""
     report = Report(job.verb)
-    folder = job.output
+    folder, pictures = job.output, named_pictures(job.options.texture)
     rig, inputs = _rig(job, report)
     take = _simulate(job, rig, inputs, report)
     studio = _studio(job, rig, report)
     _write_still(job, folder / "still.png", studio, *_rest(rig), report)
     _write_sheet(folder / "motion.png", studio, rig, take, report)
-    _write_cards(job, folder / "cards.glb", rig, report)
+    written = _write_cards(job, folder / "cards.glb", rig, pictures, report)
+    _write_card_still(job, folder / "cards.png", studio, written, report)
     with report.stage("write strands"):
         write_tfx(folder / "strands.tfx", rig.strands)
     report.add_output(folder / "strands.tfx")
@@ -259,18 +264,34 @@ def _write_sheet(path: Path, studio: Studio, rig: Rig, take: Take, report: Repor
     report.add_output(path)
 
 
-def _write_cards(job: Job, path: Path, rig: Rig, report: Report) -> None:
+def _write_cards(
+    job: Job, path: Path, rig: Rig, pictures: Mapping[str, Floats], report: Report
+) -> WrittenCards:
     print("building hair cards", flush=True)
     choices = CardChoices(
         job.set(CardSettings),
         job.set(TextureSettings),
         job.set(AmbientSettings),
         job.set(ShadingSettings),
+        pictures,
     )
-    mesh, sidecar = write_cards(path, rig, choices, report.stage)
-    report.facts.update(cards=mesh.card_count, card_triangles=len(mesh.triangles))
+    written = write_cards(path, rig, choices, report.stage)
+    report.facts.update(cards=written.mesh.card_count, card_triangles=len(written.mesh.triangles))
+    for file in written.files:
+        report.add_output(file)
+    return written
+
+
+def _write_card_still(
+    job: Job, path: Path, studio: Studio, written: WrittenCards, report: Report
+) -> None:
+    """The cards where the strands are in the still."""
+    options, has_map = job.options, job.set(TextureSettings).highlights == "tangent"
+    shown = CardSnapshot(written.mesh, written.textures, has_map)
+    with report.stage("draw cards"):
+        picture = studio.card_picture(shown, options.width, options.height, options.samples)
+    write_png(path, picture)
     report.add_output(path)
-    report.add_output(sidecar)
 
 
 def _finish(job: Job, report: Report, output: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import bpy
 import numpy as np
@@ -38,6 +38,42 @@ def light_warnings(depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
         f"Lights: {count} shine here, but the preview draws only the {LIGHT_CAPACITY} that are "
         "brightest at the middle of the hair. Hide those that add least.",
     )
+
+
+def no_light_warnings(lights: Sequence[Light], ambient: Color) -> tuple[str, ...]:
+    """What the artist should know where nothing shines although a view goes by the scene's lights.
+
+    Such a view shows hair by the world alone, or, if that is black, by a studio's lights; see
+    `overlay.lit`.
+    """
+    if lights or not any(uses_scene_light(each)[0] for each in _open_shadings()):
+        return ()
+    if any(ambient):
+        return (
+            "Lights: no light shines here, so where views go by the scene's lights, hair has only "
+            "the world's colour. Add a light, or turn Scene Lights off in Viewport Shading.",
+        )
+    return (
+        "Lights: no light shines here and the world is black, so hair is shown by the lights of a "
+        "studio. Add a light, or give the world a colour.",
+    )
+
+
+def uses_scene_light(shading: bpy.types.View3DShading) -> tuple[bool, bool]:
+    """Whether a 3D view shows things by the scene's lights, and by its world."""
+    if shading.type == "MATERIAL":
+        return shading.use_scene_lights, shading.use_scene_world
+    if shading.type == "RENDERED":
+        return shading.use_scene_lights_render, shading.use_scene_world_render
+    return False, False
+
+
+def _open_shadings() -> Iterator[bpy.types.View3DShading]:
+    """Of all 3D views that are open."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                yield area.spaces.active.shading
 
 
 def read_ambient(scene: bpy.types.Scene) -> Color:

@@ -17,6 +17,7 @@ from . import overlay, playback, timeline
 from .objects import is_solid, spaces_without
 from .originals import refresh_views, show_originals
 from .overlay import Drawing
+from .redraw import redraw_panels
 from .session import Session
 from .shown import with_all_strands
 from .simulated import Simulated
@@ -52,13 +53,13 @@ def add(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     _take_bake(session, depsgraph)
     _sessions[session.uid] = session
     _publish(session, depsgraph)
-    overlay.redraw_panels()
+    redraw_panels()
 
 
 def stop(session: Simulated) -> None:
     """Preview it no longer."""
     _forget(session)
-    overlay.redraw_panels()
+    redraw_panels()
     if not isinstance(session, Session):
         return
     hair = session.hair.handle.find()
@@ -131,7 +132,7 @@ def pause(is_paused: bool) -> None:
     """Hold all hair that plays freely where it is, or let it go on."""
     global _is_paused
     _is_paused = is_paused
-    overlay.redraw_panels()
+    redraw_panels()
 
 
 def play(depsgraph: bpy.types.Depsgraph) -> list[str]:
@@ -201,7 +202,7 @@ def bake_changed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         _take_bake(session, depsgraph)
 
     attempt(session, depsgraph, show)
-    overlay.redraw_panels()
+    redraw_panels()
 
 
 def is_free(session: Simulated) -> bool:

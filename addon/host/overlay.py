@@ -17,8 +17,11 @@ import numpy as np
 from ..render.camera import Camera
 from ..render.snapshot import Snapshot
 from ..render.strand_pass import StrandPass
-from ..shading.lights import three_point_lights
+from ..shading.lights import Light, three_point_lights
+from . import view_transform
+from .lights import uses_scene_light
 from .overlay_text import counts_line, write_lines
+from .redraw import redraw_panels, redraw_views
 from .shown import with_all_strands
 
 
@@ -55,7 +58,8 @@ def show(uid: int, drawing: Drawing) -> None:
             add(_draw, (draw,), "WINDOW", kind)
             for draw, kind in ((_draw_strands, "POST_VIEW"), (_draw_counts, "POST_PIXEL"))
         )
-    redraw()
+        view_transform.prepare()
+    redraw_views()
 
 
 def drop(uid: int) -> None:
@@ -64,7 +68,7 @@ def drop(uid: int) -> None:
     _passes.pop(uid, None)
     if not _drawings:
         _remove_handlers()
-    redraw()
+    redraw_views()
 
 
 def drawing_of(uid: int) -> Drawing | None:
@@ -84,24 +88,6 @@ def retry() -> None:
         bpy.context.workspace.status_text_set(None)
 
 
-def redraw() -> None:
-    """Ask all 3D views to draw themselves again."""
-    _redraw({("VIEW_3D", "WINDOW")})
-
-
-def redraw_panels() -> None:
-    """Ask all places that have a panel of ours to draw themselves again."""
-    _redraw({("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")})
-
-
-def _redraw(places: set[tuple[str, str]]) -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            for region in area.regions:
-                if (area.type, region.type) in places:
-                    region.tag_redraw()
-
-
 def _draw(what: Callable[[Any], None]) -> None:
     """Called by Blender for each 3D view; an error is told once, not at every redraw."""
     if _failure:
@@ -115,14 +101,18 @@ def _draw(what: Callable[[Any], None]) -> None:
 def _draw_strands(context: Any) -> None:
     space, view = context.space_data, context.region_data
     camera = Camera(np.array(view.view_matrix), np.array(view.window_matrix))
-    address, light = space.as_pointer(), _lighting(space, camera)
+    address, studio = space.as_pointer(), three_point_lights(camera.view)
+    display = view_transform.display_of(space.shading, context.scene)
     _, _, width, height = gpu.state.viewport_get()
     for uid, drawing in _shown_in(space):
         snapshot = drawing.snapshot
         if is_seen_through(space.shading) or address in drawing.bare_in:
             snapshot = with_all_strands(snapshot)
         strand_pass = _passes.setdefault(uid, StrandPass())
-        strand_pass.draw(light(snapshot), camera, width, height, output="viewport")
+        snapshot = lit(snapshot, space.shading, studio)
+        # colours that stand for numbers are no light
+        shown_by = display if snapshot.debug_view == "none" else None
+        strand_pass.draw(snapshot, camera, width, height, output="viewport", display=shown_by)
 
 
 def _draw_counts(context: Any) -> None:
@@ -156,21 +146,16 @@ def is_seen_through(shading: Any) -> bool:
     return shading.type == "WIREFRAME" or (shading.type == "SOLID" and shading.show_xray)
 
 
-def _lighting(space: Any, camera: Camera) -> Callable[[Snapshot], Snapshot]:
-    """The scene's lights where Blender itself uses them; elsewhere, as there, a studio's."""
-    shading = space.shading
-    uses_scene = {
-        "RENDERED": shading.use_scene_lights_render,
-        "MATERIAL": shading.use_scene_lights,
-    }
-    studio = three_point_lights(camera.view)
-
-    def lit(snapshot: Snapshot) -> Snapshot:
-        if uses_scene.get(shading.type, False) and snapshot.lights:
-            return snapshot
+def lit(snapshot: Snapshot, shading: Any, studio: tuple[Light, ...]) -> Snapshot:
+    """By the scene's lights and world where Blender itself uses them; elsewhere, as there, by a
+    studio's. A scene that has no light and a black world has the studio's too, not black hair.
+    """
+    uses_lights, uses_world = uses_scene_light(shading)
+    lights = snapshot.lights if uses_lights else ()
+    ambient = snapshot.ambient if uses_world else Snapshot.ambient
+    if not lights and not (uses_world and any(ambient)):
         return replace(snapshot, lights=studio, ambient=Snapshot.ambient)
-
-    return lit
+    return replace(snapshot, lights=lights, ambient=ambient)
 
 
 def _fail(error: Exception) -> None:

@@ -1,43 +1,140 @@
-"""The presets that come with Hairloom, found by section, and put onto a groom."""
+"""Presets: those that come with Hairloom and the artist's own, found by section, put onto a groom.
+
+The artist's own lie in the folder that Blender keeps for the extension. They are data like all
+presets, checked and never executed; a file there that is none is told of and otherwise left alone.
+"""
 
 from __future__ import annotations
 
-from functools import cache
+import json
+import re
+from dataclasses import dataclass
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 import bpy
 
 from ..errors import HairloomError
+from ..exchange.atomic import write_text_atomic
 from ..parameters import ALL_SETTINGS
 from ..params import Settings
-from ..params.preset import Preset, read_any_preset
+from ..params.preset import Preset, preset_as_dict, read_any_preset
+from . import previews
 
-PRESET_FOLDER = Path(__file__).parents[2] / "presets"
+PRESET_FOLDER = Path(__file__).resolve().parents[2] / "presets"
+#: what the names of the artist's own presets begin with
+OWN = "own/"
+#: no preset is nearly as long [bytes]
+_LONGEST = 1_000_000
+_LONGEST_TITLE = 40
+#: the package that Blender knows, two above this one
+_EXTENSION = __package__.rpartition(".addon")[0]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One preset in a menu.
+
+    name: as `named_preset` knows it.
+    """
+
+    name: str
+    title: str
+    path: Path
+
+    @property
+    def is_own(self) -> bool:
+        return self.name.startswith(OWN)
+
+    @property
+    def icon(self) -> int:
+        """See `previews.icon_of`."""
+        return previews.icon_of(self.path)
 
 
 @cache
-def shipped(section: str) -> tuple[tuple[str, str], ...]:
-    """(name, title) of the presets of one section; a name is a path below the preset folder."""
+def shipped(section: str) -> tuple[Entry, ...]:
+    """The presets of one section that come with Hairloom; a name is a path below their folder."""
     found = []
     for path in sorted(PRESET_FOLDER.rglob("*.json")):
         preset = read_any_preset(path, ALL_SETTINGS)
         if preset.settings.section == section:
             name = path.relative_to(PRESET_FOLDER).with_suffix("").as_posix()
-            found.append((name, preset.title))
+            found.append(Entry(name, preset.title, path))
     return tuple(found)
 
 
+def own(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
+    """The artist's own presets of one section, and what is wrong with other files there."""
+    entries, warnings = [], []
+    for path in _own_files():
+        try:
+            stat = path.stat()
+            title, found = _read(path, stat.st_mtime_ns, stat.st_size)
+        except (HairloomError, OSError, RecursionError) as error:
+            why = error.problem if isinstance(error, HairloomError) else error
+            warnings.append(f"{path.name} is no preset: {why}")
+            continue
+        if found == section:
+            entries.append(Entry(OWN + path.stem, title, path))
+    return tuple(sorted(entries, key=lambda entry: entry.title.lower())), tuple(warnings)
+
+
+def own_folder() -> Path:
+    """Where the artist's own presets lie; it may not be there yet."""
+    try:
+        return Path(bpy.utils.extension_path_user(_EXTENSION, path="presets"))
+    except ValueError:  # not installed as an extension
+        return Path(bpy.utils.user_resource("CONFIG", path="hairloom")) / "presets"
+
+
+def save_own(title: str, settings: Settings) -> Path:
+    """Keep settings as a preset of this title; one that has the same title is replaced.
+
+    Raises:
+        HairloomError: the title is empty, or the file cannot be written.
+    """
+    title = " ".join(title.split())[:_LONGEST_TITLE]
+    stem = re.sub(r"[^a-z0-9]+", "_", title.lower()).strip("_")
+    if not title:
+        raise HairloomError("a preset needs a name", place="Save Preset", remedy="Type one")
+    path = _file_for(stem or "preset", title, settings.section)
+    data = preset_as_dict(Preset(title, "saved by the artist", settings))
+    write_text_atomic(path, json.dumps(data, indent=2) + "\n")
+    return path
+
+
+def delete_own(name: str) -> None:
+    """Delete one of the artist's own presets, with its picture.
+
+    Raises:
+        HairloomError: there is no such preset of the artist's own, or it cannot be deleted.
+    """
+    path = _own_path(name)
+    if path is None:
+        raise HairloomError("there is no such preset of your own", place=name, remedy=_KNOWN_OWN)
+    previews.forget(path)
+    try:
+        path.unlink()
+        path.with_suffix(".png").unlink(missing_ok=True)
+    except OSError as error:
+        raise HairloomError(
+            f"it cannot be deleted ({error.strerror})", place=str(path), remedy="Delete it yourself"
+        ) from error
+
+
 def named_preset(name: str) -> Preset[Any]:
-    """A preset by its name, such as looks/blond, or by the path of a file.
+    """A preset by its name, such as looks/blond or own/mine, or by the path of a file.
 
     Raises:
         HairloomError: there is no such preset, or it is damaged.
     """
-    own = PRESET_FOLDER / f"{name}.json"
-    path = own if own.is_file() and own.resolve().is_relative_to(PRESET_FOLDER) else Path(name)
+    below = PRESET_FOLDER / f"{name}.json"
+    is_shipped = below.is_file() and below.resolve().is_relative_to(PRESET_FOLDER)
+    path = (below if is_shipped else None) or _own_path(name) or Path(name)
     if not path.is_file():
-        known = ", ".join(one for section in ALL_SETTINGS for one, _ in shipped(section))
+        known = ", ".join(one.name for section in ALL_SETTINGS for one in shipped(section))
         raise HairloomError("there is no such preset", place=name, remedy=f"Use a file or {known}")
     return read_any_preset(path, ALL_SETTINGS)
 
@@ -59,3 +156,40 @@ def apply(settings: Settings, hair: bpy.types.Object) -> None:
         place="preset",
         remedy="Choose a preset of looks or dynamics",
     )
+
+
+_KNOWN_OWN = "Choose one from the menu of presets"
+
+
+def _own_files() -> list[Path]:
+    try:
+        return sorted(own_folder().glob("*.json"))
+    except OSError:
+        return []
+
+
+def _own_path(name: str) -> Path | None:
+    """The file of a name such as own/mine, if there is one; never one outside of the folder."""
+    found = {OWN + path.stem: path for path in _own_files()} if name.startswith(OWN) else {}
+    return found.get(name)
+
+
+@lru_cache(maxsize=256)
+def _read(path: Path, _changed: int, size: int) -> tuple[str, str]:
+    """Title and section of a preset file; read again only when it has changed."""
+    if size > _LONGEST:
+        raise HairloomError("it is too long", place=path.name, remedy="Delete it")
+    preset = read_any_preset(path, ALL_SETTINGS)
+    title = " ".join(preset.title.split())[:_LONGEST_TITLE]
+    return title or path.stem, preset.settings.section
+
+
+def _file_for(stem: str, title: str, section: str) -> Path:
+    """The file of this title, else a new one whose name no other has."""
+    entries, _ = own(section)
+    for entry in entries:
+        if entry.title == title:
+            return entry.path
+    taken = {path.stem for path in _own_files()}
+    names = [stem, *(f"{stem}_{number}" for number in range(2, len(taken) + 3))]
+    return own_folder() / f"{next(name for name in names if name not in taken)}.json"

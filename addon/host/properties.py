@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import bpy
+import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 
 from ..params import Parameter, Settings
@@ -102,7 +103,11 @@ def _value(group: Any, parameter: Parameter) -> Any:
     value = getattr(group, parameter.name)
     if parameter.kind in {"color", "curve"}:
         return tuple(_as_typed(channel) for channel in value)
-    return _as_typed(value) if parameter.kind == "number" else value
+    if parameter.kind == "number":
+        # 30 degrees in radians have more digits than are stored: what was declared comes first
+        declared = (parameter.default, *(parameter.hard_range or ()))
+        return next((one for one in declared if np.float32(one) == value), _as_typed(value))
+    return value
 
 
 def _as_typed(value: float) -> float:

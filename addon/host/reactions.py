@@ -13,14 +13,18 @@ from functools import partial
 
 import bpy
 
-from . import live, overlay, playback, timeline
+from . import live, playback, timeline, view_transform
 from .changes import changes, is_among, is_edited, is_weighted_anew
 from .originals import refresh_views
+from .redraw import redraw_panels
 from .session import Session
 from .simulated import Simulated
 
 #: Edits come in bursts, as brush strokes do: read again when this long [s] nothing came.
 SETTLING_TIME = 0.2
+
+#: Shading is drawn by quick tables while a slider moves, by full ones when it rests this long [s].
+REFINING_TIME = 0.3
 
 _last_edit = 0.0
 
@@ -38,6 +42,7 @@ def settings_changed(owner: bpy.types.ID) -> None:
 
 def _take_settings(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
     session.take_settings()
+    _refine_soon(session)
     timeline.look_again(session, depsgraph)
 
 
@@ -82,6 +87,7 @@ def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
 def _go(session: Simulated, depsgraph: bpy.types.Depsgraph, is_lit_anew: bool) -> None:
     if isinstance(session, Session):
         session.take_settings()
+        _refine_soon(session)
         if is_lit_anew:
             session.light(depsgraph)
     if timeline.follows_playback(session):
@@ -90,6 +96,23 @@ def _go(session: Simulated, depsgraph: bpy.types.Depsgraph, is_lit_anew: bool) -
             timeline.follow(session, depsgraph)
     elif not live.is_free(session) and not timeline.show_frame(session, depsgraph):
         session.rest(depsgraph)
+
+
+def _refine_soon(session: Session) -> None:
+    """Once the slider rests; every move puts it off."""
+    if not session.is_coarse:
+        return
+    if bpy.app.timers.is_registered(_refine):
+        bpy.app.timers.unregister(_refine)
+    bpy.app.timers.register(_refine, first_interval=REFINING_TIME)
+
+
+def _refine() -> None:
+    """A timer of Blender's: the shading of a slider that is no longer moved, at its best."""
+    depsgraph = bpy.context.view_layer.depsgraph
+    for session in live.sessions():
+        if session.is_coarse:
+            live.attempt(session, depsgraph, Session.refine)
 
 
 def undone() -> None:
@@ -121,7 +144,7 @@ def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
     for session in live.simulated():
         if session.is_stale:
             live.attempt(session, depsgraph, partial(_read, depsgraph=depsgraph))
-    overlay.redraw_panels()
+    redraw_panels()
 
 
 def _read(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
@@ -138,5 +161,7 @@ def _read(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
 def clear() -> None:
     """Leave nothing behind: no preview, no timer, no notice."""
     live.end()
-    if bpy.app.timers.is_registered(_read_again):
-        bpy.app.timers.unregister(_read_again)
+    view_transform.forget()
+    for timer in (_read_again, _refine):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)

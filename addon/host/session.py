@@ -11,14 +11,15 @@ from .. import pipeline
 from ..arrays import Floats
 from ..errors import HairloomError
 from ..pipeline import Motion, Pose, Rig
+from ..shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
 from .baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays, used_vertices
 from .choices import Choices
 from .hiders import Hiders
-from .lights import light_warnings, read_ambient, read_lights
+from .lights import light_warnings, no_light_warnings, read_ambient, read_lights
 from .objects import Body
 from .obstacles import Obstacles
 from .reading import Reading
-from .shown import snapshot_of, with_choices
+from .shown import shapes_alike, snapshot_of, with_choices, with_tables
 from .simulated import Arrays
 from .solvers import Solver, computed_on, form_of, solver_of
 from .source import Source, dynamics_warnings, refuse_own_dynamics
@@ -85,7 +86,8 @@ class Session:
         doubled = () if hair is None else dynamics_warnings(hair)
         found = () if self.obstacles is None else self.obstacles.warnings
         notes = (f"{self.name}: {note}" for note in self.rig.notes)
-        return (*self.source.warnings, *notes, *doubled, *found, *self._light_warnings)
+        dark = no_light_warnings(self.snapshot.lights, self.snapshot.ambient)
+        return (*self.source.warnings, *notes, *doubled, *found, *self._light_warnings, *dark)
 
     @property
     def computed_on(self) -> str:
@@ -148,10 +150,21 @@ class Session:
         before = self.choices
         self.is_stale |= not self._reading.take_choices().acts_at_once(before)
         self.snapshot = with_choices(self.snapshot, self.choices)
+        if not shapes_alike(before.shading, self.choices.shading) and not bpy.app.background:
+            self.snapshot = with_tables(self.snapshot, PREVIEW_SIZE)
         if self.choices.detail.culling != before.detail.culling:
             self._show()
         if self.choices.dynamics.form != before.dynamics.form:
             self._change_form(self.choices.dynamics.form)
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether a slider is being moved, so that it is shaded by tables that are quickly made."""
+        return self.snapshot.table_size < DEFAULT_SIZE
+
+    def refine(self) -> None:
+        """Shade by tables of full size again."""
+        self.snapshot = with_tables(self.snapshot, DEFAULT_SIZE)
 
     def _change_form(self, form: str) -> None:
         """Go on where the hair is now, with another solver."""

@@ -9,6 +9,9 @@ import numpy as np
 from ..arrays import Floats
 from ..pipeline import Rig
 from ..render.snapshot import Snapshot
+from ..shading.marschner.look import fibre_of
+from ..shading.marschner.tables import shape_of
+from ..shading.settings import ShadingSettings
 from .choices import Choices
 
 
@@ -39,6 +42,18 @@ def with_choices(snapshot: Snapshot, choices: Choices) -> Snapshot:
         detail=choices.detail,
         debug_view=choices.debug_view,
     )
+
+
+def with_tables(snapshot: Snapshot, size: int) -> Snapshot:
+    """The same by look-up tables of this size, for hair that needs any."""
+    return snapshot if snapshot.table_size == size else replace(snapshot, table_size=size)
+
+
+def shapes_alike(one: ShadingSettings, other: ShadingSettings) -> bool:
+    """Whether the same look-up tables serve both; a change of colour needs no others."""
+    if other.model != "marschner":
+        return True
+    return one.model == other.model and shape_of(fibre_of(one)) == shape_of(fibre_of(other))
 
 
 def with_all_strands(snapshot: Snapshot) -> Snapshot:

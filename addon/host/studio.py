@@ -13,9 +13,11 @@ from ..arrays import Floats
 from ..pipeline import Pose, Rig
 from ..refine.settings import DetailSettings
 from ..render.camera import Camera, frame_camera
+from ..render.card_pass import CardPass
+from ..render.card_snapshot import CardSnapshot
 from ..render.frame import render_image
 from ..render.mesh_pass import MeshPass
-from ..render.snapshot import MeshSnapshot
+from ..render.snapshot import MeshSnapshot, Snapshot
 from ..render.strand_pass import Statistics, StrandPass
 from ..shading.lights import three_point_lights
 from ..shading.settings import ShadingSettings, StrandSettings
@@ -60,7 +62,7 @@ class Studio:
     ) -> None:
         ensure_gpu()
         self._rig, self._head_occlusion = rig, head_occlusion
-        self._passes = MeshPass(), StrandPass()
+        self._passes, self._card_pass = (MeshPass(), StrandPass()), CardPass()
         self._hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
         self._at_rest = replace(
             snapshot_of(rig, occlusion, pipeline.strand_ranks(rig)),
@@ -96,6 +98,36 @@ class Studio:
         )
         return render_image(
             snapshot, camera, width, height, samples, background=BACKDROP, passes=self._passes
+        )
+
+    def card_picture(
+        self,
+        cards: CardSnapshot,
+        width: int,
+        height: int,
+        samples: int,
+        camera: Camera | None = None,
+    ) -> Floats:
+        """These cards in place of the strands at rest; arguments as in `picture`."""
+        camera = camera or self._camera(width / height)
+        cv_count = self._at_rest.cv_count
+        snapshot = Snapshot(
+            strands=np.zeros((0, cv_count, 3), np.float32),
+            radius=np.zeros((0, cv_count), np.float32),
+            meshes=self._meshes(self._rig.rest_pose),
+            lights=three_point_lights(camera.view),
+            shading=self._at_rest.shading,
+            cards=cards,
+        )
+        return render_image(
+            snapshot,
+            camera,
+            width,
+            height,
+            samples,
+            background=BACKDROP,
+            passes=self._passes,
+            card_pass=self._card_pass,
         )
 
     @property

@@ -1,11 +1,13 @@
-"""Presets: a menu a section, and the operator behind its entries."""
+"""Presets: taking one over, saving and deleting the artist's own; and the look of a material."""
 
 from __future__ import annotations
 
 import bpy
 from bpy.props import StringProperty
 
-from ..host.presets import apply, named_preset, shipped
+from ..host.presets import apply, delete_own, named_preset, own, save_own, shipped
+from ..host.principled import has_principled_hair, look_from_material
+from ..host.properties import settings_of
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 
@@ -33,27 +35,93 @@ class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class _PresetMenu:
-    bl_label = "Presets"
-    section = ""
+class HAIRLOOM_OT_save_preset(bpy.types.Operator):
+    """Keep the look of the selected hair as a preset of your own, in all files"""
 
-    def draw(self, _context: bpy.types.Context) -> None:
-        for name, title in shipped(self.section):
-            self.layout.operator("hairloom.apply_preset", text=title).name = name  # type: ignore[attr-defined]
+    bl_idname = "hairloom.save_preset"
+    bl_label = "Save Look as Preset"
+
+    title: StringProperty(
+        name="Name", description="A preset of yours that has this name is replaced", maxlen=40
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return needs_hair(cls, context)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        self.title = chosen_hair(context)[0].name
+        return context.window_manager.invoke_props_dialog(self)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        group = chosen_hair(context)[0].data.hairloom.shading
+        path = save_own(self.title, settings_of(group, group.settings))
+        self.report({"INFO"}, f"Saved to {path}")
+        return {"FINISHED"}
 
 
-class HAIRLOOM_MT_looks(_PresetMenu, bpy.types.Menu):
-    """Colours and highlights that come with Hairloom"""
+class HAIRLOOM_OT_delete_preset(bpy.types.Operator):
+    """Delete this preset of your own for good"""
 
-    bl_idname = "HAIRLOOM_MT_looks"
-    section = "shading"
+    bl_idname = "hairloom.delete_preset"
+    bl_label = "Delete Preset"
+
+    name: StringProperty(name="Preset", description="Such as own/mine")
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_confirm(self, event)
+
+    @reporting
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        delete_own(self.name)
+        return {"FINISHED"}
 
 
-class HAIRLOOM_MT_dynamics(_PresetMenu, bpy.types.Menu):
+class HAIRLOOM_OT_look_from_material(bpy.types.Operator):
+    """Take the Principled Hair of the hair's material as the look to start from"""
+
+    bl_idname = "hairloom.look_from_material"
+    bl_label = "Look from Material"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not needs_hair(cls, context):
+            return False
+        if any(has_principled_hair(hair) for hair in chosen_hair(context)):
+            return True
+        cls.poll_message_set("The hair has no material with a Principled Hair BSDF")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        depsgraph = context.evaluated_depsgraph_get()
+        for hair in filter(has_principled_hair, chosen_hair(context)):
+            group = hair.data.hairloom.shading
+            before = settings_of(group, group.settings)
+            settings, notes = look_from_material(hair, depsgraph, before)
+            apply(settings, hair)
+            for note in notes:
+                self.report({"WARNING"}, f"{hair.name}: {note}")
+        return {"FINISHED"}
+
+
+class HAIRLOOM_MT_dynamics(bpy.types.Menu):
     """Ways to move that come with Hairloom"""
 
     bl_idname = "HAIRLOOM_MT_dynamics"
-    section = "dynamics"
+    bl_label = "Presets"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        for entry in (*shipped("dynamics"), *own("dynamics")[0]):
+            self.layout.operator("hairloom.apply_preset", text=entry.title).name = entry.name
 
 
-CLASSES = (HAIRLOOM_OT_apply_preset, HAIRLOOM_MT_looks, HAIRLOOM_MT_dynamics)
+CLASSES = (
+    HAIRLOOM_OT_apply_preset,
+    HAIRLOOM_OT_save_preset,
+    HAIRLOOM_OT_delete_preset,
+    HAIRLOOM_OT_look_from_material,
+    HAIRLOOM_MT_dynamics,
+)

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ..host import live, timeline
+from ..host import live, timeline, view_transform
 from ..host.groom_files import dropped_phrase
 from ..host.session import Session
 from ..host.source import own_dynamics
@@ -61,8 +61,8 @@ def _draw_state(layout: bpy.types.UILayout, context: bpy.types.Context, session:
     draw_lines(layout.column(align=True), context, _moved_by(session))
     if session.source.dropped:
         draw_message(layout, context, dropped_phrase(session.source.dropped).capitalize(), "INFO")
-    trouble = timeline.trouble(session.uid)
-    for warning in dict.fromkeys((*session.warnings, *((trouble,) if trouble else ()))):
+    troubles = filter(None, (timeline.trouble(session.uid), view_transform.trouble()))
+    for warning in dict.fromkeys((*session.warnings, *troubles)):
         draw_message(layout, context, warning, "ERROR")
 
 

@@ -7,7 +7,9 @@ from typing import Any
 
 import bpy
 
+from ..host.card_images import HAIRLOOM_PG_card_images
 from ..params import Parameter
+from .look import LOOK, draw_preset_row, is_idle, look_names
 from .operators_bake import draw_bake
 from .operators_colliders import draw_colliders
 
@@ -18,8 +20,24 @@ _PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
 
 
 def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    layout.menu("HAIRLOOM_MT_looks")
-    _draw_group(layout, hair.data.hairloom.shading)
+    draw_preset_row(layout, hair)
+    _look_section("")(layout, hair)
+
+
+def _look_section(label: str) -> Draw:
+    """Only what acts in the model, in the order in which it stands in LOOK."""
+
+    def draw(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+        group = hair.data.hairloom.shading
+        names = look_names(label, group)
+        if not names:
+            layout.label(text="Only in the model Marschner")
+        for name in names:
+            column = layout.column()
+            column.active = not is_idle(name, group)
+            _draw_named(column, group, (name,))
+
+    return draw
 
 
 def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -87,6 +105,11 @@ def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     layout.operator("hairloom.export_tfx", icon="EXPORT")
     _draw_titled(layout, hair.data.hairloom.cards)
     _draw_titled(layout, hair.data.hairloom.card_texture)
+    layout.label(text="Own Pictures")
+    pictures = hair.data.hairloom.card_images
+    for name in HAIRLOOM_PG_card_images.__annotations__:
+        label = pictures.bl_rna.properties[name].name
+        layout.template_ID(pictures, name, open="image.open", text=label)
 
 
 def _draw_titled(layout: bpy.types.UILayout, group: Any) -> None:
@@ -149,11 +172,14 @@ SECTIONS: tuple[tuple[str, str, Draw], ...] = (
 )
 #: section -> those below it
 SUB_SECTIONS: dict[str, tuple[tuple[str, str, Draw], ...]] = {
+    "look": tuple(
+        (f"look_{label.split()[0].lower()}", label, _look_section(label)) for label in LOOK if label
+    ),
     "dynamics": (
         ("style", "Style", _dynamics_section("Style")),
         ("medium", "Medium & Wind", _dynamics_section("Medium & Wind")),
         ("lengths", "Lengths", _dynamics_section("Lengths")),
         ("collisions", "Collisions", draw_collisions),
         ("bake", "Bake", draw_bake),
-    )
+    ),
 }

@@ -17,7 +17,7 @@ from hairloom.addon.cards.sort import inside_out_order
 from hairloom.addon.cards.strip import build_cards
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.sidecar import description
-from hairloom.addon.shading.textures import TextureSettings, card_texture
+from hairloom.addon.shading.textures import TextureSettings, hair_textures
 
 bpy = pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 
@@ -94,7 +94,7 @@ def sorted_hair() -> CardMesh:
 
 @pytest.fixture(scope="module")
 def texture(sorted_hair: CardMesh) -> np.ndarray:
-    return card_texture(TEXTURE, sorted_hair.atlas_columns)
+    return hair_textures(TEXTURE, sorted_hair.atlas_columns).card
 
 
 @pytest.fixture(scope="module")

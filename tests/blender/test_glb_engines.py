@@ -18,7 +18,7 @@ from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import inside_out_order
 from hairloom.addon.cards.strip import build_cards
-from hairloom.addon.shading.textures import TextureSettings, card_texture
+from hairloom.addon.shading.textures import TextureSettings, hair_textures
 
 pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 
@@ -37,7 +37,7 @@ def curtain() -> tuple[CardMesh, np.ndarray]:
     guides = out[:, None] * 0.1 + fall + out[:, None] * np.linspace(0.0, 0.05, 8)[:, None] ** 2
     settings = CardSettings(width_factor=1.5)
     mesh = build_cards(guides.astype(np.float32), out.astype(np.float32), settings)
-    texture = card_texture(TextureSettings(variant_width=16, height=64), mesh.atlas_columns)
+    texture = hair_textures(TextureSettings(variant_width=16, height=64), mesh.atlas_columns).card
     return inside_out_order(mesh, None), texture
 
 

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.host import live
 from hairloom.addon.host.lights import light_warnings, read_lights
+from hairloom.addon.host.overlay import lit
 from hairloom.addon.host.session import Session
-from hairloom.addon.shading.lights import LIGHT_CAPACITY, Light, light_irradiance
+from hairloom.addon.render.snapshot import Snapshot
+from hairloom.addon.shading.lights import (
+    LIGHT_CAPACITY,
+    Light,
+    light_irradiance,
+    three_point_lights,
+)
 
 
 def add(kind: str, location: tuple[float, float, float] = (0, 0, 1), **settings: Any) -> Any:
@@ -112,3 +121,68 @@ def test_a_preview_tells_of_lights_that_it_leaves_out(new_hair: Any, sphere: Any
     session.light(bpy.context.evaluated_depsgraph_get())
     assert any("Lights: 9 shine" in warning for warning in session.warnings)
     assert len(session.snapshot.lights) == LIGHT_CAPACITY
+
+
+def views() -> list[Any]:
+    """The shading of all 3D views of the file."""
+    windows = bpy.context.window_manager.windows
+    areas = [area for window in windows for area in window.screen.areas]
+    return [area.spaces.active.shading for area in areas if area.type == "VIEW_3D"]
+
+
+@pytest.mark.parametrize("world", [None, (0.0, 0.0, 0.0), (0.2, 0.1, 0.3)])
+def test_a_scene_without_light_is_told_where_a_view_goes_by_it(
+    new_hair: Any, sphere: Any, world: Any
+) -> None:
+    hair = new_hair(sphere)
+    if world is not None:
+        bpy.context.scene.world = bpy.data.worlds.new("World")
+        node = next(n for n in bpy.context.scene.world.node_tree.nodes if n.type == "BACKGROUND")
+        node.inputs["Color"].default_value = (*world, 1.0)
+    session = Session(hair, bpy.context.evaluated_depsgraph_get())
+    assert views()
+    for shading in views():
+        shading.type = "SOLID"
+    assert not any("no light" in warning for warning in session.warnings)
+    views()[0].type = "RENDERED"
+    (warning,) = (warning for warning in session.warnings if "no light" in warning)
+    assert ("studio" in warning) is (world is None or not any(world))
+    assert "Add a light" in warning and warning.endswith(".")
+    add("POINT", energy=10.0)
+    session.light(bpy.context.evaluated_depsgraph_get())
+    assert not any("no light" in warning for warning in session.warnings)
+
+
+def test_hair_is_lit_as_blender_lights_the_rest_and_never_black() -> None:
+    """The studio's lights wherever the scene gives no light at all."""
+    studio, lamp, world = three_point_lights(np.eye(4)), Light.sun((0, 0, -1), (1, 1, 1), 1.0), 0.3
+    strands, radius = np.zeros((1, 2, 3), np.float32), np.ones((1, 2), np.float32)
+
+    def shown(kind: str, lights: bool, has_world: bool, lamps: Any, grey: float) -> Any:
+        names = ("type", "use_scene_lights", "use_scene_world")
+        names += ("use_scene_lights_render", "use_scene_world_render")
+        values = (kind, lights, has_world, lights, has_world)
+        shading = SimpleNamespace(**dict(zip(names, values, strict=True)))
+        ambient = (grey, grey, grey)
+        snapshot = lit(Snapshot(strands, radius, lights=lamps, ambient=ambient), shading, studio)
+        return snapshot.lights, snapshot.ambient[0]
+
+    plain = Snapshot.ambient[0]
+    assert shown("SOLID", True, True, (lamp,), world) == (studio, plain)
+    for kind in ("MATERIAL", "RENDERED"):
+        assert shown(kind, True, True, (lamp,), world) == ((lamp,), world)
+        assert shown(kind, True, False, (lamp,), world) == ((lamp,), plain)
+        assert shown(kind, False, True, (lamp,), world) == ((), world)
+        assert shown(kind, True, True, (), world) == ((), world)
+        assert shown(kind, False, False, (lamp,), world) == (studio, plain)
+        assert shown(kind, True, False, (), world) == (studio, plain)
+        assert shown(kind, True, True, (), 0.0) == (studio, plain)
+
+
+def test_a_light_that_is_deleted_shines_no_longer(new_hair: Any, sphere: Any) -> None:
+    hair, lamp = new_hair(sphere), add("POINT", energy=10.0)
+    session = live.start(hair, bpy.context.evaluated_depsgraph_get())
+    assert len(session.snapshot.lights) == 1
+    bpy.data.objects.remove(lamp)
+    bpy.context.view_layer.update()
+    assert session.snapshot.lights == ()

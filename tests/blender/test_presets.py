@@ -1,9 +1,11 @@
-"""Presets as the artist's menu and the command line apply them."""
+"""Presets as the artist's menu and the command line apply them, and those of the artist's own."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,6 +16,7 @@ import bpy
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.host import command_line, presets
 from hairloom.addon.host.properties import settings_of
+from hairloom.addon.params.preset import PRESET_VERSION
 from hairloom.addon.shading.settings import ShadingSettings
 
 
@@ -22,16 +25,13 @@ def hair(new_hair: Callable[..., bpy.types.Object]) -> bpy.types.Object:
     return new_hair()
 
 
-@pytest.mark.parametrize("name", [name for name, _ in presets.shipped("shading")])
+@pytest.mark.parametrize("name", [entry.name for entry in presets.shipped("shading")])
 def test_a_look_goes_onto_the_selected_hair(hair: bpy.types.Object, name: str) -> None:
     assert bpy.ops.hairloom.apply_preset(name=name) == {"FINISHED"}
-    applied = settings_of(hair.data.hairloom.shading, ShadingSettings)
-    for value, wanted in zip(
-        applied.as_dict().values(),
-        presets.named_preset(name).settings.as_dict().values(),
-        strict=True,
-    ):
-        assert value == pytest.approx(wanted, rel=1e-6)
+    applied = settings_of(hair.data.hairloom.shading, ShadingSettings).as_dict()
+    for parameter, wanted in presets.named_preset(name).settings.as_dict().items():
+        is_word = isinstance(wanted, str)
+        assert applied[parameter] == (wanted if is_word else pytest.approx(wanted, rel=1e-6))
 
 
 def test_dynamics_go_onto_the_object(hair: bpy.types.Object) -> None:
@@ -59,3 +59,122 @@ def test_the_command_line_takes_presets_and_single_values_over_them(tmp_path: Pa
     assert shading["primary_strength"] == 3.0
     blond = presets.named_preset("looks/blond").settings.as_dict()
     assert shading["base_color"] == blond["base_color"]
+
+
+@pytest.fixture
+def own_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Where the artist's own presets go in a test; not made yet."""
+    folder = tmp_path / "presets"
+    monkeypatch.setattr(presets, "own_folder", lambda: folder)
+    return folder
+
+
+def titles() -> list[str]:
+    return [entry.title for entry in presets.own("shading")[0]]
+
+
+def test_a_look_is_saved_listed_applied_and_deleted(
+    hair: bpy.types.Object, own_folder: Path
+) -> None:
+    shading = hair.data.hairloom.shading
+    assert presets.own("shading") == ((), ())
+    shading.model, shading.width_r = "marschner", 0.123
+    assert bpy.ops.hairloom.save_preset(title="  My Red, no. 2 ") == {"FINISHED"}
+    assert [path.name for path in own_folder.iterdir()] == ["my_red_no_2.json"]
+    ((entry,), warnings) = presets.own("shading")
+    assert (entry.name, entry.title, warnings) == ("own/my_red_no_2", "My Red, no. 2", ())
+    assert entry.is_own and entry.icon == 0
+    assert presets.own("dynamics") == ((), ())
+    shading.model, shading.width_r = "kajiya_kay", 0.2
+    assert bpy.ops.hairloom.apply_preset(name=entry.name) == {"FINISHED"}
+    assert shading.model == "marschner" and shading.width_r == pytest.approx(0.123)
+    assert bpy.ops.hairloom.delete_preset(name=entry.name) == {"FINISHED"}
+    assert list(own_folder.iterdir()) == [] and titles() == []
+
+
+def test_the_same_title_replaces_and_another_never_does(
+    hair: bpy.types.Object, own_folder: Path
+) -> None:
+    shading = hair.data.hairloom.shading
+    for title, width in (
+        ("Fur", 0.1),
+        ("fur!", 0.2),
+        ("Fur", 0.3),
+        ("\u0448\u0435\u0440\u0441\u0442\u044c", 0.4),
+    ):
+        shading.width_r = width
+        bpy.ops.hairloom.save_preset(title=title)
+    assert sorted(titles()) == sorted(["Fur", "fur!", "\u0448\u0435\u0440\u0441\u0442\u044c"])
+    assert presets.named_preset("own/fur").settings.width_r == pytest.approx(0.3)
+    assert presets.named_preset("own/fur_2").settings.width_r == pytest.approx(0.2)
+
+
+def test_a_preset_without_a_name_is_refused(hair: bpy.types.Object, own_folder: Path) -> None:
+    with pytest.raises(RuntimeError, match="needs a name"):
+        bpy.ops.hairloom.save_preset(title="   ")
+    assert not own_folder.exists()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\xff\xfe\x00garbage",
+        b"[1, 2]",
+        b"{}",
+        b"[" * 100_000,
+        b"{" + b" " * 2_000_000 + b"}",
+        b'{"hairloom": 99, "section": "shading", "title": "x", "values": {}}',
+        b'{"hairloom": 1, "section": "shading", "title": "x", "values": {"width_r": "wide"}}',
+        b'{"hairloom": 1, "section": ["shading"], "title": "x", "values": {}}',
+        b'__import__("os").abort()',
+    ],
+    ids=range(10),
+)
+def test_garbage_in_the_folder_is_told_and_breaks_nothing(
+    hair: bpy.types.Object, own_folder: Path, content: bytes
+) -> None:
+    bpy.ops.hairloom.save_preset(title="Good")
+    (own_folder / "bad.json").write_bytes(content)
+    (own_folder / "folder.json").mkdir()
+    (own_folder / "note.txt").write_text("not looked at")
+    entries, warnings = presets.own("shading")
+    assert [entry.title for entry in entries] == ["Good"]
+    assert [warning.split(" ")[0] for warning in warnings] == ["bad.json", "folder.json"]
+    with pytest.raises(HairloomError):
+        presets.named_preset("own/folder")
+
+
+def test_a_title_that_is_too_long_or_of_many_lines_fits_a_menu(own_folder: Path) -> None:
+    own_folder.mkdir()
+    data = {"hairloom": PRESET_VERSION, "section": "shading", "title": "a\nb" * 99, "values": {}}
+    (own_folder / "long.json").write_text(json.dumps(data))
+    (title,) = titles()
+    assert len(title) <= 40 and "\n" not in title
+
+
+@pytest.mark.parametrize("name", ["own/../../secret", "own/missing", "looks/blond", "/etc/passwd"])
+def test_only_own_presets_can_be_deleted(own_folder: Path, tmp_path: Path, name: str) -> None:
+    secret = tmp_path.parent / "secret.json"
+    secret.write_text("{}")
+    with pytest.raises(HairloomError, match="no such preset of your own"):
+        presets.delete_own(name)
+    assert secret.is_file()
+
+
+def test_without_an_installed_extension_presets_go_to_blenders_settings() -> None:
+    """Blender itself knows the folder of an installed one; see tests/window/session_look.py."""
+    folder = presets.own_folder()
+    assert folder.is_absolute() and folder.parts[-2:] == ("hairloom", "presets")
+
+
+def test_a_picture_beside_a_preset_goes_with_it(extension: Any, own_folder: Path) -> None:
+    """That it is shown: tests/window/session_look.py; without a window Blender has no icons."""
+    own_folder.mkdir()
+    data = {"hairloom": PRESET_VERSION, "section": "shading", "title": "Seen", "values": {}}
+    (own_folder / "seen.json").write_text(json.dumps(data))
+    (own_folder / "seen.png").write_bytes(b"no picture")
+    (entry,), _ = presets.own("shading")
+    assert entry.icon == entry.icon
+    presets.delete_own(entry.name)
+    assert list(own_folder.iterdir()) == []

@@ -1,0 +1,154 @@
+"""The look in a session: quick tables while a slider moves, full ones when it rests; and in the
+panels: only what acts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import pytest
+
+from hairloom.addon.host import live, overlay, reactions
+from hairloom.addon.host import session as session_module
+from hairloom.addon.shading.kajiya_kay_settings import KajiyaKaySettings
+from hairloom.addon.shading.marschner.settings import MarschnerSettings
+from hairloom.addon.shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
+from hairloom.addon.shading.settings import SharedSettings
+from hairloom.addon.ui import look, sections
+
+
+@pytest.fixture
+def preview(new_hair: Any, sphere: Any, evaluated: Any) -> Any:
+    """(shading group, session) of hair by the model Marschner."""
+    hair = new_hair(sphere)
+    hair.data.hairloom.shading.model = "marschner"
+    return hair.data.hairloom.shading, live.start(hair, evaluated())
+
+
+@pytest.fixture
+def window(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if Blender had one, where tables are refined."""
+
+    class App:
+        background = False
+        timers = bpy.app.timers
+
+    class Blender:
+        app = App
+
+    monkeypatch.setattr(session_module, "bpy", Blender)
+
+
+def table_size(session: Any) -> int:
+    """Of what is drawn."""
+    drawing = overlay.drawing_of(session.uid)
+    assert drawing is not None
+    size: int = drawing.snapshot.table_size
+    return size
+
+
+def test_a_slider_of_the_fibres_shape_is_quick_and_refined_when_it_rests(
+    preview: Any, window: None
+) -> None:
+    shading, session = preview
+    assert table_size(session) == DEFAULT_SIZE
+    shading.width_r = 0.1
+    assert table_size(session) == PREVIEW_SIZE
+    assert bpy.app.timers.is_registered(reactions._refine)
+    shading.width_r = 0.2
+    reactions._refine()
+    assert table_size(session) == DEFAULT_SIZE
+    assert session.snapshot.shading.width_r == pytest.approx(0.2)
+
+
+def test_colours_and_strengths_need_no_other_tables(preview: Any, window: None) -> None:
+    shading, session = preview
+    shading.base_color = (0.3, 0.1, 0.05)
+    shading.pigment, shading.melanin = "melanin", 0.3
+    shading.strength_trt = 2.0
+    shading.sparkle = 0.0
+    assert table_size(session) == DEFAULT_SIZE
+    assert not bpy.app.timers.is_registered(reactions._refine)
+
+
+def test_kajiya_kay_has_no_tables_and_changing_to_marschner_makes_some(
+    preview: Any, window: None
+) -> None:
+    shading, session = preview
+    shading.model = "kajiya_kay"
+    shading.width_r = 0.15
+    assert table_size(session) == DEFAULT_SIZE
+    shading.model = "marschner"
+    assert table_size(session) == PREVIEW_SIZE
+
+
+def test_without_a_window_tables_are_always_full(preview: Any) -> None:
+    shading, session = preview
+    shading.width_r = 0.1
+    assert table_size(session) == DEFAULT_SIZE
+
+
+def test_nothing_ticks_on_when_hairloom_is_disabled(preview: Any, window: None) -> None:
+    shading, _ = preview
+    shading.width_r = 0.1
+    assert bpy.app.timers.is_registered(reactions._refine)
+    reactions.clear()
+    assert not bpy.app.timers.is_registered(reactions._refine)
+
+
+def drawn_in_look(hair: Any) -> list[str]:
+    """The parameters that the section Look and those below it draw, in order."""
+    found: list[str] = []
+
+    class Layout:
+        """Takes what a layout is asked for, and notes the properties of shading."""
+
+        active = True
+
+        def prop(self, group: Any, name: str, **_: Any) -> None:
+            assert group == hair.data.hairloom.shading
+            found.append(name)
+
+        def __getattr__(self, name: str) -> Any:
+            return lambda *_, **__: Layout()
+
+    for draw in (sections.draw_look, *(draw for _, _, draw in sections.SUB_SECTIONS["look"])):
+        draw(Layout(), hair)
+    return found
+
+
+#: what acts in one model alone, or with one pigment of Marschner
+KAJIYA_KAY = {parameter.name for parameter in KajiyaKaySettings.parameters()}
+MARSCHNER = {parameter.name for parameter in MarschnerSettings.parameters()}
+SHARED = {parameter.name for parameter in SharedSettings.parameters()}
+PIGMENTS = {
+    "color": {"base_color"},
+    "melanin": {"melanin", "redness"},
+    "absorption": {"absorption"},
+}
+
+
+@pytest.mark.parametrize(
+    ("model", "pigment"),
+    [("kajiya_kay", "melanin"), *(("marschner", pigment) for pigment in PIGMENTS)],
+)
+def test_every_parameter_that_acts_is_drawn_once_and_no_other(
+    new_hair: Any, model: str, pigment: str
+) -> None:
+    hair = new_hair()
+    shading = hair.data.hairloom.shading
+    shading.model, shading.pigment = model, pigment
+    acting = SHARED | KAJIYA_KAY
+    if model == "marschner":
+        others = set().union(*(names for kind, names in PIGMENTS.items() if kind != pigment))
+        acting = (SHARED | MARSCHNER) - others
+    drawn = drawn_in_look(hair)
+    assert sorted(drawn) == sorted(acting)
+    assert drawn[0] == "model"
+
+
+def test_colours_of_tips_are_grey_until_they_act(new_hair: Any) -> None:
+    shading = new_hair().data.hairloom.shading
+    assert look.is_idle("tip_color", shading) and not look.is_idle("tip_tint", shading)
+    shading.tip_tint = 0.5
+    assert not look.is_idle("tip_color", shading)

@@ -1,0 +1,301 @@
+"""The look on screen: hair shows a radiance as Blender itself shows it, in each shading mode and by
+each view transform; a scene without light; a slider that is refined; the panels of both models."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import (
+    _rectangle,
+    click,
+    look_from_front,
+    open_our_sidebar,
+    press,
+    region,
+    sidebar_button,
+    viewport,
+)
+
+#: where Blender's own picture of a radiance is, and ours, for the hair's root and its tip
+PLANES = ((-0.25, 0.0, -0.12), (-0.25, 0.0, 0.12))
+HAIR = ((0.25, 0.0, -0.12), (0.25, 0.0, 0.12))
+#: light of the world, colour of the root, colour of the tip
+LIT = ((0.5, (1.0, 0.4, 0.1), (0.04, 0.024, 0.012)), (2.0, (0.8, 0.45, 0.25), (0.09, 0.09, 0.09)))
+#: code values; what the table is off by, and the roundings of both to 8 bits
+TOLERANCE = 2.0
+NO_LIGHT = 0.0
+
+
+def of_hairloom(module):
+    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
+
+
+def session():
+    (one,) = of_hairloom("host.live").sessions()
+    return one
+
+
+def shading():
+    return viewport().spaces.active.shading
+
+
+def color_at(picture, place, reach=6):
+    """What the screen shows of a place in the scene, in code values 0 to 255."""
+    view = region("WINDOW")
+    x, y = location_3d_to_region_2d(view, viewport().spaces.active.region_3d, Vector(place))
+    x, y = int(x) + view.x, int(y) + view.y
+    return 255.0 * np.median(
+        _rectangle(picture, x - reach, x + reach, y - reach, y + reach), (0, 1)
+    )
+
+
+def apart(label):
+    """How far what ours is at the hair is from what Blender shows at the planes; the latter."""
+    picture = driver.screenshot(label)
+    theirs = np.array([color_at(picture, place) for place in PLANES])
+    ours = np.array([color_at(picture, place) for place in HAIR])
+    difference = np.abs(theirs - ours).max()
+    print(f"{label}: {difference:.1f}; Blender {theirs.tolist()} hair {ours.tolist()}", flush=True)
+    return difference, theirs, ours
+
+
+def agree(label, tolerance=TOLERANCE):
+    """Both show the same, and what Blender saves of these radiances, as soon as EEVEE has compiled
+    and drawn what it was asked for."""
+    for _ in range(30):
+        yield 3
+        difference, theirs, _ = apart(label)
+        if max(difference, np.abs(theirs - saved()).max()) <= tolerance:
+            return theirs
+    raise AssertionError(f"{label}: {difference} code values apart")
+
+
+def saved():
+    """Code values of the planes' radiances in a picture that Blender saves, by this view's mode."""
+    transform = of_hairloom("host.view_transform")
+    view, gain, gamma = transform.view_of(shading(), bpy.context.scene)
+    nodes = [material.node_tree.nodes["Emission"] for material in bpy.data.materials]
+    radiances = np.float32([node.inputs["Color"].default_value[:3] for node in nodes])
+    return 255.0 * transform.shown_by_blender(view, gain * radiances) ** (1.0 / gamma)
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    yield from set_the_scene()
+    yield from radiance_by_view_transforms()
+    yield from every_mode_has_its_transform()
+    yield from a_scene_without_light()
+    yield from a_slider_is_refined()
+    yield from own_presets()
+    yield from the_panels_of_both_models()
+    assert of_hairloom("host.overlay").failure() == ""
+    assert of_hairloom("host.view_transform").trouble() == ""
+
+
+def set_the_scene():
+    """Planes that send out a radiance, and a ribbon of hair that the world lights as strongly."""
+    bpy.data.batch_remove([*bpy.data.objects, *bpy.data.materials])
+    for place in PLANES:
+        bpy.ops.mesh.primitive_plane_add(size=0.2, location=place, rotation=(np.pi / 2.0, 0.0, 0.0))
+        material = bpy.data.materials.new("Emission")
+        tree = material.node_tree
+        tree.nodes.clear()
+        emission = tree.nodes.new("ShaderNodeEmission")
+        output = tree.nodes.new("ShaderNodeOutputMaterial")
+        tree.links.new(emission.outputs[0], output.inputs["Surface"])
+        bpy.context.object.data.materials.append(material)
+        bpy.context.object.select_set(False)
+    scene = bpy.context.scene
+    scene.render.preview_pixel_size, scene.eevee.taa_samples = "8", 1  # no more than is looked at
+    curves = bpy.data.hair_curves.new("Hair")
+    curves.add_curves([2])
+    curves.position_data.foreach_set("vector", np.float32([0.25, 0, -0.2, 0.25, 0, 0.2]))
+    radius = curves.attributes.new("radius", "FLOAT", "POINT")
+    radius.data.foreach_set("value", np.float32([0.1, 0.1]))
+    hair = bpy.data.objects.new("Hair", curves)
+    bpy.context.collection.objects.link(hair)
+    hair.select_set(True)
+    bpy.context.view_layer.objects.active = hair
+    look = curves.hairloom.shading
+    look.color_variation, look.tip_tint, look.tint_start, look.tint_end = 0.0, 1.0, 0.5, 0.5
+    curves.hairloom.ambient.strength = 0.0
+    overlays = viewport().spaces.active.overlay
+    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    look_from_front(1.2)
+    yield from open_our_sidebar()
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield 10
+    hair.select_set(False)  # no outline
+    assert session().snapshot.lights == ()
+
+
+def shine(world, *colors):
+    """The world's light on hair of these colours, and the same radiances from the planes."""
+    look = bpy.data.objects["Hair"].data.hairloom.shading
+    look.base_color, look.tip_color = colors
+    for material, color in zip(bpy.data.materials, colors, strict=True):
+        emission = material.node_tree.nodes["Emission"]
+        emission.inputs["Color"].default_value = (*(world * np.array(color)), 1.0)
+    background = next(n for n in bpy.context.scene.world.node_tree.nodes if n.type == "BACKGROUND")
+    background.inputs["Color"].default_value = (world, world, world, 1.0)
+
+
+def radiance_by_view_transforms():
+    shading().type = "RENDERED"
+    settings = bpy.context.scene.view_settings
+    for transform in ("Standard", "AgX"):
+        settings.view_transform = transform
+        for exposure in (0.0, 1.0):
+            settings.exposure = exposure
+            shine(*LIT[int(exposure) if transform == "Standard" else 1 - int(exposure)])
+            yield from agree(f"{transform}-{exposure:+.0f}".lower())
+    settings.look, settings.gamma, settings.use_white_balance = "AgX - Punchy", 1.3, True
+    settings.white_balance_temperature = 5000.0
+    yield from agree("gamma-and-white-balance", TOLERANCE + 1.0)
+    settings.look, settings.use_white_balance = "None", False
+    settings.gamma, settings.exposure = 1.0, 0.0
+
+
+def every_mode_has_its_transform():
+    """The light that reaches the hair is fixed here, so that modes with another light compare."""
+    overlay, view, scene = of_hairloom("host.overlay"), shading(), bpy.context.scene
+    lit, settings, (world, color, _) = overlay.lit, scene.view_settings, LIT[0]
+    overlay.lit = lambda snapshot, *_: replace(snapshot, lights=(), ambient=(world,) * 3)
+    shine(world, color, color)
+    for each in (view, scene.display.shading):
+        each.light, each.color_type = "FLAT", "SINGLE"
+        each.single_color = world * np.array(color)
+    settings.view_transform, settings.look = "AgX", "AgX - Medium High Contrast"
+    settings.exposure, settings.gamma = 1.0, 1.2
+    shown = {}
+    for kind, lights, uses_world in (
+        ("SOLID", True, True),
+        ("RENDERED", True, False),
+        ("RENDERED", False, True),
+        ("RENDERED", False, False),
+        ("MATERIAL", False, False),
+        ("MATERIAL", True, False),
+    ):
+        view.type = kind
+        view.use_scene_lights_render = view.use_scene_lights = lights
+        view.use_scene_world_render = view.use_scene_world = uses_world
+        label = f"{kind}{'-lights' * lights}{'-world' * uses_world}".lower()
+        shown[label] = yield from agree(label)
+    assert np.abs(shown["rendered"] - shown["rendered-lights"]).max() > 20.0
+    assert np.abs(shown["rendered"] - shown["solid-lights-world"]).max() > 3.0
+    engine, scene.render.engine, view.type = scene.render.engine, "BLENDER_WORKBENCH", "RENDERED"
+    yield from agree("workbench")
+    scene.render.engine = engine
+    view.use_scene_lights_render = view.use_scene_world_render = True
+    settings.look, settings.exposure, settings.gamma = "None", 0.0, 1.0
+    overlay.lit = lit
+
+
+def a_scene_without_light():
+    """Hair is lit by a studio then, and the artist is told; a light that comes takes over."""
+    shading().type = "RENDERED"
+    shine(NO_LIGHT, *LIT[1][1:])
+    yield 10
+    _, theirs, ours = apart("no-light")
+    assert theirs.max() < 5.0 and ours.max() > 40.0, "hair is black"
+    assert any("no light" in warning for warning in session().warnings)
+    bpy.ops.object.light_add(type="SUN", rotation=(np.pi / 2.0, 0.0, 0.0))
+    bpy.context.object.data.energy = 1.0
+    yield 10
+    assert not any("no light" in warning for warning in session().warnings)
+    bpy.data.objects.remove(bpy.context.object)
+    yield 10
+    assert any("no light" in warning for warning in session().warnings), "it shines on"
+
+
+def a_slider_is_refined():
+    tables = of_hairloom("shading.marschner.tables")
+    look = bpy.data.objects["Hair"].data.hairloom.shading
+    bpy.ops.object.light_add(type="SUN", rotation=(np.pi / 2.0, 0.0, 0.0))
+    bpy.context.object.data.energy = 10.0
+    look.model, look.base_color, look.tip_tint = "marschner", (0.25, 0.13, 0.06), 0.0
+    look.volume_shade = 0.0  # one strand has no side that faces away
+    yield 15
+    look.width_r = 0.12
+    yield 1
+    assert session().snapshot.table_size == tables.PREVIEW_SIZE
+    driver.screenshot("coarse")
+    look.width_r = 0.14
+    yield 1
+    assert session().snapshot.table_size == tables.PREVIEW_SIZE
+    yield 15
+    assert session().snapshot.table_size == tables.DEFAULT_SIZE
+    assert color_at(driver.screenshot("refined"), HAIR[0]).max() > 40.0
+
+
+def own_presets():
+    """Saved where Blender keeps what belongs to the extension, shown with a picture, deleted."""
+    presets = of_hairloom("host.presets")
+    folder = presets.own_folder()
+    assert "extensions" in folder.parts and presets.own("shading") == ((), ())
+    assert bpy.ops.hairloom.save_preset(title="Mine") == {"FINISHED"}
+    (folder / "broken.json").write_text("{")
+    image = bpy.data.images.new("Picture", 128, 128, float_buffer=True)
+    image.pixels.foreach_set(np.tile(np.float32([0.6, 0.3, 0.1, 1.0]), 128 * 128))
+    image.file_format = "PNG"
+    image.save(filepath=str(folder / "mine.png"))
+    (entry,), (warning,) = presets.own("shading")
+    assert entry.icon > 0 and warning.startswith("broken.json")
+    view = viewport()
+    bpy.context.window.cursor_warp(view.x + view.width // 3, view.y + view.height // 2)
+    yield 3
+    with bpy.context.temp_override(area=view, region=region("WINDOW")):
+        bpy.ops.hairloom.choose_look("INVOKE_DEFAULT")
+    yield 10
+    driver.screenshot("presets")
+    yield from press("ESC")
+    assert bpy.ops.hairloom.delete_preset(name=entry.name) == {"FINISHED"}
+    (folder / "broken.json").unlink()
+    assert list(folder.iterdir()) == []
+
+
+def the_panels_of_both_models():
+    """Properties > Data with every section of Look open; only what acts is there."""
+    hair = bpy.data.objects["Hair"]
+    bpy.context.view_layer.objects.active = hair
+    hair.select_set(True)
+    shader = bpy.data.materials.new("Hair").node_tree
+    node = shader.nodes.new("ShaderNodeBsdfHairPrincipled")
+    shader.links.new(node.outputs[0], shader.get_output_node("ALL").inputs["Surface"])
+    hair.data.materials.append(bpy.data.materials["Hair"])
+    panels = [p for p in of_hairloom("registration").CLASSES if "_PT_data" in p.__name__]
+    for each in reversed(panels):
+        bpy.utils.unregister_class(each)
+    for each in panels:
+        is_open = each.__name__.startswith(("HAIRLOOM_PT_data_look",)) or each is panels[0]
+        each.bl_options = set() if is_open else {"DEFAULT_CLOSED"}
+        bpy.utils.register_class(each)
+    bpy.context.preferences.view.ui_scale = 0.7
+    properties = next(a for a in bpy.context.screen.areas if a.type == "PROPERTIES")
+    properties.spaces.active.context = "DATA"
+    with bpy.context.temp_override(area=properties):
+        bpy.ops.screen.screen_full_area(use_hide_panels=False)
+    yield 10
+    look = hair.data.hairloom.shading
+    for model, pigment in (
+        ("kajiya_kay", "color"),
+        ("marschner", "color"),
+        ("marschner", "melanin"),
+        ("marschner", "absorption"),
+    ):
+        look.model, look.pigment = model, pigment
+        yield 8
+        driver.screenshot(f"panel-{model}-{pigment}")
+    assert bpy.ops.hairloom.look_from_material() == {"FINISHED"}
+    assert look.model == "marschner" and look.pigment == "color"
+
+
+driver.play(steps())
