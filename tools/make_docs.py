@@ -3,7 +3,8 @@
 python tools/make_docs.py [--check | --pictures]
 
 --check fails when docs/parameters.md is not what the code would write; --pictures also runs the
-demo, copies its pictures into docs/images, and draws those of docs/refinement.md.
+demo, copies its pictures into docs/images, and draws those of docs/refinement.md and
+docs/shading.md with the thumbnails of the looks.
 """
 
 import argparse
@@ -47,8 +48,9 @@ def make_pictures() -> None:
         preset = ["--preset", "dynamics/under_water"]
         subprocess.run([*headless, "demo", *preset, "--output", folder], check=True)
         shutil.copyfile(Path(folder) / "motion.png", IMAGES / "under_water.png")
-    refinement = [sys.executable, str(REPOSITORY / "tools" / "refinement_pictures.py")]
-    subprocess.run([*refinement, str(IMAGES)], check=True)
+    for name in ("refinement_pictures", "preset_pictures", "shading_pictures"):
+        tool = [sys.executable, str(REPOSITORY / "tools" / f"{name}.py")]
+        subprocess.run([*tool, str(IMAGES)], check=True)
 
 
 def main() -> int:

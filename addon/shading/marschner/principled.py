@@ -20,6 +20,12 @@ type Color = tuple[float, float, float]
 
 WHITE: Color = (1.0, 1.0, 1.0)
 
+#: standard deviation of the Gaussian nearest to a logistic, over the logistic's scale: of all their
+#: distribution functions come closest (Camilli 1994)
+_NEAREST_GAUSSIAN = 1.702
+#: Cycles blurs caustics by the width around alone; ours need a little [rad]
+_GLINT_WIDTH = float(np.radians(2.0))
+
 
 @dataclass(frozen=True, kw_only=True)
 class PrincipledHair:
@@ -69,13 +75,14 @@ def settings_from(
 def azimuthal_width(roughness: float) -> float:
     """Standard deviation around the fibre for Blender's radial roughness in [0, 1], [rad].
 
-    That of Chiang's logistic: s = sqrt(pi / 8) (0.265 b + 1.194 b^2 + 5.372 b^22), and pi / sqrt 3
-    times as much. (It is trimmed to the circle there, which counts only beyond 0.7.)
+    Of the Gaussian nearest to Chiang's logistic of s = sqrt(pi / 8) (0.265 b + 1.194 b^2 +
+    5.372 b^22), which is 1.702 times as wide (Camilli 1994). (It is trimmed to the circle there,
+    which counts only beyond 0.7.)
     """
     scale = np.sqrt(np.pi / 8.0) * (
         0.265 * roughness + 1.194 * roughness**2 + 5.372 * roughness**22
     )
-    return float(np.pi / np.sqrt(3.0) * scale)
+    return float(_NEAREST_GAUSSIAN * scale)
 
 
 def _pigment(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
@@ -124,6 +131,7 @@ def _shape(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
         "width_tt": width_tt,
         "width_trt": width_trt,
         "azimuthal_width": azimuthal_width(_around(hair)),
+        "glint_width": _GLINT_WIDTH,
         "eccentricity": 1.0,
         "strength_r": 1.0,
         "strength_tt": 1.0,

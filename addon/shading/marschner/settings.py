@@ -191,7 +191,7 @@ class MarschnerSettings(Settings):
         source="d'Eon et al. 2011; Chiang et al. 2016",
     )
     scattered: float = number(
-        1.0,
+        0.6,
         label="Scattered",
         description="Stands for light that comes from strand to strand, in the hair's own colour",
         soft=(0.0, 2.0),

@@ -1,0 +1,99 @@
+"""What shading costs: a frame under either model, and a slider that moves.
+
+Sintel's 11,400 strands under three lights (see _refinement_views). All rounds are interleaved, so
+that a busy machine meets all contestants alike.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+from _refinement_views import HEIGHT, WIDTH, Target, groom
+
+from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.camera import Camera
+from hairloom.addon.render.marschner_textures import MARSCHNER
+from hairloom.addon.render.snapshot import Snapshot
+from hairloom.addon.render.strand_pass import StrandPass
+from hairloom.addon.shading.lights import three_point_lights
+from hairloom.addon.shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
+from hairloom.addon.shading.settings import ShadingSettings
+
+ROUNDS = 15
+#: strands, and pixels along a side, where only the call counts
+FEW = 64
+MARSCHNER_LOOK = ShadingSettings(model="marschner")
+
+
+def cost_figures() -> dict[str, float]:
+    """The figures by name.
+
+    frame_ratio_models: time of a frame with Marschner over that with Kajiya-Kay.
+    slider_colour_ms, slider_shape_ms: what a draw call computes longer when a colour has changed
+        since the draw before, and when the fibre's shape has, at the preview's size.
+    refine_ms: the same for a shape at the size at rest.
+    """
+    shown = groom()
+    camera = shown.camera()
+    snapshot = shown.snapshot(DetailSettings(), lights=three_point_lights(camera.view))
+    return {
+        "frame_ratio_models": frame_ratio(snapshot, camera),
+        "slider_colour_ms": delay_ms(snapshot, camera, _colors(), PREVIEW_SIZE),
+        "slider_shape_ms": delay_ms(snapshot, camera, _shapes(), PREVIEW_SIZE),
+        "refine_ms": delay_ms(snapshot, camera, _shapes(), DEFAULT_SIZE),
+    }
+
+
+def frame_ratio(snapshot: Snapshot, camera: Camera) -> float:
+    """Median over median, each until a pixel can be read back."""
+    target, drawn = Target(WIDTH, HEIGHT), StrandPass()
+    looks = [replace(snapshot, shading=look) for look in (MARSCHNER_LOOK, ShadingSettings())]
+    times: list[list[float]] = [[], []]
+    for _ in range(ROUNDS + 1):
+        for look, own in zip(looks, times, strict=True):
+            own.append(target.timed(lambda s=look: drawn.draw(s, camera, WIDTH, HEIGHT)))
+    marschner, kajiya_kay = (statistics.median(own[1:]) for own in times)
+    return marschner / kajiya_kay
+
+
+def delay_ms(
+    snapshot: Snapshot, camera: Camera, changes: Iterator[ShadingSettings], size: int
+) -> float:
+    """Median of what a draw call computes longer after a change than once more without one.
+
+    By the clock of the calling thread, which other programs do not hold up, and with few strands:
+    the tables do not hang on how many there are.
+    """
+    few = replace(snapshot, strands=snapshot.strands[:FEW], radius=snapshot.radius[:FEW])
+    target, drawn = Target(FEW, FEW), StrandPass()
+    MARSCHNER.release()
+
+    def call_ms(shading: ShadingSettings) -> float:
+        """Until the call returns; what the GPU still has to do is waited for without a clock."""
+        shown = replace(few, shading=shading, table_size=size)
+        took = 0.0
+
+        def draw() -> None:
+            nonlocal took
+            begin = time.thread_time()
+            drawn.draw(shown, camera, FEW, FEW)
+            took = (time.thread_time() - begin) * 1000.0
+
+        target.timed(draw)
+        return took
+
+    call_ms(MARSCHNER_LOOK)
+    return statistics.median(call_ms(shading) - call_ms(shading) for shading in changes)
+
+
+def _colors() -> Iterator[ShadingSettings]:
+    for step in range(ROUNDS):
+        yield replace(MARSCHNER_LOOK, base_color=(0.02 + 0.03 * step, 0.1, 0.05))
+
+
+def _shapes() -> Iterator[ShadingSettings]:
+    for step in range(ROUNDS):
+        yield replace(MARSCHNER_LOOK, width_r=0.05 + 0.01 * step)

@@ -1,0 +1,108 @@
+"""Cycles in a scene of its own: strands of Principled Hair (Chiang's model), one sun, one camera.
+
+The camera is at (0, 0, 1) times DISTANCE, looks down and sees no perspective.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+DISTANCE = 50.0
+
+
+class CyclesRoom:
+    """Give it strands and a sun, set the hair, and take pictures."""
+
+    def __init__(self) -> None:
+        self._scene = scene = bpy.data.scenes.new("Room")
+        scene.render.engine = "CYCLES"
+        cycles = scene.cycles
+        cycles.device, cycles.use_adaptive_sampling = "CPU", False
+        cycles.pixel_filter_type, cycles.light_sampling_threshold = "BOX", 0.0
+        self.paths(16)
+        cycles.sample_clamp_indirect = cycles.blur_glossy = 0.0
+        scene.render.film_transparent = True
+        scene.render.image_settings.file_format = "OPEN_EXR"
+        scene.render.image_settings.color_depth = "32"
+        scene.world = bpy.data.worlds.new("Dark")
+        scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+        self._camera = self._new("Camera", bpy.data.cameras.new("Camera"))
+        self._camera.data.type, self._camera.data.clip_end = "ORTHO", 2.0 * DISTANCE
+        self._camera.location.z = DISTANCE
+        scene.camera = self._camera
+        self._sun = self._new("Sun", bpy.data.lights.new("Sun", "SUN"))
+        self._sun.data.energy, self._sun.data.angle = 1.0, 0.0
+        self._material = bpy.data.materials.new("Hair")
+        nodes = self._material.node_tree.nodes
+        self._node = nodes.new("ShaderNodeBsdfHairPrincipled")
+        self._node.model, self._node.parametrization = "CHIANG", "ABSORPTION"
+        surface = nodes["Material Output"].inputs["Surface"]
+        self._material.node_tree.links.new(self._node.outputs[0], surface)
+        self._strands: Any = None
+
+    def _new(self, name: str, data: Any) -> Any:
+        thing = bpy.data.objects.new(name, data)
+        self._scene.collection.objects.link(thing)
+        return thing
+
+    def strands(self, points: np.ndarray, radius: float, casts_shadow: bool = True) -> None:
+        """In place of those before: (strand_count, cv_count, 3), root first."""
+        curves = bpy.data.hair_curves.new("Strands")
+        curves.add_curves([points.shape[1]] * points.shape[0])
+        curves.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
+        width = curves.attributes.get("radius") or curves.attributes.new("radius", "FLOAT", "POINT")
+        width.data.foreach_set("value", np.full(points[..., 0].size, radius, np.float32))
+        curves.materials.append(self._material)
+        if self._strands is not None:
+            bpy.data.objects.remove(self._strands)
+        self._strands = self._new("Strands", curves)
+        self._strands.visible_shadow = casts_shadow
+
+    def body(self, positions: np.ndarray, triangles: np.ndarray) -> None:
+        """A black body that casts no shadow."""
+        mesh = bpy.data.meshes.new("Body")
+        mesh.from_pydata(positions.tolist(), [], triangles.tolist())
+        black = bpy.data.materials.new("Black")
+        black.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0, 0, 0, 1)
+        black.node_tree.nodes["Principled BSDF"].inputs["Specular IOR Level"].default_value = 0.0
+        mesh.materials.append(black)
+        self._new("Body", mesh).visible_shadow = False
+
+    def paths(self, samples: int, bounces: int = 0, is_denoised: bool = False) -> None:
+        """How many a pixel, and how often each meets strands again; 0 is the sun's own light."""
+        cycles = self._scene.cycles
+        cycles.samples, cycles.use_denoising = samples, is_denoised
+        cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = bounces
+        cycles.transmission_bounces = bounces
+
+    def tilt(self, angle: float) -> None:
+        """Lift the strands' +X towards the camera [rad]."""
+        self._strands.rotation_euler.y = -angle
+
+    def sun(self, towards: np.ndarray) -> None:
+        self._sun.rotation_euler = Vector(towards).to_track_quat("Z", "Y").to_euler()
+
+    def hair(self, absorption: tuple[float, float, float], **inputs: float) -> None:
+        """Principled Hair's inputs by their names, with _ for a space; angles in radians."""
+        self._node.inputs["Absorption Coefficient"].default_value = absorption
+        for name, value in inputs.items():
+            self._node.inputs[name.replace("_", " ")].default_value = value
+
+    def picture(self, size: int, height: float, seed: int = 0) -> np.ndarray:
+        """(size, size, 4) scene-linear, premultiplied, of a square `height` [m] high."""
+        render = self._scene.render
+        render.resolution_x = render.resolution_y = size
+        self._camera.data.ortho_scale, self._scene.cycles.seed = height, seed
+        with tempfile.TemporaryDirectory() as folder:
+            render.filepath = str(Path(folder) / "picture.exr")
+            bpy.ops.render.render(write_still=True, scene=self._scene.name)
+            image = bpy.data.images.load(render.filepath)
+            pixels = np.array(image.pixels[:]).reshape(size, size, 4)
+            bpy.data.images.remove(image)
+        return pixels

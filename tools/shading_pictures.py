@@ -1,0 +1,83 @@
+"""Draws where highlights lie, for docs/shading.md: a ball of combed blond hair.
+
+python tools/shading_pictures.py FOLDER
+
+From the left: R alone, TRT alone, TT alone against the light, the whole of Marschner's model with
+the light before the ball, and Kajiya-Kay.
+"""
+
+import importlib
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import bpy  # noqa: F401  it must come before gpu, which lives inside it
+import gpu
+import numpy as np
+from extension_loader import PACKAGE, REPOSITORY, load_package
+from hair_ball import ball_mesh, combed_strands
+
+BLOND = REPOSITORY / "presets" / "looks" / "blond.json"
+STRANDS, RADIUS = 16_000, 0.003
+#: side of a picture [pixels]; what it shows from bottom to top [m]
+SIZE, HEIGHT, SAMPLES = 250, 2.3, 4
+#: along these light shines, past the eye and towards it
+FORWARD, AGAINST = (0.1, -0.25, -1.0), (-0.45, -0.35, 0.8)
+STRENGTH = 3.0
+
+
+def of_addon(module: str) -> Any:
+    return importlib.import_module(f"{PACKAGE}.addon.{module}")
+
+
+def alone(blond: Any, lobe: str) -> Any:
+    """One lobe of the look, without what stands in for light from strand to strand."""
+    others = {f"strength_{name}": 0.0 for name in ("r", "tt", "trt", "rest") if name != lobe}
+    return replace(blond, scattered=0.0, **others)
+
+
+def main(folder: Path) -> None:
+    gpu.init()
+    load_package().register()
+    frame, images = of_addon("render.frame"), of_addon("host.images")
+    shading, lights = of_addon("parameters").ALL_SETTINGS["shading"], of_addon("shading.lights")
+    blond = replace(
+        of_addon("params.preset").read_preset(BLOND, shading).settings,
+        shift_noise=0.0,
+        color_variation=0.2,
+    )
+    strands = combed_strands(STRANDS)
+    skin = of_addon("strands").Surface(*ball_mesh())
+    ball = replace(frame.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), sheen=0.0)
+    camera = frame.Camera(
+        frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),
+    )
+
+    def picture(look: Any, shines_along: tuple[float, ...], strength: float) -> Any:
+        snapshot = frame.Snapshot(
+            strands,
+            np.full(strands.shape[:2], RADIUS, np.float32),
+            meshes=(ball,),
+            lights=(lights.Light.sun(shines_along, (1.0, 1.0, 1.0), strength),),
+            ambient=(0.0, 0.0, 0.0),
+            shading=look,
+            volume_center=np.zeros(3, np.float32),
+        )
+        backdrop = of_addon("host.studio").BACKDROP
+        return frame.render_image(snapshot, camera, SIZE, SIZE, SAMPLES, background=backdrop)
+
+    shown = [
+        picture(alone(blond, "r"), FORWARD, STRENGTH),
+        picture(alone(blond, "trt"), FORWARD, STRENGTH),
+        picture(alone(blond, "tt"), AGAINST, 0.5 * STRENGTH),
+        picture(blond, FORWARD, STRENGTH),
+        picture(replace(blond, model="kajiya_kay"), FORWARD, STRENGTH),
+    ]
+    images.write_png(folder / "highlights.png", images.contact_sheet(shown, len(shown)))
+    print("Wrote highlights.png", flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
