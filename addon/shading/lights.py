@@ -231,12 +231,16 @@ _STUDIO = (
 )
 
 
-def pack_lights(lights: Sequence[Light], ambient: Sequence[float]) -> Floats:
-    """The block `Lights` of gpu_shaders/struct_lights.glsl in std140, (164,) float32.
-
-    Lights beyond the capacity are left out, weakest first.
+def kept_lights(lights: Sequence[Light]) -> list[Light]:
+    """The lights that shaders know, in their order: those beyond the capacity are left out,
+    weakest first.
     """
-    kept = sorted(lights, key=lambda light: -sum(light.power) * _reach(light))[:LIGHT_CAPACITY]
+    return sorted(lights, key=lambda light: -sum(light.power) * _reach(light))[:LIGHT_CAPACITY]
+
+
+def pack_lights(lights: Sequence[Light], ambient: Sequence[float]) -> Floats:
+    """The block `Lights` of gpu_shaders/struct_lights.glsl in std140, (164,) float32."""
+    kept = kept_lights(lights)
     block = np.zeros((1 + 5 * LIGHT_CAPACITY, 4), np.float32)
     block[0] = (*ambient, len(kept))
     for index, light in enumerate(kept):

@@ -127,6 +127,16 @@ class Fibre:
         """Of R, TT, TRT and the rest."""
         return (self.strength_r, self.strength_tt, self.strength_trt, self.strength_rest)
 
+    @property
+    def lobe_widths(self) -> tuple[float, float, float, float]:
+        """Of R, TT, TRT and the rest, which is spread as TRT is."""
+        return (*self.widths, self.widths[2])
+
+    @property
+    def lobe_shifts(self) -> tuple[float, float, float, float]:
+        """Of R, TT, TRT and the rest, see highlight_shifts."""
+        return (*self.highlight_shifts, self.highlight_shifts[2])
+
 
 def directions_to_angles(
     tangent: Floats, to_light: Floats, to_eye: Floats

@@ -45,10 +45,12 @@ def fibre_of(settings: ShadingSettings) -> Fibre:
 
 
 def pack_fibre(settings: ShadingSettings) -> Floats:
-    """`Fibre` of gpu_shaders/struct_fibre.glsl in std140, (12,) float32."""
+    """`Fibre` of gpu_shaders/struct_fibre.glsl in std140, (20,) float32."""
     root = [*root_absorption(settings), COLOR_FACTOR]
     tip = [*tip_absorption(settings), GREY_LEFT]
-    return np.array([*root, *tip, *fibre_of(settings).strengths], np.float32)
+    fibre = fibre_of(settings)
+    lobes = [*fibre.strengths, *fibre.lobe_widths, *fibre.lobe_shifts]
+    return np.array([*root, *tip, *lobes], np.float32)
 
 
 def root_absorption(settings: ShadingSettings) -> Floats:
@@ -89,6 +91,18 @@ def strand_color(absorption: Floats) -> Floats:
     return absorption_color(absorption)
 
 
+def straight_light(
+    normal: Floats, to_light: Floats, tau: Floats | float, shading: ShadingSettings
+) -> Floats:
+    """The share of light that no strand is in the way of, (...): what passes tau strands.
+
+    Where tau is not known, which is when it is negative, by how much the hair's volume faces the
+    light: a stand-in.
+    """
+    facing = 1.0 + shading.volume_shade * (diffuse_bias(normal, to_light) - 1.0)
+    return np.where(np.asarray(tau) < 0.0, facing, np.exp(-np.maximum(tau, 0.0)))
+
+
 def marschner_light(
     tables: MarschnerTables,
     tangent: Floats,
@@ -100,8 +114,10 @@ def marschner_light(
     absorption: Floats,
     shading: ShadingSettings,
     level: Floats | float = 0.0,
+    tau: Floats | float = -1.0,
 ) -> Floats:
-    """What one light sends to the eye, (..., 3): times irradiance and occlusion it is radiance.
+    """What one light sends to the eye, (..., 3): times irradiance it is radiance, and times
+    occlusion where tau is not known.
 
     Args:
         tangent, normal, to_light, to_eye: unit vectors, (..., 3), in one space; the normal is that
@@ -109,6 +125,7 @@ def marschner_light(
         shift_noise, sparkle_noise: in [0, 1].
         absorption: per radius, (..., 3).
         level: see `look_up`.
+        tau: strands in the way of the light on average; negative: not known.
     """
     shift = shading.shift_noise * (shift_noise - 0.5)
     shifted = shifted_tangent(tangent, normal, shift)
@@ -119,7 +136,7 @@ def marschner_light(
         np.broadcast_arrays(strength_r, strength_tt, strength_trt * sparkle, strength_rest), axis=-1
     )
     scattered = look_up(tables, theta_i, theta_r, phi, absorption, strengths, level)
-    bias = diffuse_bias(normal, to_light)
-    shade = 1.0 + shading.volume_shade * (bias - 1.0)
+    bias = diffuse_bias(normal, to_light) * np.exp(-np.maximum(tau, 0.0))
+    shade = straight_light(normal, to_light, tau, shading)
     direct = scattered * (np.cos(theta_i) * shade)[..., None]
     return direct + strand_color(absorption) * (shading.scattered * bias / np.pi)[..., None]

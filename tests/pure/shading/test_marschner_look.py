@@ -155,12 +155,14 @@ def test_the_side_away_from_the_light_is_in_the_dark(tables: MarschnerTables) ->
 def test_the_packed_fibre_is_what_the_struct_says() -> None:
     settings = replace(PLAIN, strength_tt=0.5, strength_rest=2.0)
     packed = pack_fibre(settings)
-    assert packed.dtype == np.float32 and packed.shape == (12,)
+    assert packed.dtype == np.float32 and packed.shape == (20,)
     assert packed[:3] == pytest.approx(fibre_of(settings).absorption)
     assert np.exp(-np.sqrt(packed[:3]) * packed[3]) == pytest.approx(settings.base_color, rel=1e-5)
     assert packed[4:7] == pytest.approx(color_absorption(np.array(settings.tip_color)))
     assert packed[7] == pytest.approx(GREY_LEFT)
-    assert packed[8:] == pytest.approx([1.0, 0.5, 1.0, 2.0])
+    assert packed[8:12] == pytest.approx([1.0, 0.5, 1.0, 2.0])
+    assert packed[12:16] == pytest.approx(fibre_of(settings).lobe_widths)
+    assert packed[16:] == pytest.approx(fibre_of(settings).lobe_shifts)
 
 
 def ends() -> list[tuple[str, object]]:

@@ -1,0 +1,278 @@
+"""Dual scattering: light that reaches a strand from others, on its way in and from behind.
+
+Reference: Zinke, Yuksel, Weber and Keyser 2008, "Dual Scattering Approximation for Fast Multiple
+Scattering in Hair". Light comes to a place straight, or forward through the n strands between it
+and the light; and what it lights there are the place itself and the strands around, which send a
+part of it back and forth.
+
+What we do otherwise:
+    How many strands lie between is not a whole number but a mean, tau of the opacity maps. Strands
+        that lie at random are met as often as Poisson has it, so the mean of a_f^n is
+        exp(-tau (1 - a_f)), of which exp(-tau) has met none: no threshold, and no jump.
+    What returns out of the hair behind is summed to the end, not to its third term, and for as many
+        strands as there are: deep white hair gives all light back, a thin layer what it can.
+    Lobes around the fibre are held by two numbers each, what they send on and what they send back,
+        in place of tables of every azimuth: light from half a circle blurs the rest away.
+
+Colours are absorption, so that a strand's own colour may differ from root to tip: see shares().
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Floats
+from ..kajiya_kay import shifted_tangent
+from ..marschner.fibre import Fibre, directions_to_angles
+from ..marschner.interface import LEAST_COSINE
+from ..marschner.look import fibre_of, straight_light
+from ..marschner.tables import MarschnerTables, bilinear, kept_light, look_up
+from ..settings import ShadingSettings
+
+#: strands that are taken to lie behind a place where nothing is known of it
+UNKNOWN_BEYOND = 4.0
+#: Texels of the table of shares: cos theta_d from 0 to 1, and absorption from 0 to infinity.
+SHARES_SIZE = 32
+#: Absorption in the middle of that axis.
+HALF_WAY = 0.5
+#: share that hair may send on at most, so that sums have bounds
+_MOST = 0.999
+_MOST_KEPT = 0.9999
+_SMALLEST = 1e-6
+#: what is taken for no light at all where a share of light stands in for tau
+_LEAST_LIGHT = 1e-3
+
+
+@dataclass(frozen=True)
+class Shares:
+    """What a fibre sends on and back, by lobe: R, TT, TRT and the rest.
+
+    forward, backward: (SHARES_SIZE, SHARES_SIZE, 4) float32; row by absorption, see
+        absorption_place; column by cos theta_d; shares of the light on the fibre.
+    """
+
+    forward: Floats
+    backward: Floats
+
+
+def shares(tables: MarschnerTables, size: int = SHARES_SIZE) -> Shares:
+    """From the lobes around the fibre, for all absorptions.
+
+    Light that comes from anywhere in half a circle, and leaves by phi, goes on into the other half
+    with the share |phi| / pi (Zinke et al. 2008, equation 6, for azimuths).
+    """
+    rows = np.linspace(0, len(tables.azimuthal) - 1, 2 * size).round().astype(int)
+    columns = np.linspace(0, len(tables.azimuthal) - 1, size).round().astype(int)
+    clear, paths = tables.azimuthal[rows][:, columns], tables.paths[rows][:, columns]
+    turn = (rows / (len(tables.azimuthal) - 1))[:, None, None]
+    # the trapezoidal rule from 0 to pi, and its mirror image
+    weight = np.gradient(turn[:, 0, 0])[:, None, None] * 2.0 * np.pi
+    weight[[0, -1]] *= 0.5
+    forward, backward = np.empty((2, size, size, 4), np.float32)
+    for row, place in enumerate(np.linspace(0.0, 1.0, size)):
+        kept = kept_light(paths, np.full(1, place_absorption(place)))[..., 0]
+        lit = clear * kept * weight
+        forward[row] = (lit * turn).sum(axis=0)
+        backward[row] = (lit * (1.0 - turn)).sum(axis=0)
+    return Shares(forward, backward)
+
+
+def absorption_place(absorption: Floats) -> Floats:
+    """Where an absorption lies in the table, 0 to 1."""
+    return absorption / (absorption + HALF_WAY)
+
+
+def place_absorption(place: Floats | float) -> Floats:
+    """The absorption at a place of the table; its end stands for all that is black."""
+    inside = np.minimum(place, 1.0 - 1e-3)
+    return np.asarray(HALF_WAY * inside / (1.0 - inside))
+
+
+def shares_at(table: Floats, cos_d: Floats, absorption: Floats) -> Floats:
+    """Shares by colour and lobe, (..., 3, 4), from the forward or the backward table.
+
+    Args:
+        cos_d: (...). absorption: (..., 3).
+    """
+    return bilinear(table, cos_d[..., None], absorption_place(absorption))
+
+
+def passed(tau: Floats, a_forward: Floats) -> tuple[Floats, Floats]:
+    """What passes tau strands on average: straight, and sent on by one of them or more.
+
+    Poisson: the chance to meet none is exp(-tau), the mean of a_f^n is exp(-tau (1 - a_f)).
+    """
+    straight = np.exp(-tau)
+    return straight, np.exp(-tau * (1.0 - a_forward)) - straight
+
+
+def returned(a_forward: Floats, a_backward: Floats, count: Floats | float = np.inf) -> Floats:
+    """What so many strands, one behind the other, give back of the light on the first.
+
+    A layer over deep hair gives the deep hair again: R = a_b + a_f^2 R / (1 - a_b R), with any
+    number of turns between the two. From one layer to the next the light keeps
+    g = a_f / (1 - a_b R), so that a stack of n gives R (1 - g^2n) / (1 - R^2 g^2n) (Stokes 1862).
+    """
+    a_forward = np.minimum(a_forward, _MOST_KEPT - a_backward)
+    middle = 1.0 + a_backward**2 - a_forward**2
+    root = np.sqrt(np.maximum(middle**2 - 4.0 * a_backward**2, 0.0))
+    # the smaller root, without a difference of near equals
+    deep = 2.0 * a_backward / np.maximum(middle + root, _SMALLEST)
+    kept = a_forward / np.maximum(1.0 - a_backward * deep, _SMALLEST)
+    lost = np.minimum(kept, 1.0) ** (2.0 * count)
+    return deep * (1.0 - lost) / np.maximum(1.0 - deep**2 * lost, _SMALLEST)
+
+
+def returned_shape(
+    forward: Floats, backward: Floats, fibre: Fibre
+) -> tuple[Floats, Floats, Floats]:
+    """Width and shift of theta_h in what returns, and the width that one passage on adds.
+
+    Args:
+        forward, backward: by lobe, (..., 4).
+
+    Zinke et al. 2008, equations 16 and 17, with a_f of at most 0.999.
+    """
+    widths = np.array(fibre.lobe_widths)
+    shifts = np.array(fibre.lobe_shifts)
+    a_f = np.minimum(forward.sum(axis=-1), _MOST)
+    a_b = backward.sum(axis=-1)
+    on, back = np.maximum(a_f, _SMALLEST), np.maximum(a_b, _SMALLEST)
+    wide_f = np.sqrt((forward * widths**2).sum(axis=-1) / on)
+    wide_b = np.sqrt((backward * widths**2).sum(axis=-1) / back)
+    shift_f = (forward * shifts).sum(axis=-1) / on
+    shift_b = (backward * shifts).sum(axis=-1) / back
+    rest = 1.0 - a_f**2
+    shift = shift_b * (1.0 - 2.0 * a_b**2 / rest**2) + shift_f * (
+        (2.0 * rest**2 + 4.0 * a_f**2 * a_b**2) / rest**3
+    )
+    limit = 0.25 * np.pi
+    numerator = a_b * np.sqrt(2.0 * wide_f**2 + wide_b**2) + a_b**3 * np.sqrt(
+        2.0 * wide_f**2 + 3.0 * wide_b**2
+    )
+    width = (
+        (1.0 + 0.7 * a_f**2)
+        * numerator
+        / np.maximum(a_b + a_b**3 * (2.0 * wide_f + 3.0 * wide_b), _SMALLEST)
+    )
+    return width, np.clip(shift, -limit, limit), wide_f
+
+
+def spread_around(forward: Floats, backward: Floats, phi: Floats) -> Floats:
+    """N of a lobe for light that comes from half a circle around its direction, (...).
+
+    A raised cosine on each side: a lobe blurred over half a circle has hardly more to it.
+    """
+    cosine = np.cos(phi)
+    return (forward * (1.0 - cosine) + backward * (1.0 + cosine)) / (2.0 * np.pi)
+
+
+def half_gaussian(theta_h: Floats, shift: Floats, variance: Floats) -> Floats:
+    """Half of the unit Gaussian of theta_h about -shift: Marschner's M_p."""
+    variance = np.maximum(variance, _SMALLEST)
+    return np.exp(-0.5 * (theta_h + shift) ** 2 / variance) / (
+        2.0 * np.sqrt(2.0 * np.pi * variance)
+    )
+
+
+def dual_scattering(
+    single: Floats,
+    theta_i: Floats,
+    theta_r: Floats,
+    phi: Floats,
+    forward: Floats,
+    backward: Floats,
+    tau: Floats,
+    beyond: Floats,
+    fibre: Fibre,
+    density: float,
+) -> Floats:
+    """S of a strand among others, (..., 3): times irradiance and cos theta_i it is radiance.
+
+    Args:
+        single: S of the strand alone, (..., 3).
+        forward, backward: shares at this theta_d by colour and lobe, (..., 3, 4).
+        tau: strands between the place and the light, on average, (...).
+        beyond: strands behind the place, seen from the light, (...).
+        density: d_f and d_b of the paper.
+    """
+    theta_h, theta_d = 0.5 * (theta_i + theta_r), 0.5 * (theta_r - theta_i)
+    squared = np.maximum(np.cos(theta_d), LEAST_COSINE)[..., None] ** 2
+    a_f, a_b = forward.sum(axis=-1), backward.sum(axis=-1)
+    straight, scattered = passed(tau[..., None], a_f)
+    # widths are the same for all colours: those of green
+    width, shift, wide_f = returned_shape(forward[..., 1, :], backward[..., 1, :], fibre)
+    added = np.maximum(tau, 1.0) * wide_f**2
+    # what the strand itself sends back is in `single`
+    stack = returned(a_f, a_b, 1.0 + beyond[..., None]) - returned(a_f, a_b, 1.0)
+    back = np.maximum(stack, 0.0) / (np.pi * squared)
+    back_straight = back * half_gaussian(theta_h, shift, width**2)[..., None]
+    back_scattered = back * half_gaussian(theta_h, shift, width**2 + added)[..., None]
+    around = spread_around(forward, backward, phi[..., None, None])
+    widths = np.array(fibre.lobe_widths)
+    shifts = np.array(fibre.lobe_shifts)
+    along = half_gaussian(theta_h[..., None], shifts, widths**2 + added[..., None])
+    on = np.sum(along[..., None, :] * around, axis=-1) / squared
+    return straight * (single + density * back_straight) + scattered * density * (
+        on + density * back_scattered
+    )
+
+
+def scattering_light(
+    tables: MarschnerTables,
+    sides: Shares,
+    tangent: Floats,
+    normal: Floats,
+    to_light: Floats,
+    to_eye: Floats,
+    shift_noise: Floats,
+    sparkle_noise: Floats,
+    absorption: Floats,
+    shading: ShadingSettings,
+    density: float,
+    level: Floats | float = 0.0,
+    tau: Floats | float = -1.0,
+    beyond: Floats | float = UNKNOWN_BEYOND,
+) -> Floats:
+    """What one light sends to the eye from a strand among others, (..., 3).
+
+    As look.marschner_light, of which it has all but the colour that stands in for light from strand
+    to strand.
+
+    Args:
+        density: d_f and d_b of Zinke et al. 2008.
+    """
+    shift = shading.shift_noise * (shift_noise - 0.5)
+    shifted = shifted_tangent(tangent, normal, shift)
+    theta_i, theta_r, phi = directions_to_angles(shifted, to_light, to_eye)
+    fibre = fibre_of(shading)
+    sparkle = 1.0 + shading.sparkle * (np.asarray(sparkle_noise) - 1.0)
+    strengths = np.stack(
+        np.broadcast_arrays(
+            fibre.strength_r, fibre.strength_tt, fibre.strength_trt * sparkle, fibre.strength_rest
+        ),
+        axis=-1,
+    )
+    single = look_up(tables, theta_i, theta_r, phi, absorption, strengths, level)
+    cos_d = np.cos(0.5 * (theta_r - theta_i))
+    straight = straight_light(normal, to_light, tau, shading)
+    passed_by = np.where(
+        np.asarray(tau) < 0.0, -np.log(np.maximum(straight, _LEAST_LIGHT)), np.asarray(tau)
+    )
+    forward = shares_at(sides.forward, cos_d, absorption)
+    backward = shares_at(sides.backward, cos_d, absorption)
+    scattered = dual_scattering(
+        single,
+        theta_i,
+        theta_r,
+        phi,
+        forward,
+        backward,
+        passed_by,
+        np.asarray(beyond),
+        fibre,
+        density,
+    )
+    return scattered * np.cos(theta_i)[..., None]

@@ -1,0 +1,166 @@
+"""Opacity maps: how much hair lies between a light and a place.
+
+A texel holds, for each of some layers, how much of its area the strands between the light and the
+far end of that layer cover, each counted for itself: that is the optical depth tau, and behind it
+exp(-extinction tau) of the light is left (Beer and Lambert).
+
+There are two ways to lay the layers, both given by where they end:
+    slices  evenly through the ball around the hair (Kim and Neumann 2001; Nguyen and Donnelly
+            2005 draw 16 of them in one pass);
+    deep    from the first hair that light meets in each texel on, the layers thicker from one to
+            the next (Yuksel and Keyser 2008): they follow the hair, so that it does not band.
+Slices are deep layers that start at 0 everywhere, so that one shader draws both.
+
+All depths are those of light_frame.py, 0 to 1 through the ball. Between the ends of two layers
+tau is taken as linear. Reference of gpu_shaders/lib_opacity.glsl.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Bools, Floats, Ints
+from .light_frame import LightFrame
+from .settings import VolumeSettings
+
+#: pieces into which the reference cuts strands, in texels
+_PIECE = 0.25
+
+
+def layer_ends(settings: VolumeSettings) -> Floats:
+    """Where layers end, behind where they start, (layer_count,), rising; the last one is 1."""
+    if settings.shadows == "slices":
+        return np.arange(1, settings.slices + 1) / settings.slices
+    count = settings.layers - 1
+    near = min(settings.layer_depth, 0.999) * (np.arange(1, count + 1) / count) ** 2
+    return np.append(near, 1.0)
+
+
+def adds_to(depth: Floats, ends: Floats) -> Bools:
+    """The layers whose sums a strand at this depth behind their start is part of, (..., n)."""
+    return depth[..., None] <= ends
+
+
+def layer_weights(depth: Floats, ends: Floats) -> Floats:
+    """By what the layers' sums are to be multiplied for tau at this depth, (..., n).
+
+    Each layer's share in what is passed, less the next one's: tau is one dot product.
+    """
+    starts = np.concatenate([[0.0], ends[:-1]])
+    passed = np.clip((depth[..., None] - starts) / (ends - starts), 0.0, 1.0)
+    passed[..., :-1] -= passed[..., 1:]
+    return passed
+
+
+def transmittance(optical_depth: Floats, extinction: float) -> Floats:
+    """Light that is left."""
+    return np.exp(-extinction * optical_depth)
+
+
+def look_up(
+    layers: Floats,
+    starts: Floats,
+    meshes: Floats,
+    ends: Floats,
+    places: Floats,
+    depth: Floats,
+    bias: float,
+) -> tuple[Floats, Floats, Floats]:
+    """What light meets on its way, blended between the four texels around each place of a map.
+
+    Args:
+        layers: (resolution, resolution, n) sums, row by row.
+        starts: (resolution, resolution) depth at which each texel's layers start.
+        meshes: (resolution, resolution) depth of the first mesh, 1 where there is none.
+        ends: (n,).
+        places: (m, 2) in 0..1. depth: (m,).
+        bias: strands and meshes this close in front do not count.
+
+    Returns:
+        tau up to each place, tau from there on to the first mesh, and the share of the light that
+        no mesh is in the way of; each (m,).
+    """
+    resolution = len(layers)
+    inside = np.minimum(depth, 1.0) - bias
+    scaled = places * resolution - 0.5
+    low = np.floor(scaled).astype(np.int64)
+    share = scaled - low
+    tau, beyond, lit = np.zeros((3, len(places)))
+    for right, up in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        column = np.clip(low[:, 0] + right, 0, resolution - 1)
+        row = np.clip(low[:, 1] + up, 0, resolution - 1)
+        weight = np.abs(1 - right - share[:, 0]) * np.abs(1 - up - share[:, 1])
+        sums, start, mesh = layers[row, column], starts[row, column], meshes[row, column]
+        tau += weight * np.einsum("mn,mn->m", sums, layer_weights(inside - start, ends))
+        beyond += weight * np.einsum("mn,mn->m", sums, layer_weights(mesh - start, ends))
+        lit += weight * (inside <= mesh)
+    is_inside = ((places >= 0.0) & (places <= 1.0)).all(axis=1)
+    tau, beyond = np.where(is_inside, tau, 0.0), np.where(is_inside, beyond, 0.0)
+    return tau, np.maximum(beyond - tau, 0.0), np.where(is_inside, lit, 1.0)
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Strands as a light sees them, in pieces smaller than a texel.
+
+    texel: (n,) number of the texel, row by row; only pieces inside of the map.
+    depth: (n,) of each piece's middle.
+    covered: (n,) share of the texel's area.
+    """
+
+    resolution: int
+    texel: Ints
+    depth: Floats
+    covered: Floats
+
+    def optical_depth(self, texel: Ints, depth: Floats) -> Floats:
+        """tau at depths in texels, (m,): the sum over the pieces in front, one by one."""
+        order = np.lexsort((self.depth, self.texel))
+        key = self.texel[order] + np.clip(self.depth[order], 0.0, 1.0 - 1e-9)
+        summed = np.concatenate([[0.0], np.cumsum(self.covered[order])])
+        before = np.searchsorted(key, texel.astype(np.float64))
+        upto = np.searchsorted(key, texel + np.clip(depth, 0.0, 1.0 - 1e-9))
+        return summed[upto] - summed[before]
+
+    def starts(self) -> Floats:
+        """Depth of the first piece in each texel, (resolution^2,); 1 where there is none."""
+        first = np.ones(self.resolution**2)
+        np.minimum.at(first, self.texel, self.depth)
+        return first
+
+    def layers(self, ends: Floats, starts: Floats) -> Floats:
+        """What a map holds, (resolution^2, layer_count)."""
+        sums = np.zeros((self.resolution**2, len(ends)))
+        np.add.at(
+            sums, self.texel, adds_to(self.depth - starts[self.texel], ends) * self.covered[:, None]
+        )
+        return sums
+
+
+def coverage(strands: Floats, radius: Floats, frame: LightFrame, resolution: int) -> Coverage:
+    """Strands cut into pieces, each of which covers a part of one texel.
+
+    Args:
+        strands: (strand_count, cv_count, 3) [m], world space, straight between their CVs.
+        radius: (strand_count, cv_count) [m].
+    """
+    start, end = strands[:, :-1].reshape(-1, 3), strands[:, 1:].reshape(-1, 3)
+    thick = (radius[:, :-1] + radius[:, 1:]).ravel()
+    from_place, _ = frame.places(start.astype(np.float64))
+    to_place, _ = frame.places(end.astype(np.float64))
+    texels = np.linalg.norm(to_place - from_place, axis=-1) * resolution
+    count = np.maximum(np.ceil(texels / _PIECE), 1).astype(np.int64)
+    segment = np.repeat(np.arange(len(start)), count)
+    first = np.repeat(np.cumsum(count) - count, count)
+    share = (np.arange(len(segment)) - first + 0.5) / count[segment]
+    middle = start[segment] + (end - start)[segment] * share[:, None]
+    place, depth = frame.places(middle.astype(np.float64))
+    width = frame.texel_width(middle.astype(np.float64), resolution)
+    # its length and width in texels, as the light sees them
+    covered = (texels / count)[segment] * thick[segment] / width
+    column, row = np.floor(place * resolution).astype(np.int64).T
+    is_inside = (column >= 0) & (column < resolution) & (row >= 0) & (row < resolution)
+    texel = (row * resolution + column)[is_inside]
+    return Coverage(resolution, texel, depth[is_inside], covered[is_inside])

@@ -1,0 +1,148 @@
+"""Dual scattering against strands met at random, stacks of layers, and what must stay whole."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon.shading.marschner.fibre import Fibre
+from hairloom.addon.shading.marschner.scattering import azimuthal_lobes
+from hairloom.addon.shading.marschner.tables import marschner_tables
+from hairloom.addon.shading.volume.dual import (
+    SHARES_SIZE,
+    Shares,
+    absorption_place,
+    dual_scattering,
+    half_gaussian,
+    passed,
+    place_absorption,
+    returned,
+    returned_shape,
+    shares,
+    spread_around,
+)
+
+FIBRE = Fibre()
+
+
+@pytest.fixture(scope="module")
+def table() -> Shares:
+    return shares(marschner_tables(FIBRE, 128))
+
+
+def at(table: Shares, absorption: float, cos_d: float) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of the nearest texel, by lobe."""
+    row = round(float(absorption_place(np.array(absorption))) * (SHARES_SIZE - 1))
+    column = round(cos_d * (SHARES_SIZE - 1))
+    return table.forward[row, column], table.backward[row, column]
+
+
+def test_passing_is_the_mean_over_strands_met_at_random() -> None:
+    random = np.random.default_rng(1)
+    for tau, a_f in ((0.3, 0.8), (2.0, 0.5), (5.0, 0.95)):
+        met = random.poisson(tau, 400_000)
+        straight, on = passed(np.array(tau), np.array(a_f))
+        assert straight == pytest.approx((met == 0).mean(), abs=3e-3)
+        assert on == pytest.approx(np.where(met > 0, a_f**met, 0.0).mean(), abs=3e-3)
+
+
+@pytest.mark.parametrize(("a_f", "a_b"), [(0.8, 0.15), (0.3, 0.3), (0.05, 0.02), (0.0, 0.5)])
+def test_what_returns_is_that_of_a_deep_stack(a_f: float, a_b: float) -> None:
+    """Layers added one by one with all that passes to and fro between them."""
+    back = 0.0
+    for _ in range(4000):
+        back = a_b + a_f**2 * back / (1.0 - a_b * back)
+    assert returned(np.array(a_f), np.array(a_b)) == pytest.approx(back, rel=1e-6)
+
+
+@pytest.mark.parametrize(("a_f", "a_b"), [(0.8, 0.15), (0.3, 0.3), (0.79, 0.209)])
+def test_what_a_few_strands_return_is_that_of_as_many_layers(a_f: float, a_b: float) -> None:
+    back, on = 0.0, 1.0
+    for count in range(1, 9):
+        # one more layer in front of the stack
+        between = 1.0 / (1.0 - a_b * back)
+        back, on = a_b + a_f**2 * back * between, a_f * on * between
+        found = returned(np.array(a_f), np.array(a_b), count)
+        assert found == pytest.approx(back, rel=1e-6)
+
+
+def test_white_hair_gives_all_light_back_and_no_hair_more() -> None:
+    a_f = np.linspace(0.0, 1.0, 41)
+    assert (returned(a_f, 1.0 - a_f) <= 1.0 + 1e-9).all()
+    assert returned(np.array(0.8), np.array(0.2)) > 0.95
+    assert returned(np.array(0.8), np.array(0.19)) < 1.0
+
+
+def test_shares_are_those_of_the_lobes(table: Shares) -> None:
+    """Integrated finely over the reference's lobes, and whole for a clear fibre."""
+    turn = (np.arange(4000) + 0.5) / 4000
+    for cos_d in (1.0, 16 / 31):
+        clear = replace(FIBRE, absorption=(0.0, 0.0, 0.0))
+        lobes = azimuthal_lobes(np.array(cos_d), np.pi * turn, clear)[..., 0]
+        forward, backward = at(table, 0.0, cos_d)
+        expected = 2.0 * np.pi * (lobes * turn[:, None]).mean(axis=0)
+        assert np.allclose(forward, expected, atol=0.01)
+        assert forward.sum() + backward.sum() == pytest.approx(1.0, abs=0.02)
+
+
+def test_more_pigment_sends_less_on_and_back(table: Shares) -> None:
+    assert (np.diff(table.forward.sum(axis=-1), axis=0) <= 1e-5).all()
+    assert (np.diff(table.backward.sum(axis=-1), axis=0) <= 1e-5).all()
+    # what the surface reflects is left of black hair
+    assert table.forward[-1, -1].sum() + table.backward[-1, -1].sum() < 0.1
+
+
+def test_the_axis_of_absorption_turns_round() -> None:
+    values = np.array([0.0, 0.01, 0.5, 3.0, 100.0])
+    assert np.allclose(place_absorption(absorption_place(values)), values)
+    assert np.isfinite(place_absorption(1.0))
+
+
+def test_spreading_keeps_the_energy() -> None:
+    phi = (np.arange(1000) + 0.5) / 1000 * 2.0 * np.pi
+    spread = spread_around(np.array(0.6), np.array(0.2), phi)
+    assert spread.mean() * 2.0 * np.pi == pytest.approx(0.8)
+    assert spread[500] > spread[0] > 0.0
+
+
+def test_half_gaussian_is_half_of_one() -> None:
+    theta_h = np.linspace(-2.0, 2.0, 4001)
+    total = half_gaussian(theta_h, np.array(0.1), np.array(0.01)).sum() * 1e-3
+    assert total == pytest.approx(0.5, rel=1e-4)
+    assert theta_h[half_gaussian(theta_h, np.array(0.1), np.array(0.01)).argmax()] < 0.0
+
+
+def light_on(table: Shares, absorption: float, tau: float, density: float = 0.7) -> np.ndarray:
+    forward, backward = (np.tile(part, (3, 1)) for part in at(table, absorption, 1.0))
+    single = np.array([0.02, 0.02, 0.02])
+    zero, beyond = np.array(0.0), np.array(6.0)
+    return dual_scattering(
+        single, zero, zero, np.array(2.0), forward, backward, np.array(tau), beyond, FIBRE, density
+    )
+
+
+def test_a_strand_alone_in_the_light_is_a_strand_alone(table: Shares) -> None:
+    assert np.allclose(light_on(table, 0.2, 0.0, density=0.0), 0.02)
+
+
+def test_light_hair_is_brighter_and_carries_light_farther(table: Shares) -> None:
+    pigments = (0.01, 0.1, 0.4, 2.0)
+    near = [light_on(table, pigment, 1.0)[1] for pigment in pigments]
+    deep = [light_on(table, pigment, 8.0)[1] for pigment in pigments]
+    assert near == sorted(near, reverse=True) and deep == sorted(deep, reverse=True)
+    assert deep[0] / near[0] > 5.0 * deep[2] / near[2]
+
+
+@pytest.mark.parametrize("tau", [0.0, 1e-6, 1.0, 1e4])
+@pytest.mark.parametrize("absorption", [0.0, 0.3, 1e4])
+@pytest.mark.parametrize("density", [0.0, 1.0])
+def test_no_end_of_a_range_gives_anything_but_numbers(
+    table: Shares, tau: float, absorption: float, density: float
+) -> None:
+    found = light_on(table, absorption, tau, density)
+    assert np.isfinite(found).all() and (found >= 0.0).all()
+    forward, backward = at(table, absorption, 0.0)
+    for shape in returned_shape(forward, backward, FIBRE):
+        assert np.isfinite(shape).all()
