@@ -59,7 +59,8 @@ void main()
                                              absorption,
                                              fibre,
                                              shading,
-                                             level);
+                                             level,
+                                             -1.0);
 #  else
     radiance += irradiance * hair / LIGHT_PI *
                 kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);

@@ -117,8 +117,15 @@ float pixel_level(sampler3D longitudinal,
 }
 #endif
 
-// What one light sends to the eye: times irradiance and occlusion it is radiance. Both noises are
-// in 0..1; for the level see pixel_level.
+// The share of light that no strand is in the way of: what passes tau strands, or, where tau is not
+// known, which is when it is negative, by how much the hair's volume faces the light.
+float straight_light(vec3 normal, vec3 to_light, float tau, ShadingSettings shading)
+{
+  return tau < 0.0 ? mix(1.0, diffuse_bias(normal, to_light), shading.volume_shade) : exp(-tau);
+}
+
+// What one light sends to the eye: times irradiance, and occlusion where tau is not known, it is
+// radiance. Both noises are in 0..1; for the level see look_up.
 vec3 marschner_light(sampler3D longitudinal,
                      sampler2D azimuthal,
                      sampler2D paths,
@@ -131,14 +138,14 @@ vec3 marschner_light(sampler3D longitudinal,
                      vec3 absorption,
                      Fibre fibre,
                      ShadingSettings shading,
-                     float level)
+                     float level,
+                     float tau)
 {
   vec3 angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading);
   vec4 strengths = fibre.strengths;
   strengths.z *= mix(1.0, sparkle_noise, shading.sparkle);
   vec3 scattered = look_up(longitudinal, azimuthal, paths, angles, absorption, strengths, level);
-  float bias = diffuse_bias(normal, to_light);
-  float shade = mix(1.0, bias, shading.volume_shade);
-  return scattered * cos(angles.x) * shade +
+  float bias = diffuse_bias(normal, to_light) * (tau < 0.0 ? 1.0 : exp(-tau));
+  return scattered * cos(angles.x) * straight_light(normal, to_light, tau, shading) +
          strand_color(fibre, absorption) * (shading.scattered * bias / ANGLE_PI);
 }

@@ -1,10 +1,16 @@
-// Strands, fragment stage: all lights and the world's, without shadows but the occlusion. With a
-// DEBUG view colours that show numbers, just enough shaded that strands stay apart.
+// Strands, fragment stage: all lights and the world's. SHADOWS of strands on strands come from
+// opacity maps; where a light has none, the occlusion and how much the volume faces it stand in.
+// With SCATTERING light goes from strand to strand. With a DEBUG view colours that show numbers, just
+// enough shaded that strands stay apart.
 #include "lib_lights.glsl"
 #include "lib_strand_noise.glsl"
 #include "lib_kajiya_kay.glsl"
 #if MARSCHNER
 #  include "lib_marschner.glsl"
+#endif
+#include "lib_shadows.glsl"
+#if SCATTERING
+#  include "lib_dual.glsl"
 #endif
 #include "lib_output.glsl"
 #if DEBUG
@@ -53,13 +59,38 @@ void main()
   vec3 hair = strand_base(along, color_noise, grey_noise, shading);
 #  endif
 
-  vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz;
+  float occlusion = strand_along_and_occlusion.y;
+  vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz * occlusion;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, strand_point, to_light, irradiance);
+    vec3 way = way_of_light(index, strand_point);
+    float tau = way.x;
+    irradiance *= tau < 0.0 ? occlusion : way.z;
 #  if MARSCHNER
     float level = pixel_level(
         longitudinal, tangent, normal, to_light, to_eye, shift_noise, shading);
+#  endif
+#  if SCATTERING
+    radiance += irradiance * scattering_light(longitudinal,
+                                              azimuthal,
+                                              paths,
+                                              shares_forward,
+                                              shares_backward,
+                                              tangent,
+                                              normal,
+                                              to_light,
+                                              to_eye,
+                                              shift_noise,
+                                              sparkle_noise,
+                                              absorption,
+                                              fibre,
+                                              shading,
+                                              level,
+                                              tau,
+                                              way.y,
+                                              scatter_density);
+#  elif MARSCHNER
     radiance += irradiance * marschner_light(longitudinal,
                                              azimuthal,
                                              paths,
@@ -72,13 +103,13 @@ void main()
                                              absorption,
                                              fibre,
                                              shading,
-                                             level);
+                                             level,
+                                             tau);
 #  else
-    radiance += irradiance * hair / LIGHT_PI *
+    radiance += irradiance * (tau < 0.0 ? 1.0 : exp(-tau)) * hair / LIGHT_PI *
                 kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
 #  endif
   }
-  radiance *= strand_along_and_occlusion.y;
 #endif
   color = vec4(output_encoded(radiance, output_encoding), 1.0);
 }

@@ -3,4 +3,6 @@ struct Fibre {
   vec4 root;       // xyz absorption per radius; w factor by which a root of absorption is a colour
   vec4 tip;        // the same of the tip's own colour; w share of absorption that a grey strand has
   vec4 strengths;  // of R, TT, TRT and the rest
+  vec4 widths;     // of the same, of theta_h [rad]
+  vec4 shifts;     // of their highlights to the tip, in theta_h [rad]
 };

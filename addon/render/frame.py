@@ -72,9 +72,10 @@ def render_image(
     color = gpu.types.GPUTexture(size, format="RGBA32F")
     depth = gpu.types.GPUTexture(size, format="DEPTH_COMPONENT32F")
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+    opacity = strand_pass.opacity(snapshot)
     with drawing_into(target):
         target.clear(color=background, depth=1.0)
-        mesh_pass.draw(snapshot, camera, *size)
+        mesh_pass.draw(snapshot, camera, *size, opacity=opacity)
         strand_pass.draw(snapshot, camera, *size, samples=samples)
         (card_pass or CardPass()).draw(snapshot, camera, *size)
     return texture_to_array(color if samples == 1 else _averaged(color, samples))

@@ -12,6 +12,7 @@ from typing import Any
 from ..shading.marschner.look import fibre_of
 from ..shading.marschner.tables import MarschnerTables, marschner_tables, shape_of
 from ..shading.settings import ShadingSettings
+from ..shading.volume.dual import shares
 from .shader_program import released_with_shaders
 from .textures import texture_from, volume_from
 
@@ -23,6 +24,8 @@ MARSCHNER_TEXTURES = (
     ("FLOAT_2D", "azimuthal"),
     ("FLOAT_2D", "paths"),
 )
+#: samplers of shares_at() in lib_dual.glsl
+SHARES_TEXTURES = (("FLOAT_2D", "shares_forward"), ("FLOAT_2D", "shares_backward"))
 
 
 class MarschnerTextures:
@@ -34,6 +37,15 @@ class MarschnerTextures:
 
     def of(self, shading: ShadingSettings, size: int) -> dict[str, Any]:
         """Textures by the names of MARSCHNER_TEXTURES, `size` texels across."""
+        return self._named(MARSCHNER_TEXTURES, shading, size)
+
+    def shares(self, shading: ShadingSettings, size: int) -> dict[str, Any]:
+        """Textures by the names of SHARES_TEXTURES, made of tables `size` texels across."""
+        return self._named(SHARES_TEXTURES, shading, size)
+
+    def _named(
+        self, names: tuple[tuple[str, str], ...], shading: ShadingSettings, size: int
+    ) -> dict[str, Any]:
         shape = shape_of(fibre_of(shading))
         key = (shape, size)
         if key not in self._kept:
@@ -41,7 +53,7 @@ class MarschnerTextures:
             while len(self._kept) > CAPACITY:
                 self._kept.popitem(last=False)
         self._kept.move_to_end(key)
-        return self._kept[key]
+        return {name: self._kept[key][name] for _, name in names}
 
     def release(self) -> None:
         """Let go of all textures; the next call makes them again."""
@@ -53,7 +65,10 @@ MARSCHNER = MarschnerTextures()
 
 
 def _textures(tables: MarschnerTables) -> dict[str, Any]:
+    parts = shares(tables)
     return {
+        "shares_forward": texture_from(parts.forward, "RGBA32F"),
+        "shares_backward": texture_from(parts.backward, "RGBA32F"),
         "longitudinal": volume_from(tables.longitudinal),
         "azimuthal": texture_from(tables.azimuthal, "RGBA32F"),
         "paths": texture_from(tables.paths, "RGBA32F"),

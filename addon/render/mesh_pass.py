@@ -9,28 +9,36 @@ import numpy as np
 
 from ..shading.lights import pack_lights
 from .camera import Camera
+from .opacity_pass import OpacityForm, OpacityMaps
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .shader_source import output_index
 from .snapshot import MeshSnapshot, Snapshot
 from .textures import UniformBlock, drawing_state
 from .view_block import view_values
 
-MESH_RECIPE = ShaderRecipe(
-    name="mesh",
-    vertex="mesh.vert.glsl",
-    fragment="mesh.frag.glsl",
-    structs=("struct_view.glsl", "struct_lights.glsl"),
-    blocks=(("View", "view"), ("Lights", "lights")),
-    integers=("output_encoding",),
-    numbers=(("VEC3", "mesh_color"), ("FLOAT", "mesh_sheen")),
-    inputs=(("VEC3", "position"), ("VEC3", "normal"), ("FLOAT", "occlusion")),
-    varyings=(
-        ("smooth", "VEC3", "mesh_point"),
-        ("smooth", "VEC3", "mesh_normal"),
-        ("smooth", "FLOAT", "mesh_occlusion"),
-    ),
-    outputs=(("VEC4", "color"),),
-)
+_BLOCKS = (("View", "view"), ("Lights", "lights"))
+
+
+def mesh_recipe(opacity: OpacityForm | None = None) -> ShaderRecipe:
+    """The program that draws meshes; with opacity maps hair and meshes throw shadows on them."""
+    return ShaderRecipe(
+        name=f"mesh{f'_{opacity.slots}_{opacity.is_deep}' if opacity else ''}",
+        vertex="mesh.vert.glsl",
+        fragment="mesh.frag.glsl",
+        structs=("struct_view.glsl", "struct_lights.glsl", "struct_opacity.glsl"),
+        blocks=(*_BLOCKS, *((("Opacity", "opacity"),) if opacity else ())),
+        textures=opacity.samplers if opacity else (),
+        integers=("output_encoding",),
+        numbers=(("VEC3", "mesh_color"), ("FLOAT", "mesh_sheen")),
+        inputs=(("VEC3", "position"), ("VEC3", "normal"), ("FLOAT", "occlusion")),
+        varyings=(
+            ("smooth", "VEC3", "mesh_point"),
+            ("smooth", "VEC3", "mesh_normal"),
+            ("smooth", "FLOAT", "mesh_occlusion"),
+        ),
+        outputs=(("VEC4", "color"),),
+        defines=(("SHADOWS", int(opacity is not None)), *(opacity.defines if opacity else ())),
+    )
 
 
 class MeshPass:
@@ -48,22 +56,25 @@ class MeshPass:
         height: int,
         *,
         output: str = "scene_linear",
+        opacity: OpacityMaps | None = None,
     ) -> None:
         """Draw all meshes of the snapshot into the bound framebuffer, depth-tested.
 
-        Arguments as in StrandPass.draw.
+        Args:
+            opacity: the hair's maps, see StrandPass.opacity. Others as in StrandPass.draw.
         """
         self._upload(snapshot.meshes)
+        values = {
+            "view": view_values(camera, width, height),
+            "lights": pack_lights(snapshot.lights, snapshot.ambient),
+            **({} if opacity is None else {"opacity": opacity.values}),
+        }
+        shader = program(mesh_recipe(None if opacity is None else opacity.form))
         for mesh, batch in self._batches:
-            shader = program(MESH_RECIPE)
             with drawing_state():
                 shader.bind(
-                    blocks={
-                        "view": self._blocks["view"].holding(view_values(camera, width, height)),
-                        "lights": self._blocks["lights"].holding(
-                            pack_lights(snapshot.lights, snapshot.ambient)
-                        ),
-                    },
+                    blocks={name: self._blocks[name].holding(values[name]) for name in values},
+                    textures={} if opacity is None else opacity.textures,
                     integers={"output_encoding": output_index(output)},
                     numbers={"mesh_color": mesh.color, "mesh_sheen": mesh.sheen},
                 )
@@ -71,7 +82,7 @@ class MeshPass:
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
-        self._blocks = {name: UniformBlock() for _, name in MESH_RECIPE.blocks}
+        self._blocks = {name: UniformBlock() for name in ("view", "lights", "opacity")}
         self._batches: list[tuple[MeshSnapshot, Any]] = []
 
     def _upload(self, meshes: tuple[MeshSnapshot, ...]) -> None:

@@ -186,7 +186,8 @@ def _create_info(recipe: ShaderRecipe, texts: Mapping[str, ShaderText]) -> Any:
         info.sampler(slot, kind, name)
     for slot, (image_format, name, *access) in enumerate(recipe.images):
         qualifiers = ACCESSES[access[0] if access else "WRITE"]
-        info.image(slot, image_format, "FLOAT_2D", name, qualifiers=qualifiers)
+        kind = "UINT_2D_ATOMIC" if image_format == "R32UI" else "FLOAT_2D"
+        info.image(slot, image_format, kind, name, qualifiers=qualifiers)
     for name in recipe.integers:
         info.push_constant("INT", name)
     for kind, name in recipe.numbers:

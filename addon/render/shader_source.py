@@ -21,6 +21,7 @@ from ..dynamics.wind import MODES
 from ..refine import detail
 from ..refine.settings import DetailSettings
 from ..shading.lights import LIGHT_CAPACITY, NEAREST_DISTANCE
+from ..shading.volume.dual import HALF_WAY, UNKNOWN_BEYOND
 
 SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
 
@@ -32,6 +33,10 @@ MOMENT_TEXELS, COLLIDER_TEXELS = 1 + -(-MODES // 4), 9
 ROUNDS_ACROSS, FIELD_ROW = 512, 4096
 #: Regions behind the head that culling looks into, at most; a strand's are bits of one number.
 SHADE_CAPACITY = 16
+#: Texels of four layers that an opacity map may have: three passes of six slots, for 64 slices.
+LAYER_TEXEL_CAPACITY = 18
+#: Texels of an opacity map along one of where its layers start, and how depth is kept there.
+START_TEXELS, START_SCALE = 4, float(1 << 24)
 #: how a pass writes its colour; see encoded() in lib_output.glsl
 OUTPUTS = ("scene_linear", "viewport")
 #: what strands may be coloured by in place of their shading, see lib_debug_color.glsl
@@ -58,6 +63,11 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "rounds_across": str(ROUNDS_ACROSS),
         "field_row": str(FIELD_ROW),
         "shade_capacity": str(SHADE_CAPACITY),
+        "layer_texel_capacity": str(LAYER_TEXEL_CAPACITY),
+        "start_texels": str(START_TEXELS),
+        "half_way_absorption": repr(HALF_WAY),
+        "unknown_beyond": repr(UNKNOWN_BEYOND),
+        "start_scale": repr(START_SCALE),
         "detail_nearest": repr(float(detail.NEAREST)),
         "detail_margin": repr(float(detail.MARGIN)),
         **{

@@ -15,6 +15,7 @@ from ..refine.settings import DetailSettings
 from ..shading.lights import Light
 from ..shading.marschner.tables import DEFAULT_SIZE
 from ..shading.settings import ShadingSettings, StrandSettings
+from ..shading.volume.settings import VolumeSettings
 from ..strands import Surface
 from .card_snapshot import CardSnapshot
 from .shader_source import DEBUG_VIEWS
@@ -93,6 +94,7 @@ class Snapshot:
     hiders: (k, 4) xyz center and w radius [m, world] of balls inside the head, behind which
         strands are not seen (refine/culling.py), of which the first 16 count; None hides nothing.
     debug_view: one of DEBUG_VIEWS.
+    casters: meshes that are not drawn here but throw shadows on the hair, world space.
     table_size: texels across Marschner's look-up tables; PREVIEW_SIZE while their shape changes.
     cards: hair cards, drawn after meshes and strands (render/card_pass.py).
 
@@ -113,6 +115,7 @@ class Snapshot:
     shading: ShadingSettings = field(default_factory=ShadingSettings)
     strand_settings: StrandSettings = field(default_factory=StrandSettings)
     detail: DetailSettings = field(default_factory=DetailSettings)
+    volume: VolumeSettings = field(default_factory=VolumeSettings)
     volume_center: Floats | None = None
     device_points: DevicePoints | None = None
     guide: Ints | None = None
@@ -120,6 +123,7 @@ class Snapshot:
     rank: Floats | None = None
     hiders: Floats | None = None
     debug_view: str = "none"
+    casters: tuple[Surface, ...] = ()
     table_size: int = DEFAULT_SIZE
     cards: CardSnapshot | None = None
 

@@ -20,14 +20,16 @@ import numpy as np
 
 from ..arrays import Floats
 from ..params.glsl import struct_values
-from ..shading.lights import pack_lights
+from ..shading.lights import kept_lights, pack_lights
 from ..shading.marschner.look import pack_fibre
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..shading.strand_noise import SEED_LIMIT
+from ..shading.volume.light_frame import Ball, ball_around, reach_of, stepped_ball
 from .camera import Camera
 from .detail_pass import DetailOrder, DetailPass
 from .display import Display
-from .marschner_textures import MARSCHNER, MARSCHNER_TEXTURES
+from .marschner_textures import MARSCHNER, MARSCHNER_TEXTURES, SHARES_TEXTURES
+from .opacity_pass import OpacityForm, OpacityMaps, OpacityPass
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .shader_source import DEBUG_VIEWS, ShaderError, output_index
 from .snapshot import Snapshot
@@ -51,27 +53,42 @@ def strand_recipe(
     model: str = "kajiya_kay",
     debug_view: str = "none",
     has_display: bool = False,
+    opacity: OpacityForm | None = None,
+    scatters: bool = False,
 ) -> ShaderRecipe:
     """The program that draws every segment in equally many pieces, or each in its own.
 
     It holds one model of MODELS alone. A debug view has none: it is the same with either.
-    With a display it looks up how the viewport shows a colour, see display.py.
+    With a display it looks up how the viewport shows a colour, see display.py. With opacity maps
+    hair shades itself; `scatters` adds light from strand to strand, in Marschner's model.
     """
     is_marschner = model == "marschner"
+    lit = f"{'_scattering' * scatters}{f'_{opacity.slots}_{opacity.is_deep}' if opacity else ''}"
     kind = f"{'adaptive' if is_adaptive else 'fixed'}{'_display' if has_display else ''}"
     textures = ["cv_points", "cv_looks"]
     textures += ["order", "factors"] if is_adaptive else []
     textures += ["debug_numbers"] if debug_view in NUMBERED_VIEWS else []
     return ShaderRecipe(
-        name=f"strand_{kind}_{model}_{debug_view}",
+        name=f"strand_{kind}_{model}{lit}_{debug_view}",
         vertex="strand.vert.glsl",
         fragment="strand.frag.glsl",
-        structs=("struct_view.glsl", "struct_lights.glsl", "struct_fibre.glsl"),
+        structs=(
+            "struct_view.glsl",
+            "struct_lights.glsl",
+            "struct_fibre.glsl",
+            "struct_opacity.glsl",
+        ),
         settings=(StrandSettings, ShadingSettings),
-        blocks=(*BLOCKS, *((("Fibre", "fibre"),) if is_marschner else ())),
+        blocks=(
+            *BLOCKS,
+            *((("Fibre", "fibre"),) if is_marschner else ()),
+            *((("Opacity", "opacity"),) if opacity else ()),
+        ),
         textures=(
             *(("FLOAT_2D", name) for name in textures),
             *(MARSCHNER_TEXTURES if is_marschner else ()),
+            *(SHARES_TEXTURES if scatters else ()),
+            *(opacity.samplers if opacity else ()),
             *((("FLOAT_3D", "display_table"),) if has_display else ()),
         ),
         integers=(
@@ -82,6 +99,7 @@ def strand_recipe(
         ),
         numbers=(
             ("VEC3", "volume_center"),
+            *((("FLOAT", "scatter_density"),) if scatters else ()),
             *((("VEC4", "display_shaper"),) if has_display else ()),
         ),
         varyings=(
@@ -96,6 +114,9 @@ def strand_recipe(
             ("ADAPTIVE", int(is_adaptive)),
             ("DEBUG", DEBUG_VIEWS.index(debug_view)),
             ("MARSCHNER", int(is_marschner)),
+            ("SHADOWS", int(opacity is not None)),
+            ("SCATTERING", int(scatters)),
+            *(opacity.defines if opacity else ()),
             *((("DISPLAY", 1),) if has_display else ()),
         ),
     )
@@ -121,6 +142,7 @@ class StrandPass:
 
     def __init__(self) -> None:
         self._detail = DetailPass()
+        self._opacity = OpacityPass()
         self._points_serial = 0
         self.statistics = Statistics()
         self.release()
@@ -162,12 +184,16 @@ class StrandPass:
         is_adaptive = order.factors is not None
         shading, debug_view = snapshot.shading, snapshot.debug_view
         model = shading.model if debug_view == "none" else "kajiya_kay"
+        maps = self.opacity(snapshot) if debug_view == "none" else None
+        scatters = maps is not None and model == "marschner" and snapshot.volume.scattering
         shader = program(
             strand_recipe(
                 is_adaptive=is_adaptive,
                 model=model,
                 debug_view=debug_view,
                 has_display=display is not None,
+                opacity=None if maps is None else maps.form,
+                scatters=scatters,
             )
         )
         integers = {
@@ -187,6 +213,12 @@ class StrandPass:
             blocks["fibre"] = pack_fibre(shading)
             textures |= MARSCHNER.of(shading, snapshot.table_size)
         numbers: dict[str, Any] = {"volume_center": snapshot.center.tolist()}
+        if scatters:
+            textures |= MARSCHNER.shares(shading, snapshot.table_size)
+            numbers["scatter_density"] = snapshot.volume.density
+        if maps is not None:
+            blocks["opacity"] = maps.values
+            textures |= maps.textures
         if display is not None:
             textures["display_table"] = display.table.texture
             numbers["display_shaper"] = display.shaper
@@ -209,13 +241,48 @@ class StrandPass:
             vertices=sum(drawn.vertex_count for drawn in order.classes),
         )
 
+    def opacity(self, snapshot: Snapshot) -> OpacityMaps | None:
+        """How much hair lies between each light and every place; None where it throws no shadow.
+
+        Drawn into textures of its own, and only when something has changed.
+
+        Raises:
+            ShaderError: as `draw`.
+        """
+        if snapshot.volume.shadows == "none" or not snapshot.strand_count:
+            return None
+        self._upload(snapshot)
+        return self._opacity.maps(
+            self._textures["cv_points"],
+            self._points_serial,
+            (snapshot.strand_count, snapshot.cv_count),
+            self._ball(snapshot),
+            kept_lights(snapshot.lights),
+            snapshot.volume,
+            snapshot.strand_settings,
+            (*(mesh.surface for mesh in snapshot.meshes), *snapshot.casters),
+        )
+
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
-        self._blocks = {name: UniformBlock() for name in (*(name for _, name in BLOCKS), "fibre")}
+        names = (*(name for _, name in BLOCKS), "fibre", "opacity")
+        self._blocks = {name: UniformBlock() for name in names}
+        self._opacity.release()
+        self._extent: tuple[Floats | None, Ball | float] = (None, 0.0)
         self._textures: dict[str, Any] = {}
         self._uploaded: dict[str, tuple[Any, ...]] = {}
         self._ribbons: dict[int, Any] = {}
         self._detail.release()
+
+    def _ball(self, snapshot: Snapshot) -> Ball:
+        """Around all strands; of those on the GPU around all places that they can get to."""
+        device = snapshot.device_points
+        kept, found = self._extent
+        if kept is not snapshot.strands or isinstance(found, float) != (device is not None):
+            strands = snapshot.strands
+            found = ball_around(strands) if device is None else reach_of(strands)
+            self._extent = strands, found
+        return stepped_ball(snapshot.root_center, found) if isinstance(found, float) else found
 
     def _bound(self, order: DetailOrder, debug_view: str) -> dict[str, Any]:
         """This groom's own textures by the names of strand_recipe."""

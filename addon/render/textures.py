@@ -97,6 +97,11 @@ class UniformBlock:
         self._values = values.copy()
         return self._buffer
 
+    @property
+    def buffer(self) -> Any:
+        """The buffer as it was last filled."""
+        return self._buffer
+
 
 @contextmanager
 def drawing_state(

@@ -25,15 +25,19 @@ def compute(gpu_context: Any) -> Callable[..., np.ndarray]:
         *,
         textures: Mapping[str, np.ndarray] | None = None,
         blocks: Mapping[str, tuple[str, np.ndarray]] | None = None,
+        samplers: Mapping[str, tuple[str, Any]] | None = None,
         **recipe: Any,
     ) -> np.ndarray:
-        """`textures` are arrays (h, w, 4) or (d, h, w, 4), `blocks` (struct, std140 values)."""
+        """`textures` are arrays (h, w, 4) or (d, h, w, 4), `blocks` (struct, std140 values), and
+        `samplers` (sampler type, texture on the GPU), all by name.
+        """
         shader = program(
             ShaderRecipe(
                 name=file,
                 compute=file,
-                textures=tuple(
-                    (f"FLOAT_{array.ndim - 1}D", name) for name, array in (textures or {}).items()
+                textures=(
+                    *((f"FLOAT_{a.ndim - 1}D", name) for name, a in (textures or {}).items()),
+                    *((kind, name) for name, (kind, _) in (samplers or {}).items()),
                 ),
                 images=(("RGBA32F", "result"),),
                 blocks=tuple((struct, name) for name, (struct, _) in (blocks or {}).items()),
@@ -46,6 +50,7 @@ def compute(gpu_context: Any) -> Callable[..., np.ndarray]:
             name: volume_from(array) if array.ndim == 4 else texture_from(array, "RGBA32F")
             for name, array in (textures or {}).items()
         }
+        inputs |= {name: texture for name, (_, texture) in (samplers or {}).items()}
         buffers = {
             name: gpu_context.types.GPUUniformBuf(values)
             for name, (_, values) in (blocks or {}).items()

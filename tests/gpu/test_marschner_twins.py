@@ -143,7 +143,7 @@ def test_light(compute: Callable[..., np.ndarray], settings: ShadingSettings) ->
         texels(tangents, shift),
         texels(normals, sparkle),
         texels(lights, level),
-        texels(eyes),
+        texels(eyes, random.uniform(-1.0, 3.0, (ROWS, COLUMNS))),
     ]
     found = compute(
         "marschner_light.glsl",
@@ -169,6 +169,7 @@ def test_light(compute: Callable[..., np.ndarray], settings: ShadingSettings) ->
         root_absorption(settings),
         settings,
         packed[2][..., 3].astype(np.float64),
+        packed[3][..., 3].astype(np.float64),
     )
     assert agree(found, expected)
 

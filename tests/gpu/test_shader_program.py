@@ -84,9 +84,9 @@ def test_an_unknown_access_is_refused(recipes: Any) -> None:
 
 
 def test_release_forgets_all_and_shaders_come_back(recipes: Any) -> None:
-    from hairloom.addon.render.mesh_pass import MESH_RECIPE
+    from hairloom.addon.render.mesh_pass import mesh_recipe
 
-    before = recipes.program(MESH_RECIPE)
+    before = recipes.program(mesh_recipe())
     recipes.release()
     recipes.release()
-    assert recipes.program(MESH_RECIPE) is not before
+    assert recipes.program(mesh_recipe()) is not before

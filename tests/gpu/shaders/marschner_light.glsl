@@ -1,4 +1,4 @@
-// In w: of tangents the shift noise, of normals the sparkle noise, of lights the level.
+// In w: of tangents the shift noise, of normals the sparkle noise, of lights the level, of eyes tau.
 #include "lib_marschner.glsl"
 
 void main()
@@ -9,18 +9,20 @@ void main()
   }
   vec4 tangent = texelFetch(tangents, at, 0), normal = texelFetch(normals, at, 0);
   vec4 to_light = texelFetch(lights, at, 0);
+  vec4 to_eye = texelFetch(eyes, at, 0);
   vec3 light = marschner_light(longitudinal,
                                azimuthal,
                                paths,
                                tangent.xyz,
                                normal.xyz,
                                to_light.xyz,
-                               texelFetch(eyes, at, 0).xyz,
+                               to_eye.xyz,
                                tangent.w,
                                normal.w,
                                fibre.root.xyz,
                                fibre,
                                shading,
-                               to_light.w);
+                               to_light.w,
+                               to_eye.w);
   imageStore(result, at, vec4(light, 0.0));
 }

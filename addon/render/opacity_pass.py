@@ -1,0 +1,341 @@
+"""Draws the lights' opacity maps: how much hair lies between each light and every place.
+
+    starts  R32UI: depth of the first hair, where layers are deep; computed before them
+    meshes  depth array: of the first mesh
+    slots   RGBA32F arrays, as many as a framebuffer is given at once, at most six: four layers a
+            texel, summed up by additive blending
+
+Each light that throws shadows has a map: in `starts` one square above the other; in the slots as
+many layers of an array as it takes passes to draw all its texels, texel t in slot t % slots.
+What has not changed since the last draw is not drawn again, so that a moving camera costs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats
+from ..params.glsl import struct_values
+from ..shading.lights import LIGHT_CAPACITY, Light, light_irradiance
+from ..shading.settings import StrandSettings
+from ..shading.volume.light_frame import Ball, LightFrame, light_frame
+from ..shading.volume.opacity import layer_ends
+from ..shading.volume.settings import VolumeSettings
+from ..strands import Surface
+from .shader_program import ShaderRecipe, program
+from .shader_source import LAYER_TEXEL_CAPACITY, START_TEXELS
+from .textures import UniformBlock, drawing_into, drawing_state
+
+#: colour slots of a framebuffer
+_SLOTS = 6
+_NOTHING = (0.0, 0.0, 0.0, 0.0)
+_BLOCKS = (("Opacity", "opacity"), ("StrandSettings", "strands"))
+
+
+def opacity_recipe(slots: int, *, is_deep: bool) -> ShaderRecipe:
+    """The program that draws into so many slots."""
+    return ShaderRecipe(
+        name=f"opacity_{slots}_{'deep' if is_deep else 'slices'}",
+        vertex="opacity.vert.glsl",
+        fragment="opacity.frag.glsl",
+        structs=("struct_opacity.glsl",),
+        settings=(StrandSettings,),
+        blocks=_BLOCKS,
+        textures=(
+            ("FLOAT_2D", "cv_points"),
+            *((("UINT_2D", "opacity_starts"),) if is_deep else ()),
+        ),
+        integers=(
+            "cv_count",
+            "strand_count",
+            "light_index",
+            "first_texel",
+            *(("map_index",) if is_deep else ()),
+        ),
+        numbers=(("FLOAT", "strand_step"),),
+        varyings=(("smooth", "FLOAT", "strand_depth"), ("flat", "FLOAT", "strand_weight")),
+        outputs=tuple(("VEC4", f"layers_{slot}") for slot in range(slots)),
+        defines=(("TARGETS", slots), ("DEEP", int(is_deep))),
+    )
+
+
+_STARTS_RECIPE = ShaderRecipe(
+    name="opacity_starts",
+    compute="opacity_starts.comp.glsl",
+    structs=("struct_opacity.glsl",),
+    blocks=(("Opacity", "opacity"),),
+    textures=(("FLOAT_2D", "cv_points"),),
+    images=(("R32UI", "starts", "READ_WRITE"),),
+    integers=("cv_count", "strand_count", "drawn_count", "light_index", "map_index"),
+    numbers=(("FLOAT", "strand_step"),),
+)
+
+
+_MESH_RECIPE = ShaderRecipe(
+    name="opacity_mesh",
+    vertex="opacity_mesh.vert.glsl",
+    fragment="opacity_mesh.frag.glsl",
+    structs=("struct_opacity.glsl",),
+    blocks=(("Opacity", "opacity"),),
+    integers=("light_index",),
+    inputs=(("VEC3", "position"),),
+)
+
+
+@dataclass(frozen=True)
+class OpacityForm:
+    """What a program that reads maps has to know: slots, and whether layers are deep."""
+
+    slots: int
+    is_deep: bool
+
+    @property
+    def samplers(self) -> tuple[tuple[str, str], ...]:
+        """For a recipe."""
+        arrays = (("FLOAT_2D_ARRAY", f"opacity_{slot}") for slot in range(self.slots))
+        starts = (("UINT_2D", "opacity_starts"),) if self.is_deep else ()
+        return (*arrays, ("DEPTH_2D_ARRAY", "opacity_meshes"), *starts)
+
+    @property
+    def defines(self) -> tuple[tuple[str, int], ...]:
+        """For a recipe."""
+        return (("SLOTS", self.slots), ("DEEP", int(self.is_deep)))
+
+
+@dataclass(frozen=True, eq=False)
+class OpacityMaps:
+    """What shading reads: the block `Opacity`, and the textures."""
+
+    values: Floats
+    slots: tuple[Any, ...]
+    meshes: Any
+    starts: Any = None
+
+    @property
+    def form(self) -> OpacityForm:
+        return OpacityForm(len(self.slots), self.starts is not None)
+
+    @property
+    def textures(self) -> dict[str, Any]:
+        """By their names in the shader."""
+        named = {f"opacity_{slot}": array for slot, array in enumerate(self.slots)}
+        named["opacity_meshes"] = self.meshes
+        return named if self.starts is None else {**named, "opacity_starts": self.starts}
+
+
+@dataclass(frozen=True)
+class _Hair:
+    """Strands on the GPU. drawn: how many of them throw the shadow of all."""
+
+    points: Any
+    strand_count: int
+    cv_count: int
+    drawn: int
+
+    @property
+    def step(self) -> float:
+        return self.strand_count / self.drawn
+
+
+class OpacityPass:
+    """Keeps the maps of one groom from draw to draw; making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU; the next draw makes it anew."""
+        self._blocks = {name: UniformBlock() for _, name in _BLOCKS}
+        self._maps: OpacityMaps | None = None
+        self._drawn: tuple[Any, ...] = ()
+        self._strip: tuple[int, Any] = (0, None)
+        self._casters: list[tuple[Surface, Any]] = []
+
+    def maps(
+        self,
+        points: Any,
+        serial: int,
+        shape: tuple[int, int],
+        ball: Ball,
+        lights: Sequence[Light],
+        settings: VolumeSettings,
+        strands: StrandSettings,
+        casters: tuple[Surface, ...] = (),
+    ) -> OpacityMaps:
+        """The maps of a moment.
+
+        Args:
+            points: texture of CVs, xyz [m, world] and radius, in the layout of strand_rows.
+            serial: another number whenever the points are others.
+            shape: strand_count, cv_count.
+            ball: around all strands.
+            lights: in the order in which the shader knows them.
+            casters: meshes, world space; another object whenever one is another.
+        """
+        frames = shadow_frames(lights, ball, settings)
+        values = pack_opacity(frames, settings)
+        wanted = (serial, shape, strands, settings, values.tobytes(), tuple(map(id, casters)))
+        if self._maps is None or self._drawn != wanted:
+            shadowing = [index for index, frame in enumerate(frames) if frame is not None]
+            self._maps = _new_maps(values, max(len(shadowing), 1), settings)
+            hair = _Hair(points, *shape, max(round(shape[0] * settings.strand_share), 1))
+            self._blocks["opacity"].holding(values)
+            self._blocks["strands"].holding(struct_values(strands))
+            self._casters = [
+                (surface, self._batch_of(surface)) for surface in casters if len(surface.triangles)
+            ]
+            for number, light in enumerate(shadowing):
+                self._draw_meshes(self._maps, number, light)
+                self._draw_map(self._maps, number, light, hair, settings)
+            self._drawn = wanted
+        return self._maps
+
+    def _batch_of(self, surface: Surface) -> Any:
+        """Its triangles on the GPU, kept from the draw before where it is the same object."""
+        return next((b for kept, b in self._casters if kept is surface), None) or _batch(surface)
+
+    def _draw_meshes(self, maps: OpacityMaps, number: int, light: int) -> None:
+        """The depth of the first mesh that a light meets."""
+        target = gpu.types.GPUFrameBuffer(depth_slot={"texture": maps.meshes, "layer": number})
+        shader = program(_MESH_RECIPE)
+        with drawing_into(target), drawing_state(depth_test="LESS_EQUAL"):
+            target.clear(depth=1.0)
+            for _, batch in self._casters:
+                shader.bind(
+                    blocks={"opacity": self._blocks["opacity"].buffer},
+                    integers={"light_index": light},
+                )
+                batch.draw(shader.shader)
+
+    def _draw_map(
+        self, maps: OpacityMaps, number: int, light: int, hair: _Hair, settings: VolumeSettings
+    ) -> None:
+        """The map of one light: where its layers start, then what they hold."""
+        blocks = {name: block.buffer for name, block in self._blocks.items()}
+        integers = {
+            "cv_count": hair.cv_count,
+            "strand_count": hair.strand_count,
+            "light_index": light,
+        }
+        if maps.starts is not None:
+            integers["map_index"] = number
+            shader = program(_STARTS_RECIPE)
+            shader.bind(
+                blocks={"opacity": blocks["opacity"]},
+                textures={"cv_points": hair.points},
+                images={"starts": maps.starts},
+                integers={**integers, "drawn_count": hair.drawn},
+                numbers={"strand_step": hair.step},
+            )
+            groups = -(-hair.cv_count // 8), -(-hair.drawn // 8)
+            gpu.compute.dispatch(shader.shader, *groups, 1)
+            gpu.shader.unbind()
+        slot_count = len(maps.slots)
+        passes = _texel_count(settings) // slot_count
+        shader = program(opacity_recipe(slot_count, is_deep=maps.starts is not None))
+        for turn in range(passes):
+            layer = number * passes + turn
+            target = gpu.types.GPUFrameBuffer(
+                color_slots=tuple({"texture": slot, "layer": layer} for slot in maps.slots)
+            )
+            with (
+                drawing_into(target),
+                drawing_state(depth_test="NONE", depth_write=False, blend="ADDITIVE_PREMULT"),
+            ):
+                target.clear(color=_NOTHING)
+                starts = {} if maps.starts is None else {"opacity_starts": maps.starts}
+                shader.bind(
+                    blocks=blocks,
+                    textures={"cv_points": hair.points, **starts},
+                    integers={**integers, "first_texel": turn * slot_count},
+                    numbers={"strand_step": hair.step},
+                )
+                self._ribbon(hair.cv_count).draw_instanced(
+                    shader.shader, instance_start=0, instance_count=hair.drawn
+                )
+
+    def _ribbon(self, cv_count: int) -> Any:
+        """A strip of vertices without attributes: two a CV."""
+        if self._strip[0] != cv_count:
+            layout = gpu.types.GPUVertFormat()
+            layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
+            vertices = gpu.types.GPUVertBuf(layout, 2 * cv_count)
+            self._strip = cv_count, gpu.types.GPUBatch(type="TRI_STRIP", buf=vertices)
+        return self._strip[1]
+
+
+def _batch(surface: Surface) -> Any:
+    layout = gpu.types.GPUVertFormat()
+    layout.attr_add(id="position", comp_type="F32", len=3, fetch_mode="FLOAT")
+    vertices = gpu.types.GPUVertBuf(layout, len(surface.positions))
+    vertices.attr_fill("position", np.ascontiguousarray(surface.positions, np.float32))
+    triangles = np.ascontiguousarray(surface.triangles, np.int32)
+    indices = gpu.types.GPUIndexBuf(type="TRIS", seq=triangles)
+    return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
+
+
+def shadow_frames(
+    lights: Sequence[Light], ball: Ball, settings: VolumeSettings
+) -> list[LightFrame | None]:
+    """The frame of each light's map; None of those that throw no shadow."""
+    frames: list[LightFrame | None] = [None] * len(lights)
+    if settings.shadows == "none":
+        return frames
+    strength = [float(light_irradiance(light, ball.center).sum()) for light in lights]
+    strongest = sorted(range(len(lights)), key=lambda index: -strength[index])
+    for index in strongest[: settings.most_lights]:
+        frames[index] = light_frame(lights[index], ball)
+    return frames
+
+
+def pack_opacity(frames: Sequence[LightFrame | None], settings: VolumeSettings) -> Floats:
+    """The block `Opacity` of gpu_shaders/struct_opacity.glsl in std140, (228,) float32."""
+    rows = np.zeros((5, LIGHT_CAPACITY, 4))
+    rows[4, :, 0] = -1.0
+    numbers = iter(range(LIGHT_CAPACITY))
+    for index, frame in enumerate(frames[:LIGHT_CAPACITY]):
+        if frame is not None:
+            rows[:3, index] = frame.to_map[[0, 1, 3]]
+            rows[3, index], rows[4, index, 0] = frame.to_depth, next(numbers)
+    found = layer_ends(settings)
+    ends = 2.0 + np.arange(4.0 * LAYER_TEXEL_CAPACITY)  # lanes without a layer end behind all hair
+    ends[: len(found)] = found
+    words = np.zeros(4, np.float32)
+    words[:2] = settings.extinction, settings.bias
+    words.view(np.int32)[2:] = _texel_count(settings), map_side(settings)
+    return np.concatenate([rows.ravel().astype(np.float32), ends.astype(np.float32), words])
+
+
+def _new_maps(values: Floats, map_count: int, settings: VolumeSettings) -> OpacityMaps:
+    texels, slots = _texel_count(settings), _slot_count(settings)
+    size = map_side(settings), map_side(settings)
+    # one texture alone would not be an array
+    count = max(map_count * texels // slots, 2)
+    arrays = tuple(gpu.types.GPUTexture(size, layers=count, format="RGBA32F") for _ in range(slots))
+    meshes = gpu.types.GPUTexture(size, layers=max(map_count, 2), format="DEPTH_COMPONENT32F")
+    if settings.shadows != "deep":
+        return OpacityMaps(values, arrays, meshes)
+    side = map_side(settings) // START_TEXELS
+    starts = gpu.types.GPUTexture((side, side * map_count), format="R32UI")
+    starts.clear(format="UINT", value=(-1,))  # beyond all depths
+    return OpacityMaps(values, arrays, meshes, starts)
+
+
+def map_side(settings: VolumeSettings) -> int:
+    """Texels along a side of a map: whole ones of `starts`."""
+    return -(-settings.resolution // START_TEXELS) * START_TEXELS
+
+
+def _slot_count(settings: VolumeSettings) -> int:
+    return min(-(-len(layer_ends(settings)) // 4), _SLOTS)
+
+
+def _texel_count(settings: VolumeSettings) -> int:
+    """Texels of a map, four layers each: whole passes."""
+    slots = _slot_count(settings)
+    return -(-len(layer_ends(settings)) // (4 * slots)) * slots

@@ -1,0 +1,146 @@
+// Dual scattering: light that reaches a strand from others, on its way in and from behind.
+//
+// Twin of addon/shading/volume/dual.py: same names, same order; what the terms mean is written
+// there. Reference: Zinke, Yuksel, Weber and Keyser 2008.
+// Needs struct_fibre.glsl and the struct ShadingSettings. Holds no resources.
+//
+// Colours are columns: a mat3x4 has for each of red, green and blue the four lobes.
+#include "lib_marschner.glsl"
+
+const float DUAL_SMALLEST = 1.0e-6;
+const float DUAL_MOST = 0.999, DUAL_MOST_KEPT = 0.9999;
+const float DUAL_LEAST_LIGHT = 1.0e-3;
+
+// What a fibre sends on, or back, at cos theta_d, by colour and lobe.
+mat3x4 shares_at(sampler2D shares, float cos_d, vec3 absorption)
+{
+  vec2 size = vec2(textureSize(shares, 0));
+  vec3 row = absorption / (absorption + {{half_way_absorption}});
+  return mat3x4(textureLod(shares, table_place(vec2(cos_d, row.r), size), 0.0),
+                textureLod(shares, table_place(vec2(cos_d, row.g), size), 0.0),
+                textureLod(shares, table_place(vec2(cos_d, row.b), size), 0.0));
+}
+
+vec3 sum_of_lobes(mat3x4 lobes)
+{
+  return vec4(1.0) * lobes;
+}
+
+// What so many strands, one behind the other, give back of the light on the first.
+vec3 returned(vec3 a_forward, vec3 a_backward, float count)
+{
+  a_forward = min(a_forward, DUAL_MOST_KEPT - a_backward);
+  vec3 middle = 1.0 + a_backward * a_backward - a_forward * a_forward;
+  vec3 root = sqrt(max(middle * middle - 4.0 * a_backward * a_backward, 0.0));
+  vec3 deep = 2.0 * a_backward / max(middle + root, DUAL_SMALLEST);
+  vec3 kept = a_forward / max(1.0 - a_backward * deep, DUAL_SMALLEST);
+  vec3 lost = pow(clamp(kept, DUAL_SMALLEST, 1.0), vec3(2.0 * count));
+  return deep * (1.0 - lost) / max(1.0 - deep * deep * lost, DUAL_SMALLEST);
+}
+
+// x width and y shift of theta_h in what returns, z the width that one passage on adds.
+vec3 returned_shape(vec4 forward, vec4 backward, Fibre fibre)
+{
+  float a_f = min(dot(forward, vec4(1.0)), DUAL_MOST), a_b = dot(backward, vec4(1.0));
+  float on = max(a_f, DUAL_SMALLEST), back = max(a_b, DUAL_SMALLEST);
+  float wide_f = sqrt(dot(forward, fibre.widths * fibre.widths) / on);
+  float wide_b = sqrt(dot(backward, fibre.widths * fibre.widths) / back);
+  float shift_f = dot(forward, fibre.shifts) / on, shift_b = dot(backward, fibre.shifts) / back;
+  float rest = 1.0 - a_f * a_f;
+  float shift = shift_b * (1.0 - 2.0 * a_b * a_b / (rest * rest)) +
+                shift_f * ((2.0 * rest * rest + 4.0 * a_f * a_f * a_b * a_b) / (rest * rest * rest));
+  float wider = 2.0 * wide_f * wide_f;
+  float numerator = a_b * sqrt(wider + wide_b * wide_b) +
+                    a_b * a_b * a_b * sqrt(wider + 3.0 * wide_b * wide_b);
+  float width = (1.0 + 0.7 * a_f * a_f) * numerator /
+                max(a_b + a_b * a_b * a_b * (2.0 * wide_f + 3.0 * wide_b), DUAL_SMALLEST);
+  return vec3(width, clamp(shift, -0.25 * ANGLE_PI, 0.25 * ANGLE_PI), wide_f);
+}
+
+// N of the lobes for light that comes from half a circle around its direction.
+vec4 spread_around(vec4 forward, vec4 backward, float phi)
+{
+  float cosine = cos(phi);
+  return (forward * (1.0 - cosine) + backward * (1.0 + cosine)) / (2.0 * ANGLE_PI);
+}
+
+// Half of the unit Gaussian of theta_h about -shift: Marschner's M_p.
+float half_gaussian(float theta_h, float shift, float variance)
+{
+  variance = max(variance, DUAL_SMALLEST);
+  float off = theta_h + shift;
+  return exp(-0.5 * off * off / variance) / (2.0 * sqrt(2.0 * ANGLE_PI * variance));
+}
+
+// S of a strand among others; `single` is that of the strand alone, tau how many strands lie
+// between it and the light, beyond how many behind it.
+vec3 dual_scattering(vec3 single,
+                     vec3 angles,
+                     mat3x4 forward,
+                     mat3x4 backward,
+                     float tau,
+                     float beyond,
+                     Fibre fibre,
+                     float density)
+{
+  float theta_h = 0.5 * (angles.x + angles.y);
+  float cos_d = max(cos(0.5 * (angles.y - angles.x)), LEAST_COSINE);
+  float squared = cos_d * cos_d;
+  vec3 a_f = sum_of_lobes(forward), a_b = sum_of_lobes(backward);
+  vec3 straight = vec3(exp(-tau));
+  vec3 scattered = exp(-tau * (1.0 - a_f)) - straight;
+  // widths are the same for all colours: those of green
+  vec3 shape = returned_shape(forward[1], backward[1], fibre);
+  float added = max(tau, 1.0) * shape.z * shape.z;
+  // what the strand itself sends back is in `single`
+  vec3 stack = returned(a_f, a_b, 1.0 + beyond) - returned(a_f, a_b, 1.0);
+  vec3 back = max(stack, 0.0) / (ANGLE_PI * squared);
+  vec3 back_straight = back * half_gaussian(theta_h, shape.y, shape.x * shape.x);
+  vec3 back_scattered = back * half_gaussian(theta_h, shape.y, shape.x * shape.x + added);
+  vec4 along = vec4(half_gaussian(theta_h, fibre.shifts.x, fibre.widths.x * fibre.widths.x + added),
+                    half_gaussian(theta_h, fibre.shifts.y, fibre.widths.y * fibre.widths.y + added),
+                    half_gaussian(theta_h, fibre.shifts.z, fibre.widths.z * fibre.widths.z + added),
+                    half_gaussian(theta_h, fibre.shifts.w, fibre.widths.w * fibre.widths.w + added));
+  vec3 on = vec3(dot(along, spread_around(forward[0], backward[0], angles.z)),
+                 dot(along, spread_around(forward[1], backward[1], angles.z)),
+                 dot(along, spread_around(forward[2], backward[2], angles.z))) / squared;
+  return straight * (single + density * back_straight) +
+         scattered * density * (on + density * back_scattered);
+}
+
+// What one light sends to the eye from a strand among others: as marschner_light, of which it has
+// all but the colour that stands in for light from strand to strand.
+vec3 scattering_light(sampler3D longitudinal,
+                      sampler2D azimuthal,
+                      sampler2D paths,
+                      sampler2D shares_forward,
+                      sampler2D shares_backward,
+                      vec3 tangent,
+                      vec3 normal,
+                      vec3 to_light,
+                      vec3 to_eye,
+                      float shift_noise,
+                      float sparkle_noise,
+                      vec3 absorption,
+                      Fibre fibre,
+                      ShadingSettings shading,
+                      float level,
+                      float tau,
+                      float beyond,
+                      float density)
+{
+  vec3 angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading);
+  vec4 strengths = fibre.strengths;
+  strengths.z *= mix(1.0, sparkle_noise, shading.sparkle);
+  vec3 single = look_up(longitudinal, azimuthal, paths, angles, absorption, strengths, level);
+  float cos_d = cos(0.5 * (angles.y - angles.x));
+  float passed = -log(max(straight_light(normal, to_light, tau, shading), DUAL_LEAST_LIGHT));
+  return cos(angles.x) * dual_scattering(single,
+                                         angles,
+                                         shares_at(shares_forward, cos_d, absorption),
+                                         shares_at(shares_backward, cos_d, absorption),
+                                         tau < 0.0 ? passed : tau,
+                                         beyond,
+                                         fibre,
+                                         density);
+}

@@ -1,0 +1,91 @@
+// What light meets on its way from a light to a place, and beyond, from the maps.
+//
+// Twin of look_up in addon/shading/volume/opacity.py. Reads the block `opacity`, the texture arrays
+// `opacity_0` to `opacity_5`, as many as SLOTS says, `opacity_meshes`, and `opacity_starts` where
+// layers are DEEP.
+//
+// Texel t of a map lies in array t % SLOTS, since one framebuffer cannot hold several layers of one
+// array.
+#include "lib_opacity.glsl"
+
+#if DEEP
+#  define OPACITY_SUMS(array, layer) texelFetch(array, ivec3(texel, layer), 0)
+#else
+#  define OPACITY_SUMS(array, layer) texture(array, vec3(place, float(layer)))
+#endif
+
+#define OPACITY_ADD(slot, array) \
+  { \
+    int t = pass * SLOTS + slot; \
+    vec4 ends = opacity.ends[t], sums = OPACITY_SUMS(array, layer); \
+    float after = t + 1 < opacity.layer_texels ? opacity.ends[t + 1].x : ends.w + 1.0; \
+    tau.x += dot(sums, layer_weights(depths.x, ends, before, after)); \
+    tau.y += dot(sums, layer_weights(depths.y, ends, before, after)); \
+    before = ends.w; \
+  }
+
+// tau at two depths behind the start of the layers, of one texel, or of its bilinear neighbourhood
+// where all layers start alike.
+vec2 summed_layers(int map, vec2 place, ivec2 texel, vec2 depths)
+{
+  vec2 tau = vec2(0.0);
+  float before = 0.0;
+  int passes = opacity.layer_texels / SLOTS;
+  for (int pass = 0; pass < passes; pass++) {
+    int layer = map * passes + pass;
+    OPACITY_ADD(0, opacity_0)
+#if SLOTS > 1
+    OPACITY_ADD(1, opacity_1)
+#endif
+#if SLOTS > 2
+    OPACITY_ADD(2, opacity_2)
+#endif
+#if SLOTS > 3
+    OPACITY_ADD(3, opacity_3)
+#endif
+#if SLOTS > 4
+    OPACITY_ADD(4, opacity_4)
+#endif
+#if SLOTS > 5
+    OPACITY_ADD(5, opacity_5)
+#endif
+  }
+  return tau;
+}
+
+// x tau between the light and a place, y tau from there on to the first mesh, z the share of the
+// light that no mesh is in the way of.
+vec3 light_path(int light, vec3 point)
+{
+  int map = int(opacity.light[light].x);
+  vec3 place = map_place(opacity, light, point);
+  if (map < 0 || any(lessThan(place.xy, vec2(0.0))) || any(greaterThan(place.xy, vec2(1.0)))) {
+    return vec3(0.0, 0.0, 1.0);
+  }
+  float depth = min(place.z, 1.0) - opacity.bias;
+  vec2 scaled = place.xy * float(opacity.resolution) - 0.5;
+  vec2 share = scaled - floor(scaled);
+  ivec2 low = ivec2(floor(scaled));
+  vec2 tau = vec2(0.0);
+  float lit = 0.0, nearest = 1.0;
+  for (int corner = 0; corner < 4; corner++) {
+    ivec2 step_of = ivec2(corner & 1, corner >> 1);
+    ivec2 texel = clamp(low + step_of, ivec2(0), ivec2(opacity.resolution - 1));
+    vec2 weights = mix(1.0 - share, share, vec2(step_of));
+    float weight = weights.x * weights.y;
+    float mesh = texelFetch(opacity_meshes, ivec3(texel, map), 0).x;
+    lit += depth <= mesh ? weight : 0.0;
+    nearest = min(nearest, mesh);
+#if DEEP
+    // each texel's layers start elsewhere, so that its own tau is found before they are blended
+    ivec2 start = texel / {{start_texels}};
+    start.y += map * (opacity.resolution / {{start_texels}});
+    vec2 depths = vec2(depth, mesh) - start_depth(texelFetch(opacity_starts, start, 0).x);
+    tau += weight * summed_layers(map, place.xy, texel, depths);
+#endif
+  }
+#if !DEEP
+  tau = summed_layers(map, place.xy, ivec2(0), vec2(depth, nearest));
+#endif
+  return vec3(tau.x, max(tau.y - tau.x, 0.0), lit);
+}

@@ -1,0 +1,16 @@
+// What is in the way of a light. SHADOWS: whether there are opacity maps to ask.
+#if SHADOWS
+#  include "lib_opacity_look_up.glsl"
+#endif
+
+// x how many strands a light passes on its way to a point, -1 where nothing is known of it, y how
+// many lie behind the point, z the share of the light that no mesh is in the way of.
+vec3 way_of_light(int index, vec3 point)
+{
+#if SHADOWS
+  if (opacity.light[index].x >= 0.0) {
+    return light_path(index, point) * vec3(opacity.extinction, opacity.extinction, 1.0);
+  }
+#endif
+  return vec3(-1.0, {{unknown_beyond}}, 1.0);
+}

@@ -1,0 +1,3 @@
+// Opacity maps, fragment stage of meshes: depth alone.
+
+void main() {}

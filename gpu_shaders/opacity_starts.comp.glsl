@@ -1,0 +1,42 @@
+// Opacity maps: the depth of the first hair that a light meets, one invocation a CV.
+//
+// `starts` is coarser than the map by {{start_texels}}: a few points of each segment fill it, one in
+// each of its texels, where drawing all strands a second time would cost as much as the map itself.
+// Maps stand above one another in it. Depths are whole numbers, since only of these the least can be
+// kept.
+#include "lib_strand_texel.glsl"
+#include "lib_opacity.glsl"
+
+// Texels of `starts` along one side of a map.
+int starts_side()
+{
+  return opacity.resolution / {{start_texels}};
+}
+
+void keep_first(vec3 place)
+{
+  int side = starts_side();
+  ivec2 texel = ivec2(floor(place.xy * float(side)));
+  if (all(greaterThanEqual(texel, ivec2(0))) && all(lessThan(texel, ivec2(side)))) {
+    uint depth = uint(clamp(place.z, 0.0, 1.0) * {{start_scale}});
+    imageAtomicMin(starts, texel + ivec2(0, map_index * side), depth);
+  }
+}
+
+void main()
+{
+  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+  int strand = min(int((float(at.y) + 0.5) * strand_step), strand_count - 1);
+  if (at.x >= cv_count || at.y >= drawn_count) {
+    return;
+  }
+  vec3 root_side = texelFetch(cv_points, strand_texel(strand, max(at.x - 1, 0), cv_count), 0).xyz;
+  vec3 tip_side = texelFetch(cv_points, strand_texel(strand, at.x, cv_count), 0).xyz;
+  vec3 from = map_place(opacity, light_index, root_side);
+  vec3 to = map_place(opacity, light_index, tip_side);
+  vec2 texels = abs(to.xy - from.xy) * float(starts_side());
+  int count = clamp(int(ceil(2.0 * max(texels.x, texels.y))), 1, 2 * starts_side());
+  for (int i = 1; i <= count; i++) {
+    keep_first(mix(from, to, float(i) / float(count)));
+  }
+}
