@@ -13,6 +13,7 @@ from .refine.settings import DetailSettings
 from .shading.ambient import AmbientSettings
 from .shading.settings import ShadingSettings, StrandSettings
 from .shading.textures import TextureSettings
+from .shading.volume.settings import VolumeSettings
 
 ALL_SETTINGS: dict[str, type[Settings]] = {
     settings.section: settings
@@ -26,6 +27,7 @@ ALL_SETTINGS: dict[str, type[Settings]] = {
         DetailSettings,
         StrandSettings,
         ShadingSettings,
+        VolumeSettings,
         AmbientSettings,
         CardSettings,
         TextureSettings,

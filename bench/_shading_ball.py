@@ -5,8 +5,8 @@ strands, camera and fibre in both. Columns, from the left:
     1. Cycles, the sun's own light alone, without shadows: each strand as if it were on its own;
     2. ours without what stands in for shadows and for light from strand to strand: what must match;
     3. Cycles, path traced with all bounces and shadows: the truth;
-    4. ours as it is drawn, with both stand-ins. Light from strand to strand comes with multiple
-       scattering, and shadows with opacity maps; neither is there yet.
+    4. ours with both stand-ins. Shadows and light from strand to strand are measured in
+       _volume_balls.py.
 Rows: black from the front, blond from the front, blond against the light.
 """
 
@@ -68,34 +68,35 @@ def ball_figures() -> dict[str, Any]:
             Radial_Roughness=HAIR.around,
             Offset=HAIR.offset,
         )
-        single = _of_cycles(room, dense, bounces=0, casts_shadow=False)
-        full = _of_cycles(room, dense, bounces=64, casts_shadow=True)
-        ours = [_of_ours(dense, core, absorption, towards, share) for share in (0.0, 1.0)]
-        scale = 0.35 / np.percentile(_blocks(single), 95.0)
-        pictures += [_shown(picture, scale) for picture in (single, ours[0], full, ours[1])]
-        found[f"ball_{name}_dense_difference"] = _difference(ours[0], single)
-        single = _of_cycles(room, few, bounces=0, casts_shadow=False)
-        alone = _of_ours(few, core, absorption, towards, 0.0)
-        found[f"ball_{name}_difference"] = _difference(alone, single)
+        single = of_cycles(room, dense, bounces=0, casts_shadow=False)
+        full = of_cycles(room, dense, bounces=64, casts_shadow=True)
+        ours = [drawn(snapshot_of(dense, core, absorption, towards, share)) for share in (0.0, 1.0)]
+        scale = 0.35 / np.percentile(blocks(single), 95.0)
+        pictures += [shown(picture, scale) for picture in (single, ours[0], full, ours[1])]
+        found[f"ball_{name}_dense_difference"] = difference(ours[0], single)
+        single = of_cycles(room, few, bounces=0, casts_shadow=False)
+        alone = drawn(snapshot_of(few, core, absorption, towards, 0.0))
+        found[f"ball_{name}difference"] = difference(alone, single)
         found[f"ball_{name}_drawn_ratio"] = float(ours[1][..., :3].mean() / full[..., :3].mean())
     SHEET.parent.mkdir(exist_ok=True)
     write_png(SHEET, contact_sheet(pictures, 4))
     return found
 
 
-def _of_cycles(room: CyclesRoom, grid: np.ndarray, bounces: int, casts_shadow: bool) -> np.ndarray:
+def of_cycles(room: CyclesRoom, grid: np.ndarray, bounces: int, casts_shadow: bool) -> np.ndarray:
     room.strands(grid, RADIUS, casts_shadow)
     room.paths(PATHS_FULL if bounces else PATHS_SINGLE, bounces, is_denoised=bounces > 0)
     return room.picture(SIZE, HEIGHT)
 
 
-def _of_ours(
+def snapshot_of(
     grid: np.ndarray,
     core: Surface,
     absorption: tuple[float, float, float],
     towards: tuple[float, float, float],
     stand_ins: float,
-) -> np.ndarray:
+) -> Snapshot:
+    """The ball as we draw it, with so much of what stands in for shadows and other strands."""
     fibre = HAIR.fibre(absorption)
     shading = ShadingSettings(
         model="marschner",
@@ -113,7 +114,7 @@ def _of_ours(
         scattered=stand_ins,
         volume_shade=stand_ins,
     )
-    snapshot = Snapshot(
+    return Snapshot(
         grid,
         np.full(grid.shape[:2], RADIUS, np.float32),
         meshes=(replace(MeshSnapshot.of(core, color=(0.0, 0.0, 0.0)), sheen=0.0),),
@@ -124,24 +125,28 @@ def _of_ours(
         detail=DetailSettings(culling="none", full_size=0.0),
         volume_center=np.zeros(3, np.float32),
     )
+
+
+def drawn(snapshot: Snapshot) -> np.ndarray:
+    """From +z, (SIZE, SIZE, 4)."""
     view = look_at((0.0, 0.0, DISTANCE), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
     camera = Camera(view, orthographic(HEIGHT, 1.0, 1.0, 2.0 * DISTANCE))
     return render_image(snapshot, camera, SIZE, SIZE, SAMPLES)
 
 
-def _blocks(picture: np.ndarray) -> np.ndarray:
+def blocks(picture: np.ndarray) -> np.ndarray:
     """Means of blocks of pixels, (blocks, blocks, 3): what is left when strands are averaged."""
     count = SIZE // BLOCK
     return picture[..., :3].reshape(count, BLOCK, count, BLOCK, 3).mean(axis=(1, 3))
 
 
-def _difference(ours: np.ndarray, theirs: np.ndarray) -> float:
+def difference(ours: np.ndarray, theirs: np.ndarray) -> float:
     """Mean of the differences of blocks over the mean."""
-    one, other = _blocks(ours), _blocks(theirs)
+    one, other = blocks(ours), blocks(theirs)
     return float(np.abs(one - other).mean() / other.mean())
 
 
-def _shown(picture: np.ndarray, scale: float) -> np.ndarray:
+def shown(picture: np.ndarray, scale: float) -> np.ndarray:
     shown = picture.copy()
     shown[..., :3] *= scale
     shown[..., 3] = 1.0

@@ -13,6 +13,7 @@ from ..params import Settings
 from ..refine.settings import DetailSettings
 from ..shading.ambient import AmbientSettings
 from ..shading.settings import ShadingSettings, StrandSettings
+from ..shading.volume.settings import VolumeSettings
 from .properties import settings_of
 
 
@@ -30,6 +31,7 @@ class Choices:
     ambient: AmbientSettings
     shading: ShadingSettings
     strands: StrandSettings
+    volume: VolumeSettings
     dynamics: DynamicsSettings
     children_density: str = ""
     debug_view: str = "none"
@@ -44,6 +46,7 @@ class Choices:
             settings_of(groom.ambient, AmbientSettings),
             settings_of(groom.shading, ShadingSettings),
             settings_of(groom.strands, StrandSettings),
+            settings_of(groom.volume, VolumeSettings),
             settings_of(character.dynamics, DynamicsSettings),
             character.children_density,
             character.debug_view,

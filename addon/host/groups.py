@@ -23,6 +23,7 @@ GROOM_SECTIONS = (
     "detail",
     "strands",
     "shading",
+    "volume",
     "ambient",
     "cards",
     "card_texture",

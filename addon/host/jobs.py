@@ -25,6 +25,7 @@ from ..render.card_snapshot import CardSnapshot
 from ..shading.ambient import AmbientSettings
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..shading.textures import TextureSettings
+from ..shading.volume.settings import VolumeSettings
 from .card_files import CardChoices, WrittenCards, write_cards
 from .card_images import named_pictures
 from .images import contact_sheet, write_png
@@ -227,7 +228,12 @@ def _studio(job: Job, rig: Rig, report: Report) -> Studio:
     with report.stage("ambient occlusion"):
         occlusion = pipeline.rest_occlusion(rig, job.set(AmbientSettings))
         head_occlusion = pipeline.head_occlusion(rig, job.set(AmbientSettings))
-    look = Look(job.set(ShadingSettings), job.set(StrandSettings), job.set(DetailSettings))
+    look = Look(
+        job.set(ShadingSettings),
+        job.set(StrandSettings),
+        job.set(DetailSettings),
+        volume=job.set(VolumeSettings),
+    )
     return Studio(rig, occlusion, head_occlusion, look)
 
 

@@ -12,6 +12,7 @@ from ..arrays import Floats
 from ..errors import HairloomError
 from ..pipeline import Motion, Pose, Rig
 from ..shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
+from ..strands import Surface
 from .baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays, used_vertices
 from .choices import Choices
 from .hiders import Hiders
@@ -152,7 +153,8 @@ class Session:
         self.snapshot = with_choices(self.snapshot, self.choices)
         if not shapes_alike(before.shading, self.choices.shading) and not bpy.app.background:
             self.snapshot = with_tables(self.snapshot, PREVIEW_SIZE)
-        if self.choices.detail.culling != before.detail.culling:
+        was, now = before, self.choices
+        if (was.detail.culling, was.volume.shadows) != (now.detail.culling, now.volume.shadows):
             self._show()
         if self.choices.dynamics.form != before.dynamics.form:
             self._change_form(self.choices.dynamics.form)
@@ -289,7 +291,16 @@ class Session:
         hiders = None
         if self._hiders is not None and self.choices.detail.culling == "hidden":
             hiders = self._hiders.at(self.solver.pose)
-        self.snapshot = replace(self.solver.shown(self.snapshot), hiders=hiders)
+        self.snapshot = replace(
+            self.solver.shown(self.snapshot), hiders=hiders, casters=self._casters()
+        )
+
+    def _casters(self) -> tuple[Surface, ...]:
+        """The head as it is posed, where its shadow is wanted."""
+        head, pose = self.rig.head, self.solver.pose
+        if head is None or pose.head_positions is None or self.choices.volume.shadows == "none":
+            return ()
+        return (Surface(pose.head_positions, head.triangles),)
 
 
 def _same_guides(one: Rig, other: Rig) -> bool:

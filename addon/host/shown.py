@@ -40,6 +40,7 @@ def with_choices(snapshot: Snapshot, choices: Choices) -> Snapshot:
         shading=choices.shading,
         strand_settings=choices.strands,
         detail=choices.detail,
+        volume=choices.volume,
         debug_view=choices.debug_view,
     )
 

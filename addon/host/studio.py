@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import bpy
 import gpu
@@ -21,6 +21,7 @@ from ..render.snapshot import MeshSnapshot, Snapshot
 from ..render.strand_pass import Statistics, StrandPass
 from ..shading.lights import three_point_lights
 from ..shading.settings import ShadingSettings, StrandSettings
+from ..shading.volume.settings import VolumeSettings
 from ..strands import Surface
 from .hiders import Hiders
 from .shown import snapshot_of
@@ -43,6 +44,7 @@ class Look:
     strands: StrandSettings
     detail: DetailSettings
     debug_view: str = "none"
+    volume: VolumeSettings = field(default_factory=VolumeSettings)
 
 
 class Studio:
@@ -69,6 +71,7 @@ class Studio:
             shading=look.shading,
             strand_settings=look.strands,
             detail=look.detail,
+            volume=look.volume,
             debug_view=look.debug_view,
         )
 

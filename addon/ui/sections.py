@@ -45,6 +45,21 @@ def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     _draw_titled(layout, hair.data.hairloom.ambient)
 
 
+def draw_volume(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Only what acts in this form; scattering only where the model has it."""
+    group = hair.data.hairloom.volume
+    hidden = {name for form, names in VOLUME.items() if form != group.shadows for name in names}
+    for parameter in group.settings.parameters():
+        if parameter.name in hidden or (group.shadows == "none" and parameter.name != "shadows"):
+            continue
+        column = layout.column()
+        scatters = hair.data.hairloom.shading.model == "marschner"
+        column.active = (parameter.name != "scattering" or scatters) and (
+            parameter.name != "density" or (scatters and group.scattering)
+        )
+        _draw_named(column, group, (parameter.name,))
+
+
 def draw_guides(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     _draw_group(layout, hair.data.hairloom.guides)
 
@@ -151,6 +166,8 @@ DETAIL: dict[str, tuple[str, ...]] = {
     "heuristic": ("piece_length", "most"),
     "fixed": ("subdivisions",),
 }
+#: form of shadows -> the parameters that act in it alone
+VOLUME: dict[str, tuple[str, ...]] = {"deep": ("layers", "layer_depth"), "slices": ("slices",)}
 #: section below Dynamics -> its parameters; all others stand in Dynamics itself
 DYNAMICS: dict[str, tuple[str, ...]] = {
     "Style": ("style_root", "style_tip", "style_along", "style_damping", "bend", "bend_along"),
@@ -163,6 +180,7 @@ DYNAMICS: dict[str, tuple[str, ...]] = {
 }
 SECTIONS: tuple[tuple[str, str, Draw], ...] = (
     ("look", "Look", draw_look),
+    ("shadows", "Shadows", draw_volume),
     ("strands", "Strands", draw_strands),
     ("detail", "Detail", draw_detail),
     ("guides", "Guides", draw_guides),
