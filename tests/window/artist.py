@@ -4,7 +4,7 @@ Events are sent one a tick, as Blender wants them: call what yields by `yield fr
 """
 
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +84,15 @@ def viewport_pixels(screenshot: Path) -> np.ndarray:
 def changed(before: np.ndarray, after: np.ndarray, at_least: float = 0.1) -> float:
     """Share of the pixels that differ by more than Blender's own anti-aliasing does."""
     return float((np.abs(after - before).max(axis=2) > at_least).mean())
+
+
+def until(is_so: Callable[[], bool], message: str, tries: int = 60) -> Iterator[int]:
+    """Ticks until something is so: a busy machine draws late. Fails after twelve seconds."""
+    for _ in range(tries):
+        if is_so():
+            return
+        yield 2
+    raise AssertionError(message)
 
 
 def viewport_middle(screenshot: Path, reach: int = 20) -> np.ndarray:

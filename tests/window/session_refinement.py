@@ -15,6 +15,7 @@ from artist import (
     open_our_sidebar,
     press,
     sidebar_button,
+    until,
     viewport,
     viewport_pixels,
 )
@@ -34,6 +35,15 @@ def session():
 def statistics():
     """Of the last draw in the viewport."""
     return of_hairloom("host.overlay")._passes[session().uid].statistics
+
+
+def has_drawn_some():
+    passes = of_hairloom("host.overlay")._passes
+    return session().uid in passes and statistics().strands > 0
+
+
+def draws_all():
+    return statistics().strands == GUIDES + CHILDREN
 
 
 def hair():
@@ -81,8 +91,7 @@ def set_the_scene():
     look_from_front(0.7)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
-    yield 10
-    assert statistics().strands > 0
+    yield from until(has_drawn_some, "no hair is drawn")
 
 
 def children_appear():
@@ -91,7 +100,7 @@ def children_appear():
     children.way, children.strand_count = "multi", CHILDREN
     yield 20  # once edits have settled
     assert session().rig.strands.strand_count == GUIDES + CHILDREN
-    assert changed(before, pixels("children")) > 0.05
+    yield from until(lambda: changed(before, pixels("children")) > 0.05, "no children are seen")
 
 
 def debug_views_and_counts():
@@ -99,22 +108,25 @@ def debug_views_and_counts():
     yield 3
     plain = pixels("plain")
     hair().hairloom.show_counts = True
-    yield 3
+    yield from until(
+        lambda: changed(corner(plain), corner(pixels("counts"))) > 0.01, "no counts are to be seen"
+    )
     counted = pixels("counts")
-    assert changed(corner(plain), corner(counted)) > 0.01, "no counts are to be seen"
     assert changed(plain[:-60], counted[:-60]) < 0.003, "the counts lie over something"
     hair().hairloom.show_counts = False
     assert saturation(plain) < 0.01
     for view in ("detail", "guide", "group"):
         hair().hairloom.debug_view = view
         yield 3
+        yield from until(lambda view=view: saturation(pixels(view)) > 0.02, view)
         shown = pixels(view)
-        assert saturation(shown) > 0.02, view
         assert changed(corner(plain), corner(shown)) > 0.01, "a debug view without its counts"
     overlays = viewport().spaces.active.overlay
     overlays.show_overlays = False
-    yield 3
-    assert changed(corner(plain), corner(pixels("without-overlays"))) < 0.003
+    yield from until(
+        lambda: changed(corner(plain), corner(pixels("without-overlays"))) < 0.003,
+        "counts without overlays",
+    )
     overlays.show_overlays = True
     hair().hairloom.debug_view = "none"
     yield 3
@@ -124,21 +136,21 @@ def what_the_head_hides():
     detail, shading = hair().data.hairloom.detail, viewport().spaces.active.shading
     detail.full_size = 0.0
     detail.culling = "none"
+    yield from until(draws_all, "strands are missing")
     yield 3
     everything, count = pixels("nothing-left-out"), GUIDES + CHILDREN
-    assert statistics().strands == count
     detail.culling = "hidden"
+    yield from until(
+        lambda: 0.3 * count < statistics().strands < 0.95 * count, "the head hides no strands"
+    )
     yield 3
-    assert 0.3 * count < statistics().strands < 0.95 * count
     assert changed(everything, pixels("hidden-left-out")) < 0.0005, "what is seen was left out"
     shading.show_xray = True
-    yield 3
-    assert statistics().strands == count, "the head hides hair in X-ray"
+    yield from until(draws_all, "the head hides hair in X-ray")
     driver.screenshot("xray")
     shading.show_xray = False
     bpy.data.objects["Head"].hide_set(True)
-    yield 3
-    assert statistics().strands == count, "a hidden head hides hair"
+    yield from until(draws_all, "a hidden head hides hair")
     driver.screenshot("hidden-head")
     bpy.data.objects["Head"].hide_set(False)
     yield 3
