@@ -130,9 +130,8 @@ vec3 scattering_light(sampler3D longitudinal,
                       float density)
 {
   vec3 angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading);
-  vec4 strengths = fibre.strengths;
-  strengths.z *= mix(1.0, sparkle_noise, shading.sparkle);
-  vec3 single = look_up(longitudinal, azimuthal, paths, angles, absorption, strengths, level);
+  vec3 single = single_scattering(
+      longitudinal, azimuthal, paths, angles, sparkle_noise, absorption, fibre, shading, level);
   float cos_d = cos(0.5 * (angles.y - angles.x));
   float passed = -log(max(straight_light(normal, to_light, tau, shading), DUAL_LEAST_LIGHT));
   return cos(angles.x) * dual_scattering(single,

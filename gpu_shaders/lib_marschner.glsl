@@ -124,6 +124,22 @@ float straight_light(vec3 normal, vec3 to_light, float tau, ShadingSettings shad
   return tau < 0.0 ? mix(1.0, diffuse_bias(normal, to_light), shading.volume_shade) : exp(-tau);
 }
 
+// S of a strand on its own, for angles of strand_angles: sparkle breaks up TRT alone.
+vec3 single_scattering(sampler3D longitudinal,
+                       sampler2D azimuthal,
+                       sampler2D paths,
+                       vec3 angles,
+                       float sparkle_noise,
+                       vec3 absorption,
+                       Fibre fibre,
+                       ShadingSettings shading,
+                       float level)
+{
+  vec4 strengths = fibre.strengths;
+  strengths.z *= mix(1.0, sparkle_noise, shading.sparkle);
+  return look_up(longitudinal, azimuthal, paths, angles, absorption, strengths, level);
+}
+
 // What one light sends to the eye: times irradiance, and occlusion where tau is not known, it is
 // radiance. Both noises are in 0..1; for the level see look_up.
 vec3 marschner_light(sampler3D longitudinal,
@@ -142,9 +158,8 @@ vec3 marschner_light(sampler3D longitudinal,
                      float tau)
 {
   vec3 angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading);
-  vec4 strengths = fibre.strengths;
-  strengths.z *= mix(1.0, sparkle_noise, shading.sparkle);
-  vec3 scattered = look_up(longitudinal, azimuthal, paths, angles, absorption, strengths, level);
+  vec3 scattered = single_scattering(
+      longitudinal, azimuthal, paths, angles, sparkle_noise, absorption, fibre, shading, level);
   float bias = diffuse_bias(normal, to_light) * (tau < 0.0 ? 1.0 : exp(-tau));
   return scattered * cos(angles.x) * straight_light(normal, to_light, tau, shading) +
          strand_color(fibre, absorption) * (shading.scattered * bias / ANGLE_PI);

@@ -7,10 +7,17 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from hairloom.addon.shading.marschner.look import fibre_of, pack_fibre
+from hairloom.addon.params.glsl import struct_values
+from hairloom.addon.shading.kajiya_kay import strand_normal
+from hairloom.addon.shading.marschner.look import fibre_of, pack_fibre, root_absorption
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tables
 from hairloom.addon.shading.settings import ShadingSettings
-from hairloom.addon.shading.volume.dual import dual_scattering, shares, shares_at
+from hairloom.addon.shading.volume.dual import (
+    dual_scattering,
+    scattering_light,
+    shares,
+    shares_at,
+)
 
 SHAPE = (64, 200)
 SETTINGS = {
@@ -72,3 +79,45 @@ def test_dual_scattering(compute: Callable[..., np.ndarray], settings: ShadingSe
     # a driver interpolates with weights of eight bits
     assert np.abs(found - expected).max() <= 0.02 * expected.max()
     assert (np.abs(found - expected) <= 0.01 * expected + 1e-4).mean() > 0.99
+
+
+@pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)
+def test_scattering_light(compute: Callable[..., np.ndarray], settings: ShadingSettings) -> None:
+    """From directions to light, where tau is known and where it is not."""
+    random = np.random.default_rng(12)
+    tables = marschner_tables(fibre_of(settings), PREVIEW_SIZE)
+    table = shares(tables)
+    ways = random.normal(size=(4, *SHAPE, 3))
+    ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
+    ways[1] = strand_normal(ways[1], ways[0], np.zeros(3))
+    lanes = random.random((4, *SHAPE)) * np.array([1.0, 1.0, 8.0, 4.0])[:, None, None]
+    lanes[3] -= 1.0
+    packed = np.concatenate([ways, lanes[..., None]], axis=-1).astype(np.float32)
+    found = compute(
+        "scattering_light.glsl",
+        (SHAPE[1], SHAPE[0]),
+        textures=dict(zip(("tangents", "normals", "lights", "eyes"), packed, strict=True))
+        | {"longitudinal": tables.longitudinal, "azimuthal": tables.azimuthal}
+        | {"paths": tables.paths, "forward": table.forward, "backward": table.backward},
+        blocks={
+            "fibre": ("Fibre", pack_fibre(settings)),
+            "shading": ("ShadingSettings", struct_values(settings)),
+        },
+        structs=("struct_fibre.glsl",),
+        settings=(ShadingSettings,),
+    )[..., :3]
+    exact = packed.astype(np.float64)
+    expected = scattering_light(
+        tables,
+        table,
+        *(exact[which, ..., :3] for which in range(4)),
+        exact[0, ..., 3],
+        exact[1, ..., 3],
+        root_absorption(settings),
+        settings,
+        0.7,
+        tau=exact[3, ..., 3],
+        beyond=exact[2, ..., 3],
+    )
+    assert (np.abs(found - expected) <= 0.01 * expected + 1e-4).mean() > 0.99
+    assert np.abs(found - expected).max() <= 0.02 * expected.max()

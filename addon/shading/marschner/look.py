@@ -103,6 +103,36 @@ def straight_light(
     return np.where(np.asarray(tau) < 0.0, facing, np.exp(-np.maximum(tau, 0.0)))
 
 
+def strand_angles(
+    tangent: Floats,
+    normal: Floats,
+    to_light: Floats,
+    to_eye: Floats,
+    shift_noise: Floats,
+    shading: ShadingSettings,
+) -> tuple[Floats, Floats, Floats]:
+    """theta_i, theta_r and |phi| at a strand whose tangent is shifted by a noise in [0, 1]."""
+    shift = shading.shift_noise * (shift_noise - 0.5)
+    return directions_to_angles(shifted_tangent(tangent, normal, shift), to_light, to_eye)
+
+
+def single_scattering(
+    tables: MarschnerTables,
+    angles: tuple[Floats, Floats, Floats],
+    sparkle_noise: Floats,
+    absorption: Floats,
+    shading: ShadingSettings,
+    level: Floats | float = 0.0,
+) -> Floats:
+    """S of a strand on its own, (..., 3): sparkle breaks up TRT alone."""
+    strength_r, strength_tt, strength_trt, strength_rest = fibre_of(shading).strengths
+    sparkle = 1.0 + shading.sparkle * (np.asarray(sparkle_noise) - 1.0)
+    strengths = np.stack(
+        np.broadcast_arrays(strength_r, strength_tt, strength_trt * sparkle, strength_rest), axis=-1
+    )
+    return look_up(tables, *angles, absorption, strengths, level)
+
+
 def marschner_light(
     tables: MarschnerTables,
     tangent: Floats,
@@ -127,16 +157,9 @@ def marschner_light(
         level: see `look_up`.
         tau: strands in the way of the light on average; negative: not known.
     """
-    shift = shading.shift_noise * (shift_noise - 0.5)
-    shifted = shifted_tangent(tangent, normal, shift)
-    theta_i, theta_r, phi = directions_to_angles(shifted, to_light, to_eye)
-    strength_r, strength_tt, strength_trt, strength_rest = fibre_of(shading).strengths
-    sparkle = 1.0 + shading.sparkle * (np.asarray(sparkle_noise) - 1.0)
-    strengths = np.stack(
-        np.broadcast_arrays(strength_r, strength_tt, strength_trt * sparkle, strength_rest), axis=-1
-    )
-    scattered = look_up(tables, theta_i, theta_r, phi, absorption, strengths, level)
+    angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading)
+    scattered = single_scattering(tables, angles, sparkle_noise, absorption, shading, level)
     bias = diffuse_bias(normal, to_light) * np.exp(-np.maximum(tau, 0.0))
     shade = straight_light(normal, to_light, tau, shading)
-    direct = scattered * (np.cos(theta_i) * shade)[..., None]
+    direct = scattered * (np.cos(angles[0]) * shade)[..., None]
     return direct + strand_color(absorption) * (shading.scattered * bias / np.pi)[..., None]

@@ -24,11 +24,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Floats
-from ..kajiya_kay import shifted_tangent
-from ..marschner.fibre import Fibre, directions_to_angles
+from ..marschner.fibre import Fibre
 from ..marschner.interface import LEAST_COSINE
-from ..marschner.look import fibre_of, straight_light
-from ..marschner.tables import MarschnerTables, bilinear, kept_light, look_up
+from ..marschner.look import fibre_of, single_scattering, straight_light, strand_angles
+from ..marschner.tables import MarschnerTables, bilinear, kept_light
 from ..settings import ShadingSettings
 
 #: strands that are taken to lie behind a place where nothing is known of it
@@ -244,18 +243,9 @@ def scattering_light(
     Args:
         density: d_f and d_b of Zinke et al. 2008.
     """
-    shift = shading.shift_noise * (shift_noise - 0.5)
-    shifted = shifted_tangent(tangent, normal, shift)
-    theta_i, theta_r, phi = directions_to_angles(shifted, to_light, to_eye)
-    fibre = fibre_of(shading)
-    sparkle = 1.0 + shading.sparkle * (np.asarray(sparkle_noise) - 1.0)
-    strengths = np.stack(
-        np.broadcast_arrays(
-            fibre.strength_r, fibre.strength_tt, fibre.strength_trt * sparkle, fibre.strength_rest
-        ),
-        axis=-1,
-    )
-    single = look_up(tables, theta_i, theta_r, phi, absorption, strengths, level)
+    angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading)
+    single = single_scattering(tables, angles, sparkle_noise, absorption, shading, level)
+    theta_i, theta_r, phi = angles
     cos_d = np.cos(0.5 * (theta_r - theta_i))
     straight = straight_light(normal, to_light, tau, shading)
     passed_by = np.where(
@@ -272,7 +262,7 @@ def scattering_light(
         backward,
         passed_by,
         np.asarray(beyond),
-        fibre,
+        fibre_of(shading),
         density,
     )
     return scattered * np.cos(theta_i)[..., None]

@@ -1,0 +1,31 @@
+// In w: of tangents the shift noise, of normals the sparkle noise, of lights tau beyond, of eyes tau.
+#include "lib_dual.glsl"
+
+void main()
+{
+  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(at, imageSize(result)))) {
+    return;
+  }
+  vec4 tangent = texelFetch(tangents, at, 0), normal = texelFetch(normals, at, 0);
+  vec4 to_light = texelFetch(lights, at, 0), to_eye = texelFetch(eyes, at, 0);
+  vec3 light = scattering_light(longitudinal,
+                                azimuthal,
+                                paths,
+                                forward,
+                                backward,
+                                tangent.xyz,
+                                normal.xyz,
+                                to_light.xyz,
+                                to_eye.xyz,
+                                tangent.w,
+                                normal.w,
+                                fibre.root.xyz,
+                                fibre,
+                                shading,
+                                0.0,
+                                to_eye.w,
+                                to_light.w,
+                                0.7);
+  imageStore(result, at, vec4(light, 0.0));
+}
