@@ -1,0 +1,266 @@
+"""Shafts of light around the lights in view: the reference that the shaders are held to.
+
+Nguyen and Donnelly 2005 (Hair animation and rendering in the Nalu demo, GPU Gems 2, chapter 23,
+and the talk's "God Rays"): bright regions and what stands before them go to polar coordinates
+around the light, are blurred along the radius, and come back.
+
+    V(r, angle)  what is open: 1 - coverage by what is nearer than the light
+    B(r, angle)  the mean of V on the way out from the light, of which exp(-s / l) counts at a
+                 distance s back, so a shaft fades by 1/e in l
+    added        E / pi * strength * tint * exp(-r / (2 l)) * B
+
+r is the distance to the light on the screen, l the length of the settings there, E the irradiance
+that comes from the light to the eye. So beside the light haze is as bright as matt white that faces
+it, times the strength. Lengths are angles, so that a part of a picture is as it is in the whole.
+
+Limitations: it goes by the picture alone. Nothing outside of it casts a shaft, and haze does not
+know how far away hair is. A light that is not in front of the viewer has no place on the screen and
+gives nothing; nor does any in an orthographic view, where light does not spread from a point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from .lights import Light, light_irradiance
+from .shafts_settings import ShaftSettings
+
+#: the haze reaches so many lengths from its light
+REACH = 2.0
+#: radiance below which a light's haze is left out
+FAINTEST = 1.0e-4
+#: length [pixels] up to which there are no shafts
+_SHORTEST = 1.0e-3
+#: rays on the way out from a light at most, and at least
+_MOST_ANGLES, _LEAST_ANGLES = 4096, 64
+
+
+@dataclass(frozen=True)
+class LightOnScreen:
+    """A light in front of the viewer.
+
+    center: x, y [pixels], the lower left corner of the picture is 0, 0; may lie outside.
+    radiance: rgb of its haze, at the light.
+    depth: window depth (0 near, 1 far) behind which nothing stands before it.
+    length: of shafts [pixels].
+    """
+
+    center: tuple[float, float]
+    radiance: tuple[float, float, float]
+    depth: float
+    length: float
+
+
+@dataclass(frozen=True)
+class PolarGrid:
+    """A grid of rays out from a place, which covers a whole picture.
+
+    center: x, y [pixels].
+    middle, span: angle of the middle ray, and between the first and the last [rad].
+    nearest, farthest: distances at which rays begin and end [pixels].
+    angles, radii: rays, and texels on each; a texel's place is its middle.
+    """
+
+    center: tuple[float, float]
+    middle: float
+    span: float
+    nearest: float
+    farthest: float
+    angles: int
+    radii: int
+
+    @classmethod
+    def over(
+        cls,
+        center: tuple[float, float],
+        width: int,
+        height: int,
+        radii: int = 0,
+        most_angles: int = _MOST_ANGLES,
+    ) -> PolarGrid:
+        """The grid around a place in or outside of a picture [pixels].
+
+        Args:
+            radii: texels on a ray; 0: one a pixel.
+            most_angles: rays at most; up to there, one a pixel at the farthest corner.
+        """
+        x, y = center
+        corners = np.array([[0, 0], [width, 0], [0, height], [width, height]]) - (x, y)
+        farthest = float(np.hypot(*corners.T).max())
+        aside = max(-x, 0.0, x - width), max(-y, 0.0, y - height)
+        nearest = float(np.hypot(*aside))
+        middle, span = 0.0, 2.0 * np.pi
+        if nearest > 0.0:
+            middle = float(np.arctan2(height / 2.0 - y, width / 2.0 - x))
+            span = 2.0 * float(np.abs(_angles_from(middle, corners)).max())
+        angles = int(np.clip(np.ceil(span * farthest), _LEAST_ANGLES, most_angles))
+        radii = radii or max(int(np.ceil(farthest - nearest)), 1)
+        return cls((x, y), middle, span, nearest, farthest, angles, radii)
+
+    @property
+    def is_round(self) -> bool:
+        """Whether the last ray is beside the first."""
+        return self.nearest == 0.0
+
+    @property
+    def step(self) -> float:
+        """Between texels of a ray [pixels]."""
+        return (self.farthest - self.nearest) / self.radii
+
+
+def lights_on_screen(
+    lights: Sequence[Light],
+    view: Floats,
+    projection: Floats,
+    width: int,
+    height: int,
+    settings: ShaftSettings,
+) -> list[LightOnScreen]:
+    """The lights whose haze is seen in a picture, the brightest first.
+
+    A sun is where the directions to it meet, the others where they are.
+
+    Args:
+        view, projection: (4, 4) world to view to clip space, as in render.camera.
+        width, height: of the picture [pixels].
+    """
+    is_perspective = projection[3, 3] == 0.0
+    # of a part of a picture the projection is so much larger
+    length = float(np.tan(settings.length) * projection[1, 1] * height / 2.0)
+    if not (settings.use_shafts and is_perspective and length > _SHORTEST):
+        return []
+    to_clip = np.asarray(projection, np.float64) @ np.asarray(view, np.float64)
+    eye = np.linalg.inv(np.asarray(view, np.float64))[:3, 3]
+    found = []
+    for light in lights:
+        haze = light_irradiance(light, eye) / np.pi * np.asarray(settings.tint) * settings.strength
+        found.append(_on_screen(light, haze, to_clip, (width, height), length))
+    seen = [light for light in found if light is not None]
+    return sorted(seen, key=lambda light: -sum(light.radiance))
+
+
+def _on_screen(
+    light: Light, haze: Floats, to_clip: Floats, size: tuple[int, int], length: float
+) -> LightOnScreen | None:
+    is_sun = light.kind == "sun"
+    place = np.array([*light.vector, 0.0 if is_sun else 1.0], np.float64)
+    x, y, z, w = to_clip @ place
+    if w <= 0.0:  # behind the viewer, or beside
+        return None
+    center = (0.5 + 0.5 * x / w) * size[0], (0.5 + 0.5 * y / w) * size[1]
+    depth = 1.0 if is_sun else min(0.5 + 0.5 * z / w, 1.0)
+    r, g, b = (float(channel) for channel in haze)
+    nearest = PolarGrid.over(center, *size, 1, _LEAST_ANGLES).nearest
+    if max(r, g, b) * np.exp(-nearest / (REACH * length)) < FAINTEST:
+        return None
+    return LightOnScreen(center, (r, g, b), depth, length)
+
+
+def light_shafts(
+    picture: Floats,
+    alpha: Floats,
+    depth: Floats,
+    lights: Sequence[LightOnScreen],
+    samples: int,
+) -> Floats:
+    """A picture with the haze of these lights, and the shafts in it.
+
+    Args:
+        picture: (height, width, 4) scene-linear, premultiplied.
+        alpha: (height, width) coverage by what was drawn.
+        depth: (height, width) window depth of it; 1 where nothing is, or only thin hair, which is
+            taken to stand before all lights.
+        samples: steps on the way out from a light.
+    """
+    height, width = alpha.shape
+    result = np.array(picture, np.float64)
+    for light in lights:
+        grid = PolarGrid.over(light.center, width, height, samples)
+        is_before = (depth < light.depth) | (depth >= 1.0)
+        casting = np.where(is_before, alpha, 0.0)[..., None]
+        open_share = 1.0 - to_polar(casting, grid, outside=0.0)
+        blurred = radial_blur(open_share, grid, light.length)
+        haze = np.exp(-_distances(grid, width, height) / (REACH * light.length))[..., None]
+        result[..., :3] += haze * from_polar(blurred, grid, width, height) * light.radiance
+    return result.astype(np.float32)
+
+
+def to_polar(picture: Floats, grid: PolarGrid, outside: float | None = None) -> Floats:
+    """A picture (height, width, n) as rays from a place, (angles, radii, n), bilinear.
+
+    Args:
+        outside: what is beyond the picture's edges; None: as at the edge.
+    """
+    height, width = picture.shape[:2]
+    along = (np.arange(grid.angles) + 0.5) / grid.angles - 0.5
+    angle = (grid.middle + along * grid.span)[:, None]
+    radius = grid.nearest + (np.arange(grid.radii) + 0.5) * grid.step
+    x = grid.center[0] + radius * np.cos(angle)
+    y = grid.center[1] + radius * np.sin(angle)
+    values = _bilinear(picture, x - 0.5, y - 0.5, wraps=False)
+    if outside is not None:
+        is_inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= height)
+        values = np.where(is_inside[..., None], values, outside)
+    return values
+
+
+def radial_blur(rays: Floats, grid: PolarGrid, length: float) -> Floats:
+    """Rays (angles, radii, n) blurred outwards; what is before the first texel is 1.
+
+    Exact for values that stay the same all over a texel, at its end.
+
+    Args:
+        length: over which a value fades by 1/e [pixels].
+    """
+    blurred = np.empty(rays.shape, np.float64)
+    kept = np.exp(-grid.step / length)
+    total = weight = -np.expm1(-grid.nearest / length)
+    for index in range(grid.radii):
+        total = rays[:, index] * (1.0 - kept) + total * kept
+        weight = 1.0 - kept + weight * kept
+        blurred[:, index] = total / weight
+    return blurred
+
+
+def from_polar(rays: Floats, grid: PolarGrid, width: int, height: int) -> Floats:
+    """The picture (height, width, n) that rays (angles, radii, n) stand for, bilinear."""
+    away = _away(grid, width, height)
+    row = (_angles_from(grid.middle, away) / grid.span + 0.5) * grid.angles - 0.5
+    column = (_distances(grid, width, height) - grid.nearest) / grid.step - 0.5
+    return _bilinear(rays, column, row, wraps=grid.is_round)
+
+
+def _away(grid: PolarGrid, width: int, height: int) -> Floats:
+    """From the grid's centre to the middle of each pixel, (height, width, 2)."""
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    return np.stack([x, y], axis=-1) - grid.center
+
+
+def _distances(grid: PolarGrid, width: int, height: int) -> Floats:
+    return np.linalg.norm(_away(grid, width, height), axis=-1)
+
+
+def _angles_from(middle: float, away: Floats) -> Floats:
+    """Angles of directions (..., 2) against one of them, from -pi to pi."""
+    x, y = away[..., 0], away[..., 1]
+    ahead = x * np.cos(middle) + y * np.sin(middle)
+    return np.arctan2(y * np.cos(middle) - x * np.sin(middle), ahead)
+
+
+def _bilinear(texels: Floats, x: Floats, y: Floats, *, wraps: bool) -> Floats:
+    """Values at places counted in texels; beyond the sides as there, or with rows going round."""
+    height, width = texels.shape[:2]
+    left, lower = np.floor(x), np.floor(y)
+    across, up = (x - left)[..., None], (y - lower)[..., None]
+
+    def at(column: Floats, row: Floats) -> Floats:
+        row = row % height if wraps else np.clip(row, 0, height - 1)
+        return texels[row.astype(int), np.clip(column, 0, width - 1).astype(int)]
+
+    below = at(left, lower) * (1.0 - across) + at(left + 1, lower) * across
+    above = at(left, lower + 1) * (1.0 - across) + at(left + 1, lower + 1) * across
+    return below * (1.0 - up) + above * up

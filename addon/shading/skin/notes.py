@@ -1,0 +1,38 @@
+"""What the artist should know about a head's UVs, where its shadow is to be soft."""
+
+from __future__ import annotations
+
+from ...strands import Surface
+from ..volume.settings import VolumeSettings
+from .chart import chart_of, covering
+from .settings import SkinSettings
+
+#: texels along the longer side of a map that is only looked through for overlaps
+_RESOLUTION, _MARGIN = 256, 2
+#: a share of overlapping texels that nobody sees
+_FEW = 0.002
+
+
+def skin_notes(
+    head: Surface | None, settings: SkinSettings, volume: VolumeSettings
+) -> tuple[str, ...]:
+    """Where the shadow on a head keeps its hard edges though it is to be soft, and why."""
+    is_wanted = settings.soft_shadow and settings.softness and volume.shadows != "none"
+    return () if head is None or not is_wanted else uv_notes(head)
+
+
+def uv_notes(head: Surface) -> tuple[str, ...]:
+    """What is wrong with a head's UVs."""
+    if head.corner_uv is None:
+        return ("the head has no UVs: the hair's shadow on it keeps its hard edges",)
+    chart = chart_of(head.corner_uv, _RESOLUTION, _MARGIN)
+    if not chart.is_mapped.any():
+        return ("the head's UVs have no area: the hair's shadow on it keeps its hard edges",)
+    triangle, overlaps = covering(chart)
+    share = float(overlaps.sum() / max(int((triangle >= 0).sum()), 1))
+    if share < _FEW:
+        return ()
+    return (
+        f"the head's UVs overlap in {share:.0%} of their area: there the hair's shadow keeps its "
+        "hard edges",
+    )

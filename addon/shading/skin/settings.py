@@ -1,0 +1,42 @@
+"""What the artist sets about the shadow of hair on skin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ...params import Settings, integer, number, toggle
+
+_GREEN = "Green 2004, GPU Gems, chapter 16: texture-space diffusion"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SkinSettings(Settings):
+    """Soft shadows on the head."""
+
+    section: ClassVar[str] = "skin"
+    title: ClassVar[str] = "Soft Shadow on Skin"
+
+    soft_shadow: bool = toggle(
+        True,
+        label="Soft Shadow on Skin",
+        description="With shadows: light spreads under the skin of a head that has UVs, so that "
+        "the shadow on it has soft edges",
+        source=_GREEN,
+    )
+    softness: float = number(
+        0.003,
+        label="Softness",
+        description="How far light spreads along the skin",
+        soft=(0.0, 0.02),
+        hard=(0.0, 1.0),
+        unit="length",
+        source=_GREEN,
+    )
+    skin_resolution: int = integer(
+        512,
+        label="Skin Resolution",
+        description="Texels along the longer side of the head's UV map, for the shadow on it",
+        soft=(128, 2048),
+        hard=(64, 4096),
+    )
