@@ -11,7 +11,10 @@ from .groom.settings import GrowSettings, GuideSettings
 from .params import Settings
 from .refine.settings import DetailSettings
 from .shading.ambient import AmbientSettings
+from .shading.picture_settings import PictureSettings
 from .shading.settings import ShadingSettings, StrandSettings
+from .shading.shafts_settings import ShaftSettings
+from .shading.skin.settings import SkinSettings
 from .shading.textures import TextureSettings
 from .shading.volume.settings import VolumeSettings
 
@@ -28,8 +31,11 @@ ALL_SETTINGS: dict[str, type[Settings]] = {
         StrandSettings,
         ShadingSettings,
         VolumeSettings,
+        SkinSettings,
+        ShaftSettings,
         AmbientSettings,
         CardSettings,
         TextureSettings,
+        PictureSettings,
     )
 }

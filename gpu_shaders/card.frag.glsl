@@ -1,7 +1,8 @@
 // Cards, fragment stage: strands in textures, see addon/shading/textures.py.
 //
 // PRIME 1: depth alone, of opaque pixels. TANGENT_MAP 1: a map says which way strands run, in place
-// of the shift texture.
+// of the shift texture. SHADOWS of hair on hair, and SCATTERING from strand to strand, as strands have
+// them; where a light has no map, the occlusion stands in.
 #if PRIME
 void main()
 {
@@ -16,6 +17,10 @@ void main()
 #  if MARSCHNER
 #    include "lib_marschner.glsl"
 #  endif
+#  include "lib_card_shadows.glsl"
+#  if SCATTERING
+#    include "lib_dual.glsl"
+#  endif
 
 void main()
 {
@@ -23,6 +28,7 @@ void main()
   vec3 tangent = unit_or(card_tangent, vec3(0.0, 0.0, 1.0));
   vec3 to_eye = unit_or(view.eye.xyz - view.eye.w * card_point, normal);
   float along = card_uv.y;
+  float alpha = texture(alpha_texture, card_uv).x;
 #  if TANGENT_MAP
   vec3 texel = texture(tangent_texture, card_uv).xyz;
   tangent = mapped_tangent(texel, tangent, normal, shading.shift_noise);
@@ -40,13 +46,37 @@ void main()
   vec3 hair = card_base(along, shading);
 #  endif
 
-  vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz;
+  vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz * card_occlusion;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, card_point, to_light, irradiance);
+    vec3 way = way_of_light_to_card(index, card_point, alpha);
+    float tau = way.x;
+    irradiance *= tau < 0.0 ? card_occlusion : way.z;
 #  if MARSCHNER
     float level = pixel_level(
         longitudinal, tangent, normal, to_light, to_eye, shift_noise, shading);
+#    if SCATTERING
+    radiance += irradiance * scattering_light(longitudinal,
+                                              azimuthal,
+                                              paths,
+                                              shares_forward,
+                                              shares_backward,
+                                              tangent,
+                                              normal,
+                                              to_light,
+                                              to_eye,
+                                              shift_noise,
+                                              sparkle_noise,
+                                              absorption,
+                                              fibre,
+                                              shading,
+                                              level,
+                                              tau,
+                                              way.y,
+                                              scatter_density,
+                                              skin_color);
+#    else
     radiance += irradiance * marschner_light(longitudinal,
                                              azimuthal,
                                              paths,
@@ -60,17 +90,18 @@ void main()
                                              fibre,
                                              shading,
                                              level,
-                                             -1.0);
+                                             tau);
+#    endif
 #  else
-    radiance += irradiance * hair / LIGHT_PI *
+    radiance += irradiance * (tau < 0.0 ? 1.0 : exp(-tau)) * hair / LIGHT_PI *
                 kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
 #  endif
   }
-  radiance *= texture(base_texture, card_uv).xyz * card_occlusion;
-  float opacity = is_opaque == 1 ? 1.0 : texture(alpha_texture, card_uv).x;
-  if (opacity < least_alpha) {
+  radiance *= texture(base_texture, card_uv).xyz;
+  float covered = is_opaque == 1 ? 1.0 : alpha;
+  if (covered < least_alpha) {
     discard;  // at the end, because derivatives want all pixels until then
   }
-  color = vec4(radiance * opacity, opacity);
+  color = vec4(radiance * covered, covered);
 }
 #endif

@@ -9,7 +9,7 @@
 
 const float DUAL_SMALLEST = 1.0e-6;
 const float DUAL_MOST = 0.999, DUAL_MOST_KEPT = 0.9999;
-const float DUAL_LEAST_LIGHT = 1.0e-3;
+const float DUAL_LEAST_LIGHT = 1.0e-3, DUAL_DIFFUSIVITY = 1.66;
 
 // What a fibre sends on, or back, at cos theta_d, by colour and lobe.
 mat3x4 shares_at(sampler2D shares, float cos_d, vec3 absorption)
@@ -29,7 +29,7 @@ vec3 sum_of_lobes(mat3x4 lobes)
 // What so many strands, one behind the other, give back of the light on the first.
 vec3 returned(vec3 a_forward, vec3 a_backward, float count)
 {
-  a_forward = min(a_forward, DUAL_MOST_KEPT - a_backward);
+  a_forward = clamp(a_forward, vec3(0.0), max(DUAL_MOST_KEPT - a_backward, 0.0));
   vec3 middle = 1.0 + a_backward * a_backward - a_forward * a_forward;
   vec3 root = sqrt(max(middle * middle - 4.0 * a_backward * a_backward, 0.0));
   vec3 deep = 2.0 * a_backward / max(middle + root, DUAL_SMALLEST);
@@ -108,6 +108,26 @@ vec3 dual_scattering(vec3 single,
          scattered * density * (on + density * back_scattered);
 }
 
+// What comes off the skin behind the hair and from a strand to the eye. facing: cosine between the
+// light and the skin's normal. skin: its albedo.
+vec3 off_the_skin(float phi,
+                  mat3x4 forward,
+                  mat3x4 backward,
+                  float tau,
+                  float beyond,
+                  float facing,
+                  vec3 skin)
+{
+  facing = max(facing, 0.0);
+  vec3 a_f = sum_of_lobes(forward), a_b = sum_of_lobes(backward);
+  float strands = tau + beyond * (1.0 + DUAL_DIFFUSIVITY * facing);
+  vec3 kept = max(1.0 - skin * returned(a_f, a_b, beyond), 1.0 - DUAL_MOST);
+  vec3 lit = skin * facing / (ANGLE_PI * kept);
+  float cosine = cos(phi);
+  vec3 onward = 0.5 * (a_f * (1.0 + cosine) + a_b * (1.0 - cosine));
+  return lit * exp(-strands * (1.0 - a_f)) * onward;
+}
+
 // What one light sends to the eye from a strand among others: as marschner_light, of which it has
 // all but the colour that stands in for light from strand to strand.
 vec3 scattering_light(sampler3D longitudinal,
@@ -127,19 +147,20 @@ vec3 scattering_light(sampler3D longitudinal,
                       float level,
                       float tau,
                       float beyond,
-                      float density)
+                      float density,
+                      vec3 skin)
 {
   vec3 angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading);
   vec3 single = single_scattering(
       longitudinal, azimuthal, paths, angles, sparkle_noise, absorption, fibre, shading, level);
   float cos_d = cos(0.5 * (angles.y - angles.x));
-  float passed = -log(max(straight_light(normal, to_light, tau, shading), DUAL_LEAST_LIGHT));
-  return cos(angles.x) * dual_scattering(single,
-                                         angles,
-                                         shares_at(shares_forward, cos_d, absorption),
-                                         shares_at(shares_backward, cos_d, absorption),
-                                         tau < 0.0 ? passed : tau,
-                                         beyond,
-                                         fibre,
-                                         density);
+  mat3x4 forward = shares_at(shares_forward, cos_d, absorption);
+  mat3x4 backward = shares_at(shares_backward, cos_d, absorption);
+  float straight = straight_light(normal, to_light, tau, shading);
+  float passed = tau < 0.0 ? -log(max(straight, DUAL_LEAST_LIGHT)) : tau;
+  vec3 scattered = dual_scattering(
+      single, angles, forward, backward, passed, beyond, fibre, density);
+  float facing = dot(normal, to_light);
+  return scattered * cos(angles.x) +
+         off_the_skin(angles.z, forward, backward, passed, beyond, facing, skin);
 }

@@ -9,6 +9,7 @@
 //   ------>   |-----------|---------|---------------|------->
 //             0          sum 0     sum 1           sum 2      what the map holds at each end; in
 //                                                             between tau is linear
+// Depth is counted from where a texel's layers start, in shares of how thick they are together.
 
 // The layers whose sums a strand at this depth behind their start is part of: four of them.
 vec4 adds_to(float depth, vec4 ends)
@@ -16,15 +17,12 @@ vec4 adds_to(float depth, vec4 ends)
   return vec4(lessThanEqual(vec4(depth), ends));
 }
 
-// By what the sums are to be multiplied for tau at this depth: each layer's share in what is passed,
-// less the next one's. `before` and `after` are the ends of the layers on both sides of these four.
-vec4 layer_weights(float depth, vec4 ends, float before, float after)
+// The share of each layer that lies in front of this depth: four of them. `before` is the end of the
+// layer before these.
+vec4 layers_passed(float depth, vec4 ends, float before)
 {
   vec4 starts = vec4(before, ends.xyz);
-  vec4 next = vec4(ends.yzw, after);
-  vec4 passed = clamp((depth - starts) / (ends - starts), 0.0, 1.0);
-  vec4 passed_next = clamp((depth - ends) / (next - ends), 0.0, 1.0);
-  return passed - passed_next;
+  return clamp((depth - starts) / (ends - starts), 0.0, 1.0);
 }
 
 // Place in a light's map, xy in 0..1, and depth; outside of the map behind the light.
@@ -37,8 +35,59 @@ vec3 map_place(Opacity opacity, int light, vec3 point)
   return vec3(place, dot(opacity.map_depth[light], at));
 }
 
+// How broad a strand of the width 1 m is in a light's map, in texels. `across` is the unit vector
+// across it there, xyw its place before the division.
+float strand_breadth(Opacity opacity, int light, vec3 xyw, vec2 across)
+{
+  // how places change with the point, times 2 w
+  float w = max(abs(xyw.z), 1.0e-6);
+  vec3 turn_x = opacity.map_x[light].xyz - xyw.x / w * opacity.map_w[light].xyz;
+  vec3 turn_y = opacity.map_y[light].xyz - xyw.y / w * opacity.map_w[light].xyz;
+  return length(across.x * turn_x + across.y * turn_y) * 0.5 * float(opacity.resolution) / w;
+}
+
+// tau of a strand itself at its middle line, of what a map holds there. half_width: in texels.
+float own_depth(float half_width)
+{
+  float drawn = max(half_width, 0.5);
+  float met = min(drawn, 1.0);
+  return half_width / drawn * met * (2.0 - met);
+}
+
+// The same of a strand of this radius [m].
+float own_depth_at(Opacity opacity, int light, vec3 point, vec3 tangent, float radius)
+{
+  vec4 at = vec4(point, 1.0);
+  vec3 xyw = vec3(
+      dot(opacity.map_x[light], at), dot(opacity.map_y[light], at), dot(opacity.map_w[light], at));
+  vec3 change = vec3(dot(opacity.map_x[light].xyz, tangent),
+                     dot(opacity.map_y[light].xyz, tangent),
+                     dot(opacity.map_w[light].xyz, tangent));
+  vec2 along = change.xy * xyw.z - xyw.xy * change.z;
+  float size = length(along);
+  vec2 across = size > 1.0e-20 ? vec2(-along.y, along.x) / size : vec2(1.0, 0.0);
+  return own_depth(radius * strand_breadth(opacity, light, xyw, across));
+}
+
 // Depth of the first hair in what was kept; 1 where there is none.
 float start_depth(uint kept)
 {
   return min(float(kept) / {{start_scale}}, 1.0);
+}
+
+// Thickness of the hair between its first and its last depth in what was kept, but for sheets; where
+// the last one is not known, all of depth.
+float kept_thickness(uint first, uint last)
+{
+  float end = 1.0 - start_depth(last);
+  return last > uint({{start_scale}}) ? 1.0 : max(end - start_depth(first), {{least_thickness}});
+}
+
+// Of a texel's deep layers: x where they start, y one over how thick they are together.
+vec2 layer_span(usampler2D starts, ivec2 texel, int map, int resolution)
+{
+  int side = resolution / {{start_texels}};
+  ivec2 at = texel / {{start_texels}} + ivec2(0, map * side);
+  uint first = texelFetch(starts, at, 0).x, last = texelFetch(starts, at + ivec2(side, 0), 0).x;
+  return vec2(start_depth(first), 1.0 / kept_thickness(first, last));
 }

@@ -5,7 +5,7 @@
 // layers are DEEP.
 //
 // Texel t of a map lies in array t % SLOTS, since one framebuffer cannot hold several layers of one
-// array.
+// array, and there in one of PASSES layers.
 #include "lib_opacity.glsl"
 
 #if DEEP
@@ -16,12 +16,12 @@
 
 #define OPACITY_ADD(slot, array) \
   { \
-    int t = pass * SLOTS + slot; \
-    vec4 ends = opacity.ends[t], sums = OPACITY_SUMS(array, layer); \
-    float after = t + 1 < opacity.layer_texels ? opacity.ends[t + 1].x : ends.w + 1.0; \
-    tau.x += dot(sums, layer_weights(depths.x, ends, before, after)); \
-    tau.y += dot(sums, layer_weights(depths.y, ends, before, after)); \
+    vec4 ends = opacity.ends[pass * SLOTS + slot], sums = OPACITY_SUMS(array, layer); \
+    vec4 within = sums - vec4(sum_before, sums.xyz); \
+    tau.x += dot(within, layers_passed(depths.x, ends, before)); \
+    tau.y += dot(within, layers_passed(depths.y, ends, before)); \
     before = ends.w; \
+    sum_before = sums.w; \
   }
 
 // tau at two depths behind the start of the layers, of one texel, or of its bilinear neighbourhood
@@ -29,10 +29,9 @@
 vec2 summed_layers(int map, vec2 place, ivec2 texel, vec2 depths)
 {
   vec2 tau = vec2(0.0);
-  float before = 0.0;
-  int passes = opacity.layer_texels / SLOTS;
-  for (int pass = 0; pass < passes; pass++) {
-    int layer = map * passes + pass;
+  float before = 0.0, sum_before = 0.0;
+  for (int pass = 0; pass < PASSES; pass++) {
+    int layer = map * PASSES + pass;
     OPACITY_ADD(0, opacity_0)
 #if SLOTS > 1
     OPACITY_ADD(1, opacity_1)
@@ -78,10 +77,8 @@ vec3 light_path(int light, vec3 point)
     nearest = min(nearest, mesh);
 #if DEEP
     // each texel's layers start elsewhere, so that its own tau is found before they are blended
-    ivec2 start = texel / {{start_texels}};
-    start.y += map * (opacity.resolution / {{start_texels}});
-    vec2 depths = vec2(depth, mesh) - start_depth(texelFetch(opacity_starts, start, 0).x);
-    tau += weight * summed_layers(map, place.xy, texel, depths);
+    vec2 span = layer_span(opacity_starts, texel, map, opacity.resolution);
+    tau += weight * summed_layers(map, place.xy, texel, (vec2(depth, mesh) - span.x) * span.y);
 #endif
   }
 #if !DEEP

@@ -14,3 +14,17 @@ vec3 way_of_light(int index, vec3 point)
 #endif
   return vec3(-1.0, {{unknown_beyond}}, 1.0);
 }
+
+// As way_of_light, for a place of a strand of this radius [m] and opacity, which is in the maps as
+// well: it does not lie behind itself.
+vec3 way_of_light_to_strand(int index, vec3 point, vec3 tangent, float radius, float hides)
+{
+  vec3 way = way_of_light(index, point);
+#if SHADOWS
+  if (way.x >= 0.0) {
+    float own = hides * own_depth_at(opacity, index, point, tangent, radius);
+    way.y = max(way.y - opacity.extinction * own, 0.0);
+  }
+#endif
+  return way;
+}

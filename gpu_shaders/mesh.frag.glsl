@@ -1,28 +1,103 @@
 // Meshes, fragment stage: Lambert, the world's light, and a soft sheen (Blinn 1977) as skin has. Hair
-// and meshes throw SHADOWS on them; where a light has no map, the occlusion stands in.
+// and meshes throw SHADOWS on them; where a light has no map, the occlusion stands in. On SKIN the
+// shadow is looked up where it has been spread. PICTURES of the material take the place of its colour,
+// and bend its normals. HASHED and BLENDED: it does not cover all.
 #include "lib_lights.glsl"
 #include "lib_shadows.glsl"
 #include "lib_output.glsl"
+#ifdef SKIN
+#  include "lib_skin.glsl"
+#endif
 
 const float SHEEN_EXPONENT = 18.0;
+
+#ifdef PICTURES
+// A normal of tangent space, whose axes are those along which the map's u and v grow (Schueler 2013,
+// "Followup: Normal Mapping Without Precomputed Tangents"). Blender's own are those of vertices, which
+// differ where a map is skewed.
+vec3 bent_normal(vec3 normal, vec3 mapped, float bump)
+{
+  vec3 point_x = dFdx(mesh_point), point_y = dFdy(mesh_point);
+  vec2 uv_x = dFdx(mesh_uv), uv_y = dFdy(mesh_uv);
+  float turn = dot(cross(point_x, point_y), normal) < 0.0 ? -1.0 : 1.0;
+  vec3 along_y = turn * cross(point_y, normal), along_x = turn * cross(normal, point_x);
+  vec3 tangent = along_y * uv_x.x + along_x * uv_y.x;
+  vec3 bitangent = along_y * uv_x.y + along_x * uv_y.y;
+  float largest = max(dot(tangent, tangent), dot(bitangent, bitangent));
+  if (largest <= 0.0) {
+    return normal;
+  }
+  float scale = inversesqrt(largest);
+  vec3 bent = normalize(scale * (tangent * mapped.x + bitangent * mapped.y) + normal * mapped.z);
+  return normalize(mix(normal, bent, bump));
+}
+#endif
+
+#ifdef HASHED
+// A number from 0 to 1 for each place of the target; interleaved gradient noise (Jimenez 2014).
+float place_noise(vec2 place)
+{
+  return fract(52.9829189 * fract(dot(place, vec2(0.06711056, 0.00583715))));
+}
+#endif
 
 void main()
 {
   vec3 to_eye = normalize(view.eye.xyz - view.eye.w * mesh_point);
   vec3 normal = normalize(mesh_normal);
+#ifdef PICTURES
+  vec4 texel = texture(mesh_color_map, mesh_uv);
+  vec3 base = texel.xyz;
+  normal = bent_normal(normal, 2.0 * texture(mesh_normal_map, mesh_uv).xyz - 1.0, mesh_bump);
+#else
+  vec4 texel = vec4(1.0);
+  vec3 base = mesh_color;
+#endif
+#if defined(HASHED) || defined(BLENDED)
+  float alpha = mesh_alpha * texel.w;
+#endif
+#ifdef HASHED
+  if (alpha <= place_noise(floor(gl_FragCoord.xy))) {
+    discard;
+  }
+#endif
   normal = dot(normal, to_eye) < 0.0 ? reflect(normal, to_eye) : normal;
 
-  vec3 radiance = mesh_color * lights.ambient_and_count.xyz * mesh_occlusion;
+#ifdef SKIN
+  float known;
+  vec4 soft = skin_soft_shadow(skin_shadow,
+                               skin_texels,
+                               skin_stretches,
+                               skin_seams,
+                               skin_shifts,
+                               mesh_skin.xy,
+                               round(mesh_skin.z),
+                               known);
+#endif
+  vec3 radiance = base * lights.ambient_and_count.xyz * mesh_occlusion;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, mesh_point, to_light, irradiance);
     vec3 way = way_of_light(index, mesh_point);
-    irradiance *= (way.x < 0.0 ? mesh_occlusion : way.z * exp(-way.x)) / LIGHT_PI;
+    float reaching = way.x < 0.0 ? mesh_occlusion : way.z * exp(-way.x);
+#ifdef SKIN
+    // what is not known of the skin is as it is without: where the head's UVs overlap
+    int map = int(opacity.light[index].x);
+    if (map >= 0 && map < {{skin_lights}}) {
+      reaching = mix(reaching, soft[map], min(4.0 * known, 1.0));
+    }
+#endif
+    irradiance *= reaching / LIGHT_PI;
     float facing = max(0.0, dot(normal, to_light));
     float across = max(0.0, dot(normal, normalize(to_light + to_eye)));
     // (n + 8) / 8 keeps the sheen's energy the same whatever its sharpness
     float sheen = mesh_sheen * (SHEEN_EXPONENT + 8.0) / 8.0 * pow(across, SHEEN_EXPONENT);
-    radiance += irradiance * facing * (mesh_color + sheen);
+    radiance += irradiance * facing * (base + sheen);
   }
-  color = vec4(output_encoded(radiance, output_encoding), 1.0);
+  // a holdout covers nothing itself and hides what is behind it
+#ifdef BLENDED
+  color = mesh_cover * alpha * vec4(output_encoded(radiance, output_encoding), 1.0);
+#else
+  color = mesh_cover * vec4(output_encoded(radiance, output_encoding), 1.0);
+#endif
 }

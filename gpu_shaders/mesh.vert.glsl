@@ -5,5 +5,11 @@ void main()
   mesh_point = position;
   mesh_normal = normal;
   mesh_occlusion = occlusion;
+#ifdef PICTURES
+  mesh_uv = picture_place;
+#endif
+#ifdef SKIN
+  mesh_skin = skin_place;
+#endif
   gl_Position = view.view_projection * vec4(position, 1.0);
 }

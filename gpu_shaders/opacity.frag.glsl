@@ -1,16 +1,24 @@
 // Opacity maps, fragment stage: a strand is part of the sums of all layers that end behind it.
 //
-// TARGETS: textures of four layers each that are drawn into. DEEP: layers start at the first hair
-// that the light meets.
+// TARGETS: textures of four layers each that are drawn into. DEEP: layers lie between the first
+// and the last hair that the light meets. CARDS: cards are drawn, not strands; they count as what their alpha stands
+// for.
 #include "lib_opacity.glsl"
+#ifdef CARDS
+#  include "lib_card_opacity.glsl"
+#endif
 
 void main()
 {
+#ifdef CARDS
+  float strand_weight = card_optical_depth(texture(alpha_texture, card_uv).x);
+#endif
   float behind = strand_depth;
 #if DEEP
-  ivec2 start = ivec2(gl_FragCoord.xy) / {{start_texels}};
-  start.y += map_index * (opacity.resolution / {{start_texels}});
-  behind -= start_depth(texelFetch(opacity_starts, start, 0).x);
+  vec2 span = layer_span(
+      opacity_starts, ivec2(gl_FragCoord.xy), map_index, opacity.resolution);
+  // what was not met by the points that fill `starts` counts to the last layer
+  behind = min((behind - span.x) * span.y, 1.0);
 #endif
   layers_0 = strand_weight * adds_to(behind, opacity.ends[first_texel]);
 #if TARGETS > 1

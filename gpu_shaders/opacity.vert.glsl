@@ -30,12 +30,12 @@ void main()
 
   float texels = float(opacity.resolution);
   float taper = mix(1.0, strands.tip_width, float(station) / float(cv_count - 1));
-  float metre = length(opacity.map_x[light_index].xyz) * 0.5 * texels / max(clip.w, 1.0e-6);
-  float half_width = cv.w * strands.width_scale * taper * metre;
+  float half_width = cv.w * strands.width_scale * taper *
+                     strand_breadth(opacity, light_index, clip.xyw, across);
   float drawn = max(half_width, 0.5);
 
-  strand_weight = strand_step * half_width / drawn;
+  strand_weight = strand_step * strands.opacity * half_width / drawn;
   strand_depth = 0.5 * clip.z / clip.w + 0.5;
-  clip.xy += across * side * drawn * 2.0 / texels * clip.w;
+  clip.xy += across * side * drawn * 2.0 / texels * max(abs(clip.w), 1.0e-6);
   gl_Position = clip;
 }

@@ -4,7 +4,9 @@
 
 void main()
 {
-  vec3 place = map_place(opacity, light_index, position);
-  float w = dot(opacity.map_w[light_index], vec4(position, 1.0));
-  gl_Position = vec4((2.0 * place.xy - 1.0) * w, (2.0 * max(place.z, 0.0) - 1.0) * w, w);
+  vec4 at = vec4(position, 1.0);
+  float w = dot(opacity.map_w[light_index], at);
+  float depth = max(dot(opacity.map_depth[light_index], at), 0.0);
+  gl_Position = vec4(dot(opacity.map_x[light_index], at), dot(opacity.map_y[light_index], at),
+                     (2.0 * depth - 1.0) * w, w);
 }

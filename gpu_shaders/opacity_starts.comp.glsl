@@ -1,9 +1,9 @@
-// Opacity maps: the depth of the first hair that a light meets, one invocation a CV.
+// Opacity maps: the depths of the first and the last hair that a light meets, one invocation a CV.
 //
 // `starts` is coarser than the map by {{start_texels}}: a few points of each segment fill it, one in
 // each of its texels, where drawing all strands a second time would cost as much as the map itself.
-// Maps stand above one another in it. Depths are whole numbers, since only of these the least can be
-// kept.
+// Maps stand above one another in it, what the last hair leaves to 1 on the right of where the first
+// one is. Depths are whole numbers, since only of these the least can be kept.
 #include "lib_strand_texel.glsl"
 #include "lib_opacity.glsl"
 
@@ -13,13 +13,20 @@ int starts_side()
   return opacity.resolution / {{start_texels}};
 }
 
-void keep_first(vec3 place)
+bool is_ahead(vec3 point)
+{
+  return dot(opacity.map_w[light_index], vec4(point, 1.0)) > 0.0;
+}
+
+void keep_first_and_last(vec3 place)
 {
   int side = starts_side();
   ivec2 texel = ivec2(floor(place.xy * float(side)));
   if (all(greaterThanEqual(texel, ivec2(0))) && all(lessThan(texel, ivec2(side)))) {
-    uint depth = uint(clamp(place.z, 0.0, 1.0) * {{start_scale}});
-    imageAtomicMin(starts, texel + ivec2(0, map_index * side), depth);
+    float depth = clamp(place.z, 0.0, 1.0);
+    texel.y += map_index * side;
+    imageAtomicMin(starts, texel, uint(depth * {{start_scale}}));
+    imageAtomicMin(starts, texel + ivec2(side, 0), uint((1.0 - depth) * {{start_scale}}));
   }
 }
 
@@ -32,11 +39,14 @@ void main()
   }
   vec3 root_side = texelFetch(cv_points, strand_texel(strand, max(at.x - 1, 0), cv_count), 0).xyz;
   vec3 tip_side = texelFetch(cv_points, strand_texel(strand, at.x, cv_count), 0).xyz;
+  if (!is_ahead(root_side) || !is_ahead(tip_side)) {
+    return;  // it reaches behind the light
+  }
   vec3 from = map_place(opacity, light_index, root_side);
   vec3 to = map_place(opacity, light_index, tip_side);
   vec2 texels = abs(to.xy - from.xy) * float(starts_side());
   int count = clamp(int(ceil(2.0 * max(texels.x, texels.y))), 1, 2 * starts_side());
   for (int i = 1; i <= count; i++) {
-    keep_first(mix(from, to, float(i) / float(count)));
+    keep_first_and_last(mix(from, to, float(i) / float(count)));
   }
 }

@@ -2,8 +2,14 @@
 //
 // ADAPTIVE 0: every segment has `subdivisions` pieces. ADAPTIVE 1: instances are strands in the
 // order of detail_pass.py, their stations as its factors say.
+//
+// COVERED: ribbons as wide as strands are, and as much wider as to reach all pixels that they cover a
+// share of. GATHERED: what it takes to find a fragment's looks later, in place of the looks.
 #include "lib_strand_geometry.glsl"
 #include "lib_detail_packing.glsl"
+#if COVERED
+#  include "lib_coverage.glsl"
+#endif
 
 void main()
 {
@@ -38,9 +44,11 @@ void main()
   before = segment == 0 ? 2.0 * from.xyz - to.xyz : before;
   after = segment == last - 1 ? 2.0 * to.xyz - from.xyz : after;
 
+#if !GATHERED
   // x occlusion, y seed
   vec2 from_look = texelFetch(cv_looks, strand_texel(strand, segment, cv_count), 0).xy;
   vec2 to_look = texelFetch(cv_looks, strand_texel(strand, segment + 1, cv_count), 0).xy;
+#endif
 
   vec3 point = catmull_rom_point(before, from.xyz, to.xyz, after, u);
   vec3 tangent = catmull_rom_tangent(before, from.xyz, to.xyz, after, u);
@@ -48,17 +56,29 @@ void main()
   float radius = mix(from.w, to.w, u) * strands.width_scale;
   float taper = mix(1.0, strands.tip_width, along);
 
+#if GATHERED
+  strand_along = along;
+#else
   strand_point = point;
   strand_tangent = tangent;
   strand_along_and_occlusion = vec2(along, mix(from_look.x, to_look.x, u));
+  strand_radius = radius * taper;
   strand_seed = int(from_look.y);
-#if DEBUG
+#endif
+#if DEBUG || GATHERED
   strand_index = strand;
 #endif
 
   vec4 clip = view.view_projection * vec4(point, 1.0);
   vec4 clip_tangent = view.view_projection * vec4(tangent, 0.0);
+#if COVERED
+  vec2 normal = ribbon_normal_at(clip, clip_tangent, view);
+  float half_width = pixels_wide(radius, clip, view) * taper * widening;
+  float reach = half_width + coverage_reach(normal);
+  ribbon = vec4(side * reach, half_width, normal) * clip.w;
+#else
   float minimum = strands.minimum_width * float(samples_across);
-  float half_width = ribbon_half_width(radius, taper, minimum, clip, view) * widening;
-  gl_Position = ribbon_edge(clip, clip_tangent, side, half_width, view);
+  float reach = ribbon_half_width(radius, taper, minimum, clip, view) * widening;
+#endif
+  gl_Position = ribbon_edge(clip, clip_tangent, side, reach, view);
 }

@@ -1,13 +1,15 @@
 """Presets: JSON data with a version and a source, checked and never executed.
 
-{"hairloom": 1, "section": "kajiya_kay", "title": "...", "source": "...", "values": {...}}
+{"hairloom": 1, "section": "shading", "title": "...", "source": "...", "values": {...},
+ "also": {"shafts": {...}}}
+`also` is for presets that are about more than one section; most have none.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +24,25 @@ MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
 
 @dataclass(frozen=True)
 class Preset[S: Settings]:
-    """A named set of values, and where they come from."""
+    """A named set of values, and where they come from.
+
+    settings: of its own section, under which it is found.
+    also: of other sections, which go with it.
+    """
 
     title: str
     source: str
     settings: S
+    also: tuple[Settings, ...] = ()
+
+    @property
+    def all(self) -> tuple[Settings, ...]:
+        """All that it sets, a section each."""
+        return (self.settings, *self.also)
 
 
 def read_preset[S: Settings](path: Path, settings: type[S]) -> Preset[S]:
-    """Read and check one preset file.
+    """Read and check the preset of one section in a file.
 
     Raises:
         HairloomError: not JSON, of a newer version, for another section, or with a bad value.
@@ -53,7 +65,20 @@ def read_any_preset(path: Path, kinds: Mapping[str, type[Settings]]) -> Preset[A
             place=str(path),
             remedy="Choose a preset of " + ", ".join(kinds),
         )
-    return preset_from_dict(data, kind, str(path))
+    preset = preset_from_dict(data, kind, str(path))
+    return replace(preset, also=_also(data.get("also", {}), kinds, str(path)))
+
+
+def _also(data: Any, kinds: Mapping[str, type[Settings]], place: str) -> tuple[Settings, ...]:
+    """The settings of other sections that a preset brings along."""
+    unknown = [data] if not isinstance(data, Mapping) else sorted(set(data) - set(kinds))
+    if unknown or not all(isinstance(values, Mapping) for values in data.values()):
+        raise HairloomError(
+            "what this preset also sets is of no known kind",
+            place=place,
+            remedy="Choose a preset saved by Hairloom",
+        )
+    return tuple(kinds[section].from_dict(values, place) for section, values in data.items())
 
 
 def _content(path: Path) -> Any:
@@ -84,12 +109,14 @@ def preset_from_dict[S: Settings](data: Any, settings: type[S], place: str) -> P
 
 def preset_as_dict(preset: Preset[Any]) -> dict[str, Any]:
     """Plain data, ready for JSON."""
+    also = {settings.section: settings.as_dict() for settings in preset.also}
     return {
         "hairloom": PRESET_VERSION,
         "section": preset.settings.section,
         "title": preset.title,
         "source": preset.source,
         "values": preset.settings.as_dict(),
+        **({"also": also} if also else {}),
     }
 
 

@@ -33,8 +33,10 @@ from ..shading.marschner.look import pack_fibre
 from ..shading.settings import ShadingSettings
 from ..shading.textures import TEXTURES, HairTextures
 from .camera import Camera
+from .card_opacity import CardOpacity
 from .card_snapshot import CardSnapshot
-from .marschner_textures import MARSCHNER, MARSCHNER_TEXTURES
+from .marschner_textures import MARSCHNER, MARSCHNER_TEXTURES, SHARES_TEXTURES
+from .opacity_maps import OpacityForm, OpacityMaps
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .snapshot import Snapshot
 from .textures import UniformBlock, drawing_state, texture_from
@@ -64,22 +66,47 @@ PRIME_RECIPE = ShaderRecipe(
 )
 
 
-def card_recipe(model: str, *, has_tangent_map: bool) -> ShaderRecipe:
-    """The program that shades cards by one of shading.settings.MODELS."""
+def card_recipe(
+    model: str,
+    *,
+    has_tangent_map: bool,
+    opacity: OpacityForm | None = None,
+    scatters: bool = False,
+) -> ShaderRecipe:
+    """The program that shades cards by one of shading.settings.MODELS.
+
+    With opacity maps hair shades them; `scatters` adds light from strand to strand, in Marschner's
+    model.
+    """
     is_marschner = model == "marschner"
+    lit = f"{'_scattering' * scatters}{f'_{opacity.slots}_{opacity.is_deep}' if opacity else ''}"
     return ShaderRecipe(
-        name=f"card_{model}{'_tangent_map' * has_tangent_map}",
+        name=f"card_{model}{'_tangent_map' * has_tangent_map}{lit}",
         vertex="card.vert.glsl",
         fragment="card.frag.glsl",
-        structs=("struct_view.glsl", "struct_lights.glsl", "struct_fibre.glsl"),
+        structs=(
+            "struct_view.glsl",
+            "struct_lights.glsl",
+            "struct_fibre.glsl",
+            "struct_opacity.glsl",
+        ),
         settings=(ShadingSettings,),
-        blocks=(*_BLOCKS, *((("Fibre", "fibre"),) if is_marschner else ())),
+        blocks=(
+            *_BLOCKS,
+            *((("Fibre", "fibre"),) if is_marschner else ()),
+            *((("Opacity", "opacity"),) if opacity else ()),
+        ),
         textures=(
             *(("FLOAT_2D", f"{name}_texture") for name in _textures_of(has_tangent_map)),
             *(MARSCHNER_TEXTURES if is_marschner else ()),
+            *(SHARES_TEXTURES if scatters else ()),
+            *(opacity.samplers if opacity else ()),
         ),
         integers=("is_opaque",),
-        numbers=(("FLOAT", "least_alpha"),),
+        numbers=(
+            ("FLOAT", "least_alpha"),
+            *((("FLOAT", "scatter_density"), ("VEC3", "skin_color")) if scatters else ()),
+        ),
         inputs=_INPUTS,
         varyings=(
             ("smooth", "VEC2", "card_uv"),
@@ -93,6 +120,9 @@ def card_recipe(model: str, *, has_tangent_map: bool) -> ShaderRecipe:
             ("PRIME", 0),
             ("TANGENT_MAP", int(has_tangent_map)),
             ("MARSCHNER", int(is_marschner)),
+            ("SHADOWS", int(opacity is not None)),
+            ("SCATTERING", int(scatters)),
+            *(opacity.defines if opacity else ()),
         ),
     )
 
@@ -101,14 +131,43 @@ class CardPass:
     """Keeps the cards of the last snapshot on the GPU; making one touches no GPU."""
 
     def __init__(self) -> None:
+        self._opacity = CardOpacity()
         self.release()
         released_with_shaders(self)
 
-    def draw(self, snapshot: Snapshot, camera: Camera, width: int, height: int) -> None:
+    def opacity(self, snapshot: Snapshot) -> OpacityMaps | None:
+        """How much hair lies between each light and every place, as StrandPass.opacity of strands.
+
+        Raises:
+            ShaderError: as `draw`.
+        """
+        cards = snapshot.cards
+        if cards is None or not len(cards.mesh.triangles) or snapshot.volume.shadows == "none":
+            return None
+        self._upload(cards)
+        return self._opacity.of(
+            cards.mesh,
+            self._batch,
+            self._textures["alpha"],
+            snapshot.lights,
+            snapshot.volume,
+            (*(mesh.surface for mesh in snapshot.meshes), *snapshot.casters),
+        )
+
+    def draw(
+        self,
+        snapshot: Snapshot,
+        camera: Camera,
+        width: int,
+        height: int,
+        *,
+        opacity: OpacityMaps | None = None,
+    ) -> None:
         """Draw the snapshot's cards into the bound framebuffer: premultiplied, scene-linear.
 
         Args:
             width, height: of the target [pixels].
+            opacity: of the hair that shades them, such as their own, see `opacity`.
 
         Raises:
             ShaderError: a shader does not compile here.
@@ -118,22 +177,36 @@ class CardPass:
             return
         self._upload(cards)
         shading, has_map = snapshot.shading, cards.has_tangent_map
-        shader = program(card_recipe(shading.model, has_tangent_map=has_map))
+        is_marschner = shading.model == "marschner"
+        scatters = opacity is not None and is_marschner and snapshot.volume.scattering
+        form = None if opacity is None else opacity.form
+        shader = program(
+            card_recipe(shading.model, has_tangent_map=has_map, opacity=form, scatters=scatters)
+        )
         values = {
             "view": view_values(camera, width, height),
             "lights": pack_lights(snapshot.lights, snapshot.ambient),
             "shading": struct_values(shading),
         }
         textures = {f"{name}_texture": self._textures[name] for name in _textures_of(has_map)}
-        if shading.model == "marschner":
+        if is_marschner:
             values["fibre"] = pack_fibre(shading)
             textures |= MARSCHNER.of(shading, snapshot.table_size)
+        if scatters:
+            textures |= MARSCHNER.shares(shading, snapshot.table_size)
+        if opacity is not None:
+            values["opacity"] = opacity.values
+            textures |= opacity.textures
         blocks = {name: self._blocks[name].holding(values[name]) for name in values}
         for each in FOUR_PASSES:
             with _state_of(each):
                 if each.color_write:
                     integers = {"is_opaque": int(not each.is_blended)}
-                    numbers = {"least_alpha": LEAST_ALPHA if each.depth_write else 0.0}
+                    least = LEAST_ALPHA if each.depth_write else 0.0
+                    numbers: dict[str, Any] = {"least_alpha": least}
+                    if scatters:
+                        numbers["scatter_density"] = snapshot.volume.density
+                        numbers["skin_color"] = snapshot.skin_color
                     shader.bind(
                         blocks=blocks, textures=textures, integers=integers, numbers=numbers
                     )
@@ -143,7 +216,9 @@ class CardPass:
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
-        self._blocks = {name: UniformBlock() for name in ("view", "lights", "shading", "fibre")}
+        names = (*(name for _, name in _BLOCKS), "fibre", "opacity")
+        self._blocks = {name: UniformBlock() for name in names}
+        self._opacity.release()
         self._mesh: CardMesh | None = None
         self._batch: Any = None
         self._pictures: HairTextures | None = None

@@ -41,6 +41,8 @@ from .textures import (
 
 #: Segments whose factors lie in one texel.
 FACTORS_IN_TEXEL = 16
+#: How far a strand that covers pixels in part is drawn beyond its edge [pixels].
+EDGE = 0.75
 _BLOCKS = (("DetailView", "seen"), ("DetailSettings", "detail"))
 
 
@@ -194,7 +196,7 @@ class GroomExtent:
             (self.low + roots, self.high + roots),
             self.total_length,
             self.radius * settings.width_scale,
-            settings.minimum_width,
+            settings.least_width,
             view,
             snapshot.detail,
         )
@@ -245,7 +247,7 @@ def _shades(snapshot: Snapshot, view: PictureView, widening: float) -> Floats:
         return np.zeros((0, 12), np.float32)
     settings = snapshot.strand_settings
     radius = float(snapshot.radius.max()) * settings.width_scale * widening
-    half_width = settings.minimum_width / 2.0 * widening
+    half_width = max(settings.minimum_width / 2.0, EDGE) * widening
     shades = shades_of(snapshot.hiders[:SHADE_CAPACITY], view, half_width, radius)
     packed = np.zeros((len(shades.nearest), 12), np.float32)
     packed[:, 0:3], packed[:, 3] = shades.origin, shades.nearest

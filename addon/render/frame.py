@@ -11,6 +11,7 @@ from .camera import Camera, frame_camera, look_at, orthographic, perspective
 from .card_pass import CardPass
 from .mesh_pass import MeshPass
 from .shader_program import ShaderRecipe, program
+from .shafts_pass import add_shafts, put_under
 from .snapshot import MeshSnapshot, Snapshot
 from .strand_pass import StrandPass
 from .textures import drawing_into, texture_to_array
@@ -29,7 +30,7 @@ __all__ = [
 
 #: the largest side that a target may have on every GPU that Blender supports
 LARGEST_SIDE = 16384
-_TRANSPARENT = (0.0, 0.0, 0.0, 0.0)
+_NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 _BOX_RECIPE = ShaderRecipe(
     name="box_filter",
@@ -47,7 +48,7 @@ def render_image(
     height: int,
     samples: int = 2,
     *,
-    background: tuple[float, float, float, float] = _TRANSPARENT,
+    background: tuple[float, float, float, float] = _NOTHING,
     passes: tuple[MeshPass, StrandPass] | None = None,
     card_pass: CardPass | None = None,
 ) -> Floats:
@@ -72,13 +73,19 @@ def render_image(
     color = gpu.types.GPUTexture(size, format="RGBA32F")
     depth = gpu.types.GPUTexture(size, format="DEPTH_COMPONENT32F")
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
-    opacity = strand_pass.opacity(snapshot)
+    card_pass = card_pass or CardPass()
+    opacity = strand_pass.opacity(snapshot) or card_pass.opacity(snapshot)
     with drawing_into(target):
-        target.clear(color=background, depth=1.0)
+        # shafts ask alpha what stands before a light
+        target.clear(color=_NOTHING if snapshot.shafts.use_shafts else background, depth=1.0)
         mesh_pass.draw(snapshot, camera, *size, opacity=opacity)
         strand_pass.draw(snapshot, camera, *size, samples=samples)
-        (card_pass or CardPass()).draw(snapshot, camera, *size)
-    return texture_to_array(color if samples == 1 else _averaged(color, samples))
+        card_pass.draw(snapshot, camera, *size, opacity=opacity)
+    picture = color if samples == 1 else _averaged(color, samples)
+    if snapshot.shafts.use_shafts:
+        add_shafts(picture, color, depth, camera, snapshot.lights, snapshot.shafts)
+        put_under(picture, background)
+    return texture_to_array(picture)
 
 
 def render_coverage(

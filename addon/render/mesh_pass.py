@@ -2,43 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
-import gpu
-import numpy as np
-
-from ..shading.lights import pack_lights
+from ..shading.lights import kept_lights, pack_lights
+from ..shading.skin.layout import SkinLayout
 from .camera import Camera
-from .opacity_pass import OpacityForm, OpacityMaps
-from .shader_program import ShaderRecipe, program, released_with_shaders
+from .mesh_batch import mesh_batch
+from .mesh_pictures import PictureTextures, pictures_of
+from .mesh_recipe import NUMBERS, MeshForm
+from .opacity_pass import OpacityMaps
+from .shader_program import program, released_with_shaders
 from .shader_source import output_index
-from .snapshot import MeshSnapshot, Snapshot
+from .skin_pass import SkinPass, SkinShadow
+from .snapshot import MeshPictures, MeshSnapshot, Snapshot
 from .textures import UniformBlock, drawing_state
 from .view_block import view_values
 
-_BLOCKS = (("View", "view"), ("Lights", "lights"))
-
-
-def mesh_recipe(opacity: OpacityForm | None = None) -> ShaderRecipe:
-    """The program that draws meshes; with opacity maps hair and meshes throw shadows on them."""
-    return ShaderRecipe(
-        name=f"mesh{f'_{opacity.slots}_{opacity.is_deep}' if opacity else ''}",
-        vertex="mesh.vert.glsl",
-        fragment="mesh.frag.glsl",
-        structs=("struct_view.glsl", "struct_lights.glsl", "struct_opacity.glsl"),
-        blocks=(*_BLOCKS, *((("Opacity", "opacity"),) if opacity else ())),
-        textures=opacity.samplers if opacity else (),
-        integers=("output_encoding",),
-        numbers=(("VEC3", "mesh_color"), ("FLOAT", "mesh_sheen")),
-        inputs=(("VEC3", "position"), ("VEC3", "normal"), ("FLOAT", "occlusion")),
-        varyings=(
-            ("smooth", "VEC3", "mesh_point"),
-            ("smooth", "VEC3", "mesh_normal"),
-            ("smooth", "FLOAT", "mesh_occlusion"),
-        ),
-        outputs=(("VEC4", "color"),),
-        defines=(("SHADOWS", int(opacity is not None)), *(opacity.defines if opacity else ())),
-    )
+type _Batch = tuple[MeshSnapshot, SkinLayout | None, Any]
 
 
 class MeshPass:
@@ -63,48 +44,99 @@ class MeshPass:
         Args:
             opacity: the hair's maps, see StrandPass.opacity. Others as in StrandPass.draw.
         """
-        self._upload(snapshot.meshes)
+        skins = self.skin.shadows(
+            snapshot.meshes, opacity, snapshot.skin, len(kept_lights(snapshot.lights))
+        )
+        self._upload(snapshot.meshes, skins)
         values = {
             "view": view_values(camera, width, height),
             "lights": pack_lights(snapshot.lights, snapshot.ambient),
             **({} if opacity is None else {"opacity": opacity.values}),
         }
-        shader = program(mesh_recipe(None if opacity is None else opacity.form))
-        for mesh, batch in self._batches:
-            with drawing_state():
+        form = None if opacity is None else opacity.form
+        for mesh, _, batch in _far_to_near(self._batches, camera):
+            skin, pictures = skins.get(id(mesh)), pictures_of(mesh)
+            shader = program(
+                MeshForm(form, skin is not None, pictures is not None, mesh.transparency).recipe
+            )
+            is_blended = mesh.transparency == "blended"
+            with drawing_state(
+                depth_write=not is_blended, blend="ALPHA_PREMULT" if is_blended else "NONE"
+            ):
                 shader.bind(
                     blocks={name: self._blocks[name].holding(values[name]) for name in values},
-                    textures={} if opacity is None else opacity.textures,
+                    textures={
+                        **({} if opacity is None else opacity.textures),
+                        **({} if skin is None else skin.textures),
+                        **({} if pictures is None else self._pictures.textures(mesh, pictures)),
+                    },
                     integers={"output_encoding": output_index(output)},
-                    numbers={"mesh_color": mesh.color, "mesh_sheen": mesh.sheen},
+                    numbers=_numbers(mesh, pictures),
+                )
+                batch.draw(shader.shader)
+        self._pictures.forget_but(snapshot.meshes)
+
+    def skin_shadows(self) -> tuple[SkinShadow, ...]:
+        """The soft shadows on heads as they were drawn last."""
+        return self.skin.drawn
+
+    def draw_numbers(
+        self, meshes: tuple[MeshSnapshot, ...], camera: Camera, width: int, height: int
+    ) -> None:
+        """Draw the number of each mesh into the first channel of the bound framebuffer."""
+        self._upload(meshes, {})
+        view = view_values(camera, width, height)
+        shader = program(NUMBERS)
+        for mesh, _, batch in self._batches:
+            with drawing_state():
+                shader.bind(
+                    blocks={"view": self._blocks["view"].holding(view)},
+                    numbers={"mesh_number": float(mesh.number)},
                 )
                 batch.draw(shader.shader)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
         self._blocks = {name: UniformBlock() for name in ("view", "lights", "opacity")}
-        self._batches: list[tuple[MeshSnapshot, Any]] = []
+        self._batches: list[_Batch] = []
+        self.skin = SkinPass()
+        self._pictures = PictureTextures()
 
-    def _upload(self, meshes: tuple[MeshSnapshot, ...]) -> None:
-        kept = {id(mesh): batch for mesh, batch in self._batches}
-        self._batches = [
-            (mesh, kept[id(mesh)] if id(mesh) in kept else _batch(mesh))
+    def _upload(self, meshes: tuple[MeshSnapshot, ...], skins: Mapping[int, SkinShadow]) -> None:
+        kept = {(id(mesh), id(layout)): batch for mesh, layout, batch in self._batches}
+        wanted = [
+            (mesh, skins[id(mesh)].layout if id(mesh) in skins else None)
             for mesh in meshes
             if len(mesh.surface.triangles)
         ]
+        self._batches = [
+            (mesh, layout, kept.get((id(mesh), id(layout))) or mesh_batch(mesh, layout))
+            for mesh, layout in wanted
+        ]
 
 
-def _batch(mesh: MeshSnapshot) -> Any:
-    layout = gpu.types.GPUVertFormat()
-    for name, length in (("position", 3), ("normal", 3), ("occlusion", 1)):
-        layout.attr_add(id=name, comp_type="F32", len=length, fetch_mode="FLOAT")
-    count = len(mesh.surface.positions)
-    occlusion = np.ones(count) if mesh.occlusion is None else mesh.occlusion
-    vertices = gpu.types.GPUVertBuf(layout, count)
-    # attr_fill checks neither dtype nor order
-    vertices.attr_fill("position", np.ascontiguousarray(mesh.surface.positions, np.float32))
-    vertices.attr_fill("normal", np.ascontiguousarray(mesh.vertex_normals, np.float32))
-    vertices.attr_fill("occlusion", np.ascontiguousarray(occlusion, np.float32)[:, None])
-    triangles = np.ascontiguousarray(mesh.surface.triangles, np.int32)
-    indices = gpu.types.GPUIndexBuf(type="TRIS", seq=triangles)
-    return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
+def _numbers(mesh: MeshSnapshot, pictures: MeshPictures | None) -> dict[str, Any]:
+    """Those that the program of a mesh has."""
+    return {
+        "mesh_sheen": mesh.sheen,
+        "mesh_cover": 0.0 if mesh.is_holdout else 1.0,
+        **({"mesh_color": mesh.color} if pictures is None else {"mesh_bump": pictures.bump}),
+        **({} if mesh.transparency == "opaque" else {"mesh_alpha": mesh.alpha}),
+    }
+
+
+def _far_to_near(batches: list[_Batch], camera: Camera) -> list[_Batch]:
+    """What covers what is behind it first, then what is blended, the farthest first."""
+    return sorted(
+        batches,
+        key=lambda each: (
+            each[0].transparency == "blended",
+            -_distance(each[0], camera) if each[0].transparency == "blended" else 0.0,
+        ),
+    )
+
+
+def _distance(mesh: MeshSnapshot, camera: Camera) -> float:
+    """Of the middle of a mesh along the view [m]."""
+    low, high = mesh.surface.bounds()
+    return -float(camera.view[2, :3] @ (0.5 * (low + high)) + camera.view[2, 3])

@@ -1,19 +1,14 @@
 """Draws the lights' opacity maps: how much hair lies between each light and every place.
 
-    starts  R32UI: depth of the first hair, where layers are deep; computed before them
-    meshes  depth array: of the first mesh
-    slots   RGBA32F arrays, as many as a framebuffer is given at once, at most six: four layers a
-            texel, summed up by additive blending
-
-Each light that throws shadows has a map: in `starts` one square above the other; in the slots as
-many layers of an array as it takes passes to draw all its texels, texel t in slot t % slots.
+First the depths of meshes, then where deep layers start and end, then the sums of the layers by
+additive blending, in textures that opacity_maps.py describes. These are kept as long as they fit.
 What has not changed since the last draw is not drawn again, so that a moving camera costs nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gpu
@@ -21,18 +16,21 @@ import numpy as np
 
 from ..arrays import Floats
 from ..params.glsl import struct_values
-from ..shading.lights import LIGHT_CAPACITY, Light, light_irradiance
+from ..shading.lights import LIGHT_CAPACITY, Light
 from ..shading.settings import StrandSettings
-from ..shading.volume.light_frame import Ball, LightFrame, light_frame
+from ..shading.volume.light_frame import Ball, LightFrame
+from ..shading.volume.map_size import MapSize, fitted_size, size_note
 from ..shading.volume.opacity import layer_ends
 from ..shading.volume.settings import VolumeSettings
+from ..shading.volume.shadow_lights import shadow_frames
 from ..strands import Surface
+from .opacity_maps import OpacityForm, OpacityMaps, new_maps
 from .shader_program import ShaderRecipe, program
-from .shader_source import LAYER_TEXEL_CAPACITY, START_TEXELS
+from .shader_source import LAYER_TEXEL_CAPACITY
 from .textures import UniformBlock, drawing_into, drawing_state
 
-#: colour slots of a framebuffer
-_SLOTS = 6
+__all__ = ["OpacityForm", "OpacityMaps", "OpacityPass", "opacity_recipe", "pack_opacity"]
+
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
 _BLOCKS = (("Opacity", "opacity"), ("StrandSettings", "strands"))
 
@@ -88,47 +86,6 @@ _MESH_RECIPE = ShaderRecipe(
 
 
 @dataclass(frozen=True)
-class OpacityForm:
-    """What a program that reads maps has to know: slots, and whether layers are deep."""
-
-    slots: int
-    is_deep: bool
-
-    @property
-    def samplers(self) -> tuple[tuple[str, str], ...]:
-        """For a recipe."""
-        arrays = (("FLOAT_2D_ARRAY", f"opacity_{slot}") for slot in range(self.slots))
-        starts = (("UINT_2D", "opacity_starts"),) if self.is_deep else ()
-        return (*arrays, ("DEPTH_2D_ARRAY", "opacity_meshes"), *starts)
-
-    @property
-    def defines(self) -> tuple[tuple[str, int], ...]:
-        """For a recipe."""
-        return (("SLOTS", self.slots), ("DEEP", int(self.is_deep)))
-
-
-@dataclass(frozen=True, eq=False)
-class OpacityMaps:
-    """What shading reads: the block `Opacity`, and the textures."""
-
-    values: Floats
-    slots: tuple[Any, ...]
-    meshes: Any
-    starts: Any = None
-
-    @property
-    def form(self) -> OpacityForm:
-        return OpacityForm(len(self.slots), self.starts is not None)
-
-    @property
-    def textures(self) -> dict[str, Any]:
-        """By their names in the shader."""
-        named = {f"opacity_{slot}": array for slot, array in enumerate(self.slots)}
-        named["opacity_meshes"] = self.meshes
-        return named if self.starts is None else {**named, "opacity_starts": self.starts}
-
-
-@dataclass(frozen=True)
 class _Hair:
     """Strands on the GPU. drawn: how many of them throw the shadow of all."""
 
@@ -143,7 +100,10 @@ class _Hair:
 
 
 class OpacityPass:
-    """Keeps the maps of one groom from draw to draw; making one touches no GPU."""
+    """Keeps the maps of one groom from draw to draw; making one touches no GPU.
+
+    note: what the artist is to know of the last draw, or nothing.
+    """
 
     def __init__(self) -> None:
         self.release()
@@ -153,6 +113,8 @@ class OpacityPass:
         self._blocks = {name: UniformBlock() for _, name in _BLOCKS}
         self._maps: OpacityMaps | None = None
         self._drawn: tuple[Any, ...] = ()
+        self._meshes_drawn: tuple[Any, ...] = ()
+        self.note = ""
         self._strip: tuple[int, Any] = (0, None)
         self._casters: list[tuple[Surface, Any]] = []
 
@@ -178,22 +140,45 @@ class OpacityPass:
             casters: meshes, world space; another object whenever one is another.
         """
         frames = shadow_frames(lights, ball, settings)
-        values = pack_opacity(frames, settings)
-        wanted = (serial, shape, strands, settings, values.tobytes(), tuple(map(id, casters)))
+        count = sum(frame is not None for frame in frames)
+        size = fitted_size(settings, count, gpu.capabilities.max_texture_size_get())
+        self.note = size_note(settings, count, size)
+        values = pack_opacity(frames, settings, size)
+        meshes = tuple(map(id, casters))
+        wanted = (serial, shape, strands, settings, values.tobytes(), meshes)
         if self._maps is None or self._drawn != wanted:
             shadowing = [index for index, frame in enumerate(frames) if frame is not None]
-            self._maps = _new_maps(values, max(len(shadowing), 1), settings)
+            self._maps = maps = self._maps_of(values, size)
+            maps.forget_starts()
             hair = _Hair(points, *shape, max(round(shape[0] * settings.strand_share), 1))
             self._blocks["opacity"].holding(values)
-            self._blocks["strands"].holding(struct_values(strands))
-            self._casters = [
-                (surface, self._batch_of(surface)) for surface in casters if len(surface.triangles)
-            ]
+            self._blocks["strands"].holding(struct_values(strands.as_drawn))
+            self._draw_casters(maps, shadowing, casters)
             for number, light in enumerate(shadowing):
-                self._draw_meshes(self._maps, number, light)
-                self._draw_map(self._maps, number, light, hair, settings)
+                self._draw_map(maps, number, light, hair, settings)
             self._drawn = wanted
         return self._maps
+
+    def _maps_of(self, values: Floats, size: MapSize) -> OpacityMaps:
+        """The textures of the draw before where they have this size, with other values."""
+        if self._maps is not None and self._maps.size == size:
+            return replace(self._maps, values=values)
+        self._meshes_drawn = ()
+        return new_maps(values, size)
+
+    def _draw_casters(
+        self, maps: OpacityMaps, shadowing: list[int], casters: tuple[Surface, ...]
+    ) -> None:
+        """The depths of meshes, if a light sees others than before, or from elsewhere."""
+        seen = (tuple(map(id, casters)), maps.values[: -4 * LAYER_TEXEL_CAPACITY - 4].tobytes())
+        self._casters = [
+            (surface, self._batch_of(surface)) for surface in casters if len(surface.triangles)
+        ]
+        if self._meshes_drawn == seen:
+            return
+        for number, light in enumerate(shadowing):
+            self._draw_meshes(maps, number, light)
+        self._meshes_drawn = seen
 
     def _batch_of(self, surface: Surface) -> Any:
         """Its triangles on the GPU, kept from the draw before where it is the same object."""
@@ -236,10 +221,9 @@ class OpacityPass:
             gpu.compute.dispatch(shader.shader, *groups, 1)
             gpu.shader.unbind()
         slot_count = len(maps.slots)
-        passes = _texel_count(settings) // slot_count
         shader = program(opacity_recipe(slot_count, is_deep=maps.starts is not None))
-        for turn in range(passes):
-            layer = number * passes + turn
+        for turn in range(maps.passes):
+            layer = number * maps.passes + turn
             target = gpu.types.GPUFrameBuffer(
                 color_slots=tuple({"texture": slot, "layer": layer} for slot in maps.slots)
             )
@@ -279,21 +263,9 @@ def _batch(surface: Surface) -> Any:
     return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
 
 
-def shadow_frames(
-    lights: Sequence[Light], ball: Ball, settings: VolumeSettings
-) -> list[LightFrame | None]:
-    """The frame of each light's map; None of those that throw no shadow."""
-    frames: list[LightFrame | None] = [None] * len(lights)
-    if settings.shadows == "none":
-        return frames
-    strength = [float(light_irradiance(light, ball.center).sum()) for light in lights]
-    strongest = sorted(range(len(lights)), key=lambda index: -strength[index])
-    for index in strongest[: settings.most_lights]:
-        frames[index] = light_frame(lights[index], ball)
-    return frames
-
-
-def pack_opacity(frames: Sequence[LightFrame | None], settings: VolumeSettings) -> Floats:
+def pack_opacity(
+    frames: Sequence[LightFrame | None], settings: VolumeSettings, size: MapSize
+) -> Floats:
     """The block `Opacity` of gpu_shaders/struct_opacity.glsl in std140, (228,) float32."""
     rows = np.zeros((5, LIGHT_CAPACITY, 4))
     rows[4, :, 0] = -1.0
@@ -307,35 +279,5 @@ def pack_opacity(frames: Sequence[LightFrame | None], settings: VolumeSettings) 
     ends[: len(found)] = found
     words = np.zeros(4, np.float32)
     words[:2] = settings.extinction, settings.bias
-    words.view(np.int32)[2:] = _texel_count(settings), map_side(settings)
+    words.view(np.int32)[2:] = size.texels, size.side
     return np.concatenate([rows.ravel().astype(np.float32), ends.astype(np.float32), words])
-
-
-def _new_maps(values: Floats, map_count: int, settings: VolumeSettings) -> OpacityMaps:
-    texels, slots = _texel_count(settings), _slot_count(settings)
-    size = map_side(settings), map_side(settings)
-    # one texture alone would not be an array
-    count = max(map_count * texels // slots, 2)
-    arrays = tuple(gpu.types.GPUTexture(size, layers=count, format="RGBA32F") for _ in range(slots))
-    meshes = gpu.types.GPUTexture(size, layers=max(map_count, 2), format="DEPTH_COMPONENT32F")
-    if settings.shadows != "deep":
-        return OpacityMaps(values, arrays, meshes)
-    side = map_side(settings) // START_TEXELS
-    starts = gpu.types.GPUTexture((side, side * map_count), format="R32UI")
-    starts.clear(format="UINT", value=(-1,))  # beyond all depths
-    return OpacityMaps(values, arrays, meshes, starts)
-
-
-def map_side(settings: VolumeSettings) -> int:
-    """Texels along a side of a map: whole ones of `starts`."""
-    return -(-settings.resolution // START_TEXELS) * START_TEXELS
-
-
-def _slot_count(settings: VolumeSettings) -> int:
-    return min(-(-len(layer_ends(settings)) // 4), _SLOTS)
-
-
-def _texel_count(settings: VolumeSettings) -> int:
-    """Texels of a map, four layers each: whole passes."""
-    slots = _slot_count(settings)
-    return -(-len(layer_ends(settings)) // (4 * slots)) * slots

@@ -26,6 +26,8 @@ from .shader_source import SHADER_FOLDER, ShaderError, ShaderText, compose
 
 #: what a compute shader may do with an image, and Blender's words for it
 ACCESSES = {"WRITE": {"WRITE"}, "READ": {"READ"}, "READ_WRITE": {"READ", "WRITE"}}
+#: Blender's word for the kind of an image, where it holds no floats
+_IMAGE_KINDS = {"R32UI": "UINT_2D_ATOMIC", "RGBA32UI": "UINT_2D"}
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class ShaderRecipe:
     settings: parameter sets whose structs, named after the classes, blocks use as well.
     blocks: (struct, name) of each uniform block.
     textures: (sampler type, name).
-    images: (format, name) of what compute shaders write; (format, name, access) with an access of
+    images: (format, name) of what shaders write; (format, name, access) with an access of
         ACCESSES for those that they read as well.
     integers: names of INT push constants (UINT ones stay 0 on OpenGL); numbers: (type, name).
     inputs: (type, name) of vertex attributes; varyings: (interpolation, type, name).
@@ -186,7 +188,7 @@ def _create_info(recipe: ShaderRecipe, texts: Mapping[str, ShaderText]) -> Any:
         info.sampler(slot, kind, name)
     for slot, (image_format, name, *access) in enumerate(recipe.images):
         qualifiers = ACCESSES[access[0] if access else "WRITE"]
-        kind = "UINT_2D_ATOMIC" if image_format == "R32UI" else "FLOAT_2D"
+        kind = _IMAGE_KINDS.get(image_format, "FLOAT_2D")
         info.image(slot, image_format, kind, name, qualifiers=qualifiers)
     for name in recipe.integers:
         info.push_constant("INT", name)

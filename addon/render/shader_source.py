@@ -21,7 +21,13 @@ from ..dynamics.wind import MODES
 from ..refine import detail
 from ..refine.settings import DetailSettings
 from ..shading.lights import LIGHT_CAPACITY, NEAREST_DISTANCE
+from ..shading.skin.diffusion import KERNEL_REACH, KERNEL_TAPS, SKIN_LIGHTS
+from ..shading.skin.layout import CLOSING
+from ..shading.volume.card_opacity import MOST_ALPHA
 from ..shading.volume.dual import HALF_WAY, UNKNOWN_BEYOND
+from ..shading.volume.map_size import START_TEXELS
+from ..shading.volume.opacity import LEAST_THICKNESS
+from ..shading.volume.transparency import UNSEEN_SHARE
 
 SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
 
@@ -35,8 +41,14 @@ ROUNDS_ACROSS, FIELD_ROW = 512, 4096
 SHADE_CAPACITY = 16
 #: Texels of four layers that an opacity map may have: three passes of six slots, for 64 slices.
 LAYER_TEXEL_CAPACITY = 18
-#: Texels of an opacity map along one of where its layers start, and how depth is kept there.
-START_TEXELS, START_SCALE = 4, float(1 << 24)
+#: How depth is kept where an opacity map's deep layers start and end.
+START_SCALE = float(1 << 24)
+#: Strands' fragments in one row of the texture that holds the lists of all pixels.
+LAYER_ROW = 4096
+#: Triangles, seams and copies of seams' ends in one row of the textures of skin.
+SKIN_TRIANGLES_ACROSS, SKIN_SEAMS_ACROSS, SKIN_COPIES_ACROSS = 1024, 1024, 4096
+#: Pixels between the layers of a map that are shown side by side.
+TILE_GAP = 2
 #: how a pass writes its colour; see encoded() in lib_output.glsl
 OUTPUTS = ("scene_linear", "viewport")
 #: what strands may be coloured by in place of their shading, see lib_debug_color.glsl
@@ -65,9 +77,21 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "shade_capacity": str(SHADE_CAPACITY),
         "layer_texel_capacity": str(LAYER_TEXEL_CAPACITY),
         "start_texels": str(START_TEXELS),
+        "tile_gap": str(TILE_GAP),
         "half_way_absorption": repr(HALF_WAY),
+        "most_alpha": repr(MOST_ALPHA),
         "unknown_beyond": repr(UNKNOWN_BEYOND),
         "start_scale": repr(START_SCALE),
+        "least_thickness": repr(LEAST_THICKNESS),
+        "layer_row": str(LAYER_ROW),
+        "unseen_share": repr(UNSEEN_SHARE),
+        "skin_triangles_across": str(SKIN_TRIANGLES_ACROSS),
+        "skin_seams_across": str(SKIN_SEAMS_ACROSS),
+        "skin_copies_across": str(SKIN_COPIES_ACROSS),
+        "skin_lights": str(SKIN_LIGHTS),
+        "skin_kernel_reach": repr(float(KERNEL_REACH)),
+        "skin_kernel_taps": str(KERNEL_TAPS),
+        "skin_closing": repr(float(CLOSING)),
         "detail_nearest": repr(float(detail.NEAREST)),
         "detail_margin": repr(float(detail.MARGIN)),
         **{

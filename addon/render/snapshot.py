@@ -15,6 +15,8 @@ from ..refine.settings import DetailSettings
 from ..shading.lights import Light
 from ..shading.marschner.tables import DEFAULT_SIZE
 from ..shading.settings import ShadingSettings, StrandSettings
+from ..shading.shafts_settings import ShaftSettings
+from ..shading.skin.settings import SkinSettings
 from ..shading.volume.settings import VolumeSettings
 from ..strands import Surface
 from .card_snapshot import CardSnapshot
@@ -22,9 +24,39 @@ from .shader_source import DEBUG_VIEWS
 
 type Color = tuple[float, float, float]
 
+#: how meshes that do not cover all are drawn
+TRANSPARENCIES = ("opaque", "hashed", "blended")
 SKIN: Color = (0.55, 0.38, 0.31)
 #: an index of refraction of 1.4 gives ((1.4 - 1) / (1.4 + 1))^2
 SKIN_SHEEN = 0.028
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """The head that a mesh is, or is a part of, for the soft shadow on it (render/skin_pass.py).
+
+    surface: the whole head, world space; hand its triangles and UVs on as the same objects while
+        they are the same.
+    triangle: (triangle_count,) of the mesh: which of the head's they are; None is all of them.
+    """
+
+    surface: Surface
+    triangle: Ints | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPictures:
+    """Pictures of a material, laid over the UVs of the mesh's surface, again and again beyond them.
+
+    Hand the same array on where nothing changed. Row 0 is at v = 0.
+
+    color: (height, width, 4) scene-linear, straight alpha, in the place of the mesh's own colour.
+    normal: (height, width, 4) normals in tangent space, 0 to 1; bump: how strong they are.
+    """
+
+    color: Floats | None = None
+    normal: Floats | None = None
+    bump: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +67,13 @@ class MeshSnapshot:
     color: scene-linear albedo.
     occlusion: (vertex_count,) light that arrives, 0 to 1; None is 1 everywhere.
     sheen: the share of the light that the surface throws back as it is, head on.
+    number: what object masks hold where it is seen.
+    is_holdout: it hides what is behind it and is a hole in the picture itself.
+    skin: the head that it is a part of; None is no skin, on which shadows have hard edges.
+    pictures: of its material; None, and on a surface without UVs, its colour alone.
+    alpha: how much it covers, times the alpha of its picture.
+    transparency: one of TRANSPARENCIES: "opaque" whatever alpha says; "hashed" has so many holes as
+        alpha asks for, finer than pixels; "blended" is drawn last, the farthest first.
     """
 
     surface: Surface
@@ -42,13 +81,31 @@ class MeshSnapshot:
     color: Color = SKIN
     occlusion: Floats | None = None
     sheen: float = SKIN_SHEEN
+    number: int = 0
+    is_holdout: bool = False
+    skin: Skin | None = None
+    pictures: MeshPictures | None = None
+    alpha: float = 1.0
+    transparency: str = "opaque"
+
+    def __post_init__(self) -> None:
+        if self.transparency not in TRANSPARENCIES:
+            raise ValueError(
+                f"transparency {self.transparency!r} is none of {', '.join(TRANSPARENCIES)}"
+            )
 
     @classmethod
     def of(
-        cls, surface: Surface, color: Color = SKIN, occlusion: Floats | None = None
+        cls,
+        surface: Surface,
+        color: Color = SKIN,
+        occlusion: Floats | None = None,
+        *,
+        is_skin: bool = False,
     ) -> MeshSnapshot:
         """A mesh with smooth normals of its own."""
-        return cls(surface, surface.vertex_normals(), color, occlusion)
+        skin = Skin(surface) if is_skin else None
+        return cls(surface, surface.vertex_normals(), color, occlusion, skin=skin)
 
 
 @dataclass(eq=False)
@@ -116,6 +173,8 @@ class Snapshot:
     strand_settings: StrandSettings = field(default_factory=StrandSettings)
     detail: DetailSettings = field(default_factory=DetailSettings)
     volume: VolumeSettings = field(default_factory=VolumeSettings)
+    skin: SkinSettings = field(default_factory=SkinSettings)
+    shafts: ShaftSettings = field(default_factory=ShaftSettings)
     volume_center: Floats | None = None
     device_points: DevicePoints | None = None
     guide: Ints | None = None
@@ -165,6 +224,16 @@ class Snapshot:
         if self.volume_center is not None:
             return np.asarray(self.volume_center, np.float32)
         return self.root_center
+
+    @property
+    def skin_color(self) -> Color:
+        """What light through the hair comes back off: the mean colour of the meshes; of meshes that
+        only throw shadows no colour is known, so they are skin; black without any.
+        """
+        if not self.meshes:
+            return SKIN if self.casters else (0.0, 0.0, 0.0)
+        red, green, blue = np.mean([mesh.color for mesh in self.meshes], axis=0).tolist()
+        return red, green, blue
 
     @property
     def root_center(self) -> Floats:

@@ -22,104 +22,21 @@ from ..arrays import Floats
 from ..params.glsl import struct_values
 from ..shading.lights import kept_lights, pack_lights
 from ..shading.marschner.look import pack_fibre
-from ..shading.settings import ShadingSettings, StrandSettings
 from ..shading.strand_noise import SEED_LIMIT
-from ..shading.volume.light_frame import Ball, ball_around, reach_of, stepped_ball
 from .camera import Camera
 from .detail_pass import DetailOrder, DetailPass
 from .display import Display
-from .marschner_textures import MARSCHNER, MARSCHNER_TEXTURES, SHARES_TEXTURES
-from .opacity_pass import OpacityForm, OpacityMaps, OpacityPass
-from .shader_program import ShaderRecipe, program, released_with_shaders
-from .shader_source import DEBUG_VIEWS, ShaderError, output_index
+from .hair_ball import HairBall
+from .marschner_textures import MARSCHNER
+from .opacity_pass import OpacityMaps, OpacityPass
+from .shader_program import released_with_shaders
+from .shader_source import ShaderError, output_index
 from .snapshot import Snapshot
+from .strand_drawing import StrandDrawing
+from .strand_layers import LAYERS_OF_PIXELS
+from .strand_recipe import NUMBERED_VIEWS, StrandShading
 from .textures import UniformBlock, drawing_state, strand_rows, texture_from
 from .view_block import view_values
-
-#: debug views that show a number of each strand
-NUMBERED_VIEWS = ("guide", "group")
-#: blocks of every strand program
-BLOCKS = (
-    ("View", "view"),
-    ("Lights", "lights"),
-    ("StrandSettings", "strands"),
-    ("ShadingSettings", "shading"),
-)
-
-
-def strand_recipe(
-    *,
-    is_adaptive: bool,
-    model: str = "kajiya_kay",
-    debug_view: str = "none",
-    has_display: bool = False,
-    opacity: OpacityForm | None = None,
-    scatters: bool = False,
-) -> ShaderRecipe:
-    """The program that draws every segment in equally many pieces, or each in its own.
-
-    It holds one model of MODELS alone. A debug view has none: it is the same with either.
-    With a display it looks up how the viewport shows a colour, see display.py. With opacity maps
-    hair shades itself; `scatters` adds light from strand to strand, in Marschner's model.
-    """
-    is_marschner = model == "marschner"
-    lit = f"{'_scattering' * scatters}{f'_{opacity.slots}_{opacity.is_deep}' if opacity else ''}"
-    kind = f"{'adaptive' if is_adaptive else 'fixed'}{'_display' if has_display else ''}"
-    textures = ["cv_points", "cv_looks"]
-    textures += ["order", "factors"] if is_adaptive else []
-    textures += ["debug_numbers"] if debug_view in NUMBERED_VIEWS else []
-    return ShaderRecipe(
-        name=f"strand_{kind}_{model}{lit}_{debug_view}",
-        vertex="strand.vert.glsl",
-        fragment="strand.frag.glsl",
-        structs=(
-            "struct_view.glsl",
-            "struct_lights.glsl",
-            "struct_fibre.glsl",
-            "struct_opacity.glsl",
-        ),
-        settings=(StrandSettings, ShadingSettings),
-        blocks=(
-            *BLOCKS,
-            *((("Fibre", "fibre"),) if is_marschner else ()),
-            *((("Opacity", "opacity"),) if opacity else ()),
-        ),
-        textures=(
-            *(("FLOAT_2D", name) for name in textures),
-            *(MARSCHNER_TEXTURES if is_marschner else ()),
-            *(SHARES_TEXTURES if scatters else ()),
-            *(opacity.samplers if opacity else ()),
-            *((("FLOAT_3D", "display_table"),) if has_display else ()),
-        ),
-        integers=(
-            "cv_count",
-            "samples_across",
-            "output_encoding",
-            "first_instance" if is_adaptive else "subdivisions",
-        ),
-        numbers=(
-            ("VEC3", "volume_center"),
-            *((("FLOAT", "scatter_density"),) if scatters else ()),
-            *((("VEC4", "display_shaper"),) if has_display else ()),
-        ),
-        varyings=(
-            ("smooth", "VEC3", "strand_point"),
-            ("smooth", "VEC3", "strand_tangent"),
-            ("smooth", "VEC2", "strand_along_and_occlusion"),
-            ("flat", "INT", "strand_seed"),
-            *((("flat", "INT", "strand_index"),) if debug_view != "none" else ()),
-        ),
-        outputs=(("VEC4", "color"),),
-        defines=(
-            ("ADAPTIVE", int(is_adaptive)),
-            ("DEBUG", DEBUG_VIEWS.index(debug_view)),
-            ("MARSCHNER", int(is_marschner)),
-            ("SHADOWS", int(opacity is not None)),
-            ("SCATTERING", int(scatters)),
-            *(opacity.defines if opacity else ()),
-            *((("DISPLAY", 1),) if has_display else ()),
-        ),
-    )
 
 
 @dataclass(frozen=True)
@@ -175,66 +92,27 @@ class StrandPass:
         self.statistics = Statistics()
         if not snapshot.strand_count:
             return
+        output_encoding = output_index(output)
         self._upload(snapshot)
         size = width // samples, height // samples
         points, serial = self._textures["cv_points"], self._points_serial
         order = self._detail.order(snapshot, points, serial, camera, size)
         if not order.classes:
             return
-        is_adaptive = order.factors is not None
-        shading, debug_view = snapshot.shading, snapshot.debug_view
-        model = shading.model if debug_view == "none" else "kajiya_kay"
-        maps = self.opacity(snapshot) if debug_view == "none" else None
-        scatters = maps is not None and model == "marschner" and snapshot.volume.scattering
-        shader = program(
-            strand_recipe(
-                is_adaptive=is_adaptive,
-                model=model,
-                debug_view=debug_view,
-                has_display=display is not None,
-                opacity=None if maps is None else maps.form,
-                scatters=scatters,
-            )
+        drawing = self._drawing(
+            snapshot,
+            order,
+            display,
+            view=view_values(camera, width, height),
+            integers={"output_encoding": output_encoding, "samples_across": samples},
         )
-        integers = {
-            "cv_count": snapshot.cv_count,
-            "samples_across": samples,
-            "output_encoding": output_index(output),
-            "first_instance" if is_adaptive else "subdivisions": order.subdivisions,
-        }
-        blocks = {
-            "view": view_values(camera, width, height),
-            "lights": pack_lights(snapshot.lights, snapshot.ambient),
-            "strands": struct_values(snapshot.strand_settings),
-            "shading": struct_values(shading),
-        }
-        textures = self._bound(order, debug_view)
-        if model == "marschner":
-            blocks["fibre"] = pack_fibre(shading)
-            textures |= MARSCHNER.of(shading, snapshot.table_size)
-        numbers: dict[str, Any] = {"volume_center": snapshot.center.tolist()}
-        if scatters:
-            textures |= MARSCHNER.shares(shading, snapshot.table_size)
-            numbers["scatter_density"] = snapshot.volume.density
-        if maps is not None:
-            blocks["opacity"] = maps.values
-            textures |= maps.textures
-        if display is not None:
-            textures["display_table"] = display.table.texture
-            numbers["display_shaper"] = display.shaper
-        with drawing_state():
-            shader.bind(
-                blocks={name: self._blocks[name].holding(blocks[name]) for name in blocks},
-                textures=textures,
-                integers=integers,
-                numbers=numbers,
-            )
-            for drawn in order.classes:
-                if is_adaptive:
-                    shader.shader.uniform_int("first_instance", drawn.first)
-                self._ribbon(drawn.capacity).draw_instanced(
-                    shader.shader, instance_start=0, instance_count=drawn.count
-                )
+        is_debug = snapshot.debug_view != "none"
+        way = "none" if is_debug else snapshot.strand_settings.transparency
+        if way == "layers":
+            LAYERS_OF_PIXELS.draw(drawing.gather, drawing.shade)
+        else:
+            with drawing_state():
+                drawing.draw(is_hashed=way == "hashed")
         self.statistics = Statistics(
             strands=sum(drawn.count for drawn in order.classes),
             pieces=order.pieces,
@@ -256,7 +134,7 @@ class StrandPass:
             self._textures["cv_points"],
             self._points_serial,
             (snapshot.strand_count, snapshot.cv_count),
-            self._ball(snapshot),
+            self._ball.of(snapshot),
             kept_lights(snapshot.lights),
             snapshot.volume,
             snapshot.strand_settings,
@@ -265,33 +143,72 @@ class StrandPass:
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
-        names = (*(name for _, name in BLOCKS), "fibre", "opacity")
+        names = ("view", "lights", "strands", "shading", "fibre", "opacity")
         self._blocks = {name: UniformBlock() for name in names}
         self._opacity.release()
-        self._extent: tuple[Floats | None, Ball | float] = (None, 0.0)
+        self._ball = HairBall()
         self._textures: dict[str, Any] = {}
         self._uploaded: dict[str, tuple[Any, ...]] = {}
         self._ribbons: dict[int, Any] = {}
         self._detail.release()
 
-    def _ball(self, snapshot: Snapshot) -> Ball:
-        """Around all strands; of those on the GPU around all places that they can get to."""
-        device = snapshot.device_points
-        kept, found = self._extent
-        if kept is not snapshot.strands or isinstance(found, float) != (device is not None):
-            strands = snapshot.strands
-            found = ball_around(strands) if device is None else reach_of(strands)
-            self._extent = strands, found
-        return stepped_ball(snapshot.root_center, found) if isinstance(found, float) else found
-
-    def _bound(self, order: DetailOrder, debug_view: str) -> dict[str, Any]:
-        """This groom's own textures by the names of strand_recipe."""
-        names = ["cv_points", "cv_looks"]
-        names += ["debug_numbers"] if debug_view in NUMBERED_VIEWS else []
-        bound = {name: self._textures[name] for name in names}
+    def _drawing(
+        self,
+        snapshot: Snapshot,
+        order: DetailOrder,
+        display: Display | None,
+        *,
+        view: Floats,
+        integers: dict[str, int],
+    ) -> StrandDrawing:
+        """All that any program of this draw may bind."""
+        shading, debug_view = snapshot.shading, snapshot.debug_view
+        model = shading.model if debug_view == "none" else "kajiya_kay"
+        maps = self.opacity(snapshot) if debug_view == "none" else None
+        scatters = maps is not None and model == "marschner" and snapshot.volume.scattering
+        blocks = {
+            "view": view,
+            "lights": pack_lights(snapshot.lights, snapshot.ambient),
+            "strands": struct_values(snapshot.strand_settings.as_drawn),
+            "shading": struct_values(shading),
+        }
+        textures = dict(self._textures)
+        numbers: dict[str, Any] = {"volume_center": snapshot.center.tolist()}
         if order.factors is not None:
-            bound |= {"order": order.order, "factors": order.factors}
-        return bound
+            textures |= {"order": order.order, "factors": order.factors}
+        if model == "marschner":
+            blocks["fibre"] = pack_fibre(shading)
+            textures |= MARSCHNER.of(shading, snapshot.table_size)
+        if scatters:
+            textures |= MARSCHNER.shares(shading, snapshot.table_size)
+            numbers["scatter_density"] = snapshot.volume.density
+            numbers["skin_color"] = snapshot.skin_color
+        if maps is not None:
+            blocks["opacity"] = maps.values
+            textures |= maps.textures
+        if display is not None:
+            textures["display_table"] = display.table.texture
+            numbers["display_shaper"] = display.shaper
+        return StrandDrawing(
+            order=order,
+            shading=StrandShading(
+                model=model,
+                debug_view=debug_view,
+                has_display=display is not None,
+                opacity=None if maps is None else maps.form,
+                scatters=scatters,
+            ),
+            ribbon=self._ribbon,
+            blocks={name: self._blocks[name].holding(blocks[name]) for name in blocks},
+            textures=textures,
+            integers={
+                **integers,
+                "cv_count": snapshot.cv_count,
+                "subdivisions": order.subdivisions,
+                "first_instance": 0,
+            },
+            numbers=numbers,
+        )
 
     def _upload(self, snapshot: Snapshot) -> None:
         points: tuple[Any, ...] = (snapshot.strands, snapshot.radius)

@@ -15,7 +15,7 @@ Colours are scene-linear Rec.709. Shadows are no matter of the lights.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -68,6 +68,7 @@ class Light:
     is_ball: a radius makes it a ball, not a disk that faces whoever looks.
     cone: of a spot.
     panel: of an area light.
+    name: by which the artist knows it.
     """
 
     kind: Literal["sun", "point", "spot", "area"]
@@ -77,6 +78,7 @@ class Light:
     is_ball: bool = False
     cone: Cone | None = None
     panel: Panel | None = None
+    name: str = field(default="", compare=False)
 
     @classmethod
     def sun(
@@ -225,9 +227,9 @@ def three_point_lights(view: Floats, strength: float = 1.0) -> tuple[Light, ...]
 
 #: direction towards the light in view space (x right, y up, z to the eye), colour, [W/m^2]
 _STUDIO = (
-    ((0.55, 0.7, 0.6), (1.0, 0.96, 0.90), 4.2),
-    ((-0.9, 0.1, 0.5), (0.80, 0.90, 1.0), 1.0),
-    ((-0.5, 0.55, -0.9), (1.0, 0.97, 0.93), 4.0),
+    ((0.55, 0.7, 0.6), (1.0, 0.96, 0.90), 3.8),
+    ((-0.9, 0.1, 0.5), (0.80, 0.90, 1.0), 1.6),
+    ((-0.5, 0.55, -0.9), (1.0, 0.97, 0.93), 2.4),
 )
 
 

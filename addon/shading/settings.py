@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from ..params import Settings, choice, color, number
@@ -12,6 +12,12 @@ from .marschner.settings import MarschnerSettings
 MODELS = (
     ("kajiya_kay", "Kajiya-Kay", "Two shifted highlights by Scheuermann: quick, and free to shape"),
     ("marschner", "Marschner", "Light reflected and refracted by a fibre: as real hair has it"),
+)
+
+TRANSPARENCIES = (
+    ("layers", "Layers", "Strands cover as much of each pixel as they are wide, in their order"),
+    ("hashed", "Hashed", "The same on average, by chance: no memory, but noise"),
+    ("none", "None", "Opaque strands with hard edges, no thinner than the minimum width"),
 )
 
 
@@ -118,7 +124,7 @@ class ShadingSettings(MarschnerSettings, KajiyaKaySettings, SharedSettings):
 
 @dataclass(frozen=True, kw_only=True)
 class StrandSettings(Settings):
-    """How wide strands are drawn."""
+    """How wide strands are drawn, and how much they hide."""
 
     section: ClassVar[str] = "strands"
     title: ClassVar[str] = "Strands"
@@ -138,10 +144,37 @@ class StrandSettings(Settings):
         hard=(0.0, 1.0),
         unit="factor",
     )
+    transparency: str = choice(
+        "layers",
+        TRANSPARENCIES,
+        label="Transparency",
+        description="How strands that are thinner than a pixel are drawn, and the edges of all",
+        source="Yang et al. 2010, lists of each pixel; Wyman and McGuire 2017, hashed alpha",
+    )
+    opacity: float = number(
+        1.0,
+        label="Opacity",
+        description="How much a strand hides of what lies behind it, in its full width; with "
+        "transparency only",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+    )
     minimum_width: float = number(
         1.0,
         label="Minimum Width",
-        description="Strands are never drawn thinner than this many pixels at the root",
+        description="Without transparency, strands are never drawn thinner than this many pixels "
+        "at the root",
         soft=(0.0, 4.0),
         hard=(0.0, 100.0),
     )
+
+    @property
+    def least_width(self) -> float:
+        """What every strand covers at the root, however thin it is [pixels]."""
+        return self.minimum_width if self.transparency == "none" else 0.0
+
+    @property
+    def as_drawn(self) -> StrandSettings:
+        """With the opacity that strands have: without transparency they hide all."""
+        return replace(self, opacity=1.0) if self.transparency == "none" else self

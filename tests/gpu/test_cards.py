@@ -14,6 +14,7 @@ from hairloom.addon.shading.kajiya_kay import kajiya_kay
 from hairloom.addon.shading.lights import Light, light_direction, light_irradiance
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.textures import HairTextures, TextureSettings, hair_textures
+from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -87,7 +88,7 @@ def snapshot_of(mesh: CardMesh, textures: HairTextures, *, tangent_map: bool = F
         np.zeros((0, 2, 3), np.float32),
         np.zeros((0, 2), np.float32),
         cards=CardSnapshot(mesh, textures, tangent_map),
-        **more,
+        **{"volume": VolumeSettings(shadows="none"), **more},
     )
 
 

@@ -1,4 +1,4 @@
-"""The strands' coverage against brute force in numpy, from the definition of a ribbon.
+"""What opaque strands cover against brute force in numpy, from the definition of a ribbon.
 
 Every pixel centre is tried against every quad whose bounding box holds it. Nothing here is taken
 from the shader: the curve comes from the Catmull-Rom matrix, its direction in the picture from two
@@ -116,7 +116,9 @@ def test_coverage_is_that_of_the_definition(
     frame: Any, subdivisions: int, minimum_width: float, samples: int
 ) -> None:
     strands = curly_groom(400)
-    settings = StrandSettings(width_scale=2.0, tip_width=0.4, minimum_width=minimum_width)
+    settings = StrandSettings(
+        width_scale=2.0, tip_width=0.4, minimum_width=minimum_width, transparency="none"
+    )
     detail = DetailSettings(mode="fixed", subdivisions=subdivisions)
     radius = np.full(strands.shape[:2], 1e-3, np.float32)
     snapshot = frame.Snapshot(strands, radius, strand_settings=settings, detail=detail)
@@ -139,7 +141,12 @@ def test_coverage_of_the_real_groom(frame: Any, shared_data: Path) -> None:
     groom = read_tfx(shared_data / "sintel" / "SintelHairOriginal-sintel_hair.16points.tfx")
     strands = groom.strands.grid[::5]
     radius = np.full(strands.shape[:2], 2e-4, np.float32)
-    snapshot = frame.Snapshot(strands, radius, detail=DetailSettings(mode="fixed"))
+    snapshot = frame.Snapshot(
+        strands,
+        radius,
+        detail=DetailSettings(mode="fixed"),
+        strand_settings=StrandSettings(transparency="none"),
+    )
     camera = frame.frame_camera(groom.strands.bounds(), (-0.55, -1, 0.18), np.radians(30), 4 / 3)
     drawn = frame.render_coverage(snapshot, camera, 480, 360)
     expected = covered(snapshot, camera, 480, 360)

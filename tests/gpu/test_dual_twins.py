@@ -116,6 +116,7 @@ def test_scattering_light(compute: Callable[..., np.ndarray], settings: ShadingS
         root_absorption(settings),
         settings,
         0.7,
+        np.array([0.6, 0.4, 0.3]),
         tau=exact[3, ..., 3],
         beyond=exact[2, ..., 3],
     )

@@ -11,6 +11,7 @@ import pytest
 from hairloom.addon.shading.kajiya_kay import kajiya_kay, strand_base, strand_normal
 from hairloom.addon.shading.lights import Light, light_direction, light_irradiance
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -67,6 +68,7 @@ def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
         ambient=ambient,
         shading=shading,
         strand_settings=RIBBON,
+        volume=VolumeSettings(shadows="none"),
         volume_center=center,
     )
     eye = np.array([0.05, -0.6, 0.2])
@@ -117,6 +119,7 @@ def hairy_sphere(frame: Any, **shading: float) -> Any:
         ambient=(0.0, 0.0, 0.0),
         shading=ShadingSettings(**(values | shading)),
         strand_settings=RIBBON,
+        volume=VolumeSettings(shadows="none"),
         volume_center=np.zeros(3, np.float32),
     )
 
@@ -275,11 +278,11 @@ def test_points_on_the_gpu_that_do_not_fit_or_are_gone_are_refused(frame: Any, f
         frame.render_image(gone, front, 8, 8)
 
 
-def test_thin_strands_get_the_minimum_width(frame: Any, front: Any) -> None:
+def test_thin_opaque_strands_get_the_minimum_width(frame: Any, front: Any) -> None:
     """Widths count in pixels of the finished picture, whatever the samples."""
     strands, radius = uprights(np.array([0.25, 0.75]), 1e-6)
     for samples, width in ((1, 2.0), (4, 0.5), (4, 1.0)):
-        settings = dataclasses.replace(RIBBON, minimum_width=width)
+        settings = dataclasses.replace(RIBBON, minimum_width=width, transparency="none")
         snapshot = frame.Snapshot(strands, radius, strand_settings=settings)
         drawn = frame.render_coverage(snapshot, front, 40, 40, samples)
         assert drawn.sum(axis=1) == pytest.approx(np.full(40, 2.0 * width))

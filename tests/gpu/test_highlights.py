@@ -17,6 +17,7 @@ from hair_ball import ball_mesh, combed_strands
 from hairloom.addon.params.preset import read_preset
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -49,6 +50,7 @@ def draw() -> Callable[..., np.ndarray]:
             lights=(Light.sun(shines_along, (1.0, 1.0, 1.0), 1.0),),
             ambient=BLACK,
             shading=shading,
+            volume=VolumeSettings(shadows="none"),
             strand_settings=StrandSettings(tip_width=1.0, minimum_width=0.0),
             volume_center=np.zeros(3, np.float32),
         )

@@ -21,6 +21,7 @@ from hairloom.addon.shading.marschner.look import (
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, MarschnerTables, marschner_tables
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.strand_noise import strand_noise
+from hairloom.addon.shading.volume.settings import VolumeSettings
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
@@ -73,6 +74,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
         ambient=ambient,
         shading=shading,
         strand_settings=RIBBON,
+        volume=VolumeSettings(shadows="none"),
         volume_center=center,
         table_size=size,
     )
@@ -183,6 +185,7 @@ def test_highlights_on_waves_do_not_flicker(
                 ambient=(0.0, 0.0, 0.0),
                 shading=shading,
                 strand_settings=RIBBON,
+                volume=VolumeSettings(shadows="none"),
                 detail=DetailSettings(mode="fixed", subdivisions=1),
             )
             picture = frame.render_image(snapshot, camera, size, size, samples)

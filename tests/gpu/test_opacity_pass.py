@@ -8,16 +8,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.lights import Light, kept_lights
 from hairloom.addon.shading.settings import StrandSettings
-from hairloom.addon.shading.volume.light_frame import Ball, ball_around, light_frame
-from hairloom.addon.shading.volume.opacity import coverage, layer_ends, look_up
+from hairloom.addon.shading.volume.light_frame import Ball, ball_around, is_within, light_frame
+from hairloom.addon.shading.volume.map_size import MEMORY_LIMIT
+from hairloom.addon.shading.volume.opacity import (
+    LEAST_THICKNESS,
+    coverage,
+    layer_ends,
+    look_up,
+    own_depth,
+)
 from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands import Surface
 
 PLAIN = StrandSettings(tip_width=1.0)
 LIGHTS = {
     "sun": Light.sun((0.3, -1.0, -0.5), (1, 1, 1), 3.0),
     "point": Light.point((0.3, 0.3, 0.4), (1, 1, 1), 10.0),
+    "within the ball": Light.point((0.06, 0.03, 0.11), (1, 1, 1), 10.0),
 }
 
 
@@ -41,13 +50,17 @@ def points_of(strands: np.ndarray, radius: np.ndarray) -> Any:
 
 
 def drawn(
-    strands: np.ndarray, radius: np.ndarray, light: Light, settings: VolumeSettings
+    strands: np.ndarray,
+    radius: np.ndarray,
+    light: Light,
+    settings: VolumeSettings,
+    look: StrandSettings = PLAIN,
 ) -> tuple[Any, Ball]:
     """The maps of one light, and the ball that they cover."""
     from hairloom.addon.render.opacity_pass import OpacityPass
 
     points, ball = points_of(strands, radius), ball_around(strands)
-    return OpacityPass().maps(points, 1, strands.shape[:2], ball, (light,), settings, PLAIN), ball
+    return OpacityPass().maps(points, 1, strands.shape[:2], ball, (light,), settings, look), ball
 
 
 def layers_of(maps: Any) -> np.ndarray:
@@ -70,7 +83,9 @@ def test_sums_are_those_of_the_strands(gpu_context: Any, light: Light, shadows: 
     found = layers_of(maps)[..., 7]
     expected = np.zeros(64 * 64)
     np.add.at(expected, exact.texel, exact.covered)
-    assert found.sum() == pytest.approx(expected.sum(), rel=2e-3)
+    # under a wide angle strands that bend are not everywhere as broad as at their CVs
+    is_wide = is_within(light, ball)
+    assert found.sum() == pytest.approx(expected.sum(), rel=2e-2 if is_wide else 4e-3)
     blocks = [picture.reshape(8, 8, 8, 8).sum(axis=(1, 3)) for picture in (found, expected)]
     assert np.abs(blocks[0] - blocks[1]).max() < 0.05 * blocks[1].max()
 
@@ -91,17 +106,28 @@ def test_look_up_agrees_with_its_twin(
 
     ends = layer_ends(settings)
     layers = layers_of(maps)
-    starts = np.zeros((64, 64))
-    if maps.starts is not None:
-        kept = np.asarray(maps.starts.read()).reshape(16, 16)
-        starts = np.kron(np.minimum(kept / float(1 << 24), 1.0), np.ones((4, 4)))
+    starts, thickness = spans_of(maps)
     place, depth = frame.places(points.astype(np.float64))
     meshes = np.ones((64, 64))
-    expected = look_up(layers[..., : len(ends)], starts, meshes, ends, place, depth, settings.bias)
+    bias, layers = settings.bias, layers[..., : len(ends)]
+    expected = look_up(layers, starts, meshes, ends, place, depth, bias, thickness)
     assert (expected[0] > 0.5).sum() > 300 and (expected[1] > 0.5).sum() > 300
     # a driver interpolates with weights of eight bits
     for number, values in enumerate(expected):
         assert np.abs(found[:, number] - values).max() < (1e-3 if shadows == "deep" else 2e-2)
+
+
+def spans_of(maps: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Where the first map's layers start in each texel, and how thick they are together."""
+    side = maps.slots[0].width
+    if maps.starts is None:
+        return np.zeros((side, side)), np.ones((side, side))
+    kept = np.asarray(maps.starts.read()).reshape(side // 4, -1) / float(1 << 24)
+    first, last = np.split(kept, 2, axis=1)
+    starts = np.minimum(first, 1.0)
+    thickness = np.where(last > 1.0, 1.0, np.maximum(1.0 - last - starts, LEAST_THICKNESS))
+    blown_up = [np.kron(found, np.ones((4, 4))) for found in (starts, thickness)]
+    return blown_up[0], blown_up[1]
 
 
 def path_at(compute: Callable[..., np.ndarray], maps: Any, points: np.ndarray) -> np.ndarray:
@@ -116,6 +142,74 @@ def path_at(compute: Callable[..., np.ndarray], maps: Any, points: np.ndarray) -
         structs=("struct_opacity.glsl",),
         defines=maps.form.defines,
     )[0, :, :3]
+
+
+@pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
+def test_a_strand_finds_itself_in_the_map_as_often_as_is_taken_off(
+    gpu_context: Any, compute: Callable[..., np.ndarray], light: Light
+) -> None:
+    """Strands far apart, each a chord of the ball: all that a light path meets is the strand."""
+    random = np.random.default_rng(8)
+    settings = VolumeSettings(shadows="deep", resolution=256, strand_share=1.0, bias=0.0)
+    for radius in (1e-4, 5e-4, 1.5e-3):
+        found, expected = [], []
+        for _ in range(12):
+            ends = random.normal(size=(2, 3))
+            ends *= 0.1 / np.linalg.norm(ends, axis=1, keepdims=True)
+            strand = (ends[0] + np.linspace(0, 1, 33)[:, None] * (ends[1] - ends[0]))[None]
+            maps, ball = drawn(
+                strand.astype(np.float32), np.full((1, 33), radius, np.float32), light, settings
+            )
+            frame = light_frame(light, ball)
+            assert frame is not None
+            points = strand[0, 8:-8] + random.uniform(-0.5, 0.5, (17, 1)) * (ends[1] - ends[0]) / 32
+            along = np.broadcast_to((ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0]), (17, 3))
+            half_width = radius * frame.strand_breadth(points, along) * 256
+            path = path_at(compute, maps, points)
+            found.append(path[:, 0] + path[:, 1])
+            expected.append(own_depth(half_width))
+            twin = own_depth_of(compute, maps, points, along, radius)
+            assert np.abs(twin - expected[-1]).max() < 1e-4
+        assert np.mean(found) == pytest.approx(np.mean(expected), rel=0.06)
+
+
+def own_depth_of(
+    compute: Callable[..., np.ndarray],
+    maps: Any,
+    points: np.ndarray,
+    along: np.ndarray,
+    radius: float,
+) -> np.ndarray:
+    """What the shader takes strands' own tau for, (n,)."""
+    places = np.concatenate([points, np.full((len(points), 1), radius)], axis=1)
+    return compute(
+        "own_depth.glsl",
+        (len(points), 1),
+        textures={
+            "points": places[None].astype(np.float32),
+            "tangents": np.pad(along, ((0, 0), (0, 1)))[None].astype(np.float32),
+        },
+        blocks={"opacity": ("Opacity", maps.values)},
+        structs=("struct_opacity.glsl",),
+    )[0, :, 0]
+
+
+@pytest.mark.parametrize("transparency", ["none", "hashed", "layers"])
+@pytest.mark.parametrize("opacity", [0.0, 0.5, 1.0])
+def test_strands_that_hide_less_shade_less(
+    gpu_context: Any, transparency: str, opacity: float
+) -> None:
+    """Half of tau where they hide half; without transparency they hide all."""
+    strands, radius = dome(300)
+    settings = VolumeSettings(shadows="deep", resolution=64, strand_share=1.0)
+    look = StrandSettings(tip_width=1.0, transparency=transparency, opacity=opacity)
+    maps, ball = drawn(strands, radius, LIGHTS["sun"], settings, look)
+    frame = light_frame(LIGHTS["sun"], ball)
+    assert frame is not None
+    share = 1.0 if transparency == "none" else opacity
+    expected = coverage(strands, radius, frame, 64, share).covered.sum()
+    assert layers_of(maps)[..., 7].sum() == pytest.approx(expected, rel=2e-2, abs=1e-6)
+    assert expected == pytest.approx(share * coverage(strands, radius, frame, 64).covered.sum())
 
 
 def test_a_map_is_drawn_again_only_when_something_changed(gpu_context: Any) -> None:
@@ -168,3 +262,88 @@ def test_a_light_in_the_hair_throws_no_shadow(
     maps, _ = drawn(strands, radius, light, settings)
     points = np.asarray(strands.reshape(-1, 3)[::10])
     assert not path_at(compute, maps, points)[:, 0].any()
+
+
+def test_hair_that_moves_keeps_its_textures(gpu_context: Any) -> None:
+    """Textures made anew in every frame pile up on Vulkan as long as nothing is read back."""
+    from hairloom.addon.render.opacity_pass import OpacityPass
+
+    strands, radius = dome(50)
+    ball, opacity = ball_around(strands), OpacityPass()
+
+    def textures(serial: int, resolution: int) -> set[int]:
+        settings = VolumeSettings(shadows="deep", resolution=resolution)
+        moved = points_of(strands + np.float32(1e-4 * serial), radius)
+        light = (LIGHTS["sun"],)
+        maps = opacity.maps(moved, serial, strands.shape[:2], ball, light, settings, PLAIN)
+        kept.append(maps)
+        return set(map(id, maps.textures.values()))
+
+    kept: list[Any] = []
+    first = textures(0, 32)
+    assert all(textures(serial, 32) == first for serial in range(1, 20))
+    assert len(first) == 4 and not textures(20, 64) & first
+
+
+def test_textures_that_are_kept_hold_nothing_of_the_frame_before(gpu_context: Any) -> None:
+    from hairloom.addon.render.opacity_pass import OpacityPass
+
+    strands, radius = dome(300)
+    box = Surface(np.float32([[-1, -1, 0], [1, -1, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
+    opacity, settings = OpacityPass(), VolumeSettings(shadows="deep", resolution=64)
+    ball = ball_around(np.concatenate([strands, 0.5 * strands]))
+
+    def held(drawn_by: OpacityPass, serial: int, scale: float, meshes: tuple[Any, ...]) -> Any:
+        points = points_of(np.float32(scale) * strands, radius)
+        shape, light = strands.shape[:2], (LIGHTS["sun"],)
+        maps = drawn_by.maps(points, serial, shape, ball, light, settings, PLAIN, meshes)
+        meshes_depth = np.asarray(maps.meshes.read())
+        return layers_of(maps), np.asarray(maps.starts.read()), meshes_depth
+
+    held(opacity, 1, 1.0, (box,))
+    for serial, (scale, meshes) in enumerate([(0.5, (box,)), (0.5, ()), (1.0, (box,))], start=2):
+        again = held(opacity, serial, scale, meshes)
+        anew = held(OpacityPass(), 1, scale, meshes)
+        assert (anew[1] == 0xFFFFFFFF).any() and (anew[1] < 1 << 24).any()
+        for one, other in zip(again, anew, strict=True):
+            assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("shadows", ["slices", "deep"])
+def test_maps_too_large_for_memory_are_drawn_smaller_and_still_right(
+    gpu_context: Any, compute: Callable[..., np.ndarray], shadows: str
+) -> None:
+    """Eight lights with all layers there are, under a limit that leaves them few texels."""
+    from hairloom.addon.render.opacity_pass import OpacityPass
+
+    strands, radius = dome(300)
+    lights = [Light.sun((np.sin(turn), np.cos(turn), -1.0), (1, 1, 1), 3.0) for turn in range(8)]
+    settings = VolumeSettings(
+        shadows=shadows, slices=64, layers=64, resolution=2048, most_lights=8, strand_share=1.0
+    )
+    points, ball, opacity = points_of(strands, radius), ball_around(strands), OpacityPass()
+    maps = opacity.maps(points, 1, strands.shape[:2], ball, lights, settings, PLAIN)
+    assert maps.size.bytes <= MEMORY_LIMIT and f"drawn with {maps.size.side}" in opacity.note
+    frame = light_frame(lights[0], ball)
+    assert frame is not None
+    exact = coverage(strands, radius, frame, 64)
+    places = ball.center + 0.5 * ball.radius * np.random.default_rng(2).uniform(-1, 1, (16000, 3))
+    place, depth = frame.places(places)
+    column, row = np.floor(place * 64).astype(int).T
+    expected = exact.optical_depth(row * 64 + column, depth - settings.bias).mean()
+    assert path_at(compute, maps, places)[:, 0].mean() == pytest.approx(expected, rel=0.05)
+
+
+def test_of_twenty_lights_the_strongest_throw_shadows(gpu_context: Any) -> None:
+    from hairloom.addon.render.opacity_pass import OpacityPass
+
+    strands, radius = dome(50)
+    points, ball = points_of(strands, radius), ball_around(strands)
+    strength = np.random.default_rng(4).permutation(np.arange(1.0, 21.0))
+    given = [Light.sun((0.1 * n, 1.0, -1.0), (1, 1, 1), e) for n, e in enumerate(strength)]
+    settings = VolumeSettings(shadows="slices", resolution=32, most_lights=3)
+    kept = kept_lights(given)
+    maps = OpacityPass().maps(points, 1, strands.shape[:2], ball, kept, settings, PLAIN)
+    map_of = maps.values[128:160].reshape(8, 4)[:, 0]
+    casting = {kept[light].power[0] for light in np.flatnonzero(map_of >= 0.0)}
+    assert maps.size.map_count == 3 and casting == {20.0, 19.0, 18.0}

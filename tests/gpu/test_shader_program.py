@@ -31,7 +31,7 @@ def test_compile_error_names_our_file_and_line(recipes: Any, capfd: Any) -> None
 
 
 def test_each_recipe_is_compiled_once(recipes: Any) -> None:
-    from hairloom.addon.render.strand_pass import strand_recipe
+    from hairloom.addon.render.strand_recipe import strand_recipe
 
     first, again = (recipes.program(strand_recipe(is_adaptive=False)) for _ in range(2))
     assert first is again
@@ -84,9 +84,9 @@ def test_an_unknown_access_is_refused(recipes: Any) -> None:
 
 
 def test_release_forgets_all_and_shaders_come_back(recipes: Any) -> None:
-    from hairloom.addon.render.mesh_pass import mesh_recipe
+    from hairloom.addon.render.mesh_recipe import MeshForm
 
-    before = recipes.program(mesh_recipe())
+    before = recipes.program(MeshForm().recipe)
     recipes.release()
     recipes.release()
-    assert recipes.program(mesh_recipe()) is not before
+    assert recipes.program(MeshForm().recipe) is not before

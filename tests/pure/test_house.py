@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ADDON = Path(__file__).parents[2] / "addon"
-BLENDER = {"bpy", "bmesh", "bpy_extras", "addon_utils", "blf", "mathutils"}
+BLENDER = {"bpy", "bmesh", "bpy_extras", "addon_utils", "blf", "imbuf", "mathutils"}
 
 #: modules that stand beside the rooms: the ground floor, and the flows over the pure rooms
 GROUND = {"errors", "arrays"}

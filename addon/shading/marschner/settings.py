@@ -193,14 +193,16 @@ class MarschnerSettings(Settings):
     scattered: float = number(
         0.6,
         label="Scattered",
-        description="Stands for light that comes from strand to strand, in the hair's own colour",
+        description="Stands for light that comes from strand to strand, in the hair's own colour, "
+        "where Shadows with Scattering do not give it",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
     )
     volume_shade: float = number(
         1.0,
         label="Volume Shade",
-        description="How much strands on the side of the groom that faces away are in the dark",
+        description="How much strands on the side of the groom that faces away are in the dark, "
+        "for lights that throw no shadows",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",

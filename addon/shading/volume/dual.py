@@ -13,6 +13,8 @@ What we do otherwise:
         strands as there are: deep white hair gives all light back, a thin layer what it can.
     Lobes around the fibre are held by two numbers each, what they send on and what they send back,
         in place of tables of every azimuth: light from half a circle blurs the rest away.
+    Behind the hair lies skin: what passes all strands comes back off it, see off_the_skin. Of blond
+        hair as thick as a groom's strands make it, that is nearly half of the light.
 
 Colours are absorption, so that a strand's own colour may differ from root to tip: see shares().
 """
@@ -40,6 +42,9 @@ HALF_WAY = 0.5
 _MOST = 0.999
 _MOST_KEPT = 0.9999
 _SMALLEST = 1e-6
+#: even light passes as much as light that is so many times as slanted as light straight up
+#: (Elsasser 1942)
+_DIFFUSIVITY = 1.66
 #: what is taken for no light at all where a share of light stands in for tau
 _LEAST_LIGHT = 1e-3
 
@@ -114,13 +119,13 @@ def returned(a_forward: Floats, a_backward: Floats, count: Floats | float = np.i
     number of turns between the two. From one layer to the next the light keeps
     g = a_f / (1 - a_b R), so that a stack of n gives R (1 - g^2n) / (1 - R^2 g^2n) (Stokes 1862).
     """
-    a_forward = np.minimum(a_forward, _MOST_KEPT - a_backward)
+    a_forward = np.clip(a_forward, 0.0, np.maximum(_MOST_KEPT - a_backward, 0.0))
     middle = 1.0 + a_backward**2 - a_forward**2
     root = np.sqrt(np.maximum(middle**2 - 4.0 * a_backward**2, 0.0))
     # the smaller root, without a difference of near equals
     deep = 2.0 * a_backward / np.maximum(middle + root, _SMALLEST)
     kept = a_forward / np.maximum(1.0 - a_backward * deep, _SMALLEST)
-    lost = np.minimum(kept, 1.0) ** (2.0 * count)
+    lost = np.clip(kept, _SMALLEST, 1.0) ** (2.0 * count)
     return deep * (1.0 - lost) / np.maximum(1.0 - deep**2 * lost, _SMALLEST)
 
 
@@ -219,6 +224,41 @@ def dual_scattering(
     )
 
 
+def off_the_skin(
+    phi: Floats,
+    forward: Floats,
+    backward: Floats,
+    tau: Floats,
+    beyond: Floats,
+    facing: Floats,
+    skin: Floats,
+) -> Floats:
+    """What comes off the skin behind the hair and from a strand to the eye, (..., 3): times
+    irradiance it is radiance.
+
+    The skin is Lambert's, and light and hair lie over it as over a plane. Light reaches it through
+    tau + beyond strands, which in the light's slant direction are 1 / facing times as many as
+    straight up; comes back evenly, and goes to and fro between skin and hair. A strand sends a_f of
+    what lights it from behind to an eye on the light's side, and a_b to one on the other.
+
+    Args:
+        forward, backward: shares at this theta_d by colour and lobe, (..., 3, 4).
+        tau: strands between the place and the light, on average, (...).
+        beyond: strands behind the place, seen from the light, (...).
+        facing: cosine between the light and the skin's normal, above 0 where it is lit, (...).
+        skin: the skin's albedo, (3,); black where there is none.
+    """
+    facing = np.maximum(facing, 0.0)[..., None]
+    a_f, a_b = forward.sum(axis=-1), backward.sum(axis=-1)
+    behind = np.asarray(beyond)[..., None]
+    strands = np.asarray(tau)[..., None] + behind * (1.0 + _DIFFUSIVITY * facing)
+    kept = np.maximum(1.0 - skin * returned(a_f, a_b, behind), 1.0 - _MOST)
+    lit = skin * facing / (np.pi * kept)
+    cosine = np.cos(phi)[..., None]
+    onward = 0.5 * (a_f * (1.0 + cosine) + a_b * (1.0 - cosine))
+    return lit * np.exp(-strands * (1.0 - a_f)) * onward
+
+
 def scattering_light(
     tables: MarschnerTables,
     sides: Shares,
@@ -231,6 +271,7 @@ def scattering_light(
     absorption: Floats,
     shading: ShadingSettings,
     density: float,
+    skin: Floats,
     level: Floats | float = 0.0,
     tau: Floats | float = -1.0,
     beyond: Floats | float = UNKNOWN_BEYOND,
@@ -242,6 +283,7 @@ def scattering_light(
 
     Args:
         density: d_f and d_b of Zinke et al. 2008.
+        skin: (3,), albedo of what lies behind the hair; the volume's normal stands for its own.
     """
     angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading)
     single = single_scattering(tables, angles, sparkle_noise, absorption, shading, level)
@@ -265,4 +307,7 @@ def scattering_light(
         fibre_of(shading),
         density,
     )
-    return scattered * np.cos(theta_i)[..., None]
+    facing = np.sum(normal * to_light, axis=-1)
+    return scattered * np.cos(theta_i)[..., None] + off_the_skin(
+        phi, forward, backward, passed_by, np.asarray(beyond), facing, skin
+    )

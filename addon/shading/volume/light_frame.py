@@ -4,6 +4,11 @@ A map covers the hair's bounding sphere. Of a sun it is a square as wide as the 
 at a place it is the picture of a camera there. Depth runs evenly from 0 at the near end of the
 sphere to 1 at its far end, so that layers are equally thick whatever the light.
 
+A light may stand within the sphere, as a lamp close to long hair does. Its map then opens as wide
+as a flat picture can, a point's towards the middle of the hair, a spot's and a panel's the way they
+shine; depth begins at the light. Hair beside and behind it gets no shadow. Only a point light
+amidst the hair has no map at all.
+
 The frame hangs on light and hair alone: what the camera does changes nothing in it. Its centre and
 size move in steps, so that hair which sways does not make the map's texels swim.
 """
@@ -14,15 +19,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Bools, Floats
 from ..lights import Light
 
 #: the sphere is a little larger than the hair, so that nothing lies on a map's edge
 _ROOM = 1.02
+#: a tangent that is shorter in a map than this, in shares of its side, points along the light
+SEEN_FROM_ITS_END = 1e-20
 #: [m] hair smaller than this gets a map as if it were so large
 _LEAST_RADIUS = 1e-4
-#: a light must be this many radii from the middle of the hair; else it is inside
-_LEAST_DISTANCE = 1.1
+#: a map opens no wider than this to each side [rad]: beyond, few texels hold most of the picture
+WIDEST = float(np.radians(75.0))
+#: a point light nearer to the middle of the hair than this, in radii, has hair all around it
+_AMIDST = 0.25
+#: a light within the sphere that has less of it ahead, in radii, shines away from it
+_LEAST_AHEAD = 0.05
 #: sizes of the sphere come in such steps, and its centre in such shares of its radius
 _SIZE_STEP, _PLACE_STEP = 1.05, 1.0 / 64.0
 
@@ -59,11 +70,45 @@ class LightFrame:
         place = np.where(w > 0.0, 0.5 * clip[..., :2] / np.where(w > 0.0, w, 1.0) + 0.5, -1.0)
         return place, homogeneous @ self.to_depth
 
-    def texel_width(self, points: Floats, resolution: int) -> Floats:
-        """Side of a texel at points (..., 3), (...) [m]."""
+    def is_ahead(self, points: Floats) -> Bools:
+        """Whether points (..., 3) [m] lie on the side to which the light looks, (...)."""
+        ahead: Bools = points @ self.to_map[3, :3] + self.to_map[3, 3] > 0.0
+        return ahead
+
+    def strand_area(self, points: Floats, along: Floats) -> Floats:
+        """The share of the map that a short piece of a strand of the width 1 m covers, (...).
+
+        Args:
+            points: (..., 3) its middle [m]. along: (..., 3) from its one end to the other [m].
+        """
+        way, breadth = self._seen(points, along)
+        return np.linalg.norm(way, axis=-1) * breadth
+
+    def strand_breadth(self, points: Floats, along: Floats) -> Floats:
+        """How broad a strand of the width 1 m is in the map, as a share of the map's side, (...).
+
+        The light sees its width across its own ray: towards the rim of a wide map, which lies
+        aslant there, it gets broader the more, the less the strand runs towards the middle.
+
+        Args:
+            points: (..., 3) [m], ahead of the light. along: (..., 3) its tangent.
+        """
+        return self._seen(points, along)[1]
+
+    def _seen(self, points: Floats, along: Floats) -> tuple[Floats, Floats]:
+        """The way along a strand in the map, (..., 2), and its breadth, (...)."""
         homogeneous = np.concatenate([points, np.ones_like(points[..., :1])], axis=-1)
-        w = homogeneous @ self.to_map[3]
-        return 2.0 * w / (np.linalg.norm(self.to_map[0, :3]) * resolution)
+        clip = homogeneous @ self.to_map.T
+        w = clip[..., 3, None, None]
+        # how places change with the point
+        turn = (self.to_map[:2, :3] - clip[..., :2, None] / w * self.to_map[3, :3]) / (2.0 * w)
+        way = np.einsum("...ij,...j->...i", turn, along)
+        length = np.linalg.norm(way, axis=-1, keepdims=True)
+        # a strand along the ray is as broad whichever way it is seen
+        is_seen = length > SEEN_FROM_ITS_END
+        unit = np.where(is_seen, way, [1.0, 0.0]) / np.where(is_seen, length, 1.0)
+        across = np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
+        return way, np.linalg.norm(np.einsum("...i,...ij->...j", across, turn), axis=-1)
 
 
 def ball_around(points: Floats) -> Ball:
@@ -95,14 +140,47 @@ def stepped_ball(center: Floats, radius: float) -> Ball:
 
 
 def light_frame(light: Light, ball: Ball) -> LightFrame | None:
-    """The frame of a light's map; None where the light stands in the hair and throws no shadow."""
+    """The frame of a light's map; None where a light within the ball can have none."""
     if light.kind == "sun":
         return _of_sun(np.asarray(light.vector, np.float64), ball)
-    away = np.asarray(light.vector, np.float64) - ball.center
+    eye = np.asarray(light.vector, np.float64)
+    away = eye - ball.center
     distance = float(np.linalg.norm(away))
-    if distance < _LEAST_DISTANCE * ball.radius:
+    if not is_within(light, ball):
+        # the cone that touches the ball
+        tangent = ball.radius / np.sqrt(distance**2 - ball.radius**2)
+        ends = distance - ball.radius, distance + ball.radius
+        return _of_place(away / distance, eye, float(tangent), ends)
+    axis = shines_along(light)
+    if axis is None:
+        if distance < _AMIDST * ball.radius:
+            return None
+        axis = -away / distance
+    ahead = float(-away @ axis)
+    if ahead + ball.radius < _LEAST_AHEAD * ball.radius:
         return None
-    return _of_place(away / distance, distance, ball)
+    near = max(ahead - ball.radius, 0.0)
+    return _of_place(-axis, eye, float(np.tan(WIDEST)), (near, ahead + ball.radius))
+
+
+def is_within(light: Light, ball: Ball) -> bool:
+    """Whether a light sees the ball under a wider angle than a map can have."""
+    if light.kind == "sun":
+        return False
+    distance = float(np.linalg.norm(np.asarray(light.vector, np.float64) - ball.center))
+    return distance * np.sin(WIDEST) <= ball.radius
+
+
+def shines_along(light: Light) -> Floats | None:
+    """Unit vector of the middle of a light's beam; None of a point, which has none."""
+    if light.panel is not None:
+        return np.asarray(light.panel.shines_along, np.float64)
+    if light.cone is None:
+        return None
+    right, up, back = np.asarray(light.cone.axes, np.float64)
+    along = np.cross(right, up)
+    along *= -np.sign(along @ back) / max(float(np.linalg.norm(along)), 1e-30)
+    return along if along.any() else None
 
 
 def _of_sun(towards: Floats, ball: Ball) -> LightFrame:
@@ -110,29 +188,29 @@ def _of_sun(towards: Floats, ball: Ball) -> LightFrame:
     to_map = np.eye(4)
     to_map[:2, :3] = right / ball.radius, up / ball.radius
     to_map[:2, 3] = -to_map[:2, :3] @ ball.center
-    to_map[2] = _depth(towards, ball)
+    to_map[2, :3] = -towards / (2.0 * ball.radius)
+    to_map[2, 3] = 0.5 + towards @ ball.center / (2.0 * ball.radius)
     return LightFrame(to_map, to_map[2].copy(), 2.0 * ball.radius)
 
 
-def _of_place(towards: Floats, distance: float, ball: Ball) -> LightFrame:
+def _of_place(
+    towards: Floats, eye: Floats, tangent: float, ends: tuple[float, float]
+) -> LightFrame:
+    """Of a light at `eye` that looks against `towards`.
+
+    Args:
+        tangent: of half the angle under which it sees.
+        ends: where depth is 0 and 1, from the light on [m].
+    """
     right, up, towards = _axes(towards)
-    # the cone that touches the ball
-    tangent = ball.radius / np.sqrt(distance**2 - ball.radius**2)
-    eye = ball.center + distance * towards
+    near, far = ends
     to_map = np.zeros((4, 4))
     to_map[:2, :3] = right / tangent, up / tangent
-    to_map[:2, 3] = -to_map[:2, :3] @ eye
-    to_map[2] = _depth(towards, ball)
     to_map[3, :3] = -towards
-    to_map[3, 3] = towards @ eye
-    return LightFrame(to_map, to_map[2].copy(), 2.0 * ball.radius)
-
-
-def _depth(towards: Floats, ball: Ball) -> Floats:
-    row = np.zeros(4)
-    row[:3] = -towards / (2.0 * ball.radius)
-    row[3] = 0.5 + towards @ ball.center / (2.0 * ball.radius)
-    return row
+    to_map[2] = to_map[3] / (far - near)
+    to_map[:, 3] = -to_map[:, :3] @ eye
+    to_map[2, 3] -= near / (far - near)
+    return LightFrame(to_map, to_map[2].copy(), far - near)
 
 
 def _axes(towards: Floats) -> tuple[Floats, Floats, Floats]:

@@ -9,7 +9,9 @@ There are two ways to lay the layers, both given by where they end:
             2005 draw 16 of them in one pass);
     deep    from the first hair that light meets in each texel on, the layers thicker from one to
             the next (Yuksel and Keyser 2008): they follow the hair, so that it does not band.
-Slices are deep layers that start at 0 everywhere, so that one shader draws both.
+            Theirs are as thick everywhere; ours share out what lies up to the last hair, so that
+            few of them serve a thin fringe and a whole head alike.
+Slices are deep layers that start at 0 and end at 1 everywhere, so that one shader draws both.
 
 All depths are those of light_frame.py, 0 to 1 through the ball. Between the ends of two layers
 tau is taken as linear. Reference of gpu_shaders/lib_opacity.glsl.
@@ -25,22 +27,32 @@ from ...arrays import Bools, Floats, Ints
 from .light_frame import LightFrame
 from .settings import VolumeSettings
 
+#: deep layers together are at least so thick
+LEAST_THICKNESS = 1.0 / 1024.0
 #: pieces into which the reference cuts strands, in texels
 _PIECE = 0.25
 
 
 def layer_ends(settings: VolumeSettings) -> Floats:
-    """Where layers end, behind where they start, (layer_count,), rising; the last one is 1."""
+    """Where layers end, in shares of how thick they are together, (layer_count,), rising to 1."""
     if settings.shadows == "slices":
         return np.arange(1, settings.slices + 1) / settings.slices
-    count = settings.layers - 1
-    near = min(settings.layer_depth, 0.999) * (np.arange(1, count + 1) / count) ** 2
-    return np.append(near, 1.0)
+    # half of them reach layer_depth
+    power = np.log(settings.layer_depth) / np.log(0.5)
+    ends: Floats = (np.arange(1, settings.layers + 1) / settings.layers) ** power
+    return ends
 
 
 def adds_to(depth: Floats, ends: Floats) -> Bools:
-    """The layers whose sums a strand at this depth behind their start is part of, (..., n)."""
+    """The layers whose sums a strand at this share of their depth is part of, (..., n)."""
     return depth[..., None] <= ends
+
+
+def layers_passed(depth: Floats, ends: Floats) -> Floats:
+    """The share of each layer that lies in front of this depth, (..., n)."""
+    starts = np.concatenate([[0.0], ends[:-1]])
+    passed: Floats = np.clip((depth[..., None] - starts) / (ends - starts), 0.0, 1.0)
+    return passed
 
 
 def layer_weights(depth: Floats, ends: Floats) -> Floats:
@@ -48,8 +60,7 @@ def layer_weights(depth: Floats, ends: Floats) -> Floats:
 
     Each layer's share in what is passed, less the next one's: tau is one dot product.
     """
-    starts = np.concatenate([[0.0], ends[:-1]])
-    passed = np.clip((depth[..., None] - starts) / (ends - starts), 0.0, 1.0)
+    passed = layers_passed(depth, ends)
     passed[..., :-1] -= passed[..., 1:]
     return passed
 
@@ -67,6 +78,7 @@ def look_up(
     places: Floats,
     depth: Floats,
     bias: float,
+    thickness: Floats | None = None,
 ) -> tuple[Floats, Floats, Floats]:
     """What light meets on its way, blended between the four texels around each place of a map.
 
@@ -77,12 +89,14 @@ def look_up(
         ends: (n,).
         places: (m, 2) in 0..1. depth: (m,).
         bias: strands and meshes this close in front do not count.
+        thickness: (resolution, resolution) of each texel's layers together; None is 1.
 
     Returns:
         tau up to each place, tau from there on to the first mesh, and the share of the light that
         no mesh is in the way of; each (m,).
     """
     resolution = len(layers)
+    thick = np.ones_like(starts) if thickness is None else thickness
     inside = np.minimum(depth, 1.0) - bias
     scaled = places * resolution - 0.5
     low = np.floor(scaled).astype(np.int64)
@@ -93,12 +107,29 @@ def look_up(
         row = np.clip(low[:, 1] + up, 0, resolution - 1)
         weight = np.abs(1 - right - share[:, 0]) * np.abs(1 - up - share[:, 1])
         sums, start, mesh = layers[row, column], starts[row, column], meshes[row, column]
-        tau += weight * np.einsum("mn,mn->m", sums, layer_weights(inside - start, ends))
-        beyond += weight * np.einsum("mn,mn->m", sums, layer_weights(mesh - start, ends))
+        size = thick[row, column]
+        weights = layer_weights((inside - start) / size, ends)
+        tau += weight * np.einsum("mn,mn->m", sums, weights)
+        weights = layer_weights((mesh - start) / size, ends)
+        beyond += weight * np.einsum("mn,mn->m", sums, weights)
         lit += weight * (inside <= mesh)
     is_inside = ((places >= 0.0) & (places <= 1.0)).all(axis=1)
     tau, beyond = np.where(is_inside, tau, 0.0), np.where(is_inside, beyond, 0.0)
     return tau, np.maximum(beyond - tau, 0.0), np.where(is_inside, lit, 1.0)
+
+
+def own_depth(half_width: Floats) -> Floats:
+    """tau of a strand itself at its middle line, of what a map holds there, (...).
+
+    Maps hold it as at least a texel wide, and a look-up blends over a texel to each side of it: the
+    integral of that tent over its width. A strand is not in its own way, nor behind itself.
+
+    Args:
+        half_width: in texels.
+    """
+    drawn = np.maximum(half_width, 0.5)
+    met = np.minimum(drawn, 1.0)
+    return half_width / drawn * met * (2.0 - met)
 
 
 @dataclass(frozen=True)
@@ -124,30 +155,49 @@ class Coverage:
         upto = np.searchsorted(key, texel + np.clip(depth, 0.0, 1.0 - 1e-9))
         return summed[upto] - summed[before]
 
-    def starts(self) -> Floats:
-        """Depth of the first piece in each texel, (resolution^2,); 1 where there is none."""
-        first = np.ones(self.resolution**2)
-        np.minimum.at(first, self.texel, self.depth)
-        return first
+    def span(self, block: int = 1) -> tuple[Floats, Floats]:
+        """Where each texel's deep layers start, and how thick they are, (resolution^2,) each.
 
-    def layers(self, ends: Floats, starts: Floats) -> Floats:
+        From the first to the last piece in its block of so many texels each way; 1 and 1 where
+        there is none.
+        """
+        side = self.resolution // block
+        row, column = np.divmod(self.texel, self.resolution)
+        of_piece = row // block * side + column // block
+        first, last = np.ones(side**2), np.full(side**2, -1.0)
+        np.minimum.at(first, of_piece, self.depth)
+        np.maximum.at(last, of_piece, self.depth)
+        thickness = np.where(last < 0.0, 1.0, np.maximum(last - first, LEAST_THICKNESS))
+        blown_up = (found.reshape(side, side) for found in (first, thickness))
+        starts, thick = (np.kron(found, np.ones((block, block))).ravel() for found in blown_up)
+        return starts, thick
+
+    def layers(self, ends: Floats, starts: Floats, thickness: Floats | None = None) -> Floats:
         """What a map holds, (resolution^2, layer_count)."""
-        sums = np.zeros((self.resolution**2, len(ends)))
-        np.add.at(
-            sums, self.texel, adds_to(self.depth - starts[self.texel], ends) * self.covered[:, None]
-        )
-        return sums
+        thick = np.ones_like(starts) if thickness is None else thickness
+        behind = np.minimum((self.depth - starts[self.texel]) / thick[self.texel], 1.0)
+        # of the layers that a piece adds to, the first; the others have it by summing up
+        first = self.texel * len(ends) + np.searchsorted(ends, behind)
+        held = np.bincount(first, self.covered, self.resolution**2 * len(ends))
+        return np.cumsum(held.reshape(-1, len(ends)), axis=1)
 
 
-def coverage(strands: Floats, radius: Floats, frame: LightFrame, resolution: int) -> Coverage:
+def coverage(
+    strands: Floats, radius: Floats, frame: LightFrame, resolution: int, opacity: float = 1.0
+) -> Coverage:
     """Strands cut into pieces, each of which covers a part of one texel.
+
+    Segments that reach behind a light are left out.
 
     Args:
         strands: (strand_count, cv_count, 3) [m], world space, straight between their CVs.
         radius: (strand_count, cv_count) [m].
+        opacity: how much a strand hides in its full width.
     """
     start, end = strands[:, :-1].reshape(-1, 3), strands[:, 1:].reshape(-1, 3)
     thick = (radius[:, :-1] + radius[:, 1:]).ravel()
+    is_ahead = frame.is_ahead(start) & frame.is_ahead(end)
+    start, end, thick = start[is_ahead], end[is_ahead], thick[is_ahead]
     from_place, _ = frame.places(start.astype(np.float64))
     to_place, _ = frame.places(end.astype(np.float64))
     texels = np.linalg.norm(to_place - from_place, axis=-1) * resolution
@@ -157,9 +207,9 @@ def coverage(strands: Floats, radius: Floats, frame: LightFrame, resolution: int
     share = (np.arange(len(segment)) - first + 0.5) / count[segment]
     middle = start[segment] + (end - start)[segment] * share[:, None]
     place, depth = frame.places(middle.astype(np.float64))
-    width = frame.texel_width(middle.astype(np.float64), resolution)
-    # its length and width in texels, as the light sees them
-    covered = (texels / count)[segment] * thick[segment] / width
+    along = (end - start)[segment].astype(np.float64) / count[segment][:, None]
+    area = thick[segment] * frame.strand_area(middle.astype(np.float64), along)
+    covered = opacity * area * resolution**2
     column, row = np.floor(place * resolution).astype(np.int64).T
     is_inside = (column >= 0) & (column < resolution) & (row >= 0) & (row < resolution)
     texel = (row * resolution + column)[is_inside]

@@ -26,7 +26,7 @@ class VolumeSettings(Settings):
     title: ClassVar[str] = "Shadows"
 
     shadows: str = choice(
-        "none",
+        "deep",
         SHADOWS,
         label="Shadows",
         description="How the hair's shadow on itself is kept",
@@ -66,12 +66,12 @@ class VolumeSettings(Settings):
         source=_YUKSEL,
     )
     layer_depth: float = number(
-        0.5,
+        0.25,
         label="Layer Depth",
-        description="Deep opacity: how deep all layers but the last reach, as a share of the "
-        "hair's size; the last holds the rest",
-        soft=(0.05, 1.0),
-        hard=(0.001, 2.0),
+        description="Deep opacity: how deep the first half of the layers reach, as a share of the "
+        "hair there; 0.5 makes all equally thick",
+        soft=(0.05, 0.5),
+        hard=(0.001, 0.9),
         unit="factor",
         source=_YUKSEL,
     )
@@ -94,11 +94,17 @@ class VolumeSettings(Settings):
         unit="factor",
     )
     most_lights: int = integer(
-        2,
+        3,
         label="Lights",
         description="Lights that throw shadows at most, the strongest first",
         soft=(0, 8),
         hard=(0, 8),
+    )
+    on_body: bool = toggle(
+        False,
+        label="On Body",
+        description="Where a 3D view goes by the scene's lights, hair as it moves shades the head "
+        "that Blender draws, in place of Blender's own strands at rest, which shade all meshes",
     )
     scattering: bool = toggle(
         True,

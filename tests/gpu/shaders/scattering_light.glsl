@@ -26,6 +26,7 @@ void main()
                                 0.0,
                                 to_eye.w,
                                 to_light.w,
-                                0.7);
+                                0.7,
+                                vec3(0.6, 0.4, 0.3));
   imageStore(result, at, vec4(light, 0.0));
 }

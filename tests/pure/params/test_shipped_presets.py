@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
-from hairloom.addon.params.preset import read_any_preset
+from hairloom.addon.params.preset import preset_as_dict, read_any_preset
+from hairloom.addon.shading.shafts_settings import ShaftSettings
 
 FOLDER = Path(__file__).parents[3] / "presets"
 PRESETS = sorted(FOLDER.rglob("*.json"))
@@ -39,3 +41,32 @@ def test_a_preset_of_no_known_kind_is_refused(tmp_path: Path, text: str) -> None
     with pytest.raises(HairloomError, match="no known kind") as caught:
         read_any_preset(path, ALL_SETTINGS)
     assert caught.value.place == str(path)
+
+
+def test_a_preset_may_bring_along_other_sections(tmp_path: Path) -> None:
+    path = tmp_path / "wet.json"
+    data = {"hairloom": 1, "section": "shading", "title": "x", "values": {}}
+    path.write_text(json.dumps(data | {"also": {"shafts": {"use_shafts": True, "length": 0.7}}}))
+    preset = read_any_preset(path, ALL_SETTINGS)
+    assert [settings.section for settings in preset.all] == ["shading", "shafts"]
+    assert preset.also == (ShaftSettings(use_shafts=True, length=0.7),)
+    path.write_text(json.dumps(preset_as_dict(preset)))
+    assert read_any_preset(path, ALL_SETTINGS) == preset
+
+
+@pytest.mark.parametrize("also", [["shafts"], {"paint": {}}, {"shafts": 3}, "shafts", None])
+def test_what_a_preset_brings_along_is_checked(tmp_path: Path, also: object) -> None:
+    path = tmp_path / "odd.json"
+    data = {"hairloom": 1, "section": "shading", "title": "x", "values": {}, "also": also}
+    path.write_text(json.dumps(data))
+    with pytest.raises(HairloomError, match="no known kind"):
+        read_any_preset(path, ALL_SETTINGS)
+
+
+def test_only_the_look_under_water_has_shafts_of_light() -> None:
+    presets = {path: read_any_preset(path, ALL_SETTINGS) for path in PRESETS}
+    with_shafts = {path.stem for path, preset in presets.items() if preset.also}
+    assert with_shafts == {"under_water"}
+    (shafts,) = presets[FOLDER / "looks" / "under_water.json"].also
+    assert isinstance(shafts, ShaftSettings) and shafts.use_shafts
+    assert not ShaftSettings().use_shafts

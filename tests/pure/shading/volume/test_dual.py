@@ -16,6 +16,7 @@ from hairloom.addon.shading.volume.dual import (
     absorption_place,
     dual_scattering,
     half_gaussian,
+    off_the_skin,
     passed,
     place_absorption,
     returned,
@@ -135,6 +136,41 @@ def test_light_hair_is_brighter_and_carries_light_farther(table: Shares) -> None
     assert deep[0] / near[0] > 5.0 * deep[2] / near[2]
 
 
+def skin_light(a_f: float, a_b: float, skin: float, **more: float) -> float:
+    """What comes off the skin, of light head on and an eye beside it unless said otherwise."""
+    values = {"phi": 0.0, "tau": 0.0, "beyond": 0.0, "facing": 1.0} | more
+    lobes = [np.tile([0.0, share, 0.0, 0.0], (3, 1)) for share in (a_f, a_b)]
+    phi, tau, beyond, facing = (np.array(values[name]) for name in values)
+    return float(off_the_skin(phi, *lobes, tau, beyond, facing, np.full(3, skin))[1])
+
+
+def test_skin_behind_a_strand_that_hides_nothing_is_lambert() -> None:
+    for skin, facing in ((0.5, 1.0), (0.2, 0.3)):
+        found = skin_light(1.0, 0.0, skin, facing=facing, beyond=4.0)
+        assert found == pytest.approx(skin * facing / np.pi, rel=1e-3)
+    # an eye on the other side sees none of it through the strand
+    assert skin_light(1.0, 0.0, 0.5, phi=np.pi) == pytest.approx(0.0, abs=1e-6)
+    assert skin_light(0.6, 0.1, 0.5, phi=np.pi) == pytest.approx(0.1 * 0.5 / np.pi, rel=0.02)
+
+
+def test_black_skin_and_skin_in_the_dark_give_nothing() -> None:
+    assert skin_light(0.7, 0.2, 0.0, tau=1.0, beyond=1.0) == 0.0
+    assert skin_light(0.7, 0.2, 0.5, facing=-0.4) == 0.0
+
+
+@pytest.mark.parametrize("facing", [1.0, 0.5])
+@pytest.mark.parametrize("beyond", [0.1, 0.5, 2.0])
+def test_even_light_comes_back_through_the_strands_it_meets(beyond: float, facing: float) -> None:
+    """Rays off the skin into all directions, each through as many strands as its slant asks for."""
+    a_f, skin = 0.7, 0.4
+    random = np.random.default_rng(4)
+    upward = np.sqrt(random.random(100_000))  # Lambert's
+    back = np.exp(-(1.0 - a_f) * beyond * facing / upward).mean()
+    there = np.exp(-(1.0 - a_f) * (1.0 + beyond))
+    found = skin_light(a_f, 0.0, skin, tau=1.0, beyond=beyond, facing=facing)
+    assert found == pytest.approx(skin * facing / np.pi * there * back * a_f, rel=0.07)
+
+
 @pytest.mark.parametrize("tau", [0.0, 1e-6, 1.0, 1e4])
 @pytest.mark.parametrize("absorption", [0.0, 0.3, 1e4])
 @pytest.mark.parametrize("density", [0.0, 1.0])
@@ -143,6 +179,9 @@ def test_no_end_of_a_range_gives_anything_but_numbers(
 ) -> None:
     found = light_on(table, absorption, tau, density)
     assert np.isfinite(found).all() and (found >= 0.0).all()
+    for skin in (0.0, 1.0):
+        white = skin_light(1.0 - density, density, skin, tau=tau, beyond=tau)
+        assert np.isfinite(white) and white >= 0.0
     forward, backward = at(table, absorption, 0.0)
     for shape in returned_shape(forward, backward, FIBRE):
         assert np.isfinite(shape).all()

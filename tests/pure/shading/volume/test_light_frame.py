@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon.shading.lights import Light
-from hairloom.addon.shading.volume.light_frame import Ball, ball_around, light_frame
+from hairloom.addon.shading.lights import Cone, Light
+from hairloom.addon.shading.volume.light_frame import WIDEST, Ball, ball_around, light_frame
 
 LIGHTS = {
     "sun": Light.sun((0.3, -1.0, -0.5), (1, 1, 1), 3.0),
@@ -48,19 +48,71 @@ def test_all_points_of_a_ray_share_a_place_and_get_deeper(light: Light) -> None:
 
 
 @pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
-def test_a_texel_is_as_wide_as_it_says(light: Light) -> None:
+def test_a_strand_is_as_broad_as_its_outline(light: Light) -> None:
+    """In a map: whichever way it runs, wherever it is, against the two rays that touch it."""
     frame = light_frame(light, BALL)
     assert frame is not None
-    right = frame.to_map[0, :3] / np.linalg.norm(frame.to_map[0, :3])
-    points = on_the_ball(20)
-    width = frame.texel_width(points, 256)
-    place, _ = frame.places(points)
-    beside, _ = frame.places(points + right * width[:, None])
-    assert np.allclose((beside - place)[:, 0] * 256, 1.0, rtol=1e-6)
+    random, thin = np.random.default_rng(3), 1e-6
+    points, along = on_the_ball(200), 1e-5 * random.normal(size=(200, 3))
+    rays = np.asarray(light.vector) - points * float(light.kind != "sun")
+    side = np.cross(along, rays)
+    side *= thin / np.linalg.norm(side, axis=1, keepdims=True)
+    left, right = frame.places(points - side)[0], frame.places(points + side)[0]
+    course = frame.places(points + along)[0] - frame.places(points)[0]
+    apart = right - left
+    covered = np.abs(apart[:, 0] * course[:, 1] - apart[:, 1] * course[:, 0])
+    assert frame.strand_area(points, along) * 2.0 * thin == pytest.approx(covered, rel=1e-2)
 
 
-def test_a_light_inside_has_no_map() -> None:
-    assert light_frame(Light.point((0.01, -0.02, 0.1), (1, 1, 1), 3.0), BALL) is None
+def spot(place: tuple[float, float, float], along: tuple[float, float, float]) -> Light:
+    """Of 60 degrees."""
+    back = -np.asarray(along) / np.linalg.norm(along)
+    right = np.cross([0.1, 0.7, 0.3], back)
+    right /= np.linalg.norm(right)
+    axes = tuple(tuple(row) for row in (right, np.cross(back, right), back))
+    return Light.spot(place, (1, 1, 1), 3.0, Cone(axes, 1.0, 0.1))
+
+
+def test_a_point_light_amidst_the_hair_has_no_map() -> None:
+    assert light_frame(Light.point((0.01, -0.02, 0.04), (1, 1, 1), 3.0), BALL) is None
+
+
+@pytest.mark.parametrize("along", [(0.0, 0.0, -1.0), (1.0, 0.2, 0.0), (-0.3, 0.4, 0.9)])
+def test_a_map_of_a_light_within_the_ball_opens_the_way_it_shines(
+    along: tuple[float, float, float],
+) -> None:
+    """A spot's own way; a point's to the middle of the ball. Nothing of the way is cut off."""
+    place = np.array([0.01, -0.02, 0.13])
+    for light in (spot(tuple(place), along), Light.point(tuple(place), (1, 1, 1), 3.0)):
+        frame = light_frame(light, BALL)
+        assert frame is not None
+        axis = np.asarray(along) if light.kind == "spot" else BALL.center - place
+        axis = axis / np.linalg.norm(axis)
+        points = BALL.center + np.random.default_rng(2).uniform(-0.15, 0.15, size=(4000, 3))
+        points = points[np.linalg.norm(points - BALL.center, axis=1) < BALL.radius]
+        ahead = (points - place) @ axis / np.linalg.norm(points - place, axis=1)
+        found, depth = frame.places(points)
+        is_in = (np.abs(found - 0.5) <= 0.5).all(axis=1)
+        assert is_in[ahead > np.cos(WIDEST)].all()
+        assert not is_in[ahead < 0.0].any()
+        assert (depth[is_in] >= 0.0).all() and (depth[is_in] <= 1.0).all()
+
+
+def test_a_spot_at_the_rim_that_shines_away_has_no_map() -> None:
+    edge = (0.01, -0.02, 0.03 + 0.1499)
+    assert light_frame(spot(edge, (0.0, 0.0, 1.0)), BALL) is None
+    assert light_frame(spot(edge, (0.0, 0.0, -1.0)), BALL) is not None
+
+
+def test_a_light_that_nears_the_ball_changes_its_map_without_a_jump() -> None:
+    """Where the cone around the ball gets too wide, the widest takes its place."""
+    rim = BALL.radius / np.sin(WIDEST)
+    frames = [
+        light_frame(Light.point(BALL.center + [0.0, 0.0, rim + step], (1, 1, 1), 3.0), BALL)
+        for step in (-1e-7, 1e-7)
+    ]
+    assert frames[0] is not None and frames[1] is not None
+    assert np.allclose(frames[0].to_map, frames[1].to_map, atol=1e-4)
 
 
 def test_what_is_behind_a_light_is_outside_of_its_map() -> None:

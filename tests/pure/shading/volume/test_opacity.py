@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hair_ball import combed_strands
 
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.volume.light_frame import ball_around, light_frame
@@ -30,7 +31,7 @@ SUN = Light.sun((0.0, 0.0, -1.0), (1, 1, 1), 3.0)
         VolumeSettings(shadows="slices"),
         VolumeSettings(shadows="slices", slices=64),
         VolumeSettings(shadows="deep"),
-        VolumeSettings(shadows="deep", layers=2, layer_depth=2.0),
+        VolumeSettings(shadows="deep", layers=2, layer_depth=0.9),
         VolumeSettings(shadows="deep", layers=64, layer_depth=0.001),
     ],
 )
@@ -76,7 +77,7 @@ def test_coverage_is_length_times_width() -> None:
     area = (np.linalg.norm(np.diff(strands, axis=1), axis=2) * 2.0 * radius[:, 1:]).sum()
     for size in (16, 64):
         found = coverage(strands, radius, frame, size)
-        texel = frame.texel_width(np.zeros(3), size) ** 2
+        texel = 1.0 / (frame.strand_area(np.zeros(3), np.array([1.0, 0.0, 0.0])) * size**2)
         assert found.covered.sum() * texel == pytest.approx(area, rel=1e-6)
 
 
@@ -103,29 +104,91 @@ def test_at_the_ends_of_layers_sums_are_exact(shadows: str) -> None:
     settings = VolumeSettings(shadows=shadows)
     found, _, _ = counted()
     ends = layer_ends(settings)
-    starts = found.starts() if shadows == "deep" else np.zeros(SIZE * SIZE)
-    layers = found.layers(ends, starts)
+    starts, thickness = spans(found, settings)
+    layers = found.layers(ends, starts, thickness)
     filled = np.flatnonzero(layers[:, -1] > 0.0)
     for number, end in enumerate(ends[:-1]):
-        depth = starts[filled] + end
-        expected = found.optical_depth(filled, np.nextafter(depth, 2.0))
-        assert np.allclose(layers[filled, number], expected, atol=1e-6)
+        depth = starts[filled] + end * thickness[filled]
+        # a piece may lie just at the end
+        before, after = (found.optical_depth(filled, depth + step) for step in (-1e-9, 1e-9))
+        held = layers[filled, number]
+        assert (before < held + 1e-6).all() and (held < after + 1e-6).all()
+
+
+def test_layers_hold_what_adds_to_them() -> None:
+    found, _, _ = counted()
+    ends = np.array([0.2, 0.5, 1.0])
+    starts, thickness = found.span(4)
+    expected = np.zeros((SIZE * SIZE, len(ends)))
+    behind = np.minimum((found.depth - starts[found.texel]) / thickness[found.texel], 1.0)
+    np.add.at(expected, found.texel, adds_to(behind, ends) * found.covered[:, None])
+    assert np.allclose(found.layers(ends, starts, thickness), expected)
+
+
+def spans(found: Coverage, settings: VolumeSettings, block: int = 1) -> tuple[np.ndarray, ...]:
+    """Where layers start, and how thick they are together."""
+    if settings.shadows == "deep":
+        return found.span(block)
+    return np.zeros(found.resolution**2), np.ones(found.resolution**2)
+
+
+def test_deep_layers_lie_between_the_first_and_the_last_hair() -> None:
+    """Of a texel, or of all texels of a block."""
+    found, _, _ = counted()
+    for block in (1, 4):
+        starts, thickness = found.span(block)
+        depth = (found.depth - starts[found.texel]) / thickness[found.texel]
+        assert depth.min() == 0.0 and depth.max() == pytest.approx(1.0, abs=1e-12)
+        row, column = np.divmod(found.texel, SIZE)
+        of_block = row // block * SIZE + column // block
+        for which in np.unique(of_block)[::97]:
+            inside = found.depth[of_block == which]
+            texel = found.texel[of_block == which][0]
+            assert starts[texel] == inside.min()
+            assert thickness[texel] >= inside.max() - inside.min() - 1e-12
+    bare = np.setdiff1d(np.arange(SIZE * SIZE), found.texel)[0]
+    starts, thickness = found.span()
+    assert starts[bare] == thickness[bare] == 1.0
+
+
+def mean_error(
+    of: tuple[Coverage, np.ndarray, np.ndarray], settings: VolumeSettings, extinction: float
+) -> float:
+    """Of the transmittance at random places."""
+    found, texel, depth = of
+    exact = transmittance(found.optical_depth(texel, depth), extinction)
+    ends = layer_ends(settings)
+    starts, thickness = spans(found, settings, block=4)
+    weights = layer_weights((depth - starts[texel]) / thickness[texel], ends)
+    tau = (found.layers(ends, starts, thickness)[texel] * weights).sum(axis=1)
+    return float(np.abs(transmittance(tau, extinction) - exact).mean())
 
 
 def test_error_falls_with_slices_and_deep_layers_beat_as_many_even_ones() -> None:
-    found, texel, depth = counted(Light.sun((0.4, -1.0, -0.6), (1, 1, 1), 3.0))
-    exact = transmittance(found.optical_depth(texel, depth), 2.0)
-
-    def error(settings: VolumeSettings) -> float:
-        ends = layer_ends(settings)
-        starts = found.starts() if settings.shadows == "deep" else np.zeros(SIZE * SIZE)
-        weights = layer_weights(depth - starts[texel], ends)
-        tau = (found.layers(ends, starts)[texel] * weights).sum(axis=1)
-        return float(np.abs(transmittance(tau, 2.0) - exact).mean())
-
-    even = [error(VolumeSettings(shadows="slices", slices=count)) for count in (4, 8, 16, 64)]
+    of = counted(Light.sun((0.4, -1.0, -0.6), (1, 1, 1), 3.0))
+    slices = [VolumeSettings(shadows="slices", slices=count) for count in (4, 8, 16, 64)]
+    even = [mean_error(of, settings, 2.0) for settings in slices]
     assert all(finer < coarser for coarser, finer in pairwise(even))
-    assert error(VolumeSettings(shadows="deep", layers=8)) < even[1]
+    layered = [VolumeSettings(shadows="deep", layers=count) for count in (4, 8)]
+    deep = [mean_error(of, settings, 2.0) for settings in layered]
+    assert deep[1] < deep[0] < even[0] and deep[1] < even[1]
+
+
+def test_four_deep_layers_beat_sixteen_slices_on_a_head_of_hair() -> None:
+    strands = combed_strands(3000)
+    frame = light_frame(SUN, ball_around(strands))
+    assert frame is not None
+    size = 4 * SIZE
+    found = coverage(strands, np.full(strands.shape[:2], 3e-3), frame, size)
+    points = np.random.default_rng(5).permutation(strands.reshape(-1, 3))[:5000]
+    place, depth = frame.places(points)
+    column, row = np.floor(place * size).astype(np.int64).T
+    of = found, row * size + column, depth - VolumeSettings().bias
+    deep, even = (
+        mean_error(of, VolumeSettings(shadows=shadows, layers=4, slices=16), 1.0)
+        for shadows in ("deep", "slices")
+    )
+    assert deep < even
 
 
 def test_blended_look_up_of_equal_texels_is_that_of_one() -> None:
@@ -162,3 +225,47 @@ def test_transmittance_stays_a_share(extinction: float) -> None:
     left = transmittance(np.array([0.0, 1e-6, 1.0, 1e6]), extinction)
     assert np.isfinite(left).all() and (left >= 0.0).all() and (left <= 1.0).all()
     assert left[0] == 1.0
+
+
+def crossed(strands: np.ndarray, radius: float, lamp: np.ndarray, place: np.ndarray) -> int:
+    """How many segments lie within their radius of the straight way from a lamp to a place."""
+    start, along = strands[:, :-1].reshape(-1, 3), np.diff(strands, axis=1).reshape(-1, 3)
+    way = place - lamp
+    off = start - lamp
+    a, b, c = (along**2).sum(axis=1), along @ way, way @ way
+    d, e = (along * off).sum(axis=1), off @ way
+    rest = a * c - b * b
+    on_segment, on_way = (b * e - c * d) / rest, (a * e - b * d) / rest
+    gap = np.linalg.norm(off + on_segment[:, None] * along - on_way[:, None] * way, axis=1)
+    meets = (on_segment >= 0.0) & (on_segment <= 1.0) & (on_way > 0.0) & (on_way < 1.0)
+    return int((meets & (gap < radius)).sum())
+
+
+def test_a_lamp_within_the_ball_counts_as_many_strands_as_its_rays_meet() -> None:
+    """Also towards the rim of its wide map, whichever way strands run there."""
+    random, radius, lamp = np.random.default_rng(7), 5e-4, np.array([0.0, 0.02, 0.07])
+    middles = random.uniform(-0.1, 0.1, size=(16000, 3))
+    is_hair = (np.linalg.norm(middles, axis=1) < 0.1) & (
+        np.linalg.norm(middles - lamp, axis=1) > 0.03
+    )
+    middles = middles[is_hair]
+    way = random.normal(size=middles.shape)
+    way *= 0.01 / np.linalg.norm(way, axis=1, keepdims=True)
+    strands = middles[:, None] + way[:, None] * np.array([-1.0, 0.0, 1.0])[:, None]
+    ball = ball_around(strands)
+    frame = light_frame(Light.point(tuple(lamp), (1, 1, 1), 3.0), ball)
+    assert frame is not None
+    found = coverage(strands, np.full(strands.shape[:2], radius), frame, SIZE)
+    axis = (ball.center - lamp) / np.linalg.norm(ball.center - lamp)
+    away = random.normal(size=(20000, 3))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    for low, high in pairwise((0.26, 0.4, 0.6, 0.8, 1.0)):
+        ring = away[(away @ axis > low) & (away @ axis < high)][:600]
+        points = lamp + ring * random.uniform(0.04, 0.12, size=(len(ring), 1))
+        points = points[np.linalg.norm(points, axis=1) < 0.1]
+        place, depth = frame.places(points)
+        column, row = np.clip(place * SIZE, 0, SIZE - 1).astype(np.int64).T
+        tau = found.optical_depth(row * SIZE + column, depth)
+        counts = [crossed(strands, radius, lamp, point) for point in points]
+        assert np.mean(counts) > 1.0
+        assert tau.mean() == pytest.approx(np.mean(counts), rel=0.08)

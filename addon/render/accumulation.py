@@ -1,0 +1,132 @@
+"""A picture as the mean of many, added up on the GPU in float32."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats
+from .shader_program import ShaderRecipe, program, released_with_shaders
+from .textures import drawing_into, drawing_state, texture_to_array
+
+_ADDING = ShaderRecipe(
+    name="accumulate",
+    compute="accumulate.comp.glsl",
+    textures=(("FLOAT_2D", "one_sample"),),
+    images=(("RGBA32F", "sum_of_samples", "READ_WRITE"),),
+)
+_SHOWING = ShaderRecipe(
+    name="accumulated",
+    vertex="accumulated.vert.glsl",
+    fragment="accumulated.frag.glsl",
+    textures=(("FLOAT_2D", "sum_of_samples"),),
+    integers=("sample_count", "left", "bottom"),
+    inputs=(("FLOAT", "unused"),),
+    outputs=(("VEC4", "color"),),
+)
+
+
+class Accumulation:
+    """Samples of one picture, all of one size; making one touches no GPU.
+
+    count: samples so far.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._size = (0, 0)
+        self._sum: Any = None
+        self._triangle: Any = None
+        released_with_shaders(self)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [pixels]."""
+        return self._size
+
+    def begin(self, width: int, height: int) -> None:
+        """Forget all samples, for a picture of this size [pixels]."""
+        self.count = 0
+        if self._size != (width, height) or self._sum is None:
+            self._size = width, height
+            self._sum = gpu.types.GPUTexture(self._size, format="RGBA32F")
+        self._sum.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+
+    def add(self, sample: Any) -> None:
+        """Add one picture, a float texture of this size, premultiplied."""
+        shader = program(_ADDING)
+        shader.bind(textures={"one_sample": sample}, images={"sum_of_samples": self._sum})
+        width, height = self._size
+        gpu.compute.dispatch(shader.shader, -(-width // 8), -(-height // 8), 1)
+        gpu.shader.unbind()
+        self.count += 1
+
+    def mean(self) -> Floats:
+        """The picture so far, (height, width, 4) float32, row 0 at the bottom."""
+        return texture_to_array(self._sum) / np.float32(max(self.count, 1))
+
+    def show(self, left: int = 0, bottom: int = 0) -> None:
+        """Draw the picture so far over what is in the bound framebuffer.
+
+        Args:
+            left, bottom: the pixel of the target at which the picture begins.
+        """
+        if self._triangle is None:
+            layout = gpu.types.GPUVertFormat()
+            layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
+            self._triangle = gpu.types.GPUBatch(type="TRIS", buf=gpu.types.GPUVertBuf(layout, 3))
+        shader = program(_SHOWING)
+        with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
+            shader.bind(
+                textures={"sum_of_samples": self._sum},
+                integers={"sample_count": max(self.count, 1), "left": left, "bottom": bottom},
+            )
+            self._triangle.draw(shader.shader)
+
+    def release(self) -> None:
+        """See shader_program.released_with_shaders."""
+        self.count = 0
+        self._sum = self._triangle = None
+
+
+class Target:
+    """A colour texture with a depth buffer, made anew when its size changes."""
+
+    def __init__(self) -> None:
+        self._size = (0, 0)
+        self._framebuffer: Any = None
+        self.color: Any = None
+        self.depth: Any = None
+        released_with_shaders(self)
+
+    def sized(self, width: int, height: int) -> Target:
+        """This target in that size [pixels]."""
+        if self._size != (width, height):
+            self._size = width, height
+            self.color = gpu.types.GPUTexture(self._size, format="RGBA32F")
+            self.depth = gpu.types.GPUTexture(self._size, format="DEPTH_COMPONENT32F")
+            self._framebuffer = gpu.types.GPUFrameBuffer(
+                depth_slot=self.depth, color_slots=(self.color,)
+            )
+        return self
+
+    def clear(self, color: tuple[float, float, float, float]) -> None:
+        """Fill it with one colour, as far away as can be."""
+        with drawing_into(self._framebuffer):
+            self._framebuffer.clear(color=color, depth=1.0)
+
+    def drawing(self) -> Any:
+        """A context in which draws go into it."""
+        return drawing_into(self._framebuffer)
+
+    def depths(self) -> Floats:
+        """The depth buffer, (height, width) float32 in [0, 1]."""
+        width, height = self._size
+        return np.array(self.depth.read(), np.float32).reshape(height, width)
+
+    def release(self) -> None:
+        """See shader_program.released_with_shaders."""
+        self._size = (0, 0)
+        self._framebuffer = self.color = self.depth = None

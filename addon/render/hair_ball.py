@@ -1,0 +1,24 @@
+"""The sphere around the hair of a snapshot. Pure numpy: importable without gpu."""
+
+from __future__ import annotations
+
+from ..arrays import Floats
+from ..shading.volume.light_frame import Ball, ball_around, reach_of, stepped_ball
+from .snapshot import Snapshot
+
+
+class HairBall:
+    """Keeps what it has found for one array of strands, since that takes time."""
+
+    def __init__(self) -> None:
+        self._extent: tuple[Floats | None, Ball | float] = (None, 0.0)
+
+    def of(self, snapshot: Snapshot) -> Ball:
+        """Around all strands; of those on the GPU around all places that they can get to."""
+        device = snapshot.device_points
+        kept, found = self._extent
+        if kept is not snapshot.strands or isinstance(found, float) != (device is not None):
+            strands = snapshot.strands
+            found = ball_around(strands) if device is None else reach_of(strands)
+            self._extent = strands, found
+        return stepped_ball(snapshot.root_center, found) if isinstance(found, float) else found

@@ -1,0 +1,58 @@
+"""Meshes on the GPU."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats
+from ..shading.skin.layout import SkinLayout
+from .mesh_pictures import pictures_of
+from .snapshot import MeshSnapshot
+
+
+def mesh_batch(mesh: MeshSnapshot, skin: SkinLayout | None = None) -> Any:
+    """The triangles of a mesh: position, normal, occlusion; with pictures its UVs, for which each
+    corner is a vertex of its own.
+
+    Args:
+        skin: the layout of the head that it is a part of, in which each corner has a place.
+    """
+    surface = mesh.surface
+    count = len(surface.positions)
+    occlusion = np.ones(count) if mesh.occlusion is None else mesh.occlusion
+    values = {
+        "position": surface.positions,
+        "normal": mesh.vertex_normals,
+        "occlusion": occlusion[:, None],
+    }
+    has_corners = skin is not None or pictures_of(mesh) is not None
+    if has_corners:
+        corners = surface.triangles.ravel()
+        values = {name: array[corners] for name, array in values.items()}
+    if skin is not None:
+        values["skin_place"] = _skin_places(mesh, skin)
+    if pictures_of(mesh) is not None and surface.corner_uv is not None:
+        values["picture_place"] = surface.corner_uv.reshape(-1, 2)
+    layout = gpu.types.GPUVertFormat()
+    for name, array in values.items():
+        layout.attr_add(id=name, comp_type="F32", len=array.shape[1], fetch_mode="FLOAT")
+    vertices = gpu.types.GPUVertBuf(layout, len(values["position"]))
+    for name, array in values.items():
+        # attr_fill checks neither dtype nor order
+        vertices.attr_fill(name, np.ascontiguousarray(array, np.float32))
+    if has_corners:
+        return gpu.types.GPUBatch(type="TRIS", buf=vertices)
+    triangles = np.ascontiguousarray(surface.triangles, np.int32)
+    indices = gpu.types.GPUIndexBuf(type="TRIS", seq=triangles)
+    return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
+
+
+def _skin_places(mesh: MeshSnapshot, skin: SkinLayout) -> Floats:
+    """Place and island of each corner, (3 triangle_count, 3)."""
+    assert mesh.skin is not None
+    chosen = slice(None) if mesh.skin.triangle is None else mesh.skin.triangle
+    place = skin.place[chosen].reshape(-1, 2)
+    return np.column_stack([place, np.repeat(skin.triangle_island[chosen], 3)])

@@ -1,0 +1,64 @@
+"""The pictures of meshes' materials on the GPU."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from .snapshot import Color, MeshPictures, MeshSnapshot
+from .textures import texture_from
+
+#: straight up in tangent space
+_LEVEL = np.array([[[0.5, 0.5, 1.0, 1.0]]], np.float32)
+
+
+def pictures_of(mesh: MeshSnapshot) -> MeshPictures | None:
+    """Those of a mesh that has UVs to lay them over."""
+    pictures = mesh.pictures
+    if pictures is None or mesh.surface.corner_uv is None:
+        return None
+    return None if pictures.color is None and pictures.normal is None else pictures
+
+
+class PictureTextures:
+    """Uploads a picture once, as long as it is the same array."""
+
+    def __init__(self) -> None:
+        self._kept: dict[int, tuple[Floats, Any]] = {}
+        self._colors: dict[Color, Any] = {}
+
+    def textures(self, mesh: MeshSnapshot, pictures: MeshPictures) -> dict[str, Any]:
+        """By their names in the shader; of what has no picture one texel."""
+        color = pictures.color
+        return {
+            "mesh_color_map": self._plain(mesh.color) if color is None else self._texture(color),
+            "mesh_normal_map": self._texture(
+                _LEVEL if pictures.normal is None else pictures.normal
+            ),
+        }
+
+    def forget_but(self, meshes: Sequence[MeshSnapshot]) -> None:
+        """Let go of what none of these meshes has."""
+        used = {id(_LEVEL)}
+        for mesh in meshes:
+            if mesh.pictures is not None:
+                used |= {id(mesh.pictures.color), id(mesh.pictures.normal)}
+        colors = {mesh.color for mesh in meshes}
+        self._colors = {color: kept for color, kept in self._colors.items() if color in colors}
+        self._kept = {key: kept for key, kept in self._kept.items() if key in used}
+
+    def _plain(self, color: Color) -> Any:
+        if color not in self._colors:
+            texel = np.array([[[*color, 1.0]]], np.float32)
+            self._colors[color] = texture_from(texel, "RGBA32F")
+        return self._colors[color]
+
+    def _texture(self, picture: Floats) -> Any:
+        if id(picture) not in self._kept:
+            texture = texture_from(picture, "RGBA16F")
+            texture.extend_mode("REPEAT")
+            self._kept[id(picture)] = picture, texture
+        return self._kept[id(picture)][1]

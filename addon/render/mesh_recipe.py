@@ -1,0 +1,92 @@
+"""The programs that draw meshes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .opacity_pass import OpacityForm
+from .shader_program import ShaderRecipe
+from .skin_pass import SKIN_TEXTURES
+
+MESH_BLOCKS = (("View", "view"), ("Lights", "lights"))
+_INPUTS = (("VEC3", "position"), ("VEC3", "normal"), ("FLOAT", "occlusion"))
+_VARYINGS = (
+    ("smooth", "VEC3", "mesh_point"),
+    ("smooth", "VEC3", "mesh_normal"),
+    ("smooth", "FLOAT", "mesh_occlusion"),
+)
+#: of the pictures of a material
+PICTURES = ("mesh_color_map", "mesh_normal_map")
+_STRUCTS = ("struct_view.glsl", "struct_lights.glsl", "struct_opacity.glsl")
+
+
+@dataclass(frozen=True)
+class MeshForm:
+    """Which of the programs a mesh needs.
+
+    opacity: of the maps through which hair and meshes throw shadows on it; None: there are none.
+    is_skin: whether the shadow is looked up where it has been spread.
+    has_pictures: whether pictures are laid over its UVs.
+    transparency: one of TRANSPARENCIES.
+    """
+
+    opacity: OpacityForm | None = None
+    is_skin: bool = False
+    has_pictures: bool = False
+    transparency: str = "opaque"
+
+    @property
+    def recipe(self) -> ShaderRecipe:
+        opacity = self.opacity
+        parts = [f"{opacity.slots}_{opacity.is_deep}"] if opacity else []
+        parts += ["skin"] * self.is_skin + ["pictures"] * self.has_pictures
+        return ShaderRecipe(
+            name="_".join(["mesh", *parts, self.transparency]),
+            vertex="mesh.vert.glsl",
+            fragment="mesh.frag.glsl",
+            structs=_STRUCTS,
+            blocks=(*MESH_BLOCKS, *((("Opacity", "opacity"),) if opacity else ())),
+            textures=(
+                *(opacity.samplers if opacity else ()),
+                *(SKIN_TEXTURES if self.is_skin else ()),
+                *((("FLOAT_2D", name) for name in PICTURES) if self.has_pictures else ()),
+            ),
+            integers=("output_encoding",),
+            numbers=(
+                ("FLOAT", "mesh_sheen"),
+                ("FLOAT", "mesh_cover"),
+                ("FLOAT", "mesh_bump") if self.has_pictures else ("VEC3", "mesh_color"),
+                *((("FLOAT", "mesh_alpha"),) if self.transparency != "opaque" else ()),
+            ),
+            inputs=(
+                *_INPUTS,
+                *((("VEC3", "skin_place"),) if self.is_skin else ()),
+                *((("VEC2", "picture_place"),) if self.has_pictures else ()),
+            ),
+            varyings=(
+                *_VARYINGS,
+                *((("smooth", "VEC3", "mesh_skin"),) if self.is_skin else ()),
+                *((("smooth", "VEC2", "mesh_uv"),) if self.has_pictures else ()),
+            ),
+            outputs=(("VEC4", "color"),),
+            defines=(
+                ("SHADOWS", int(opacity is not None)),
+                *(opacity.defines if opacity else ()),
+                *((("SKIN", 1),) if self.is_skin else ()),
+                *((("PICTURES", 1),) if self.has_pictures else ()),
+                *(((self.transparency.upper(), 1),) if self.transparency != "opaque" else ()),
+            ),
+        )
+
+
+NUMBERS = ShaderRecipe(
+    name="mesh_number",
+    vertex="mesh.vert.glsl",
+    fragment="mesh_number.frag.glsl",
+    structs=("struct_view.glsl",),
+    blocks=(MESH_BLOCKS[0],),
+    numbers=(("FLOAT", "mesh_number"),),
+    inputs=_INPUTS,
+    varyings=_VARYINGS,
+    outputs=(("VEC4", "color"),),
+)

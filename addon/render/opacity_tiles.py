@@ -1,0 +1,83 @@
+"""The layers of opacity maps side by side in one picture, to see what they hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import HairloomError
+from ..shading.lights import LIGHT_CAPACITY
+from .opacity_maps import OpacityMaps
+from .shader_program import ShaderRecipe, program
+from .shader_source import TILE_GAP
+from .textures import UniformBlock, texture_to_array
+
+#: pixels along a side of a tile, at most
+_TILE = 256
+
+
+def opacity_tiles(maps: OpacityMaps, layer_count: int) -> Floats:
+    """How much light is left behind each layer, (height, width, 4) scene-linear.
+
+    Row 0 is at the bottom. Layers of a map lie in rows from the top left on, 16 of them 4 x 4; of
+    deep ones the first tile is the depth at which they start, bright near the light. The maps of
+    several lights lie below one another, in the order of the lights.
+
+    Args:
+        layer_count: of the layers that a map has, see shading.volume.opacity.layer_ends.
+
+    Raises:
+        HairloomError: no light has a map.
+    """
+    numbers = maps.values[: 5 * 4 * LIGHT_CAPACITY].reshape(5, LIGHT_CAPACITY, 4)[4, :, 0]
+    map_count = int((numbers >= 0.0).sum())
+    if not map_count:
+        raise HairloomError(
+            "no light throws a shadow of hair here",
+            place="Show Slices",
+            remedy="Add a light outside of the hair, and raise Lights in Shadows if it is 0",
+        )
+    return np.concatenate([_tiles(maps, each, layer_count) for each in reversed(range(map_count))])
+
+
+def _recipe(maps: OpacityMaps) -> ShaderRecipe:
+    samplers = [each for each in maps.form.samplers if each[1] != "opacity_meshes"]
+    return ShaderRecipe(
+        name=f"opacity_tiles_{maps.form.slots}_{'deep' if maps.form.is_deep else 'slices'}",
+        compute="opacity_tiles.comp.glsl",
+        structs=("struct_opacity.glsl",),
+        blocks=(("Opacity", "opacity"),),
+        textures=tuple(samplers),
+        images=(("RGBA32F", "tiles"),),
+        integers=("map_index", "tile_count", "tile_columns", "texels_across"),
+        defines=maps.form.defines,
+    )
+
+
+def _tiles(maps: OpacityMaps, number: int, layer_count: int) -> Floats:
+    count = layer_count + maps.form.is_deep
+    columns = int(np.ceil(np.sqrt(count)))
+    across = -(-maps.slots[0].width // _TILE)
+    pitch = maps.slots[0].width // across + TILE_GAP
+    width, height = columns * pitch, -(-count // columns) * pitch
+    tiles = gpu.types.GPUTexture((width, height), format="RGBA32F")
+    recipe, block = _recipe(maps), UniformBlock()
+    shader = program(recipe)
+    textures: dict[str, Any] = {name: maps.textures[name] for _, name in recipe.textures}
+    shader.bind(
+        blocks={"opacity": block.holding(maps.values)},
+        textures=textures,
+        images={"tiles": tiles},
+        integers={
+            "map_index": number,
+            "tile_count": count,
+            "tile_columns": columns,
+            "texels_across": across,
+        },
+    )
+    gpu.compute.dispatch(shader.shader, -(-width // 8), -(-height // 8), 1)
+    gpu.shader.unbind()
+    return texture_to_array(tiles)

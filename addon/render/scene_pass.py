@@ -1,0 +1,138 @@
+"""Draws a whole scene: meshes first, then the strands of all grooms, each in its own light."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Hashable
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Floats
+from .accumulation import Target
+from .camera import Camera
+from .camera_window import view_depth
+from .card_pass import CardPass
+from .mesh_pass import MeshPass
+from .opacity_maps import OpacityMaps
+from .scene_snapshot import SceneSnapshot, shaded_by
+from .shafts_pass import add_shafts, put_under
+from .snapshot import MeshSnapshot, Snapshot
+from .strand_pass import StrandPass
+from .textures import texture_to_array
+
+type Rgba = tuple[float, float, float, float]
+
+#: A render in the window draws in a thread of its own, and passes share textures.
+ONE_AT_A_TIME = threading.Lock()
+_NOTHING: Rgba = (0.0, 0.0, 0.0, 0.0)
+#: distance [m] where nothing is, as Blender's engines have it
+FAR_AWAY = 1.0e10
+
+
+class ScenePass:
+    """Keeps a scene on the GPU from draw to draw; making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self._strand_passes: dict[Hashable, StrandPass] = {}
+        self._card_passes: dict[Hashable, CardPass] = {}
+        self._mesh_passes: dict[Hashable, MeshPass] = {}
+        self._numbered = MeshPass()
+
+    def draw(
+        self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int], sky: Rgba
+    ) -> None:
+        """Draw one moment, scene-linear, premultiplied.
+
+        Args:
+            size: width and height [pixels].
+            sky: what is seen where nothing is.
+
+        Raises:
+            ShaderError: a shader does not compile here, or points on the GPU were released.
+        """
+        with ONE_AT_A_TIME:
+            self._draw(scene, camera, target, size, sky)
+
+    def _draw(
+        self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int], sky: Rgba
+    ) -> None:
+        self._forget_but(scene)
+        lit = {groom.key: scene.lit(groom) for groom in scene.grooms}
+        maps = {
+            key: self._strands(key).opacity(groom) or self._cards(key).opacity(groom)
+            for key, groom in lit.items()
+        }
+        shafts = next((each.shafts for each in lit.values() if each.shafts.use_shafts), None)
+        # shafts ask alpha what stands before a light
+        target.sized(*size).clear(sky if shafts is None else _NOTHING)
+        with target.drawing():
+            self._draw_meshes(scene, camera, size, maps)
+            for key, groom in lit.items():
+                self._strands(key).draw(groom, camera, *size)
+            for key, groom in lit.items():
+                self._cards(key).draw(groom, camera, *size, opacity=maps[key])
+        if shafts is not None:
+            color, depth = target.color, target.depth
+            add_shafts(color, color, depth, camera, scene.lights, shafts)
+            put_under(color, sky)
+
+    def distances_and_numbers(
+        self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]
+    ) -> tuple[Floats, Floats]:
+        """Of what lies in the middle of each pixel: how far away along the view [m], and its
+        object's number; each (height, width) float32, row 0 at the bottom.
+        """
+        with ONE_AT_A_TIME:
+            target.sized(*size).clear(_NOTHING)
+            with target.drawing():
+                self._numbered.draw_numbers(scene.meshes, camera, *size)
+            numbers = texture_to_array(target.color)[..., 0].copy()
+            depth = target.depths()
+            for groom in scene.grooms:
+                with target.drawing():
+                    self._strands(groom.key).draw(_hiding(scene.lit(groom)), camera, *size)
+                before, depth = depth, target.depths()
+                numbers[depth < before] = groom.number
+        distances = np.where(depth < 1.0, view_depth(camera, depth), FAR_AWAY)
+        return distances.astype(np.float32), numbers
+
+    def _strands(self, key: Hashable) -> StrandPass:
+        return self._strand_passes.setdefault(key, StrandPass())
+
+    def _cards(self, key: Hashable) -> CardPass:
+        return self._card_passes.setdefault(key, CardPass())
+
+    def _draw_meshes(
+        self,
+        scene: SceneSnapshot,
+        camera: Camera,
+        size: tuple[int, int],
+        maps: dict[Hashable, OpacityMaps | None],
+    ) -> None:
+        """Each mesh with the shadow of the groom that is nearest."""
+        shading = [groom for groom in scene.grooms if maps[groom.key] is not None]
+        centers = np.array([scene.lit(groom).center for groom in shading]).reshape(-1, 3)
+        groups: dict[int, list[MeshSnapshot]] = {}
+        for mesh, index in zip(scene.meshes, shaded_by(scene.meshes, centers), strict=True):
+            groups.setdefault(index, []).append(mesh)
+        for index, meshes in groups.items():
+            groom = None if index < 0 else shading[index]
+            light = scene.unlit_by_hair() if groom is None else scene.lit(groom)
+            key = None if groom is None else groom.key
+            mesh_pass = self._mesh_passes.setdefault(key, MeshPass())
+            opacity = None if key is None else maps[key]
+            mesh_pass.draw(replace(light, meshes=tuple(meshes)), camera, *size, opacity=opacity)
+
+    def _forget_but(self, scene: SceneSnapshot) -> None:
+        """Let go of grooms that are no longer there."""
+        keys = {groom.key for groom in scene.grooms}
+        for passes in (self._strand_passes, self._card_passes, self._mesh_passes):
+            for key in set(passes) - keys - {None}:
+                del passes[key]
+
+
+def _hiding(snapshot: Snapshot) -> Snapshot:
+    """The same hair, whose strands hide all that is behind them."""
+    opaque = replace(snapshot.strand_settings, transparency="none")
+    return replace(snapshot, strand_settings=opaque)

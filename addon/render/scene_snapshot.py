@@ -1,0 +1,100 @@
+"""A whole scene as it is drawn: meshes, grooms and light, as plain arrays.
+
+Pure numpy: importable without gpu.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..arrays import Floats
+from ..shading.lights import Light
+from .snapshot import Color, MeshSnapshot, Snapshot
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnGroom:
+    """One groom of a scene.
+
+    key: equal from moment to moment.
+    snapshot: its own meshes, lights and ambient count for nothing, the scene's stand for them.
+    number: what the object mask holds where it is seen.
+    """
+
+    key: Hashable
+    snapshot: Snapshot
+    number: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class SceneSnapshot:
+    """One moment of a scene.
+
+    casters: meshes that throw shadows on hair, seen or not, world space.
+    ambient: the world's colour [W/(m^2 sr)].
+    """
+
+    meshes: tuple[MeshSnapshot, ...] = ()
+    casters: tuple[MeshSnapshot, ...] = ()
+    grooms: tuple[DrawnGroom, ...] = ()
+    lights: tuple[Light, ...] = ()
+    ambient: Color = (0.0, 0.0, 0.0)
+    _lit: dict[Hashable, Snapshot] = field(default_factory=dict, init=False, repr=False)
+
+    def lit(self, groom: DrawnGroom) -> Snapshot:
+        """The groom in the scene's light, on the mesh that is nearest, among all that throw
+        shadows; the same object as long as the scene is the same.
+        """
+        if groom.key not in self._lit:
+            near = _nearest(self.casters, groom.snapshot.center)
+            others = tuple(mesh.surface for mesh in self.casters if mesh is not near)
+            self._lit[groom.key] = replace(
+                groom.snapshot,
+                meshes=() if near is None else (near,),
+                casters=others,
+                lights=self.lights,
+                ambient=self.ambient,
+            )
+        return self._lit[groom.key]
+
+    def unlit_by_hair(self) -> Snapshot:
+        """Nothing but light, for meshes that no hair shades."""
+        none = np.zeros((0, 2, 3), np.float32)
+        return Snapshot(none, none[..., 0], lights=self.lights, ambient=self.ambient)
+
+
+def shaded_by(meshes: tuple[MeshSnapshot, ...], centers: Floats) -> list[int]:
+    """For each mesh the groom whose shadow falls on it: the one that is nearest.
+
+    Args:
+        centers: (groom_count, 3) [m], the middles of the grooms that throw shadows.
+
+    Returns:
+        Indices into `centers`; all -1 without any.
+    """
+    if not len(centers):
+        return [-1] * len(meshes)
+    return [int(_distances(mesh, centers).argmin()) for mesh in meshes]
+
+
+def _nearest(meshes: tuple[MeshSnapshot, ...], center: Floats) -> MeshSnapshot | None:
+    """The mesh that hair around this place grows from, as far as that can be told; of those whose
+    box holds the place, the smallest.
+    """
+
+    def rank(mesh: MeshSnapshot) -> tuple[float, float]:
+        low, high = mesh.surface.bounds()
+        return float(_distances(mesh, center[None])[0]), float(np.linalg.norm(high - low))
+
+    return min(meshes, key=rank, default=None)
+
+
+def _distances(mesh: MeshSnapshot, places: Floats) -> Floats:
+    """Squares of the distances [m^2] of places (n, 3) from a mesh's box, (n,)."""
+    low, high = mesh.surface.bounds()
+    outside = np.maximum(low - places, places - high).clip(min=0.0)
+    squares: Floats = (outside**2).sum(axis=1)
+    return squares

@@ -1,0 +1,284 @@
+"""Draws soft shadows on heads: how much light reaches the skin, in UV space, spread along it.
+
+    texels     what each texel of a head's UV map shows: triangle, two weights, island
+    stretches  its width and height [m], and the nearest seam
+    shadow     the share of each light that reaches the skin, a channel a light, at first as it is;
+               spread along rows and then along columns
+    shifts     what closes seams where three or more meet
+
+The layout (addon/shading/skin/layout.py) is made when a head's triangles or UVs are others; the
+shadow when anything has moved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..shading.skin.layout import SkinLayout
+from ..shading.skin.settings import SkinSettings
+from ..strands import Surface
+from .opacity_pass import OpacityForm, OpacityMaps
+from .shader_program import ShaderRecipe, program
+from .shader_source import SKIN_COPIES_ACROSS, SKIN_SEAMS_ACROSS, SKIN_TRIANGLES_ACROSS
+from .skin_layouts import layout_of
+from .snapshot import MeshSnapshot
+from .textures import UniformBlock, texture_from, texture_to_array
+
+#: what a program that looks the shadow up needs
+SKIN_TEXTURES = tuple(
+    ("FLOAT_2D", f"skin_{name}") for name in ("shadow", "texels", "stretches", "seams", "shifts")
+)
+
+
+def _shadow_recipe(opacity: OpacityForm) -> ShaderRecipe:
+    return ShaderRecipe(
+        name=f"skin_shadow_{opacity.slots}_{opacity.is_deep}",
+        compute="skin_shadow.comp.glsl",
+        structs=("struct_opacity.glsl",),
+        blocks=(("Opacity", "opacity"),),
+        textures=(
+            ("FLOAT_2D", "skin_texels"),
+            ("FLOAT_2D", "skin_corners"),
+            *opacity.samplers,
+        ),
+        images=(("RGBA32F", "reaching"),),
+        integers=("light_count",),
+        defines=(("SHADOWS", 1), *opacity.defines),
+    )
+
+
+_BLUR_RECIPE = ShaderRecipe(
+    name="skin_blur",
+    compute="skin_blur.comp.glsl",
+    textures=tuple(("FLOAT_2D", f"skin_{name}") for name in ("shadow", "texels", "stretches")),
+    images=(("RGBA32F", "spread"),),
+    integers=("axis",),
+    numbers=(("FLOAT", "softness"),),
+)
+_CORNER_RECIPE = ShaderRecipe(
+    name="skin_corner",
+    compute="skin_corner.comp.glsl",
+    textures=tuple(
+        ("FLOAT_2D", f"skin_{name}") for name in ("shadow", "texels", "seams", "copies")
+    ),
+    images=(("RGBA32F", "shifts"),),
+)
+
+
+@dataclass(eq=False)
+class SkinShadow:
+    """The shadow on one head.
+
+    textures: by their names in the shader, see SKIN_TEXTURES.
+    """
+
+    layout: SkinLayout
+    textures: dict[str, Any]
+
+    def picture(self) -> Floats:
+        """The map as a picture, (rows, columns, channels), row 0 at v = 0: the share of each light
+        that reaches the skin, 1 where there is none.
+        """
+        return texture_to_array(self.textures["skin_shadow"])
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """What a shadow hangs on."""
+
+    positions: Floats
+    opacity: OpacityMaps
+    softness: float
+    light_count: int
+
+    def is_like(self, other: _Drawn) -> bool:
+        return (
+            self.positions is other.positions
+            and self.opacity is other.opacity
+            and (self.softness, self.light_count) == (other.softness, other.light_count)
+        )
+
+
+@dataclass(eq=False)
+class _Head:
+    """A head on the GPU. drawn: of what its shadow was drawn."""
+
+    triangles: Ints
+    corner_uv: Floats
+    resolution: int
+    layout: SkinLayout
+    textures: dict[str, Any]
+    drawn: _Drawn | None = None
+    shadow: SkinShadow | None = None
+
+    def is_of(self, surface: Surface, resolution: int) -> bool:
+        return (
+            self.triangles is surface.triangles
+            and self.corner_uv is surface.corner_uv
+            and self.resolution == resolution
+        )
+
+
+class SkinPass:
+    """Keeps layouts and shadows of the heads that were drawn last; making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU; the next draw makes it anew."""
+        self._heads: list[_Head] = []
+        self._block = UniformBlock()
+
+    def shadows(
+        self,
+        meshes: Sequence[MeshSnapshot],
+        opacity: OpacityMaps | None,
+        settings: SkinSettings,
+        light_count: int,
+    ) -> dict[int, SkinShadow]:
+        """The soft shadow on each mesh that is skin, by the mesh's id(); none on those whose UVs
+        are of no use, and none at all without opacity maps or softness.
+
+        Args:
+            light_count: lights that the maps know of.
+        """
+        if opacity is None or not settings.soft_shadow or not settings.softness:
+            return {}
+        found, used = {}, []
+        for mesh in meshes:
+            if mesh.skin is None or mesh.skin.surface.corner_uv is None:
+                continue
+            head = self._head(mesh.skin.surface, settings.skin_resolution)
+            used.append(head)
+            if not head.layout.is_empty:
+                found[id(mesh)] = self._drawn(
+                    head, mesh.skin.surface, opacity, settings.softness, light_count
+                )
+        self._heads = [head for head in self._heads if head in used]
+        return found
+
+    @property
+    def drawn(self) -> tuple[SkinShadow, ...]:
+        """The shadows of the heads that were drawn last."""
+        return tuple(head.shadow for head in self._heads if head.shadow is not None)
+
+    def _head(self, surface: Surface, resolution: int) -> _Head:
+        for head in self._heads:
+            if head.is_of(surface, resolution):
+                return head
+        assert surface.corner_uv is not None
+        layout = layout_of(surface, resolution)
+        textures = {} if layout.is_empty else layout_textures(layout)
+        self._heads.append(
+            _Head(surface.triangles, surface.corner_uv, resolution, layout, textures)
+        )
+        return self._heads[-1]
+
+    def _drawn(
+        self,
+        head: _Head,
+        surface: Surface,
+        opacity: OpacityMaps,
+        softness: float,
+        light_count: int,
+    ) -> SkinShadow:
+        wanted = _Drawn(surface.positions, opacity, softness, light_count)
+        if head.shadow is None or head.drawn is None or not head.drawn.is_like(wanted):
+            shadow = self._reaching(head, surface, opacity, light_count)
+            for axis in range(2):
+                shadow = spread(shadow, head.textures, softness, axis)
+            shifts = closing_shifts(shadow, head.textures)
+            kept = {name: head.textures[name] for _, name in SKIN_TEXTURES[1:4]}
+            textures = {"skin_shadow": shadow, "skin_shifts": shifts, **kept}
+            head.shadow, head.drawn = SkinShadow(head.layout, textures), wanted
+        return head.shadow
+
+    def _reaching(
+        self, head: _Head, surface: Surface, opacity: OpacityMaps, light_count: int
+    ) -> Any:
+        """How much of each light reaches the skin, as it is."""
+        corners = texture_from(
+            _in_rows(surface.corners.reshape(-1, 3), 3 * SKIN_TRIANGLES_ACROSS), "RGBA32F"
+        )
+        texels = head.textures["skin_texels"]
+        shader = program(_shadow_recipe(opacity.form))
+        found = _like(texels)
+        shader.bind(
+            blocks={"opacity": self._block.holding(opacity.values)},
+            textures={"skin_texels": texels, "skin_corners": corners, **opacity.textures},
+            images={"reaching": found},
+            integers={"light_count": light_count},
+        )
+        _dispatch(shader, found)
+        return found
+
+
+def layout_textures(layout: SkinLayout) -> dict[str, Any]:
+    """A layout on the GPU, as lib_skin.glsl and skin_*.comp.glsl read it, by name."""
+    texels = np.dstack([layout.triangle, layout.weights, layout.island])
+    stretches = np.dstack([layout.stretch, layout.seam, np.zeros_like(layout.seam)])
+    count = len(layout.seams)
+    parts = np.zeros((max(count, 1), 4, 4))
+    if count:
+        parts[:, :2] = layout.seams
+        parts[:, 2, :2] = layout.seam_islands
+        parts[:, 3] = layout.end_copies.reshape(-1, 4)
+    rows = {
+        "skin_texels": texels,
+        "skin_stretches": stretches,
+        "skin_seams": _in_rows(parts.reshape(-1, 4), 4 * SKIN_SEAMS_ACROSS),
+        "skin_copies": _in_rows(layout.copies, SKIN_COPIES_ACROSS),
+    }
+    return {name: texture_from(values, "RGBA32F") for name, values in rows.items()}
+
+
+def spread(shadow: Any, textures: dict[str, Any], softness: float, axis: int) -> Any:
+    """The texture spread by so many metres along rows (axis 0) or columns (axis 1)."""
+    found, shader = _like(shadow), program(_BLUR_RECIPE)
+    names = ("skin_texels", "skin_stretches")
+    shader.bind(
+        textures={"skin_shadow": shadow, **{name: textures[name] for name in names}},
+        images={"spread": found},
+        integers={"axis": axis},
+        numbers={"softness": softness},
+    )
+    _dispatch(shader, found)
+    return found
+
+
+def closing_shifts(shadow: Any, textures: dict[str, Any]) -> Any:
+    """A texture with two texels a seam, see skin_corner.comp.glsl."""
+    seams = textures["skin_seams"]
+    found = gpu.types.GPUTexture((seams.width // 2, seams.height), format="RGBA32F")
+    shader = program(_CORNER_RECIPE)
+    names = ("skin_texels", "skin_seams", "skin_copies")
+    shader.bind(
+        textures={"skin_shadow": shadow, **{name: textures[name] for name in names}},
+        images={"shifts": found},
+    )
+    _dispatch(shader, found)
+    return found
+
+
+def _in_rows(values: Floats, across: int) -> Floats:
+    """Values (n, channels) as texels, `across` a row, (rows, across, 4)."""
+    rows = max(-(-len(values) // across), 1)
+    texels = np.zeros((rows * across, 4), np.float32)
+    texels[: len(values), : values.shape[1]] = values
+    return texels.reshape(rows, across, 4)
+
+
+def _like(texture: Any) -> Any:
+    return gpu.types.GPUTexture((texture.width, texture.height), format="RGBA32F")
+
+
+def _dispatch(shader: Any, image: Any) -> None:
+    gpu.compute.dispatch(shader.shader, -(-image.width // 8), -(-image.height // 8), 1)
+    gpu.shader.unbind()

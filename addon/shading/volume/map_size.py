@@ -1,0 +1,101 @@
+"""How large opacity maps are: what GPU and memory allow of what is asked for.
+
+A map has as many texels a side as the settings say, as long as that fits: many lights with many
+layers at the largest resolution would be gigabytes, which are allocated before anything is drawn.
+What does not fit is drawn with fewer texels: blurred, and as dark as it should be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .opacity import layer_ends
+from .settings import VolumeSettings
+
+#: [bytes] that all maps of one groom may take
+MEMORY_LIMIT = 512 * 2**20
+#: texels of a map along one of where its deep layers start
+START_TEXELS = 4
+#: colour slots that a framebuffer has
+MOST_SLOTS = 6
+#: sums of four layers in float32; the depth of the first mesh; first and last hair in every block
+_LAYERS_BYTES, _MESH_BYTES, _SPAN_BYTES = 16, 4, 8
+#: [texels] of a texture on every GPU that Blender supports
+_LARGEST_SIDE = 16384
+
+
+@dataclass(frozen=True)
+class MapSize:
+    """Of all maps of a groom.
+
+    side: texels along a side of a map, whole blocks of START_TEXELS.
+    slots: textures of four layers that are drawn into at once.
+    passes: how often, and layers of each of these arrays that one map takes.
+    map_count: maps, one a light.
+    """
+
+    side: int
+    slots: int
+    passes: int
+    map_count: int
+    is_deep: bool
+
+    @property
+    def texels(self) -> int:
+        """Texels of four layers that a map has in depth."""
+        return self.slots * self.passes
+
+    @property
+    def bytes(self) -> int:
+        """On the GPU."""
+        # one texture alone would not be an array
+        arrays = max(self.map_count * self.passes, 2) * self.slots * _LAYERS_BYTES
+        meshes = max(self.map_count, 2) * _MESH_BYTES
+        spans = _SPAN_BYTES * self.map_count / START_TEXELS**2 if self.is_deep else 0.0
+        return int(self.side**2 * (arrays + meshes + spans))
+
+
+def asked_size(settings: VolumeSettings, map_count: int) -> MapSize:
+    """What the settings ask for."""
+    layers = len(layer_ends(settings))
+    slots = min(-(-layers // 4), MOST_SLOTS)
+    side = -(-settings.resolution // START_TEXELS) * START_TEXELS
+    is_deep = settings.shadows == "deep"
+    return MapSize(side, slots, -(-layers // (4 * slots)), max(map_count, 1), is_deep)
+
+
+def fitted_size(
+    settings: VolumeSettings, map_count: int, largest_side: int = _LARGEST_SIDE
+) -> MapSize:
+    """What is drawn: fewer texels a side where the asked size does not fit.
+
+    Args:
+        map_count: lights that throw shadows.
+        largest_side: of a texture on this GPU.
+    """
+    size = asked_size(settings, map_count)
+    per_texel = size.bytes / size.side**2
+    # `starts` has the maps above one another
+    side = min(size.side, largest_side, int(np.sqrt(MEMORY_LIMIT / per_texel)))
+    if size.is_deep:
+        side = min(side, largest_side * START_TEXELS // size.map_count)
+    return replace(size, side=max(side // START_TEXELS, 1) * START_TEXELS)
+
+
+def size_note(settings: VolumeSettings, map_count: int, drawn: MapSize | None = None) -> str:
+    """What the artist is told where maps are smaller than asked for; empty where they are not.
+
+    Args:
+        drawn: None where the GPU is not known: what every GPU allows.
+    """
+    if settings.shadows == "none":
+        return ""
+    asked, drawn = asked_size(settings, map_count), drawn or fitted_size(settings, map_count)
+    if drawn == asked:
+        return ""
+    return (
+        f"Shadow maps of {asked.side} texels for {asked.map_count} lights would take "
+        f"{asked.bytes / 2**20:,.0f} MB: drawn with {drawn.side}"
+    )

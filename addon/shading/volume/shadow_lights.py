@@ -1,0 +1,139 @@
+"""Which lights throw shadows of hair, and what the artist should know about them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ...arrays import Floats
+from ..lights import Light, light_irradiance
+from .light_frame import WIDEST, Ball, LightFrame, is_within, light_frame, shines_along
+from .map_size import size_note
+from .settings import VolumeSettings
+
+#: lights without a shadow are told of where they are more than this share of all light
+_MUCH_LIGHT = 0.25
+#: at this extinction one strand, though it covers a hundredth of a texel, takes most of the light
+_HARD_EXTINCTION = 100.0
+#: [m] hair smaller than this has no extent
+_NO_EXTENT = 2e-4
+
+
+def shadow_frames(
+    lights: Sequence[Light], ball: Ball, settings: VolumeSettings
+) -> list[LightFrame | None]:
+    """The frame of each light's map; None of those that throw no shadow."""
+    frames: list[LightFrame | None] = [None] * len(lights)
+    if settings.shadows != "none":
+        for index, frame in _asked(lights, ball, settings):
+            frames[index] = frame
+    return frames
+
+
+def shadow_warnings(
+    lights: Sequence[Light], ball: Ball, settings: VolumeSettings
+) -> tuple[str, ...]:
+    """What keeps hair from throwing the shadows that one may expect, each with its remedy.
+
+    Args:
+        ball: around all hair.
+    """
+    if settings.shadows == "none":
+        return ()
+    maps = list(_asked(lights, ball, settings))
+    asked = [index for index, _ in maps]
+    found = list(_setting_warnings(ball, settings))
+    too_large = size_note(settings, sum(frame is not None for _, frame in maps))
+    if too_large:
+        found.append(f"{too_large}. Lower Resolution, the number of layers, or Lights in Shadows.")
+    found += [note for index in asked for note in _light_warnings(lights[index], ball)]
+    strengths = _strengths(lights, ball)
+    left_out = 1.0 - float(strengths[asked].sum()) / max(float(strengths.sum()), 1e-30)
+    if settings.most_lights and len(lights) > len(asked) and left_out > _MUCH_LIGHT:
+        found.append(
+            f"Shadows: only the {settings.most_lights} strongest of {len(lights)} lights throw "
+            f"shadows of hair; {left_out:.0%} of the light comes from the others. Raise Lights in "
+            "Shadows, or hide those that add least."
+        )
+    return tuple(found)
+
+
+def _setting_warnings(ball: Ball, settings: VolumeSettings) -> Iterator[str]:
+    if settings.extinction == 0.0:
+        yield (
+            "Shadows: with an Extinction of 0 hair throws none. Set it to 1, which is what the "
+            "strands' width asks for, or Shadows to None."
+        )
+    if settings.extinction >= _HARD_EXTINCTION:
+        yield (
+            f"Shadows: with an Extinction of {settings.extinction:g} a single strand takes all "
+            "light. Set it to 1, which is what the strands' width asks for."
+        )
+    if settings.most_lights == 0:
+        yield (
+            "Shadows: no light throws any as long as Lights is 0. Raise it, or set Shadows to None."
+        )
+    if ball.radius < _NO_EXTENT:
+        yield (
+            "Shadows: the hair has no extent, so it throws none that could be seen. Give its "
+            "strands a length."
+        )
+
+
+def _light_warnings(light: Light, ball: Ball) -> Iterator[str]:
+    """Of a light that has, or could have, a map."""
+    name = light.name or f"A {light.kind} light"
+    if _misses(light, ball):
+        yield (
+            f"{name}: it shines past the hair, so it neither lights it nor throws its shadow. Turn "
+            "it to the hair, or hide it."
+        )
+    elif is_within(light, ball) and _is_wide(light):
+        clear = f"Move it farther than {1.05 * ball.radius:.2g} m from the middle of the hair"
+        if light_frame(light, ball) is None:
+            yield f"{name}: it stands amidst the hair, which throws no shadow of it. {clear}."
+        else:
+            yield (
+                f"{name}: it stands as near as hair reaches, and hair beside and behind it gets no "
+                f"shadow. {clear}, or take a spot."
+            )
+
+
+def _is_wide(light: Light) -> bool:
+    """Whether it lights more than a map can hold."""
+    if light.panel is not None:
+        return False  # what lies flat beside it has hardly any light
+    return light.cone is None or 0.5 * light.cone.size > WIDEST
+
+
+def _misses(light: Light, ball: Ball) -> bool:
+    """Whether no place of the ball is in a light's beam."""
+    along = shines_along(light)
+    if along is None:
+        return False
+    towards = ball.center - np.asarray(light.vector)
+    distance = float(np.linalg.norm(towards))
+    if distance <= ball.radius:
+        return light_frame(light, ball) is None
+    angle = float(np.arccos(np.clip(along @ towards / distance, -1.0, 1.0)))
+    half = 0.5 * (light.cone.size if light.cone is not None else np.pi)
+    return angle - float(np.arcsin(ball.radius / distance)) > half
+
+
+def _strengths(lights: Sequence[Light], ball: Ball) -> Floats:
+    """Light of each at the middle of the hair, (light_count,)."""
+    return np.array([float(light_irradiance(light, ball.center).sum()) for light in lights])
+
+
+def _asked(
+    lights: Sequence[Light], ball: Ball, settings: VolumeSettings
+) -> Iterator[tuple[int, LightFrame | None]]:
+    """The strongest lights, until as many have a map as may have one."""
+    strengths, left = _strengths(lights, ball), settings.most_lights
+    for index in sorted(range(len(lights)), key=lambda index: -strengths[index]):
+        if left == 0:
+            return
+        frame = light_frame(lights[index], ball)
+        left -= frame is not None
+        yield index, frame

@@ -1,0 +1,35 @@
+// Hair's shadow on meshes that Blender has drawn: how much of the light hair leaves, as black that
+// lies over the finished picture.
+//
+// What a colour of the picture becomes hangs on its view transform; a middle grey stands for all.
+#include "lib_lights.glsl"
+#include "lib_shadows.glsl"
+#include "lib_output.glsl"
+
+const float MIDDLE_GREY = 0.18, NO_LIGHT = 1.0e-4;
+
+// Brightness on the screen of a matt grey surface in this light.
+float shown(vec3 radiance)
+{
+  vec3 code = pow(output_encoded(MIDDLE_GREY * radiance, {{output_viewport}}), vec3(1.0 / 2.2));
+  return dot(code, vec3(0.2126, 0.7152, 0.0722));
+}
+
+void main()
+{
+  vec3 to_eye = view.eye.xyz - view.eye.w * mesh_point;
+  vec3 normal = normalize(mesh_normal);
+  normal = dot(normal, to_eye) < 0.0 ? -normal : normal;
+  vec3 all_light = lights.ambient_and_count.xyz;
+  vec3 left = all_light;
+  for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
+    vec3 to_light, irradiance;
+    light_at(lights, index, mesh_point, to_light, irradiance);
+    vec3 way = way_of_light(index, mesh_point);
+    vec3 arriving = irradiance * way.z * max(0.0, dot(normal, to_light)) / LIGHT_PI;
+    all_light += arriving;
+    left += arriving * exp(-max(way.x, 0.0));
+  }
+  // where there is no light at all hair takes none
+  color = vec4(vec3(0.0), 1.0 - (shown(left) + NO_LIGHT) / (shown(all_light) + NO_LIGHT));
+}

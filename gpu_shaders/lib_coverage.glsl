@@ -1,0 +1,36 @@
+// How much of a pixel a thin strip covers: the pixel is a unit square, the strip goes on beyond it.
+//
+// Twin of addon/shading/volume/transparency.py. Holds no resources.
+
+// The share of a pixel that lies below a line, whose distance from the pixel's centre is `distance`,
+// positive above it. `normal` is the line's unit normal without its signs.
+float share_below(float distance, vec2 normal)
+{
+  float wide = max(normal.x, normal.y), narrow = min(normal.x, normal.y);
+  float inner = 0.5 * (wide - narrow), reach = 0.5 * (wide + narrow);
+  float away = min(abs(distance), reach);
+  float corner = (reach - away) * (reach - away) / (2.0 * wide * max(narrow, 1.0e-6));
+  float beyond = away <= inner ? 0.5 - away / wide : corner;
+  return distance < 0.0 ? beyond : 1.0 - beyond;
+}
+
+// The share that a strip covers. half_width: of the strip [pixels]; distance: of its middle line from
+// the pixel's centre [pixels].
+float strip_coverage(float distance, float half_width, vec2 normal)
+{
+  return share_below(distance + half_width, normal) - share_below(distance - half_width, normal);
+}
+
+// How far beyond its edge a strip reaches pixels' centres that it covers a share of [pixels].
+float coverage_reach(vec2 normal)
+{
+  return 0.5 * (abs(normal.x) + abs(normal.y));
+}
+
+// The share that a ribbon covers. x distance from its middle line, y half its width, zw its normal: all
+// of them linear in the picture. Vertices give them times their w, fragments take them times
+// gl_FragCoord.w, because some drivers clip what is declared noperspective wrongly.
+float ribbon_coverage(vec4 ribbon_of)
+{
+  return strip_coverage(ribbon_of.x, ribbon_of.y, abs(ribbon_of.zw));
+}

@@ -1,0 +1,29 @@
+// A strand's fragment as it waits in a pixel's list: x the next one's number, 0 at the end; y depth as
+// float bits; z the strand; w where along it, in 20 bits, and alpha, in 12.
+//
+// Holds no resources.
+
+const float LAYER_ALONG = 1048575.0, LAYER_ALPHA = 4095.0;
+
+uint packed_layer(float along, float alpha)
+{
+  uint place = uint(clamp(along, 0.0, 1.0) * LAYER_ALONG + 0.5);
+  return (place << 12u) | uint(clamp(alpha, 0.0, 1.0) * LAYER_ALPHA + 0.5);
+}
+
+float layer_along(uint word)
+{
+  return float(word >> 12u) / LAYER_ALONG;
+}
+
+float layer_alpha(uint word)
+{
+  return float(word & 4095u) / LAYER_ALPHA;
+}
+
+// Where node `number`, counted from 1, lies in the texture of nodes.
+ivec2 layer_texel(uint number)
+{
+  uint index = number - 1u;
+  return ivec2(int(index % uint({{layer_row}})), int(index / uint({{layer_row}})));
+}

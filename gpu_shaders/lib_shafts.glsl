@@ -1,0 +1,47 @@
+// Polar coordinates around a light on the screen; twin of addon/shading/shafts.py.
+//
+// Needs struct_shafts.glsl.
+
+// From the light's place to a place on the screen, both in pixels, to ray and texel of the grid.
+vec2 polar_place(Shafts grid, vec2 away)
+{
+  float ahead = dot(away, grid.middle_cos_sin);
+  float aside = away.y * grid.middle_cos_sin.x - away.x * grid.middle_cos_sin.y;
+  // at the light itself there is no angle, and none is needed
+  float angle = dot(away, away) > 0.0 ? atan(aside, ahead) : 0.0;
+  float row = (angle / grid.span + 0.5) * float(grid.angles) - 0.5;
+  return vec2((length(away) - grid.nearest) / grid.radial_step - 0.5, row);
+}
+
+// The place on the screen of a texel of a ray, in pixels.
+vec2 screen_place(Shafts grid, int ray, int texel)
+{
+  float angle = ((float(ray) + 0.5) / float(grid.angles) - 0.5) * grid.span;
+  vec2 turned = vec2(cos(angle), sin(angle));
+  vec2 along = vec2(
+      turned.x * grid.middle_cos_sin.x - turned.y * grid.middle_cos_sin.y,
+      turned.x * grid.middle_cos_sin.y + turned.y * grid.middle_cos_sin.x);
+  return grid.center + (grid.nearest + (float(texel) + 0.5) * grid.radial_step) * along;
+}
+
+// The red of a texture at a place counted in texels, exact where drivers filter in eight bits.
+// Beyond the sides as there, or with rows going round.
+float bilinear_red(sampler2D texels, vec2 place, bool wraps)
+{
+  ivec2 size = textureSize(texels, 0);
+  vec2 corner = floor(place);
+  vec2 weight = place - corner;
+  ivec2 first = ivec2(corner);
+  ivec2 last = first + 1;
+  int top = size.y - 1;
+  ivec2 columns = clamp(ivec2(first.x, last.x), 0, size.x - 1);
+  ivec2 rows = wraps ? (ivec2(first.y, last.y) + size.y) % size.y
+                     : clamp(ivec2(first.y, last.y), 0, top);
+  vec2 below = vec2(
+      texelFetch(texels, ivec2(columns.x, rows.x), 0).r,
+      texelFetch(texels, ivec2(columns.y, rows.x), 0).r);
+  vec2 above = vec2(
+      texelFetch(texels, ivec2(columns.x, rows.y), 0).r,
+      texelFetch(texels, ivec2(columns.y, rows.y), 0).r);
+  return mix(mix(below.x, below.y, weight.x), mix(above.x, above.y, weight.x), weight.y);
+}

@@ -1,0 +1,118 @@
+// Soft shadows on skin: look-ups in a head's UV map that know its islands and seams.
+//
+// Twin of addon/shading/skin/diffusion.py: same names, same order. Textures as in
+// addon/render/skin_pass.py: a texel of `texels` has in x the triangle that it shows, in yz the weights
+// of its second and third corner, in w its island, -1 none; one of `stretches` in xy its width and
+// height [m], in z the nearest seam, -1 none. A seam is four texels: its start and its end, xy on its
+// own side and zw on the other; its two islands; the copies of its ends. Holds no resources.
+
+// LEAST_KNOWN and NARROW of diffusion.py
+const float SKIN_LEAST_KNOWN = 1e-6, SKIN_NARROW = 1.0;
+
+ivec2 skin_seam_texel(int seam, int part, int parts)
+{
+  return ivec2(parts * (seam % {{skin_seams_across}}) + part, seam / {{skin_seams_across}});
+}
+
+ivec2 skin_texel_around(sampler2D texels, vec2 place, int corner)
+{
+  ivec2 texel = ivec2(floor(place - 0.5)) + ivec2(corner & 1, corner >> 1);
+  return clamp(texel, ivec2(0), textureSize(texels, 0) - 1);
+}
+
+// Values between texels of one island alone, and how much of them is known.
+vec4 skin_looked_up(
+    sampler2D values, sampler2D texels, vec2 place, float island, out float known)
+{
+  vec2 share = place - 0.5 - floor(place - 0.5);
+  vec4 total = vec4(0.0);
+  known = 0.0;
+  for (int corner = 0; corner < 4; corner++) {
+    ivec2 at = skin_texel_around(texels, place, corner);
+    vec2 weights = mix(1.0 - share, share, vec2(corner & 1, corner >> 1));
+    bool is_own = island >= 0.0 && texelFetch(texels, at, 0).w == island;
+    float weight = is_own ? weights.x * weights.y : 0.0;
+    total += weight * texelFetch(values, at, 0);
+    known += weight;
+  }
+  return total / max(known, SKIN_LEAST_KNOWN);
+}
+
+// Where on an edge the place nearest to a point lies, 0 at its start and 1 at its end.
+float skin_along_border(vec2 point, vec2 start, vec2 end)
+{
+  vec2 way = end - start;
+  return clamp(dot(point - start, way) / max(dot(way, way), 1e-18), 0.0, 1.0);
+}
+
+float skin_distance(vec2 place, vec2 start, vec2 end)
+{
+  return distance(mix(start, end, skin_along_border(place, start, end)), place);
+}
+
+// The nearest of the seams that the texels around a place know, -1 where they know none.
+int skin_seam_at(
+    sampler2D texels, sampler2D stretches, sampler2D seams, vec2 place, float island)
+{
+  float nearest = 1e30;
+  int seam = -1;
+  for (int corner = 0; corner < 4; corner++) {
+    ivec2 at = skin_texel_around(texels, place, corner);
+    int known = int(texelFetch(stretches, at, 0).z);
+    if (known < 0 || texelFetch(texels, at, 0).w != island) {
+      continue;
+    }
+    vec2 start = texelFetch(seams, skin_seam_texel(known, 0, 4), 0).xy;
+    vec2 end = texelFetch(seams, skin_seam_texel(known, 1, 4), 0).xy;
+    float far = skin_distance(place, start, end);
+    seam = far < nearest ? known : seam;
+    nearest = min(nearest, far);
+  }
+  return seam;
+}
+
+// Values that are the same on both sides of a seam, and how much of them is known: what the blur has
+// left of a difference is taken half and half to both sides.
+vec4 skin_soft_shadow(sampler2D values,
+                      sampler2D texels,
+                      sampler2D stretches,
+                      sampler2D seams,
+                      sampler2D shifts,
+                      vec2 place,
+                      float island,
+                      out float known)
+{
+  vec4 found = skin_looked_up(values, texels, place, island, known);
+  int seam = skin_seam_at(texels, stretches, seams, place, island);
+  if (seam < 0) {
+    return found;
+  }
+  vec4 start = texelFetch(seams, skin_seam_texel(seam, 0, 4), 0);
+  vec4 end = texelFetch(seams, skin_seam_texel(seam, 1, 4), 0);
+  vec2 islands = texelFetch(seams, skin_seam_texel(seam, 2, 4), 0).xy;
+  // at the tip of a slit a texel may know only the other side of the same island
+  if (islands.x == islands.y &&
+      skin_distance(place, start.zw, end.zw) < skin_distance(place, start.xy, end.xy))
+  {
+    start = start.zwxy;
+    end = end.zwxy;
+  }
+  float share = skin_along_border(place, start.xy, end.xy);
+  vec4 on_seam = mix(start, end, share);
+  float is_here, is_known;
+  vec4 here = skin_looked_up(values, texels, on_seam.xy, island, is_here);
+  vec4 across = skin_looked_up(values, texels, on_seam.zw, islands.y, is_known);
+  vec4 shift = mix(texelFetch(shifts, skin_seam_texel(seam, 0, 2), 0),
+                   texelFetch(shifts, skin_seam_texel(seam, 1, 2), 0),
+                   share);
+  float nearness = clamp(1.0 - distance(place, on_seam.xy) / {{skin_closing}}, 0.0, 1.0);
+  float fade = is_known > 0.0 ? nearness * nearness * (3.0 - 2.0 * nearness) : 0.0;
+  // where the two sides lie on the same texels both take what lies between them
+  vec2 gap = on_seam.zw - on_seam.xy;
+  if (islands.x == islands.y && length(gap) < SKIN_NARROW) {
+    float is_between;
+    vec2 between = place + 0.5 * fade * gap;
+    return skin_looked_up(values, texels, between, island, is_between) + fade * shift;
+  }
+  return found + fade * (0.5 * (across - here) + shift);
+}

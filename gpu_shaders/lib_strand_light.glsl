@@ -1,0 +1,108 @@
+// What a strand sends to the eye: all lights and the world's. SHADOWS of strands on strands come from
+// opacity maps; where a light has none, the occlusion and how much the volume faces it stand in.
+// With SCATTERING light goes from strand to strand.
+//
+// Reads the blocks `view`, `lights`, `strands`, `shading`, `fibre`, and the textures of strand_recipe.
+#include "lib_lights.glsl"
+#include "lib_strand_noise.glsl"
+#include "lib_kajiya_kay.glsl"
+#if MARSCHNER
+#  include "lib_marschner.glsl"
+#endif
+#include "lib_shadows.glsl"
+#if SCATTERING
+#  include "lib_dual.glsl"
+#endif
+
+#if MARSCHNER
+// The level at which a highlight does not flicker. In a fragment pixels beside say how much theta_h
+// changes; elsewhere `bend` does, by how much the tangent turns in a pixel.
+float strand_level(
+    vec3 tangent, vec3 bend, vec3 normal, vec3 to_light, vec3 to_eye, float shift_noise)
+{
+#  ifdef GPU_FRAGMENT_SHADER
+  return pixel_level(longitudinal, tangent, normal, to_light, to_eye, shift_noise, shading);
+#  else
+  // the derivative of theta = asin(t . w), which has no end where a ray runs along the strand
+  vec2 sines = vec2(dot(tangent, to_light), dot(tangent, to_eye));
+  vec2 turned = vec2(dot(bend, to_light), dot(bend, to_eye));
+  vec2 angles = turned * inversesqrt(max(1.0 - sines * sines, vec2(1.0e-4)));
+  return table_level(0.5 * abs(angles.x + angles.y), longitudinal);
+#  endif
+}
+#endif
+
+vec3 strand_radiance(vec3 point,
+                     vec3 tangent,
+                     vec3 bend,
+                     float radius,
+                     float along,
+                     float occlusion,
+                     uint seed)
+{
+  vec3 normal = strand_normal(point, tangent, volume_center);
+  vec3 to_eye = unit_or(view.eye.xyz - view.eye.w * point, normal);
+  float cells = along * shading.noise_cells;
+  float shift_noise = strand_noise(seed, 0u, cells);
+  float sparkle_noise = strand_noise(seed, 1u, cells);
+  float color_noise = strand_noise(seed, 2u, 0.0);
+  float grey_noise = strand_noise(seed, 3u, 0.0);
+#if MARSCHNER
+  vec3 absorption = strand_absorption(fibre, along, color_noise, grey_noise, shading);
+  vec3 hair = strand_color(fibre, absorption);
+#else
+  vec3 hair = strand_base(along, color_noise, grey_noise, shading);
+#endif
+
+  vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz * occlusion;
+  for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
+    vec3 to_light, irradiance;
+    light_at(lights, index, point, to_light, irradiance);
+    vec3 way = way_of_light_to_strand(index, point, tangent, radius, strands.opacity);
+    float tau = way.x;
+    irradiance *= tau < 0.0 ? occlusion : way.z;
+#if MARSCHNER
+    float level = strand_level(tangent, bend, normal, to_light, to_eye, shift_noise);
+#endif
+#if SCATTERING
+    radiance += irradiance * scattering_light(longitudinal,
+                                              azimuthal,
+                                              paths,
+                                              shares_forward,
+                                              shares_backward,
+                                              tangent,
+                                              normal,
+                                              to_light,
+                                              to_eye,
+                                              shift_noise,
+                                              sparkle_noise,
+                                              absorption,
+                                              fibre,
+                                              shading,
+                                              level,
+                                              tau,
+                                              way.y,
+                                              scatter_density,
+                                              skin_color);
+#elif MARSCHNER
+    radiance += irradiance * marschner_light(longitudinal,
+                                             azimuthal,
+                                             paths,
+                                             tangent,
+                                             normal,
+                                             to_light,
+                                             to_eye,
+                                             shift_noise,
+                                             sparkle_noise,
+                                             absorption,
+                                             fibre,
+                                             shading,
+                                             level,
+                                             tau);
+#else
+    radiance += irradiance * (tau < 0.0 ? 1.0 : exp(-tau)) * hair / LIGHT_PI *
+                kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
+#endif
+  }
+  return radiance;
+}

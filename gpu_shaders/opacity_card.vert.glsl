@@ -1,0 +1,13 @@
+// Opacity maps, vertex stage of cards: their triangles as the light sees them.
+#include "lib_opacity.glsl"
+
+void main()
+{
+  vec4 at = vec4(position, 1.0);
+  float w = dot(opacity.map_w[light_index], at);
+  float depth = clamp(dot(opacity.map_depth[light_index], at), 0.0, 1.0);
+  card_uv = uv;
+  strand_depth = depth;
+  gl_Position = vec4(dot(opacity.map_x[light_index], at), dot(opacity.map_y[light_index], at),
+                     (2.0 * depth - 1.0) * w, w);
+}

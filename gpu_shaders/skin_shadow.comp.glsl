@@ -1,0 +1,33 @@
+// Soft shadows on skin, first step: how much of each light reaches the skin that a texel of the
+// head's UV map shows. A channel a light, by the number of its opacity map.
+#include "lib_shadows.glsl"
+
+vec3 corner_of(int triangle, int corner)
+{
+  ivec2 texel = ivec2(3 * (triangle % {{skin_triangles_across}}) + corner,
+                      triangle / {{skin_triangles_across}});
+  return texelFetch(skin_corners, texel, 0).xyz;
+}
+
+void main()
+{
+  ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(texel, imageSize(reaching)))) {
+    return;
+  }
+  vec4 shown = texelFetch(skin_texels, texel, 0);
+  vec4 lit = vec4(1.0);
+  if (shown.w >= 0.0) {
+    int triangle = int(shown.x);
+    vec3 point = (1.0 - shown.y - shown.z) * corner_of(triangle, 0) +
+                 shown.y * corner_of(triangle, 1) + shown.z * corner_of(triangle, 2);
+    for (int index = 0; index < light_count; index++) {
+      int map = int(opacity.light[index].x);
+      if (map >= 0 && map < {{skin_lights}}) {
+        vec3 way = way_of_light(index, point);
+        lit[map] = way.z * exp(-way.x);
+      }
+    }
+  }
+  imageStore(reaching, texel, lit);
+}

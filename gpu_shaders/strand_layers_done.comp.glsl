@@ -1,0 +1,3 @@
+// Does nothing: but what draws before it have stored, can be read after it.
+
+void main() {}

@@ -1,0 +1,15 @@
+// A light on the screen and the grid of rays around it; filled by addon/render/shafts_pass.py.
+
+struct Shafts {
+  vec4 radiance;        // rgb of the haze at the light, w window depth of the light
+  vec2 center;          // of the light [pixels]
+  vec2 middle_cos_sin;  // direction of the middle ray
+  float span;           // between the first and the last ray [rad]
+  float nearest;        // where rays begin [pixels]
+  float radial_step;    // between texels of a ray [pixels]
+  float kept;           // share of a shaft that is left after a step
+  float before;         // what counts of the way from the light to where rays begin
+  float fall;           // of the haze [1 / pixels]
+  int angles;           // rays
+  int is_round;         // the last ray is beside the first
+};

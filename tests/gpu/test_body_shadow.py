@@ -1,0 +1,140 @@
+"""Hair's shadow over a finished picture of a mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.settings import StrandSettings
+from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands import Surface
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+SIZE = 64
+SUN = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 3.0)
+FLOOR = Surface(
+    np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32),
+    np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+)
+
+
+def curtain(count: int, spacing: float, height: float) -> np.ndarray:
+    strands = np.zeros((count, 6, 3), np.float32)
+    strands[..., 0] = spacing * (np.arange(count) - 0.5 * (count - 1))[:, None]
+    strands[..., 1] = np.linspace(-0.1, 0.1, 6)
+    strands[..., 2] = height
+    return strands
+
+
+def shadow(
+    *lights: Light,
+    ambient: float = 0.0,
+    depth: float = 1.0,
+    shadows: str = "deep",
+    eye: tuple[float, float, float] = (0.0, -2.0, 0.6),
+) -> np.ndarray:
+    """Over white, (SIZE, SIZE): what is left of it. Strands cover half of the middle."""
+    import gpu
+
+    from hairloom.addon.render.body_shadow import BodyShadow
+    from hairloom.addon.render.frame import Camera, Snapshot, look_at, orthographic
+    from hairloom.addon.render.strand_pass import StrandPass
+    from hairloom.addon.render.textures import drawing_into, texture_to_array
+
+    strands = curtain(24, 4.0e-3, 0.05)
+    snapshot = Snapshot(
+        strands,
+        np.full(strands.shape[:2], 1.0e-3, np.float32),
+        lights=lights,
+        ambient=(ambient,) * 3,
+        casters=(FLOOR,),
+        strand_settings=StrandSettings(tip_width=1.0),
+        volume=VolumeSettings(shadows=shadows, resolution=16, strand_share=1.0),
+    )
+    maps = StrandPass().opacity(snapshot)
+    assert maps is not None
+    camera = Camera(look_at(eye, (0.0, 0.0, 0.0)), orthographic(0.2, 1.0, 0.0, 9.0))
+    color = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
+    kept = gpu.types.GPUTexture((SIZE, SIZE), format="DEPTH_COMPONENT32F")
+    target = gpu.types.GPUFrameBuffer(depth_slot=kept, color_slots=(color,))
+    with drawing_into(target):
+        target.clear(color=(1.0, 1.0, 1.0, 1.0), depth=depth)
+        BodyShadow().draw(snapshot, maps, camera, SIZE, SIZE)
+    picture = texture_to_array(color)
+    assert np.ptp(picture[..., :3], axis=-1).max() == 0.0
+    return picture[..., 0]
+
+
+def encoded(radiance: float) -> float:
+    return 1.055 * radiance ** (1.0 / 2.4) - 0.055
+
+
+@pytest.mark.parametrize("shadows", ["slices", "deep"])
+def test_skin_is_as_much_darker_on_the_screen_as_hair_leaves_of_its_light(shadows: str) -> None:
+    """Beneath strands that cover half of it; beside them it is as it was."""
+    found = shadow(SUN, shadows=shadows)
+    grey = 0.18 * 3.0 / np.pi
+    expected = encoded(grey * np.exp(-0.5)) / encoded(grey)
+    assert found[30:34, 30:34].mean() == pytest.approx(expected, abs=0.04)
+    assert found[30:34, 2:8].min() > 0.99
+
+
+def test_other_light_fills_the_shadow() -> None:
+    aside = Light.sun((0.0, 1.0, -0.02), (1.0, 1.0, 1.0), 3.0)
+    middle = [
+        shadow(*lights, ambient=ambient)[30:34, 30:34].mean()
+        for lights, ambient in (((SUN,), 0.0), ((SUN,), 1.0), ((SUN, SUN), 0.0))
+    ]
+    assert middle[0] + 0.05 < middle[1] < 1.0
+    assert shadow(SUN, aside)[30:34, 30:34].mean() >= middle[0] - 1e-3
+
+
+def test_from_below_and_behind_other_things_there_is_none() -> None:
+    assert shadow(SUN, depth=0.0).min() == 1.0
+    assert shadow(SUN, eye=(0.0, -2.0, -0.6)).min() > 0.99
+
+
+def test_a_mesh_that_is_there_already_is_covered_without_gaps() -> None:
+    """Its depths come from another transformation; still every pixel is met."""
+    import gpu
+
+    from hairloom.addon.render.body_shadow import BodyShadow
+    from hairloom.addon.render.frame import Camera, MeshSnapshot, Snapshot, look_at, perspective
+    from hairloom.addon.render.mesh_pass import MeshPass
+    from hairloom.addon.render.strand_pass import StrandPass
+    from hairloom.addon.render.textures import drawing_into, texture_to_array
+
+    random = np.random.default_rng(3)
+    hill = np.stack(np.meshgrid(*[np.linspace(-0.1, 0.1, 60)] * 2, [0.0]), axis=-1).reshape(-1, 3)
+    hill[:, 2] = -3.0 * (hill[:, :2] ** 2).sum(axis=1) + random.normal(size=len(hill)) * 1e-4
+    corner = (np.arange(59)[:, None] * 60 + np.arange(59)).ravel()
+    halves = (corner, corner + 60, corner + 1), (corner + 1, corner + 60, corner + 61)
+    triangles = np.concatenate([np.stack(half, axis=1) for half in halves])
+    body = Surface(hill.astype(np.float32), triangles.astype(np.int32))
+    strands = curtain(50, 4.0e-3, 0.05)
+    volume = VolumeSettings(resolution=16, strand_share=1.0)
+    radius = np.full(strands.shape[:2], 2e-3, np.float32)
+    snapshot = Snapshot(strands, radius, lights=(SUN,), volume=volume, casters=(body,))
+    camera = Camera(look_at((0.2, -0.3, 0.3), (0.0, 0.0, 0.0)), perspective(0.6, 1.0, 0.01, 100.0))
+    moved = Camera(camera.view @ np.eye(4), camera.projection * np.float32(1.0 + 1e-7))
+    color = gpu.types.GPUTexture((256, 256), format="RGBA32F")
+    depth = gpu.types.GPUTexture((256, 256), format="DEPTH_COMPONENT32F")
+    target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+    maps = StrandPass().opacity(snapshot)
+    assert maps is not None
+    with drawing_into(target):
+        target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
+        white = MeshSnapshot.of(body, color=(1.0, 1.0, 1.0))
+        lit = Snapshot(strands[:0], radius[:0], meshes=(white,), ambient=(1.0, 1.0, 1.0))
+        MeshPass().draw(lit, moved, 256, 256)
+    before = texture_to_array(color)
+    with drawing_into(target):
+        BodyShadow().draw(snapshot, maps, camera, 256, 256)
+    left = texture_to_array(color)[..., 0] / np.maximum(before[..., 0], 1e-6)
+    drawn = before[..., 3] > 0.0
+    middle = np.zeros_like(drawn)
+    middle[100:156, 100:156] = True
+    assert (drawn & middle).sum() > 1000
+    assert (left[drawn & middle] < 0.95).all()

@@ -1,0 +1,177 @@
+"""Shadows of cards on cards and on skin, and of meshes on cards."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.cards.card_mesh import CardMesh
+from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.settings import ShadingSettings
+from hairloom.addon.shading.textures import HairTextures
+from hairloom.addon.shading.volume.card_opacity import MOST_ALPHA
+from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands import Surface
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+SIZE = 32
+FORMS = ["slices", "deep"]
+#: from where the eye is, along +y
+SUN = Light.sun((0.0, 1.0, 0.0), (1.0, 1.0, 1.0), 3.0)
+PLAIN = ShadingSettings(base_color=(0.5, 0.4, 0.3))
+
+
+def card(low: float, high: float, y: float, u: tuple[float, float] = (0.0, 1.0)) -> Any:
+    """From x = low to high, z from 0 to 1; one whose low is the greater faces +y."""
+    way = np.array([0.0, -1.0 if low < high else 1.0, 0.0])
+    return {
+        "positions": np.array([[low, y, 1], [high, y, 1], [low, y, 0], [high, y, 0]]),
+        "triangles": np.array([[0, 2, 3], [0, 3, 1]]),
+        "uv": np.array([[u[0], 0.0], [u[1], 0.0], [u[0], 1.0], [u[1], 1.0]]),
+        "normal": np.repeat([way], 4, axis=0),
+        "tangent": np.repeat([[0.0, 0.0, -1.0]], 4, axis=0),
+        "occlusion": np.ones(4),
+    }
+
+
+def mesh_of(*cards: Any) -> CardMesh:
+    joined = {name: np.concatenate([each[name] for each in cards]) for name in cards[0]}
+    joined["triangles"] = joined["triangles"] + np.repeat(np.arange(len(cards)) * 4, 2)[:, None]
+    return CardMesh(**joined, card=np.repeat(np.arange(len(cards)), 2))
+
+
+def textures_of(alpha: Any) -> HairTextures:
+    """Of one colour; alpha from u = 0 to u = 1."""
+    alpha = np.repeat(np.atleast_2d(np.float32(alpha)), 2, axis=0)
+    half = np.full((2, 2), 0.5, np.float32)
+    white = np.ones((2, 2, 3), np.float32)
+    return HairTextures(white, alpha, half, half, np.full((2, 2, 3), 0.5, np.float32))
+
+
+def snapshot_of(mesh: CardMesh, textures: HairTextures, **more: Any) -> Any:
+    from hairloom.addon.render.card_snapshot import CardSnapshot
+    from hairloom.addon.render.snapshot import Snapshot
+
+    none = np.zeros((0, 2, 3), np.float32)
+    return Snapshot(none, none[..., 0], cards=CardSnapshot(mesh, textures), **more)
+
+
+@pytest.fixture(scope="module")
+def frame() -> Any:
+    pytest.importorskip("gpu")
+    from hairloom.addon.render import frame
+
+    return frame
+
+
+def behind(frame: Any) -> Any:
+    """Sees the cards from the dark side: x from right to left."""
+    return frame.Camera(
+        frame.look_at((0.5, 3.0, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 5.0)
+    )
+
+
+def drawn(frame: Any, mesh: Any, textures: Any, volume: VolumeSettings, **more: Any) -> np.ndarray:
+    settings = {"lights": (SUN,), "ambient": (0.0, 0.0, 0.0), "shading": PLAIN, **more}
+    snapshot = snapshot_of(mesh, textures, volume=volume, **settings)
+    picture: np.ndarray = frame.render_image(snapshot, behind(frame), SIZE, SIZE, 1)
+    assert np.isfinite(picture).all()
+    return picture
+
+
+def of_form(form: str, **more: Any) -> VolumeSettings:
+    return VolumeSettings(shadows=form, resolution=64, scattering=False, **more)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("alpha", [0.3, 0.7, 1.0])
+@pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
+def test_a_card_behind_cards_has_the_light_that_they_leave(
+    frame: Any, form: str, alpha: float, model: str
+) -> None:
+    """Two before one half of it, none before the other; it faces away from them."""
+    look = dataclasses.replace(PLAIN, model=model)
+    back = card(1.0, 0.0, 0.6, (1.0, 1.0))
+    back["normal"] = -back["normal"]  # to the light
+    fronts = [card(0.0, 0.5, y, (0.0, 0.0)) for y in (0.0, 0.2)]
+    # the last one alone is seen, as only that is opaque
+    textures = textures_of([alpha, 1.0])
+    found, alone = (
+        drawn(frame, mesh_of(*cards), textures, of_form(form), shading=look)[16, :, 0]
+        for cards in ((*fronts, back), (back,))
+    )
+    left = (1.0 - min(alpha, MOST_ALPHA)) ** 2
+    assert alone.min() > 0.01
+    # seen from behind, x runs to the left
+    assert found[20:30] / alone[20:30] == pytest.approx(left, rel=0.02, abs=1e-3)
+    assert found[2:12] == pytest.approx(alone[2:12], rel=0.02)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_cards_shade_the_skin_and_a_mesh_shades_cards(frame: Any, form: str) -> None:
+    def wall(y: float, low: float, high: float) -> Any:
+        corners = np.array([[low, y, -1], [high, y, -1], [high, y, 2], [low, y, 2]], np.float32)
+        surface = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+        return frame.MeshSnapshot.of(surface, color=(0.5, 0.5, 0.5))
+
+    mesh, textures = mesh_of(card(0.0, 0.5, 0.0)), textures_of([0.6, 0.6])
+    skin = wall(0.3, -1.0, 2.0)
+    front = frame.Camera(
+        frame.look_at((0.5, -3.0, 0.5), (0.5, 0.0, 0.5), up=(0.0, 0.0, 1.0)),
+        frame.orthographic(1.0, 1.0, 0.0, 9.0),
+    )
+    # seen past the cards
+    past = frame.Camera(
+        frame.look_at((2.5, -1.0, 0.5), (0.4, 0.3, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 9.0)
+    )
+
+    def seen(volume: VolumeSettings, camera: Any, **more: Any) -> np.ndarray:
+        snapshot = snapshot_of(
+            mesh, textures, lights=(SUN,), ambient=(0, 0, 0), shading=PLAIN, volume=volume, **more
+        )
+        picture: np.ndarray = frame.render_image(snapshot, camera, SIZE, SIZE, 1)
+        return picture[..., 0]
+
+    lit, shaded = (seen(each, past, meshes=(skin,)) for each in (of_form("none"), of_form(form)))
+    ratio = shaded / np.maximum(lit, 1e-9)
+    assert ratio[lit > 0.0].max() > 0.99
+    assert ratio[lit > 0.0].min() == pytest.approx(0.4, abs=0.02)
+    hidden = seen(
+        of_form(form), front, meshes=(wall(9.0, -1, 2),), casters=(wall(-1, 0, 2).surface,)
+    )
+    assert hidden[:, 3:13].max() < 1e-6
+    shown = seen(of_form(form), front, meshes=(wall(9.0, -1, 2),))
+    assert shown[:, 3:13].min() > 0.01
+
+
+def test_light_from_strand_to_strand_brightens_light_cards_and_not_black(frame: Any) -> None:
+    mesh = mesh_of(*(card(0.0, 1.0, 0.1 * layer) for layer in range(4)))
+    gain = []
+    for melanin in (0.1, 1.0):
+        look = dataclasses.replace(
+            PLAIN, model="marschner", pigment="melanin", melanin=melanin, scattered=0.0
+        )
+        alone, among = (
+            drawn(frame, mesh, textures_of([0.6, 0.6]), volume, shading=look)[..., 0].mean()
+            for volume in (of_form("deep"), dataclasses.replace(of_form("deep"), scattering=True))
+        )
+        gain.append(among - alone)
+    assert gain[0] > 0.02 and abs(gain[1]) < 0.02 * gain[0]
+
+
+def test_maps_are_drawn_again_only_when_something_changed(frame: Any) -> None:
+    from hairloom.addon.render.card_pass import CardPass
+
+    cards = CardPass()
+    mesh, volume = mesh_of(card(0.0, 1.0, 0.0)), of_form("deep")
+    first = snapshot_of(mesh, textures_of([1.0, 1.0]), lights=(SUN,), volume=volume)
+    maps = cards.opacity(first)
+    assert maps is not None and cards.opacity(first) is maps
+    other = dataclasses.replace(first.cards, textures=textures_of([0.5, 0.5]))
+    again = cards.opacity(dataclasses.replace(first, cards=other))
+    assert again is not maps
+    assert cards.opacity(dataclasses.replace(first, volume=VolumeSettings(shadows="none"))) is None

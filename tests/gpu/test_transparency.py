@@ -1,0 +1,325 @@
+"""Strands that hide a share of a pixel: against areas, and against all layers sorted in numpy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.shading.volume.transparency import over_nearest, strip_coverage
+from hairloom.addon.strands import Surface
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+SIZE = 96
+#: the colour of a strand is its occlusion, and nothing else
+FLAT = ShadingSettings(base_color=(1.0, 1.0, 1.0), color_variation=0.0)
+WHITE = (1.0, 1.0, 1.0)
+COLORED = replace(FLAT, tip_color=(0.1, 0.3, 1.0), tip_tint=1.0, tint_start=0.0, tint_end=1.0)
+
+
+@pytest.fixture(scope="module")
+def frame() -> Any:
+    pytest.importorskip("gpu")
+    from hairloom.addon.render import frame
+
+    return frame
+
+
+@pytest.fixture(scope="module")
+def front(frame: Any) -> Any:
+    """A pixel is a metre; x and z from 0 to SIZE, along +y."""
+    middle = SIZE / 2
+    return frame.Camera(
+        frame.look_at((middle, -100.0, middle), (middle, 0.0, middle)),
+        frame.orthographic(SIZE, 1.0, 0.0, 200.0),
+    )
+
+
+def snapshot_of(frame: Any, strands: np.ndarray, radius: float, **more: Any) -> Any:
+    settings = {
+        "ambient": WHITE,
+        "shading": FLAT,
+        "strand_settings": StrandSettings(tip_width=1.0),
+        "detail": DetailSettings(full_size=0.0),
+        "volume": VolumeSettings(shadows="none"),
+    }
+    shape = strands.shape[:2]
+    points = strands.astype(np.float32)
+    return frame.Snapshot(points, np.full(shape, radius, np.float32), **(settings | more))
+
+
+def test_coverage_is_that_of_numpy(compute: Callable[..., np.ndarray]) -> None:
+    random = np.random.default_rng(3)
+    angle, distance = random.uniform(-4.0, 4.0, (2, 64, 64))
+    half_width = 10.0 ** random.uniform(-3.0, 1.0, (64, 64))
+    normal = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    normal[0, :4] = (1, 0), (0, -1), (-0.6, 0.8), np.sqrt((0.5, 0.5))
+    packed = np.concatenate([distance[..., None], half_width[..., None], normal], axis=-1)
+    packed = packed.astype(np.float32)
+    found = compute("coverage.glsl", (64, 64), textures={"strips": packed})[..., 0]
+    exact = packed.astype(np.float64)
+    expected = strip_coverage(exact[..., 0], exact[..., 1], np.abs(exact[..., 2:]))
+    assert 0.1 < (expected > 0.0).mean() < 0.9
+    assert np.abs(found - expected).max() < 2e-6
+
+
+@pytest.mark.parametrize("width", [0.05, 0.7, 6.0])
+@pytest.mark.parametrize("degrees", [0.0, 17.0, 45.0, 90.0])
+def test_what_a_strand_covers_is_its_width(
+    frame: Any, front: Any, width: float, degrees: float
+) -> None:
+    """Summed over rows, or columns, that it crosses, wherever it lies among the pixels."""
+    turn = np.radians(degrees)
+    direction = np.array([np.sin(turn), 0.0, np.cos(turn)])
+    across = 0 if degrees <= 45.0 else 1
+    expected = width / max(abs(direction[0]), abs(direction[2]))
+    for shift in (0.0, 0.21, 0.5):
+        middle = np.array([SIZE / 2 + shift, 0.0, SIZE / 2 + shift])
+        strand = np.stack([middle - 200.0 * direction, middle + 200.0 * direction])[None]
+        picture = frame.render_image(snapshot_of(frame, strand, width / 2.0), front, SIZE, SIZE, 1)
+        sums = picture[..., 3].sum(axis=1 - across)[30:-30]
+        # alpha is kept in steps of 1 / 4095, of which a row may have a few
+        assert sums == pytest.approx(np.full(sums.shape, expected), abs=1e-3)
+        assert np.allclose(picture[..., :3], picture[..., 3:], atol=1e-5), "premultiplied"
+
+
+def test_a_tip_thins_out_and_does_not_break_up(frame: Any, front: Any) -> None:
+    strand = np.array([[[40.3, 0.0, -10.0], [44.7, 0.0, SIZE + 10.0]]])
+    settings = StrandSettings(tip_width=0.0)
+    picture = frame.render_image(
+        snapshot_of(frame, strand, 0.5, strand_settings=settings), front, SIZE, SIZE, 1
+    )
+    rows = np.arange(SIZE) + 0.5
+    lean = np.hypot(4.4, SIZE + 20.0) / (SIZE + 20.0)
+    expected = (1.0 - (rows + 10.0) / (SIZE + 20.0)) * lean
+    assert picture[..., 3].sum(axis=1) == pytest.approx(expected, abs=3e-3)
+
+
+def crossing(count: int, random: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Straight strands through the picture at all depths and angles, and their colours."""
+    ends = random.uniform(0.0, SIZE, (count, 2, 3))
+    ends[..., 1] = random.uniform(-40.0, 40.0, (count, 2))
+    return ends, random.random(count)
+
+
+def layers_of(
+    strands: np.ndarray, width: float, camera: Any, opacity: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Depth, alpha and place along it of each straight strand in each pixel, (pixels, strands)."""
+    matrix = camera.projection @ camera.view
+    clip = np.concatenate([strands, np.ones((*strands.shape[:2], 1))], axis=-1) @ matrix.T
+    w = clip[..., 3]
+    seen = (clip[..., :2] / w[..., None] + 1.0) / 2.0 * SIZE
+    row, column = np.mgrid[:SIZE, :SIZE] + 0.5
+    pixel = np.stack([column.ravel(), row.ravel()], axis=-1)
+    run = seen[:, 1] - seen[:, 0]
+    length = np.linalg.norm(run, axis=-1)
+    away = pixel[:, None] - seen[None, :, 0]
+    share = (away * run).sum(-1) / length**2
+    distance = (away[..., 0] * -run[:, 1] + away[..., 1] * run[:, 0]) / length
+    normal = np.abs(np.stack([-run[:, 1], run[:, 0]], axis=-1) / length[:, None])
+    focal = camera.projection[1, 1] * SIZE / 2.0
+    half = width / 2.0 * focal / w
+    half = half[:, 0] + share * (half[:, 1] - half[:, 0])
+    alpha = opacity * strip_coverage(distance, half, np.broadcast_to(normal, away.shape))
+    alpha[(share < 0.0) | (share > 1.0)] = 0.0
+    depth = clip[:, 0, 2] / w[:, 0] * (1.0 - share) + clip[:, 1, 2] / w[:, 1] * share
+    along = share / w[:, 1] / ((1.0 - share) / w[:, 0] + share / w[:, 1])
+    return depth, np.round(alpha * 4095.0) / 4095.0, along
+
+
+@pytest.mark.parametrize("width", [0.4, 1.3, 5.0])
+@pytest.mark.parametrize("opacity", [0.2, 1.0])
+def test_crossing_strands_are_those_sorted_in_numpy(
+    frame: Any, width: float, opacity: float
+) -> None:
+    """In perspective, up to dozens over each other, each of a colour that changes along it."""
+    random = np.random.default_rng(7)
+    strands, brightness = crossing(400, random)
+    camera = frame.Camera(
+        frame.look_at((SIZE / 2, -150.0, SIZE / 2), (SIZE / 2, 0.0, SIZE / 2)),
+        frame.perspective(0.6, 1.0, 50.0, 300.0),
+    )
+    settings = StrandSettings(tip_width=1.0, opacity=opacity)
+    occlusion = np.repeat(brightness[:, None], 2, axis=1).astype(np.float32)
+    shown = snapshot_of(
+        frame,
+        strands,
+        width / 2.0,
+        occlusion=occlusion,
+        shading=COLORED,
+        strand_settings=settings,
+        detail=DetailSettings(mode="fixed", subdivisions=1),
+    )
+    found = frame.render_image(shown, camera, SIZE, SIZE, 1).reshape(-1, 4)
+    depth, alpha, along = layers_of(strands, width, camera, opacity)
+    tint = along * along * (3.0 - 2.0 * along)
+    tint = np.clip(tint, 0.0, 1.0)[..., None]
+    colors = brightness[:, None] * (1.0 + tint * (np.array(COLORED.tip_color) - 1.0))
+    count = alpha.shape[1]
+    exact = over_nearest(depth, alpha, colors, layers=count, unseen_share=0.0)
+    assert ((alpha > 0.0).sum(axis=1) > 8).any(), "more than are kept"
+    assert np.abs(found - exact).mean() < 0.02
+    assert opacity < 1.0 or np.abs(found - exact).mean() < 0.004
+    assert np.abs(found[:, 3] - exact[:, 3]).mean() < 1e-3
+    same = over_nearest(depth, alpha, colors)
+    assert np.abs(found - same).mean() < 0.002
+
+
+@pytest.mark.parametrize("mode", ["fixed", "adaptive"])
+def test_no_order_of_strands_changes_the_picture(frame: Any, mode: str) -> None:
+    """Among them many in one plane, where depths are equal."""
+    random = np.random.default_rng(8)
+    strands, brightness = crossing(600, random)
+    strands[:200, :, 1] = 0.0
+    occlusion = np.repeat(brightness[:, None], 2, axis=1).astype(np.float32)
+    camera = frame.Camera(
+        frame.look_at((SIZE / 2, -150.0, SIZE / 2), (SIZE / 2, 0.0, SIZE / 2)),
+        frame.perspective(0.6, 1.0, 50.0, 300.0),
+    )
+    shown = snapshot_of(
+        frame,
+        strands,
+        0.8,
+        occlusion=occlusion,
+        seed=np.arange(600),
+        shading=replace(COLORED, color_variation=1.0),
+        strand_settings=StrandSettings(tip_width=1.0, opacity=0.7),
+        detail=DetailSettings(mode=mode, full_size=0.0),
+    )
+    first = frame.render_image(shown, camera, SIZE, SIZE, 1)
+    assert first[..., 3].mean() > 0.5
+    for _ in range(4):
+        order = random.permutation(600)
+        moved = replace(
+            shown,
+            strands=np.ascontiguousarray(shown.strands[order]),
+            occlusion=occlusion[order],
+            seed=order,
+        )
+        again = frame.render_image(moved, camera, SIZE, SIZE, 1)
+        assert np.abs(again - first).max() < 1.0 / 255.0
+
+
+def test_a_mesh_hides_layers_behind_it(frame: Any, front: Any) -> None:
+    square = np.array([[0, 0, 0], [48, 0, 0], [48, 0, SIZE], [0, 0, SIZE]], np.float32)
+    mesh = frame.MeshSnapshot.of(
+        Surface(square, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 0.0)
+    )
+    strand = np.array([[[-5.0, 0.0, 30.3], [SIZE + 5.0, 0.0, 30.3]]])
+    behind, before = strand + [0, 20.0, 20.0], strand - [0, 20.0, 0]
+    shown = snapshot_of(frame, np.concatenate([behind, before]), 0.2, meshes=(mesh,))
+    picture = frame.render_image(shown, front, SIZE, SIZE, 1)
+    sums = picture[..., 0].sum(axis=0)
+    assert sums[2:46] == pytest.approx(np.full(44, 0.4), abs=2e-3), "only the one before it"
+    assert sums[50:94] == pytest.approx(np.full(44, 0.8), abs=2e-3), "both"
+    assert picture[:, :48, 3] == pytest.approx(1.0), "a mesh stays opaque under hair"
+
+
+def test_what_comes_later_is_hidden_by_hair_that_hides(frame: Any, front: Any) -> None:
+    """Depth is written where more than half is hidden, and only there."""
+    import gpu
+
+    from hairloom.addon.render.strand_pass import StrandPass
+    from hairloom.addon.render.textures import drawing_into
+
+    strand = np.array([[[20.0, 0.0, -5.0], [20.0, 0.0, SIZE + 5.0]]])
+    thin, wide = (snapshot_of(frame, strand + [x, 0, 0], r) for x, r in ((0, 0.2), (40, 6.0)))
+    level = np.array([[[-5.0, 30.0, 50.0], [SIZE + 5.0, 30.0, 50.0]]])
+    later = snapshot_of(frame, level, 4.0, ambient=(0.0, 0.0, 1.0))
+    color = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
+    depth = gpu.types.GPUTexture((SIZE, SIZE), format="DEPTH_COMPONENT32F")
+    target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+    drawn = [StrandPass() for _ in range(3)]
+    with drawing_into(target):
+        target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
+        for own, shown in zip(drawn, (thin, wide, later), strict=True):
+            own.draw(shown, front, SIZE, SIZE)
+    picture = np.asarray(color.read()).reshape(SIZE, SIZE, 4)
+    assert picture[50, 60].tolist() == [1.0, 1.0, 1.0, 1.0], "hidden by the wide one"
+    assert picture[50, 20, 2] == pytest.approx(1.0) and picture[50, 20, 0] < 0.5, "not by the thin"
+
+
+@pytest.mark.parametrize("transparency", ["layers", "hashed"])
+@pytest.mark.parametrize(
+    "change", [{"opacity": 0.0}, {"width_scale": 0.0}], ids=["no opacity", "no width"]
+)
+def test_what_is_not_there_draws_nothing(
+    frame: Any, front: Any, transparency: str, change: dict[str, float]
+) -> None:
+    strands, _ = crossing(50, np.random.default_rng(9))
+    settings = StrandSettings(transparency=transparency, **change)
+    shown = snapshot_of(frame, strands, 0.5, strand_settings=settings)
+    assert not frame.render_image(shown, front, SIZE, SIZE, 1).any()
+
+
+@pytest.mark.parametrize("transparency", ["layers", "hashed"])
+def test_bad_hair_gives_finite_pictures(frame: Any, transparency: str) -> None:
+    """Strands without length, through the eye, wider than the picture, too many in a pixel."""
+    random = np.random.default_rng(10)
+    strands, _ = crossing(300, random)
+    strands[:50, 1] = strands[:50, 0]
+    strands[50:250] = strands[50]
+    strands[250:] += [0.0, -150.0, 0.0]
+    camera = frame.Camera(
+        frame.look_at((SIZE / 2, -150.0, SIZE / 2), (SIZE / 2, 0.0, SIZE / 2)),
+        frame.perspective(0.6, 1.0, 0.1, 300.0),
+    )
+    shown = snapshot_of(
+        frame, strands, 0.5, strand_settings=StrandSettings(transparency=transparency)
+    )
+    shown.radius[10:20] = 1e4
+    shown.radius[20:30] = 0.0
+    picture = frame.render_image(shown, camera, SIZE, SIZE, 1)
+    assert np.isfinite(picture).all()
+    assert picture.min() >= 0.0 and picture[..., 3].max() <= 1.0 + 1e-5
+    assert picture[..., 3].any()
+
+
+def test_an_empty_groom_and_other_sizes(frame: Any, front: Any) -> None:
+    """Buffers are made anew, or kept, as pictures of other sizes come between."""
+    from hairloom.addon.render.mesh_pass import MeshPass
+    from hairloom.addon.render.strand_pass import StrandPass
+
+    passes = MeshPass(), StrandPass()
+    strands, _ = crossing(80, np.random.default_rng(11))
+    shown = snapshot_of(frame, strands, 0.4)
+    first = frame.render_image(shown, front, SIZE, SIZE, 1, passes=passes)
+    for size in ((7, 5), (SIZE, 2 * SIZE), (SIZE, SIZE)):
+        again = frame.render_image(shown, front, *size, 1, passes=passes)
+    assert (again == first).all()
+    empty = snapshot_of(frame, strands[:0], 0.4)
+    assert not frame.render_image(empty, front, SIZE, SIZE, 1, passes=passes).any()
+
+
+def test_lists_grow_until_all_fragments_have_room(
+    frame: Any, front: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from hairloom.addon.render import strand_layers
+
+    strands, _ = crossing(3000, np.random.default_rng(12))
+    shown = snapshot_of(frame, strands, 0.4)
+    first = frame.render_image(shown, front, SIZE, SIZE, 1)
+    monkeypatch.setattr(strand_layers, "FIRST_ROWS", 1)
+    strand_layers.LAYERS_OF_PIXELS.release()
+    assert (frame.render_image(shown, front, SIZE, SIZE, 1) == first).all()
+
+
+def test_hashed_strands_cover_as_much_on_average(frame: Any, front: Any) -> None:
+    strands, _ = crossing(200, np.random.default_rng(13))
+    settings = StrandSettings(tip_width=1.0, opacity=0.8)
+    shown = snapshot_of(frame, strands, 0.4, strand_settings=settings)
+    exact = frame.render_image(shown, front, SIZE, SIZE, 1)
+    hashed = replace(shown, strand_settings=replace(settings, transparency="hashed"))
+    noisy = frame.render_image(hashed, front, SIZE, SIZE, 1)
+    calm = frame.render_image(hashed, front, SIZE, SIZE, 6)
+    assert set(np.unique(noisy[..., 3])) == {0.0, 1.0}
+    assert noisy[..., 3].mean() == pytest.approx(exact[..., 3].mean(), rel=0.03)
+    assert np.abs(calm - exact).mean() < 0.3 * np.abs(noisy - exact).mean()

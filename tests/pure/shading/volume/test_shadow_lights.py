@@ -1,0 +1,100 @@
+"""Which lights throw shadows, and what the artist is told of those that do not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon.shading.area_lights import Panel
+from hairloom.addon.shading.lights import Cone, Light
+from hairloom.addon.shading.volume.light_frame import Ball
+from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.shading.volume.shadow_lights import shadow_frames, shadow_warnings
+
+BALL = Ball(np.array([0.1, 0.0, 1.5]), 0.2)
+SUN = Light.sun((0.0, 0.0, -1.0), (1, 1, 1), 3.0)
+DEEP = VolumeSettings(shadows="deep", most_lights=2)
+#: shines along +x
+CONE = Cone(((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)), 1.0, 0.1)
+
+
+def point(*place: float, power: float = 10.0) -> Light:
+    return replace(Light.point(place, (1, 1, 1), power), name="Lamp")
+
+
+def spot(*place: float, size: float = 1.0) -> Light:
+    cone = replace(CONE, size=size)
+    return replace(Light.spot(place, (1, 1, 1), 10.0, cone), name="Spot")
+
+
+def told(*lights: Light, settings: VolumeSettings = DEEP, ball: Ball = BALL) -> tuple[str, ...]:
+    found = shadow_warnings(lights, ball, settings)
+    for warning in found:
+        place, rest = warning.split(": ", 1)
+        assert place and rest[0].islower() and warning.endswith(".")
+        assert warning.count(". ") >= 1, "what to do"
+    return found
+
+
+def test_lights_that_throw_all_their_shadow_are_not_told_of() -> None:
+    assert told(SUN) == () and told(SUN, point(1.0, 0.0, 1.5)) == ()
+    assert told(spot(-1.0, 0.0, 1.5)) == () and told(spot(0.05, 0.0, 1.5)) == ()
+    assert told(point(0.1, 0.0, 1.5), settings=VolumeSettings(shadows="none")) == ()
+
+
+def test_a_light_amidst_the_hair_is_told_by_its_name() -> None:
+    (warning,) = told(SUN, point(0.1, 0.02, 1.5))
+    assert warning.startswith("Lamp: it stands amidst the hair") and "0.21 m" in warning
+    assert shadow_frames([SUN, point(0.1, 0.02, 1.5)], BALL, DEEP)[1] is None
+
+
+def test_of_a_light_as_near_as_hair_reaches_a_part_has_no_shadow() -> None:
+    (warning,) = told(point(0.1, 0.12, 1.5))
+    assert warning.startswith("Lamp: it stands as near as hair reaches")
+    assert shadow_frames([point(0.1, 0.12, 1.5)], BALL, DEEP)[0] is not None
+    assert told(spot(0.1, 0.12, 1.5, size=3.1))[0].startswith("Spot: ")
+
+
+@pytest.mark.parametrize("place", [(0.31, 0.0, 1.5), (1.0, 0.0, 1.5), (-1.0, 0.9, 1.5)])
+def test_a_spot_that_misses_the_hair_is_told(place: tuple[float, float, float]) -> None:
+    (warning,) = told(spot(*place))
+    assert warning.startswith("Spot: it shines past the hair")
+
+
+def test_a_panel_with_its_back_to_the_hair_is_told() -> None:
+    panel = Panel((0, 1, 0), (0, 0, 1), (1.0, 0.0, 0.0), 0.1, 0.1, False, np.pi)
+    lamp = replace(Light.area((1.0, 0.0, 1.5), (1, 1, 1), 9.0, panel), name="Area")
+    assert told(lamp)[0].startswith("Area: it shines past the hair")
+    assert told(replace(lamp, vector=(-1.0, 0.0, 1.5))) == ()
+
+
+def test_lights_beyond_those_that_throw_shadows_are_told_where_they_are_much() -> None:
+    lights = [point(np.cos(turn), np.sin(turn), 1.5) for turn in range(20)]
+    (warning,) = told(*lights)
+    assert "the 2 strongest of 20" in warning
+    assert told(*lights[:2], point(0.0, 2.0, 1.5, power=1.0)) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "word"),
+    [
+        ("extinction", 0.0, "throws none"),
+        ("extinction", 1000.0, "1000"),
+        ("most_lights", 0, "Lights is 0"),
+    ],
+)
+def test_settings_that_leave_no_shadow_are_told(name: str, value: float, word: str) -> None:
+    (warning,) = told(SUN, settings=replace(DEEP, **{name: value}))
+    assert word in warning
+
+
+def test_maps_that_no_gpu_could_hold_are_told() -> None:
+    settings = VolumeSettings(shadows="slices", slices=64, resolution=2048, most_lights=8)
+    (warning,) = told(*(point(1.0, turn, 1.5) for turn in range(8)), settings=settings)
+    assert "2048 texels for 8 lights" in warning and "Lower Resolution" in warning
+
+
+def test_hair_without_extent_is_told() -> None:
+    assert "no extent" in told(SUN, ball=Ball(np.zeros(3), 1.2e-4))[0]
