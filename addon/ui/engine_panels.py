@@ -1,0 +1,136 @@
+"""Panels of the render engine Hairloom, and Blender's own that serve it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..host.overlay import ENGINE
+
+#: serve every engine but those with panels of their own for the same
+_UNFIT = frozenset({"VIEWLAYER_PT_filter", "RENDER_PT_freestyle"})
+#: serve EEVEE alone, and what they show means the same here
+_FIT = frozenset(
+    {
+        "EEVEE_MATERIAL_PT_context_material",
+        "EEVEE_MATERIAL_PT_surface",
+        "EEVEE_WORLD_PT_surface",
+        "VIEWLAYER_PT_layer_passes",
+    }
+)
+
+_served: list[type[Any]] = []
+
+
+class _RenderPanel(bpy.types.Panel):
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "render"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine == ENGINE
+
+
+class HAIRLOOM_PT_engine_sampling(_RenderPanel):
+    """How many samples make one picture."""
+
+    bl_label = "Sampling"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, picture = self.layout, context.scene.hairloom.picture
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column(align=True)
+        column.prop(picture, "viewport_samples", text="Viewport")
+        column.prop(picture, "samples", text="Render")
+
+
+class HAIRLOOM_PT_engine_motion_blur(_RenderPanel):
+    """How long the shutter is open."""
+
+    bl_label = "Motion Blur"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.render, "use_motion_blur", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, render = self.layout, context.scene.render
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.active = render.use_motion_blur
+        layout.prop(render, "motion_blur_position", text="Position")
+        layout.prop(render, "motion_blur_shutter", text="Shutter")
+        layout.prop(context.scene.hairloom.picture, "motion_steps", text="Steps")
+
+
+class HAIRLOOM_PT_engine_film(_RenderPanel):
+    """What lies behind the scene, and how sharp a pixel is."""
+
+    bl_label = "Film"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, render = self.layout, context.scene.render
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(render, "filter_size")
+        layout.prop(render, "film_transparent", text="Transparent")
+
+
+class HAIRLOOM_PT_engine_passes(bpy.types.Panel):
+    """What is rendered beside the picture."""
+
+    bl_label = "Data"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "view_layer"
+    bl_parent_id = "VIEWLAYER_PT_layer_passes"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine == ENGINE
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, layer = self.layout, context.view_layer
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column()
+        column.prop(layer, "use_pass_z")
+        column.prop(layer, "use_pass_object_index")
+
+
+CLASSES = (
+    HAIRLOOM_PT_engine_sampling,
+    HAIRLOOM_PT_engine_motion_blur,
+    HAIRLOOM_PT_engine_film,
+    HAIRLOOM_PT_engine_passes,
+)
+
+
+def register() -> None:
+    """Let Blender's panels show themselves with our engine, as its documentation has it."""
+    for panel in _panels(bpy.types.Panel):
+        engines = getattr(panel, "COMPAT_ENGINES", None)
+        name = panel.__name__
+        if engines is None or name in _UNFIT or ENGINE in engines:
+            continue
+        if "BLENDER_RENDER" in engines or name in _FIT:
+            engines.add(ENGINE)
+            _served.append(panel)
+
+
+def unregister() -> None:
+    for panel in _served:
+        panel.COMPAT_ENGINES.discard(ENGINE)
+    _served.clear()
+
+
+def _panels(parent: type[Any]) -> list[type[Any]]:
+    """All panels there are, also those that are made from others."""
+    found = []
+    for each in parent.__subclasses__():
+        found += [each, *_panels(each)]
+    return list(dict.fromkeys(found))
