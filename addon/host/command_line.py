@@ -9,21 +9,26 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 from ..errors import HairloomError
 from ..parameters import ALL_SETTINGS
 from ..params import Settings
 from .bake_job import bake
 from .inputs import Sources
-from .jobs import Job, cards, demo, export, render, simulate
+from .job_steps import Job
+from .jobs import cards, demo, export, render, sheet, simulate, turntable
 from .overrides import overrides
 from .presets import named_preset
 from .principled import look_from_named
+from .turntable import LIGHTS
 
 VERBS = {
     "simulate": simulate,
     "bake": bake,
     "render": render,
+    "turntable": turntable,
+    "sheet": sheet,
     "cards": cards,
     "export": export,
     "demo": demo,
@@ -154,26 +159,60 @@ def _add_job_options(verb: argparse.ArgumentParser, name: str) -> None:
         job.add_argument(
             "--scene", action="store_true", help="use the scene's animation and frame range"
         )
-    if name in ("render", "export"):
+    if name in ("render", "export", "turntable", "sheet"):
         job.add_argument("--take", help="a take written by 'hairloom simulate'")
         job.add_argument("--frame", type=int, default=0, help="frame of the take, from 0")
-    if name in ("render", "demo"):
-        job.add_argument("--width", type=int, default=960, help="pixels across")
-        job.add_argument("--height", type=int, default=720, help="pixels down")
+    if name in _PICTURES:
+        width, height = _PICTURES[name]
+        job.add_argument("--width", type=int, default=width, help="pixels across")
+        job.add_argument("--height", type=int, default=height, help="pixels down")
         job.add_argument("--samples", type=int, default=3, help="sub-pixels along each side")
+    if name == "turntable":
+        _add_turntable_options(job)
+    if name == "sheet":
+        job.add_argument(
+            "--looks", action="store_true", help="in all looks that ship, in place of all sides"
+        )
     if name == "render":
         job.add_argument(
             "--look-from-material",
             action="store_true",
             help="start from the Principled Hair of the material of --groom, a hair object",
         )
+        job.add_argument(
+            "--slices",
+            metavar="FILE.png",
+            help="write the layers of the lights' shadow maps side by side too",
+        )
         job.add_argument("--sheet", help="write a contact sheet of the take to this .png too")
 
 
+def _add_turntable_options(job: Any) -> None:
+    job.add_argument("--frames", type=int, default=48, help="pictures in a whole turn")
+    job.add_argument("--frame-rate", type=float, default=24.0, help="of the video, frames a second")
+    job.add_argument(
+        "--lights",
+        choices=[name for name, _, _ in LIGHTS],
+        default="camera",
+        help="whether lights turn with the camera (default) or stay on the groom",
+    )
+    job.add_argument("--transparent", action="store_true", help="without a backdrop")
+    job.add_argument("--no-video", action="store_true", help="pictures only")
+
+
+#: verb -> default size of a picture [pixels]
+_PICTURES = {
+    "render": (960, 720),
+    "demo": (960, 720),
+    "turntable": (720, 720),
+    "sheet": (480, 480),
+}
 _OUTPUTS = {
     "simulate": "take to write (.npz)",
     "bake": "folder for the bake, of several objects one below it each (default: their own)",
     "render": "picture to write (.png)",
+    "turntable": "folder for the pictures and the video",
+    "sheet": "picture to write (.png); --width and --height are of each picture in it",
     "cards": "hair cards to write (.glb)",
     "export": "strands to write (.tfx)",
     "demo": "folder to write into (default: out)",
@@ -232,8 +271,7 @@ def _settings(options: argparse.Namespace) -> dict[str, Settings]:
     """All parameter sets: the defaults, changed by --preset or a material, changed by --set."""
     chosen = {section: made() for section, made in ALL_SETTINGS.items()}
     for name in options.preset:
-        preset = named_preset(name)
-        chosen[preset.settings.section] = preset.settings
+        chosen |= {settings.section: settings for settings in named_preset(name).all}
     if getattr(options, "look_from_material", False):
         chosen["shading"], notes = look_from_named(options.groom, chosen["shading"])
         for note in notes:

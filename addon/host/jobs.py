@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,53 +14,35 @@ from ..dynamics.colliders import DistanceField
 from ..dynamics.settings import DynamicsSettings
 from ..errors import HairloomError
 from ..exchange.tressfx import write_tfx
-from ..groom.children_settings import ChildrenSettings
-from ..groom.settings import GrowSettings, GuideSettings
-from ..params import Settings
 from ..pipeline import Pose, Rig
-from ..refine.settings import DetailSettings
 from ..render.card_snapshot import CardSnapshot
 from ..shading.ambient import AmbientSettings
-from ..shading.settings import ShadingSettings, StrandSettings
+from ..shading.settings import ShadingSettings
 from ..shading.textures import TextureSettings
 from ..shading.volume.settings import VolumeSettings
 from .card_files import CardChoices, WrittenCards, write_cards
 from .card_images import named_pictures
 from .images import contact_sheet, write_png
-from .inputs import Inputs, Sources, read_inputs
+from .inputs import Inputs
+from .job_steps import Job, finish, moment_of, open_studio, read_rig, rest_of, tell_notes
 from .report import Progress, Report
-from .studio import Look, Studio
+from .sheet import Sheet
+from .studio import Studio
 from .take import Take, TakeDrive, read_take, scene_drive, shaken_poses, write_take
 from .take import simulate as simulate_take
+from .turntable import Turntable, TurntableSettings
 
 SHEET_COLUMNS, SHEET_ROWS = 4, 3
-
-
-@dataclass(frozen=True)
-class Job:
-    """One call of a verb: what to work on, how, and where the result goes."""
-
-    verb: str
-    sources: Sources
-    settings: dict[str, Settings]
-    output: Path
-    options: argparse.Namespace
-
-    def set[S: Settings](self, kind: type[S]) -> S:
-        """This job's values of one parameter set."""
-        values = self.settings[kind.section]
-        assert isinstance(values, kind)
-        return values
 
 
 def simulate(job: Job) -> None:
     """Simulate the guides and write them as a take."""
     report = Report(job.verb)
-    rig, inputs = _rig(job, report)
+    rig, inputs = read_rig(job, report)
     take = _simulate(job, rig, inputs, report)
     with report.stage("write take"):
         write_take(job.output, take)
-    _finish(job, report, job.output)
+    finish(job, report, job.output)
 
 
 def render(job: Job) -> None:
@@ -71,44 +51,94 @@ def render(job: Job) -> None:
         raise HairloomError(
             "a contact sheet needs motion", place="--sheet", remedy="Give a take with --take"
         )
+    if job.options.slices and job.set(VolumeSettings).shadows == "none":
+        raise HairloomError(
+            "there are no shadows whose layers could be shown",
+            place="--slices",
+            remedy="Add --set volume.shadows=slices, or deep",
+        )
     report = Report(job.verb)
-    rig, _ = _rig(job, report)
-    studio = _studio(job, rig, report)
+    rig, _ = read_rig(job, report)
+    studio = open_studio(job, rig, report)
     if job.options.sheet:
         take = read_take(Path(job.options.take), rig)
         _write_sheet(Path(job.options.sheet), studio, rig, take, report)
-    pose, points = _moment(job, rig)
+    pose, points = moment_of(job, rig)
     _write_still(job, job.output, studio, pose, points, report)
-    _finish(job, report, job.output)
+    if job.options.slices:
+        _write_slices(Path(job.options.slices), studio, pose, points, report)
+    finish(job, report, job.output)
 
 
 def cards(job: Job) -> None:
     """Turn the guides into hair cards, sorted from inside to outside: a GLB and its textures."""
     report = Report(job.verb)
     pictures = named_pictures(job.options.texture)
-    rig, _ = _rig(job, report)
+    rig, _ = read_rig(job, report)
     _write_cards(job, job.output, rig, pictures, report)
-    _finish(job, report, job.output)
+    finish(job, report, job.output)
 
 
 def export(job: Job) -> None:
     """Write the strands, at rest or at a frame of a take, as TressFX."""
     report = Report(job.verb)
-    rig, _ = _rig(job, report)
-    _, points = _moment(job, rig)
+    rig, _ = read_rig(job, report)
+    _, points = moment_of(job, rig)
     with report.stage("write strands"):
         write_tfx(job.output, rig.strands.with_points(points.reshape(-1, 3)))
-    _finish(job, report, job.output)
+    finish(job, report, job.output)
+
+
+def turntable(job: Job) -> None:
+    """Turn the groom once before the camera: a picture a frame, and a video of them."""
+    options, report = job.options, Report(job.verb)
+    chosen = TurntableSettings(
+        frames=options.frames,
+        width=options.width,
+        height=options.height,
+        samples=options.samples,
+        lights=options.lights,
+        transparent=options.transparent,
+        video=not options.no_video,
+        frame_rate=options.frame_rate,
+    )
+    rig, _ = read_rig(job, report)
+    studio = open_studio(job, rig, report)
+    pose, points = moment_of(job, rig)
+    turn = Turntable(studio, pose, points, chosen, job.output)
+    progress = Progress("drawing the turntable", chosen.frames)
+    with report.stage("draw turntable"):
+        for done in turn.steps():
+            progress.show(done)
+    tell_notes(turn.notes, report)
+    for path in turn.files:
+        report.add_output(path)
+    finish(job, report, job.output)
+
+
+def sheet(job: Job) -> None:
+    """Draw a contact sheet: the groom from all sides, or in all looks."""
+    options, report = job.options, Report(job.verb)
+    rig, _ = read_rig(job, report)
+    studio = open_studio(job, rig, report)
+    size = options.width, options.height
+    drawn = Sheet(studio, *moment_of(job, rig), size, options.samples, by_looks=options.looks)
+    progress = Progress("drawing the contact sheet", drawn.count)
+    with report.stage("draw contact sheet"):
+        for done in drawn.steps():
+            progress.show(done)
+    write_png(job.output, drawn.picture)
+    finish(job, report, job.output)
 
 
 def demo(job: Job) -> None:
     """Do it all: simulate, stills, contact sheet, hair cards, strands and report.json."""
     report = Report(job.verb)
     folder, pictures = job.output, named_pictures(job.options.texture)
-    rig, inputs = _rig(job, report)
+    rig, inputs = read_rig(job, report)
     take = _simulate(job, rig, inputs, report)
-    studio = _studio(job, rig, report)
-    _write_still(job, folder / "still.png", studio, *_rest(rig), report)
+    studio = open_studio(job, rig, report)
+    _write_still(job, folder / "still.png", studio, *rest_of(rig), report)
     _write_sheet(folder / "motion.png", studio, rig, take, report)
     written = _write_cards(job, folder / "cards.glb", rig, pictures, report)
     _write_card_still(job, folder / "cards.png", studio, written, report)
@@ -117,56 +147,6 @@ def demo(job: Job) -> None:
     report.add_output(folder / "strands.tfx")
     report.write(folder / "report.json")
     print(f"Wrote {', '.join(report.facts['outputs'])} and report.json into {folder}")
-
-
-def _rig(job: Job, report: Report) -> tuple[Rig, Inputs]:
-    """Read what the job names and make it ready to move."""
-    print("reading", job.sources.groom or "(a groom grown here)", flush=True)
-    with report.stage("read inputs"):
-        inputs = read_inputs(job.sources, job.set(GrowSettings))
-    _tell_drops(job, inputs)
-    with report.stage("bind roots, choose guides"):
-        rig = pipeline.prepare(
-            inputs.strands,
-            inputs.head,
-            job.set(GuideSettings),
-            place=inputs.groom_name,
-            children=job.set(ChildrenSettings),
-            density=inputs.density,
-        )
-    tell_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
-    low, high = rig.strands.bounds()
-    report.facts.update(
-        groom=Path(inputs.groom_name).name,
-        strands=rig.strands.strand_count,
-        guides=len(rig.guides),
-        children=rig.strands.strand_count - len(rig.guides),
-        cv_count=rig.strands.grid.shape[1],
-        bounds_m=[low.round(5).tolist(), high.round(5).tolist()],
-        dropped=inputs.dropped,
-    )
-    return rig, inputs
-
-
-def _tell_drops(job: Job, inputs: Inputs) -> None:
-    """Say what was dropped; with --strict that is an error."""
-    if not inputs.dropped:
-        return
-    reasons = ", ".join(f"{count} with {reason}" for reason, count in inputs.dropped.items())
-    if job.options.strict:
-        raise HairloomError(
-            f"strands would be dropped: {reasons}",
-            place=inputs.groom_name,
-            remedy="Mend the groom, or leave out --strict",
-        )
-    print(f"hairloom: {inputs.groom_name}: dropped strands: {reasons}", flush=True)
-
-
-def tell_notes(notes: list[str], report: Report) -> None:
-    """Say what the artist should know, and put it into the report."""
-    for note in notes:
-        print(f"hairloom: {note}", flush=True)
-    report.facts["notes"] = notes
 
 
 def _simulate(job: Job, rig: Rig, inputs: Inputs, report: Report) -> Take:
@@ -205,38 +185,6 @@ def _drive(job: Job, rig: Rig, inputs: Inputs) -> TakeDrive:
     return scene_drive(inputs.head_object)
 
 
-def _rest(rig: Rig) -> tuple[Pose, Floats]:
-    return rig.rest_pose, rig.strands.grid
-
-
-def _moment(job: Job, rig: Rig) -> tuple[Pose, Floats]:
-    """The pose and all strands at the frame of the take that was asked for; else at rest."""
-    if not job.options.take:
-        return _rest(rig)
-    take = read_take(Path(job.options.take), rig)
-    if not 0 <= job.options.frame < take.frame_count:
-        raise HairloomError(
-            f"frame {job.options.frame} is not in this take",
-            place=job.options.take,
-            remedy=f"Use a frame from 0 to {take.frame_count - 1}",
-        )
-    pose = take.pose(job.options.frame)
-    return pose, pipeline.strands_at(rig, pose, take.guides[job.options.frame])
-
-
-def _studio(job: Job, rig: Rig, report: Report) -> Studio:
-    with report.stage("ambient occlusion"):
-        occlusion = pipeline.rest_occlusion(rig, job.set(AmbientSettings))
-        head_occlusion = pipeline.head_occlusion(rig, job.set(AmbientSettings))
-    look = Look(
-        job.set(ShadingSettings),
-        job.set(StrandSettings),
-        job.set(DetailSettings),
-        volume=job.set(VolumeSettings),
-    )
-    return Studio(rig, occlusion, head_occlusion, look)
-
-
 def _write_still(
     job: Job, path: Path, studio: Studio, pose: Pose, points: Floats, report: Report
 ) -> None:
@@ -270,6 +218,14 @@ def _write_sheet(path: Path, studio: Studio, rig: Rig, take: Take, report: Repor
     report.add_output(path)
 
 
+def _write_slices(path: Path, studio: Studio, pose: Pose, points: Floats, report: Report) -> None:
+    """The layers of the shadow maps."""
+    with report.stage("draw slices"):
+        picture = studio.slices(pose, points)
+    write_png(path, picture)
+    report.add_output(path)
+
+
 def _write_cards(
     job: Job, path: Path, rig: Rig, pictures: Mapping[str, Floats], report: Report
 ) -> WrittenCards:
@@ -298,12 +254,3 @@ def _write_card_still(
         picture = studio.card_picture(shown, options.width, options.height, options.samples)
     write_png(path, picture)
     report.add_output(path)
-
-
-def _finish(job: Job, report: Report, output: Path) -> None:
-    """Name the result, and write the report where one was asked for."""
-    if not report.facts["outputs"]:
-        report.add_output(output)
-    if job.options.report:
-        report.write(Path(job.options.report))
-    print(f"Wrote {output}")

@@ -1,0 +1,301 @@
+"""Turntables and contact sheets: whole turns, whole files, and messages where there are none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="turntables are drawn inside Blender")
+
+import bpy
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.host import command_line, video
+from hairloom.addon.host import turntable as turntable_module
+from hairloom.addon.host.images import read_texture
+from hairloom.addon.host.labels import labelled
+from hairloom.addon.host.presets import shipped
+from hairloom.addon.host.sheet import COLUMNS, VIEWS, Sheet
+from hairloom.addon.host.showing import file_name, shown_groom
+from hairloom.addon.host.turntable import Turntable, TurntableSettings
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+SMALL = TurntableSettings(frames=4, width=64, height=48, samples=1, video=False)
+
+
+@pytest.fixture
+def hair(new_hair: Callable[..., bpy.types.Object], sphere: bpy.types.Object) -> bpy.types.Object:
+    return new_hair(sphere)
+
+
+@pytest.fixture
+def table(hair: bpy.types.Object, tmp_path: Path) -> Turntable:
+    shown = shown_groom(hair, bpy.context.evaluated_depsgraph_get())
+    folder = tmp_path / "made" / "turn"
+    return Turntable(shown.studio, shown.pose, shown.points, SMALL, folder)
+
+
+def data_blocks() -> list[str]:
+    """But for the image in which Blender shows what was rendered last."""
+    images = [image for image in bpy.data.images if image.type != "RENDER_RESULT"]
+    return [block.name for block in (*bpy.data.scenes, *bpy.data.objects, *images)]
+
+
+def pixels_of(path: Path) -> np.ndarray:
+    return read_texture(path, is_color=False)
+
+
+def test_one_press_gives_pictures_and_a_video(hair: bpy.types.Object, tmp_path: Path) -> None:
+    blocks = data_blocks()
+    options = {"frames": 5, "size": 64, "samples": 1}
+    assert bpy.ops.hairloom.turntable(directory=str(tmp_path), **options) == {"FINISHED"}
+    names = [f"Hair_000{number}.png" for number in range(1, 6)]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["Hair.mp4", *names]
+    pictures = [pixels_of(tmp_path / name) for name in names]
+    assert all(picture.shape[:2] == (64, 64) for picture in pictures)
+    for index, picture in enumerate(pictures):
+        for other in pictures[:index]:
+            assert np.abs(picture - other).max() > 0.1
+    assert data_blocks() == blocks
+    clip = bpy.data.movieclips.load(str(tmp_path / "Hair.mp4"))
+    assert (clip.frame_duration, tuple(clip.size)) == (5, (64, 64))
+    assert clip.fps == pytest.approx(bpy.context.scene.render.fps)
+
+
+def test_a_video_shows_the_pictures_as_they_are(tmp_path: Path) -> None:
+    """Each of one colour, so that only the codec's rounding lies between, and in their order."""
+    frames, colors = [], [(0.8, 0.1, 0.1), (0.1, 0.7, 0.2), (0.2, 0.3, 0.9)]
+    for index, color in enumerate(colors):
+        path = tmp_path / f"{index}.png"
+        image = bpy.data.images.new("frame", 33, 20)
+        image.pixels.foreach_set(np.tile([*color, 1.0], 33 * 20).astype(np.float32))
+        image.file_format = "PNG"
+        image.save(filepath=str(path))
+        bpy.data.images.remove(image)
+        frames.append(path)
+    video.write_video(tmp_path / "v.mp4", frames, (33, 20), 23.976)
+    clip = bpy.data.movieclips.load(str(tmp_path / "v.mp4"))
+    assert clip.fps == pytest.approx(23.976, abs=0.01)
+    movie = bpy.data.images.load(str(tmp_path / "v.mp4"))
+    assert (movie.frame_duration, tuple(movie.size)) == (3, (32, 20))
+    found = np.array(movie.pixels[:]).reshape(20, 32, 4)[10, 16, :3]
+    assert found == pytest.approx(colors[0], abs=0.03)
+
+
+def test_after_a_whole_turn_it_is_the_same_picture(table: Turntable) -> None:
+    first, last = table.picture(0), table.picture(SMALL.frames)
+    assert np.array_equal(first, last)
+    assert np.abs(first - table.picture(1)).max() > 0.05
+
+
+@pytest.mark.parametrize("size", [(64, 48), (48, 90)])
+def test_the_groom_stays_whole_in_view_and_does_not_drift(
+    table: Turntable, size: tuple[int, int]
+) -> None:
+    """Also one that is long to one side of its head, and high up."""
+    points = table.points.copy() + [0.5, -0.2, 3.0]
+    points[::7] += np.linspace(0.0, 0.4, points.shape[1])[:, None] * np.array([1.0, 0.2, 0.0])
+    table.points = points
+    table.pose = replace(table.pose, head_positions=None)
+    table.settings = replace(SMALL, frames=36, width=size[0], height=size[1])
+    homogeneous = np.append(points.reshape(-1, 3), np.ones((points.size // 3, 1)), axis=1)
+    middle = np.append((points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2.0, 1.0)
+    largest, places = 0.0, []
+    for frame in range(36):
+        camera = table.camera(frame)
+        to_clip = camera.projection @ camera.view
+        clip = homogeneous @ to_clip.T
+        assert (np.abs(clip[:, :3]) < clip[:, 3:]).all()
+        largest = max(largest, float((np.abs(clip[:, :2]) / clip[:, 3:]).max()))
+        places.append((to_clip @ middle) / (to_clip @ middle)[3])
+    assert largest > 0.5
+    assert np.ptp(places, axis=0).max() < 1e-6
+
+
+def test_lights_turn_with_the_camera_or_stay_on_the_groom(table: Turntable) -> None:
+    follows = [table.picture(frame) for frame in (0, 1)]
+    table.settings = replace(SMALL, lights="groom")
+    stays = [table.picture(frame) for frame in (0, 1)]
+    assert np.array_equal(follows[0], stays[0])
+    assert np.abs(follows[1] - stays[1]).mean() > 1e-3
+
+
+def test_transparent_pictures_have_no_backdrop(table: Turntable) -> None:
+    table.settings = replace(SMALL, transparent=True)
+    picture = table.picture(0)
+    assert picture[0, 0].tolist() == [0.0] * 4 and picture[..., 3].max() > 0.9
+
+
+@pytest.mark.parametrize("is_there", [False, True])
+def test_what_is_cancelled_leaves_nothing(table: Turntable, is_there: bool) -> None:
+    kept = table.folder / "turntable_0001.png"
+    if is_there:
+        table.folder.mkdir(parents=True)
+        kept.write_text("of an earlier turn")
+    steps = table.steps()
+    assert [next(steps), next(steps)] == [1, 2]
+    steps.close()
+    if is_there:
+        assert [path.name for path in table.folder.iterdir()] == [kept.name]
+        assert kept.read_text() == "of an earlier turn"
+    else:
+        assert not table.folder.exists()
+
+
+def test_what_fails_leaves_nothing(table: Turntable, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = table.picture
+
+    def picture(frame: int) -> Any:
+        if frame == 2:
+            raise HairloomError("it broke", place="here", remedy="Mend it")
+        return drawn(frame)
+
+    monkeypatch.setattr(table, "picture", picture)
+    with pytest.raises(HairloomError, match="it broke"):
+        list(table.steps())
+    assert not table.folder.exists()
+
+
+def test_without_a_writer_of_videos_the_pictures_stay(
+    table: Turntable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(video, "can_write_video", lambda: False)
+    table.settings = replace(SMALL, video=True)
+    assert list(table.steps()) == [1, 2, 3, 4]
+    assert sorted(table.folder.iterdir()) == sorted(table.files)
+    assert len(table.files) == 4 and not table.has_video
+    (note,) = table.notes
+    assert "FFmpeg" in note and "pictures are there" in note
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"frames": 0}, {"frames": -3}, {"width": 0}, {"height": 100_000}, {"samples": 9}],
+    ids=str,
+)
+def test_what_nobody_can_draw_is_refused(wrong: dict[str, int]) -> None:
+    with pytest.raises(HairloomError, match=f"{next(iter(wrong))} cannot be"):
+        TurntableSettings(**wrong)
+
+
+@pytest.mark.parametrize("frame_rate", [0.0, -24.0, float("nan")])
+def test_a_frame_rate_that_is_none_is_refused(frame_rate: float) -> None:
+    with pytest.raises(HairloomError, match="frame rate"):
+        TurntableSettings(frame_rate=frame_rate)
+
+
+def test_a_folder_that_is_a_file_is_named(table: Turntable, tmp_path: Path) -> None:
+    table.folder = tmp_path / "file"
+    table.folder.write_text("mine")
+    with pytest.raises(HairloomError) as caught:
+        list(table.steps())
+    assert caught.value.place == str(table.folder)
+    assert table.folder.read_text() == "mine"
+
+
+def test_without_hair_the_buttons_say_so(extension: None, tmp_path: Path) -> None:
+    for operator in (bpy.ops.hairloom.turntable, bpy.ops.hairloom.contact_sheet):
+        assert not operator.poll()
+
+
+def test_a_contact_sheet_shows_all_sides(hair: bpy.types.Object, tmp_path: Path) -> None:
+    path = tmp_path / "sheet.png"
+    result = bpy.ops.hairloom.contact_sheet(filepath=str(path), size=64, samples=1)
+    assert result == {"FINISHED"}
+    assert len(VIEWS) + 1 == 2 * COLUMNS
+    sheet = pixels_of(path)
+    assert sheet.shape[:2] == (128, 64 * COLUMNS)
+    tiles = [sheet[64 * (i // 3) :][:64, 64 * (i % 3) :][:, :64] for i in range(6)]
+    for index, tile in enumerate(tiles):
+        assert tile.std() > 0.02
+        for other in tiles[:index]:
+            assert np.abs(tile - other).max() > 0.1
+
+
+def test_a_contact_sheet_of_all_looks_leaves_the_groom_its_own(table: Turntable) -> None:
+    studio, look = table.studio, table.studio.look
+    sheet = Sheet(studio, table.pose, table.points, (48, 48), 1, by_looks=True)
+    assert list(sheet.steps()) == list(range(1, len(shipped("shading")) + 1))
+    assert studio.look is look
+    rows = -(-len(shipped("shading")) // COLUMNS)
+    assert sheet.picture.shape == (48 * rows, 48 * COLUMNS, 4)
+    top = sheet.picture[-48:]
+    assert np.abs(top[:, :48] - top[:, 48:96]).max() > 0.1
+
+
+def test_a_label_stands_in_the_lower_left_corner_and_nowhere_else() -> None:
+    grey = np.full((100, 300, 4), 0.1, np.float32)
+    named = labelled(grey, "Side")
+    changed = np.argwhere(np.abs(named - grey).max(axis=-1) > 0.01)
+    assert len(changed) > 20
+    assert changed.max(axis=0)[0] < 20 and changed.max(axis=0)[1] < 60
+    assert np.array_equal(labelled(grey, ""), grey)
+    assert not np.array_equal(labelled(grey, "Back"), named)
+
+
+def test_names_of_data_blocks_become_names_of_files() -> None:
+    assert file_name("Hair.001") == "Hair.001"
+    assert file_name("../a/b:c") == "_a_b_c"
+    assert file_name("..") == "groom"
+
+
+GROWN = ["--set", "grow.strand_count=60", "--set", "guides.guide_count=10"]
+
+
+def test_the_command_line_turns_a_groom(tmp_path: Path) -> None:
+    folder, report = tmp_path / "turn", tmp_path / "report.json"
+    sizes = ["--frames", "3", "--width", "64", "--height", "48", "--samples", "1"]
+    arguments = ["turntable", *GROWN, *sizes, "--output", str(folder), "--report", str(report)]
+    assert command_line.run(arguments) == 0
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "turntable.mp4",
+        *(f"turntable_000{number}.png" for number in (1, 2, 3)),
+    ]
+    assert "turntable_0003.png" in report.read_text()
+
+
+def test_the_command_line_draws_a_contact_sheet(tmp_path: Path) -> None:
+    sizes = ["--width", "64", "--height", "48", "--samples", "1"]
+    path = tmp_path / "sheet.png"
+    assert command_line.run(["sheet", *GROWN, *sizes, "--output", str(path)]) == 0
+    assert pixels_of(path).shape[:2] == (96, 64 * COLUMNS)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "place"),
+    [(["--frames", "0"], "turntable"), (["--width", "0"], "--width")],
+    ids=["no frames", "no width"],
+)
+def test_the_command_line_refuses_what_nobody_can_draw(
+    wrong: list[str], place: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "turn"
+    assert command_line.run(["turntable", *GROWN, *wrong, "--output", str(folder)]) == 1
+    assert f"hairloom: {place}: " in capfd.readouterr().err
+    assert not folder.exists()
+
+
+def test_a_folder_that_cannot_be_written_gets_a_message(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    file.write_text("mine")
+    sizes = ["--frames", "2", "--width", "32", "--height", "32", "--samples", "1"]
+    assert command_line.run(["turntable", *GROWN, *sizes, "--output", str(file / "turn")]) == 1
+    message = capfd.readouterr().err
+    assert message.startswith(f"hairloom: {file / 'turn'}: ") and "Choose a folder" in message
+
+
+def test_limits_of_the_button_are_those_of_the_settings(extension: None) -> None:
+    properties = bpy.ops.hairloom.turntable.get_rna_type().properties
+    assert (properties["frames"].hard_min, properties["frames"].hard_max) == turntable_module.FRAMES
+    assert (properties["size"].hard_min, properties["size"].hard_max) == turntable_module.SIDES
+    defaults = TurntableSettings()
+    assert properties["frames"].default == defaults.frames
+    assert properties["size"].default == defaults.width == defaults.height

@@ -1,0 +1,76 @@
+"""Showing a groom to others: a turntable that goes on in the window, one that Esc ends, a sheet."""
+
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import look_from_front, open_our_sidebar, press, until
+
+STRANDS, FRAMES = 300, 5
+FOLDER = Path(bpy.app.tempdir) / "shown"
+SMALL = {"size": 64, "samples": 1}
+
+
+def running():
+    return sys.modules[f"{driver.EXTENSION}.addon.ui.operators_show"]._running
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    for obj in list(bpy.data.objects):
+        if obj.type == "MESH":
+            bpy.data.objects.remove(obj)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    assert bpy.ops.hairloom.grow(strand_count=STRANDS, length=0.12) == {"FINISHED"}
+    bpy.context.object.name = "Hair"
+    look_from_front(0.9)
+    yield from open_our_sidebar()
+    yield from a_whole_turn()
+    yield from a_cancelled_one()
+    yield from a_sheet()
+
+
+def turntable(**options):
+    assert bpy.ops.hairloom.turntable(directory=str(FOLDER), **SMALL, **options) == {
+        "RUNNING_MODAL"
+    }
+    assert not bpy.ops.hairloom.turntable.poll()
+
+
+def a_whole_turn():
+    """Pictures and a video, while the window stays alive."""
+    turntable(frames=FRAMES)
+    yield from until(lambda: running() is None, "the turntable does not end", tries=300)
+    names = sorted(path.name for path in FOLDER.iterdir())
+    assert names == ["Hair.mp4", *(f"Hair_000{n}.png" for n in range(1, FRAMES + 1))], names
+    clip = bpy.data.movieclips.load(str(FOLDER / "Hair.mp4"))
+    assert clip.frame_duration == FRAMES
+    assert [scene.name for scene in bpy.data.scenes] == ["Scene"]
+    driver.screenshot("turned")
+
+
+def a_cancelled_one():
+    """Esc ends it between two pictures; those of the turn before stay as they are."""
+    before = {path.name: path.stat().st_mtime_ns for path in FOLDER.iterdir()}
+    turntable(frames=2000)
+    yield from until(lambda: running() is None or running().done > 2, "no picture is drawn", 300)
+    assert running() is not None
+    driver.screenshot("turning")
+    yield from press("ESC")
+    yield from until(lambda: running() is None, "Esc does not cancel the turntable")
+    assert {path.name: path.stat().st_mtime_ns for path in FOLDER.iterdir()} == before
+    assert bpy.ops.hairloom.turntable.poll()
+
+
+def a_sheet():
+    path = FOLDER / "sheet.png"
+    assert bpy.ops.hairloom.contact_sheet(filepath=str(path), **SMALL) == {"FINISHED"}
+    assert path.is_file()
+    yield 1
+
+
+driver.play(steps())
