@@ -10,9 +10,10 @@ from typing import Any
 
 import bpy
 
-from .host import groups, handlers, previews, reactions
+from .host import engine, engine_group, groups, handlers, previews, reactions
 from .host.command_line import run
 from .ui import (
+    engine_panels,
     look,
     operators_bake,
     operators_colliders,
@@ -20,6 +21,8 @@ from .ui import (
     operators_fins,
     operators_presets,
     operators_preview,
+    operators_show,
+    operators_slices,
     panels,
 )
 
@@ -29,15 +32,20 @@ COMMAND = "hairloom"
 
 CLASSES: tuple[type[Any], ...] = (
     *groups.CLASSES,
+    *engine_group.CLASSES,
+    *engine.CLASSES,
     *operators_preview.CLASSES,
     *operators_bake.CLASSES,
     *operators_colliders.CLASSES,
     *operators_files.CLASSES,
     *operators_presets.CLASSES,
+    *operators_show.CLASSES,
+    *operators_slices.CLASSES,
     *look.CLASSES,
     *panels.CLASSES,
     *operators_fins.CLASSES,
     *operators_bake.FIN_CLASSES,
+    *engine_panels.CLASSES,
 )
 
 type Step = tuple[Callable[[], Any], Callable[[], Any]]
@@ -62,7 +70,9 @@ def unregister() -> None:
     """The exact mirror image, after the previews have ended."""
     operators_preview.stop_ticking()
     operators_bake.stop()
+    operators_show.stop()
     reactions.clear()
+    engine.unregister()
     for _, undo in reversed(_steps()):
         undo()
 
@@ -72,6 +82,8 @@ def _steps() -> tuple[Step, ...]:
     return (
         *(_class_step(each) for each in CLASSES),
         (groups.register, groups.unregister),
+        (engine_group.register, engine_group.unregister),
+        (engine_panels.register, engine_panels.unregister),
         (previews.register, previews.unregister),
         (panels.register, panels.unregister),
         (handlers.register, handlers.unregister),

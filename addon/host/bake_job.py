@@ -13,7 +13,7 @@ from ..params import Settings
 from . import playback
 from .bake import Bake, bakeable, show_in_renders
 from .bake_settings import folder_of
-from .jobs import Job, tell_notes
+from .job_steps import Job, tell_notes
 from .overrides import overrides
 from .presets import named_preset
 from .properties import settings_of
@@ -99,8 +99,7 @@ def _take_settings(obj: bpy.types.Object, presets: list[str], assignments: list[
     """Change the object's own settings by --preset and --set, as the artist would."""
     chosen: dict[str, Settings] = {}
     for name in presets:
-        preset = named_preset(name)
-        chosen[preset.settings.section] = preset.settings
+        chosen |= {settings.section: settings for settings in named_preset(name).all}
     for section in ALL_SETTINGS:
         group, values = _group(obj, section), overrides(assignments, section)
         settings = chosen.get(section)

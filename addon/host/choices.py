@@ -13,6 +13,8 @@ from ..params import Settings
 from ..refine.settings import DetailSettings
 from ..shading.ambient import AmbientSettings
 from ..shading.settings import ShadingSettings, StrandSettings
+from ..shading.shafts_settings import ShaftSettings
+from ..shading.skin.settings import SkinSettings
 from ..shading.volume.settings import VolumeSettings
 from .properties import settings_of
 
@@ -32,6 +34,8 @@ class Choices:
     shading: ShadingSettings
     strands: StrandSettings
     volume: VolumeSettings
+    skin: SkinSettings
+    shafts: ShaftSettings
     dynamics: DynamicsSettings
     children_density: str = ""
     debug_view: str = "none"
@@ -47,6 +51,8 @@ class Choices:
             settings_of(groom.shading, ShadingSettings),
             settings_of(groom.strands, StrandSettings),
             settings_of(groom.volume, VolumeSettings),
+            settings_of(groom.skin, SkinSettings),
+            settings_of(groom.shafts, ShaftSettings),
             settings_of(character.dynamics, DynamicsSettings),
             character.children_density,
             character.debug_view,

@@ -24,6 +24,8 @@ GROOM_SECTIONS = (
     "strands",
     "shading",
     "volume",
+    "skin",
+    "shafts",
     "ambient",
     "cards",
     "card_texture",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -46,7 +47,7 @@ def no_light_warnings(lights: Sequence[Light], ambient: Color) -> tuple[str, ...
     Such a view shows hair by the world alone, or, if that is black, by a studio's lights; see
     `overlay.lit`.
     """
-    if lights or not any(uses_scene_light(each)[0] for each in _open_shadings()):
+    if lights or not scene_lights_are_shown():
         return ()
     if any(ambient):
         return (
@@ -57,6 +58,11 @@ def no_light_warnings(lights: Sequence[Light], ambient: Color) -> tuple[str, ...
         "Lights: no light shines here and the world is black, so hair is shown by the lights of a "
         "studio. Add a light, or give the world a colour.",
     )
+
+
+def scene_lights_are_shown() -> bool:
+    """Whether a view goes by the scene's lights."""
+    return any(uses_scene_light(each)[0] for each in _open_shadings())
 
 
 def uses_scene_light(shading: bpy.types.View3DShading) -> tuple[bool, bool]:
@@ -93,7 +99,7 @@ def _lights(depsgraph: bpy.types.Depsgraph) -> Iterator[Light]:
         if instance.type == "LIGHT":
             light = _light(instance)
             if light is not None and sum(light.power) > 0.0:
-                yield light
+                yield replace(light, name=instance.name)
 
 
 def _light(instance: bpy.types.Object) -> Light | None:

@@ -242,7 +242,9 @@ def _publish(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     overlay.show(session.uid, _drawing(session, hair))
     is_replaced = hair.mode == "OBJECT" and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original
-    show_originals(hair, depsgraph, show=not hides)
+    volume = session.choices.volume
+    has_own_shadow = volume.on_body and volume.shadows != "none"
+    show_originals(hair, depsgraph, show=not hides, has_own_shadow=has_own_shadow)
 
 
 def _drawing(session: Session, hair: bpy.types.Object) -> Drawing:

@@ -5,10 +5,19 @@ from __future__ import annotations
 import bpy
 
 
-def show_originals(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, show: bool) -> None:
+def show_originals(
+    hair: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    *,
+    show: bool,
+    has_own_shadow: bool = False,
+) -> None:
     """Solid view leaves out what is shown as its bounds, EEVEE what no camera can see.
 
     Touches the evaluated copy only.
+
+    Args:
+        has_own_shadow: ours lies on the head, so that Blender's strands are to throw none.
     """
     evaluated = hair.evaluated_get(depsgraph)
     if not evaluated.is_evaluated:
@@ -18,6 +27,9 @@ def show_originals(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, sh
         evaluated.display_type = display
     if evaluated.visible_camera != is_seen:
         evaluated.visible_camera = is_seen
+    throws = hair.visible_shadow and (show or not has_own_shadow)
+    if evaluated.visible_shadow != throws:
+        evaluated.visible_shadow = throws
 
 
 def refresh_views() -> None:

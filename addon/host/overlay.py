@@ -14,7 +14,9 @@ import bpy
 import gpu
 import numpy as np
 
+from ..render.body_shadow import BodyShadow
 from ..render.camera import Camera
+from ..render.scene_pass import ONE_AT_A_TIME
 from ..render.snapshot import Snapshot
 from ..render.strand_pass import StrandPass
 from ..shading.lights import Light, three_point_lights
@@ -42,8 +44,11 @@ class Drawing:
     counts_of: str = ""
 
 
+#: by which Blender knows our render engine
+ENGINE = "HAIRLOOM"
 _drawings: dict[int, Drawing] = {}
 _passes: dict[int, StrandPass] = {}
+_shadows: dict[int, BodyShadow] = {}
 _handles: tuple[Any, ...] = ()
 _failure = ""
 
@@ -66,6 +71,7 @@ def drop(uid: int) -> None:
     """No longer draw this groom; with the last one the draw handlers go."""
     _drawings.pop(uid, None)
     _passes.pop(uid, None)
+    _shadows.pop(uid, None)
     if not _drawings:
         _remove_handlers()
     redraw_views()
@@ -90,7 +96,7 @@ def retry() -> None:
 
 def _draw(what: Callable[[Any], None]) -> None:
     """Called by Blender for each 3D view; an error is told once, not at every redraw."""
-    if _failure:
+    if _failure or is_rendered_by_us(bpy.context):
         return
     try:
         what(bpy.context)
@@ -104,7 +110,7 @@ def _draw_strands(context: Any) -> None:
     address, studio = space.as_pointer(), three_point_lights(camera.view)
     display = view_transform.display_of(space.shading, context.scene)
     _, _, width, height = gpu.state.viewport_get()
-    for uid, drawing in _shown_in(space):
+    for uid, drawing in shown_in(space):
         snapshot = drawing.snapshot
         if is_seen_through(space.shading) or address in drawing.bare_in:
             snapshot = with_all_strands(snapshot)
@@ -112,7 +118,13 @@ def _draw_strands(context: Any) -> None:
         snapshot = lit(snapshot, space.shading, studio)
         # colours that stand for numbers are no light
         shown_by = display if snapshot.debug_view == "none" else None
-        strand_pass.draw(snapshot, camera, width, height, output="viewport", display=shown_by)
+        with ONE_AT_A_TIME:
+            if _shades_body(snapshot, space) and address not in drawing.bare_in:
+                maps = strand_pass.opacity(snapshot)
+                if maps is not None:
+                    shadow = _shadows.setdefault(uid, BodyShadow())
+                    shadow.draw(snapshot, maps, camera, width, height, display=display)
+            strand_pass.draw(snapshot, camera, width, height, output="viewport", display=shown_by)
 
 
 def _draw_counts(context: Any) -> None:
@@ -126,13 +138,25 @@ def _draw_counts(context: Any) -> None:
             drawing.snapshot.strand_count,
             strand_pass.statistics,
         )
-        for uid, drawing in _shown_in(context.space_data)
+        for uid, drawing in shown_in(context.space_data)
         if drawing.counts_of and (strand_pass := _passes.get(uid)) is not None
     ]
     write_lines(context, lines)
 
 
-def _shown_in(space: Any) -> list[tuple[int, Drawing]]:
+def drawn() -> frozenset[int]:
+    """Session numbers of the grooms that are drawn here, not by Blender."""
+    return frozenset(_drawings)
+
+
+def is_rendered_by_us(context: Any) -> bool:
+    """Whether our render engine draws this 3D view, and the hair with it."""
+    is_ours = context.scene.render.engine == ENGINE
+    return is_ours and context.space_data.shading.type == "RENDERED"
+
+
+def shown_in(space: Any) -> list[tuple[int, Drawing]]:
+    """The grooms that a 3D view shows."""
     address = space.as_pointer()
     return [
         (uid, drawing)
@@ -144,6 +168,13 @@ def _shown_in(space: Any) -> list[tuple[int, Drawing]]:
 def is_seen_through(shading: Any) -> bool:
     """Whether a view shows what is behind heads."""
     return shading.type == "WIREFRAME" or (shading.type == "SOLID" and shading.show_xray)
+
+
+def _shades_body(snapshot: Snapshot, space: Any) -> bool:
+    """Whether hair's shadow lies on the head, which Blender has drawn in the same light."""
+    uses_lights, _ = uses_scene_light(space.shading)
+    is_shown = bool(snapshot.casters) and not is_seen_through(space.shading)
+    return snapshot.volume.on_body and uses_lights and bool(snapshot.lights) and is_shown
 
 
 def lit(snapshot: Snapshot, shading: Any, studio: tuple[Light, ...]) -> Snapshot:

@@ -11,12 +11,20 @@ from .. import pipeline
 from ..arrays import Floats
 from ..errors import HairloomError
 from ..pipeline import Motion, Pose, Rig
+from ..render.hair_ball import HairBall
 from ..shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
+from ..shading.volume.shadow_lights import shadow_warnings
 from ..strands import Surface
 from .baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays, used_vertices
 from .choices import Choices
 from .hiders import Hiders
-from .lights import light_warnings, no_light_warnings, read_ambient, read_lights
+from .lights import (
+    light_warnings,
+    no_light_warnings,
+    read_ambient,
+    read_lights,
+    scene_lights_are_shown,
+)
 from .objects import Body
 from .obstacles import Obstacles
 from .reading import Reading
@@ -53,6 +61,7 @@ class Session:
         self.is_stale = False
         self._is_drawn = is_drawn
         self._light_warnings: tuple[str, ...] = ()
+        self._ball = HairBall()
         self._take_rig(self._reading.rig(baked), depsgraph)
 
     @property
@@ -88,7 +97,15 @@ class Session:
         found = () if self.obstacles is None else self.obstacles.warnings
         notes = (f"{self.name}: {note}" for note in self.rig.notes)
         dark = no_light_warnings(self.snapshot.lights, self.snapshot.ambient)
-        return (*self.source.warnings, *notes, *doubled, *found, *self._light_warnings, *dark)
+        lights = (*self._light_warnings, *dark, *self._shadow_warnings())
+        return (*self.source.warnings, *notes, *doubled, *found, *lights)
+
+    def _shadow_warnings(self) -> tuple[str, ...]:
+        snapshot = self.snapshot
+        if snapshot.volume.shadows == "none" or not snapshot.strand_count:
+            return ()
+        lights = snapshot.lights if scene_lights_are_shown() else ()
+        return shadow_warnings(lights, self._ball.of(snapshot), snapshot.volume)
 
     @property
     def computed_on(self) -> str:

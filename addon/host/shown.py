@@ -41,6 +41,8 @@ def with_choices(snapshot: Snapshot, choices: Choices) -> Snapshot:
         strand_settings=choices.strands,
         detail=choices.detail,
         volume=choices.volume,
+        skin=choices.skin,
+        shafts=choices.shafts,
         debug_view=choices.debug_view,
     )
 

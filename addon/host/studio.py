@@ -16,15 +16,21 @@ from ..render.camera import Camera, frame_camera
 from ..render.card_pass import CardPass
 from ..render.card_snapshot import CardSnapshot
 from ..render.frame import render_image
+from ..render.hair_ball import HairBall
 from ..render.mesh_pass import MeshPass
 from ..render.snapshot import MeshSnapshot, Snapshot
 from ..render.strand_pass import Statistics, StrandPass
-from ..shading.lights import three_point_lights
+from ..shading.lights import Light, three_point_lights
 from ..shading.settings import ShadingSettings, StrandSettings
+from ..shading.shafts_settings import ShaftSettings
+from ..shading.skin.notes import skin_notes
+from ..shading.skin.settings import SkinSettings
 from ..shading.volume.settings import VolumeSettings
+from ..shading.volume.shadow_lights import shadow_warnings
 from ..strands import Surface
 from .hiders import Hiders
 from .shown import snapshot_of
+from .slices import shown_slices
 
 #: three-quarter view from the front; heads face -Y
 VIEW_DIRECTION = (-0.55, -1.0, 0.18)
@@ -34,6 +40,8 @@ HEAD_ROOM = 0.25
 #: below 1, because nothing fills the corners of the box that the camera holds
 MARGIN = 0.85
 BACKDROP = (0.045, 0.05, 0.058, 1.0)
+
+type Rgba = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -45,6 +53,8 @@ class Look:
     detail: DetailSettings
     debug_view: str = "none"
     volume: VolumeSettings = field(default_factory=VolumeSettings)
+    skin: SkinSettings = field(default_factory=SkinSettings)
+    shafts: ShaftSettings = field(default_factory=ShaftSettings)
 
 
 class Studio:
@@ -66,12 +76,20 @@ class Studio:
         self._rig, self._head_occlusion = rig, head_occlusion
         self._passes, self._card_pass = (MeshPass(), StrandPass()), CardPass()
         self._hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
-        self._at_rest = replace(
-            snapshot_of(rig, occlusion, pipeline.strand_ranks(rig)),
+        self._groom = snapshot_of(rig, occlusion, pipeline.strand_ranks(rig))
+        self.look = look
+
+    @property
+    def _at_rest(self) -> Snapshot:
+        look = self.look
+        return replace(
+            self._groom,
             shading=look.shading,
             strand_settings=look.strands,
             detail=look.detail,
             volume=look.volume,
+            skin=look.skin,
+            shafts=look.shafts,
             debug_view=look.debug_view,
         )
 
@@ -83,6 +101,9 @@ class Studio:
         height: int,
         samples: int,
         camera: Camera | None = None,
+        *,
+        lights: tuple[Light, ...] | None = None,
+        background: Rgba = BACKDROP,
     ) -> Floats:
         """Hair at these points on the head in this pose, (height, width, 4) scene-linear.
 
@@ -90,18 +111,34 @@ class Studio:
             points: (strand_count, cv_count, 3) [m], world space.
             samples: sub-pixels along each side of a pixel.
             camera: in place of the studio's own.
+            lights: in place of three that hang on the camera.
+            background: premultiplied.
         """
         camera = camera or self._camera(width / height)
         snapshot = replace(
             self._at_rest,
             strands=points,
             meshes=self._meshes(pose),
-            lights=three_point_lights(camera.view),
+            lights=three_point_lights(camera.view) if lights is None else lights,
             hiders=None if self._hiders is None else self._hiders.at(pose),
         )
         return render_image(
-            snapshot, camera, width, height, samples, background=BACKDROP, passes=self._passes
+            snapshot, camera, width, height, samples, background=background, passes=self._passes
         )
+
+    def slices(self, pose: Pose, points: Floats) -> Floats:
+        """The layers of the shadow maps in the studio's light, see opacity_tiles.
+
+        Raises:
+            HairloomError: there are none.
+        """
+        snapshot = replace(
+            self._at_rest,
+            strands=points,
+            meshes=self._meshes(pose),
+            lights=three_point_lights(self._camera(1.0).view),
+        )
+        return shown_slices(snapshot, self._passes[1])
 
     def card_picture(
         self,
@@ -120,6 +157,8 @@ class Studio:
             meshes=self._meshes(self._rig.rest_pose),
             lights=three_point_lights(camera.view),
             shading=self._at_rest.shading,
+            volume=self._at_rest.volume,
+            skin=self._at_rest.skin,
             cards=cards,
         )
         return render_image(
@@ -134,25 +173,42 @@ class Studio:
         )
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the artist should know about shadows, in the studio's light."""
+        lights = three_point_lights(self._camera(1.0).view)
+        snapshot = self._at_rest
+        return (
+            *shadow_warnings(lights, HairBall().of(snapshot), snapshot.volume),
+            *skin_notes(self._rig.head, snapshot.skin, snapshot.volume),
+        )
+
+    @property
     def statistics(self) -> Statistics:
         """What was drawn of the hair in the last picture."""
         return self._passes[1].statistics
 
-    def _camera(self, aspect: float) -> Camera:
-        """Holds the groom at rest and what of the head is near it, with room for the motion."""
-        low, high = self._rig.strands.bounds()
-        if self._rig.head is not None:
+    def bounds(self, pose: Pose, points: Floats) -> tuple[Floats, Floats]:
+        """Lowest and highest corner [m] of hair and of what of the head is near it."""
+        places = points.reshape(-1, 3)
+        low, high = places.min(axis=0), places.max(axis=0)
+        if pose.head_positions is not None:
             room = HEAD_ROOM * float(np.max(high - low))
-            head_low, head_high = self._rig.head.bounds()
+            head_low, head_high = pose.head_positions.min(axis=0), pose.head_positions.max(axis=0)
             low = np.minimum(low, np.maximum(head_low, low - room))
             high = np.maximum(high, np.minimum(head_high, high + room))
-        return frame_camera((low, high), VIEW_DIRECTION, FIELD_OF_VIEW, aspect, margin=MARGIN)
+        return low, high
+
+    def _camera(self, aspect: float) -> Camera:
+        """Holds the groom at rest and what of the head is near it, with room for the motion."""
+        held = self.bounds(self._rig.rest_pose, self._rig.strands.grid)
+        return frame_camera(held, VIEW_DIRECTION, FIELD_OF_VIEW, aspect, margin=MARGIN)
 
     def _meshes(self, pose: Pose) -> tuple[MeshSnapshot, ...]:
         if self._rig.head is None or pose.head_positions is None:
             return ()
-        surface = Surface(pose.head_positions, self._rig.head.triangles)
-        return (MeshSnapshot.of(surface, occlusion=self._head_occlusion),)
+        head = self._rig.head
+        surface = Surface(pose.head_positions, head.triangles, head.corner_uv)
+        return (MeshSnapshot.of(surface, occlusion=self._head_occlusion, is_skin=True),)
 
 
 def ensure_gpu() -> None:

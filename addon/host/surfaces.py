@@ -33,7 +33,7 @@ def read_surface(
             raise HairloomError(
                 "this mesh has no faces", place=place, remedy="Choose a mesh with faces"
             )
-        corner_uv = _corner_uv(mesh)
+        corner_uv = read_corner_uv(mesh)
         if corner_uv is None and need_uv:
             raise HairloomError(
                 "this mesh has no UVs, so hair cannot be placed on its texture",
@@ -82,7 +82,7 @@ def _positions(mesh: bpy.types.Mesh) -> Floats:
     return positions
 
 
-def _corner_uv(mesh: bpy.types.Mesh) -> Floats | None:
+def read_corner_uv(mesh: bpy.types.Mesh) -> Floats | None:
     """UVs of the active map at each triangle's corners, (triangle_count, 3, 2), or None."""
     if mesh.uv_layers.active is None:
         return None

@@ -60,9 +60,13 @@ def look_names(section: str, shading: Any) -> list[str]:
     return [name for name in names if _OF_PIGMENT.get(name, shading.pigment) == shading.pigment]
 
 
-def is_idle(name: str, shading: Any) -> bool:
-    """Whether it does nothing at the moment, but would if another slider were moved."""
-    return name in _OF_TINT and shading.tip_tint == 0.0
+def is_idle(name: str, shading: Any, volume: Any) -> bool:
+    """Whether it does nothing at the moment, but would if another setting were changed."""
+    if name in _OF_TINT:
+        return shading.tip_tint == 0.0
+    if volume.shadows == "none":
+        return False
+    return name == "volume_shade" or (name == "scattered" and volume.scattering)
 
 
 def draw_preset_row(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

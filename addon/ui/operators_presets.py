@@ -31,7 +31,8 @@ class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         preset = named_preset(self.name)
         for hair in chosen_hair(context):
-            apply(preset.settings, hair)
+            for settings in preset.all:
+                apply(settings, hair)
         return {"FINISHED"}
 
 
@@ -118,10 +119,22 @@ class HAIRLOOM_MT_dynamics(bpy.types.Menu):
             self.layout.operator("hairloom.apply_preset", text=entry.title).name = entry.name
 
 
+class HAIRLOOM_MT_shadows(bpy.types.Menu):
+    """Shadows from fast to fine"""
+
+    bl_idname = "HAIRLOOM_MT_shadows"
+    bl_label = "Presets"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        for entry in (*shipped("volume"), *own("volume")[0]):
+            self.layout.operator("hairloom.apply_preset", text=entry.title).name = entry.name
+
+
 CLASSES = (
     HAIRLOOM_OT_apply_preset,
     HAIRLOOM_OT_save_preset,
     HAIRLOOM_OT_delete_preset,
     HAIRLOOM_OT_look_from_material,
     HAIRLOOM_MT_dynamics,
+    HAIRLOOM_MT_shadows,
 )

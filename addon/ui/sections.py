@@ -12,6 +12,7 @@ from ..params import Parameter
 from .look import LOOK, draw_preset_row, is_idle, look_names
 from .operators_bake import draw_bake
 from .operators_colliders import draw_colliders
+from .operators_show import draw_show
 
 type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
 
@@ -34,7 +35,7 @@ def _look_section(label: str) -> Draw:
             layout.label(text="Only in the model Marschner")
         for name in names:
             column = layout.column()
-            column.active = not is_idle(name, group)
+            column.active = not is_idle(name, group, hair.data.hairloom.volume)
             _draw_named(column, group, (name,))
 
     return draw
@@ -47,6 +48,7 @@ def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 def draw_volume(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Only what acts in this form; scattering only where the model has it."""
+    layout.menu("HAIRLOOM_MT_shadows")
     group = hair.data.hairloom.volume
     hidden = {name for form, names in VOLUME.items() if form != group.shadows for name in names}
     for parameter in group.settings.parameters():
@@ -58,6 +60,26 @@ def draw_volume(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
             parameter.name != "density" or (scatters and group.scattering)
         )
         _draw_named(column, group, (parameter.name,))
+    if group.shadows != "none":
+        layout.operator("hairloom.show_slices")
+    if group.shadows != "none":
+        draw_skin(layout, hair)
+
+
+def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    group = hair.data.hairloom.skin
+    layout.prop(group, "soft_shadow")
+    column = layout.column()
+    column.active = group.soft_shadow
+    _draw_named(column, group, [p.name for p in group.settings.parameters()[1:]])
+
+
+def draw_shafts(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    group = hair.data.hairloom.shafts
+    layout.prop(group, "use_shafts")
+    column = layout.column()
+    column.active = group.use_shafts
+    _draw_named(column, group, [p.name for p in group.settings.parameters()[1:]])
 
 
 def draw_guides(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -181,11 +203,13 @@ DYNAMICS: dict[str, tuple[str, ...]] = {
 SECTIONS: tuple[tuple[str, str, Draw], ...] = (
     ("look", "Look", draw_look),
     ("shadows", "Shadows", draw_volume),
+    ("shafts", "Light Shafts", draw_shafts),
     ("strands", "Strands", draw_strands),
     ("detail", "Detail", draw_detail),
     ("guides", "Guides", draw_guides),
     ("children", "Children", draw_children),
     ("dynamics", "Dynamics", draw_dynamics),
+    ("show", "Show", draw_show),
     ("export", "Export", draw_export),
 )
 #: section -> those below it

@@ -148,7 +148,23 @@ def test_every_parameter_that_acts_is_drawn_once_and_no_other(
 
 
 def test_colours_of_tips_are_grey_until_they_act(new_hair: Any) -> None:
-    shading = new_hair().data.hairloom.shading
-    assert look.is_idle("tip_color", shading) and not look.is_idle("tip_tint", shading)
+    groom = new_hair().data.hairloom
+    shading, volume = groom.shading, groom.volume
+    assert look.is_idle("tip_color", shading, volume)
+    assert not look.is_idle("tip_tint", shading, volume)
     shading.tip_tint = 0.5
-    assert not look.is_idle("tip_color", shading)
+    assert not look.is_idle("tip_color", shading, volume)
+
+
+def test_what_stands_in_for_shadows_and_scattering_is_grey_where_they_are(new_hair: Any) -> None:
+    groom = new_hair().data.hairloom
+
+    def idle() -> list[str]:
+        names = ("ambient", "scattered", "volume_shade")
+        return [name for name in names if look.is_idle(name, groom.shading, groom.volume)]
+
+    assert idle() == ["scattered", "volume_shade"], "a new groom has both"
+    groom.volume.scattering = False
+    assert idle() == ["volume_shade"]
+    groom.volume.shadows = "none"
+    assert idle() == []

@@ -18,6 +18,7 @@ from hairloom.addon.host import command_line, presets
 from hairloom.addon.host.properties import settings_of
 from hairloom.addon.params.preset import PRESET_VERSION
 from hairloom.addon.shading.settings import ShadingSettings
+from hairloom.addon.shading.shafts_settings import ShaftSettings
 
 
 @pytest.fixture
@@ -178,3 +179,16 @@ def test_a_picture_beside_a_preset_goes_with_it(extension: Any, own_folder: Path
     assert entry.icon == entry.icon
     presets.delete_own(entry.name)
     assert list(own_folder.iterdir()) == []
+
+
+def test_the_look_under_water_brings_its_shafts_of_light_with_it(hair: bpy.types.Object) -> None:
+    shafts = hair.data.hairloom.shafts
+    assert not shafts.use_shafts
+    assert bpy.ops.hairloom.apply_preset(name="looks/under_water") == {"FINISHED"}
+    assert shafts.use_shafts
+    wanted = presets.named_preset("looks/under_water").also
+    assert (settings_of(shafts, ShaftSettings),) == wanted
+    options = command_line.parser().parse_args(
+        ["render", "--output", "x.png", "--preset", "looks/under_water"]
+    )
+    assert command_line._settings(options)["shafts"] == wanted[0]

@@ -168,6 +168,22 @@ def test_blenders_own_strands_are_hidden_in_the_evaluated_copy_only(preview, eva
     assert display(hair) == shown
 
 
+def test_blenders_own_strands_throw_no_shadow_where_ours_lies_on_the_head(preview, evaluated):
+    hair, _, session = preview
+    for shadows, on_body, throws in (
+        ("deep", True, False),
+        ("deep", False, True),
+        ("none", True, True),
+        ("slices", True, False),
+    ):
+        hair.data.hairloom.volume.shadows = shadows
+        hair.data.hairloom.volume.on_body = on_body
+        assert hair.evaluated_get(evaluated()).visible_shadow is throws
+    assert hair.visible_shadow
+    live.stop(session)
+    assert hair.evaluated_get(evaluated()).visible_shadow
+
+
 def test_a_preview_adds_and_changes_no_data(new_hair, sphere, evaluated):
     new_hair(sphere)
     before = {data.name_full for data in bpy.data.user_map()}

@@ -14,6 +14,7 @@ from hairloom.addon.shading.marschner.look import fibre_of, marschner_light, str
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tables
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.strand_noise import strand_noise
+from hairloom.addon.shading.volume.settings import VolumeSettings
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
@@ -40,6 +41,7 @@ def snapshot_of(frame: Any, shading: ShadingSettings, **more: Any) -> Any:
         ambient=(0.0, 0.0, 0.0),
         shading=shading,
         strand_settings=StrandSettings(tip_width=1.0, minimum_width=0.0),
+        volume=VolumeSettings(shadows="none"),
         volume_center=np.array([0.0, 5.0, 0.2], np.float32),
         table_size=PREVIEW_SIZE,
         **more,

@@ -65,7 +65,14 @@ def has_drawn():
 
 
 def shadows_appear():
-    """The side that faces away is darker with them; each form is drawn without a failure."""
+    """They are there from the start. The side that faces away is darker with them; each form is
+    drawn without a failure.
+    """
+    assert volume().shadows == "deep"
+    shaded = pixels("shadows_at_first")
+    volume().shadows = "none"
+    yield from seen_to_differ(shaded, "without_shadows")
+    yield 10
     plain = pixels("without_shadows")
     for form in ("slices", "deep"):
         volume().shadows = form

@@ -1,0 +1,98 @@
+"""Show Slices: the layers of shadow maps as a file of the command line and as an image."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="runs inside Blender")
+
+import bpy
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.host import command_line
+from hairloom.addon.host.session import Session
+from hairloom.addon.host.slices import IMAGE, shown_slices, slices_image
+from hairloom.addon.shading.volume.settings import VolumeSettings
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+SMALL = ["--set", "grow.strand_count=200", "--width", "32", "--height", "32", "--samples", "1"]
+
+
+def test_render_writes_the_layers_side_by_side(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    slices, picture = tmp_path / "slices.png", tmp_path / "a.png"
+    arguments = ["render", *SMALL, "--output", str(picture), "--slices", str(slices)]
+    assert command_line.run([*arguments, "--set", "volume.shadows=none"]) == 1
+    assert "--slices" in capfd.readouterr().err and not picture.exists()
+    arguments += ["--set", "volume.shadows=slices", "--set", "volume.resolution=64"]
+    arguments += ["--set", "volume.most_lights=2"]
+    assert command_line.run(arguments) == 0
+    image = bpy.data.images.load(str(slices))
+    # one light below the other
+    assert tuple(image.size) == (4 * 66, 2 * 4 * 66)
+    assert np.ptp(np.array(image.pixels[:]).reshape(-1, 4)[:, 0]) > 0.5
+    bpy.data.images.remove(image)
+
+
+def test_extremes_are_told_on_the_command_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["render", *SMALL, "--output", str(tmp_path / "a.png")]
+    arguments += ["--set", "volume.shadows=deep", "--set", "volume.resolution=32"]
+    for value, word in ((0, "Extinction of 0"), (1000, "Extinction of 1000")):
+        assert command_line.run([*arguments, "--set", f"volume.extinction={value}"]) == 0
+        assert word in capfd.readouterr().out
+
+
+def test_an_image_shows_them_and_is_the_same_each_time(new_hair: Any, sphere: Any) -> None:
+    from dataclasses import replace
+
+    from hairloom.addon.render.strand_pass import StrandPass
+
+    lamp = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    bpy.context.scene.collection.objects.link(lamp)
+    session = Session(new_hair(sphere), bpy.context.evaluated_depsgraph_get())
+    with pytest.raises(HairloomError, match="Set Shadows to"):
+        none = replace(session.snapshot, volume=VolumeSettings(shadows="none"))
+        shown_slices(none, StrandPass())
+    for layers, across in ((3, 2), (8, 3)):
+        volume = VolumeSettings(shadows="deep", resolution=32, layers=layers)
+        snapshot = replace(session.snapshot, volume=volume)
+        picture = shown_slices(snapshot, StrandPass())
+        image = slices_image(picture)
+        assert image.name == IMAGE and tuple(image.size) == (across * 34, across * 34)
+        assert np.allclose(np.array(image.pixels[:]).reshape(picture.shape), picture)
+    assert sum(each.name.startswith(IMAGE) for each in bpy.data.images) == 1
+
+
+def views() -> list[Any]:
+    windows = bpy.context.window_manager.windows
+    areas = [area for window in windows for area in window.screen.areas]
+    return [area.spaces.active.shading for area in areas if area.type == "VIEW_3D"]
+
+
+def test_a_lamp_amidst_the_hair_is_told_where_a_view_goes_by_it(new_hair: Any, sphere: Any) -> None:
+    hair = new_hair(sphere)
+    hair.data.hairloom.volume.shadows = "deep"
+    lamp = bpy.data.objects.new("Candle", bpy.data.lights.new("Candle", "POINT"))
+    lamp.data.energy = 10.0
+    bpy.context.scene.collection.objects.link(lamp)
+    lamp.location = sphere.matrix_world.translation
+    bpy.context.view_layer.update()
+    session = Session(hair, bpy.context.evaluated_depsgraph_get())
+    for shading in views():
+        shading.type = "SOLID"
+    assert not any("Candle" in warning for warning in session.warnings)
+    views()[0].type = "RENDERED"
+    (warning,) = (each for each in session.warnings if each.startswith("Candle: "))
+    assert "amidst the hair" in warning
+    lamp.location.x += 5.0
+    bpy.context.view_layer.update()
+    session.light(bpy.context.evaluated_depsgraph_get())
+    assert not any("Candle" in each for each in session.warnings)

@@ -1,0 +1,130 @@
+"""Hair's shadow on the head that Blender draws, and the layers of its map in an Image Editor."""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import (
+    changed,
+    click,
+    look_from_front,
+    open_our_sidebar,
+    press,
+    sidebar_button,
+    until,
+    viewport,
+    viewport_pixels,
+)
+
+
+def of_hairloom(module):
+    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
+
+
+def pixels(label):
+    return viewport_pixels(driver.screenshot(label))
+
+
+def volume():
+    return bpy.data.objects["Hair"].data.hairloom.volume
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    yield from set_the_scene()
+    yield from hair_shades_the_head()
+    yield from layers_are_shown()
+    assert of_hairloom("host.overlay").failure() == ""
+
+
+def set_the_scene():
+    """A fringe above a ball, under a sun from above the eye."""
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    bpy.context.scene.render.engine = "BLENDER_EEVEE"
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, segments=48, ring_count=24)
+    head = bpy.context.object
+    head.name = "Head"
+    bpy.ops.object.shade_smooth()
+    group = head.vertex_groups.new(name="Crown")
+    crown = [each.index for each in head.data.vertices if each.co.z > 0.075]
+    group.add(crown, 1.0, "REPLACE")
+    bpy.ops.hairloom.grow(way="normals", strand_count=3000, length=0.08, density_group="Crown")
+    bpy.context.object.name = "Hair"
+    bpy.ops.object.light_add(type="SUN", rotation=(np.radians(25.0), 0.0, 0.0))
+    bpy.context.object.data.energy = 4.0
+    bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
+    bpy.data.objects["Hair"].select_set(True)
+    bpy.data.objects["Hair"].data.hairloom.shading.model = "marschner"
+    bpy.data.objects["Hair"].data.hairloom.strands.width_scale = 3.0
+    volume().shadows = "deep"
+    volume().on_body = True
+    shading, overlays = viewport().spaces.active.shading, viewport().spaces.active.overlay
+    shading.type = "MATERIAL"
+    shading.use_scene_lights = shading.use_scene_world = True
+    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    look_from_front(0.6)
+    yield from open_our_sidebar()
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield from until(has_drawn, "no hair is drawn", tries=200)
+    yield 30
+
+
+def has_drawn():
+    passes = of_hairloom("host.overlay")._passes
+    return any(each.statistics.strands > 0 for each in passes.values())
+
+
+def hair_shades_the_head():
+    """Ours in place of Blender's; without a light none; and as before when it comes back."""
+    shaded = pixels("on_body")
+    sun = bpy.data.objects["Sun"].data
+    sun.use_shadow = False
+    yield 10
+    # Blender throws no shadow of its own strands that this could take away
+    assert changed(shaded, pixels("no_blender_shadow"), 0.05) < 5e-3
+    volume().on_body = False
+    yield from until(
+        lambda: changed(shaded, pixels("bare"), 0.05) > 0.004, "hair does not shade the head"
+    )
+    yield 10
+    bare = pixels("bare")
+    assert np.quantile((shaded - bare).max(axis=2), 0.995) < 0.05, "it only darkens"
+    volume().on_body = True
+    yield from until(
+        lambda: changed(shaded, pixels("on_body_again"), 0.05) < 5e-3, "it does not come back"
+    )
+    # a head that is not shown is not shaded
+    bpy.data.objects["Head"].hide_set(True)
+    yield 20
+    hidden = pixels("hidden_head")
+    volume().on_body = False
+    yield 20
+    assert changed(hidden, pixels("hidden_head_bare"), 0.05) < 1e-3
+    bpy.data.objects["Head"].hide_set(False)
+    yield 20
+
+
+def layers_are_shown():
+    area = viewport()
+    before = len(bpy.context.window_manager.windows)
+    space = next(each for each in area.regions if each.type == "WINDOW")
+    with bpy.context.temp_override(area=area, region=space):
+        assert bpy.ops.hairloom.show_slices() == {"FINISHED"}
+    yield 20
+    windows = bpy.context.window_manager.windows
+    assert len(windows) == before + 1
+    editor = windows[-1].screen.areas[0]
+    assert editor.type == "IMAGE_EDITOR"
+    image = editor.spaces.active.image
+    # nine tiles: where eight layers start, and they
+    assert tuple(image.size) == (3 * 258, 3 * 258)
+    driver.screenshot("slices")
+
+
+driver.play(steps())
