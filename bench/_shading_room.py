@@ -1,6 +1,6 @@
 """Cycles in a scene of its own: strands of Principled Hair (Chiang's model), one sun, one camera.
 
-The camera is at (0, 0, 1) times DISTANCE, looks down and sees no perspective.
+The camera is at (0, 0, 1) times DISTANCE, looks down and sees no perspective; or it is one of ours.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
+
+from hairloom.addon.render.camera import Camera
 
 DISTANCE = 50.0
 
@@ -45,6 +47,7 @@ class CyclesRoom:
         surface = nodes["Material Output"].inputs["Surface"]
         self._material.node_tree.links.new(self._node.outputs[0], surface)
         self._strands: Any = None
+        self._body: Any = None
 
     def _new(self, name: str, data: Any) -> Any:
         thing = bpy.data.objects.new(name, data)
@@ -64,15 +67,35 @@ class CyclesRoom:
         self._strands = self._new("Strands", curves)
         self._strands.visible_shadow = casts_shadow
 
-    def body(self, positions: np.ndarray, triangles: np.ndarray) -> None:
-        """A black body that casts no shadow."""
+    def body(
+        self,
+        positions: np.ndarray,
+        triangles: np.ndarray,
+        color: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        casts_shadow: bool = False,
+    ) -> None:
+        """A smooth body that follows Lambert; it is black and casts no shadow."""
         mesh = bpy.data.meshes.new("Body")
         mesh.from_pydata(positions.tolist(), [], triangles.tolist())
-        black = bpy.data.materials.new("Black")
-        black.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0, 0, 0, 1)
-        black.node_tree.nodes["Principled BSDF"].inputs["Specular IOR Level"].default_value = 0.0
-        mesh.materials.append(black)
-        self._new("Body", mesh).visible_shadow = False
+        mesh.shade_smooth()
+        material = bpy.data.materials.new("Body")
+        principled = material.node_tree.nodes["Principled BSDF"].inputs
+        principled["Base Color"].default_value = (*color, 1.0)
+        principled["Specular IOR Level"].default_value = 0.0
+        mesh.materials.append(material)
+        self._body = self._new("Body", mesh)
+        self._body.visible_shadow = casts_shadow
+
+    def leave_out_body(self, is_left_out: bool) -> None:
+        """Whether it is a hole in the picture, so that alpha is what strands cover."""
+        self._body.is_holdout = is_left_out
+
+    def look(self, camera: Camera) -> None:
+        """See through a perspective camera of ours, in square pictures."""
+        lens = self._camera.data
+        self._camera.matrix_world = Matrix(np.linalg.inv(camera.view).tolist())
+        lens.type, lens.sensor_fit = "PERSP", "VERTICAL"
+        lens.angle = 2.0 * float(np.arctan(1.0 / camera.projection[1, 1]))
 
     def paths(self, samples: int, bounces: int = 0, is_denoised: bool = False) -> None:
         """How many a pixel, and how often each meets strands again; 0 is the sun's own light."""
@@ -85,7 +108,9 @@ class CyclesRoom:
         """Lift the strands' +X towards the camera [rad]."""
         self._strands.rotation_euler.y = -angle
 
-    def sun(self, towards: np.ndarray) -> None:
+    def sun(self, towards: np.ndarray, strength: float = 1.0) -> None:
+        """Towards the sun, and its strength [W/m^2]."""
+        self._sun.data.energy = strength
         self._sun.rotation_euler = Vector(towards).to_track_quat("Z", "Y").to_euler()
 
     def hair(self, absorption: tuple[float, float, float], **inputs: float) -> None:
@@ -94,8 +119,10 @@ class CyclesRoom:
         for name, value in inputs.items():
             self._node.inputs[name.replace("_", " ")].default_value = value
 
-    def picture(self, size: int, height: float, seed: int = 0) -> np.ndarray:
-        """(size, size, 4) scene-linear, premultiplied, of a square `height` [m] high."""
+    def picture(self, size: int, height: float = 1.0, seed: int = 0) -> np.ndarray:
+        """(size, size, 4) scene-linear, premultiplied, of a square `height` [m] high; what a camera
+        of ours sees is as high as it is.
+        """
         render = self._scene.render
         render.resolution_x = render.resolution_y = size
         self._camera.data.ortho_scale, self._scene.cycles.seed = height, seed

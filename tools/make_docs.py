@@ -48,7 +48,8 @@ def make_pictures() -> None:
         preset = ["--preset", "dynamics/under_water"]
         subprocess.run([*headless, "demo", *preset, "--output", folder], check=True)
         shutil.copyfile(Path(folder) / "motion.png", IMAGES / "under_water.png")
-    for name in ("refinement_pictures", "preset_pictures", "shading_pictures"):
+    tools = ("refinement_pictures", "preset_pictures", "shading_pictures", "volume_pictures")
+    for name in tools:
         tool = [sys.executable, str(REPOSITORY / "tools" / f"{name}.py")]
         subprocess.run([*tool, str(IMAGES)], check=True)
 

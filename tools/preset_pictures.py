@@ -18,8 +18,9 @@ from extension_loader import PACKAGE, REPOSITORY, load_package
 
 LOOKS = REPOSITORY / "presets" / "looks"
 #: [pixels]; thumbnails are square
-THUMBNAIL, WIDTH, HEIGHT, SAMPLES = 192, 210, 250, 4
-STRANDS = 9000
+THUMBNAIL, WIDTH, HEIGHT, SAMPLES = 192, 210, 250, 2
+#: so many, so much thicker than they are grown
+STRANDS, THICKER = 9000, 1.6
 #: from behind the ear, where there is the most hair
 DIRECTION = (-0.9, 0.75, 0.35)
 NO_BACKDROP = (0.0, 0.0, 0.0, 0.0)
@@ -46,6 +47,7 @@ def wig() -> Any:
         snapshot,
         meshes=(of_addon("render.snapshot").MeshSnapshot.of(head, occlusion=shaded),),
         detail=settings["detail"](full_size=0.0),
+        strand_settings=settings["strands"](width_scale=THICKER),
     )
 
 
@@ -53,7 +55,7 @@ def against(view: np.ndarray) -> tuple[Any, ...]:
     """A sun behind the hair and a weak one before it, which hang on the camera."""
     sun = of_addon("shading.lights").Light.sun
     to_world = np.linalg.inv(view)[:3, :3]
-    suns = (((0.35, 0.5, -1.0), (1.0, 0.97, 0.93), 6.0), ((-0.6, 0.3, 0.6), (0.8, 0.9, 1.0), 0.6))
+    suns = (((0.35, 0.5, -1.0), (1.0, 0.97, 0.93), 3.0), ((-0.6, 0.3, 0.6), (0.8, 0.9, 1.0), 0.6))
     return tuple(sun(-to_world @ np.array(towards), *light) for towards, *light in suns)
 
 

@@ -3,7 +3,7 @@
 python tools/shading_pictures.py FOLDER
 
 From the left: R alone, TRT alone, TT alone against the light, the whole of Marschner's model with
-the light before the ball, and Kajiya-Kay.
+the light before the ball, and Kajiya-Kay. Lobes alone are without shadows and scattering.
 """
 
 import importlib
@@ -47,6 +47,7 @@ def main(folder: Path) -> None:
         shift_noise=0.0,
         color_variation=0.2,
     )
+    volume = of_addon("parameters").ALL_SETTINGS["volume"]
     strands = combed_strands(STRANDS)
     skin = of_addon("strands").Surface(*ball_mesh())
     ball = replace(frame.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), sheen=0.0)
@@ -55,7 +56,9 @@ def main(folder: Path) -> None:
         frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),
     )
 
-    def picture(look: Any, shines_along: tuple[float, ...], strength: float) -> Any:
+    def picture(
+        look: Any, shines_along: tuple[float, ...], strength: float, shadows: str = "none"
+    ) -> Any:
         snapshot = frame.Snapshot(
             strands,
             np.full(strands.shape[:2], RADIUS, np.float32),
@@ -63,6 +66,7 @@ def main(folder: Path) -> None:
             lights=(lights.Light.sun(shines_along, (1.0, 1.0, 1.0), strength),),
             ambient=(0.0, 0.0, 0.0),
             shading=look,
+            volume=volume(shadows=shadows),
             volume_center=np.zeros(3, np.float32),
         )
         backdrop = of_addon("host.studio").BACKDROP
@@ -72,8 +76,8 @@ def main(folder: Path) -> None:
         picture(alone(blond, "r"), FORWARD, STRENGTH),
         picture(alone(blond, "trt"), FORWARD, STRENGTH),
         picture(alone(blond, "tt"), AGAINST, 0.5 * STRENGTH),
-        picture(blond, FORWARD, STRENGTH),
-        picture(replace(blond, model="kajiya_kay"), FORWARD, STRENGTH),
+        picture(blond, FORWARD, STRENGTH, "deep"),
+        picture(replace(blond, model="kajiya_kay"), FORWARD, STRENGTH, "deep"),
     ]
     images.write_png(folder / "highlights.png", images.contact_sheet(shown, len(shown)))
     print("Wrote highlights.png", flush=True)

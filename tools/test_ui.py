@@ -3,7 +3,8 @@
 python tools/test_ui.py [SESSION ...]      all of it, or only the named window sessions
 
 First the extension's zip is installed as an artist would, then all tests run in that Blender in
-the background, then each tests/window/session_*.py plays with a real window under Xvfb. Logs and
+the background, and what they have drawn on both backends is compared; then each
+tests/window/session_*.py plays with a real window under Xvfb. Logs and
 screenshots go to out/window/. The last line is `N passed, N failed`.
 """
 
@@ -17,6 +18,9 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 
+import flip_evaluator
+import numpy as np
+
 REPOSITORY = Path(__file__).resolve().parents[1]
 OUTPUT = REPOSITORY / "out" / "window"
 INSTALLED = OUTPUT / "installed"
@@ -25,6 +29,8 @@ TESTS_LIMIT_S = 1500
 SESSION_LIMIT_S = 480
 CLOSING_LINE = "SESSION PASSED"
 PROBLEM_LINES = 30
+#: mean FLIP of the same picture on both backends
+MOST_DIFFERENT = 0.02
 
 
 @dataclass
@@ -116,7 +122,8 @@ def run_tests(backend: str, tally: Tally) -> None:
     log, report = OUTPUT / f"tests-{backend}.log", OUTPUT / f"tests-{backend}.xml"
     arguments = ["--factory-startup", "--gpu-backend", backend, "--python-exit-code", "1"]
     arguments += ["--python", "tests/run_in_blender.py", "--", f"--junitxml={report}"]
-    code = run_blender("background", arguments, log, TESTS_LIMIT_S, {})
+    kept = {"HAIRLOOM_PICTURES": str(OUTPUT)}
+    code = run_blender("background", arguments, log, TESTS_LIMIT_S, kept)
     if not report.is_file():
         announce("tests", backend, False, f"exit code {code} and no report", log)
         tally.add(0, 1)
@@ -132,6 +139,23 @@ def run_tests(backend: str, tally: Tally) -> None:
     detail = f"{passed} passed, {failed} failed, {skipped} skipped, exit code {code}"
     announce("tests", backend, failed == 0, detail, log)
     tally.add(passed, failed)
+
+
+def compare_backends(tally: Tally) -> None:
+    """The pictures that tests/gpu/test_backends_agree.py has left, side by side."""
+    log, files = OUTPUT / "backends.log", [OUTPUT / f"{backend}.npz" for backend in BACKENDS]
+    if missing := [file.name for file in files if not file.is_file()]:
+        log.write_text(f"no {', '.join(missing)}\n")
+        announce("comparing", "both", False, "pictures are missing", log)
+        tally.add(0, 1)
+        return
+    one, other = (np.load(file) for file in files)
+    found = {name: flip_evaluator.evaluate(one[name], other[name], "LDR")[1] for name in one}
+    log.write_text("".join(f"{name} {flip:.5f}\n" for name, flip in found.items()))
+    passed = max(found.values()) <= MOST_DIFFERENT
+    detail = f"FLIP of {len(found)} pictures at most {max(found.values()):.4f}"
+    announce("comparing", "both", passed, detail, log)
+    tally.add(passed, not passed)
 
 
 def run_session(script: Path, backend: str, tally: Tally) -> None:
@@ -171,6 +195,7 @@ def main(wanted: list[str]) -> int:
             run_command_line(tally)
         for backend in BACKENDS:
             run_tests(backend, tally)
+        compare_backends(tally)
     for script in sessions:
         for backend in BACKENDS if installed else ():
             if not wanted or script.stem in wanted:

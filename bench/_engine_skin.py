@@ -1,0 +1,148 @@
+"""The soft shadow on Sintel's head: how far apart the two sides of a seam are, and its cost.
+
+The sheet out/skin_sheet.png: the UV-space map as the light comes, and as it has spread along the
+skin; below them the forehead with the plain compare, and with the soft shadow.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import gpu
+import numpy as np
+from extension_loader import REPOSITORY
+
+from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.host.images import contact_sheet, write_png
+from hairloom.addon.host.mesh_files import read_mesh_file
+from hairloom.addon.render.camera import Camera, look_at, perspective
+from hairloom.addon.render.frame import render_image
+from hairloom.addon.render.mesh_pass import MeshPass
+from hairloom.addon.render.skin_pass import SkinShadow
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
+from hairloom.addon.render.strand_pass import StrandPass
+from hairloom.addon.shading.lights import three_point_lights
+from hairloom.addon.shading.settings import StrandSettings
+from hairloom.addon.shading.skin.diffusion import soft_shadow
+from hairloom.addon.shading.skin.settings import SkinSettings
+from hairloom.addon.shading.volume.settings import VolumeSettings
+
+SHEET = REPOSITORY / "out" / "skin_sheet.png"
+SIZE, ROUNDS, PLACES = 512, 5, 17
+#: [m] no softness that could be seen
+HARD = 1e-6
+DEEP = VolumeSettings(shadows="deep", strand_share=1.0)
+
+
+def skin_figures() -> dict[str, float]:
+    """Of all lights and places along all seams the largest difference between the two sides, and
+    what 999 of 1000 are below, in 255ths of a light; seconds to lay the head out, milliseconds to
+    draw a shadow again.
+    """
+    snapshot = sintel()
+    hard = replace(snapshot, skin=replace(snapshot.skin, softness=HARD))
+    plain = replace(snapshot, skin=replace(snapshot.skin, soft_shadow=False))
+    begun = time.perf_counter()
+    pictures, shadows = zip(*(drawn(one) for one in (hard, plain, snapshot)), strict=True)
+    seconds = time.perf_counter() - begun
+    off = seam_differences(shadows[2][0])
+    SHEET.parent.mkdir(exist_ok=True)
+    maps = [padded(shadows[which][0].picture()) for which in (0, 2)]
+    write_png(SHEET, contact_sheet([*maps, pictures[1], pictures[2]], 2))
+    return {
+        "seam_difference": float(off.max()),
+        "seam_difference_999_of_1000": float(np.percentile(off, 99.9)),
+        "skin_pictures_seconds": seconds,
+        **milliseconds(snapshot),
+    }
+
+
+def sintel() -> Snapshot:
+    """Sintel's bust under the studio's lights, with hair over the forehead."""
+    data = Path(os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data")) / "sintel"
+    hair = read_tfx(data / "SintelHairOriginal-sintel_hair.16points.tfx").strands
+    head = read_mesh_file(data / "sintel.obj", need_uv=True)
+    return Snapshot(
+        hair.grid.astype(np.float32),
+        hair.radius.reshape(hair.strand_count, -1).astype(np.float32),
+        meshes=(MeshSnapshot.of(head, is_skin=True),),
+        casters=(head,),
+        lights=three_point_lights(camera(hair.bounds()).view),
+        strand_settings=StrandSettings(width_scale=2.0),
+        volume=DEEP,
+        skin=SkinSettings(),
+    )
+
+
+def camera(bounds: tuple[np.ndarray, np.ndarray]) -> Camera:
+    """Close to the face, from the front and a little from the left."""
+    low, high = (np.asarray(side, np.float64) for side in bounds)
+    aim = 0.5 * (low + high) + np.array([0.0, -0.06, -0.02])
+    eye = aim + np.array([-0.10, -0.42, 0.0])
+    return Camera(look_at(eye, aim), perspective(np.radians(26.0), 1.0, 0.05, 5.0))
+
+
+def drawn(snapshot: Snapshot) -> tuple[np.ndarray, tuple[SkinShadow, ...]]:
+    """The face, and the soft shadows that it was drawn with."""
+    passes = MeshPass(), StrandPass()
+    low, high = snapshot.strands.min(axis=(0, 1)), snapshot.strands.max(axis=(0, 1))
+    picture = render_image(
+        snapshot,
+        camera((low, high)),
+        SIZE,
+        SIZE,
+        2,
+        background=(0.05, 0.05, 0.06, 1.0),
+        passes=passes,
+    )
+    return picture, passes[0].skin_shadows()
+
+
+def seam_differences(shadow: SkinShadow) -> np.ndarray:
+    """Between the two sides at places along all seams, (n,) in 255ths."""
+    layout, values = shadow.layout, shadow.picture()
+    share = np.linspace(0.0, 1.0, PLACES)[None, :, None]
+    places = (layout.seams[:, :1] * (1.0 - share) + layout.seams[:, 1:] * share).reshape(-1, 4)
+    islands = np.repeat(layout.seam_islands, PLACES, axis=0)
+    one, two = (
+        soft_shadow(values, layout, places[:, 2 * side : 2 * side + 2], islands[:, side])[0]
+        for side in range(2)
+    )
+    return 255.0 * np.abs(one - two).max(axis=1)
+
+
+def milliseconds(snapshot: Snapshot) -> dict[str, float]:
+    """The least of some rounds to draw the shadow again, by how soft it is."""
+    passes, (mesh,) = (MeshPass(), StrandPass()), snapshot.meshes
+    opacity = passes[1].opacity(snapshot)
+    skin_pass = passes[0].skin
+    found = {}
+    for name, softness in (("3mm", 0.003), ("10mm", 0.01)):
+        taken = []
+        for number in range(ROUNDS):
+            # a little more each time, so that it is drawn each time
+            settings = replace(snapshot.skin, softness=softness * (1.0 + 1e-4 * number))
+            begun = time.perf_counter()
+            shadows = skin_pass.shadows((mesh,), opacity, settings, len(snapshot.lights))
+            shadows[id(mesh)].picture()  # waits until it is drawn
+            taken.append(1000.0 * (time.perf_counter() - begun))
+        found[f"skin_shadow_ms_{name}"] = min(taken)
+    return found
+
+
+def padded(shadow: np.ndarray) -> np.ndarray:
+    """The first three lights as colours, in a picture as large as the others."""
+    rows, columns = (min(side, SIZE) for side in shadow.shape[:2])
+    picture = np.zeros((SIZE, SIZE, 4), np.float32)
+    picture[..., 3] = 1.0
+    picture[:rows, :columns, :3] = shadow[:rows, :columns, :3]
+    return picture
+
+
+if __name__ == "__main__":
+    gpu.init()
+    for name, value in skin_figures().items():
+        print(f"{name:40} {value:14.4f}")

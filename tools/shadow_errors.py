@@ -1,0 +1,84 @@
+"""How far opacity maps are from counting the strands between light and place one by one.
+
+The mean error of T at random places of strands, over the mean of T, by ways to lay layers. Needs
+the package `hairloom`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.volume.light_frame import ball_around, light_frame
+from hairloom.addon.shading.volume.map_size import START_TEXELS
+from hairloom.addon.shading.volume.opacity import (
+    Coverage,
+    coverage,
+    layer_ends,
+    layer_weights,
+    transmittance,
+)
+from hairloom.addon.shading.volume.settings import VolumeSettings
+
+RESOLUTION, POINTS = 512, 10_000
+SLICES, LAYERS = (4, 8, 16, 64, 255), (4, 8, 16)
+
+
+@dataclass(frozen=True)
+class Places:
+    """Random places of strands, what was counted there, and what maps are made of."""
+
+    exact: Coverage
+    texel: np.ndarray
+    depth: np.ndarray
+    counted: np.ndarray
+
+    def error(self, settings: VolumeSettings, ends: np.ndarray) -> float:
+        """With layers that end there; spans as coarse as the shader has them."""
+        starts, thickness = np.zeros(RESOLUTION**2), np.ones(RESOLUTION**2)
+        if settings.shadows == "deep":
+            starts, thickness = self.exact.span(START_TEXELS)
+        behind = (self.depth - starts[self.texel]) / thickness[self.texel]
+        layers = self.exact.layers(ends, starts, thickness)[self.texel]
+        return self.error_of((layers * layer_weights(behind, ends)).sum(axis=1))
+
+    def error_of(self, tau: np.ndarray) -> float:
+        wrong = np.abs(transmittance(tau, 1.0) - self.counted)
+        return float(wrong.mean() / self.counted.mean())
+
+
+def errors(
+    strands: np.ndarray,
+    radius: float,
+    sun: Light,
+    slices: tuple[int, ...] = SLICES,
+    layers: tuple[int, ...] = LAYERS,
+) -> dict[str, float]:
+    """By way: none is light without shadow, slicesN, deepN.
+
+    Args:
+        strands: (strand_count, cv_count, 3) [m] float64. radius: of all of them [m].
+    """
+    at = _places(strands, radius, sun)
+    found = {"none": at.error_of(np.zeros(POINTS))}
+    for count in slices:
+        even = np.arange(1, count + 1) / count
+        found[f"slices{count}"] = at.error(VolumeSettings(shadows="slices"), even)
+    for count in layers:
+        settings = VolumeSettings(shadows="deep", layers=count)
+        found[f"deep{count}"] = at.error(settings, layer_ends(settings))
+    return found
+
+
+def _places(strands: np.ndarray, radius: float, sun: Light) -> Places:
+    frame = light_frame(sun, ball_around(strands))
+    assert frame is not None
+    exact = coverage(strands, np.full(strands.shape[:2], radius), frame, RESOLUTION)
+    points = strands.reshape(-1, 3)
+    chosen = np.random.default_rng(1).integers(len(points), size=POINTS)
+    place, depth = frame.places(points[chosen])
+    column, row = np.floor(place * RESOLUTION).astype(np.int64).T
+    texel, depth = row * RESOLUTION + column, depth - VolumeSettings().bias
+    return Places(exact, texel, depth, transmittance(exact.optical_depth(texel, depth), 1.0))

@@ -1,0 +1,153 @@
+"""Draws what opacity maps miss, for docs/shading.md.
+
+python tools/volume_pictures.py FOLDER
+
+opacity_error.png: the mean error of T on a ball of combed hair, over the number of slices and of
+deep layers. opacity_slices.png: that ball without shadows, with 15 slices, with 64, and with 8 deep
+layers.
+"""
+
+import importlib
+import sys
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import bpy  # noqa: F401  it must come before gpu, which lives inside it
+import gpu
+import numpy as np
+from extension_loader import PACKAGE, load_package
+from hair_ball import ball_mesh, combed_strands
+
+STRANDS, RADIUS, SUN = 14_000, 0.003, (-0.45, -0.5, -0.8)
+#: side of a picture [pixels]; what it shows from bottom to top [m]
+SIZE, HEIGHT, SAMPLES = 300, 2.3, 3
+WIDE, HIGH, LEFT, RIGHT, LOW, TOP = 720, 400, 70, 110, 50, 30
+INK, PALE = (0.02, 0.02, 0.02), (0.75, 0.75, 0.75)
+LINES = {"slices": (0.7, 0.12, 0.05), "deep": (0.03, 0.2, 0.6)}
+NAMES = {"slices": "slices", "deep": "deep layers"}
+
+
+def of_addon(module: str) -> Any:
+    return importlib.import_module(f"{PACKAGE}.addon.{module}")
+
+
+class Chart:
+    """A picture to draw lines and words into, scene-linear, row 0 at the bottom."""
+
+    def __init__(self) -> None:
+        self.pixels = np.ones((HIGH, WIDE, 4), np.float32)
+
+    def line(
+        self, start: tuple[float, float], end: tuple[float, float], color: Any, width: float
+    ) -> None:
+        """Between two places [pixels], its rim a pixel soft."""
+        y, x = np.mgrid[:HIGH, :WIDE] + 0.5
+        along = np.subtract(end, start)
+        share = ((x - start[0]) * along[0] + (y - start[1]) * along[1]) / max(along @ along, 1e-9)
+        share = np.clip(share, 0.0, 1.0)
+        away = np.hypot(x - start[0] - share * along[0], y - start[1] - share * along[1])
+        cover = np.clip(0.5 * width + 0.5 - away, 0.0, 1.0)[..., None]
+        self.pixels[..., :3] += cover * (np.array(color) - self.pixels[..., :3])
+
+    def word(self, place: tuple[float, float], text: str, color: Any, size: int = 15) -> None:
+        """Centred on a place [pixels]."""
+        # like gpu, they live inside bpy
+        blf, imbuf = importlib.import_module("blf"), importlib.import_module("imbuf")
+        blf.size(0, size)
+        blf.color(0, 1.0, 1.0, 1.0, 1.0)
+        wide, high = blf.dimensions(0, text)
+        blf.position(0, round(place[0] - 0.5 * wide), round(place[1] - 0.5 * high), 0)
+        page = imbuf.new((WIDE, HIGH))
+        with blf.bind_imbuf(0, page):
+            blf.draw_buffer(0, text)
+        with page.with_buffer() as held:
+            cover = np.array(held, np.float32).reshape(HIGH, WIDE, 4)[..., 3:] / 255.0
+        self.pixels[..., :3] += cover * (np.array(color) - self.pixels[..., :3])
+
+
+def error_chart(errors: dict[str, float]) -> Any:
+    """Error over how many slices or layers there are, both in octaves."""
+    chart = Chart()
+    most, least = 2.0, 0.025
+
+    def place(count: float, error: float) -> tuple[float, float]:
+        right = np.log2(count / 4.0) / np.log2(64.0)
+        up = np.log2(error / least) / np.log2(most / least)
+        return LEFT + right * (WIDE - LEFT - RIGHT), LOW + up * (HIGH - LOW - TOP)
+
+    for error in (0.025, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0):
+        chart.line(place(4, error), place(256, error), PALE, 1.0)
+        chart.word((LEFT - 30, place(4, error)[1]), f"{100.0 * error:g} %", INK)
+    for count in (4, 8, 16, 64, 255):
+        chart.word((place(count, least)[0], LOW - 18), str(count), INK)
+    chart.line(place(4, errors["none"]), place(256, errors["none"]), INK, 2.0)
+    chart.word((WIDE - 52, place(4, errors["none"])[1]), "no shadows", INK)
+    for way, color in LINES.items():
+        counts = sorted(int(key[len(way) :]) for key in errors if key.startswith(way))
+        places = [place(count, errors[f"{way}{count}"]) for count in counts]
+        for start, end in pairwise(places):
+            chart.line(start, end, color, 2.5)
+        for spot in places:
+            chart.line(spot, spot, color, 9.0)
+        chart.word((places[-1][0] + 60, places[-1][1]), NAMES[way], color)
+    return chart.pixels
+
+
+def shadow_pictures(strands: Any) -> list[Any]:
+    """The ball without shadows, with few and many slices, and with deep layers."""
+    settings = of_addon("parameters").ALL_SETTINGS
+    frame, lights = of_addon("render.frame"), of_addon("shading.lights")
+    skin = of_addon("strands").Surface(*ball_mesh())
+    ball = replace(frame.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), sheen=0.0)
+    camera = frame.Camera(
+        frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),
+    )
+    volume = settings["volume"](shadows="slices", strand_share=1.0)
+    ways = (
+        replace(volume, extinction=0.0),
+        replace(volume, slices=15),
+        replace(volume, slices=64),
+        replace(volume, shadows="deep"),
+    )
+    radius = np.full(strands.shape[:2], RADIUS, np.float32)
+    sun = lights.Light.sun(SUN, (1.0, 1.0, 1.0), 4.0)
+    return [
+        frame.render_image(
+            frame.Snapshot(
+                strands,
+                radius,
+                meshes=(ball,),
+                lights=(sun,),
+                ambient=(0.02, 0.02, 0.02),
+                shading=settings["shading"](volume_shade=0.0),
+                volume=way,
+                volume_center=np.zeros(3, np.float32),
+            ),
+            camera,
+            SIZE,
+            SIZE,
+            SAMPLES,
+            background=of_addon("host.studio").BACKDROP,
+        )
+        for way in ways
+    ]
+
+
+def main(folder: Path) -> None:
+    gpu.init()
+    load_package().register()
+    images, light = of_addon("host.images"), of_addon("shading.lights").Light
+    strands = combed_strands(STRANDS)
+    shown = shadow_pictures(strands)
+    images.write_png(folder / "opacity_slices.png", images.contact_sheet(shown, len(shown)))
+    errors = importlib.import_module("shadow_errors").errors
+    found = errors(strands.astype(np.float64), RADIUS, light.sun(SUN, (1.0, 1.0, 1.0), 1.0))
+    images.write_png(folder / "opacity_error.png", error_chart(found))
+    print("Wrote opacity_slices.png and opacity_error.png", flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
