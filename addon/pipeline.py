@@ -13,6 +13,7 @@ import numpy as np
 
 from .arrays import Floats, Ints
 from .cards.card_mesh import CardMesh
+from .cards.fit import cluster_cards
 from .cards.settings import CardSettings
 from .cards.sort import inside_out_order
 from .cards.strip import build_cards
@@ -280,9 +281,13 @@ def strand_ranks(rig: Rig) -> Floats:
 
 
 def cards_of(rig: Rig, settings: CardSettings, ambient: AmbientSettings) -> CardMesh:
-    """One card for each guide, with ambient occlusion, in order from the inside to the outside."""
-    guides = rig.strands.grid[rig.guides]
-    mesh = build_cards(guides, root_normals(rig)[rig.guides], settings)
+    """Cards at rest, with ambient occlusion, in order from the inside to the outside."""
+    strands, normals = rig.strands, root_normals(rig)
+    if settings.way == "guides":
+        mesh = build_cards(strands.grid[rig.guides], normals[rig.guides], settings)
+    else:
+        radius = strands.radius.reshape(strands.strand_count, -1)
+        mesh = cluster_cards(strands.grid, radius, strands.group, normals, settings)
     occlusion = ambient_occlusion(rig.strands, mesh.positions, rig.head, ambient)
     return inside_out_order(mesh.with_occlusion(occlusion), rig.head)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,6 +64,20 @@ class CardMesh:
     def with_occlusion(self, occlusion: Floats) -> CardMesh:
         """The same mesh with ambient occlusion, (vertex_count,)."""
         return replace(self, occlusion=occlusion)
+
+
+def joined(meshes: Sequence[CardMesh]) -> CardMesh:
+    """All triangles in one mesh, one mesh after the other; card numbers stay as they are."""
+    counts = [len(mesh.positions) for mesh in meshes]
+    starts = np.cumsum([0, *counts[:-1]])
+    both = {
+        name: np.concatenate([getattr(mesh, name) for mesh in meshes])
+        for name in ("positions", "uv", "normal", "tangent", "occlusion", "card")
+    }
+    triangles = np.concatenate(
+        [mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)]
+    )
+    return CardMesh(triangles=triangles, atlas_columns=meshes[0].atlas_columns, **both)
 
 
 def _layout(vertex_count: int, triangle_count: int) -> dict[str, tuple[type, tuple[int, ...]]]:

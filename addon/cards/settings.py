@@ -4,20 +4,67 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..params import Settings, integer, number
+from ..params import Settings, choice, integer, number, toggle
 
 
 @dataclass(frozen=True, kw_only=True)
 class CardSettings(Settings):
-    """How a guide becomes a strip of textured triangles."""
+    """How strands become strips of textured triangles."""
 
     section = "cards"
     title = "Hair cards"
 
+    way: str = choice(
+        "guides",
+        (
+            ("guides", "Guides", "A card along each guide"),
+            ("clusters", "Clusters", "A card for each cluster of strands that lie together"),
+        ),
+        label="Cards From",
+        description="What a card stands for",
+    )
+    card_count: int = integer(
+        800,
+        label="Cards",
+        description="Clusters: how many cards are made",
+        soft=(50, 2000),
+        hard=(1, 20_000),
+    )
+    error: float = number(
+        0.002,
+        label="Error",
+        description="Clusters: how far a card's edges may be from the strands' own way; less "
+        "makes more segments",
+        soft=(0.0005, 0.02),
+        hard=(0.0, 10.0),
+        unit="length",
+    )
+    cover: float = number(
+        1.0,
+        label="Cover",
+        description="Clusters: width of a card, as a factor of how widely its strands lie",
+        soft=(0.5, 2.0),
+        hard=(0.01, 100.0),
+    )
+    crossed: bool = toggle(
+        False,
+        label="Crossed Pairs",
+        description="Clusters: a second card through each, turned by a right angle, so that hair "
+        "has body from all sides",
+    )
+    fly_aways: float = number(
+        0.1,
+        label="Fly-aways",
+        description="Clusters: share of the cards that go to single strands which lie far from "
+        "all others",
+        soft=(0.0, 0.5),
+        hard=(0.0, 1.0),
+        unit="factor",
+    )
     segment_count: int = integer(
         12,
         label="Segments",
-        description="Pieces of a card from root to tip",
+        description="Pieces of a card from root to tip; with clusters, the most",
         soft=(4, 32),
         hard=(1, 128),
     )
@@ -31,14 +78,14 @@ class CardSettings(Settings):
     width_factor: float = number(
         3.5,
         label="Width",
-        description="Width at the root, in mean distances between neighbouring guides",
+        description="Guides: width at the root, in mean distances between neighbouring guides",
         soft=(1.0, 6.0),
         hard=(0.01, 100.0),
     )
     tip_width: float = number(
         0.5,
         label="Tip width",
-        description="Width at the tip as a part of the width at the root",
+        description="Guides: width at the tip as a part of the width at the root",
         soft=(0.0, 1.0),
         hard=(0.0, 10.0),
     )

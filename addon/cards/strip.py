@@ -1,4 +1,4 @@
-"""From guides to cards: one textured strip of triangles along each guide.
+"""Strips of textured triangles, and those that run along guides; see fit.py for clusters.
 
 side ->            u runs along `side`, v along the guide, so that side x tangent = normal and
 3---4---5  tip     the strip is seen counter-clockwise from outside. Each quad is cut into two
@@ -8,6 +8,7 @@ side ->            u runs along `side`, v along the guide, so that side x tangen
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +17,9 @@ from ..arrays import Floats, Ints
 from ..strands import StrandSet
 from ..strands.frames import tangents, transported_normals
 from ..strands.resample import resample
-from .card_mesh import CardMesh
+from .card_mesh import CardMesh, joined
 from .settings import CardSettings
+from .sort import reordered
 
 #: Roots whose distance to their neighbours is measured.
 _SPACING_SAMPLES = 512
@@ -39,6 +41,17 @@ class CardFrames:
     side: Floats
 
 
+@dataclass(frozen=True)
+class Strips:
+    """Strips that all have as many rows. width: (card_count, row_count) [m]."""
+
+    frames: CardFrames
+    width: Floats
+
+    def __len__(self) -> int:
+        return len(self.width)
+
+
 def build_cards(guides: Floats, root_normal: Floats, settings: CardSettings) -> CardMesh:
     """One card for each guide, in the order of the guides; occlusion is 1 until it is computed.
 
@@ -50,22 +63,40 @@ def build_cards(guides: Floats, root_normal: Floats, settings: CardSettings) -> 
         HairloomError: a guide is not finite or has fewer than two CVs.
     """
     frames = card_frames(guides, root_normal, settings.segment_count)
-    card_count, row_count = frames.center.shape[:2]
+    along = np.linspace(0.0, 1.0, settings.segment_count + 1, dtype=np.float32)
+    width = settings.width_factor * mean_spacing(guides[:, 0]) * taper(along, settings.tip_width)
+    strips = Strips(frames, np.broadcast_to(width, (len(guides), len(along))))
+    return strip_mesh([(np.arange(len(guides)), strips)], settings)
+
+
+def strip_mesh(parts: Sequence[tuple[Ints, Strips]], settings: CardSettings) -> CardMesh:
+    """Strips as triangles, card after card; occlusion is 1 until it is computed.
+
+    Args:
+        parts: strips with the numbers of their cards, which are 0, 1, 2 ... all together.
+    """
+    card_count = sum(len(numbers) for numbers, _ in parts)
+    column = np.random.default_rng(settings.seed).integers(settings.atlas_columns, size=card_count)
+    meshes = [_part_mesh(strips, numbers, column[numbers], settings) for numbers, strips in parts]
+    return reordered(joined(meshes), np.arange(card_count))
+
+
+def _part_mesh(strips: Strips, numbers: Ints, column: Ints, settings: CardSettings) -> CardMesh:
+    frames = strips.frames
+    card_count, row_count = strips.width.shape
     across = np.linspace(0.0, 1.0, settings.column_count + 1, dtype=np.float32)
     along = np.linspace(0.0, 1.0, row_count, dtype=np.float32)
-
-    width = settings.width_factor * mean_spacing(guides[:, 0]) * taper(along, settings.tip_width)
     triangles = strip_triangles(row_count, settings.column_count)
     vertices_per_card = row_count * len(across)
     first = np.arange(card_count, dtype=np.int32) * vertices_per_card
     return CardMesh(
-        positions=_positions(frames, width, across, settings).reshape(-1, 3),
+        positions=_positions(frames, strips.width, across, settings).reshape(-1, 3),
         triangles=(first[:, None, None] + triangles).reshape(-1, 3),
-        uv=_uv(card_count, across, along, settings).reshape(-1, 2),
+        uv=_uv(column, across, along, settings).reshape(-1, 2),
         normal=_normals(frames, across, settings).reshape(-1, 3),
         tangent=np.repeat(frames.tangent.reshape(-1, 3), len(across), axis=0),
         occlusion=np.ones(card_count * vertices_per_card, np.float32),
-        card=np.repeat(np.arange(card_count, dtype=np.int32), len(triangles)),
+        card=np.repeat(numbers.astype(np.int32), len(triangles)),
         atlas_columns=settings.atlas_columns,
     )
 
@@ -123,8 +154,8 @@ def strip_triangles(row_count: int, column_count: int) -> Ints:
 
 def _positions(frames: CardFrames, width: Floats, across: Floats, settings: CardSettings) -> Floats:
     """The guide runs through the middle; the edges fall back by a parabola of height `bend`."""
-    aside = (across - 0.5) * width[:, None]
-    behind = -settings.bend * width[:, None] * (2.0 * across - 1.0) ** 2
+    aside = (across - 0.5) * width[..., None]
+    behind = -settings.bend * width[..., None] * (2.0 * across - 1.0) ** 2
     return (
         frames.center[:, :, None]
         + frames.side[:, :, None] * aside[..., None]
@@ -140,10 +171,8 @@ def _normals(frames: CardFrames, across: Floats, settings: CardSettings) -> Floa
     return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
 
-def _uv(card_count: int, across: Floats, along: Floats, settings: CardSettings) -> Floats:
+def _uv(column: Ints, across: Floats, along: Floats, settings: CardSettings) -> Floats:
     """(card_count, row_count, column_count + 1, 2): each card in one column of the texture."""
-    random = np.random.default_rng(settings.seed)
-    column = random.integers(settings.atlas_columns, size=card_count)
     u = (column[:, None] + across) / settings.atlas_columns
     return np.stack(np.broadcast_arrays(u[:, None, :], along[None, :, None]), axis=-1)
 
@@ -156,4 +185,4 @@ def _resampled(guides: Floats, row_count: int) -> Floats:
         radius=np.zeros(guide_count * cv_count),
         group=np.zeros(guide_count, np.int32),
     )
-    return resample(strands, row_count).grid
+    return resample(strands, row_count).points.reshape(guide_count, row_count, 3)

@@ -1,0 +1,95 @@
+"""Clusters of strands against bundles that are known, and against moving single strands."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hairloom.addon.cards.clusters import cluster_strands, shared_out
+
+
+def bundles(count: int, strands: int, spread: float = 0.002) -> tuple[np.ndarray, np.ndarray]:
+    """Straight strands in bundles that lie 5 cm from each other: (n, 8, 3), and whose they are."""
+    random = np.random.default_rng(5)
+    owner = random.permutation(np.repeat(np.arange(count), strands))
+    roots = np.stack([owner % 4, owner // 4, np.zeros(len(owner))], axis=1) * 0.05
+    roots += random.normal(size=roots.shape) * spread
+    along = np.linspace(0.0, 0.2, 8)[:, None] * [0.1, 0.0, -1.0]
+    return (roots[:, None] + along).astype(np.float32), owner
+
+
+def spread_within(grid: np.ndarray, label: np.ndarray) -> float:
+    """What k-means makes small, over all CVs."""
+    means = np.stack([grid[label == each].mean(axis=0) for each in range(label.max() + 1)])
+    return float(((grid - means[label]) ** 2).sum())
+
+
+def test_bundles_that_lie_apart_are_found() -> None:
+    grid, owner = bundles(12, 30)
+    label = cluster_strands(grid, np.zeros(len(grid), np.int32), 12)
+    pairs = {(int(a), int(b)) for a, b in zip(label, owner, strict=True)}
+    assert len(pairs) == 12 == label.max() + 1
+
+
+def test_strands_that_part_are_kept_apart_though_their_roots_touch() -> None:
+    random = np.random.default_rng(2)
+    side = np.repeat([-1.0, 1.0], 50)
+    along = np.linspace(0.0, 0.2, 8)
+    grid = random.normal(size=(100, 1, 3)) * 0.001 + np.stack(
+        [side[:, None] * along, 0.0 * side[:, None] + 0.0 * along, -along + 0.0 * side[:, None]],
+        axis=-1,
+    )
+    label = cluster_strands(grid.astype(np.float32), np.zeros(100, np.int32), 2)
+    np.testing.assert_array_equal(label, np.where(np.arange(100) < 50, label[0], 1 - label[0]))
+
+
+def test_no_cluster_holds_two_groups_and_each_group_has_its_share() -> None:
+    grid, _ = bundles(8, 50, spread=0.03)
+    group = np.where(np.arange(len(grid)) < 300, 7, -2).astype(np.int32)
+    label = cluster_strands(grid, group, 40)
+    in_first, in_second = set(label[:300].tolist()), set(label[300:].tolist())
+    assert not in_first & in_second
+    assert (len(in_first), len(in_second)) == (30, 10)
+
+
+def test_no_single_strand_could_move_to_a_much_better_cluster() -> None:
+    """A solution of k-means: hardly any strand is nearer to another mean; ours is not far off the
+    best of many starts."""
+    grid = np.random.default_rng(3).normal(size=(400, 6, 3)).astype(np.float32)
+    group = np.zeros(400, np.int32)
+    found = [spread_within(grid, cluster_strands(grid, group, 20, seed)) for seed in range(8)]
+    assert max(found) < 1.1 * min(found)
+    random = np.random.default_rng(0).integers(20, size=400)
+    assert max(found) < 0.95 * spread_within(grid, random)
+
+
+def test_a_seed_gives_the_same_clusters_again_and_another_one_others() -> None:
+    grid = np.random.default_rng(3).normal(size=(300, 6, 3)).astype(np.float32)
+    group = np.zeros(300, np.int32)
+    first = cluster_strands(grid, group, 20, seed=4)
+    np.testing.assert_array_equal(first, cluster_strands(grid, group, 20, seed=4))
+    assert (first != cluster_strands(grid, group, 20, seed=5)).any()
+
+
+def test_as_many_clusters_as_strands_and_more_leave_each_strand_alone() -> None:
+    grid, _ = bundles(3, 4)
+    for count in (12, 500):
+        label = cluster_strands(grid, np.zeros(12, np.int32), count)
+        np.testing.assert_array_equal(np.sort(label), np.arange(12))
+
+
+def test_strands_that_coincide_are_one_cluster() -> None:
+    grid = np.ones((9, 4, 3), np.float32)
+    np.testing.assert_array_equal(cluster_strands(grid, np.zeros(9, np.int32), 3), np.zeros(9))
+
+
+def test_more_strands_than_are_learnt_from_all_find_their_bundle() -> None:
+    grid, owner = bundles(10, 2_500)
+    label = cluster_strands(grid, np.zeros(len(grid), np.int32), 10)
+    pairs = {(int(a), int(b)) for a, b in zip(label, owner, strict=True)}
+    assert len(pairs) == 10
+
+
+def test_cards_are_shared_out_by_size() -> None:
+    np.testing.assert_array_equal(shared_out(10, np.array([50, 30, 20])), [5, 3, 2])
+    np.testing.assert_array_equal(shared_out(2, np.array([1000, 1, 1])), [2, 1, 1])
+    np.testing.assert_array_equal(shared_out(100, np.array([3, 5])), [3, 5])
