@@ -169,7 +169,7 @@ class GrowSettings(Settings):
         hard=(0.0, 10.0),
     )
     radius: float = number(
-        1.0e-4,
+        2.0e-4,
         label="Radius",
         description="Radius of the strands; wider than a hair where few strands stand for many",
         unit="length",
