@@ -1,6 +1,13 @@
 // Twin of addon/shading/lights.py and area_lights.py: the radiometric convention is written there.
 // Needs struct_lights.glsl. Holds no resources.
+//
+// LIGHT_KINDS, where a recipe says it: 0 there are suns alone, 1 points and spots as well, 2 area lights
+// too. A software driver computes all branches, and panels cost as much as all other shading.
 #include "lib_angle.glsl"
+
+#ifndef LIGHT_KINDS
+#  define LIGHT_KINDS 2
+#endif
 
 const float LIGHT_PI = 3.14159265358979;
 const float POINT_LIGHT = 1.0, SPOT_LIGHT = 2.0, RECTANGLE_LIGHT = 3.0, DISK_LIGHT = 4.0;
@@ -159,11 +166,13 @@ void light_at(Lights lights, int index, vec3 point, out vec3 to_light, out vec3 
   vec4 light = lights.vector_and_kind[index];
   to_light = light.xyz;
   irradiance = lights.power[index].xyz;
+#if LIGHT_KINDS > 0
   if (light.w == 0.0) {
     return;
   }
   vec3 away = light.xyz - point;
   to_light = away / max(length(away), {{nearest_distance}});
+#  if LIGHT_KINDS > 1
   if (light.w >= RECTANGLE_LIGHT) {
     vec3 arriving = panel_vector_irradiance(lights, index, away);
     float strength = length(arriving);
@@ -171,6 +180,7 @@ void light_at(Lights lights, int index, vec3 point, out vec3 to_light, out vec3 
     irradiance *= strength;
     return;
   }
+#  endif
   float added = lights.power[index].w, least = lights.across[index].w;
   float squared = max(dot(away, away) + added, least);
   float let_through = 1.0;
@@ -178,4 +188,5 @@ void light_at(Lights lights, int index, vec3 point, out vec3 to_light, out vec3 
     let_through = cone_share(lights, index, away, min((added + least) / squared, 1.0));
   }
   irradiance *= let_through / (4.0 * LIGHT_PI * squared);
+#endif
 }

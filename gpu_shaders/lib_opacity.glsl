@@ -35,6 +35,14 @@ vec3 map_place(Opacity opacity, int light, vec3 point)
   return vec3(place, dot(opacity.map_depth[light], at));
 }
 
+// 1 in the middle of a map, 0 at its border: how much of the shadows of meshes counts on meshes, which
+// reach beyond it.
+float within_map(vec2 place)
+{
+  vec2 away = abs(place - 0.5);
+  return clamp((0.5 - max(away.x, away.y)) / {{map_border}}, 0.0, 1.0);
+}
+
 // How broad a strand of the width 1 m is in a light's map, in texels. `across` is the unit vector
 // across it there, xyw its place before the division.
 float strand_breadth(Opacity opacity, int light, vec3 xyw, vec2 across)

@@ -15,6 +15,26 @@ vec3 way_of_light(int index, vec3 point)
   return vec3(-1.0, {{unknown_beyond}}, 1.0);
 }
 
+// As way_of_light, for a place of a mesh. Meshes reach beyond the map, where nothing is known of what
+// is in the way: their shadows fade towards its border, or they would end at a line.
+vec3 way_of_light_to_mesh(int index, vec3 point)
+{
+  vec3 way = way_of_light(index, point);
+#if SHADOWS
+  if (way.x >= 0.0) {
+    way.z = mix(1.0, way.z, within_map(map_place(opacity, index, point).xy));
+  }
+#endif
+  return way;
+}
+
+// The share of a light that hair and meshes in its way leave, by colour: of what strands take they
+// send `forward` on.
+vec3 light_left(vec3 way, vec3 forward)
+{
+  return way.z * exp(-max(way.x, 0.0) * (1.0 - forward));
+}
+
 // As way_of_light, for a place of a strand of this radius [m] and opacity, which is in the maps as
 // well: it does not lie behind itself.
 vec3 way_of_light_to_strand(int index, vec3 point, vec3 tangent, float radius, float hides)

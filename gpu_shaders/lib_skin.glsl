@@ -9,6 +9,21 @@
 // LEAST_KNOWN and NARROW of diffusion.py
 const float SKIN_LEAST_KNOWN = 1e-6, SKIN_NARROW = 1.0;
 
+// Of the colours' shares of light that hair sends on the one with which the shadow is spread.
+float skin_forward(vec3 forward)
+{
+  return dot(forward, vec3(1.0 / 3.0));
+}
+
+// The spread shadow in colours, from the strands that a light passes on its way to the place itself.
+// It cannot have lost more to hair than to all there is; what meshes take has no colour.
+vec3 skin_colored(float soft, float tau, vec3 forward)
+{
+  float mean = skin_forward(forward);
+  float lost = -log(clamp(soft, 1.0e-6, 1.0)) / (1.0 - mean);
+  return soft * exp(min(max(tau, 0.0), lost) * (forward - mean));
+}
+
 ivec2 skin_seam_texel(int seam, int part, int parts)
 {
   return ivec2(parts * (seam % {{skin_seams_across}}) + part, seam / {{skin_seams_across}});

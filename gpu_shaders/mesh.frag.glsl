@@ -57,7 +57,8 @@ void main()
   float alpha = mesh_alpha * texel.w;
 #endif
 #ifdef HASHED
-  if (alpha <= place_noise(floor(gl_FragCoord.xy))) {
+  float chance = gl_FrontFacing ? mesh_chance.x : mesh_chance.y;
+  if (alpha <= fract(place_noise(floor(gl_FragCoord.xy)) + chance)) {
     discard;
   }
 #endif
@@ -78,18 +79,24 @@ void main()
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, mesh_point, to_light, irradiance);
-    vec3 way = way_of_light(index, mesh_point);
-    float reaching = way.x < 0.0 ? mesh_occlusion : way.z * exp(-way.x);
+    vec3 way = way_of_light_to_mesh(index, mesh_point);
+    vec3 reaching = vec3(mesh_occlusion);
+#if SHADOWS
+    reaching = way.x < 0.0 ? reaching : light_left(way, hair_forward);
+#endif
 #ifdef SKIN
     // what is not known of the skin is as it is without: where the head's UVs overlap
     int map = int(opacity.light[index].x);
     if (map >= 0 && map < {{skin_lights}}) {
-      reaching = mix(reaching, soft[map], min(4.0 * known, 1.0));
+      vec3 colored = skin_colored(soft[map], way.x, hair_forward);
+      reaching = mix(reaching, colored, min(4.0 * known, 1.0));
     }
 #endif
     irradiance *= reaching / LIGHT_PI;
     float facing = max(0.0, dot(normal, to_light));
-    float across = max(0.0, dot(normal, normalize(to_light + to_eye)));
+    // between light and eye; of no length where the light comes straight from behind
+    vec3 between = to_light + to_eye;
+    float across = max(0.0, dot(normal, between)) * inversesqrt(max(dot(between, between), 1.0e-12));
     // (n + 8) / 8 keeps the sheen's energy the same whatever its sharpness
     float sheen = mesh_sheen * (SHEEN_EXPONENT + 8.0) / 8.0 * pow(across, SHEEN_EXPONENT);
     radiance += irradiance * facing * (base + sheen);

@@ -1,6 +1,7 @@
 // Soft shadows on skin, first step: how much of each light reaches the skin that a texel of the
 // head's UV map shows. A channel a light, by the number of its opacity map.
 #include "lib_shadows.glsl"
+#include "lib_skin.glsl"
 
 vec3 corner_of(int triangle, int corner)
 {
@@ -24,8 +25,8 @@ void main()
     for (int index = 0; index < light_count; index++) {
       int map = int(opacity.light[index].x);
       if (map >= 0 && map < {{skin_lights}}) {
-        vec3 way = way_of_light(index, point);
-        lit[map] = way.z * exp(-way.x);
+        vec3 way = way_of_light_to_mesh(index, point);
+        lit[map] = light_left(way, vec3(skin_forward(hair_forward))).x;
       }
     }
   }

@@ -53,7 +53,9 @@ void main()
 #if HASHED
   // at the end, because derivatives want all pixels until then
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  float chance = hash_unit(seed, uint(pixel.x) + uint(pixel.y) * {{strand_rows}}u);
+  uint place_number = uint(pixel.x) + uint(pixel.y) * {{strand_rows}}u;
+  // another part in each sample of a picture
+  float chance = hash_unit(seed, place_number + uint(view.viewport.z) * 0x9e3779b9u);
   if (chance >= strands.opacity * ribbon_coverage(ribbon * gl_FragCoord.w)) {
     discard;
   }

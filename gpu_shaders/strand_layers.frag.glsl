@@ -1,5 +1,6 @@
-// Strands as layers, first step: each fragment that no mesh hides joins the list of its pixel. What
-// it looks like is found later, for those that are seen.
+// Strands as layers, first step: each fragment that no mesh hides joins the list of its pixel. The
+// first one puts the pixel into the list of those that have hair. What fragments look like is found
+// later, for those that are seen.
 #include "lib_coverage.glsl"
 #include "lib_layer_packing.glsl"
 
@@ -11,7 +12,13 @@ void main()
   if (alpha * LAYER_ALPHA >= 0.5) {
     uint number = imageAtomicAdd(layer_count, ivec2(0), 1u) + 1u;
     if (number <= uint(capacity)) {
-      uint next = imageAtomicExchange(layer_heads, ivec2(gl_FragCoord.xy), number);
+      uvec2 pixel = uvec2(gl_FragCoord.xy);
+      uint next = imageAtomicExchange(layer_heads, ivec2(pixel), number);
+      if (next == 0u) {
+        int at = int(imageAtomicAdd(layer_count, ivec2(1, 0), 1u));
+        int width = imageSize(layer_pixels).x;
+        imageStore(layer_pixels, ivec2(at % width, at / width), uvec4(pixel.x | (pixel.y << 16u)));
+      }
       uint depth = floatBitsToUint(gl_FragCoord.z);
       uint word = packed_layer(strand_along, alpha);
       imageStore(layer_nodes, layer_texel(number), uvec4(next, depth, uint(strand_index), word));

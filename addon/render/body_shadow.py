@@ -20,6 +20,7 @@ from ..shading.lights import pack_lights
 from ..strands import Surface
 from .camera import Camera
 from .display import Display
+from .marschner_textures import hair_forward
 from .opacity_maps import OpacityForm, OpacityMaps
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .snapshot import Snapshot
@@ -41,7 +42,10 @@ def body_shadow_recipe(opacity: OpacityForm, *, has_display: bool) -> ShaderReci
             *opacity.samplers,
             *((("FLOAT_3D", "display_table"),) if has_display else ()),
         ),
-        numbers=(("VEC4", "display_shaper"),) if has_display else (),
+        numbers=(
+            ("VEC3", "hair_forward"),
+            *((("VEC4", "display_shaper"),) if has_display else ()),
+        ),
         inputs=(("VEC3", "position"), ("VEC3", "normal")),
         varyings=(("smooth", "VEC3", "mesh_point"), ("smooth", "VEC3", "mesh_normal")),
         outputs=(("VEC4", "color"),),
@@ -84,7 +88,8 @@ class BodyShadow:
             "lights": pack_lights(snapshot.lights, snapshot.ambient),
             "opacity": maps.values,
         }
-        textures, numbers = dict(maps.textures), {}
+        textures = dict(maps.textures)
+        numbers: dict[str, Any] = {"hair_forward": hair_forward(snapshot)}
         if display is not None:
             textures["display_table"] = display.table.texture
             numbers["display_shaper"] = display.shaper

@@ -19,11 +19,14 @@ class Camera:
 
     view: (4, 4) world to view space, a rigid motion.
     projection: (4, 4) view to clip space, perspective or orthographic.
+    sample: which of a picture's samples it takes, from 0; what hashed alpha leaves out is another
+        part in each.
     Both multiply columns: clip = projection @ view @ (x, y, z, 1).
     """
 
     view: Floats
     projection: Floats
+    sample: int = 0
 
     @property
     def eye(self) -> Floats:

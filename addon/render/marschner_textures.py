@@ -7,13 +7,16 @@ share their textures.
 from __future__ import annotations
 
 from collections import OrderedDict
+from dataclasses import dataclass
 from typing import Any
 
+from ..arrays import Floats
 from ..shading.marschner.look import fibre_of
 from ..shading.marschner.tables import MarschnerTables, marschner_tables, shape_of
 from ..shading.settings import ShadingSettings
-from ..shading.volume.dual import shares
+from ..shading.volume.dual import Shares, mean_forward, shares
 from .shader_program import released_with_shaders
+from .snapshot import Snapshot
 from .textures import texture_from, volume_from
 
 #: shapes kept; one at the default size is 14 MB
@@ -28,32 +31,44 @@ MARSCHNER_TEXTURES = (
 SHARES_TEXTURES = (("FLOAT_2D", "shares_forward"), ("FLOAT_2D", "shares_backward"))
 
 
+@dataclass(frozen=True)
+class _Tables:
+    shares: Shares
+    textures: dict[str, Any]
+
+
 class MarschnerTextures:
     """Makes textures for a shape of fibre when it is first asked, and keeps the last CAPACITY."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[Any, dict[str, Any]] = OrderedDict()
+        self._kept: OrderedDict[Any, _Tables] = OrderedDict()
         released_with_shaders(self)
 
     def of(self, shading: ShadingSettings, size: int) -> dict[str, Any]:
         """Textures by the names of MARSCHNER_TEXTURES, `size` texels across."""
-        return self._named(MARSCHNER_TEXTURES, shading, size)
+        kept = self._of(shading, size).textures
+        return {name: kept[name] for _, name in MARSCHNER_TEXTURES}
 
     def shares(self, shading: ShadingSettings, size: int) -> dict[str, Any]:
         """Textures by the names of SHARES_TEXTURES, made of tables `size` texels across."""
-        return self._named(SHARES_TEXTURES, shading, size)
+        kept = self._of(shading, size).textures
+        return {name: kept[name] for _, name in SHARES_TEXTURES}
 
-    def _named(
-        self, names: tuple[tuple[str, str], ...], shading: ShadingSettings, size: int
-    ) -> dict[str, Any]:
+    def forward(self, shading: ShadingSettings, size: int) -> Floats:
+        """The share of light that a strand sends on, by colour, (3,)."""
+        return mean_forward(self._of(shading, size).shares.forward, shading)
+
+    def _of(self, shading: ShadingSettings, size: int) -> _Tables:
         shape = shape_of(fibre_of(shading))
         key = (shape, size)
         if key not in self._kept:
-            self._kept[key] = _textures(marschner_tables(shape, size))
+            tables = marschner_tables(shape, size)
+            sides = shares(tables)
+            self._kept[key] = _Tables(sides, _textures(tables, sides))
             while len(self._kept) > CAPACITY:
                 self._kept.popitem(last=False)
         self._kept.move_to_end(key)
-        return {name: self._kept[key][name] for _, name in names}
+        return self._kept[key]
 
     def release(self) -> None:
         """Let go of all textures; the next call makes them again."""
@@ -64,11 +79,21 @@ class MarschnerTextures:
 MARSCHNER = MarschnerTextures()
 
 
-def _textures(tables: MarschnerTables) -> dict[str, Any]:
-    parts = shares(tables)
+def hair_forward(snapshot: Snapshot) -> tuple[float, float, float]:
+    """The share of light that the hair sends on to what lies under it, by colour; 0 without light
+    from strand to strand.
+    """
+    shading = snapshot.shading
+    if shading.model != "marschner" or not snapshot.volume.scattering:
+        return 0.0, 0.0, 0.0
+    red, green, blue = MARSCHNER.forward(shading, snapshot.table_size).tolist()
+    return red, green, blue
+
+
+def _textures(tables: MarschnerTables, sides: Shares) -> dict[str, Any]:
     return {
-        "shares_forward": texture_from(parts.forward, "RGBA32F"),
-        "shares_backward": texture_from(parts.backward, "RGBA32F"),
+        "shares_forward": texture_from(sides.forward, "RGBA32F"),
+        "shares_backward": texture_from(sides.backward, "RGBA32F"),
         "longitudinal": volume_from(tables.longitudinal),
         "azimuthal": texture_from(tables.azimuthal, "RGBA32F"),
         "paths": texture_from(tables.paths, "RGBA32F"),

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..shading.lights import kept_lights, pack_lights
+from ..shading.lights import kept_lights, kinds_needed, pack_lights
 from ..shading.skin.layout import SkinLayout
 from .camera import Camera
+from .hashed_alpha import shifts
+from .marschner_textures import hair_forward
 from .mesh_batch import mesh_batch
 from .mesh_pictures import PictureTextures, pictures_of
 from .mesh_recipe import NUMBERS, MeshForm
@@ -44,8 +46,9 @@ class MeshPass:
         Args:
             opacity: the hair's maps, see StrandPass.opacity. Others as in StrandPass.draw.
         """
+        forward = (0.0, 0.0, 0.0) if opacity is None else hair_forward(snapshot)
         skins = self.skin.shadows(
-            snapshot.meshes, opacity, snapshot.skin, len(kept_lights(snapshot.lights))
+            snapshot.meshes, opacity, snapshot.skin, len(kept_lights(snapshot.lights)), forward
         )
         self._upload(snapshot.meshes, skins)
         values = {
@@ -54,10 +57,13 @@ class MeshPass:
             **({} if opacity is None else {"opacity": opacity.values}),
         }
         form = None if opacity is None else opacity.form
-        for mesh, _, batch in _far_to_near(self._batches, camera):
+        kinds = kinds_needed(kept_lights(snapshot.lights))
+        for number, (mesh, _, batch) in enumerate(_far_to_near(self._batches, camera)):
             skin, pictures = skins.get(id(mesh)), pictures_of(mesh)
             shader = program(
-                MeshForm(form, skin is not None, pictures is not None, mesh.transparency).recipe
+                MeshForm(
+                    form, skin is not None, pictures is not None, mesh.transparency, kinds
+                ).recipe
             )
             is_blended = mesh.transparency == "blended"
             with drawing_state(
@@ -71,7 +77,11 @@ class MeshPass:
                         **({} if pictures is None else self._pictures.textures(mesh, pictures)),
                     },
                     integers={"output_encoding": output_index(output)},
-                    numbers=_numbers(mesh, pictures),
+                    numbers={
+                        **_numbers(mesh, pictures),
+                        **_chance(mesh, number, camera.sample),
+                        **({} if opacity is None else {"hair_forward": forward}),
+                    },
                 )
                 batch.draw(shader.shader)
         self._pictures.forget_but(snapshot.meshes)
@@ -123,6 +133,11 @@ def _numbers(mesh: MeshSnapshot, pictures: MeshPictures | None) -> dict[str, Any
         **({"mesh_color": mesh.color} if pictures is None else {"mesh_bump": pictures.bump}),
         **({} if mesh.transparency == "opaque" else {"mesh_alpha": mesh.alpha}),
     }
+
+
+def _chance(mesh: MeshSnapshot, number: int, sample: int) -> dict[str, Any]:
+    """How far the pattern by which a hashed mesh is left out is shifted; see hashed_alpha.py."""
+    return {"mesh_chance": shifts(number, sample)} if mesh.transparency == "hashed" else {}
 
 
 def _far_to_near(batches: list[_Batch], camera: Camera) -> list[_Batch]:

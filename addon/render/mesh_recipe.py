@@ -28,12 +28,14 @@ class MeshForm:
     is_skin: whether the shadow is looked up where it has been spread.
     has_pictures: whether pictures are laid over its UVs.
     transparency: one of TRANSPARENCIES.
+    light_kinds: see kinds_needed.
     """
 
     opacity: OpacityForm | None = None
     is_skin: bool = False
     has_pictures: bool = False
     transparency: str = "opaque"
+    light_kinds: int = 2
 
     @property
     def recipe(self) -> ShaderRecipe:
@@ -41,7 +43,7 @@ class MeshForm:
         parts = [f"{opacity.slots}_{opacity.is_deep}"] if opacity else []
         parts += ["skin"] * self.is_skin + ["pictures"] * self.has_pictures
         return ShaderRecipe(
-            name="_".join(["mesh", *parts, self.transparency]),
+            name="_".join(["mesh", *parts, self.transparency, str(self.light_kinds)]),
             vertex="mesh.vert.glsl",
             fragment="mesh.frag.glsl",
             structs=_STRUCTS,
@@ -55,8 +57,10 @@ class MeshForm:
             numbers=(
                 ("FLOAT", "mesh_sheen"),
                 ("FLOAT", "mesh_cover"),
+                *((("VEC3", "hair_forward"),) if opacity else ()),
                 ("FLOAT", "mesh_bump") if self.has_pictures else ("VEC3", "mesh_color"),
                 *((("FLOAT", "mesh_alpha"),) if self.transparency != "opaque" else ()),
+                *((("VEC2", "mesh_chance"),) if self.transparency == "hashed" else ()),
             ),
             inputs=(
                 *_INPUTS,
@@ -71,6 +75,7 @@ class MeshForm:
             outputs=(("VEC4", "color"),),
             defines=(
                 ("SHADOWS", int(opacity is not None)),
+                ("LIGHT_KINDS", self.light_kinds),
                 *(opacity.defines if opacity else ()),
                 *((("SKIN", 1),) if self.is_skin else ()),
                 *((("PICTURES", 1),) if self.has_pictures else ()),

@@ -82,6 +82,7 @@ _MESH_RECIPE = ShaderRecipe(
     blocks=(("Opacity", "opacity"),),
     integers=("light_index",),
     inputs=(("VEC3", "position"),),
+    varyings=(("smooth", "FLOAT", "mesh_depth"),),
 )
 
 

@@ -26,7 +26,7 @@ from ..shading.skin.layout import CLOSING
 from ..shading.volume.card_opacity import MOST_ALPHA
 from ..shading.volume.dual import HALF_WAY, UNKNOWN_BEYOND
 from ..shading.volume.map_size import START_TEXELS
-from ..shading.volume.opacity import LEAST_THICKNESS
+from ..shading.volume.opacity import LEAST_THICKNESS, MAP_BORDER
 from ..shading.volume.transparency import UNSEEN_SHARE
 
 SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
@@ -76,6 +76,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "field_row": str(FIELD_ROW),
         "shade_capacity": str(SHADE_CAPACITY),
         "layer_texel_capacity": str(LAYER_TEXEL_CAPACITY),
+        "map_border": repr(MAP_BORDER),
         "start_texels": str(START_TEXELS),
         "tile_gap": str(TILE_GAP),
         "half_way_absorption": repr(HALF_WAY),

@@ -27,7 +27,7 @@ from .opacity_pass import OpacityForm, OpacityMaps
 from .shader_program import ShaderRecipe, program
 from .shader_source import SKIN_COPIES_ACROSS, SKIN_SEAMS_ACROSS, SKIN_TRIANGLES_ACROSS
 from .skin_layouts import layout_of
-from .snapshot import MeshSnapshot
+from .snapshot import Color, MeshSnapshot
 from .textures import UniformBlock, texture_from, texture_to_array
 
 #: what a program that looks the shadow up needs
@@ -49,6 +49,7 @@ def _shadow_recipe(opacity: OpacityForm) -> ShaderRecipe:
         ),
         images=(("RGBA32F", "reaching"),),
         integers=("light_count",),
+        numbers=(("VEC3", "hair_forward"),),
         defines=(("SHADOWS", 1), *opacity.defines),
     )
 
@@ -96,12 +97,14 @@ class _Drawn:
     opacity: OpacityMaps
     softness: float
     light_count: int
+    forward: Color
 
     def is_like(self, other: _Drawn) -> bool:
         return (
             self.positions is other.positions
             and self.opacity is other.opacity
             and (self.softness, self.light_count) == (other.softness, other.light_count)
+            and self.forward == other.forward
         )
 
 
@@ -142,12 +145,15 @@ class SkinPass:
         opacity: OpacityMaps | None,
         settings: SkinSettings,
         light_count: int,
+        forward: Color = (0.0, 0.0, 0.0),
     ) -> dict[int, SkinShadow]:
         """The soft shadow on each mesh that is skin, by the mesh's id(); none on those whose UVs
         are of no use, and none at all without opacity maps or softness.
 
         Args:
             light_count: lights that the maps know of.
+            forward: the share of light that hair sends on, by colour; the shadow is that of their
+                mean.
         """
         if opacity is None or not settings.soft_shadow or not settings.softness:
             return {}
@@ -158,9 +164,9 @@ class SkinPass:
             head = self._head(mesh.skin.surface, settings.skin_resolution)
             used.append(head)
             if not head.layout.is_empty:
-                found[id(mesh)] = self._drawn(
-                    head, mesh.skin.surface, opacity, settings.softness, light_count
-                )
+                light = settings.softness, light_count, forward
+                wanted = _Drawn(mesh.skin.surface.positions, opacity, *light)
+                found[id(mesh)] = self._drawn(head, mesh.skin.surface, wanted)
         self._heads = [head for head in self._heads if head in used]
         return found
 
@@ -181,29 +187,20 @@ class SkinPass:
         )
         return self._heads[-1]
 
-    def _drawn(
-        self,
-        head: _Head,
-        surface: Surface,
-        opacity: OpacityMaps,
-        softness: float,
-        light_count: int,
-    ) -> SkinShadow:
-        wanted = _Drawn(surface.positions, opacity, softness, light_count)
+    def _drawn(self, head: _Head, surface: Surface, wanted: _Drawn) -> SkinShadow:
         if head.shadow is None or head.drawn is None or not head.drawn.is_like(wanted):
-            shadow = self._reaching(head, surface, opacity, light_count)
+            shadow = self._reaching(head, surface, wanted)
             for axis in range(2):
-                shadow = spread(shadow, head.textures, softness, axis)
+                shadow = spread(shadow, head.textures, wanted.softness, axis)
             shifts = closing_shifts(shadow, head.textures)
             kept = {name: head.textures[name] for _, name in SKIN_TEXTURES[1:4]}
             textures = {"skin_shadow": shadow, "skin_shifts": shifts, **kept}
             head.shadow, head.drawn = SkinShadow(head.layout, textures), wanted
         return head.shadow
 
-    def _reaching(
-        self, head: _Head, surface: Surface, opacity: OpacityMaps, light_count: int
-    ) -> Any:
+    def _reaching(self, head: _Head, surface: Surface, wanted: _Drawn) -> Any:
         """How much of each light reaches the skin, as it is."""
+        opacity = wanted.opacity
         corners = texture_from(
             _in_rows(surface.corners.reshape(-1, 3), 3 * SKIN_TRIANGLES_ACROSS), "RGBA32F"
         )
@@ -214,7 +211,8 @@ class SkinPass:
             blocks={"opacity": self._block.holding(opacity.values)},
             textures={"skin_texels": texels, "skin_corners": corners, **opacity.textures},
             images={"reaching": found},
-            integers={"light_count": light_count},
+            integers={"light_count": wanted.light_count},
+            numbers={"hair_forward": wanted.forward},
         )
         _dispatch(shader, found)
         return found

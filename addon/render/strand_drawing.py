@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from .detail_pass import DetailOrder
 from .shader_program import ShaderProgram, ShaderRecipe, program
-from .strand_recipe import StrandShading, gather_recipe, layers_recipe, strand_recipe
+from .strand_recipe import StrandShading, gather_recipe, shade_recipe, shown_recipe, strand_recipe
 
 Named = Mapping[str, Any]
 
@@ -45,9 +45,15 @@ class StrandDrawing:
         recipe = gather_recipe(is_adaptive=self.is_adaptive)
         self._draw(recipe, images, {"capacity": capacity})
 
-    def shade(self, images: Named) -> ShaderProgram:
-        """Bind what shades these lists."""
-        return self._bound(layers_recipe(self.shading), images, {})
+    def shade(self, images: Named, seen_count: int) -> ShaderProgram:
+        """Bind what shades so many nodes that are seen."""
+        recipe = shade_recipe(replace(self.shading, has_display=False))
+        return self._bound(recipe, images, {"seen_count": seen_count})
+
+    def show(self, images: Named, *, writes_depth: bool) -> ShaderProgram:
+        """Bind what adds up these lists."""
+        recipe = shown_recipe(has_display=self.shading.has_display)
+        return self._bound(recipe, images, {"writes_depth": int(writes_depth)})
 
     def _draw(self, recipe: ShaderRecipe, images: Named, integers: Named) -> None:
         shader = self._bound(recipe, images, integers).shader

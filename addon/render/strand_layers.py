@@ -1,17 +1,20 @@
-"""Strands as layers: the lists of all pixels, from which the nearest are shaded and put together.
+"""Strands as layers: the lists of all pixels, of which the nearest are shaded and added up.
 
-    count   R32UI 1 x 1:   how many fragments there are
-    heads   R32UI:         of each pixel the last one of its list, counted from 1; 0 is none
-    nodes   RGBA32UI:      the fragments, see lib_layer_packing.glsl
-    colors  RGBA32F, fronts R32F:   what each pixel shows, and from which depth on it hides
+    count   R32UI 3 x 1:   how many fragments there are, how many pixels that have some, and how
+                           many fragments are seen
+    heads   R32UI:         of each pixel the first one of its list, counted from 1; 0 is none
+    pixels  R32UI:         those that have fragments, side by side: x, and y in the upper half
+    nodes   RGBA32UI:      the fragments, see lib_layer_packing.glsl; later their colours
+    seen    R32UI:         the numbers of those that are seen, side by side, whatever their pixels:
+                           no invocation that shades is idle because its pixel has fewer of them
+    fronts  RG32F:         of each pixel the depth from which on it hides, and its alpha
 
-That is 24 bytes a pixel, and 16 more for each fragment of a strand that no mesh hides. All grooms
+That is 16 bytes a pixel, and 20 more for each fragment of a strand that no mesh hides. All grooms
 and all views share them, since nothing is kept from one draw to the next.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import gpu
@@ -19,16 +22,15 @@ import numpy as np
 
 from .shader_program import ShaderProgram, program, released_with_shaders
 from .shader_source import LAYER_ROW
-from .strand_recipe import DONE_RECIPE, SHOWN_RECIPE
+from .strand_drawing import StrandDrawing
+from .strand_recipe import DONE_RECIPE, ORDER_RECIPE
 from .textures import drawing_state
 
-#: rows of nodes at first, and at most: 32 Mi fragments, 512 MiB. What comes after that is missing:
+#: rows of nodes at first, and at most: 32 Mi fragments, 640 MiB. What comes after that is missing:
 #: the farthest, since near strands are drawn first.
 FIRST_ROWS, MOST_ROWS = 256, 8192
 #: a count that turned out too small is made this much larger than what was found
 _SPARE = 1.25
-
-Images = dict[str, Any]
 
 
 class StrandLayers:
@@ -43,75 +45,74 @@ class StrandLayers:
         self._size = 0, 0
         self._count: Any = None
         self._heads: Any = None
+        self._pixels: Any = None
         self._nodes: Any = None
-        self._colors: Any = None
+        self._seen: Any = None
         self._fronts: Any = None
         self._triangle: Any = None
 
-    def draw(
-        self,
-        gather: Callable[[Images, int], None],
-        shade: Callable[[Images], ShaderProgram],
-    ) -> None:
-        """Gather, shade, and put the result over what is in the bound framebuffer.
-
-        Args:
-            gather: draws all strands with these images and room for so many fragments.
-            shade: binds the program that shades, with these images.
-        """
+    def draw(self, drawing: StrandDrawing) -> None:
+        """Gather, order, shade, and put the result over what is in the bound framebuffer."""
         left, bottom, width, height = gpu.state.viewport_get()
         size = left + width, bottom + height
         self._fit(size)
-        while not self._gathered(gather):
+        while not self._gathered(drawing):
             pass
-        shader = shade(
-            {
-                "layer_heads": self._heads,
-                "layer_nodes": self._nodes,
-                "layer_colors": self._colors,
-                "layer_fronts": self._fronts,
-            }
+        _, pixel_count, _ = self._counts()
+        if not pixel_count:
+            return
+        images = self._images
+        order = program(ORDER_RECIPE)
+        order.bind(
+            images={name: images[name] for _, name, *_ in ORDER_RECIPE.images},
+            integers={"pixel_count": pixel_count},
         )
-        gpu.compute.dispatch(shader.shader, -(-size[0] // 8), -(-size[1] // 8), 1)
+        _dispatch(order, pixel_count, self._pixels.width)
+        _, _, seen_count = self._counts()
+        _dispatch(drawing.shade(images, seen_count), seen_count, LAYER_ROW)
         with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
-            self._show(writes_depth=False)
+            self._triangle.draw(drawing.show(images, writes_depth=False).shader)
         with drawing_state(depth_test="ALWAYS"):
             gpu.state.color_mask_set(False, False, False, False)
-            self._show(writes_depth=True)
+            self._triangle.draw(drawing.show(images, writes_depth=True).shader)
 
-    def _gathered(self, gather: Callable[[Images, int], None]) -> bool:
+    def _gathered(self, drawing: StrandDrawing) -> bool:
         """Whether all fragments had room; where not, there is more of it now."""
         for counter in (self._count, self._heads):
             counter.clear(format="UINT", value=(0,))
         capacity = self._nodes.height * LAYER_ROW
         # adds nothing to the colours; with the colour mask off, drivers skip such a draw
         with drawing_state(depth_write=False, blend="ADDITIVE_PREMULT"):
-            gather(
-                {
-                    "layer_count": self._count,
-                    "layer_heads": self._heads,
-                    "layer_nodes": self._nodes,
-                },
-                capacity,
-            )
+            drawing.gather(self._images, capacity)
         done = program(DONE_RECIPE)
         done.bind()
         gpu.compute.dispatch(done.shader, 1, 1, 1)
         gpu.shader.unbind()
-        found = int(np.asarray(self._count.read()).ravel()[0])
+        found, _, _ = self._counts()
         if found <= capacity or self._nodes.height == MOST_ROWS:
             return True
-        rows = min(int(found * _SPARE) // LAYER_ROW + 1, MOST_ROWS)
-        self._nodes = gpu.types.GPUTexture((LAYER_ROW, rows), format="RGBA32UI")
+        self._make_nodes(min(int(found * _SPARE) // LAYER_ROW + 1, MOST_ROWS))
         return False
 
-    def _show(self, *, writes_depth: bool) -> None:
-        shader = program(SHOWN_RECIPE)
-        shader.bind(
-            textures={"layer_colors": self._colors, "layer_fronts": self._fronts},
-            integers={"writes_depth": int(writes_depth)},
-        )
-        self._triangle.draw(shader.shader)
+    def _counts(self) -> tuple[int, int, int]:
+        """How many fragments there are, pixels that have some, and fragments that are seen."""
+        found, pixels, seen = np.asarray(self._count.read()).ravel().tolist()
+        return int(found), int(pixels), int(seen)
+
+    @property
+    def _images(self) -> dict[str, Any]:
+        return {
+            "layer_count": self._count,
+            "layer_heads": self._heads,
+            "layer_pixels": self._pixels,
+            "layer_nodes": self._nodes,
+            "layer_seen": self._seen,
+            "layer_fronts": self._fronts,
+        }
+
+    def _make_nodes(self, rows: int) -> None:
+        self._nodes = gpu.types.GPUTexture((LAYER_ROW, rows), format="RGBA32UI")
+        self._seen = gpu.types.GPUTexture((LAYER_ROW, rows), format="R32UI")
 
     def _fit(self, size: tuple[int, int]) -> None:
         """Buffers that hold so many pixels, those of before where they are not far too large."""
@@ -120,16 +121,22 @@ class StrandLayers:
         if is_held and kept[0] * kept[1] <= 4 * max(wanted[0] * wanted[1], 1):
             return
         self._size = size
-        self._count = gpu.types.GPUTexture((1, 1), format="R32UI")
+        self._count = gpu.types.GPUTexture((3, 1), format="R32UI")
         self._heads = gpu.types.GPUTexture(size, format="R32UI")
-        self._nodes = gpu.types.GPUTexture((LAYER_ROW, FIRST_ROWS), format="RGBA32UI")
-        self._colors = gpu.types.GPUTexture(size, format="RGBA32F")
-        self._fronts = gpu.types.GPUTexture(size, format="R32F")
+        self._pixels = gpu.types.GPUTexture(size, format="R32UI")
+        self._make_nodes(FIRST_ROWS)
+        self._fronts = gpu.types.GPUTexture(size, format="RG32F")
         if self._triangle is None:
             layout = gpu.types.GPUVertFormat()
             layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
             corners = gpu.types.GPUVertBuf(layout, 3)
             self._triangle = gpu.types.GPUBatch(type="TRIS", buf=corners)
+
+
+def _dispatch(shader: ShaderProgram, count: int, across: int) -> None:
+    """One invocation for each of the first `count` texels of a texture so many texels wide."""
+    columns = -(-min(count, across) // shader.recipe.group_size[0])
+    gpu.compute.dispatch(shader.shader, columns, -(-count // across), 1)
 
 
 #: of all grooms and views

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..params.glsl import struct_values
-from ..shading.lights import kept_lights, pack_lights
+from ..shading.lights import kept_lights, kinds_needed, pack_lights
 from ..shading.marschner.look import pack_fibre
 from ..shading.strand_noise import SEED_LIMIT
 from .camera import Camera
@@ -109,7 +109,7 @@ class StrandPass:
         is_debug = snapshot.debug_view != "none"
         way = "none" if is_debug else snapshot.strand_settings.transparency
         if way == "layers":
-            LAYERS_OF_PIXELS.draw(drawing.gather, drawing.shade)
+            LAYERS_OF_PIXELS.draw(drawing)
         else:
             with drawing_state():
                 drawing.draw(is_hashed=way == "hashed")
@@ -197,6 +197,7 @@ class StrandPass:
                 has_display=display is not None,
                 opacity=None if maps is None else maps.form,
                 scatters=scatters,
+                light_kinds=kinds_needed(kept_lights(snapshot.lights)),
             ),
             ribbon=self._ribbon,
             blocks={name: self._blocks[name].holding(blocks[name]) for name in blocks},

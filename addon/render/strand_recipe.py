@@ -15,6 +15,9 @@ from .shader_source import DEBUG_VIEWS
 NUMBERED_VIEWS = ("guide", "group")
 #: what covers pixels in part, see ribbon_coverage in lib_coverage.glsl
 _RIBBON = (("smooth", "VEC4", "ribbon"),)
+#: how the viewport shows a colour
+_DISPLAY_TEXTURES = (("FLOAT_3D", "display_table"),)
+_DISPLAY_NUMBERS = (("VEC4", "display_shaper"),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +27,7 @@ class StrandShading:
     It holds one model of MODELS alone. A debug view has none: it is the same with either.
     With a display it looks up how the viewport shows a colour, see display.py. With opacity maps
     hair shades itself; `scatters` adds light from strand to strand, in Marschner's model.
+    light_kinds: see kinds_needed.
     """
 
     model: str = "kajiya_kay"
@@ -31,11 +35,12 @@ class StrandShading:
     has_display: bool = False
     opacity: OpacityForm | None = None
     scatters: bool = False
+    light_kinds: int = 2
 
     @property
     def name(self) -> str:
         maps = f"_{self.opacity.slots}_{self.opacity.is_deep}" if self.opacity else ""
-        parts = f"{self.model}{'_scattering' * self.scatters}{maps}"
+        parts = f"{self.model}{'_scattering' * self.scatters}{maps}_{self.light_kinds}"
         return f"{parts}_{self.debug_view}{'_display' * self.has_display}"
 
     @property
@@ -65,18 +70,19 @@ class StrandShading:
                 *(MARSCHNER_TEXTURES if is_marschner else ()),
                 *(SHARES_TEXTURES if self.scatters else ()),
                 *(self.opacity.samplers if self.opacity else ()),
-                *((("FLOAT_3D", "display_table"),) if self.has_display else ()),
+                *(_DISPLAY_TEXTURES if self.has_display else ()),
             ),
             integers=("cv_count", "output_encoding"),
             numbers=(
                 ("VEC3", "volume_center"),
                 *((("FLOAT", "scatter_density"), ("VEC3", "skin_color")) if self.scatters else ()),
-                *((("VEC4", "display_shaper"),) if self.has_display else ()),
+                *(_DISPLAY_NUMBERS if self.has_display else ()),
             ),
             defines=(
                 ("MARSCHNER", int(is_marschner)),
                 ("SHADOWS", int(self.opacity is not None)),
                 ("SCATTERING", int(self.scatters)),
+                ("LIGHT_KINDS", self.light_kinds),
                 *(self.opacity.defines if self.opacity else ()),
                 *((("DISPLAY", 1),) if self.has_display else ()),
             ),
@@ -138,6 +144,7 @@ def gather_recipe(*, is_adaptive: bool) -> ShaderRecipe:
         images=(
             ("R32UI", "layer_count", "READ_WRITE"),
             ("R32UI", "layer_heads", "READ_WRITE"),
+            ("R32UI", "layer_pixels"),
             ("RGBA32UI", "layer_nodes"),
         ),
         integers=("cv_count", "capacity", _detail_integer(is_adaptive)),
@@ -156,33 +163,59 @@ def gather_recipe(*, is_adaptive: bool) -> ShaderRecipe:
     )
 
 
-def layers_recipe(shading: StrandShading) -> ShaderRecipe:
-    """The program that shades the nearest of each pixel's list and puts them over each other."""
+ORDER_RECIPE = ShaderRecipe(
+    name="strand_layers_order",
+    compute="strand_layers_order.comp.glsl",
+    images=(
+        ("R32UI", "layer_count", "READ_WRITE"),
+        ("R32UI", "layer_heads", "READ_WRITE"),
+        ("R32UI", "layer_pixels", "READ"),
+        ("RGBA32UI", "layer_nodes", "READ_WRITE"),
+        ("R32UI", "layer_seen"),
+        ("RG32F", "layer_fronts"),
+    ),
+    integers=("pixel_count",),
+    group_size=(64, 1),
+    defines=(("LAYERS", LAYERS),),
+)
+
+
+def shade_recipe(shading: StrandShading) -> ShaderRecipe:
+    """The program that shades those of all lists that are seen."""
     recipe = shading.recipe
     return replace(
         recipe,
-        name=f"strand_layers_{recipe.name}",
-        compute="strand_layers.comp.glsl",
+        name=f"strand_layers_shade_{recipe.name}",
+        compute="strand_layers_shade.comp.glsl",
+        textures=tuple(each for each in recipe.textures if each not in _DISPLAY_TEXTURES),
+        numbers=tuple(each for each in recipe.numbers if each not in _DISPLAY_NUMBERS),
+        images=(("R32UI", "layer_seen", "READ"), ("RGBA32UI", "layer_nodes", "READ_WRITE")),
+        integers=("cv_count", "seen_count"),
+        group_size=(64, 1),
+    )
+
+
+def shown_recipe(*, has_display: bool) -> ShaderRecipe:
+    """The program that adds up each pixel's list."""
+    return ShaderRecipe(
+        name=f"strand_layers_shown{'_display' * has_display}",
+        vertex="strand_layers.vert.glsl",
+        fragment="strand_layers_shown.frag.glsl",
+        textures=_DISPLAY_TEXTURES if has_display else (),
         images=(
             ("R32UI", "layer_heads", "READ"),
             ("RGBA32UI", "layer_nodes", "READ"),
-            ("RGBA32F", "layer_colors"),
-            ("R32F", "layer_fronts"),
+            ("RG32F", "layer_fronts", "READ"),
         ),
-        defines=(*recipe.defines, ("LAYERS", LAYERS)),
+        integers=("output_encoding", "writes_depth"),
+        numbers=_DISPLAY_NUMBERS if has_display else (),
+        outputs=(("VEC4", "color"),),
+        defines=(("DISPLAY", 1),) if has_display else (),
     )
 
 
 DONE_RECIPE = ShaderRecipe(
     name="strand_layers_done", compute="strand_layers_done.comp.glsl", group_size=(1, 1)
-)
-SHOWN_RECIPE = ShaderRecipe(
-    name="strand_layers_shown",
-    vertex="strand_layers.vert.glsl",
-    fragment="strand_layers_shown.frag.glsl",
-    textures=(("FLOAT_2D", "layer_colors"), ("FLOAT_2D", "layer_fronts")),
-    integers=("writes_depth",),
-    outputs=(("VEC4", "color"),),
 )
 
 

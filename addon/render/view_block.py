@@ -16,7 +16,7 @@ def view_values(camera: Camera, width: int, height: int) -> Floats:
     """
     projection = np.asarray(camera.projection, np.float64)
     view_projection = projection @ np.asarray(camera.view, np.float64)
-    viewport = np.array([width, height, 0.0, 0.0])
+    viewport = np.array([width, height, camera.sample, 0.0])
     return np.concatenate(
         [view_projection.T.ravel(), projection.T.ravel(), camera.eye, viewport]
     ).astype(np.float32)

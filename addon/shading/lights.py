@@ -146,6 +146,13 @@ class Light:
         return (0.0, max(squared, nearest)) if self.is_ball else (squared, nearest)
 
 
+def kinds_needed(lights: Sequence[Light]) -> int:
+    """LIGHT_KINDS of lib_lights.glsl: 0 suns alone, 1 points and spots too, 2 all kinds."""
+    if any(light.kind == "area" for light in lights):
+        return 2
+    return int(any(light.kind != "sun" for light in lights))
+
+
 def light_at(light: Light, points: Floats) -> tuple[Floats, Floats]:
     """What comes from one light to points (..., 3): direction and irradiance, each (..., 3).
 

@@ -154,8 +154,8 @@ class StrandSettings(Settings):
     opacity: float = number(
         1.0,
         label="Opacity",
-        description="How much a strand hides of what lies behind it, in its full width; with "
-        "transparency only",
+        description="How much a strand hides of what lies behind it, in its full width, and how "
+        "much light it takes from that; with transparency only",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",

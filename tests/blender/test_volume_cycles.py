@@ -26,8 +26,8 @@ from _shading_room import DISTANCE, CyclesRoom
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
 RADIUS = 0.004
-#: Strands, and texels along a side of the opacity map; how far a channel's light may be off. In fine
-#: maps texels know single strands, each of which is in its own texels.
+#: Strands, texels along a side of the opacity map, how far a channel's light may be off on skin. In
+#: fine maps texels know single strands, each of which is in its own texels.
 CASES = {
     "coarse map": (3000, 64, 0.11),
     "fine map": (3000, 512, 0.16),

@@ -10,7 +10,13 @@ import pytest
 
 from hairloom.addon.shading.lights import Light, kept_lights
 from hairloom.addon.shading.settings import StrandSettings
-from hairloom.addon.shading.volume.light_frame import Ball, ball_around, is_within, light_frame
+from hairloom.addon.shading.volume.light_frame import (
+    Ball,
+    LightFrame,
+    ball_around,
+    is_within,
+    light_frame,
+)
 from hairloom.addon.shading.volume.map_size import MEMORY_LIMIT
 from hairloom.addon.shading.volume.opacity import (
     LEAST_THICKNESS,
@@ -162,8 +168,9 @@ def test_a_strand_finds_itself_in_the_map_as_often_as_is_taken_off(
             )
             frame = light_frame(light, ball)
             assert frame is not None
-            points = strand[0, 8:-8] + random.uniform(-0.5, 0.5, (17, 1)) * (ends[1] - ends[0]) / 32
-            along = np.broadcast_to((ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0]), (17, 3))
+            way = ends[1] - ends[0]
+            points = strand[0, 8:-8] + random.uniform(-0.5, 0.5, (17, 1)) * way / 32
+            along = np.broadcast_to(way / np.linalg.norm(way), (17, 3))
             half_width = radius * frame.strand_breadth(points, along) * 256
             path = path_at(compute, maps, points)
             found.append(path[:, 0] + path[:, 1])
@@ -210,6 +217,64 @@ def test_strands_that_hide_less_shade_less(
     expected = coverage(strands, radius, frame, 64, share).covered.sum()
     assert layers_of(maps)[..., 7].sum() == pytest.approx(expected, rel=2e-2, abs=1e-6)
     assert expected == pytest.approx(share * coverage(strands, radius, frame, 64).covered.sum())
+
+
+@pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
+def test_depths_of_large_meshes_are_those_of_rays(gpu_context: Any, light: Light) -> None:
+    """Two triangles aslant, one far larger than the hair, one right across a light within it."""
+    from hairloom.addon.render.opacity_pass import OpacityPass
+
+    strands, radius = dome(50)
+    ball, settings = ball_around(strands), VolumeSettings(shadows="deep", resolution=64)
+    frame = light_frame(light, ball)
+    assert frame is not None
+    middle = np.argmin(np.abs(frame.to_depth[:3]))
+    for scale, slant in ((2.0, 0.3), (0.2, 1.2)):
+        corners = scale * np.array([[-1.0, -1.0, 0.0], [1.2, -0.8, 0.0], [0.0, 1.3, 0.0]])
+        corners[:, 2] = slant * corners[:, 0] - 0.4 * slant * corners[:, 1]
+        corners = ball.center + np.roll(corners, middle, axis=1)
+        mesh = Surface(corners.astype(np.float32), np.array([[0, 1, 2]], np.int32))
+        maps = OpacityPass().maps(
+            points_of(strands, radius),
+            1,
+            strands.shape[:2],
+            ball,
+            (light,),
+            settings,
+            PLAIN,
+            (mesh,),
+        )
+        found = np.asarray(maps.meshes.read()).reshape(64, 64)
+        expected = depths_of_rays(frame, mesh.positions.astype(np.float64))
+        is_hit = expected < 1.0
+        assert is_hit.sum() > 300
+        # a ray along the triangle's edge may miss or meet it
+        differs = np.abs(found - expected) > 1e-4
+        assert differs.mean() < 0.03 and not differs[2:-2, 2:-2][inner(is_hit)[2:-2, 2:-2]].any()
+
+
+def depths_of_rays(frame: LightFrame, corners: np.ndarray) -> np.ndarray:
+    """Where rays through the middles of texels meet a triangle, (64, 64); 1 where they miss."""
+    across = (np.arange(64) + 0.5) / 32.0 - 1.0
+    y, x = np.meshgrid(across, across, indexing="ij")
+    rows = frame.to_map[[0, 1]][:, None, None] - np.stack([x, y])[..., None] * frame.to_map[3]
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    plane = np.broadcast_to(normal, (64, 64, 3))
+    left = np.stack([rows[0, ..., :3], rows[1, ..., :3], plane], axis=-2)
+    right = np.stack([-rows[0, ..., 3], -rows[1, ..., 3], np.full((64, 64), normal @ corners[0])])
+    points = np.linalg.solve(left, np.moveaxis(right, 0, -1)[..., None])[..., 0]
+    inside = np.ones((64, 64), bool)
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        inside &= np.cross(end - start, points - start) @ normal >= 0.0
+    depth = points @ frame.to_depth[:3] + frame.to_depth[3]
+    return np.where(inside & frame.is_ahead(points), np.clip(depth, 0.0, 1.0), 1.0)
+
+
+def inner(is_hit: np.ndarray) -> np.ndarray:
+    """Those of these texels whose neighbours are also among them."""
+    shifted = [np.roll(is_hit, (y, x), (0, 1)) for y in (-1, 0, 1) for x in (-1, 0, 1)]
+    found: np.ndarray = np.logical_and.reduce(shifted)
+    return found
 
 
 def test_a_map_is_drawn_again_only_when_something_changed(gpu_context: Any) -> None:

@@ -28,7 +28,13 @@ import numpy as np
 from ...arrays import Floats
 from ..marschner.fibre import Fibre
 from ..marschner.interface import LEAST_COSINE
-from ..marschner.look import fibre_of, single_scattering, straight_light, strand_angles
+from ..marschner.look import (
+    fibre_of,
+    single_scattering,
+    straight_light,
+    strand_absorption,
+    strand_angles,
+)
 from ..marschner.tables import MarschnerTables, bilinear, kept_light
 from ..settings import ShadingSettings
 
@@ -101,6 +107,28 @@ def shares_at(table: Floats, cos_d: Floats, absorption: Floats) -> Floats:
         cos_d: (...). absorption: (..., 3).
     """
     return bilinear(table, cos_d[..., None], absorption_place(absorption))
+
+
+def mean_forward(table: Floats, shading: ShadingSettings) -> Floats:
+    """The share of light that a strand of this hair sends on, by colour, (3,).
+
+    Over strands that lie any way, which meet light at theta as often as cos theta, and are then
+    cos theta as broad; from root to tip, grey ones as many as there are.
+
+    Args:
+        table: `forward` of Shares.
+    """
+    count = 16
+    theta = (np.arange(count) + 0.5) / count * 0.5 * np.pi
+    along = (np.arange(count) + 0.5) / count
+    found = np.zeros(3)
+    for grey_noise, share in ((0.0, shading.grey_share), (1.0, 1.0 - shading.grey_share)):
+        noises = np.full(count, 0.5), np.full(count, grey_noise)
+        absorption = strand_absorption(shading, along, *noises)
+        # light that goes on leaves at the inclination at which it came
+        sent = shares_at(table, np.cos(theta)[:, None], absorption).sum(axis=-1).mean(axis=1)
+        found += share * np.average(sent, axis=0, weights=np.cos(theta) ** 2)
+    return np.minimum(found, _MOST)
 
 
 def passed(tau: Floats, a_forward: Floats) -> tuple[Floats, Floats]:

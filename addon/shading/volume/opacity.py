@@ -29,6 +29,8 @@ from .settings import VolumeSettings
 
 #: deep layers together are at least so thick
 LEAST_THICKNESS = 1.0 / 1024.0
+#: share of a map's side over which the shadows of meshes on meshes fade to its border
+MAP_BORDER = 0.06
 #: pieces into which the reference cuts strands, in texels
 _PIECE = 0.25
 
@@ -65,9 +67,14 @@ def layer_weights(depth: Floats, ends: Floats) -> Floats:
     return passed
 
 
-def transmittance(optical_depth: Floats, extinction: float) -> Floats:
-    """Light that is left."""
-    return np.exp(-extinction * optical_depth)
+def transmittance(
+    optical_depth: Floats, extinction: float, forward: Floats | float = 0.0
+) -> Floats:
+    """Light that is left, with what strands send on: of all that they take this share.
+
+    See passed() in dual.py: straight light and light sent on, in one.
+    """
+    return np.exp(-extinction * optical_depth * (1.0 - forward))
 
 
 def look_up(
@@ -116,6 +123,18 @@ def look_up(
     is_inside = ((places >= 0.0) & (places <= 1.0)).all(axis=1)
     tau, beyond = np.where(is_inside, tau, 0.0), np.where(is_inside, beyond, 0.0)
     return tau, np.maximum(beyond - tau, 0.0), np.where(is_inside, lit, 1.0)
+
+
+def within_map(places: Floats) -> Floats:
+    """How much of the shadows of meshes counts on meshes, which reach beyond a map, (...).
+
+    1 in its middle, 0 at its border: there shadows would end at a line.
+
+    Args:
+        places: (..., 2) in 0..1, and beyond.
+    """
+    away = np.abs(places - 0.5).max(axis=-1)
+    return np.clip((0.5 - away) / MAP_BORDER, 0.0, 1.0)
 
 
 def own_depth(half_width: Floats) -> Floats:

@@ -114,7 +114,7 @@ class VolumeSettings(Settings):
         source=_ZINKE,
     )
     density: float = number(
-        0.7,
+        0.75,
         label="Scatter Density",
         description="How closely strands around a place are packed: 0 is a single strand, 1 is "
         "full of hair",

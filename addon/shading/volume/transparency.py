@@ -6,7 +6,7 @@
               (Porter and Duff 1984)
 
 `over_nearest` is what the GPU does: it needs no order but that of the nearest. Twin of
-lib_coverage.glsl and of strand_layers.comp.glsl.
+lib_coverage.glsl and of strand_layers_order.comp.glsl.
 """
 
 from __future__ import annotations

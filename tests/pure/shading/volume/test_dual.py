@@ -8,20 +8,24 @@ import numpy as np
 import pytest
 
 from hairloom.addon.shading.marschner.fibre import Fibre
+from hairloom.addon.shading.marschner.look import strand_absorption
 from hairloom.addon.shading.marschner.scattering import azimuthal_lobes
 from hairloom.addon.shading.marschner.tables import marschner_tables
+from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.dual import (
     SHARES_SIZE,
     Shares,
     absorption_place,
     dual_scattering,
     half_gaussian,
+    mean_forward,
     off_the_skin,
     passed,
     place_absorption,
     returned,
     returned_shape,
     shares,
+    shares_at,
     spread_around,
 )
 
@@ -86,6 +90,22 @@ def test_shares_are_those_of_the_lobes(table: Shares) -> None:
         expected = 2.0 * np.pi * (lobes * turn[:, None]).mean(axis=0)
         assert np.allclose(forward, expected, atol=0.01)
         assert forward.sum() + backward.sum() == pytest.approx(1.0, abs=0.02)
+
+
+def test_what_hair_sends_on_is_the_mean_over_strands_that_lie_any_way(table: Shares) -> None:
+    """Strands by chance, each of which meets as much light as it is broad."""
+    alike = ShadingSettings(color_variation=0.0, grey_share=0.0)
+    absorption = strand_absorption(alike, np.zeros(1), np.full(1, 0.5), np.full(1, 0.5))
+    random = np.random.default_rng(6)
+    along = random.normal(size=(40_000, 3))
+    sine = along[:, 0] / np.linalg.norm(along, axis=1)
+    broad = np.sqrt(1.0 - sine**2)
+    sent = shares_at(table.forward, broad, absorption).sum(axis=-1)
+    expected = (sent * broad[:, None]).sum(axis=0) / broad.sum()
+    assert mean_forward(table.forward, alike) == pytest.approx(expected, rel=5e-3)
+    grey = mean_forward(table.forward, replace(alike, grey_share=1.0))
+    half = mean_forward(table.forward, replace(alike, grey_share=0.5))
+    assert half == pytest.approx(0.5 * (expected + grey), rel=5e-3)
 
 
 def test_more_pigment_sends_less_on_and_back(table: Shares) -> None:

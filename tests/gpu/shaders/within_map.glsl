@@ -1,0 +1,10 @@
+// How much of the shadows of meshes counts at places of a map.
+#include "lib_opacity.glsl"
+
+void main()
+{
+  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+  if (at.x < textureSize(places, 0).x) {
+    imageStore(result, at, vec4(within_map(texelFetch(places, at, 0).xy)));
+  }
+}

@@ -1,0 +1,143 @@
+"""Light that hair sends on to what lies under it, drawn, against the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.marschner.look import fibre_of
+from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tables
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.skin.settings import SkinSettings
+from hairloom.addon.shading.volume.dual import mean_forward, shares
+from hairloom.addon.shading.volume.opacity import transmittance, within_map
+from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands import Surface
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+SIZE = 64
+BLOND = ShadingSettings(model="marschner", pigment="absorption", absorption=(0.06, 0.12, 0.3))
+CORNERS = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
+TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+FLOOR = Surface(CORNERS, TRIANGLES, (0.5 * CORNERS[:, :2] + 0.5)[TRIANGLES].astype(np.float32))
+
+
+def snapshot_of(shading: ShadingSettings, *, scattering: bool, is_skin: bool) -> Any:
+    """A floor under crossing strands, denser to one side, in the sun above."""
+    from hairloom.addon.render.frame import MeshSnapshot, Snapshot
+
+    random = np.random.default_rng(2)
+    strands = np.zeros((900, 6, 3), np.float32)
+    strands[..., 0] = np.sqrt(random.random(900))[:, None] - 0.5
+    strands[..., 0] += 0.1 * random.normal(size=(900, 1)) * np.linspace(-1, 1, 6)
+    strands[..., 1] = np.linspace(-0.6, 0.6, 6)
+    strands[..., 2] = random.uniform(0.3, 0.5, (900, 1))
+    mesh = replace(MeshSnapshot.of(FLOOR, (1.0, 1.0, 1.0), is_skin=is_skin), sheen=0.0)
+    return Snapshot(
+        strands,
+        np.full(strands.shape[:2], 2e-3, np.float32),
+        meshes=(mesh,),
+        lights=(Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), np.pi),),
+        ambient=(0.0, 0.0, 0.0),
+        shading=shading,
+        strand_settings=StrandSettings(tip_width=1.0),
+        volume=VolumeSettings(strand_share=1.0, scattering=scattering, resolution=32),
+        skin=SkinSettings(softness=1e-6 if is_skin else 0.0, skin_resolution=256),
+        table_size=PREVIEW_SIZE,
+    )
+
+
+def left_on_the_floor(snapshot: Any) -> np.ndarray:
+    """The share of light that arrives under the hair, seen from between the two, (n, 3)."""
+    from hairloom.addon.render.frame import Camera, look_at, orthographic, render_image
+
+    camera = Camera(
+        look_at((0.0, 0.0, 0.2), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        orthographic(0.8, 1.0, 0.0, 1.0),
+    )
+    return render_image(snapshot, camera, SIZE, SIZE, 1)[..., :3].reshape(-1, 3)
+
+
+@pytest.mark.parametrize("is_skin", [False, True], ids=["mesh", "skin"])
+def test_skin_under_hair_has_what_hair_sends_on(*, is_skin: bool) -> None:
+    """Of tau, found where hair sends nothing on, it takes the share that the reference says."""
+    straight = left_on_the_floor(snapshot_of(BLOND, scattering=False, is_skin=is_skin))
+    found = left_on_the_floor(snapshot_of(BLOND, scattering=True, is_skin=is_skin))
+    assert np.ptp(straight, axis=1).max() < 1e-6
+    assert straight.min() < 0.2 and straight.max() > 0.6
+    sides = shares(marschner_tables(fibre_of(BLOND), PREVIEW_SIZE))
+    forward = mean_forward(sides.forward, BLOND)
+    assert forward[0] > forward[1] + 0.03 > forward[2] + 0.06
+    expected = transmittance(-np.log(straight), 1.0, forward)
+    # the shadow on skin is blended between texels before it is coloured
+    assert found == pytest.approx(expected, abs=0.02 if is_skin else 1e-4)
+
+
+def test_the_soft_edge_of_a_meshs_shadow_has_no_colour_of_hair() -> None:
+    """Hair stands on either side, a plate is in the way."""
+    snapshot = snapshot_of(BLOND, scattering=True, is_skin=True)
+    plate = Surface((0.2 * CORNERS + [-0.2, 0.0, 0.4]).astype(np.float32), TRIANGLES)
+    aside = snapshot.strands.copy()
+    aside[..., 0] += np.where(np.arange(len(aside)) % 2, 1.2, -1.2)[:, None]
+    skin = replace(snapshot.skin, softness=0.03)
+    found = left_on_the_floor(replace(snapshot, strands=aside, casters=(plate,), skin=skin))
+    assert ((found > 0.2) & (found < 0.8)).mean() > 0.02
+    assert np.ptp(found, axis=1).max() < 5e-3
+
+
+def test_hair_that_sends_nothing_on_shades_as_before() -> None:
+    kajiya_kay = replace(BLOND, model="kajiya_kay")
+    alike = [
+        left_on_the_floor(snapshot_of(each, scattering=scatters, is_skin=False))
+        for each, scatters in ((kajiya_kay, True), (BLOND, False))
+    ]
+    assert np.array_equal(*alike)
+
+
+def test_what_counts_near_a_border_is_what_the_reference_says(
+    compute: Callable[..., np.ndarray],
+) -> None:
+    places = np.random.default_rng(1).uniform(-0.2, 1.2, (500, 2))
+    found = compute(
+        "within_map.glsl",
+        (500, 1),
+        textures={"places": np.pad(places, ((0, 0), (0, 2)))[None].astype(np.float32)},
+        structs=("struct_opacity.glsl",),
+    )[0, :, 0]
+    expected = within_map(places)
+    assert 0.1 < expected.mean() < 0.9
+    assert found == pytest.approx(expected, abs=1e-5)
+
+
+def test_the_shadow_of_a_mesh_that_reaches_beyond_the_map_ends_at_no_line() -> None:
+    """A long plank above hair and floor: its shadow is dark amid the map and fades further out."""
+    from hairloom.addon.render.frame import (
+        Camera,
+        MeshSnapshot,
+        look_at,
+        orthographic,
+        render_image,
+    )
+
+    plank = np.array([[-0.3, -5, 0.9], [0.3, -5, 0.9], [0.3, 5, 0.9], [-0.3, 5, 0.9]], np.float32)
+    wide = Surface(4.0 * CORNERS, TRIANGLES)
+    snapshot = snapshot_of(BLOND, scattering=False, is_skin=False)
+    camera = Camera(
+        look_at((0.0, 0.0, 0.2), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        orthographic(2.0, 1.0, 0.0, 1.0),
+    )
+    snapshot = replace(
+        snapshot,
+        meshes=(replace(MeshSnapshot.of(wide, (1.0, 1.0, 1.0)), sheen=0.0),),
+        casters=(Surface(plank, TRIANGLES),),
+        volume=replace(snapshot.volume, extinction=0.0, resolution=256),
+    )
+    along = render_image(snapshot, camera, SIZE, SIZE, 1)[:, SIZE // 2, 0]
+    assert along[SIZE // 2] == 0.0 and along[[0, -1]].min() > 0.99
+    assert np.abs(np.diff(along)).max() < 0.5
