@@ -3,8 +3,8 @@
 python tools/make_docs.py [--check | --pictures]
 
 --check fails when docs/parameters.md is not what the code would write; --pictures also runs the
-demo, copies its pictures into docs/images, and draws those of docs/refinement.md and
-docs/shading.md with the thumbnails of the looks.
+demo, copies its pictures into docs/images, and draws those of docs/refinement.md,
+docs/shading.md and docs/engine.md with the thumbnails of the looks.
 """
 
 import argparse
@@ -48,8 +48,8 @@ def make_pictures() -> None:
         preset = ["--preset", "dynamics/under_water"]
         subprocess.run([*headless, "demo", *preset, "--output", folder], check=True)
         shutil.copyfile(Path(folder) / "motion.png", IMAGES / "under_water.png")
-    tools = ("refinement_pictures", "preset_pictures", "shading_pictures", "volume_pictures")
-    for name in tools:
+    tools = ("refinement", "preset", "shading", "volume", "engine")
+    for name in (f"{each}_pictures" for each in tools):
         tool = [sys.executable, str(REPOSITORY / "tools" / f"{name}.py")]
         subprocess.run([*tool, str(IMAGES)], check=True)
 

@@ -184,6 +184,11 @@ def _add_job_options(verb: argparse.ArgumentParser, name: str) -> None:
             metavar="FILE.png",
             help="write the layers of the lights' shadow maps side by side too",
         )
+        job.add_argument(
+            "--skin-shadow",
+            metavar="FILE.png",
+            help="write the soft shadow on the head too, laid out as the head's UV map",
+        )
         job.add_argument("--sheet", help="write a contact sheet of the take to this .png too")
 
 

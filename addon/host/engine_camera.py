@@ -84,6 +84,48 @@ def border_window(
     return (left / width, bottom / height, right / width, top / height), size
 
 
+def view_rectangle(
+    context: Any, depsgraph: bpy.types.Depsgraph, width: int, height: int
+) -> tuple[int, int, int, int]:
+    """The part of a 3D view that is drawn: its render region, in a camera's view the scene's.
+
+    Args:
+        width, height: of the view [pixels].
+
+    Returns:
+        Left, bottom, width and height [pixels]; the two last are 0 where the region lies outside
+        of the view or has no pixels.
+    """
+    space, region, scene = context.space_data, context.region_data, depsgraph.scene
+    corners = np.array([[0.0, 0.0], [1.0, 1.0]])
+    if region.view_perspective != "CAMERA":
+        if space.use_render_border:
+            corners = _border(space, "render_border")
+    elif scene.render.use_border:
+        camera = space.camera or scene.camera
+        if camera is not None and camera.type == "CAMERA":
+            frame = _camera_frame(camera.evaluated_get(depsgraph), scene, region)
+            corners = frame[0] + _border(scene.render, "border") * (frame[1] - frame[0])
+    low, high = np.clip(corners * (width, height), 0, (width, height)).round().astype(int)
+    across, up = np.maximum(high - low, 0)
+    return int(low[0]), int(low[1]), int(across), int(up)
+
+
+def _border(owner: Any, name: str) -> Floats:
+    """Lower left and upper right corner, (2, 2), as shares."""
+    return np.array(
+        [[getattr(owner, f"{name}_{end}_{axis}") for axis in "xy"] for end in ("min", "max")]
+    )
+
+
+def _camera_frame(camera: bpy.types.Object, scene: bpy.types.Scene, region: Any) -> Floats:
+    """Lower left and upper right corner of what a camera sees, as shares of its 3D view."""
+    frame = np.array([(*corner, 1.0) for corner in camera.data.view_frame(scene=scene)])
+    clip = frame @ np.array(region.window_matrix).T
+    places = 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
+    return np.array([places.min(axis=0), places.max(axis=0)])
+
+
 def _view_matrix(matrix: Floats) -> Floats:
     """World to view space of a camera's matrix, whose scale counts for nothing."""
     rigid = np.eye(4)

@@ -28,7 +28,7 @@ type IsShown = Callable[[bpy.types.Object], bool]
 
 
 @dataclass(frozen=True)
-class _Visibility:
+class Visibility:
     """How one instance takes part in the picture."""
 
     is_seen: bool
@@ -59,10 +59,12 @@ class SceneReader:
     """Reads a scene again and again; what is the same stays the same object.
 
     warnings: what the artist should know of the last reading, each with its remedy.
+    previewed: grooms that were left out because they are previewed, by session number.
     """
 
     def __init__(self) -> None:
         self.warnings: tuple[str, ...] = ()
+        self.previewed: dict[int, Visibility] = {}
         self._meshes: dict[Key, _ReadMesh] = {}
         self._grooms: dict[Key, _ReadGroom] = {}
         self._heads: frozenset[int] = frozenset()
@@ -89,6 +91,7 @@ class SceneReader:
         grooms: dict[Key, _ReadGroom] = {}
         read: dict[Key, _ReadMesh] = {}
         uids: set[int] = set()
+        self.previewed = {}
         self._heads = _heads(depsgraph)
         for instance in depsgraph.object_instances:
             obj = instance.object
@@ -102,12 +105,16 @@ class SceneReader:
                     drawn += read[key].meshes
                 if visibility.casts:
                     casters += read[key].meshes
+            elif obj.type == "CURVES" and is_previewed(obj.original.session_uid):
+                uids.add(engine_hair.owner_of(obj.original).session_uid)
+                self.previewed[obj.original.session_uid] = visibility
             elif obj.type == "CURVES" and visibility.is_seen:
                 hair = obj.original
                 uids.add(engine_hair.owner_of(hair).session_uid)
-                if not is_previewed(hair.session_uid):
-                    groom = self._read_groom(key, hair, matrix, depsgraph, changed, warnings)
-                    grooms |= {} if groom is None else {key: groom}
+                groom = self._read_groom(
+                    key, hair, matrix, depsgraph, changed, warnings, visibility.is_holdout
+                )
+                grooms |= {} if groom is None else {key: groom}
         self._meshes, self._grooms = read, grooms
         engine_hair.forget_but(uids)
         found = tuple(each.groom for each in grooms.values())
@@ -129,7 +136,7 @@ class SceneReader:
         key: Key,
         obj: bpy.types.Object,
         matrix: Floats,
-        visibility: _Visibility,
+        visibility: Visibility,
         changed: set[int] | None,
     ) -> _ReadMesh:
         known = self._meshes.get(key)
@@ -162,6 +169,7 @@ class SceneReader:
         depsgraph: bpy.types.Depsgraph,
         changed: set[int] | None,
         warnings: list[str],
+        is_holdout: bool,
     ) -> _ReadGroom | None:
         """None, and a warning, where the hair cannot be drawn."""
         if hair.type != "CURVES":
@@ -171,7 +179,7 @@ class SceneReader:
             )
             return None
         try:
-            state = (*engine_hair.state_of(hair, depsgraph), matrix.tobytes())
+            state = (*engine_hair.state_of(hair, depsgraph), matrix.tobytes(), is_holdout)
             known = self._grooms.get(key)
             is_same = known is not None and changed is not None and known.state == state
             if known is not None and is_same and not (changed or set()) & engine_hair.uids_of(hair):
@@ -184,7 +192,7 @@ class SceneReader:
             own = np.array(hair.evaluated_get(depsgraph).matrix_world)
             snapshot = engine_hair.placed(snapshot, matrix @ np.linalg.pinv(own))
         number = engine_hair.owner_of(hair).pass_index
-        return _ReadGroom(state, DrawnGroom(key, snapshot, number))
+        return _ReadGroom(state, DrawnGroom(key, snapshot, number, is_holdout))
 
 
 def _has_soft_shadow(snapshot: Snapshot) -> bool:
@@ -236,12 +244,15 @@ def _uids(obj: bpy.types.Object) -> set[int]:
 
 def _visibility(
     instance: bpy.types.DepsgraphObjectInstance, layer: bpy.types.ViewLayer
-) -> _Visibility:
+) -> Visibility:
     """The artist's settings, not what a preview has written into the evaluated copy."""
     obj, holder = instance.object.original, _holder(instance)
     is_indirect = holder.indirect_only_get(view_layer=layer)
-    is_holdout = obj.is_holdout or holder.is_holdout or holder.holdout_get(view_layer=layer)
-    return _Visibility(obj.visible_camera and not is_indirect, is_holdout, obj.visible_shadow)
+    # a copy for renders stands for the groom, and is as that is
+    owner = engine_hair.owner_of(obj) if obj.type == "CURVES" else obj
+    marked = (each.is_holdout for each in (obj, owner, holder))
+    is_holdout = any(marked) or holder.holdout_get(view_layer=layer)
+    return Visibility(obj.visible_camera and not is_indirect, is_holdout, obj.visible_shadow)
 
 
 def _center(grooms: tuple[DrawnGroom, ...], meshes: list[MeshSnapshot]) -> Floats:

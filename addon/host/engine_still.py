@@ -128,7 +128,7 @@ class Still:
         self._engine.frame_set(frame, time_ - frame)
 
     def _add_sample(self, scene: SceneSnapshot, camera: Camera, place: Floats) -> None:
-        moved = jittered(camera, place, *self._size)
+        moved = jittered(camera, place, *self._size, sample=self._picture.count)
         self._pass.draw(scene, moved, self._target, self._size, sky_of(scene, self._render))
         self._picture.add(self._target.color)
         self._engine.update_progress(self._picture.count / self._settings.samples)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..render.accumulation import Accumulation, Target
 from ..render.camera import Camera
-from ..render.camera_window import jittered
+from ..render.camera_window import Window, cropped, jittered
 from ..render.pixel_filter import jitters
 from ..render.scene_pass import ScenePass
 from ..render.scene_snapshot import DrawnGroom, SceneSnapshot
@@ -19,7 +19,8 @@ from ..render.snapshot import Snapshot
 from ..shading.lights import three_point_lights
 from ..shading.picture_settings import PictureSettings
 from . import overlay
-from .engine_scene import SceneReader
+from .engine_camera import view_rectangle
+from .engine_scene import SceneReader, Visibility
 from .engine_still import sky_of
 from .lights import uses_scene_light
 from .properties import settings_of
@@ -73,20 +74,29 @@ class EngineView:
         if self._scene is None or self._previewed != overlay.drawn() or self._local != local:
             self._read(context, depsgraph, None if self._scene is None else set())
         settings = settings_of(depsgraph.scene.hairloom.picture, PictureSettings)
-        _, _, *size = gpu.state.viewport_get()
-        shown = self._now(context, render, size)
+        left, bottom, wide, high = gpu.state.viewport_get()
+        x, y, *size = view_rectangle(context, depsgraph, wide, high)
+        if not all(size):
+            return settings.viewport_samples, settings.viewport_samples
+        window = x / wide, y / high, (x + size[0]) / wide, (y + size[1]) / high
+        shown = self._now(context, render, size, window)
         if not shown.continues(self._shown) or self._picture.size != tuple(size):
             self._picture.begin(*size)
         self._shown = shown
         if self._picture.count < settings.viewport_samples:
-            place = jitters(self._picture.count + 1, render.filter_size)[-1]
-            camera = jittered(shown.camera, place, *size)
-            sky = sky_of(shown.scene, render)
-            self._pass.draw(shown.scene, camera, self._target, (size[0], size[1]), sky)
-            self._picture.add(self._target.color)
-        left, bottom, *_ = gpu.state.viewport_get()
-        self._picture.show(left, bottom)
+            self._add_sample(shown, render)
+        # beyond its region Blender's background stays
+        gpu.state.viewport_set(left + x, bottom + y, *size)
+        self._picture.show(left + x, bottom + y)
+        gpu.state.viewport_set(left, bottom, wide, high)
         return self._picture.count, settings.viewport_samples
+
+    def _add_sample(self, shown: _Shown, render: bpy.types.RenderSettings) -> None:
+        size, number = self._picture.size, self._picture.count
+        place = jitters(number + 1, render.filter_size)[-1]
+        camera = jittered(shown.camera, place, *size, number)
+        self._pass.draw(shown.scene, camera, self._target, size, sky_of(shown.scene, render))
+        self._picture.add(self._target.color)
 
     @property
     def count(self) -> int:
@@ -108,13 +118,22 @@ class EngineView:
             is_previewed=self._previewed.__contains__,
         )
 
-    def _now(self, context: Any, render: bpy.types.RenderSettings, size: list[int]) -> _Shown:
+    def _now(
+        self, context: Any, render: bpy.types.RenderSettings, size: list[int], window: Window
+    ) -> _Shown:
         assert self._scene is not None
         space, view = context.space_data, context.region_data
-        camera = Camera(np.array(view.view_matrix), np.array(view.window_matrix))
+        whole = Camera(np.array(view.view_matrix), np.array(view.window_matrix))
+        camera = cropped(whole, window)
+        unknown = Visibility(is_seen=True, is_holdout=False, casts=True)
+        found = (
+            (*each, self._reader.previewed.get(each[0], unknown))
+            for each in overlay.shown_in(space)
+        )
         previewed = tuple(
-            DrawnGroom((uid,), with_all_strands(drawing.snapshot))
-            for uid, drawing in overlay.shown_in(space)
+            DrawnGroom((uid,), with_all_strands(drawing.snapshot), is_holdout=visibility.is_holdout)
+            for uid, drawing, visibility in found
+            if visibility.is_seen
         )
         scene = replace(self._scene, grooms=(*self._scene.grooms, *previewed))
         uses_lights, uses_world = uses_scene_light(space.shading)
@@ -126,6 +145,7 @@ class EngineView:
             self._scene,
             *(drawing.snapshot for _, drawing in overlay.shown_in(space)),
             *(_serial(groom.snapshot) for groom in previewed),
+            *((groom.key, groom.is_holdout) for groom in previewed),
             camera.view.tobytes(),
             camera.projection.tobytes(),
             (uses_lights, uses_world, render.film_transparent, render.filter_size, *size),

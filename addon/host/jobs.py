@@ -57,6 +57,12 @@ def render(job: Job) -> None:
             place="--slices",
             remedy="Add --set volume.shadows=slices, or deep",
         )
+    if job.options.skin_shadow and job.set(VolumeSettings).shadows == "none":
+        raise HairloomError(
+            "there is no soft shadow on skin that could be shown",
+            place="--skin-shadow",
+            remedy="Add --set volume.shadows=deep, or slices",
+        )
     report = Report(job.verb)
     rig, _ = read_rig(job, report)
     studio = open_studio(job, rig, report)
@@ -67,6 +73,8 @@ def render(job: Job) -> None:
     _write_still(job, job.output, studio, pose, points, report)
     if job.options.slices:
         _write_slices(Path(job.options.slices), studio, pose, points, report)
+    if job.options.skin_shadow:
+        _write_skin_shadow(Path(job.options.skin_shadow), studio, pose, points, report)
     finish(job, report, job.output)
 
 
@@ -222,6 +230,16 @@ def _write_slices(path: Path, studio: Studio, pose: Pose, points: Floats, report
     """The layers of the shadow maps."""
     with report.stage("draw slices"):
         picture = studio.slices(pose, points)
+    write_png(path, picture)
+    report.add_output(path)
+
+
+def _write_skin_shadow(
+    path: Path, studio: Studio, pose: Pose, points: Floats, report: Report
+) -> None:
+    """The map of the soft shadow on the head."""
+    with report.stage("draw skin shadow"):
+        picture = studio.skin_shadow(pose, points)
     write_png(path, picture)
     report.add_output(path)
 

@@ -145,16 +145,18 @@ def apply(settings: Settings, hair: bpy.types.Object) -> None:
     Raises:
         HairloomError: settings that a groom does not keep, such as those for growing one.
     """
-    for owner in (hair.data.hairloom, hair.hairloom):
+    owners = hair.data.hairloom, hair.hairloom
+    for owner in owners:
         group = getattr(owner, settings.section, None)
         if group is not None:
             for name, value in settings.as_dict().items():
                 setattr(group, name, value)
             return
+    kept = [name for name in ALL_SETTINGS if any(hasattr(owner, name) for owner in owners)]
     raise HairloomError(
         f"a groom keeps no '{settings.section}' settings",
         place="preset",
-        remedy="Choose a preset of looks or dynamics",
+        remedy=f"Choose a preset of {', '.join(kept)}",
     )
 
 

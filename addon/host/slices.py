@@ -40,23 +40,28 @@ def slices_of_view(snapshot: Snapshot, context: bpy.types.Context) -> Floats:
     Raises:
         HairloomError: as `shown_slices`.
     """
+    return shown_slices(lit_as_in(context, snapshot), StrandPass())
+
+
+def lit_as_in(context: bpy.types.Context, snapshot: Snapshot) -> Snapshot:
+    """In the light in which a 3D view shows the hair; elsewhere in the scene's."""
     space = context.space_data
-    if isinstance(space, bpy.types.SpaceView3D):
-        studio = three_point_lights(np.array(context.region_data.view_matrix))
-        snapshot = lit(snapshot, space.shading, studio)
-    return shown_slices(snapshot, StrandPass())
+    if not isinstance(space, bpy.types.SpaceView3D):
+        return snapshot
+    studio = three_point_lights(np.array(context.region_data.view_matrix))
+    return lit(snapshot, space.shading, studio)
 
 
-def slices_image(picture: Floats) -> bpy.types.Image:
-    """The image with this picture in it, scene-linear.
+def shown_image(name: str, picture: Floats) -> bpy.types.Image:
+    """The image of this name with this picture in it, scene-linear.
 
     Args:
         picture: (height, width, 4), row 0 at the bottom.
     """
     height, width = picture.shape[:2]
-    image = bpy.data.images.get(IMAGE)
+    image = bpy.data.images.get(name)
     if image is None:
-        image = bpy.data.images.new(IMAGE, width, height, float_buffer=True)
+        image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
     if tuple(image.size) != (width, height):
         image.generated_width, image.generated_height = width, height
     image.colorspace_settings.name = "Linear Rec.709"

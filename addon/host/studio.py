@@ -30,6 +30,7 @@ from ..shading.volume.shadow_lights import shadow_warnings
 from ..strands import Surface
 from .hiders import Hiders
 from .shown import snapshot_of
+from .skin_picture import shown_skin_shadow
 from .slices import shown_slices
 
 #: three-quarter view from the front; heads face -Y
@@ -132,13 +133,24 @@ class Studio:
         Raises:
             HairloomError: there are none.
         """
-        snapshot = replace(
+        return shown_slices(self._in_its_light(pose, points), self._passes[1])
+
+    def skin_shadow(self, pose: Pose, points: Floats) -> Floats:
+        """The soft shadow on the head in the studio's light, see shown_skin_shadow.
+
+        Raises:
+            HairloomError: there is none.
+        """
+        snapshot = self._in_its_light(pose, points)
+        return shown_skin_shadow(snapshot, self._passes[1], place="--skin-shadow")
+
+    def _in_its_light(self, pose: Pose, points: Floats) -> Snapshot:
+        return replace(
             self._at_rest,
             strands=points,
             meshes=self._meshes(pose),
             lights=three_point_lights(self._camera(1.0).view),
         )
-        return shown_slices(snapshot, self._passes[1])
 
     def card_picture(
         self,

@@ -32,16 +32,17 @@ def cropped(camera: Camera, window: Window) -> Camera:
     return replace(camera, projection=projection)
 
 
-def jittered(camera: Camera, offset: Floats, width: int, height: int) -> Camera:
+def jittered(camera: Camera, offset: Floats, width: int, height: int, sample: int = 0) -> Camera:
     """The camera whose pixels look where `offset` (2,) [pixels] from their middles is.
 
     Args:
         width, height: of the target [pixels].
+        sample: number of the sample that is taken there.
     """
     projection = np.array(camera.projection, np.float64)
     for axis, side in enumerate((width, height)):
         projection[axis] -= 2.0 * float(offset[axis]) / side * projection[3]
-    return replace(camera, projection=projection)
+    return replace(camera, projection=projection, sample=sample)
 
 
 def view_depth(camera: Camera, depth: Floats) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Hashable
+from collections.abc import Hashable, Set
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from .accumulation import Target
 from .camera import Camera
 from .camera_window import view_depth
 from .card_pass import CardPass
+from .holdout import Holdout
 from .mesh_pass import MeshPass
 from .opacity_maps import OpacityMaps
 from .scene_snapshot import SceneSnapshot, shaded_by
@@ -38,6 +39,7 @@ class ScenePass:
         self._card_passes: dict[Hashable, CardPass] = {}
         self._mesh_passes: dict[Hashable, MeshPass] = {}
         self._numbered = MeshPass()
+        self._holdout = Holdout()
 
     def draw(
         self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int], sky: Rgba
@@ -64,14 +66,15 @@ class ScenePass:
             for key, groom in lit.items()
         }
         shafts = next((each.shafts for each in lit.values() if each.shafts.use_shafts), None)
+        holes = {groom.key for groom in scene.grooms if groom.is_holdout}
+        seen = lit.keys() - holes
         # shafts ask alpha what stands before a light
         target.sized(*size).clear(sky if shafts is None else _NOTHING)
         with target.drawing():
             self._draw_meshes(scene, camera, size, maps)
-            for key, groom in lit.items():
-                self._strands(key).draw(groom, camera, *size)
-            for key, groom in lit.items():
-                self._cards(key).draw(groom, camera, *size, opacity=maps[key])
+            self._draw_hair(lit, seen, camera, size, maps)
+        if holes:
+            self._holdout.cut(target, lambda: self._draw_hair(lit, holes, camera, size, maps))
         if shafts is not None:
             color, depth = target.color, target.depth
             add_shafts(color, color, depth, camera, scene.lights, shafts)
@@ -96,6 +99,21 @@ class ScenePass:
                 numbers[depth < before] = groom.number
         distances = np.where(depth < 1.0, view_depth(camera, depth), FAR_AWAY)
         return distances.astype(np.float32), numbers
+
+    def _draw_hair(
+        self,
+        lit: dict[Hashable, Snapshot],
+        keys: Set[Hashable],
+        camera: Camera,
+        size: tuple[int, int],
+        maps: dict[Hashable, OpacityMaps | None],
+    ) -> None:
+        """These grooms alone, in the order of the scene."""
+        grooms = [(key, groom) for key, groom in lit.items() if key in keys]
+        for key, groom in grooms:
+            self._strands(key).draw(groom, camera, *size)
+        for key, groom in grooms:
+            self._cards(key).draw(groom, camera, *size, opacity=maps[key])
 
     def _strands(self, key: Hashable) -> StrandPass:
         return self._strand_passes.setdefault(key, StrandPass())

@@ -1,11 +1,13 @@
-"""Show Slices: what the lights' shadow maps hold, in an Image Editor."""
+"""Show Slices and Show Skin Shadow: what the maps of shadows hold, in an Image Editor."""
 
 from __future__ import annotations
 
 import bpy
 
-from ..host import live
-from ..host.slices import slices_image, slices_of_view
+from ..host import live, skin_picture, slices
+from ..host.session import Session
+from ..host.skin_picture import skin_shadow_of_view
+from ..host.slices import shown_image, slices_of_view
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 
@@ -18,20 +20,51 @@ class HAIRLOOM_OT_show_slices(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not needs_hair(cls, context):
-            return False
-        if live.session_of(chosen_hair(context)[0]) is None:
-            cls.poll_message_set("Press Preview first")
-            return False
-        return True
+        return _needs_preview(cls, context)
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        session = live.session_of(chosen_hair(context)[0])
-        assert session is not None, "poll"
-        _show(context, slices_image(slices_of_view(session.snapshot, context)))
+        picture = slices_of_view(_previewed(context).snapshot, context)
+        _show(context, shown_image(slices.IMAGE, picture))
         self.report({"INFO"}, "White: all light is left. Layers from the light on, from top left")
         return {"FINISHED"}
+
+
+class HAIRLOOM_OT_show_skin_shadow(bpy.types.Operator):
+    """Show the soft shadow of the hair on its head, laid out as the head's UV map, in an Image
+    Editor"""
+
+    bl_idname = "hairloom.show_skin_shadow"
+    bl_label = "Show Skin Shadow"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _needs_preview(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        session = _previewed(context)
+        hair = session.snapshot, session.rig, session.solver.pose
+        picture = skin_shadow_of_view(*hair, context, place=self.bl_label)
+        _show(context, shown_image(skin_picture.IMAGE, picture))
+        self.report({"INFO"}, "White: all light reaches the skin. One map for each light")
+        return {"FINISHED"}
+
+
+def _needs_preview(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """For `poll`: whether hair is previewed; says so on the greyed-out button."""
+    if not needs_hair(operator, context):
+        return False
+    if live.session_of(chosen_hair(context)[0]) is None:
+        operator.poll_message_set("Press Preview first")
+        return False
+    return True
+
+
+def _previewed(context: bpy.types.Context) -> Session:
+    session = live.session_of(chosen_hair(context)[0])
+    assert session is not None, "poll"
+    return session
 
 
 def _show(context: bpy.types.Context, image: bpy.types.Image) -> None:
@@ -48,4 +81,4 @@ def _show(context: bpy.types.Context, image: bpy.types.Image) -> None:
     editor.spaces.active.image = image
 
 
-CLASSES = (HAIRLOOM_OT_show_slices,)
+CLASSES = (HAIRLOOM_OT_show_slices, HAIRLOOM_OT_show_skin_shadow)

@@ -72,6 +72,7 @@ def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     column = layout.column()
     column.active = group.soft_shadow
     _draw_named(column, group, [p.name for p in group.settings.parameters()[1:]])
+    column.operator("hairloom.show_skin_shadow")
 
 
 def draw_shafts(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

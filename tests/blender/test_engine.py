@@ -196,6 +196,36 @@ def test_border_percentage_and_film(stage: Any, tmp_path: Path) -> None:
     assert picture(tmp_path).shape == (SIZE // 2, SIZE // 2, 4)
 
 
+def test_the_region_of_a_view_is_that_of_the_picture(stage: Any) -> None:
+    """In a camera's view the scene's, wherever the camera's frame lies in it; else the view's."""
+    from types import SimpleNamespace
+
+    from hairloom.addon.host.engine_camera import view_rectangle
+
+    camera, render = stage.camera, stage.render
+    render.resolution_x, render.resolution_y = 200, 100
+    camera.data.shift_x, camera.data.shift_y = 0.1, -0.2
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    # the frame is the middle of the view, half as wide and half as high
+    matrix = np.array(camera.calc_matrix_camera(depsgraph, x=200, y=100))
+    matrix[:2] *= 0.5
+    region = SimpleNamespace(view_perspective="CAMERA", window_matrix=matrix)
+    space = SimpleNamespace(camera=None, use_render_border=False)
+    context = SimpleNamespace(space_data=space, region_data=region)
+    assert view_rectangle(context, depsgraph, 400, 200) == (0, 0, 400, 200)
+    render.use_border = True
+    render.border_min_x, render.border_max_x = 0.25, 1.0
+    render.border_min_y, render.border_max_y = 0.5, 1.0
+    depsgraph.update()
+    assert view_rectangle(context, depsgraph, 400, 200) == (150, 100, 150, 50)
+    region.view_perspective = "PERSP"
+    assert view_rectangle(context, depsgraph, 400, 200) == (0, 0, 400, 200)
+    space.use_render_border = True
+    space.render_border_min_x, space.render_border_max_x = 0.0, 0.5
+    space.render_border_min_y, space.render_border_max_y = 0.25, 0.25
+    assert view_rectangle(context, depsgraph, 400, 200) == (0, 50, 200, 0)
+
+
 def test_view_layers_and_holdouts(stage: Any, tmp_path: Path) -> None:
     """Each layer has what is in it; a holdout is a hole."""
     stage.render.film_transparent = True
@@ -219,6 +249,57 @@ def test_view_layers_and_holdouts(stage: Any, tmp_path: Path) -> None:
         for name in ("ViewLayer", "Second", "Third")
     }
     assert covered == {"ViewLayer": (1.0, 1.0), "Second": (0.0, 1.0), "Third": (0.0, 1.0)}
+
+
+@pytest.mark.parametrize("way", ["none", "hashed", "layers"])
+def test_hair_may_be_a_hole(
+    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path, way: str
+) -> None:
+    """Before a wall it takes as much away as it covers alone; meshes before it stay."""
+    stage.render.film_transparent = True
+    stage.hairloom.picture.samples = 16
+    hair = new_hair(sphere)
+    hair.data.hairloom.strands.width_scale = 60.0
+    hair.data.hairloom.strands.transparency = way
+    hair.data.hairloom.strands.opacity = 0.7
+    bpy.data.objects.remove(sphere)
+    alone = picture(tmp_path)[..., 3]
+    assert alone.max() > 0.1 and 0.005 < alone.mean() < 0.9
+    wall = add_ball(1.5)
+    wall.location.y = 2.0
+    assert picture(tmp_path)[..., 3].min() > 0.99
+    hair.is_holdout = True
+    np.testing.assert_allclose(picture(tmp_path)[..., 3], 1.0 - alone, atol=2e-3)
+    wall.location.y, wall.scale = -0.6, (0.1,) * 3
+    assert picture(tmp_path)[SIZE // 2, SIZE // 2, 3] == 1.0
+    hair.is_holdout = False
+    bpy.data.objects.remove(wall)
+    apart = bpy.data.collections.new("Apart")
+    stage.collection.children.link(apart)
+    stage.collection.objects.unlink(hair)
+    apart.objects.link(hair)
+    assert picture(tmp_path)[..., 3].max() > 0.1
+    stage.view_layers[0].layer_collection.children["Apart"].indirect_only = True
+    assert picture(tmp_path)[..., 3].max() == 0.0
+
+
+def test_previewed_hair_is_seen_as_its_object_is(
+    stage: Any, new_hair: Callable[..., Any], sphere: Any
+) -> None:
+    """The reader leaves it out and says how it takes part, whatever a preview wrote to the copy."""
+    from hairloom.addon.host.engine_scene import SceneReader
+
+    hair, reader = new_hair(sphere), SceneReader()
+    hair.is_holdout = True
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    hair.evaluated_get(depsgraph).visible_camera = False
+    assert not reader.read(depsgraph, is_previewed=lambda _: True).grooms
+    found = reader.previewed[hair.session_uid]
+    assert (found.is_seen, found.is_holdout) == (True, True)
+    hair.visible_camera, hair.is_holdout = False, False
+    reader.read(bpy.context.evaluated_depsgraph_get(), is_previewed=lambda _: True)
+    found = reader.previewed[hair.session_uid]
+    assert (found.is_seen, found.is_holdout) == (False, False)
 
 
 def test_texts_metaballs_and_instances_are_drawn(stage: Any, tmp_path: Path) -> None:

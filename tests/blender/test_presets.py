@@ -16,6 +16,7 @@ import bpy
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.host import command_line, presets
 from hairloom.addon.host.properties import settings_of
+from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import PRESET_VERSION
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.shafts_settings import ShaftSettings
@@ -39,6 +40,14 @@ def test_dynamics_go_onto_the_object(hair: bpy.types.Object) -> None:
     bpy.ops.hairloom.apply_preset(name="dynamics/soft")
     wanted = presets.named_preset("dynamics/soft").settings.as_dict()["style_tip"]
     assert hair.hairloom.dynamics.style_tip == pytest.approx(wanted)
+
+
+def test_settings_that_a_groom_does_not_keep_are_refused(hair: bpy.types.Object) -> None:
+    """All that it does keep are named."""
+    with pytest.raises(HairloomError, match="no 'grow' settings") as told:
+        presets.apply(ALL_SETTINGS["grow"](), hair)
+    assert "shading, " in str(told.value) and "volume" in str(told.value)
+    assert "dynamics" in str(told.value) and " grow," not in str(told.value)
 
 
 def test_an_unknown_name_is_reported_with_those_that_are_known(hair: bpy.types.Object) -> None:

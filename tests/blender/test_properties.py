@@ -1,6 +1,9 @@
 """Blender properties from parameter declarations, and what becomes of their values."""
 
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import bpy
 import pytest
@@ -130,6 +133,39 @@ def test_settings_survive_saving_also_by_a_blender_without_hairloom(new_hair, tm
     hair = bpy.data.objects["Hair"]
     assert hair.data.hairloom.shading.base_color[:] == (0.5, 0.25, 0.125)
     assert hair.hairloom.dynamics.damping == 2.0
+
+
+OPENED = """
+import sys
+sys.path.insert(0, {tools!r})
+from extension_loader import load_package
+import bpy
+load_package().register()
+bpy.ops.wm.open_mainfile(filepath={file!r})
+for name in ("Hair", "Bare"):
+    volume = bpy.data.objects[name].data.hairloom.volume
+    print("found", name, volume.shadows, volume.is_property_set("shadows"))
+"""
+
+
+@pytest.mark.skipif(not bpy.app.module, reason="starts another Python that has bpy")
+def test_a_file_from_before_shadows_shows_the_default_and_keeps_what_was_set(new_hair, tmp_path):
+    """In another process: values that no file holds are declared ones, all others the artist's."""
+    hair, bare = new_hair(), new_hair()
+    bare.name = "Bare"
+    hair.data.hairloom.volume.shadows = "slices"
+    hair.data.hairloom.volume.property_unset("shadows")
+    bare.data.hairloom.volume.shadows = "none"
+    file = str(tmp_path / "hair.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    tools = str(Path(__file__).parents[2] / "tools")
+    script = OPENED.format(tools=tools, file=file)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    default = ALL_SETTINGS["volume"]().shadows
+    assert default != "none"
+    assert f"found Hair {default} False" in done.stdout
+    assert "found Bare none True" in done.stdout
 
 
 def test_everything_that_the_artist_can_set_has_a_description(extension):

@@ -1,4 +1,4 @@
-"""Show Slices: the layers of shadow maps as a file of the command line and as an image."""
+"""Show Slices and Show Skin Shadow: maps as files of the command line and as images."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ pytest.importorskip("bpy", reason="runs inside Blender")
 import bpy
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import command_line
+from hairloom.addon.host import command_line, live
 from hairloom.addon.host.session import Session
-from hairloom.addon.host.slices import IMAGE, shown_slices, slices_image
+from hairloom.addon.host.skin_picture import IMAGE as SKIN_IMAGE
+from hairloom.addon.host.slices import IMAGE, shown_image, shown_slices
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -65,10 +66,56 @@ def test_an_image_shows_them_and_is_the_same_each_time(new_hair: Any, sphere: An
         volume = VolumeSettings(shadows="deep", resolution=32, layers=layers)
         snapshot = replace(session.snapshot, volume=volume)
         picture = shown_slices(snapshot, StrandPass())
-        image = slices_image(picture)
+        image = shown_image(IMAGE, picture)
         assert image.name == IMAGE and tuple(image.size) == (across * 34, across * 34)
         assert np.allclose(np.array(image.pixels[:]).reshape(picture.shape), picture)
     assert sum(each.name.startswith(IMAGE) for each in bpy.data.images) == 1
+
+
+def test_render_writes_the_skin_shadow(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """White where no hair is in the way, dark below it, a map for each light."""
+    shadow, picture = tmp_path / "skin.png", tmp_path / "a.png"
+    arguments = ["render", *SMALL, "--output", str(picture), "--skin-shadow", str(shadow)]
+    assert command_line.run([*arguments, "--set", "volume.shadows=none"]) == 1
+    assert "--skin-shadow" in capfd.readouterr().err and not picture.exists()
+    arguments += ["--set", "volume.resolution=64", "--set", "skin.skin_resolution=128"]
+    assert command_line.run([*arguments, "--set", "skin.soft_shadow=false"]) == 1
+    assert "Soft Shadow on Skin" in capfd.readouterr().err
+    assert command_line.run([*arguments, "--set", "volume.most_lights=2"]) == 0
+    image = bpy.data.images.load(str(shadow))
+    pixels = np.array(image.pixels[:]).reshape(*image.size[::-1], 4)
+    assert max(image.size[0] / 2, image.size[1]) == 128
+    is_skin = pixels[..., 3] > 0.5
+    assert 0.1 < is_skin.mean() < 1.0
+    assert pixels[is_skin][:, 0].min() < 0.3 and pixels[is_skin][:, 0].max() > 0.99
+    bpy.data.images.remove(image)
+
+
+def test_the_skin_shadow_of_previewed_hair(new_hair: Any, sphere: Any) -> None:
+    lamp = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    bpy.context.scene.collection.objects.link(lamp)
+    hair = new_hair(sphere)
+    hair.data.hairloom.volume.resolution = 128
+    hair.data.hairloom.skin.skin_resolution = 128
+    hair.data.hairloom.strands.width_scale = 30.0
+    assert not bpy.ops.hairloom.show_skin_shadow.poll()
+    bpy.ops.hairloom.preview()
+    try:
+        assert bpy.ops.hairloom.show_skin_shadow() == {"FINISHED"}
+        image = bpy.data.images[SKIN_IMAGE]
+        pixels = np.array(image.pixels[:]).reshape(*image.size[::-1], 4)
+        is_skin = pixels[..., 3] > 0.5
+        assert pixels[is_skin][:, 0].min() < 0.5 < 0.99 < pixels[is_skin][:, 0].max()
+        hair.data.hairloom.skin.soft_shadow = False
+        bpy.context.view_layer.update()
+        session = live.session_of(hair)
+        assert session is not None
+        session.take_settings()
+        with pytest.raises(RuntimeError, match="Soft Shadow on Skin"):
+            bpy.ops.hairloom.show_skin_shadow()
+    finally:
+        bpy.ops.hairloom.preview()
+    assert live.session_of(hair) is None
 
 
 def views() -> list[Any]:

@@ -59,6 +59,7 @@ def steps():
     yield from set_the_scene()
     yield from it_gets_better_and_rests()
     yield from it_is_what_f12_gives()
+    yield from a_region_alone_is_drawn()
     yield from it_begins_anew_at_a_change()
     yield from hair_plays_in_it()
     assert of_hairloom("host.overlay").failure() == ""
@@ -121,7 +122,9 @@ def it_is_what_f12_gives():
     render.filepath, render.image_settings.file_format = str(path), "PNG"
     bpy.context.preferences.view.render_display_type = "NONE"
     bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
-    yield from until(path.is_file, "F12 writes no picture")
+    yield from until(
+        lambda: path.is_file() and not bpy.app.is_job_running("RENDER"), "F12 writes no picture"
+    )
     yield 5
     image = bpy.data.images.load(str(path))
     image.colorspace_settings.is_data = True
@@ -135,6 +138,29 @@ def it_is_what_f12_gives():
     difference = 255.0 * np.abs(part - shown)
     print(f"Rendered mode against F12: {difference.max():.2f} / 255 at most")
     assert difference.max() < 1.5
+
+
+def a_region_alone_is_drawn():
+    """The lower left quarter of the camera's frame, which is that of the view; then all again."""
+    yield from settled()  # F12 lets the view begin anew
+    whole, render, size = pixels("whole"), bpy.context.scene.render, view()._picture.size
+    render.border_min_x = render.border_min_y = 0.0
+    render.border_max_x = render.border_max_y = 0.5
+    render.use_border = True
+    yield from until(lambda: view()._picture.size != size, "the region is not taken over")
+    yield from settled()
+    part = pixels("region")
+    inside = np.s_[REACH + 2 :, : REACH - 2]
+    difference = 255.0 * np.abs(part - whole)[inside]
+    print(f"a region against the whole: {difference.max():.2f} / 255 at most")
+    assert difference.max() < 1.5
+    outside = part[: REACH - 2, REACH + 2 :]
+    assert np.ptp(outside, axis=(0, 1)).max() < 0.02, "something is drawn beyond the region"
+    assert np.ptp(whole[: REACH - 2, REACH + 2 :], axis=(0, 1)).max() > 0.1
+    render.use_border = False
+    yield from until(lambda: view()._picture.size == size, "the region is not let go of")
+    yield from settled()
+    assert np.abs(pixels("whole_again") - whole).max() < 1.5 / 255.0
 
 
 def it_begins_anew_at_a_change():

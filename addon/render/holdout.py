@@ -1,0 +1,54 @@
+"""Hair that is a hole in the picture, as strong as it covers what is behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import gpu
+
+from .accumulation import Target
+from .shader_program import ShaderRecipe, program, released_with_shaders
+from .textures import drawing_into
+
+_RECIPE = ShaderRecipe(
+    name="holdout",
+    compute="holdout.comp.glsl",
+    textures=(("FLOAT_2D", "holes"),),
+    images=(("RGBA32F", "picture", "READ_WRITE"),),
+)
+_NOTHING = (0.0, 0.0, 0.0, 0.0)
+
+
+class Holdout:
+    """Draws beside a target and cuts that out of it; making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self.release()
+        released_with_shaders(self)
+
+    def release(self) -> None:
+        """See shader_program.released_with_shaders."""
+        self._depth: Any = None
+        self._holes: Any = None
+        self._framebuffer: Any = None
+
+    def cut(self, target: Target, draw: Callable[[], None]) -> None:
+        """Take what `draw` draws, hidden by all that is in the target and hiding what comes after
+        it, out of the target's colours and alpha.
+        """
+        if self._depth is not target.depth:
+            size = target.color.width, target.color.height
+            self._depth = target.depth
+            self._holes = gpu.types.GPUTexture(size, format="RGBA32F")
+            self._framebuffer = gpu.types.GPUFrameBuffer(
+                depth_slot=self._depth, color_slots=(self._holes,)
+            )
+        with drawing_into(self._framebuffer):
+            self._framebuffer.clear(color=_NOTHING)
+            draw()
+        shader = program(_RECIPE)
+        shader.bind(textures={"holes": self._holes}, images={"picture": target.color})
+        width, height = self._holes.width, self._holes.height
+        gpu.compute.dispatch(shader.shader, -(-width // 8), -(-height // 8), 1)
+        gpu.shader.unbind()

@@ -1,0 +1,36 @@
+"""What the grooms of a scene know of its meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.render.scene_snapshot import DrawnGroom, SceneSnapshot
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
+from hairloom.addon.strands import Surface
+
+TRIANGLES = np.array([[0, 1, 2]], np.int32)
+CORNERS = np.array([[-1.0, -1.0, -0.1], [1.0, -1.0, 0.1], [0.0, 1.0, 0.0]], np.float32)
+
+
+def hair_at(x: float) -> Snapshot:
+    strands = np.zeros((3, 4, 3), np.float32)
+    strands[..., 0] = x
+    return Snapshot(strands, np.full((3, 4), 1e-4, np.float32))
+
+
+def test_light_comes_back_to_each_groom_off_its_own_head() -> None:
+    """In the head's colour, whatever other meshes throw shadows."""
+    colors = {0.0: (0.1, 0.2, 0.3), 5.0: (0.8, 0.6, 0.4)}
+    heads = tuple(
+        MeshSnapshot.of(Surface(CORNERS + np.float32([x, 0.0, 0.0]), TRIANGLES), color)
+        for x, color in colors.items()
+    )
+    grooms = tuple(DrawnGroom(x, hair_at(x)) for x in colors)
+    scene = SceneSnapshot(casters=heads, grooms=grooms)
+    for groom, own in zip(grooms, heads, strict=True):
+        lit = scene.lit(groom)
+        assert lit.skin_color == pytest.approx(own.color)
+        shadowing = [*(mesh.surface for mesh in lit.meshes), *lit.casters]
+        assert {id(surface) for surface in shadowing} == {id(head.surface) for head in heads}
+    assert SceneSnapshot(grooms=grooms).lit(grooms[0]).skin_color == (0.0, 0.0, 0.0)

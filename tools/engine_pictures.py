@@ -1,0 +1,133 @@
+"""Draws what the render engine gives: picture, distance and object mask, for docs/engine.md.
+
+python tools/engine_pictures.py FOLDER
+
+FOLDER gets engine.png. The head is Blender's Suzanne with a groom, her face a material of its own,
+before a wall; rendered as an artist would, by the engine, into a file of many layers.
+"""
+
+import importlib
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from extension_loader import PACKAGE, load_package
+from mathutils import Vector
+
+SIZE, SAMPLES, STRANDS, THICKER = 340, 16, 12000, 1.5
+WORLD = (0.12, 0.15, 0.2, 1.0)
+CAMERA, TARGET = Vector((-0.42, -0.85, 0.12)), Vector((0.0, 0.0, 0.02))
+#: number in the mask -> colour [scene-linear]
+MASK = {0: (0.02, 0.02, 0.02), 1: (0.7, 0.25, 0.12), 2: (0.1, 0.3, 0.75), 3: (0.15, 0.4, 0.15)}
+
+
+def of_addon(module: str) -> Any:
+    return importlib.import_module(f"{PACKAGE}.addon.{module}")
+
+
+def material(name: str, color: tuple[float, float, float], roughness: float) -> Any:
+    found = bpy.data.materials.new(name)
+    principled = found.node_tree.nodes["Principled BSDF"]
+    principled.inputs["Base Color"].default_value = (*color, 1.0)
+    principled.inputs["Roughness"].default_value = roughness
+    return found
+
+
+def head() -> Any:
+    """The built-in head as an object."""
+    surface = of_addon("host.built_in_head").built_in_head()
+    mesh = bpy.data.meshes.new("Head")
+    mesh.from_pydata(surface.positions, [], surface.triangles)
+    mesh.uv_layers.new().data.foreach_set("uv", surface.corner_uv.ravel())
+    mesh.shade_smooth()
+    mesh.materials.append(material("Skin", (0.8, 0.55, 0.42), 0.5))
+    found = bpy.data.objects.new("Head", mesh)
+    bpy.context.collection.objects.link(found)
+    found.pass_index = 1
+    return found
+
+
+def scene_of_head() -> Any:
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene, skin = bpy.context.scene, head()
+    bpy.context.view_layer.objects.active = skin
+    skin.select_set(True)
+    bpy.ops.hairloom.grow(strand_count=STRANDS, length=0.12)
+    hair = bpy.context.object
+    hair.pass_index = 2
+    bpy.ops.hairloom.apply_preset(name="looks/brown")
+    hair.data.hairloom.strands.width_scale = THICKER
+    bpy.ops.mesh.primitive_plane_add(size=2.0, location=(0.2, 0.5, 0.0), rotation=(1.57, 0.0, -0.4))
+    wall = bpy.context.object
+    wall.scale, wall.pass_index = (0.25, 0.2, 1.0), 3
+    wall.data.materials.append(material("Wall", (0.3, 0.45, 0.3), 0.9))
+    bpy.ops.object.light_add(type="AREA", location=(-0.7, -0.6, 0.9))
+    lamp = bpy.context.object
+    lamp.data.energy, lamp.data.size = 14.0, 0.3
+    lamp.rotation_euler = (-lamp.location).to_track_quat("-Z", "Y").to_euler()
+    bpy.ops.object.camera_add(location=CAMERA)
+    scene.camera = bpy.context.object
+    scene.camera.rotation_euler = (TARGET - CAMERA).to_track_quat("-Z", "Y").to_euler()
+    scene.camera.data.lens, scene.camera.data.clip_start = 92.0, 0.01
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = WORLD
+    return scene
+
+
+def passes_of(scene: Any, path: Path) -> dict[str, Any]:
+    """Render; name -> (height, width, channels), row 0 at the bottom."""
+    import OpenImageIO
+
+    render, layer = scene.render, scene.view_layers[0]
+    render.engine = "HAIRLOOM"
+    render.resolution_x = render.resolution_y = SIZE
+    scene.hairloom.picture.samples = SAMPLES
+    layer.use_pass_z = layer.use_pass_object_index = True
+    settings = render.image_settings
+    settings.media_type, settings.file_format = "MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER"
+    render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    file, found = OpenImageIO.ImageInput.open(str(path)), {}
+    while file.seek_subimage(len(found), 0):
+        spec = file.spec()
+        pixels = file.read_image(len(found), 0, 0, spec.nchannels, "float")
+        found[spec.channelnames[0].split(".")[1]] = pixels[::-1]
+    file.close()
+    return found
+
+
+def opaque(colors: Any) -> Any:
+    return np.concatenate([colors, np.ones_like(colors[..., :1])], axis=-1).astype(np.float32)
+
+
+def distances(depth: Any) -> Any:
+    """White what is near, grey what is far, black where nothing is."""
+    is_there = depth < 1.0e9
+    near, far = depth[is_there].min(), np.percentile(depth[is_there], 98.0)
+    share = np.clip((depth - near) / (far - near), 0.0, 1.0)
+    return opaque(np.where(is_there, 0.9 - 0.85 * share, 0.0) * np.ones(3))
+
+
+def main() -> int:
+    folder = Path(sys.argv[1])
+    extension = load_package()
+    extension.register()
+    try:
+        with tempfile.TemporaryDirectory() as work:
+            found = passes_of(scene_of_head(), Path(work) / "picture.exr")
+    finally:
+        extension.unregister()
+    mask = np.zeros((SIZE, SIZE, 3), np.float32)
+    for number, color in MASK.items():
+        mask[found["Object Index"][..., 0] == number] = color
+    pictures = [opaque(found["Combined"][..., :3]), distances(found["Depth"]), opaque(mask)]
+    images = of_addon("host.images")
+    images.write_png(folder / "engine.png", images.contact_sheet(pictures, len(pictures)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
