@@ -114,12 +114,26 @@ def every_panel_draws():
         yield 5
         driver.screenshot(f"panels-of-{obj.name.lower()}")
     fin_modifier.remove_modifier(head)
+    yield from panels_of_the_engine(properties)
     missing = {
         each.__name__ for each in of_hairloom("registration").CLASSES if "_PT_" in each.__name__
     } - drawn
     assert not missing, f"never drawn: {missing}"
     (session,) = of_hairloom("host.live").sessions()
     assert session.source.dropped == {"fewer than two points": 3}
+
+
+def panels_of_the_engine(properties):
+    """They are there while the engine is chosen; Passes stands below a panel of Blender's own."""
+    render = bpy.context.scene.render
+    before, render.engine = render.engine, "HAIRLOOM"
+    for tab in ("RENDER", "VIEW_LAYER"):
+        properties.spaces.active.context = tab
+        yield 10
+        driver.screenshot(f"panels-of-the-engine-{tab.lower()}")
+    render.engine = before
+    properties.spaces.active.context = "DATA"
+    yield 3
 
 
 def hiding_and_local_view():
