@@ -14,13 +14,8 @@ void main()
 #else
 #  include "lib_lights.glsl"
 #  include "lib_card.glsl"
-#  if MARSCHNER
-#    include "lib_marschner.glsl"
-#  endif
+#  include "lib_hair_light.glsl"
 #  include "lib_card_shadows.glsl"
-#  if SCATTERING
-#    include "lib_dual.glsl"
-#  endif
 
 void main()
 {
@@ -37,10 +32,11 @@ void main()
   float shift_noise = texture(shift_texture, card_uv).x;
 #  endif
   float sparkle_noise = texture(noise_texture, card_uv).x;
+  vec3 absorption = vec3(0.0);
 #  if MARSCHNER
   vec3 colored = strand_absorption(fibre, along, 0.5, 1.5, shading);
   vec3 grey = strand_absorption(fibre, along, 0.5, -0.5, shading);
-  vec3 absorption = mix(colored, grey, shading.grey_share);
+  absorption = mix(colored, grey, shading.grey_share);
   vec3 hair = strand_color(fibre, absorption);
 #  else
   vec3 hair = card_base(along, shading);
@@ -51,51 +47,22 @@ void main()
     vec3 to_light, irradiance;
     light_at(lights, index, card_point, to_light, irradiance);
     vec3 way = way_of_light_to_card(index, card_point, alpha);
-    float tau = way.x;
-    irradiance *= tau < 0.0 ? card_occlusion : way.z;
+    irradiance *= way.x < 0.0 ? card_occlusion : way.z;
+    float level = 0.0;
 #  if MARSCHNER
-    float level = pixel_level(
+    level = pixel_level(
         longitudinal, tangent, normal, to_light, to_eye, shift_noise, shading);
-#    if SCATTERING
-    radiance += irradiance * scattering_light(longitudinal,
-                                              azimuthal,
-                                              paths,
-                                              shares_forward,
-                                              shares_backward,
-                                              tangent,
-                                              normal,
-                                              to_light,
-                                              to_eye,
-                                              shift_noise,
-                                              sparkle_noise,
-                                              absorption,
-                                              fibre,
-                                              shading,
-                                              level,
-                                              tau,
-                                              way.y,
-                                              scatter_density,
-                                              skin_color);
-#    else
-    radiance += irradiance * marschner_light(longitudinal,
-                                             azimuthal,
-                                             paths,
-                                             tangent,
-                                             normal,
-                                             to_light,
-                                             to_eye,
-                                             shift_noise,
-                                             sparkle_noise,
-                                             absorption,
-                                             fibre,
-                                             shading,
-                                             level,
-                                             tau);
-#    endif
-#  else
-    radiance += irradiance * (tau < 0.0 ? 1.0 : exp(-tau)) * hair / LIGHT_PI *
-                kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
 #  endif
+    radiance += irradiance * hair_light(tangent,
+                                        normal,
+                                        to_light,
+                                        to_eye,
+                                        shift_noise,
+                                        sparkle_noise,
+                                        hair,
+                                        absorption,
+                                        level,
+                                        way);
   }
   radiance *= texture(base_texture, card_uv).xyz;
   float covered = is_opaque == 1 ? 1.0 : alpha;

@@ -5,14 +5,7 @@
 // Reads the blocks `view`, `lights`, `strands`, `shading`, `fibre`, and the textures of strand_recipe.
 #include "lib_lights.glsl"
 #include "lib_strand_noise.glsl"
-#include "lib_kajiya_kay.glsl"
-#if MARSCHNER
-#  include "lib_marschner.glsl"
-#endif
-#include "lib_shadows.glsl"
-#if SCATTERING
-#  include "lib_dual.glsl"
-#endif
+#include "lib_hair_light.glsl"
 
 #if MARSCHNER
 // The level at which a highlight does not flicker. In a fragment pixels beside say how much theta_h
@@ -47,8 +40,9 @@ vec3 strand_radiance(vec3 point,
   float sparkle_noise = strand_noise(seed, 1u, cells);
   float color_noise = strand_noise(seed, 2u, 0.0);
   float grey_noise = strand_noise(seed, 3u, 0.0);
+  vec3 absorption = vec3(0.0);
 #if MARSCHNER
-  vec3 absorption = strand_absorption(fibre, along, color_noise, grey_noise, shading);
+  absorption = strand_absorption(fibre, along, color_noise, grey_noise, shading);
   vec3 hair = strand_color(fibre, absorption);
 #else
   vec3 hair = strand_base(along, color_noise, grey_noise, shading);
@@ -59,50 +53,21 @@ vec3 strand_radiance(vec3 point,
     vec3 to_light, irradiance;
     light_at(lights, index, point, to_light, irradiance);
     vec3 way = way_of_light_to_strand(index, point, tangent, radius, strands.opacity);
-    float tau = way.x;
-    irradiance *= tau < 0.0 ? occlusion : way.z;
+    irradiance *= way.x < 0.0 ? occlusion : way.z;
+    float level = 0.0;
 #if MARSCHNER
-    float level = strand_level(tangent, bend, normal, to_light, to_eye, shift_noise);
+    level = strand_level(tangent, bend, normal, to_light, to_eye, shift_noise);
 #endif
-#if SCATTERING
-    radiance += irradiance * scattering_light(longitudinal,
-                                              azimuthal,
-                                              paths,
-                                              shares_forward,
-                                              shares_backward,
-                                              tangent,
-                                              normal,
-                                              to_light,
-                                              to_eye,
-                                              shift_noise,
-                                              sparkle_noise,
-                                              absorption,
-                                              fibre,
-                                              shading,
-                                              level,
-                                              tau,
-                                              way.y,
-                                              scatter_density,
-                                              skin_color);
-#elif MARSCHNER
-    radiance += irradiance * marschner_light(longitudinal,
-                                             azimuthal,
-                                             paths,
-                                             tangent,
-                                             normal,
-                                             to_light,
-                                             to_eye,
-                                             shift_noise,
-                                             sparkle_noise,
-                                             absorption,
-                                             fibre,
-                                             shading,
-                                             level,
-                                             tau);
-#else
-    radiance += irradiance * (tau < 0.0 ? 1.0 : exp(-tau)) * hair / LIGHT_PI *
-                kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
-#endif
+    radiance += irradiance * hair_light(tangent,
+                                        normal,
+                                        to_light,
+                                        to_eye,
+                                        shift_noise,
+                                        sparkle_noise,
+                                        hair,
+                                        absorption,
+                                        level,
+                                        way);
   }
   return radiance;
 }

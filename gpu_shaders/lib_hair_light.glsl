@@ -1,0 +1,65 @@
+// What hair, strands and cards alike, sends to the eye of one light that reaches it whole: by the
+// model that the program holds, and with SCATTERING from strand to strand.
+//
+// Reads the blocks `shading` and `fibre`, and the textures of strand_recipe.
+#include "lib_kajiya_kay.glsl"
+#if MARSCHNER
+#  include "lib_marschner.glsl"
+#endif
+#include "lib_shadows.glsl"
+#if SCATTERING
+#  include "lib_dual.glsl"
+#endif
+
+// hair: its colour, for Kajiya-Kay; absorption and level: for Marschner; way: see way_of_light.
+vec3 hair_light(vec3 tangent,
+                vec3 normal,
+                vec3 to_light,
+                vec3 to_eye,
+                float shift_noise,
+                float sparkle_noise,
+                vec3 hair,
+                vec3 absorption,
+                float level,
+                vec3 way)
+{
+#if SCATTERING
+  return scattering_light(longitudinal,
+                          azimuthal,
+                          paths,
+                          shares_forward,
+                          shares_backward,
+                          tangent,
+                          normal,
+                          to_light,
+                          to_eye,
+                          shift_noise,
+                          sparkle_noise,
+                          absorption,
+                          fibre,
+                          shading,
+                          level,
+                          way.x,
+                          way.y,
+                          scatter_density,
+                          skin_color);
+#elif MARSCHNER
+  return marschner_light(longitudinal,
+                         azimuthal,
+                         paths,
+                         tangent,
+                         normal,
+                         to_light,
+                         to_eye,
+                         shift_noise,
+                         sparkle_noise,
+                         absorption,
+                         fibre,
+                         shading,
+                         level,
+                         way.x);
+#else
+  return (way.x < 0.0 ? 1.0 : exp(-way.x)) * hair / LIGHT_PI *
+         kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
+#endif
+}
