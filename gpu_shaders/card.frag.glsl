@@ -22,7 +22,7 @@ void main()
   vec3 normal = unit_or(card_normal, vec3(0.0, 0.0, 1.0));
   vec3 tangent = unit_or(card_tangent, vec3(0.0, 0.0, 1.0));
   vec3 to_eye = unit_or(view.eye.xyz - view.eye.w * card_point, normal);
-  float along = card_uv.y;
+  float along = card_along;
   float alpha = texture(alpha_texture, card_uv).x;
 #  if TANGENT_MAP
   vec3 texel = texture(tangent_texture, card_uv).xyz;

@@ -9,6 +9,7 @@ void main()
   card_normal = normal;
   card_tangent = tangent;
   card_occlusion = occlusion;
+  card_along = along;
 #endif
   precise vec4 place = view.view_projection * vec4(position, 1.0);
   gl_Position = place;

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
+from .atlas_grid import AtlasGrid
+
+#: What a mesh knows of each vertex, and of each card.
+OF_VERTICES = ("positions", "uv", "along", "normal", "tangent", "occlusion")
+OF_CARDS = ("group", "layer", "tile")
+
+
+def _empty() -> Ints:
+    return np.zeros(0, np.int32)
 
 
 @dataclass(frozen=True)
@@ -17,14 +27,18 @@ class CardMesh:
 
     positions: (vertex_count, 3) float32 [m].
     triangles: (triangle_count, 3) int32, counter-clockwise seen from outside the head.
-    uv: (vertex_count, 2) float32 in [0, 1]; u runs across the card within its column of the
-        texture, v from 0 at the root to 1 at the tip. Row 0 of a texture, its lowest, is the root.
-        (glTF counts v from the top of the picture, so there the root has v = 1.)
+    uv: (vertex_count, 2) float32 in [0, 1]; u runs across the card within its tile of the
+        texture, v along it, upwards from the root. Row 0 of a texture is its lowest.
+        (glTF counts v from the top of the picture, so there a root has the larger v.)
+    along: (vertex_count,) float32 from 0 at the root to 1 at the tip.
     normal: (vertex_count, 3) float32 unit vectors, away from the head.
     tangent: (vertex_count, 3) float32 unit vectors from root to tip.
     occlusion: (vertex_count,) float32, ambient occlusion from 0, shut in, to 1, open.
-    card: (triangle_count,) int32, which card a triangle belongs to.
-    atlas_columns: columns of the texture that u spans.
+    card: (triangle_count,) int32, which card a triangle belongs to. Cards keep their numbers when
+        others are left out.
+    group, layer, tile: (highest card number + 1 or more,) int32 of each card: its group of hair,
+        its layer, 0 next to the head, and its tile of the atlas; empty becomes 0 for all.
+    atlas: how the texture is divided into tiles.
 
     Raises:
         HairloomError: shapes that do not fit, an index out of range, values not finite.
@@ -37,7 +51,11 @@ class CardMesh:
     tangent: Floats
     occlusion: Floats
     card: Ints
-    atlas_columns: int = 1
+    along: Floats
+    group: Ints = field(default_factory=_empty)
+    layer: Ints = field(default_factory=_empty)
+    tile: Ints = field(default_factory=_empty)
+    atlas: AtlasGrid = field(default_factory=AtlasGrid)
 
     def __post_init__(self) -> None:
         vertex_count, triangle_count = len(self.positions), len(self.triangles)
@@ -50,6 +68,18 @@ class CardMesh:
             object.__setattr__(self, name, value)
         if triangle_count and not 0 <= self.triangles.min() <= self.triangles.max() < vertex_count:
             raise _broken("a triangle names a vertex that does not exist")
+        self._check_cards()
+
+    def _check_cards(self) -> None:
+        """What is known of each card is there for all of them."""
+        needed = int(self.card.max()) + 1 if len(self.card) else 0
+        for name in OF_CARDS:
+            value = np.ascontiguousarray(getattr(self, name), np.int32)
+            if not len(value):
+                value = np.zeros(needed, np.int32)
+            if value.ndim != 1 or len(value) < needed:
+                raise _broken(f"{name} has shape {value.shape} for {needed} cards")
+            object.__setattr__(self, name, value)
 
     @property
     def card_count(self) -> int:
@@ -67,17 +97,17 @@ class CardMesh:
 
 
 def joined(meshes: Sequence[CardMesh]) -> CardMesh:
-    """All triangles in one mesh, one mesh after the other; card numbers stay as they are."""
-    counts = [len(mesh.positions) for mesh in meshes]
-    starts = np.cumsum([0, *counts[:-1]])
-    both = {
-        name: np.concatenate([getattr(mesh, name) for mesh in meshes])
-        for name in ("positions", "uv", "normal", "tangent", "occlusion", "card")
+    """All triangles in one mesh, one mesh after the other; card numbers stay as they are.
+
+    What is known of cards, and the atlas, are those of the first mesh, and hold for all numbers.
+    """
+    starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
+    triangles = [mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)]
+    both: dict[str, Any] = {
+        name: np.concatenate([getattr(mesh, name) for mesh in meshes]) for name in OF_VERTICES
     }
-    triangles = np.concatenate(
-        [mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)]
-    )
-    return CardMesh(triangles=triangles, atlas_columns=meshes[0].atlas_columns, **both)
+    card = np.concatenate([mesh.card for mesh in meshes])
+    return replace(meshes[0], triangles=np.concatenate(triangles), card=card, **both)
 
 
 def _layout(vertex_count: int, triangle_count: int) -> dict[str, tuple[type, tuple[int, ...]]]:
@@ -85,6 +115,7 @@ def _layout(vertex_count: int, triangle_count: int) -> dict[str, tuple[type, tup
         "positions": (np.float32, (vertex_count, 3)),
         "triangles": (np.int32, (triangle_count, 3)),
         "uv": (np.float32, (vertex_count, 2)),
+        "along": (np.float32, (vertex_count,)),
         "normal": (np.float32, (vertex_count, 3)),
         "tangent": (np.float32, (vertex_count, 3)),
         "occlusion": (np.float32, (vertex_count,)),

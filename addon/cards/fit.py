@@ -13,10 +13,11 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands.frames import tangents, transported_normals
+from .atlas_grid import AtlasGrid
 from .card_mesh import CardMesh
 from .clusters import cluster_strands
 from .settings import CardSettings
-from .strip import CardFrames, Strips, strip_mesh
+from .strip import CardFrames, Strips, scattered_tiles, strip_mesh
 
 #: Half a card's width in standard deviations of its strands: sqrt(3) holds evenly spread strands.
 _COVERING = 1.8
@@ -47,7 +48,15 @@ def cluster_cards(
     segments = segment_counts(strips, settings.error, settings.segment_count)
     chosen = ((np.flatnonzero(segments == count), int(count)) for count in np.unique(segments))
     parts = [(cards, with_segments(strips, cards, count)) for cards, count in chosen]
-    return strip_mesh(parts, settings)
+    atlas = AtlasGrid(columns=settings.atlas_columns)
+    tile = scattered_tiles(len(strips), atlas, settings.seed)
+    return strip_mesh(parts, _group_of(cluster, group, len(tile)), tile, atlas, settings)
+
+
+def _group_of(cluster: Ints, group: Ints, card_count: int) -> Ints:
+    """The group of each card, (card_count,); crossed ones come after all others."""
+    _, first = np.unique(cluster, return_index=True)
+    return np.resize(group[first], card_count)
 
 
 def with_fly_aways(grid: Floats, cluster: Ints, count: int) -> Ints:

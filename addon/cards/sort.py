@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import Surface
 from ..strands.closest_point import closest_point
-from .card_mesh import CardMesh
+from .card_mesh import OF_VERTICES, CardMesh
 
 #: Vertices of a card whose distance from the head is measured; more hardly change the order.
 SAMPLE_COUNT = 7
@@ -42,15 +42,9 @@ def reordered(mesh: CardMesh, key: Floats | Ints) -> CardMesh:
     vertices = np.argsort(key[owner], kind="stable")
     place = np.empty(len(vertices), np.int32)
     place[vertices] = np.arange(len(vertices), dtype=np.int32)
+    moved = {name: getattr(mesh, name)[vertices] for name in OF_VERTICES}
     return replace(
-        mesh,
-        positions=mesh.positions[vertices],
-        triangles=place[mesh.triangles[triangles]],
-        uv=mesh.uv[vertices],
-        normal=mesh.normal[vertices],
-        tangent=mesh.tangent[vertices],
-        occlusion=mesh.occlusion[vertices],
-        card=mesh.card[triangles],
+        mesh, triangles=place[mesh.triangles[triangles]], card=mesh.card[triangles], **moved
     )
 
 

@@ -17,6 +17,7 @@ from ..arrays import Floats, Ints
 from ..strands import StrandSet
 from ..strands.frames import tangents, transported_normals
 from ..strands.resample import resample
+from .atlas_grid import AtlasGrid
 from .card_mesh import CardMesh, joined
 from .settings import CardSettings
 from .sort import reordered
@@ -66,38 +67,61 @@ def build_cards(guides: Floats, root_normal: Floats, settings: CardSettings) -> 
     along = np.linspace(0.0, 1.0, settings.segment_count + 1, dtype=np.float32)
     width = settings.width_factor * mean_spacing(guides[:, 0]) * taper(along, settings.tip_width)
     strips = Strips(frames, np.broadcast_to(width, (len(guides), len(along))))
-    return strip_mesh([(np.arange(len(guides)), strips)], settings)
+    atlas = AtlasGrid(columns=settings.atlas_columns)
+    tile = scattered_tiles(len(guides), atlas, settings.seed)
+    parts = [(np.arange(len(guides)), strips)]
+    return strip_mesh(parts, np.zeros_like(tile), tile, atlas, settings)
 
 
-def strip_mesh(parts: Sequence[tuple[Ints, Strips]], settings: CardSettings) -> CardMesh:
+def strip_mesh(
+    parts: Sequence[tuple[Ints, Strips]],
+    group: Ints,
+    tile: Ints,
+    atlas: AtlasGrid,
+    settings: CardSettings,
+) -> CardMesh:
     """Strips as triangles, card after card; occlusion is 1 until it is computed.
 
     Args:
         parts: strips with the numbers of their cards, which are 0, 1, 2 ... all together.
+        group: (card_count,) of the hair, that each card belongs to.
+        tile: (card_count,) of the atlas, that each card shows.
     """
-    card_count = sum(len(numbers) for numbers, _ in parts)
-    column = np.random.default_rng(settings.seed).integers(settings.atlas_columns, size=card_count)
-    meshes = [_part_mesh(strips, numbers, column[numbers], settings) for numbers, strips in parts]
-    return reordered(joined(meshes), np.arange(card_count))
+    cards = {"group": group, "layer": np.zeros_like(tile), "tile": tile}
+    meshes = [_part_mesh(strips, numbers, cards, atlas, settings) for numbers, strips in parts]
+    return reordered(joined(meshes), np.arange(len(tile)))
 
 
-def _part_mesh(strips: Strips, numbers: Ints, column: Ints, settings: CardSettings) -> CardMesh:
+def scattered_tiles(card_count: int, atlas: AtlasGrid, seed: int) -> Ints:
+    """A tile for each card, by chance, (card_count,)."""
+    return np.random.default_rng(seed).integers(atlas.tile_count, size=card_count)
+
+
+def _part_mesh(
+    strips: Strips,
+    numbers: Ints,
+    cards: dict[str, Ints],
+    atlas: AtlasGrid,
+    settings: CardSettings,
+) -> CardMesh:
     frames = strips.frames
     card_count, row_count = strips.width.shape
     across = np.linspace(0.0, 1.0, settings.column_count + 1, dtype=np.float32)
-    along = np.linspace(0.0, 1.0, row_count, dtype=np.float32)
+    along = np.linspace(0.0, 1.0, row_count, dtype=np.float32)[:, None]
     triangles = strip_triangles(row_count, settings.column_count)
     vertices_per_card = row_count * len(across)
     first = np.arange(card_count, dtype=np.int32) * vertices_per_card
     return CardMesh(
         positions=_positions(frames, strips.width, across, settings).reshape(-1, 3),
         triangles=(first[:, None, None] + triangles).reshape(-1, 3),
-        uv=_uv(column, across, along, settings).reshape(-1, 2),
+        uv=atlas.uv(cards["tile"][numbers, None, None], across, along).reshape(-1, 2),
+        along=np.broadcast_to(along, (card_count, row_count, len(across))).reshape(-1),
         normal=_normals(frames, across, settings).reshape(-1, 3),
         tangent=np.repeat(frames.tangent.reshape(-1, 3), len(across), axis=0),
         occlusion=np.ones(card_count * vertices_per_card, np.float32),
         card=np.repeat(numbers.astype(np.int32), len(triangles)),
-        atlas_columns=settings.atlas_columns,
+        atlas=atlas,
+        **cards,
     )
 
 
@@ -169,12 +193,6 @@ def _normals(frames: CardFrames, across: Floats, settings: CardSettings) -> Floa
     lean = (4.0 * settings.bend + settings.roundness) * edge  # the parabola's slope is 4 bend edge
     normals = frames.normal[:, :, None] + frames.side[:, :, None] * lean[:, None]
     return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
-
-
-def _uv(column: Ints, across: Floats, along: Floats, settings: CardSettings) -> Floats:
-    """(card_count, row_count, column_count + 1, 2): each card in one column of the texture."""
-    u = (column[:, None] + across) / settings.atlas_columns
-    return np.stack(np.broadcast_arrays(u[:, None, :], along[None, :, None]), axis=-1)
 
 
 def _resampled(guides: Floats, row_count: int) -> Floats:

@@ -107,7 +107,7 @@ def description(mesh: CardMesh, *, portable: bool = True) -> dict[str, Any]:
         },
         "bounds": _bounds(mesh),
         "attributes": _ATTRIBUTES | ({} if portable else {"_AO": _OCCLUSION}),
-        "texture": {"columns": mesh.atlas_columns, **_TEXTURE},
+        "texture": {"columns": mesh.atlas.columns, **_TEXTURE},
         "draw_order": _DRAW_ORDER,
         "opaque_alpha": OPAQUE_ALPHA,
         "least_alpha": LEAST_ALPHA,

@@ -68,7 +68,7 @@ def write_cards(
     with stage("build cards"):
         mesh = pipeline.cards_of(rig, choices.cards, choices.ambient)
     with stage("card texture"):
-        made = hair_textures(choices.texture, mesh.atlas_columns)
+        made = hair_textures(choices.texture, mesh.atlas.columns)
         textures = made.with_pictures(choices.pictures)
     with stage("write cards"):
         write_glb(path, mesh, textures.card, name=path.stem, base_color=choices.shading.base_color)

@@ -43,7 +43,7 @@ from .textures import UniformBlock, drawing_state, texture_from
 from .view_block import view_values
 
 #: vertex attribute of a CardMesh -> its length
-_ATTRIBUTES = {"position": 3, "normal": 3, "tangent": 3, "uv": 2, "occlusion": 1}
+_ATTRIBUTES = {"position": 3, "normal": 3, "tangent": 3, "uv": 2, "occlusion": 1, "along": 1}
 _INPUTS = tuple(
     ("FLOAT" if length == 1 else f"VEC{length}", name) for name, length in _ATTRIBUTES.items()
 )
@@ -114,6 +114,7 @@ def card_recipe(
             ("smooth", "VEC3", "card_normal"),
             ("smooth", "VEC3", "card_tangent"),
             ("smooth", "FLOAT", "card_occlusion"),
+            ("smooth", "FLOAT", "card_along"),
         ),
         outputs=(("VEC4", "color"),),
         defines=(
@@ -273,7 +274,11 @@ def _batch(mesh: CardMesh) -> Any:
     for name, length in _ATTRIBUTES.items():
         layout.attr_add(id=name, comp_type="F32", len=length, fetch_mode="FLOAT")
     vertices = gpu.types.GPUVertBuf(layout, len(mesh.positions))
-    values = {"position": mesh.positions, "occlusion": mesh.occlusion[:, None]}
+    values = {
+        "position": mesh.positions,
+        "occlusion": mesh.occlusion[:, None],
+        "along": mesh.along[:, None],
+    }
     for name in _ATTRIBUTES:  # a CardMesh holds contiguous float32, as attr_fill needs it
         vertices.attr_fill(name, values[name] if name in values else getattr(mesh, name))
     indices = gpu.types.GPUIndexBuf(type="TRIS", seq=mesh.triangles)

@@ -94,7 +94,7 @@ def sorted_hair() -> CardMesh:
 
 @pytest.fixture(scope="module")
 def texture(sorted_hair: CardMesh) -> np.ndarray:
-    return hair_textures(TEXTURE, sorted_hair.atlas_columns).card
+    return hair_textures(TEXTURE, sorted_hair.atlas.columns).card
 
 
 @pytest.fixture(scope="module")

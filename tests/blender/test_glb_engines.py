@@ -37,7 +37,7 @@ def curtain() -> tuple[CardMesh, np.ndarray]:
     guides = out[:, None] * 0.1 + fall + out[:, None] * np.linspace(0.0, 0.05, 8)[:, None] ** 2
     settings = CardSettings(width_factor=1.5)
     mesh = build_cards(guides.astype(np.float32), out.astype(np.float32), settings)
-    texture = hair_textures(TextureSettings(variant_width=16, height=64), mesh.atlas_columns).card
+    texture = hair_textures(TextureSettings(variant_width=16, height=64), mesh.atlas.columns).card
     return inside_out_order(mesh, None), texture
 
 

@@ -32,6 +32,7 @@ def card(low: float, high: float, y: float, u: tuple[float, float] = (0.0, 1.0))
         "positions": np.array([[low, y, 1], [high, y, 1], [low, y, 0], [high, y, 0]]),
         "triangles": np.array([[0, 2, 3], [0, 3, 1]]),
         "uv": np.array([[u[0], 0.0], [u[1], 0.0], [u[0], 1.0], [u[1], 1.0]]),
+        "along": np.array([0.0, 0.0, 1.0, 1.0]),
         "normal": np.repeat([way], 4, axis=0),
         "tangent": np.repeat([[0.0, 0.0, -1.0]], 4, axis=0),
         "occlusion": np.ones(4),

@@ -53,6 +53,7 @@ def card(
         "positions": corners,
         "triangles": np.array([[0, 2, 3], [0, 3, 1]]),
         "uv": np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]),
+        "along": np.array([0.0, 0.0, 1.0, 1.0]),
         "normal": np.repeat([lean], 4, axis=0),
         "tangent": np.repeat([[0.0, -np.sin(tilt), -np.cos(tilt)]], 4, axis=0),
         "occlusion": np.array([0.4, 0.6, 0.8, 1.0]),

@@ -117,4 +117,4 @@ def test_cards_of_a_groom() -> None:
     ahead = np.einsum("ij,ij->i", np.cross(b - a, c - a), mesh.normal[mesh.triangles].mean(axis=1))
     assert (ahead > 0.0).mean() > 0.97  # a strip that is bent sharply may fold
     # root to tip: along the strands, which fall
-    assert (mesh.tangent[mesh.uv[:, 1] > 0.9, 2] < 0.0).mean() > 0.95
+    assert (mesh.tangent[mesh.along > 0.9, 2] < 0.0).mean() > 0.95

@@ -104,12 +104,13 @@ def test_everything_of_a_vertex_travels_with_it() -> None:
     ordered = inside_out_order(mesh, None)
 
     def table(one: CardMesh) -> np.ndarray:
-        values = [one.positions, one.uv, one.normal, one.tangent, one.occlusion[:, None]]
+        values = [one.positions, one.uv, one.normal, one.tangent]
+        values += [one.occlusion[:, None], one.along[:, None]]
         return np.unique(np.concatenate(values, axis=1), axis=0)
 
     np.testing.assert_array_equal(table(ordered), table(mesh))
     assert (np.diff(ordered.triangles.min(axis=1)) >= 0).all()  # vertices follow their cards
-    assert ordered.atlas_columns == mesh.atlas_columns
+    assert ordered.atlas == mesh.atlas
 
 
 def test_cards_at_equal_distance_keep_their_order() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hairloom.addon.cards.atlas_grid import AtlasGrid
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.exchange.sidecar import write_sidecar
 
@@ -20,7 +21,8 @@ def one_triangle() -> CardMesh:
         tangent=np.tile([0.0, 1.0, 0.0], (3, 1)),
         occlusion=np.ones(3),
         card=np.array([0]),
-        atlas_columns=4,
+        along=np.zeros(3),
+        atlas=AtlasGrid(columns=4),
     )
 
 
