@@ -25,7 +25,7 @@ void main()
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, mesh_point, to_light, irradiance);
-    vec3 way = way_of_light_to_mesh(index, mesh_point);
+    vec3 way = way_of_light_to_mesh(index, mesh_point, normal);
     vec3 arriving = irradiance * max(0.0, dot(normal, to_light)) / LIGHT_PI;
     all_light += arriving * way.z;
     left += arriving * light_left(way, hair_forward);

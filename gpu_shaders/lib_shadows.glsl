@@ -1,6 +1,10 @@
-// What is in the way of a light. SHADOWS: whether there are opacity maps to ask.
+// What is in the way of a light. SHADOWS: whether there are opacity maps to ask. MESH_SHADOWS: whether
+// there are maps of the depths of all meshes.
 #if SHADOWS
 #  include "lib_opacity_look_up.glsl"
+#endif
+#ifdef MESH_SHADOWS
+#  include "lib_mesh_shadows.glsl"
 #endif
 
 // x how many strands a light passes on its way to a point, -1 where nothing is known of it, y how
@@ -15,17 +19,29 @@ vec3 way_of_light(int index, vec3 point)
   return vec3(-1.0, {{unknown_beyond}}, 1.0);
 }
 
-// As way_of_light, for a place of a mesh. Meshes reach beyond the map, where nothing is known of what
-// is in the way: their shadows fade towards its border, or they would end at a line.
-vec3 way_of_light_to_mesh(int index, vec3 point)
+// As way_of_light, for a place of a mesh and the normal of its triangle. Meshes reach beyond the map of
+// hair: towards its border the map of all meshes takes over what they are in the way of, or else their
+// shadows fade, or they would end at a line.
+vec3 way_of_light_to_mesh(int index, vec3 point, vec3 normal)
 {
   vec3 way = way_of_light(index, point);
+  float beyond = 1.0;
+#ifdef MESH_SHADOWS
+  beyond = mesh_light(index, point, normal);
+#endif
 #if SHADOWS
   if (way.x >= 0.0) {
-    way.z = mix(1.0, way.z, within_map(map_place(opacity, index, point).xy));
+    vec3 place = map_place(opacity, index, point);
+    float within = within_map(place.xy);
+#  ifdef MESH_SHADOWS
+    // depths before and behind all hair are not told apart
+    within = min(within, within_map(vec2(0.5, place.z - opacity.bias)));
+#  endif
+    way.z = mix(beyond, way.z, within);
+    return way;
   }
 #endif
-  return way;
+  return vec3(way.xy, beyond);
 }
 
 // The share of a light that hair and meshes in its way leave, by colour: of what strands take they

@@ -1,6 +1,7 @@
 // What a strand sends to the eye: all lights and the world's. SHADOWS of strands on strands come from
 // opacity maps; where a light has none, the occlusion and how much the volume faces it stand in.
-// With SCATTERING light goes from strand to strand.
+// With SCATTERING light goes from strand to strand. OTHERS: there is more hair in the way than the maps
+// hold; `between` is its optical depth, of the first lights.
 //
 // Reads the blocks `view`, `lights`, `strands`, `shading`, `fibre`, and the textures of strand_recipe.
 #include "lib_lights.glsl"
@@ -31,6 +32,7 @@ vec3 strand_radiance(vec3 point,
                      float radius,
                      float along,
                      float occlusion,
+                     vec4 between,
                      uint seed)
 {
   vec3 normal = strand_normal(point, tangent, volume_center);
@@ -53,6 +55,9 @@ vec3 strand_radiance(vec3 point,
     vec3 to_light, irradiance;
     light_at(lights, index, point, to_light, irradiance);
     vec3 way = way_of_light_to_strand(index, point, tangent, radius, strands.opacity);
+#ifdef OTHERS
+    way.x += way.x >= 0.0 && index < {{others_lights}} ? between[index] : 0.0;
+#endif
     irradiance *= way.x < 0.0 ? occlusion : way.z;
     float level = 0.0;
 #if MARSCHNER

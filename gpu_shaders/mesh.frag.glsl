@@ -1,5 +1,6 @@
 // Meshes, fragment stage: Lambert, the world's light, and a soft sheen (Blinn 1977) as skin has. Hair
-// and meshes throw SHADOWS on them; where a light has no map, the occlusion stands in. On SKIN the
+// throws SHADOWS on them, and meshes do; where a light has no map of hair, the occlusion stands in.
+// OTHERS: there is more hair in the way than the maps hold. On SKIN the
 // shadow is looked up where it has been spread. PICTURES of the material take the place of its colour,
 // and bend its normals. HASHED and BLENDED: it does not cover all.
 #include "lib_lights.glsl"
@@ -7,6 +8,9 @@
 #include "lib_output.glsl"
 #ifdef SKIN
 #  include "lib_skin.glsl"
+#endif
+#ifdef HASHED
+#  include "lib_hashed.glsl"
 #endif
 
 const float SHEEN_EXPONENT = 18.0;
@@ -33,18 +37,11 @@ vec3 bent_normal(vec3 normal, vec3 mapped, float bump)
 }
 #endif
 
-#ifdef HASHED
-// A number from 0 to 1 for each place of the target; interleaved gradient noise (Jimenez 2014).
-float place_noise(vec2 place)
-{
-  return fract(52.9829189 * fract(dot(place, vec2(0.06711056, 0.00583715))));
-}
-#endif
-
 void main()
 {
   vec3 to_eye = normalize(view.eye.xyz - view.eye.w * mesh_point);
   vec3 normal = normalize(mesh_normal);
+  vec3 facet = cross(dFdx(mesh_point), dFdy(mesh_point));
 #ifdef PICTURES
   vec4 texel = texture(mesh_color_map, mesh_uv);
   vec3 base = texel.xyz;
@@ -76,11 +73,14 @@ void main()
                                known);
 #endif
   vec3 radiance = base * lights.ambient_and_count.xyz * mesh_occlusion;
+#ifdef OTHERS
+  vec4 between = texelFetch(hair_between, ivec2(gl_FragCoord.xy), 0);
+#endif
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, mesh_point, to_light, irradiance);
-    vec3 way = way_of_light_to_mesh(index, mesh_point);
-    vec3 reaching = vec3(mesh_occlusion);
+    vec3 way = way_of_light_to_mesh(index, mesh_point, facet);
+    vec3 reaching = vec3(mesh_occlusion * way.z);
 #if SHADOWS
     reaching = way.x < 0.0 ? reaching : light_left(way, hair_forward);
 #endif
@@ -91,6 +91,9 @@ void main()
       vec3 colored = skin_colored(soft[map], way.x, hair_forward);
       reaching = mix(reaching, colored, min(4.0 * known, 1.0));
     }
+#endif
+#ifdef OTHERS
+    reaching *= exp((index < {{others_lights}} ? -between[index] : 0.0) * (1.0 - hair_forward));
 #endif
     irradiance *= reaching / LIGHT_PI;
     float facing = max(0.0, dot(normal, to_light));

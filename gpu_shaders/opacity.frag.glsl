@@ -11,7 +11,7 @@
 void main()
 {
 #ifdef CARDS
-  float strand_weight = card_optical_depth(texture(alpha_texture, card_uv).x);
+  float strand_weight = card_thickness * card_optical_depth(texture(alpha_texture, card_uv).x);
 #endif
   float behind = strand_depth;
 #if DEEP

@@ -22,10 +22,12 @@ void main()
     int triangle = int(shown.x);
     vec3 point = (1.0 - shown.y - shown.z) * corner_of(triangle, 0) +
                  shown.y * corner_of(triangle, 1) + shown.z * corner_of(triangle, 2);
+    vec3 facet = cross(corner_of(triangle, 1) - corner_of(triangle, 0),
+                       corner_of(triangle, 2) - corner_of(triangle, 0));
     for (int index = 0; index < light_count; index++) {
       int map = int(opacity.light[index].x);
       if (map >= 0 && map < {{skin_lights}}) {
-        vec3 way = way_of_light_to_mesh(index, point);
+        vec3 way = way_of_light_to_mesh(index, point, facet);
         lit[map] = light_left(way, vec3(skin_forward(hair_forward))).x;
       }
     }

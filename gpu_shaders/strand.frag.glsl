@@ -47,8 +47,12 @@ void main()
   vec3 radiance = debug_radiance(tangent, seed);
 #else
   vec2 place = strand_along_and_occlusion;
+  vec4 between = vec4(0.0);
+#  ifdef OTHERS
+  between = strand_between;
+#  endif
   vec3 radiance = strand_radiance(
-      strand_point, tangent, vec3(0.0), strand_radius, place.x, place.y, seed);
+      strand_point, tangent, vec3(0.0), strand_radius, place.x, place.y, between, seed);
 #endif
 #if HASHED
   // at the end, because derivatives want all pixels until then

@@ -40,7 +40,14 @@ vec3 layer_radiance(int strand, float along)
   float occlusion = mix(from_look.x, to_look.x, u);
   float radius = mix(root_side.w, tip_side.w, u) * strands.width_scale *
                  mix(1.0, strands.tip_width, along);
-  return strand_radiance(point, tangent, bend, radius, along, occlusion, uint(from_look.y));
+  vec4 between = vec4(0.0);
+#ifdef OTHERS
+  between = mix(texelFetch(cv_between, strand_texel(strand, segment, cv_count), 0),
+                texelFetch(cv_between, strand_texel(strand, segment + 1, cv_count), 0),
+                u);
+#endif
+  uint seed = uint(from_look.y);
+  return strand_radiance(point, tangent, bend, radius, along, occlusion, between, seed);
 }
 
 void main()

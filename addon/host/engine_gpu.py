@@ -13,7 +13,7 @@ import bpy
 import gpu
 
 from ..errors import HairloomError
-from .studio import gpu_in_use
+from .gpu_context import gpu_in_use
 
 #: Exits with 0 where OpenGL or Vulkan finds a device without a window, as Blender's do.
 _TRIAL = """

@@ -5,11 +5,13 @@ from __future__ import annotations
 import bpy
 from bpy.props import PointerProperty
 
+from ..shading.mesh_shadow_settings import MeshShadowSettings
 from ..shading.picture_settings import PictureSettings
 from .properties import property_group
 from .redraw import redraw_views
 
 HAIRLOOM_PG_picture = property_group(PictureSettings, lambda _scene: redraw_views())
+HAIRLOOM_PG_mesh_shadows = property_group(MeshShadowSettings, lambda _scene: redraw_views())
 
 
 class HAIRLOOM_PG_scene(bpy.types.PropertyGroup):
@@ -21,10 +23,15 @@ class HAIRLOOM_PG_scene(bpy.types.PropertyGroup):
             name=PictureSettings.title,
             description="How many samples make one picture",
         ),
+        "mesh_shadows": PointerProperty(
+            type=HAIRLOOM_PG_mesh_shadows,
+            name=MeshShadowSettings.title,
+            description="Shadows of meshes on meshes",
+        ),
     }
 
 
-CLASSES = (HAIRLOOM_PG_picture, HAIRLOOM_PG_scene)
+CLASSES = (HAIRLOOM_PG_picture, HAIRLOOM_PG_mesh_shadows, HAIRLOOM_PG_scene)
 
 
 def register() -> None:

@@ -6,7 +6,7 @@ frame as long as curves, head and settings are the same.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import bpy
@@ -14,16 +14,20 @@ import numpy as np
 
 from .. import pipeline
 from ..arrays import Floats
+from ..cards.follow import moved_mesh
 from ..pipeline import Rig
 from ..render.snapshot import Snapshot
 from ..strands.affine import moved
 from . import playback
 from .baked_rig import BakedRig
 from .cache import Cache
+from .card_builds import BuiltCards, CardForm, built_cards
+from .card_images import chosen_pictures
 from .choices import Choices
 from .objects import head_of
 from .reading import Reading
 from .shown import snapshot_of, with_all_strands, with_choices
+from .shown_cards import as_shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +37,15 @@ class _Kept:
     made_from: tuple[Any, ...]
     rig: Rig
     snapshot: Snapshot
+    _cards: list[BuiltCards] = field(default_factory=list)
+
+    def cards(self, owner: bpy.types.Object, form: CardForm) -> BuiltCards:
+        """Its cards; those of the last form are kept, to the last colour."""
+        kept = [each for each in self._cards if each.form == form]
+        if not kept or kept[0].form.shading != form.shading:
+            pictures, _ = chosen_pictures(owner.data.hairloom.card_images)
+            self._cards[:] = [built_cards(self.rig, form, pictures)]
+        return self._cards[0]
 
 
 _kept: dict[int, _Kept] = {}
@@ -65,9 +78,15 @@ def read_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Snapsh
     if cache is not None and (owner != hair or _shows_bake(owner, cache, scene.frame_current)):
         strands = playback.strands_in(cache, scene.frame_current, scene.frame_subframe)
         kept = _of_bake(owner, playback.rig_in(cache), choices)
-        snapshot = replace(kept.snapshot, strands=strands)
+        pose = playback.pose_in(cache, scene.frame_current, scene.frame_subframe)
     else:
-        snapshot = _of_curves(owner, choices, depsgraph).snapshot
+        kept = _of_curves(owner, choices, depsgraph)
+        strands, pose = kept.snapshot.strands, kept.rig.rest_pose
+    snapshot = replace(kept.snapshot, strands=strands)
+    if choices.shows_cards:
+        built = kept.cards(owner, choices.card_form)
+        cards = built.at(pose, strands[kept.rig.guides], choices.cards_drawn)
+        snapshot = as_shown(replace(snapshot, cards=cards))
     return with_all_strands(with_choices(snapshot, choices))
 
 
@@ -92,8 +111,13 @@ def uids_of(hair: bpy.types.Object) -> set[int]:
 
 def placed(snapshot: Snapshot, motion: Floats) -> Snapshot:
     """The same, moved by an affine (4, 4) matrix, as an instance is."""
-    strands = moved(snapshot.strands.reshape(-1, 3), motion)
-    return replace(snapshot, strands=strands.reshape(snapshot.strands.shape))
+    strands = moved(snapshot.strands.reshape(-1, 3), motion).reshape(snapshot.strands.shape)
+    cards, center = snapshot.cards, snapshot.volume_center
+    if cards is not None:
+        cards = replace(cards, mesh=moved_mesh(cards.mesh, motion))
+    if center is not None:
+        center = moved(center[None], motion)[0]
+    return replace(snapshot, strands=strands, cards=cards, volume_center=center)
 
 
 def forget() -> None:

@@ -41,11 +41,12 @@ def _split(
     mesh: bpy.types.Mesh, obj: bpy.types.Object, matrix: Floats, is_head: bool
 ) -> tuple[MeshSnapshot, ...]:
     triangles, positions, normals = _corners(mesh)
-    normal_matrix = np.linalg.pinv(matrix[:3, :3]).T
+    # rows: the transpose of the inverse, which normals need, from the right
+    from_world = np.linalg.pinv(matrix[:3, :3])
     positions = moved(positions, matrix)
     if not np.isfinite(positions).all():
         return ()
-    normals = normals @ normal_matrix.astype(np.float32)
+    normals = normals @ from_world.astype(np.float32)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0.0)
     slots = np.zeros(len(triangles), np.int32)

@@ -16,12 +16,14 @@ from ..arrays import Floats
 from ..errors import HairloomError
 from ..render.scene_snapshot import DrawnGroom, SceneSnapshot
 from ..render.snapshot import MeshSnapshot, Snapshot
+from ..shading.mesh_shadow_settings import MeshShadowSettings
 from ..shading.skin.notes import uv_notes
 from . import engine_hair
 from .engine_meshes import SOLID_TYPES, as_before, read_meshes
 from .lights import light_warnings, read_ambient, read_lights
 from .mesh_materials import material_notes
 from .objects import head_of
+from .properties import settings_of
 
 type Key = tuple[int, ...]
 type IsShown = Callable[[bpy.types.Object], bool]
@@ -129,6 +131,7 @@ class SceneReader:
             grooms=found,
             lights=read_lights(depsgraph, center),
             ambient=read_ambient(depsgraph.scene_eval),
+            mesh_shadows=settings_of(depsgraph.scene.hairloom.mesh_shadows, MeshShadowSettings),
         )
 
     def _read_mesh(

@@ -17,6 +17,7 @@ from ..render.scene_pass import ScenePass
 from ..render.scene_snapshot import DrawnGroom, SceneSnapshot
 from ..render.snapshot import Snapshot
 from ..shading.lights import three_point_lights
+from ..shading.mesh_shadow_settings import MeshShadowSettings
 from ..shading.picture_settings import PictureSettings
 from . import overlay
 from .engine_camera import view_rectangle
@@ -135,14 +136,16 @@ class EngineView:
             for uid, drawing, visibility in found
             if visibility.is_seen
         )
-        scene = replace(self._scene, grooms=(*self._scene.grooms, *previewed))
+        shadows = settings_of(context.scene.hairloom.mesh_shadows, MeshShadowSettings)
+        grooms = (*self._scene.grooms, *previewed)
+        scene = replace(self._scene, grooms=grooms, mesh_shadows=shadows)
         uses_lights, uses_world = uses_scene_light(space.shading)
         if not uses_lights:
             scene = replace(scene, lights=three_point_lights(camera.view))
         if not uses_world:
             scene = replace(scene, ambient=Snapshot.ambient)
         marks = (
-            self._scene,
+            *(self._scene, shadows),
             *(drawing.snapshot for _, drawing in overlay.shown_in(space)),
             *(_serial(groom.snapshot) for groom in previewed),
             *((groom.key, groom.is_holdout) for groom in previewed),

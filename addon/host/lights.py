@@ -99,7 +99,7 @@ def _lights(depsgraph: bpy.types.Depsgraph) -> Iterator[Light]:
         if instance.type == "LIGHT":
             light = _light(instance)
             if light is not None and sum(light.power) > 0.0:
-                yield replace(light, name=instance.name)
+                yield replace(light, name=instance.name, casts_shadow=instance.data.use_shadow)
 
 
 def _light(instance: bpy.types.Object) -> Light | None:

@@ -23,7 +23,7 @@ from .display import Display
 from .marschner_textures import hair_forward
 from .opacity_maps import OpacityForm, OpacityMaps
 from .shader_program import ShaderRecipe, program, released_with_shaders
-from .snapshot import Snapshot
+from .snapshot import Caster, Snapshot, surface_of
 from .textures import UniformBlock, drawing_state
 from .view_block import view_values
 
@@ -108,11 +108,11 @@ class BodyShadow:
         self._blocks = {name: UniformBlock() for _, name in _BLOCKS}
         self._batches: list[tuple[Surface, Any]] = []
 
-    def _upload(self, casters: tuple[Surface, ...]) -> None:
+    def _upload(self, casters: tuple[Caster, ...]) -> None:
         kept = {id(surface): batch for surface, batch in self._batches}
         self._batches = [
             (surface, kept[id(surface)] if id(surface) in kept else _batch(surface))
-            for surface in casters
+            for surface in map(surface_of, casters)
             if len(surface.triangles)
         ]
 

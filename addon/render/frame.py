@@ -7,6 +7,8 @@ from typing import Any
 import gpu
 
 from ..arrays import Floats
+from ..shading.lights import kept_lights
+from ..shading.mesh_shadow_settings import MeshShadowSettings
 from .camera import Camera, frame_camera, look_at, orthographic, perspective
 from .card_pass import CardPass
 from .mesh_pass import MeshPass
@@ -75,10 +77,15 @@ def render_image(
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
     card_pass = card_pass or CardPass()
     opacity = strand_pass.opacity(snapshot) or card_pass.opacity(snapshot)
+    shadows = None
+    if opacity is not None:
+        shadows = mesh_pass.mesh_shadows.maps(
+            snapshot.all_casters, kept_lights(snapshot.lights), MeshShadowSettings()
+        )
     with drawing_into(target):
         # shafts ask alpha what stands before a light
         target.clear(color=_NOTHING if snapshot.shafts.use_shafts else background, depth=1.0)
-        mesh_pass.draw(snapshot, camera, *size, opacity=opacity)
+        mesh_pass.draw(snapshot, camera, *size, opacity=opacity, shadows=shadows)
         strand_pass.draw(snapshot, camera, *size, samples=samples)
         card_pass.draw(snapshot, camera, *size, opacity=opacity)
     picture = color if samples == 1 else _averaged(color, samples)

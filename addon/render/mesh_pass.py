@@ -12,7 +12,8 @@ from .hashed_alpha import shifts
 from .marschner_textures import hair_forward
 from .mesh_batch import mesh_batch
 from .mesh_pictures import PictureTextures, pictures_of
-from .mesh_recipe import NUMBERS, MeshForm
+from .mesh_recipe import MeshForm
+from .mesh_shadows import MeshShadowPass, MeshShadows, ShadowBlock
 from .opacity_pass import OpacityMaps
 from .shader_program import program, released_with_shaders
 from .shader_source import output_index
@@ -28,6 +29,7 @@ class MeshPass:
     """Keeps the meshes of the last snapshot on the GPU; making one touches no GPU."""
 
     def __init__(self) -> None:
+        self.mesh_shadows = MeshShadowPass()
         self.release()
         released_with_shaders(self)
 
@@ -40,15 +42,21 @@ class MeshPass:
         *,
         output: str = "scene_linear",
         opacity: OpacityMaps | None = None,
+        shadows: MeshShadows | None = None,
+        between: Any = None,
     ) -> None:
         """Draw all meshes of the snapshot into the bound framebuffer, depth-tested.
 
         Args:
-            opacity: the hair's maps, see StrandPass.opacity. Others as in StrandPass.draw.
+            opacity: the hair's maps, see StrandPass.opacity.
+            shadows: of all meshes; without, they shade each other only where the hair's maps are.
+            between: what other hair is in the way, at each pixel of the target, see HairBetween;
+                counts where there are maps. Others as in StrandPass.draw.
         """
         forward = (0.0, 0.0, 0.0) if opacity is None else hair_forward(snapshot)
+        light_count = len(kept_lights(snapshot.lights))
         skins = self.skin.shadows(
-            snapshot.meshes, opacity, snapshot.skin, len(kept_lights(snapshot.lights)), forward
+            snapshot.meshes, opacity, snapshot.skin, light_count, forward, shadows
         )
         self._upload(snapshot.meshes, skins)
         values = {
@@ -57,22 +65,36 @@ class MeshPass:
             **({} if opacity is None else {"opacity": opacity.values}),
         }
         form = None if opacity is None else opacity.form
+        shadow_block = self._shadow_block.of(shadows, camera.sample)
         kinds = kinds_needed(kept_lights(snapshot.lights))
         for number, (mesh, _, batch) in enumerate(_far_to_near(self._batches, camera)):
             skin, pictures = skins.get(id(mesh)), pictures_of(mesh)
+            is_blended = mesh.transparency == "blended"
+            # a pixel stands for what lies behind all that is blended
+            has_others = between is not None and opacity is not None and not is_blended
             shader = program(
                 MeshForm(
-                    form, skin is not None, pictures is not None, mesh.transparency, kinds
+                    form,
+                    skin is not None,
+                    pictures is not None,
+                    mesh.transparency,
+                    kinds,
+                    shadows is not None,
+                    has_others,
                 ).recipe
             )
-            is_blended = mesh.transparency == "blended"
             with drawing_state(
                 depth_write=not is_blended, blend="ALPHA_PREMULT" if is_blended else "NONE"
             ):
                 shader.bind(
-                    blocks={name: self._blocks[name].holding(values[name]) for name in values},
+                    blocks={
+                        **{name: self._blocks[name].holding(values[name]) for name in values},
+                        **shadow_block,
+                    },
                     textures={
                         **({} if opacity is None else opacity.textures),
+                        **({} if shadows is None else shadows.textures),
+                        **({"hair_between": between} if has_others else {}),
                         **({} if skin is None else skin.textures),
                         **({} if pictures is None else self._pictures.textures(mesh, pictures)),
                     },
@@ -90,26 +112,13 @@ class MeshPass:
         """The soft shadows on heads as they were drawn last."""
         return self.skin.drawn
 
-    def draw_numbers(
-        self, meshes: tuple[MeshSnapshot, ...], camera: Camera, width: int, height: int
-    ) -> None:
-        """Draw the number of each mesh into the first channel of the bound framebuffer."""
-        self._upload(meshes, {})
-        view = view_values(camera, width, height)
-        shader = program(NUMBERS)
-        for mesh, _, batch in self._batches:
-            with drawing_state():
-                shader.bind(
-                    blocks={"view": self._blocks["view"].holding(view)},
-                    numbers={"mesh_number": float(mesh.number)},
-                )
-                batch.draw(shader.shader)
-
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
         self._blocks = {name: UniformBlock() for name in ("view", "lights", "opacity")}
+        self._shadow_block = ShadowBlock()
         self._batches: list[_Batch] = []
         self.skin = SkinPass()
+        self.mesh_shadows.release()
         self._pictures = PictureTextures()
 
     def _upload(self, meshes: tuple[MeshSnapshot, ...], skins: Mapping[int, SkinShadow]) -> None:

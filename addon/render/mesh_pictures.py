@@ -40,6 +40,10 @@ class PictureTextures:
             ),
         }
 
+    def color(self, picture: Floats) -> Any:
+        """A picture of colours by itself, (height, width, 4)."""
+        return self._texture(picture)
+
     def forget_but(self, meshes: Sequence[MeshSnapshot]) -> None:
         """Let go of what none of these meshes has."""
         used = {id(_LEVEL)}

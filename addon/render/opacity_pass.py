@@ -23,10 +23,11 @@ from ..shading.volume.map_size import MapSize, fitted_size, size_note
 from ..shading.volume.opacity import layer_ends
 from ..shading.volume.settings import VolumeSettings
 from ..shading.volume.shadow_lights import shadow_frames
-from ..strands import Surface
+from .mesh_depths import MeshDepths
 from .opacity_maps import OpacityForm, OpacityMaps, new_maps
 from .shader_program import ShaderRecipe, program
 from .shader_source import LAYER_TEXEL_CAPACITY
+from .snapshot import Caster
 from .textures import UniformBlock, drawing_into, drawing_state
 
 __all__ = ["OpacityForm", "OpacityMaps", "OpacityPass", "opacity_recipe", "pack_opacity"]
@@ -74,18 +75,6 @@ _STARTS_RECIPE = ShaderRecipe(
 )
 
 
-_MESH_RECIPE = ShaderRecipe(
-    name="opacity_mesh",
-    vertex="opacity_mesh.vert.glsl",
-    fragment="opacity_mesh.frag.glsl",
-    structs=("struct_opacity.glsl",),
-    blocks=(("Opacity", "opacity"),),
-    integers=("light_index",),
-    inputs=(("VEC3", "position"),),
-    varyings=(("smooth", "FLOAT", "mesh_depth"),),
-)
-
-
 @dataclass(frozen=True)
 class _Hair:
     """Strands on the GPU. drawn: how many of them throw the shadow of all."""
@@ -117,7 +106,7 @@ class OpacityPass:
         self._meshes_drawn: tuple[Any, ...] = ()
         self.note = ""
         self._strip: tuple[int, Any] = (0, None)
-        self._casters: list[tuple[Surface, Any]] = []
+        self._casters = MeshDepths()
 
     def maps(
         self,
@@ -128,7 +117,7 @@ class OpacityPass:
         lights: Sequence[Light],
         settings: VolumeSettings,
         strands: StrandSettings,
-        casters: tuple[Surface, ...] = (),
+        casters: tuple[Caster, ...] = (),
     ) -> OpacityMaps:
         """The maps of a moment.
 
@@ -168,35 +157,17 @@ class OpacityPass:
         return new_maps(values, size)
 
     def _draw_casters(
-        self, maps: OpacityMaps, shadowing: list[int], casters: tuple[Surface, ...]
+        self, maps: OpacityMaps, shadowing: list[int], casters: tuple[Caster, ...]
     ) -> None:
         """The depths of meshes, if a light sees others than before, or from elsewhere."""
         seen = (tuple(map(id, casters)), maps.values[: -4 * LAYER_TEXEL_CAPACITY - 4].tobytes())
-        self._casters = [
-            (surface, self._batch_of(surface)) for surface in casters if len(surface.triangles)
-        ]
+        self._casters.hold(casters)
         if self._meshes_drawn == seen:
             return
+        rows = maps.values[: 4 * 4 * LIGHT_CAPACITY].reshape(4, LIGHT_CAPACITY, 4)
         for number, light in enumerate(shadowing):
-            self._draw_meshes(maps, number, light)
+            self._casters.draw(maps.meshes, number, rows[:, light])
         self._meshes_drawn = seen
-
-    def _batch_of(self, surface: Surface) -> Any:
-        """Its triangles on the GPU, kept from the draw before where it is the same object."""
-        return next((b for kept, b in self._casters if kept is surface), None) or _batch(surface)
-
-    def _draw_meshes(self, maps: OpacityMaps, number: int, light: int) -> None:
-        """The depth of the first mesh that a light meets."""
-        target = gpu.types.GPUFrameBuffer(depth_slot={"texture": maps.meshes, "layer": number})
-        shader = program(_MESH_RECIPE)
-        with drawing_into(target), drawing_state(depth_test="LESS_EQUAL"):
-            target.clear(depth=1.0)
-            for _, batch in self._casters:
-                shader.bind(
-                    blocks={"opacity": self._blocks["opacity"].buffer},
-                    integers={"light_index": light},
-                )
-                batch.draw(shader.shader)
 
     def _draw_map(
         self, maps: OpacityMaps, number: int, light: int, hair: _Hair, settings: VolumeSettings
@@ -252,16 +223,6 @@ class OpacityPass:
             vertices = gpu.types.GPUVertBuf(layout, 2 * cv_count)
             self._strip = cv_count, gpu.types.GPUBatch(type="TRI_STRIP", buf=vertices)
         return self._strip[1]
-
-
-def _batch(surface: Surface) -> Any:
-    layout = gpu.types.GPUVertFormat()
-    layout.attr_add(id="position", comp_type="F32", len=3, fetch_mode="FLOAT")
-    vertices = gpu.types.GPUVertBuf(layout, len(surface.positions))
-    vertices.attr_fill("position", np.ascontiguousarray(surface.positions, np.float32))
-    triangles = np.ascontiguousarray(surface.triangles, np.int32)
-    indices = gpu.types.GPUIndexBuf(type="TRIS", seq=triangles)
-    return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
 
 
 def pack_opacity(

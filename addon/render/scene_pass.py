@@ -9,12 +9,17 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Floats
+from ..shading.lights import kept_lights
 from .accumulation import Target
 from .camera import Camera
 from .camera_window import view_depth
 from .card_pass import CardPass
+from .hair_between import may_shade
+from .hair_on_meshes import HairOnMeshes
 from .holdout import Holdout
 from .mesh_pass import MeshPass
+from .mesh_places import MeshPlaces, Placed
+from .mesh_shadows import MeshShadowPass
 from .opacity_maps import OpacityMaps
 from .scene_snapshot import SceneSnapshot, shaded_by
 from .shafts_pass import add_shafts, put_under
@@ -38,7 +43,8 @@ class ScenePass:
         self._strand_passes: dict[Hashable, StrandPass] = {}
         self._card_passes: dict[Hashable, CardPass] = {}
         self._mesh_passes: dict[Hashable, MeshPass] = {}
-        self._numbered = MeshPass()
+        self._mesh_shadows, self._hair_on_meshes = MeshShadowPass(), HairOnMeshes()
+        self._numbered = MeshPlaces()
         self._holdout = Holdout()
 
     def draw(
@@ -89,12 +95,14 @@ class ScenePass:
         with ONE_AT_A_TIME:
             target.sized(*size).clear(_NOTHING)
             with target.drawing():
-                self._numbered.draw_numbers(scene.meshes, camera, *size)
-            numbers = texture_to_array(target.color)[..., 0].copy()
+                numbered = [Placed(mesh, float(mesh.number)) for mesh in scene.meshes]
+                self._numbered.draw(numbered, camera, *size)
+            numbers = texture_to_array(target.color)[..., 3].copy()
             depth = target.depths()
             for groom in scene.grooms:
                 with target.drawing():
                     self._strands(groom.key).draw(_hiding(scene.lit(groom)), camera, *size)
+                    self._cards(groom.key).draw_depth(groom.snapshot, camera, *size)
                 before, depth = depth, target.depths()
                 numbers[depth < before] = groom.number
         distances = np.where(depth < 1.0, view_depth(camera, depth), FAR_AWAY)
@@ -111,9 +119,20 @@ class ScenePass:
         """These grooms alone, in the order of the scene."""
         grooms = [(key, groom) for key, groom in lit.items() if key in keys]
         for key, groom in grooms:
-            self._strands(key).draw(groom, camera, *size)
+            others = self._others(key, groom, maps)
+            self._strands(key).draw(groom, camera, *size, others=others)
         for key, groom in grooms:
             self._cards(key).draw(groom, camera, *size, opacity=maps[key])
+
+    def _others(
+        self, key: Hashable, groom: Snapshot, maps: dict[Hashable, OpacityMaps | None]
+    ) -> list[OpacityMaps]:
+        """Those of all other grooms whose shadow may fall on this one."""
+        others = [each for other, each in maps.items() if other != key and each is not None]
+        if not others or not groom.strand_count:
+            return []
+        ball = self._strands(key).ball(groom)
+        return [each for each in others if may_shade(each, ball)]
 
     def _strands(self, key: Hashable) -> StrandPass:
         return self._strand_passes.setdefault(key, StrandPass())
@@ -128,19 +147,34 @@ class ScenePass:
         size: tuple[int, int],
         maps: dict[Hashable, OpacityMaps | None],
     ) -> None:
-        """Each mesh with the shadow of the groom that is nearest."""
+        """Each mesh with the maps of the groom that is nearest, and what the others have in the way
+        of light.
+        """
         shading = [groom for groom in scene.grooms if maps[groom.key] is not None]
         centers = np.array([scene.lit(groom).center for groom in shading]).reshape(-1, 3)
+        shadows = self._mesh_shadows.maps(
+            scene.casters, kept_lights(scene.lights), scene.mesh_shadows
+        )
         groups: dict[int, list[MeshSnapshot]] = {}
         for mesh, index in zip(scene.meshes, shaded_by(scene.meshes, centers), strict=True):
             groups.setdefault(index, []).append(mesh)
+        found = [each for groom in shading if (each := maps[groom.key]) is not None]
+        light_count = len(kept_lights(scene.lights))
+        between = self._hair_on_meshes.at(groups, found, light_count, camera, size)
         for index, meshes in groups.items():
             groom = None if index < 0 else shading[index]
             light = scene.unlit_by_hair() if groom is None else scene.lit(groom)
             key = None if groom is None else groom.key
             mesh_pass = self._mesh_passes.setdefault(key, MeshPass())
             opacity = None if key is None else maps[key]
-            mesh_pass.draw(replace(light, meshes=tuple(meshes)), camera, *size, opacity=opacity)
+            mesh_pass.draw(
+                replace(light, meshes=tuple(meshes)),
+                camera,
+                *size,
+                opacity=opacity,
+                shadows=shadows,
+                between=between,
+            )
 
     def _forget_but(self, scene: SceneSnapshot) -> None:
         """Let go of grooms that are no longer there."""

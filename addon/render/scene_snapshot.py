@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..shading.lights import Light
+from ..shading.mesh_shadow_settings import MeshShadowSettings
 from .snapshot import Color, MeshSnapshot, Snapshot
 
 
@@ -35,7 +36,8 @@ class DrawnGroom:
 class SceneSnapshot:
     """One moment of a scene.
 
-    casters: meshes that throw shadows on hair, seen or not, world space.
+    casters: meshes that throw shadows, seen or not, world space.
+    mesh_shadows: of meshes on meshes.
     ambient: the world's colour [W/(m^2 sr)].
     """
 
@@ -44,6 +46,7 @@ class SceneSnapshot:
     grooms: tuple[DrawnGroom, ...] = ()
     lights: tuple[Light, ...] = ()
     ambient: Color = (0.0, 0.0, 0.0)
+    mesh_shadows: MeshShadowSettings = field(default_factory=MeshShadowSettings)
     _lit: dict[Hashable, Snapshot] = field(default_factory=dict, init=False, repr=False)
 
     def lit(self, groom: DrawnGroom) -> Snapshot:
@@ -52,7 +55,7 @@ class SceneSnapshot:
         """
         if groom.key not in self._lit:
             near = _nearest(self.casters, groom.snapshot.center)
-            others = tuple(mesh.surface for mesh in self.casters if mesh is not near)
+            others = tuple(mesh for mesh in self.casters if mesh is not near)
             self._lit[groom.key] = replace(
                 groom.snapshot,
                 meshes=() if near is None else (near,),

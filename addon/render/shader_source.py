@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
+from ..cards.bake import SAMPLES, SPARSE_RANGE, SPARSE_STEPS
 from ..dynamics.constraints import CONTACT_WEIGHT, HELD, PINNED
 from ..dynamics.contacts import SKIN
 from ..dynamics.wind import MODES
@@ -26,6 +27,8 @@ from ..shading.skin.layout import CLOSING
 from ..shading.volume.card_opacity import MOST_ALPHA
 from ..shading.volume.dual import HALF_WAY, UNKNOWN_BEYOND
 from ..shading.volume.map_size import START_TEXELS
+from ..shading.volume.mesh_frames import MESH_FRAME_CAPACITY
+from ..shading.volume.mesh_light import EDGE_ON, MESH_BIAS, STEEPEST
 from ..shading.volume.opacity import LEAST_THICKNESS, MAP_BORDER
 from ..shading.volume.transparency import UNSEEN_SHARE
 
@@ -49,6 +52,10 @@ LAYER_ROW = 4096
 SKIN_TRIANGLES_ACROSS, SKIN_SEAMS_ACROSS, SKIN_COPIES_ACROSS = 1024, 1024, 4096
 #: Pixels between the layers of a map that are shown side by side.
 TILE_GAP = 2
+#: masks hold what covers more of a pixel than this, as Cycles has it
+COVERS = 0.5
+#: the strongest lights, for which one groom shades others: a channel of a texture each
+OTHERS_LIGHTS = 4
 #: how a pass writes its colour; see encoded() in lib_output.glsl
 OUTPUTS = ("scene_linear", "viewport")
 #: what strands may be coloured by in place of their shading, see lib_debug_color.glsl
@@ -77,6 +84,12 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "shade_capacity": str(SHADE_CAPACITY),
         "layer_texel_capacity": str(LAYER_TEXEL_CAPACITY),
         "map_border": repr(MAP_BORDER),
+        "mesh_frame_capacity": str(MESH_FRAME_CAPACITY),
+        "covers": repr(COVERS),
+        "others_lights": str(OTHERS_LIGHTS),
+        "mesh_bias": repr(MESH_BIAS),
+        "steepest": repr(STEEPEST),
+        "edge_on": repr(EDGE_ON),
         "start_texels": str(START_TEXELS),
         "tile_gap": str(TILE_GAP),
         "half_way_absorption": repr(HALF_WAY),
@@ -93,6 +106,9 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "skin_kernel_reach": repr(float(KERNEL_REACH)),
         "skin_kernel_taps": str(KERNEL_TAPS),
         "skin_closing": repr(float(CLOSING)),
+        "atlas_samples": str(SAMPLES),
+        "sparse_mask": str(SPARSE_RANGE - 1),
+        **{f"sparse_step_{axis}": str(s) for axis, s in zip("xyz", SPARSE_STEPS, strict=True)},
         "detail_nearest": repr(float(detail.NEAREST)),
         "detail_margin": repr(float(detail.MARGIN)),
         **{

@@ -23,6 +23,7 @@ from ..arrays import Floats, Ints
 from ..shading.skin.layout import SkinLayout
 from ..shading.skin.settings import SkinSettings
 from ..strands import Surface
+from .mesh_shadows import MESH_SHADOW_BLOCKS, MESH_SHADOW_TEXTURES, MeshShadows, ShadowBlock
 from .opacity_pass import OpacityForm, OpacityMaps
 from .shader_program import ShaderRecipe, program
 from .shader_source import SKIN_COPIES_ACROSS, SKIN_SEAMS_ACROSS, SKIN_TRIANGLES_ACROSS
@@ -36,21 +37,26 @@ SKIN_TEXTURES = tuple(
 )
 
 
-def _shadow_recipe(opacity: OpacityForm) -> ShaderRecipe:
+def _shadow_recipe(opacity: OpacityForm, *, has_depths: bool) -> ShaderRecipe:
     return ShaderRecipe(
-        name=f"skin_shadow_{opacity.slots}_{opacity.is_deep}",
+        name=f"skin_shadow_{opacity.slots}_{opacity.is_deep}{'_depths' * has_depths}",
         compute="skin_shadow.comp.glsl",
-        structs=("struct_opacity.glsl",),
-        blocks=(("Opacity", "opacity"),),
+        structs=("struct_opacity.glsl", "struct_mesh_shadows.glsl"),
+        blocks=(("Opacity", "opacity"), *(MESH_SHADOW_BLOCKS if has_depths else ())),
         textures=(
             ("FLOAT_2D", "skin_texels"),
             ("FLOAT_2D", "skin_corners"),
             *opacity.samplers,
+            *(MESH_SHADOW_TEXTURES if has_depths else ()),
         ),
         images=(("RGBA32F", "reaching"),),
         integers=("light_count",),
         numbers=(("VEC3", "hair_forward"),),
-        defines=(("SHADOWS", 1), *opacity.defines),
+        defines=(
+            ("SHADOWS", 1),
+            *opacity.defines,
+            *((("MESH_SHADOWS", 1),) if has_depths else ()),
+        ),
     )
 
 
@@ -98,11 +104,13 @@ class _Drawn:
     softness: float
     light_count: int
     forward: Color
+    shadows: MeshShadows | None
 
     def is_like(self, other: _Drawn) -> bool:
         return (
             self.positions is other.positions
             and self.opacity is other.opacity
+            and self.shadows is other.shadows
             and (self.softness, self.light_count) == (other.softness, other.light_count)
             and self.forward == other.forward
         )
@@ -137,7 +145,7 @@ class SkinPass:
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw makes it anew."""
         self._heads: list[_Head] = []
-        self._block = UniformBlock()
+        self._block, self._shadow_block = UniformBlock(), ShadowBlock()
 
     def shadows(
         self,
@@ -146,6 +154,7 @@ class SkinPass:
         settings: SkinSettings,
         light_count: int,
         forward: Color = (0.0, 0.0, 0.0),
+        shadows: MeshShadows | None = None,
     ) -> dict[int, SkinShadow]:
         """The soft shadow on each mesh that is skin, by the mesh's id(); none on those whose UVs
         are of no use, and none at all without opacity maps or softness.
@@ -154,6 +163,7 @@ class SkinPass:
             light_count: lights that the maps know of.
             forward: the share of light that hair sends on, by colour; the shadow is that of their
                 mean.
+            shadows: of all meshes, beyond the maps.
         """
         if opacity is None or not settings.soft_shadow or not settings.softness:
             return {}
@@ -164,7 +174,7 @@ class SkinPass:
             head = self._head(mesh.skin.surface, settings.skin_resolution)
             used.append(head)
             if not head.layout.is_empty:
-                light = settings.softness, light_count, forward
+                light = settings.softness, light_count, forward, shadows
                 wanted = _Drawn(mesh.skin.surface.positions, opacity, *light)
                 found[id(mesh)] = self._drawn(head, mesh.skin.surface, wanted)
         self._heads = [head for head in self._heads if head in used]
@@ -205,11 +215,19 @@ class SkinPass:
             _in_rows(surface.corners.reshape(-1, 3), 3 * SKIN_TRIANGLES_ACROSS), "RGBA32F"
         )
         texels = head.textures["skin_texels"]
-        shader = program(_shadow_recipe(opacity.form))
+        shadows = wanted.shadows
+        shader = program(_shadow_recipe(opacity.form, has_depths=shadows is not None))
         found = _like(texels)
         shader.bind(
-            blocks={"opacity": self._block.holding(opacity.values)},
-            textures={"skin_texels": texels, "skin_corners": corners, **opacity.textures},
+            blocks={
+                "opacity": self._block.holding(opacity.values),
+                **self._shadow_block.of(shadows, sample=0),
+            },
+            textures={
+                **{"skin_texels": texels, "skin_corners": corners},
+                **opacity.textures,
+                **({} if shadows is None else shadows.textures),
+            },
             images={"reaching": found},
             integers={"light_count": wanted.light_count},
             numbers={"hair_forward": wanted.forward},

@@ -108,6 +108,14 @@ class MeshSnapshot:
         return cls(surface, surface.vertex_normals(), color, occlusion, skin=skin)
 
 
+#: what throws shadows: a mesh with its alpha, or one that covers all
+type Caster = Surface | MeshSnapshot
+
+
+def surface_of(caster: Caster) -> Surface:
+    return caster.surface if isinstance(caster, MeshSnapshot) else caster
+
+
 @dataclass(eq=False)
 class DevicePoints:
     """CVs that are computed on the GPU and stay there.
@@ -182,7 +190,7 @@ class Snapshot:
     rank: Floats | None = None
     hiders: Floats | None = None
     debug_view: str = "none"
-    casters: tuple[Surface, ...] = ()
+    casters: tuple[Caster, ...] = ()
     table_size: int = DEFAULT_SIZE
     cards: CardSnapshot | None = None
 
@@ -209,6 +217,11 @@ class Snapshot:
             )
         if self.debug_view not in DEBUG_VIEWS:
             raise ValueError(f"debug_view {self.debug_view!r} is none of {', '.join(DEBUG_VIEWS)}")
+
+    @property
+    def all_casters(self) -> tuple[Caster, ...]:
+        """Meshes that throw shadows on the hair, drawn here or not."""
+        return (*self.meshes, *self.casters)
 
     @property
     def strand_count(self) -> int:

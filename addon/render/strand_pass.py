@@ -11,7 +11,7 @@ How many pieces each segment has comes from detail_pass.py, unless all have equa
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,10 +23,12 @@ from ..params.glsl import struct_values
 from ..shading.lights import kept_lights, kinds_needed, pack_lights
 from ..shading.marschner.look import pack_fibre
 from ..shading.strand_noise import SEED_LIMIT
+from ..shading.volume.light_frame import Ball
 from .camera import Camera
 from .detail_pass import DetailOrder, DetailPass
 from .display import Display
 from .hair_ball import HairBall
+from .hair_between import NOBODY, HairBetween
 from .marschner_textures import MARSCHNER
 from .opacity_pass import OpacityMaps, OpacityPass
 from .shader_program import released_with_shaders
@@ -75,6 +77,7 @@ class StrandPass:
         output: str = "scene_linear",
         display: Display | None = None,
         samples: int = 1,
+        others: Sequence[OpacityMaps] = (),
     ) -> None:
         """Draw all strands into the bound framebuffer, depth-tested against what is in it.
 
@@ -85,6 +88,8 @@ class StrandPass:
             display: for "viewport", the view transform; None is the plain "Standard".
             samples: pixels of the target across one pixel of the final picture; the least width
                 and the settings of detail count in the latter.
+            others: maps of other hair that may be in the way of light. Counts where this hair has
+                maps itself, see `opacity`.
 
         Raises:
             ShaderError: the shader does not compile here, or points on the GPU were released.
@@ -103,6 +108,7 @@ class StrandPass:
             snapshot,
             order,
             display,
+            others,
             view=view_values(camera, width, height),
             integers={"output_encoding": output_encoding, "samples_across": samples},
         )
@@ -138,15 +144,19 @@ class StrandPass:
             kept_lights(snapshot.lights),
             snapshot.volume,
             snapshot.strand_settings,
-            (*(mesh.surface for mesh in snapshot.meshes), *snapshot.casters),
+            snapshot.all_casters,
         )
+
+    def ball(self, snapshot: Snapshot) -> Ball:
+        """A sphere that holds all its strands."""
+        return self._ball.of(snapshot)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
         names = ("view", "lights", "strands", "shading", "fibre", "opacity")
         self._blocks = {name: UniformBlock() for name in names}
         self._opacity.release()
-        self._ball = HairBall()
+        self._ball, self._between = HairBall(), HairBetween()
         self._textures: dict[str, Any] = {}
         self._uploaded: dict[str, tuple[Any, ...]] = {}
         self._ribbons: dict[int, Any] = {}
@@ -157,6 +167,7 @@ class StrandPass:
         snapshot: Snapshot,
         order: DetailOrder,
         display: Display | None,
+        others: Sequence[OpacityMaps],
         *,
         view: Floats,
         integers: dict[str, int],
@@ -186,6 +197,12 @@ class StrandPass:
         if maps is not None:
             blocks["opacity"] = maps.values
             textures |= maps.textures
+        has_others = maps is not None and bool(others)
+        if has_others:
+            grooms = [(NOBODY, other) for other in others]
+            textures["cv_between"] = self._between.at(
+                textures["cv_points"], self._points_serial, grooms, len(snapshot.lights)
+            )
         if display is not None:
             textures["display_table"] = display.table.texture
             numbers["display_shaper"] = display.shaper
@@ -198,6 +215,7 @@ class StrandPass:
                 opacity=None if maps is None else maps.form,
                 scatters=scatters,
                 light_kinds=kinds_needed(kept_lights(snapshot.lights)),
+                has_others=has_others,
             ),
             ribbon=self._ribbon,
             blocks={name: self._blocks[name].holding(blocks[name]) for name in blocks},

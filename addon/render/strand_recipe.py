@@ -28,6 +28,7 @@ class StrandShading:
     With a display it looks up how the viewport shows a colour, see display.py. With opacity maps
     hair shades itself; `scatters` adds light from strand to strand, in Marschner's model.
     light_kinds: see kinds_needed.
+    has_others: whether there is more hair in the way than the maps hold, by CV.
     """
 
     model: str = "kajiya_kay"
@@ -36,11 +37,13 @@ class StrandShading:
     opacity: OpacityForm | None = None
     scatters: bool = False
     light_kinds: int = 2
+    has_others: bool = False
 
     @property
     def name(self) -> str:
         maps = f"_{self.opacity.slots}_{self.opacity.is_deep}" if self.opacity else ""
-        parts = f"{self.model}{'_scattering' * self.scatters}{maps}_{self.light_kinds}"
+        scattering, others = "_scattering" * self.scatters, "_others" * self.has_others
+        parts = f"{self.model}{scattering}{maps}{others}_{self.light_kinds}"
         return f"{parts}_{self.debug_view}{'_display' * self.has_display}"
 
     @property
@@ -67,6 +70,7 @@ class StrandShading:
             textures=(
                 ("FLOAT_2D", "cv_points"),
                 ("FLOAT_2D", "cv_looks"),
+                *((("FLOAT_2D", "cv_between"),) if self.has_others else ()),
                 *(MARSCHNER_TEXTURES if is_marschner else ()),
                 *(SHARES_TEXTURES if self.scatters else ()),
                 *(self.opacity.samplers if self.opacity else ()),
@@ -85,6 +89,7 @@ class StrandShading:
                 ("LIGHT_KINDS", self.light_kinds),
                 *(self.opacity.defines if self.opacity else ()),
                 *((("DISPLAY", 1),) if self.has_display else ()),
+                *((("OTHERS", 1),) if self.has_others else ()),
             ),
         )
 
@@ -116,6 +121,7 @@ def strand_recipe(
             ("smooth", "VEC2", "strand_along_and_occlusion"),
             ("smooth", "FLOAT", "strand_radius"),
             ("flat", "INT", "strand_seed"),
+            *((("smooth", "VEC4", "strand_between"),) if shading.has_others else ()),
             *((("flat", "INT", "strand_index"),) if debug_view != "none" else ()),
             *(_RIBBON if is_hashed else ()),
         ),

@@ -68,6 +68,7 @@ class Light:
     is_ball: a radius makes it a ball, not a disk that faces whoever looks.
     cone: of a spot.
     panel: of an area light.
+    casts_shadow: whether anything is in its way.
     name: by which the artist knows it.
     """
 
@@ -78,6 +79,7 @@ class Light:
     is_ball: bool = False
     cone: Cone | None = None
     panel: Panel | None = None
+    casts_shadow: bool = True
     name: str = field(default="", compare=False)
 
     @classmethod

@@ -47,6 +47,22 @@ class HAIRLOOM_PT_engine_sampling(_RenderPanel):
         column.prop(picture, "samples", text="Render")
 
 
+class HAIRLOOM_PT_engine_mesh_shadows(_RenderPanel):
+    """Which shadows meshes throw."""
+
+    bl_label = "Mesh Shadows"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.hairloom.mesh_shadows, "mesh_shadows", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, shadows = self.layout, context.scene.hairloom.mesh_shadows
+        layout.use_property_split = True
+        layout.active = shadows.mesh_shadows
+        layout.prop(shadows, "mesh_resolution")
+
+
 class HAIRLOOM_PT_engine_motion_blur(_RenderPanel):
     """How long the shutter is open."""
 
@@ -104,6 +120,7 @@ class HAIRLOOM_PT_engine_passes(bpy.types.Panel):
 
 CLASSES = (
     HAIRLOOM_PT_engine_sampling,
+    HAIRLOOM_PT_engine_mesh_shadows,
     HAIRLOOM_PT_engine_motion_blur,
     HAIRLOOM_PT_engine_film,
     HAIRLOOM_PT_engine_passes,

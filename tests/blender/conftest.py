@@ -8,6 +8,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
+from engine_stage import SIZE, set_world  # noqa: E402
+
 import hairloom  # noqa: E402  it is loaded by tests/conftest.py
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
@@ -69,3 +71,23 @@ def new_hair(extension: None) -> Callable[..., Any]:
 def evaluated() -> Callable[[], Any]:
     """Gives the evaluated dependency graph as it is now."""
     return lambda: bpy.context.evaluated_depsgraph_get()
+
+
+@pytest.fixture
+def stage(extension: None) -> Any:
+    """A scene with a camera 1 m in front of the origin, rendered by our engine."""
+    scene = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0.0, -1.0, 0.0), (np.pi / 2.0, 0.0, 0.0)
+    camera.data.clip_start = 0.01
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.world = bpy.data.worlds.new("World")
+    set_world((0.5, 0.5, 0.5))
+    render = scene.render
+    render.engine = "HAIRLOOM"
+    render.resolution_x = render.resolution_y = SIZE
+    render.resolution_percentage = 100
+    render.dither_intensity = 0.0
+    scene.hairloom.picture.samples = 4
+    return scene

@@ -1,4 +1,4 @@
-"""The render engine in the background: pictures, passes, and what an artist may throw at it."""
+"""The render engine in the background: pictures, passes, and what Blender asks of engines."""
 
 from __future__ import annotations
 
@@ -14,79 +14,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
+from engine_stage import SIZE, add_ball, coded, passes_in, picture, rendered  # noqa: E402
+
 pytestmark = pytest.mark.usefixtures("gpu_context", "extension")
-
-SIZE = 64
-
-
-@pytest.fixture
-def stage(extension: None) -> Any:
-    """A scene with a camera 1 m in front of the origin, rendered by our engine."""
-    scene = bpy.context.scene
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.location, camera.rotation_euler = (0.0, -1.0, 0.0), (np.pi / 2.0, 0.0, 0.0)
-    camera.data.clip_start = 0.01
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    scene.world = bpy.data.worlds.new("World")
-    set_world((0.5, 0.5, 0.5))
-    render = scene.render
-    render.engine = "HAIRLOOM"
-    render.resolution_x = render.resolution_y = SIZE
-    render.resolution_percentage = 100
-    render.dither_intensity = 0.0
-    scene.hairloom.picture.samples = 4
-    return scene
-
-
-def set_world(color: tuple[float, float, float]) -> None:
-    world = bpy.context.scene.world
-    world.node_tree.nodes.clear()
-    background = world.node_tree.nodes.new("ShaderNodeBackground")
-    background.inputs["Color"].default_value = (*color, 1.0)
-
-
-def add_ball(radius: float = 0.15, color: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Any:
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, segments=48, ring_count=24)
-    ball = bpy.context.object
-    material = bpy.data.materials.new("Diffuse")
-    material.node_tree.nodes.clear()
-    diffuse = material.node_tree.nodes.new("ShaderNodeBsdfDiffuse")
-    diffuse.inputs["Color"].default_value = (*color, 1.0)
-    ball.data.materials.append(material)
-    return ball
-
-
-def rendered(folder: Path) -> dict[str, np.ndarray]:
-    """Render, and read back all passes, see `passes_in`."""
-    scene = bpy.context.scene
-    settings = scene.render.image_settings
-    if hasattr(settings, "media_type"):
-        settings.media_type = "MULTI_LAYER_IMAGE"
-    settings.file_format = "OPEN_EXR_MULTILAYER"
-    settings.color_depth = "32"
-    path = folder / "picture.exr"
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
-    return passes_in(path) if path.is_file() else {}
-
-
-def passes_in(path: Path) -> dict[str, np.ndarray]:
-    """Name -> (height, width, channels), row 0 at the bottom."""
-    import OpenImageIO
-
-    found = {}
-    file = OpenImageIO.ImageInput.open(str(path))
-    while file.seek_subimage(len(found), 0):
-        spec = file.spec()
-        pixels = file.read_image(len(found), 0, 0, spec.nchannels, "float")
-        found[spec.channelnames[0].rpartition(".")[0]] = pixels[::-1]
-    file.close()
-    return found
-
-
-def picture(folder: Path) -> np.ndarray:
-    return rendered(folder)["ViewLayer.Combined"]
 
 
 def test_radiance_arrives_as_it_is(stage: Any, tmp_path: Path) -> None:
@@ -111,14 +41,6 @@ def test_radiance_is_shown_as_blender_shows_it(stage: Any, tmp_path: Path, trans
     shown = [coded(tmp_path / f"{name}.png") for name in ("rendered", "plain")]
     np.testing.assert_array_equal(*shown)
     assert 160 < 255.0 * shown[0].mean() < 190
-
-
-def coded(path: Path) -> np.ndarray:
-    image = bpy.data.images.load(str(path))
-    image.colorspace_settings.is_data = True
-    pixels = np.empty(len(image.pixels), np.float32)
-    image.pixels.foreach_get(pixels)
-    return pixels.reshape(*image.size[::-1], 4)[..., :3]
 
 
 def test_hair_is_drawn_and_two_renders_are_the_same(
@@ -226,121 +148,6 @@ def test_the_region_of_a_view_is_that_of_the_picture(stage: Any) -> None:
     assert view_rectangle(context, depsgraph, 400, 200) == (0, 50, 200, 0)
 
 
-def test_view_layers_and_holdouts(stage: Any, tmp_path: Path) -> None:
-    """Each layer has what is in it; a holdout is a hole."""
-    stage.render.film_transparent = True
-    collections = [bpy.data.collections.new(name) for name in ("One", "Two")]
-    for collection, x in zip(collections, (-0.15, 0.15), strict=True):
-        stage.collection.children.link(collection)
-        ball = add_ball(0.1)
-        ball.location.x = x
-        stage.collection.objects.unlink(ball)
-        collection.objects.link(ball)
-    second = stage.view_layers.new("Second")
-    second.layer_collection.children["One"].exclude = True
-    third = stage.view_layers.new("Third")
-    third.layer_collection.children["One"].holdout = True
-    found = rendered(tmp_path)
-    covered = {
-        name: (
-            found[f"{name}.Combined"][:, : SIZE // 2, 3].max(),
-            found[f"{name}.Combined"][:, SIZE // 2 :, 3].max(),
-        )
-        for name in ("ViewLayer", "Second", "Third")
-    }
-    assert covered == {"ViewLayer": (1.0, 1.0), "Second": (0.0, 1.0), "Third": (0.0, 1.0)}
-
-
-@pytest.mark.parametrize("way", ["none", "hashed", "layers"])
-def test_hair_may_be_a_hole(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path, way: str
-) -> None:
-    """Before a wall it takes as much away as it covers alone; meshes before it stay."""
-    stage.render.film_transparent = True
-    stage.hairloom.picture.samples = 16
-    hair = new_hair(sphere)
-    hair.data.hairloom.strands.width_scale = 60.0
-    hair.data.hairloom.strands.transparency = way
-    hair.data.hairloom.strands.opacity = 0.7
-    bpy.data.objects.remove(sphere)
-    alone = picture(tmp_path)[..., 3]
-    assert alone.max() > 0.1 and 0.005 < alone.mean() < 0.9
-    wall = add_ball(1.5)
-    wall.location.y = 2.0
-    assert picture(tmp_path)[..., 3].min() > 0.99
-    hair.is_holdout = True
-    np.testing.assert_allclose(picture(tmp_path)[..., 3], 1.0 - alone, atol=2e-3)
-    wall.location.y, wall.scale = -0.6, (0.1,) * 3
-    assert picture(tmp_path)[SIZE // 2, SIZE // 2, 3] == 1.0
-    hair.is_holdout = False
-    bpy.data.objects.remove(wall)
-    apart = bpy.data.collections.new("Apart")
-    stage.collection.children.link(apart)
-    stage.collection.objects.unlink(hair)
-    apart.objects.link(hair)
-    assert picture(tmp_path)[..., 3].max() > 0.1
-    stage.view_layers[0].layer_collection.children["Apart"].indirect_only = True
-    assert picture(tmp_path)[..., 3].max() == 0.0
-
-
-def test_previewed_hair_is_seen_as_its_object_is(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any
-) -> None:
-    """The reader leaves it out and says how it takes part, whatever a preview wrote to the copy."""
-    from hairloom.addon.host.engine_scene import SceneReader
-
-    hair, reader = new_hair(sphere), SceneReader()
-    hair.is_holdout = True
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    hair.evaluated_get(depsgraph).visible_camera = False
-    assert not reader.read(depsgraph, is_previewed=lambda _: True).grooms
-    found = reader.previewed[hair.session_uid]
-    assert (found.is_seen, found.is_holdout) == (True, True)
-    hair.visible_camera, hair.is_holdout = False, False
-    reader.read(bpy.context.evaluated_depsgraph_get(), is_previewed=lambda _: True)
-    found = reader.previewed[hair.session_uid]
-    assert (found.is_seen, found.is_holdout) == (False, False)
-
-
-def test_texts_metaballs_and_instances_are_drawn(stage: Any, tmp_path: Path) -> None:
-    stage.render.film_transparent = True
-    add: list[Callable[[], Any]] = [
-        lambda: bpy.ops.object.text_add(rotation=(np.pi / 2.0, 0.0, 0.0), scale=(0.3,) * 3),
-        lambda: bpy.ops.object.metaball_add(radius=0.1),
-        lambda: bpy.ops.surface.primitive_nurbs_surface_sphere_add(radius=0.1),
-    ]
-    for each in add:
-        each()
-        assert picture(tmp_path)[..., 3].mean() > 0.01
-        bpy.data.objects.remove(bpy.context.object)
-    inside = bpy.data.collections.new("Inside")
-    ball = add_ball(0.05)
-    stage.collection.objects.unlink(ball)
-    inside.objects.link(ball)
-    assert picture(tmp_path)[..., 3].max() == 0.0
-    for x in (-0.1, 0.1):
-        empty = bpy.data.objects.new("Empty", None)
-        empty.instance_type, empty.instance_collection = "COLLECTION", inside
-        empty.location.x = x
-        stage.collection.objects.link(empty)
-    alpha = picture(tmp_path)[SIZE // 2, :, 3]
-    assert np.count_nonzero(np.diff((alpha > 0.5).astype(int))) == 4
-
-
-def test_hidden_in_renders_is_not_drawn(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
-) -> None:
-    stage.render.film_transparent = True
-    hair = new_hair(sphere)
-    sphere.hide_render = True
-    hair.data.hairloom.strands.width_scale = 20.0
-    assert picture(tmp_path)[..., 3].max() > 0.5
-    hair.visible_camera = False
-    assert picture(tmp_path)[..., 3].max() == 0.0
-    hair.visible_camera, hair.hide_render = True, True
-    assert picture(tmp_path)[..., 3].max() == 0.0
-
-
 def test_motion_blur_spreads_over_the_way(stage: Any, tmp_path: Path) -> None:
     """A ball that flies by is as dense in each place as it is long there, and loses nothing."""
     stage.render.film_transparent = True
@@ -369,33 +176,6 @@ def curves_of(obj: Any) -> Iterator[Any]:
         for strip in layer.strips:
             for bag in strip.channelbags:
                 yield from bag.fcurves
-
-
-def test_bad_input_is_told(stage: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    stage.world = None
-    assert picture(tmp_path)[..., :3].max() == 0.0
-    assert "Lights: no light shines here" in capfd.readouterr().out
-    stage.camera.data.type = "PANO"
-    picture(tmp_path)
-    assert "panoramic cameras are not drawn" in capfd.readouterr().out
-    render = stage.render
-    render.use_border, render.border_min_x, render.border_max_x = True, 0.5, 0.501
-    with pytest.raises(RuntimeError, match=r"too small|pixels"):
-        bpy.ops.render.render()
-    render.use_border = False
-    stage.camera = None
-    with pytest.raises(RuntimeError, match=r"(?i)camera"):
-        bpy.ops.render.render()
-
-
-def test_the_camera_may_be_inside_of_hair_and_head(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
-) -> None:
-    new_hair(sphere)
-    for y in (-0.12, 0.0):
-        stage.camera.location.y = y
-        found = picture(tmp_path)
-        assert np.isfinite(found).all() and found[..., 3].min() > 0.99
 
 
 @pytest.mark.skipif(
@@ -484,50 +264,3 @@ def test_both_eyes_of_a_stereo_camera(stage: Any, tmp_path: Path) -> None:
     places = [np.average(np.arange(SIZE), weights=alpha.sum(axis=0)) for alpha in alphas]
     # parallax of a point at 1 m, whose eyes meet at 2 m, through a lens that sees 0.72 m there
     assert abs(abs(places[0] - places[1]) - 0.05 / 0.72 * SIZE) < 0.3
-
-
-def test_hair_is_rendered_as_it_was_baked(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
-) -> None:
-    """Frames and moments between them, although the curves themselves are hidden then."""
-    from hairloom.addon.host import engine_hair, playback
-
-    hair = new_hair(sphere)
-    stage.frame_start, stage.frame_end = 1, 4
-    for frame, x in ((1, -0.2), (4, 0.2)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
-    hair.hairloom.dynamics.form = "numpy"
-    hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.bake.folder = str(tmp_path / "bake")
-    hair.pass_index = 5
-    stage.frame_set(1)
-    assert bpy.ops.hairloom.bake() == {"FINISHED"}
-    assert hair.hide_render and hair.hairloom.bake.copy is not None
-    copy = hair.hairloom.bake.copy
-    for frame, subframe in ((2, 0.0), (2, 0.25)):
-        stage.frame_set(frame, subframe=subframe)
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        expected = playback.strands_in(playback.cache_of(hair), frame, subframe)
-        for obj in (copy, hair):
-            found = engine_hair.read_groom(obj, depsgraph)
-            np.testing.assert_array_equal(found.strands, expected)
-    stage.view_layers[0].use_pass_object_index = True
-    hair.data.hairloom.strands.width_scale = 20.0
-    numbers = rendered(tmp_path)["ViewLayer.Object Index"]
-    assert (numbers == 5.0).any()
-
-
-def test_animated_settings_are_those_of_the_frame(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any
-) -> None:
-    from hairloom.addon.host import engine_hair
-
-    hair = new_hair(sphere)
-    strands = hair.data.hairloom.strands
-    for frame, width in ((1, 1.0), (3, 5.0)):
-        strands.width_scale = width
-        hair.data.keyframe_insert("hairloom.strands.width_scale", frame=frame)
-    stage.frame_set(3)
-    found = engine_hair.read_groom(hair, bpy.context.evaluated_depsgraph_get())
-    assert found.strand_settings.width_scale == 5.0

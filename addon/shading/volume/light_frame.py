@@ -142,7 +142,7 @@ def stepped_ball(center: Floats, radius: float) -> Ball:
 def light_frame(light: Light, ball: Ball) -> LightFrame | None:
     """The frame of a light's map; None where a light within the ball can have none."""
     if light.kind == "sun":
-        return _of_sun(np.asarray(light.vector, np.float64), ball)
+        return frame_of_sun(np.asarray(light.vector, np.float64), ball)
     eye = np.asarray(light.vector, np.float64)
     away = eye - ball.center
     distance = float(np.linalg.norm(away))
@@ -150,7 +150,7 @@ def light_frame(light: Light, ball: Ball) -> LightFrame | None:
         # the cone that touches the ball
         tangent = ball.radius / np.sqrt(distance**2 - ball.radius**2)
         ends = distance - ball.radius, distance + ball.radius
-        return _of_place(away / distance, eye, float(tangent), ends)
+        return frame_at(away / distance, eye, float(tangent), ends)
     axis = shines_along(light)
     if axis is None:
         if distance < _AMIDST * ball.radius:
@@ -160,7 +160,7 @@ def light_frame(light: Light, ball: Ball) -> LightFrame | None:
     if ahead + ball.radius < _LEAST_AHEAD * ball.radius:
         return None
     near = max(ahead - ball.radius, 0.0)
-    return _of_place(-axis, eye, float(np.tan(WIDEST)), (near, ahead + ball.radius))
+    return frame_at(-axis, eye, float(np.tan(WIDEST)), (near, ahead + ball.radius))
 
 
 def is_within(light: Light, ball: Ball) -> bool:
@@ -183,7 +183,8 @@ def shines_along(light: Light) -> Floats | None:
     return along if along.any() else None
 
 
-def _of_sun(towards: Floats, ball: Ball) -> LightFrame:
+def frame_of_sun(towards: Floats, ball: Ball) -> LightFrame:
+    """Of a light that shines from one direction, towards which `towards` (3,) points."""
     right, up, towards = _axes(towards)
     to_map = np.eye(4)
     to_map[:2, :3] = right / ball.radius, up / ball.radius
@@ -193,10 +194,8 @@ def _of_sun(towards: Floats, ball: Ball) -> LightFrame:
     return LightFrame(to_map, to_map[2].copy(), 2.0 * ball.radius)
 
 
-def _of_place(
-    towards: Floats, eye: Floats, tangent: float, ends: tuple[float, float]
-) -> LightFrame:
-    """Of a light at `eye` that looks against `towards`.
+def frame_at(towards: Floats, eye: Floats, tangent: float, ends: tuple[float, float]) -> LightFrame:
+    """Of a light at the place `eye` that looks against `towards`, each (3,).
 
     Args:
         tangent: of half the angle under which it sees.

@@ -26,8 +26,9 @@ def shadow_frames(
     """The frame of each light's map; None of those that throw no shadow."""
     frames: list[LightFrame | None] = [None] * len(lights)
     if settings.shadows != "none":
-        for index, frame in _asked(lights, ball, settings):
-            frames[index] = frame
+        casting = [index for index, light in enumerate(lights) if light.casts_shadow]
+        for index, frame in _asked([lights[each] for each in casting], ball, settings):
+            frames[casting[index]] = frame
     return frames
 
 
@@ -41,6 +42,7 @@ def shadow_warnings(
     """
     if settings.shadows == "none":
         return ()
+    lights = [light for light in lights if light.casts_shadow]
     maps = list(_asked(lights, ball, settings))
     asked = [index for index, _ in maps]
     found = list(_setting_warnings(ball, settings))

@@ -1,0 +1,44 @@
+"""Meshes on the GPU where only their places count, and the holes of their alpha."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats
+from .mesh_pictures import pictures_of
+from .snapshot import Caster, MeshSnapshot, surface_of
+
+
+def alpha_picture(caster: Caster) -> Floats | None:
+    """The picture whose alpha makes holes; None where none does."""
+    if not isinstance(caster, MeshSnapshot) or caster.transparency == "opaque":
+        return None
+    pictures = pictures_of(caster)
+    return None if pictures is None else pictures.color
+
+
+def caster_batch(caster: Caster) -> Any:
+    """The triangles: position; with such a picture UVs as well, for which each corner is a vertex
+    of its own.
+    """
+    surface = surface_of(caster)
+    values, has_corners = {"position": surface.positions}, alpha_picture(caster) is not None
+    if has_corners and surface.corner_uv is not None:
+        values = {
+            "position": surface.corners.reshape(-1, 3),
+            "picture_place": surface.corner_uv.reshape(-1, 2),
+        }
+    layout = gpu.types.GPUVertFormat()
+    for name, array in values.items():
+        layout.attr_add(id=name, comp_type="F32", len=array.shape[1], fetch_mode="FLOAT")
+    vertices = gpu.types.GPUVertBuf(layout, len(values["position"]))
+    for name, array in values.items():
+        vertices.attr_fill(name, np.ascontiguousarray(array, np.float32))
+    if has_corners:
+        return gpu.types.GPUBatch(type="TRIS", buf=vertices)
+    triangles = np.ascontiguousarray(surface.triangles, np.int32)
+    indices = gpu.types.GPUIndexBuf(type="TRIS", seq=triangles)
+    return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)

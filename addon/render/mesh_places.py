@@ -1,0 +1,98 @@
+"""Draws where meshes are and which is nearest, for masks and for what is found at their places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .camera import Camera
+from .caster_batch import alpha_picture, caster_batch
+from .mesh_pictures import PictureTextures
+from .shader_program import ShaderRecipe, program, released_with_shaders
+from .snapshot import MeshSnapshot
+from .textures import UniformBlock, drawing_state
+from .view_block import view_values
+
+#: the pattern of a mesh that is cut where it covers less than half, see mesh_place.frag.glsl
+CUT = (-1.0, -1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A mesh to draw. number: what is written. chance: of its holes, see hashed_alpha.shifts."""
+
+    mesh: MeshSnapshot
+    number: float
+    chance: tuple[float, float] = CUT
+
+
+def place_recipe(*, has_alpha: bool, has_pictures: bool) -> ShaderRecipe:
+    """The program of meshes that have holes, or have not."""
+    return ShaderRecipe(
+        name=f"mesh_place{'_alpha' * has_alpha}{'_pictures' * has_pictures}",
+        vertex="mesh_place.vert.glsl",
+        fragment="mesh_place.frag.glsl",
+        structs=("struct_view.glsl",),
+        blocks=(("View", "view"),),
+        textures=(("FLOAT_2D", "mesh_color_map"),) if has_pictures else (),
+        numbers=(
+            ("FLOAT", "mesh_number"),
+            *((("FLOAT", "mesh_alpha"), ("VEC2", "mesh_chance")) if has_alpha else ()),
+        ),
+        inputs=(("VEC3", "position"), *((("VEC2", "picture_place"),) if has_pictures else ())),
+        varyings=(
+            ("smooth", "VEC3", "mesh_point"),
+            *((("smooth", "VEC2", "mesh_uv"),) if has_pictures else ()),
+        ),
+        outputs=(("VEC4", "color"),),
+        defines=(
+            *((("ALPHA", 1),) if has_alpha else ()),
+            *((("PICTURES", 1),) if has_pictures else ()),
+        ),
+    )
+
+
+class MeshPlaces:
+    """Keeps meshes on the GPU from draw to draw; making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self.release()
+        released_with_shaders(self)
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU; the next draw uploads again."""
+        self._view = UniformBlock()
+        self._batches: list[tuple[MeshSnapshot, Any]] = []
+        self._pictures = PictureTextures()
+
+    def draw(self, meshes: Sequence[Placed], camera: Camera, width: int, height: int) -> None:
+        """Draw place [m, world] and number of each mesh into the bound framebuffer."""
+        kept = {id(mesh): batch for mesh, batch in self._batches}
+        self._batches = [
+            (each.mesh, kept[id(each.mesh)] if id(each.mesh) in kept else caster_batch(each.mesh))
+            for each in meshes
+            if len(each.mesh.surface.triangles)
+        ]
+        batches = {id(mesh): batch for mesh, batch in self._batches}
+        view = self._view.holding(view_values(camera, width, height))
+        for each in meshes:
+            if id(each.mesh) in batches:
+                shader = self._bound(each, view)
+                with drawing_state():
+                    batches[id(each.mesh)].draw(shader)
+        self._pictures.forget_but([each.mesh for each in meshes])
+
+    def _bound(self, each: Placed, view: Any) -> Any:
+        """The shader of a mesh, ready to draw."""
+        mesh, picture = each.mesh, alpha_picture(each.mesh)
+        has_alpha, has_pictures = mesh.transparency != "opaque", picture is not None
+        textures: dict[str, Any] = {}
+        if picture is not None:
+            textures["mesh_color_map"] = self._pictures.color(picture)
+        numbers: dict[str, Any] = {"mesh_number": each.number}
+        if has_alpha:
+            numbers |= {"mesh_alpha": mesh.alpha, "mesh_chance": each.chance}
+        shader = program(place_recipe(has_alpha=has_alpha, has_pictures=has_pictures))
+        shader.bind(blocks={"view": view}, textures=textures, numbers=numbers)
+        return shader.shader

@@ -1,0 +1,165 @@
+"""Shadows of meshes on meshes, wherever they are: a map of depths or more for each light.
+
+Maps are drawn only when a mesh or a light is another one than before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats
+from ..shading.lights import LIGHT_CAPACITY, Light
+from ..shading.mesh_shadow_settings import MeshShadowSettings
+from ..shading.volume.light_frame import LightFrame
+from ..shading.volume.map_size import MEMORY_LIMIT
+from ..shading.volume.mesh_frames import (
+    MESH_FRAME_CAPACITY,
+    Extent,
+    ball_of_casters,
+    extent_of,
+    mesh_frames,
+)
+from .hashed_alpha import shifts
+from .mesh_depths import MeshDepths
+from .shader_program import released_with_shaders
+from .snapshot import Caster, surface_of
+from .textures import UniformBlock
+
+#: what a program that reads the maps has to declare
+MESH_SHADOW_BLOCKS = (("MeshShadows", "mesh_shadows"),)
+MESH_SHADOW_TEXTURES = (("DEPTH_2D_ARRAY", "mesh_depths"),)
+_TEXEL_BYTES = 4
+#: of hashed_alpha.shifts, by which the texels that are asked move from sample to sample
+_SEQUENCE = 1
+
+
+@dataclass(frozen=True, eq=False)
+class MeshShadows:
+    """What shading reads: the block `MeshShadows` without a shift, and the maps."""
+
+    values: Floats
+    depths: Any
+
+    @property
+    def textures(self) -> dict[str, Any]:
+        """By their names in the shader."""
+        return {"mesh_depths": self.depths}
+
+    def values_of(self, sample: int) -> Floats:
+        """The block for a sample of a picture: each asks other places of the maps, so that the mean
+        of them has smooth edges.
+        """
+        values = self.values.copy()
+        values[-4:-2] = 2.0 * (np.add(shifts(_SEQUENCE, sample), 0.5) % 1.0) - 1.0
+        return values
+
+
+class MeshShadowPass:
+    """Keeps the maps of a scene from draw to draw; making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self.release()
+        released_with_shaders(self)
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU; the next draw makes it anew."""
+        self._casters = MeshDepths()
+        self._extents: list[tuple[Caster, Extent]] = []
+        self._drawn: tuple[Any, ...] = ()
+        self._maps: MeshShadows | None = None
+        self._shape = (0, 0)
+
+    def maps(
+        self, casters: Sequence[Caster], lights: Sequence[Light], settings: MeshShadowSettings
+    ) -> MeshShadows | None:
+        """The maps of a moment; None where no mesh can shade another one.
+
+        Args:
+            casters: in world space; another object whenever one is another.
+            lights: in the order in which the shader knows them.
+        """
+        if not settings.mesh_shadows:
+            self.release()
+            return None
+        frames = self._frames(casters, lights)
+        if not any(frames):
+            return None
+        layers = max(sum(map(len, frames)), 2)  # one texture alone would not be an array
+        most = gpu.capabilities.max_texture_size_get()
+        side = mesh_map_side(settings.mesh_resolution, layers, most)
+        values = pack_mesh_shadows(frames, side)
+        wanted = (tuple(map(id, casters)), values.tobytes())
+        if self._maps is None or self._drawn != wanted:
+            self._maps = MeshShadows(values, self._texture(side, layers))
+            self._casters.hold(casters)
+            for layer, frame in enumerate(frame for each in frames for frame in each):
+                rows = np.stack([*frame.to_map[[0, 1, 3]], frame.to_depth])
+                self._casters.draw(self._maps.depths, layer, rows)
+            self._drawn = wanted
+        return self._maps
+
+    def _frames(
+        self, casters: Sequence[Caster], lights: Sequence[Light]
+    ) -> list[tuple[LightFrame, ...]]:
+        """Of each light, as many as there may be."""
+        kept = {id(caster): extent for caster, extent in self._extents}
+        self._extents = [
+            (each, kept[id(each)] if id(each) in kept else extent_of(surface_of(each)))
+            for each in casters
+            if len(surface_of(each).triangles)
+        ]
+        ball = ball_of_casters([extent for _, extent in self._extents])
+        if ball is None:
+            return []
+        found, left = [], MESH_FRAME_CAPACITY
+        for light in lights[:LIGHT_CAPACITY]:
+            frames = mesh_frames(light, ball)
+            found.append(frames if len(frames) <= left else ())
+            left -= len(found[-1])
+        return found
+
+    def _texture(self, side: int, layers: int) -> Any:
+        """That of the draw before, where it is as large."""
+        if self._maps is not None and self._shape == (side, layers):
+            return self._maps.depths
+        self._shape = side, layers
+        return gpu.types.GPUTexture((side, side), layers=layers, format="DEPTH_COMPONENT32F")
+
+
+class ShadowBlock:
+    """The block of a draw; making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self._block = UniformBlock()
+
+    def of(self, maps: MeshShadows | None, sample: int) -> dict[str, Any]:
+        """By its name in the shader; nothing without maps."""
+        return {} if maps is None else {"mesh_shadows": self._block.holding(maps.values_of(sample))}
+
+
+def mesh_map_side(asked: int, layers: int, most: int) -> int:
+    """Texels along a side of each of so many maps that memory and GPU allow."""
+    return max(min(asked, most, int(np.sqrt(MEMORY_LIMIT / (_TEXEL_BYTES * layers)))), 1)
+
+
+def pack_mesh_shadows(frames: Sequence[Sequence[LightFrame]], side: int) -> Floats:
+    """The block `MeshShadows` of gpu_shaders/struct_mesh_shadows.glsl in std140, (420,) float32.
+
+    Args:
+        frames: of each light. side: texels along a side of each map.
+    """
+    rows = np.zeros((4, MESH_FRAME_CAPACITY, 4), np.float32)
+    of_lights = np.zeros((LIGHT_CAPACITY, 4), np.float32)
+    number = 0
+    for index, each in enumerate(frames[:LIGHT_CAPACITY]):
+        of_lights[index, :2] = number, len(each)
+        for frame in each:
+            rows[:3, number], rows[3, number] = frame.to_map[[0, 1, 3]], frame.to_depth
+            number += 1
+    words = np.array([0.0, 0.0, side, 0.0], np.float32)
+    return np.concatenate([rows.ravel(), of_lights.ravel(), words])

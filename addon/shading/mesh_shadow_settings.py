@@ -1,0 +1,30 @@
+"""What the artist sets about the shadows that meshes throw on meshes in a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..params import Settings, integer, toggle
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshShadowSettings(Settings):
+    """Shadows of meshes on meshes, beside those of hair."""
+
+    section: ClassVar[str] = "mesh_shadows"
+    title: ClassVar[str] = "Mesh Shadows"
+
+    mesh_shadows: bool = toggle(
+        True,
+        label="Mesh Shadows",
+        description="Meshes throw shadows on meshes everywhere; without, only around hair",
+    )
+    mesh_resolution: int = integer(
+        2048,
+        label="Resolution",
+        description="Texels along a side of each light's map of all meshes; a lamp amidst them has "
+        "up to six such maps",
+        soft=(512, 4096),
+        hard=(16, 8192),
+    )

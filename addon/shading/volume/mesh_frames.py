@@ -1,0 +1,143 @@
+"""How a light sees all meshes of a scene, for the map of their depths.
+
+An opacity map covers the hair alone. Meshes throw shadows on meshes everywhere, so each light has
+maps of its own for them, one or more frames of light_frame.py: a sun's is a square over all meshes,
+a spot's its cone, and of others the cone that holds all meshes; a light amidst them looks along the
+sides of a cube.
+
+A ground is large and would take most texels. What is flat throws no shadow on itself, and what else
+lies in its shadow is seen by the light anyway: so the largest flat mesh counts for nothing when the
+frames are laid. Still it is drawn, as far as it lies in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Floats
+from ...strands import Surface
+from ..lights import Light
+from .light_frame import Ball, LightFrame, frame_at, frame_of_sun, shines_along, stepped_ball
+
+#: frames of all lights together, at most: of four lamps amidst meshes
+MESH_FRAME_CAPACITY = 24
+#: one frame opens no wider than this to each side [rad]; what is wider takes the sides of a cube
+_WIDEST = float(np.radians(55.0))
+#: tangent of half the angle of a cube's side, with room for the filter at its border
+_SIDE = 1.02
+#: a mesh is flat whose vertices are as near to a plane, as a share of its size
+_FLAT = 1e-5
+#: vertices that are asked before all are
+_FEW = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Extent:
+    """Where a mesh is: lowest and highest corner of its box, (3,) [m]; is_flat: in one plane."""
+
+    low: Floats
+    high: Floats
+    is_flat: bool
+
+    @property
+    def size(self) -> float:
+        return float(np.linalg.norm(self.high - self.low))
+
+    @property
+    def corners(self) -> Floats:
+        """(8, 3) [m]."""
+        ends = np.array([self.low, self.high], np.float64)
+        x, y, z = np.indices((2, 2, 2)).reshape(3, 8)
+        return np.stack([ends[x, 0], ends[y, 1], ends[z, 2]], axis=1)
+
+
+def extent_of(surface: Surface) -> Extent:
+    """Of a mesh with vertices."""
+    low, high = surface.bounds()
+    return Extent(low, high, _is_flat(surface.positions, float(np.linalg.norm(high - low))))
+
+
+def ball_of_casters(extents: Sequence[Extent]) -> Ball | None:
+    """Around all meshes between which shadows may fall; None where none can."""
+    flat = max((each for each in extents if each.is_flat), key=lambda e: e.size, default=None)
+    counted = [each for each in extents if each is not flat]
+    if not counted:
+        return None
+    low = np.min([each.low for each in counted], axis=0)
+    high = np.max([each.high for each in counted], axis=0)
+    return stepped_ball(0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)))
+
+
+def mesh_frames(light: Light, ball: Ball) -> tuple[LightFrame, ...]:
+    """The frames in which a light sees all meshes; none of a light that throws no shadow, or
+    shines past them.
+
+    Args:
+        ball: around the meshes. A place beyond it is as far away as its end.
+    """
+    if not light.casts_shadow:
+        return ()
+    if light.kind == "sun":
+        return (frame_of_sun(np.asarray(light.vector, np.float64), ball),)
+    eye = np.asarray(light.vector, np.float64)
+    away = eye - ball.center
+    distance = float(np.linalg.norm(away))
+    ends = max(distance - ball.radius, 0.0), distance + ball.radius
+    axis, tangent = shines_along(light), _cone_tangent(light)
+    is_around = distance * np.sin(_WIDEST) <= ball.radius
+    reach = np.inf if is_around else ball.radius / np.sqrt(distance**2 - ball.radius**2)
+    if axis is not None and tangent < min(reach, float(np.tan(_WIDEST))):
+        return (frame_at(-axis, eye, tangent, (0.0, ends[1])),)
+    if not is_around:
+        return (frame_at(away / distance, eye, float(reach), ends),)
+    sides = _sides(axis)
+    return tuple(
+        frame_at(-side, eye, _SIDE, (0.0, ends[1])) for side in sides if _sees(side, -away, ball)
+    )
+
+
+def _is_flat(positions: Floats, size: float) -> bool:
+    """Whether all vertices lie in one plane, of which the farthest three tell."""
+    for places in (positions[:_FEW], positions):
+        offset = places - places[0].astype(np.float64)
+        first = offset[np.argmax((offset**2).sum(axis=1))]
+        normals = np.cross(first, offset)
+        lengths = np.linalg.norm(normals, axis=1)
+        normal = normals[np.argmax(lengths)] / max(float(lengths.max()), 1e-30)
+        if np.abs(offset @ normal).max() > _FLAT * size:
+            return False
+    return True
+
+
+def _cone_tangent(light: Light) -> float:
+    """Of half the angle of a spot's cone; endless of all else. A scaled object squeezes it."""
+    if light.cone is None or light.cone.size >= np.pi:
+        return np.inf
+    right, up, back = np.linalg.norm(np.asarray(light.cone.axes, np.float64), axis=1)
+    squeezed = float(back / max(min(right, up), 1e-30))
+    return max(float(np.tan(0.5 * light.cone.size)) * squeezed, 1e-3)
+
+
+def _sides(axis: Floats | None) -> Iterator[Floats]:
+    """Directions in which a light looks: along its beam and across it, or along all axes."""
+    rows = np.eye(3)
+    if axis is not None:
+        rows = np.linalg.qr(np.column_stack([axis, np.eye(3)]))[0].T
+        rows[0] *= np.sign(rows[0] @ axis)
+    for number, row in enumerate(rows):
+        yield row
+        if number or axis is None:  # a beam has no back
+            yield -row
+
+
+def _sees(side: Floats, center: Floats, ball: Ball) -> bool:
+    """Whether any of the ball may lie in a cube's side. center: of the ball, from the light."""
+    distance = float(np.linalg.norm(center))
+    if distance <= ball.radius:
+        return True
+    away = np.arccos(np.clip(center @ side / distance, -1.0, 1.0))
+    corner = np.arctan(np.sqrt(2.0) * _SIDE)
+    return bool(away < corner + np.arcsin(ball.radius / distance))

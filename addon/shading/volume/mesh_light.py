@@ -1,0 +1,79 @@
+"""How much of a light meshes let through to a place of a mesh, by the map of their depths.
+
+The share of the four texels around the place that see the light (percentage closer filtering;
+Reeves, Salesin and Cook 1987). Each of them is compared with the depth of the plane of the place's
+own triangle there: a slope does not shade itself, and edges stay where they are. Each sample of a
+picture asks texels shifted by up to one, so that the mean has smooth edges.
+
+Reference of gpu_shaders/lib_mesh_shadows.glsl.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Floats
+from .light_frame import LightFrame
+
+#: how far in front of a place a mesh must be, in texels
+MESH_BIAS = 0.5
+#: the steepest slope that is followed, as a tangent
+STEEPEST = 20.0
+#: a slope that is seen from its edge, as a cosine
+EDGE_ON = 1.0e-3
+
+
+def mesh_light(
+    frame: LightFrame,
+    depths: Floats,
+    points: Floats,
+    normals: Floats,
+    shift: tuple[float, float] = (0.0, 0.0),
+) -> Floats:
+    """The share of the light that reaches points, (n,); 1 outside of the map.
+
+    Args:
+        depths: (size, size) of the first mesh, row 0 at the bottom; 1 where there is none.
+        points: (n, 3) [m]. normals: (n, 3) unit, of their triangles; their sign counts for nothing.
+        shift: of the texels that are asked, in texels.
+    """
+    size = len(depths)
+    places, depth = frame.places(points)
+    slope, unit = _slope(frame, points, normals, size)
+    scaled = places * size + shift - 0.5
+    low = np.floor(scaled)
+    share = scaled - low
+    lit = np.zeros(len(points))
+    for corner in range(4):
+        step = np.array([corner & 1, corner >> 1])
+        texel = low + step
+        weights = np.where(step == 1, share, 1.0 - share).prod(axis=1)
+        column, row = np.clip(texel, 0, size - 1).astype(int).T
+        way = texel - (places * size - 0.5)
+        there = np.minimum(depth + (slope * way).sum(axis=1), 1.0) - MESH_BIAS * unit
+        lit += weights * (there <= depths[row, column])
+    is_inside = ((places >= 0.0) & (places <= 1.0)).all(axis=1)
+    return np.where(is_inside, lit, 1.0)
+
+
+def _slope(frame: LightFrame, points: Floats, normals: Floats, size: int) -> tuple[Floats, Floats]:
+    """How depth changes from texel to texel on the planes through points, (n, 2), and the depth of
+    one texel's width, (n,).
+    """
+    homogeneous = np.concatenate([points, np.ones_like(points[:, :1])], axis=1)
+    x, y, _, w = (homogeneous @ frame.to_map.T).T[..., None]
+    w = np.maximum(np.abs(w), 1e-6)
+    across = (frame.to_map[0, :3] - x / w * frame.to_map[3, :3]) / w
+    upward = (frame.to_map[1, :3] - y / w * frame.to_map[3, :3]) / w
+    ray = np.cross(across, upward)
+    length = np.linalg.norm(ray, axis=1)
+    cosine = (normals * ray).sum(axis=1) / length
+    cosine = np.where(cosine < 0.0, -1.0, 1.0) * np.maximum(np.abs(cosine), EDGE_ON)
+    deeper = frame.to_depth[:3]
+    slope = np.stack(
+        [np.cross(upward, normals) @ deeper, np.cross(normals, across) @ deeper], axis=1
+    )
+    slope *= 2.0 / size / (length * cosine)[:, None]
+    unit = 2.0 / size * np.linalg.norm(deeper) / np.sqrt(length)
+    steep = np.linalg.norm(slope, axis=1) / (STEEPEST * unit)
+    return slope / np.maximum(steep, 1.0)[:, None], unit

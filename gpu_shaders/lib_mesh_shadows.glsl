@@ -1,0 +1,72 @@
+// How much of a light meshes let through to a place of a mesh, by the maps of their depths.
+//
+// Twin of addon/shading/volume/mesh_light.py: same order; a test holds the two together. Reads the
+// block `mesh_shadows` and the texture array `mesh_depths`.
+
+// Place in a map before the division, and w: not positive behind the light.
+vec3 mesh_map_place(int map, vec3 point)
+{
+  vec4 at = vec4(point, 1.0);
+  return vec3(dot(mesh_shadows.map_x[map], at),
+              dot(mesh_shadows.map_y[map], at),
+              dot(mesh_shadows.map_w[map], at));
+}
+
+// The map of a light in which a point lies; -1 none.
+int mesh_map_at(int light, vec3 point)
+{
+  int first = int(mesh_shadows.light[light].x), count = int(mesh_shadows.light[light].y);
+  int found = -1;
+  for (int map = first; map < first + count; map++) {
+    vec3 place = mesh_map_place(map, point);
+    found = max(abs(place.x), abs(place.y)) <= place.z ? map : found;
+  }
+  return found;
+}
+
+// xy how depth changes from texel to texel on the plane through a point, z the depth of one texel's
+// width.
+vec3 mesh_slope(int map, vec3 place, vec3 normal)
+{
+  float w = max(abs(place.z), 1.0e-6);
+  vec3 across = (mesh_shadows.map_x[map].xyz - place.x * mesh_shadows.map_w[map].xyz) / w;
+  vec3 upward = (mesh_shadows.map_y[map].xyz - place.y * mesh_shadows.map_w[map].xyz) / w;
+  vec3 ray = cross(across, upward), deeper = mesh_shadows.map_depth[map].xyz;
+  float size = length(ray);
+  float cosine = dot(normal, ray) / size;
+  cosine = (cosine < 0.0 ? -1.0 : 1.0) * max(abs(cosine), {{edge_on}});
+  float texel = 2.0 / mesh_shadows.resolution;
+  vec2 slope = vec2(dot(cross(upward, normal), deeper), dot(cross(normal, across), deeper));
+  slope *= texel / (size * cosine);
+  float unit = texel * length(deeper) * inversesqrt(size);
+  return vec3(slope / max(length(slope) / ({{steepest}} * unit), 1.0), unit);
+}
+
+// The share of a light that reaches a point. normal: of its triangle; its sign and its length count for
+// nothing.
+float mesh_light(int light, vec3 point, vec3 normal)
+{
+  int map = mesh_map_at(light, point);
+  if (map < 0) {
+    return 1.0;
+  }
+  vec3 place = mesh_map_place(map, point);
+  place.xy /= max(place.z, 1.0e-6);
+  vec3 unit_normal = normal * inversesqrt(max(dot(normal, normal), 1.0e-36));
+  vec3 slope = mesh_slope(map, place, unit_normal);
+  float depth = dot(mesh_shadows.map_depth[map], vec4(point, 1.0));
+  vec2 own = (0.5 * place.xy + 0.5) * mesh_shadows.resolution - 0.5;
+  vec2 scaled = own + mesh_shadows.shift;
+  vec2 low = floor(scaled), share = scaled - low;
+  float lit = 0.0;
+  for (int corner = 0; corner < 4; corner++) {
+    vec2 step_of = vec2(corner & 1, corner >> 1);
+    vec2 texel = low + step_of;
+    vec2 weights = mix(1.0 - share, share, step_of);
+    float there = min(depth + dot(slope.xy, texel - own), 1.0) - {{mesh_bias}} * slope.z;
+    ivec2 at = clamp(ivec2(texel), ivec2(0), ivec2(mesh_shadows.resolution) - 1);
+    float first = texelFetch(mesh_depths, ivec3(at, map), 0).x;
+    lit += there <= first ? weights.x * weights.y : 0.0;
+  }
+  return lit;
+}

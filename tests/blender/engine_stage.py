@@ -1,0 +1,69 @@
+"""What the tests of the render engine put into their scene, and what it renders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+SIZE = 64
+
+
+def set_world(color: tuple[float, float, float]) -> None:
+    world = bpy.context.scene.world
+    world.node_tree.nodes.clear()
+    background = world.node_tree.nodes.new("ShaderNodeBackground")
+    background.inputs["Color"].default_value = (*color, 1.0)
+
+
+def add_ball(radius: float = 0.15, color: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Any:
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, segments=48, ring_count=24)
+    ball = bpy.context.object
+    material = bpy.data.materials.new("Diffuse")
+    material.node_tree.nodes.clear()
+    diffuse = material.node_tree.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (*color, 1.0)
+    ball.data.materials.append(material)
+    return ball
+
+
+def rendered(folder: Path) -> dict[str, np.ndarray]:
+    """Render, and read back all passes, see `passes_in`."""
+    scene = bpy.context.scene
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format = "OPEN_EXR_MULTILAYER"
+    settings.color_depth = "32"
+    path = folder / "picture.exr"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    return passes_in(path) if path.is_file() else {}
+
+
+def passes_in(path: Path) -> dict[str, np.ndarray]:
+    """Name -> (height, width, channels), row 0 at the bottom."""
+    import OpenImageIO
+
+    found = {}
+    file = OpenImageIO.ImageInput.open(str(path))
+    while file.seek_subimage(len(found), 0):
+        spec = file.spec()
+        pixels = file.read_image(len(found), 0, 0, spec.nchannels, "float")
+        found[spec.channelnames[0].rpartition(".")[0]] = pixels[::-1]
+    file.close()
+    return found
+
+
+def picture(folder: Path) -> np.ndarray:
+    return rendered(folder)["ViewLayer.Combined"]
+
+
+def coded(path: Path) -> np.ndarray:
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.is_data = True
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels.reshape(*image.size[::-1], 4)[..., :3]

@@ -1,0 +1,97 @@
+"""Shadows of meshes on meshes as the render engine has them, beside those of Cycles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
+
+from engine_stage import add_ball, picture, set_world  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures("gpu_context", "extension")
+
+
+@pytest.fixture
+def props(stage: Any) -> Any:
+    """A ground of 40 m, a turned block and a floating ball, white, before a dark world."""
+    set_world((0.0, 0.0, 0.0))
+    bpy.ops.mesh.primitive_plane_add(size=40.0)
+    bpy.ops.mesh.primitive_cube_add(size=0.6, location=(0.0, 0.0, 0.35), rotation=(0.2, 0.1, 0.5))
+    bpy.context.object.scale = (1.0, 0.6, 1.1)
+    ball = add_ball(0.25)
+    ball.location = (-0.7, 0.3, 0.7)
+    nodes, links = (getattr(bpy.data.materials["Diffuse"].node_tree, n) for n in ("nodes", "links"))
+    surface = nodes.new("ShaderNodeOutputMaterial").inputs["Surface"]
+    links.new(nodes["Diffuse BSDF"].outputs["BSDF"], surface)
+    for obj in bpy.data.objects:
+        if obj.type == "MESH":
+            obj.data.materials.clear()
+            obj.data.materials.append(bpy.data.materials["Diffuse"])
+    stage.camera.location, stage.camera.rotation_euler = (0.6, -3.0, 2.6), (0.86, 0.0, 0.2)
+    stage.hairloom.picture.samples = 16
+    return ball
+
+
+def add_light(kind: str, energy: float, **where: Any) -> Any:
+    light = bpy.data.objects.new("Light", bpy.data.lights.new("Light", kind))
+    light.data.energy = energy
+    for name, value in where.items():
+        setattr(light, name, value)
+    bpy.context.scene.collection.objects.link(light)
+    return light
+
+
+@pytest.mark.parametrize("kind", ["SUN", "POINT", "SPOT"])
+def test_shadows_lie_where_cycles_has_them(
+    stage: Any, props: Any, kind: str, tmp_path: Path
+) -> None:
+    """Under small lights, with no light thrown back: but for edges the pictures are the same."""
+    light = add_light(
+        kind,
+        3.0 if kind == "SUN" else 150.0,
+        location=(1.2, -1.0, 2.2),
+        rotation_euler=(0.5, 0.5, 0.3),
+    )
+    if kind == "SUN":
+        light.data.angle = 0.0
+    else:
+        light.data.shadow_soft_size = 0.0
+    found = picture(tmp_path)[..., 0]
+    stage.render.engine = "CYCLES"
+    cycles = stage.cycles
+    cycles.samples, cycles.use_denoising, cycles.max_bounces = 16, False, 0
+    expected = picture(tmp_path)[..., 0]
+    scale = np.percentile(expected, 95)
+    away = np.abs(found - expected) / scale
+    assert expected.max() > 0.1 and (expected < 0.02 * scale).mean() > 0.015
+    assert away.mean() < 0.01
+    assert (away > 0.2).mean() < 0.008
+
+
+def test_what_is_not_to_throw_a_shadow_throws_none(stage: Any, props: Any, tmp_path: Path) -> None:
+    """A light without shadows, objects without, the scene without; each is brighter."""
+    light = add_light("SUN", 3.0, rotation_euler=(0.5, 0.5, 0.3))
+    with_all = picture(tmp_path)[..., 0].mean()
+    props.visible_shadow = False
+    without_ball = picture(tmp_path)[..., 0].mean()
+    stage.hairloom.mesh_shadows.mesh_shadows = False
+    without_any = picture(tmp_path)[..., 0].mean()
+    stage.hairloom.mesh_shadows.mesh_shadows = True
+    light.data.use_shadow = False
+    assert with_all < without_ball < without_any
+    assert picture(tmp_path)[..., 0].mean() == pytest.approx(without_any, rel=1e-6)
+
+
+def test_motion_moves_shadows(stage: Any, props: Any, tmp_path: Path) -> None:
+    """In an animation, where maps are kept from frame to frame only as long as nothing moves."""
+    add_light("SUN", 3.0, rotation_euler=(0.5, 0.5, 0.3))
+    before = picture(tmp_path)[..., 0]
+    props.location.x += 0.2
+    moved = picture(tmp_path)[..., 0]
+    props.location.x -= 0.2
+    np.testing.assert_array_equal(picture(tmp_path)[..., 0], before)
+    assert (np.abs(moved - before) > 0.05).mean() > 0.005

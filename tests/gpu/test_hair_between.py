@@ -1,0 +1,149 @@
+"""Shadows of grooms on each other and on meshes: strands shade alike, in one groom or in more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.scene_snapshot import DrawnGroom, SceneSnapshot
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
+from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.volume.light_frame import Ball
+from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands import Surface
+
+SIZE = 128
+LOOK = StrandSettings(tip_width=1.0, transparency="none")
+VOLUME = VolumeSettings(resolution=256, layers=8, strand_share=1.0, bias=0.0, scattering=False)
+SUN = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 3.0)
+CAMERA = Camera(
+    look_at((0.0, -0.8, 0.9), (0.0, 0.0, 0.1), up=(0.0, 0.0, 1.0)), orthographic(0.6, 1.0, 0.0, 3.0)
+)
+LEVEL = Camera(
+    look_at((0.0, -3.0, 0.1), (0.0, 0.0, 0.1), up=(0.0, 0.0, 1.0)), orthographic(0.6, 1.0, 0.0, 9.0)
+)
+FLOOR = Surface(
+    np.array([[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], np.float32),
+    np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+)
+
+
+def sheet(height: float, count: int = 400, seed: int = 1) -> np.ndarray:
+    """Level strands side by side, each at a height of its own, (count, 6, 3)."""
+    random = np.random.default_rng(seed)
+    strands = np.zeros((count, 6, 3), np.float32)
+    strands[..., 0] = np.linspace(-0.2, 0.2, 6)
+    strands[..., 1] = random.uniform(-0.2, 0.2, (count, 1))
+    strands[..., 2] = height + random.uniform(0.0, 0.02, (count, 1))
+    return strands
+
+
+def groom(key: str, strands: np.ndarray, **changes: Any) -> DrawnGroom:
+    radius = np.full(strands.shape[:2], 2e-4, np.float32)
+    made = Snapshot(
+        strands,
+        radius,
+        strand_settings=LOOK,
+        volume=VOLUME,
+        volume_center=np.array([0.0, 0.0, -1.0]),
+    )
+    return DrawnGroom(key, replace(made, **changes))
+
+
+def picture(*grooms: DrawnGroom, camera: Camera = CAMERA, **scene: Any) -> np.ndarray:
+    from hairloom.addon.render.accumulation import Target
+    from hairloom.addon.render.scene_pass import ScenePass
+    from hairloom.addon.render.textures import texture_to_array
+
+    floor = replace(MeshSnapshot.of(FLOOR, (1.0, 1.0, 1.0)), sheen=0.0)
+    whole = SceneSnapshot(**{"meshes": (floor,), "grooms": grooms, "lights": (SUN,), **scene})
+    target = Target()
+    ScenePass().draw(whole, camera, target, (SIZE, SIZE), (0.0, 0.0, 0.0, 0.0))
+    return texture_to_array(target.color)
+
+
+def test_a_mesh_has_the_shadow_of_all_grooms(gpu_context: Any) -> None:
+    """Three sheets above each other let as much light through as the same strands in one groom."""
+    sheets = [sheet(height, seed=seed) for seed, height in enumerate((0.2, 0.3, 0.4))]
+    alone = picture(groom("a", np.concatenate(sheets)))[:, :, 0]
+    shared = picture(*(groom(str(i), each) for i, each in enumerate(sheets)))[:, :, 0]
+    one = picture(groom("a", sheets[0]))[:, :, 0]
+    # below the hair in the picture lies the floor's middle with its shadow
+    is_floor = np.zeros((SIZE, SIZE), bool)
+    is_floor[20:50, 30:98] = True
+    lit, expected, least = (each[is_floor].mean() for each in (shared, alone, one))
+    assert least > 1.3 * expected
+    assert lit == pytest.approx(expected, rel=0.04)
+
+
+@pytest.mark.parametrize("transparency", ["none", "hashed", "layers"])
+@pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
+def test_hair_has_the_shadow_of_other_grooms(
+    gpu_context: Any, transparency: str, model: str
+) -> None:
+    """A sheet below another one, seen from its side, is as dark in two grooms as in one, and
+    brighter without it.
+    """
+    look = {
+        "strand_settings": replace(LOOK, transparency=transparency),
+        "shading": ShadingSettings(model=model),
+        "volume": replace(VOLUME, layers=16, layer_depth=0.5),
+    }
+    low, high = sheet(0.1, seed=2), sheet(0.2, seed=3)
+    found = {
+        "one": picture(groom("a", np.concatenate([low, high]), **look), meshes=(), camera=LEVEL),
+        "two": picture(groom("a", low, **look), groom("b", high, **look), meshes=(), camera=LEVEL),
+        "low": picture(groom("a", low, **look), meshes=(), camera=LEVEL),
+    }
+    light = {name: each[:76, :, :3].sum() for name, each in found.items()}
+    assert light["low"] > 1.2 * light["one"]
+    assert light["two"] == pytest.approx(light["one"], rel=0.06)
+
+
+def test_what_lies_beside_or_before_a_groom_is_not_asked(gpu_context: Any) -> None:
+    from hairloom.addon.render.hair_between import may_shade
+    from hairloom.addon.render.strand_pass import StrandPass
+
+    for light in (SUN, Light.point((0.0, 0.0, 1.2), (1.0, 1.0, 1.0), 10.0)):
+        maps = StrandPass().opacity(replace(groom("a", sheet(0.3)).snapshot, lights=(light,)))
+        assert maps is not None
+        assert may_shade(maps, Ball(np.array([0.0, 0.0, 0.0]), 0.1))
+        assert may_shade(maps, Ball(np.array([0.3, 0.0, 0.3]), 0.1))
+        assert not may_shade(maps, Ball(np.array([1.5, 0.0, 0.0]), 0.1))
+        assert not may_shade(maps, Ball(np.array([0.0, 0.0, 1.0]), 0.1))
+
+
+def test_masks_hold_what_alpha_shows(gpu_context: Any, compute: Callable[..., Any]) -> None:
+    """A sheet with holes lets the object behind it through, in both passes."""
+    from hairloom.addon.render.accumulation import Target
+    from hairloom.addon.render.scene_pass import FAR_AWAY, ScenePass
+    from hairloom.addon.render.snapshot import MeshPictures
+
+    camera = Camera(
+        look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        orthographic(2.0, 1.0, 0.0, 9.0),
+    )
+    uv = (FLOOR.corners[..., :2] + 2.0) / 4.0
+    leaf = np.ones((8, 8, 4), np.float32)
+    leaf[:, 4:, 3] = 0.2
+    high = Surface(FLOOR.positions + np.float32([0, 0, 1]), FLOOR.triangles, uv)
+    sheet_of = replace(MeshSnapshot.of(high), pictures=MeshPictures(color=leaf), number=7)
+    below = replace(MeshSnapshot.of(FLOOR), number=3)
+    for transparency, right in (("hashed", 3.0), ("blended", 3.0), ("opaque", 7.0)):
+        meshes = (below, replace(sheet_of, transparency=transparency))
+        distances, numbers = ScenePass().distances_and_numbers(
+            SceneSnapshot(meshes=meshes), camera, Target(), (SIZE, SIZE)
+        )
+        assert numbers[64, 20] == 7.0 and numbers[64, 108] == right
+        assert distances[64, 20] == pytest.approx(2.0, abs=1e-3)
+        assert distances[64, 108] == pytest.approx(3.0 if right == 3.0 else 2.0, abs=1e-3)
+    distances, numbers = ScenePass().distances_and_numbers(
+        SceneSnapshot(), camera, Target(), (SIZE, SIZE)
+    )
+    assert numbers.max() == 0.0 and distances.min() == np.float32(FAR_AWAY)
