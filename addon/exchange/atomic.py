@@ -28,14 +28,14 @@ def atomic_write(path: Path) -> Iterator[Path]:
     try:
         _check_writable(target, temporary)
     except OSError as error:
-        raise _unwritable(path, error.strerror or str(error)) from error
+        raise unwritable(path, error.strerror or str(error)) from error
     try:
         yield temporary
         if not temporary.is_file():
-            raise _unwritable(path, "nothing was written")
+            raise unwritable(path, "nothing was written")
         _replace(temporary, target)
     except OSError as error:
-        raise _unwritable(path, error.strerror or str(error)) from error
+        raise unwritable(path, error.strerror or str(error)) from error
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -71,13 +71,14 @@ def _check_writable(target: Path, temporary: Path) -> None:
 def _replace(temporary: Path, target: Path) -> None:
     if target.exists():
         shutil.copymode(target, temporary)
-    _flush_to_disk(temporary, os.O_RDWR)
+    flush_to_disk(temporary, os.O_RDWR)
     os.replace(temporary, target)
     if os.name == "posix":  # elsewhere a folder cannot be opened
-        _flush_to_disk(target.parent, os.O_RDONLY)
+        flush_to_disk(target.parent, os.O_RDONLY)
 
 
-def _flush_to_disk(path: Path, flags: int) -> None:
+def flush_to_disk(path: Path, flags: int) -> None:
+    """Wait until a file, or a folder's list of files, is on the disk."""
     descriptor = os.open(path, flags)
     try:
         os.fsync(descriptor)
@@ -85,7 +86,8 @@ def _flush_to_disk(path: Path, flags: int) -> None:
         os.close(descriptor)
 
 
-def _unwritable(path: Path, why: str) -> HairloomError:
+def unwritable(path: Path, why: str) -> HairloomError:
+    """The message for a place where nothing can be written."""
     return HairloomError(
         f"this file cannot be written ({why})",
         place=str(path),

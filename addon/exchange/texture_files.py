@@ -2,7 +2,8 @@
 
 Colours are scene-linear here, and by the sRGB curve in files of integers; everything else (alpha,
 shifts, directions) is stored as it is. Alpha is straight: OpenImageIO would multiply colours with
-it, which loses them where it is 0. Only EXR files hold them multiplied, as all programs take them.
+it, which loses them where it is 0. Only EXR files hold them multiplied, as all programs take them,
+but for packed textures, whose channels are values of their own.
 
 OpenImageIO comes with official builds of Blender and lies on PyPI as `openimageio`. Where it is
 missing, host/images.py has Blender's own readers and writers in its place.
@@ -10,6 +11,7 @@ missing, host/images.py has Blender's own readers and writers in its place.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +33,11 @@ DEPTHS = {
     ".tif": ("uint8", "uint16", "float"),
     ".tiff": ("uint8", "uint16", "float"),
 }
+
+#: The chunk IEND with its checksum.
+_END_OF_PNG = b"\0\0\0\0IEND\xaeB`\x82"
+#: In EXR files, whose alpha is multiplied otherwise: this one's is not.
+_STRAIGHT = "hairloom_straight_alpha"
 
 
 def has_openimageio() -> bool:
@@ -88,7 +95,14 @@ def read_texture(path: Path, *, is_color: bool) -> Floats:
         source.close()
 
 
-def write_texture(path: Path, pixels: Floats, *, is_color: bool, depth: str | None = None) -> None:
+def write_texture(
+    path: Path,
+    pixels: Floats,
+    *,
+    is_color: bool,
+    depth: str | None = None,
+    is_packed: bool = False,
+) -> None:
     """Write a picture as PNG, EXR or TIFF, by the suffix.
 
     Args:
@@ -96,6 +110,7 @@ def write_texture(path: Path, pixels: Floats, *, is_color: bool, depth: str | No
             integers hold [0, 1].
         is_color: integers are coded by the sRGB curve.
         depth: one of DEPTHS for this suffix; None is the usual one.
+        is_packed: engines unpack its channels, so that nothing is multiplied in EXR files either.
 
     Raises:
         HairloomError: no OpenImageIO, another suffix or depth, or nothing can be written there.
@@ -106,24 +121,35 @@ def write_texture(path: Path, pixels: Floats, *, is_color: bool, depth: str | No
     if is_color and depth.startswith("uint"):
         image = _with_colors(image, srgb_encoded(np.clip(_colors(image), 0.0, 1.0)))
     height, width, channels = image.shape
-    is_multiplied = path.suffix.lower() == ".exr"
+    is_multiplied = path.suffix.lower() == ".exr" and not is_packed
     if channels in (2, 4) and is_multiplied:
         image = _with_colors(image, _colors(image) * image[..., -1:])
     spec = library.ImageSpec(width, height, channels, depth)
     if channels in (2, 4):
         spec.alpha_channel = channels - 1
         spec.attribute("oiio:UnassociatedAlpha", int(not is_multiplied))
+        spec.attribute(_STRAIGHT, int(not is_multiplied))
     spec.attribute("oiio:ColorSpace", _space(is_color=is_color, depth=depth))
     with atomic_write(path) as temporary:
         target = library.ImageOutput.create(str(temporary))
         done = target is not None and target.open(str(temporary), spec)
         done = done and target.write_image(np.ascontiguousarray(image))
-        if not (done and target.close()):
+        if not (done and target.close() and has_its_end(temporary)):
             raise HairloomError(
                 f"this picture cannot be written ({_reason(target or library)})",
                 place=str(path),
                 remedy="Choose another folder or format",
             )
+
+
+def has_its_end(path: Path) -> bool:
+    """Whether a PNG has its closing chunk: those who write them are silent about a full disk."""
+    if path.suffix.lower() != ".png":
+        return True
+    with path.open("rb") as file:
+        file.seek(0, os.SEEK_END)
+        file.seek(-min(len(_END_OF_PNG), file.tell()), os.SEEK_END)
+        return file.read() == _END_OF_PNG
 
 
 def _openimageio(path: Path) -> Any:
@@ -150,7 +176,8 @@ def _pixels(path: Path, source: Any, library: Any, *, is_color: bool) -> Floats:
     if image is None or source.has_error:
         raise _broken(path, source)
     image = np.asarray(image, np.float32).reshape(height, width, channels)
-    if channels in (2, 4) and not spec.get_int_attribute("oiio:UnassociatedAlpha"):
+    is_straight = any(map(spec.get_int_attribute, ("oiio:UnassociatedAlpha", _STRAIGHT)))
+    if channels in (2, 4) and not (is_straight or source.format_name() == "dds"):
         image = _straight(image)
     if is_color and str(spec.format) not in ("half", "float", "double"):
         image = _with_colors(image, srgb_decoded(_colors(image)))

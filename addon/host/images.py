@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import HairloomError
 from ..exchange import texture_files
-from ..exchange.atomic import atomic_write
+from ..exchange.atomic import atomic_write, unwritable
 from ..exchange.srgb import srgb_decoded, srgb_encoded
 
 
@@ -29,23 +29,33 @@ def write_png(path: Path, linear: Floats) -> None:
     _save_png(path, display_encoded(linear), has_alpha=True)
 
 
-def write_texture(path: Path, pixels: Floats, *, is_color: bool, depth: str) -> None:
-    """Write a texture as PNG, see `texture_files.write_texture`; without OpenImageIO in 8 bits.
+def write_texture(
+    path: Path, pixels: Floats, *, is_color: bool, depth: str, is_packed: bool = False
+) -> None:
+    """Write a texture, see `texture_files.write_texture`; without OpenImageIO as PNG in 8 bits.
 
     Args:
-        pixels: (height, width) or (height, width, 3), row 0 at the bottom.
-        depth: "uint8" or "uint16".
+        pixels: (height, width) or (height, width, 1, 3 or 4), row 0 at the bottom.
 
     Raises:
         HairloomError: the folder or file cannot be written.
     """
     if texture_files.has_openimageio():
-        texture_files.write_texture(path, pixels, is_color=is_color, depth=depth)
+        texture_files.write_texture(
+            path, pixels, is_color=is_color, depth=depth, is_packed=is_packed
+        )
         return
-    colors = np.atleast_3d(pixels).astype(np.float32)
-    coded = np.ones((*colors.shape[:2], 4), np.float32)
-    coded[..., :3] = srgb_encoded(colors) if is_color else colors
-    _save_png(path, coded, has_alpha=False)
+    if path.suffix.lower() != ".png":
+        raise HairloomError(
+            f"without OpenImageIO textures are not written as '{path.suffix}'",
+            place=str(path),
+            remedy="Choose PNG, or use an official build of Blender",
+        )
+    values = np.clip(np.atleast_3d(pixels).astype(np.float32), 0.0, 1.0)
+    coded = np.ones((*values.shape[:2], 4), np.float32)
+    coded[..., :3] = srgb_encoded(values[..., :3]) if is_color else values[..., :3]
+    coded[..., 3:] = values[..., 3:] if values.shape[2] == 4 else 1.0
+    _save_png(path, coded, has_alpha=values.shape[2] == 4)
 
 
 def read_texture(path: Path, *, is_color: bool) -> Floats:
@@ -137,5 +147,7 @@ def _save_png(path: Path, coded: Floats, *, has_alpha: bool) -> None:
         image.file_format = "PNG"
         with atomic_write(path) as temporary:
             image.save(filepath=str(temporary))
+            if not texture_files.has_its_end(temporary):
+                raise unwritable(path, "the disk is full")
     finally:
         bpy.data.images.remove(image)

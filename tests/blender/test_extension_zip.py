@@ -44,7 +44,18 @@ def in_fresh_blender(script, resources):
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory):
+def wheels():
+    """The packages that go into the zip, fetched where they are not there yet."""
+    done = subprocess.run(
+        [sys.executable, REPOSITORY / "tools" / "fetch_wheels.py"], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    table = (REPOSITORY / "tools" / "wheels.sha256").read_text(encoding="utf-8")
+    return [line.split()[1] for line in table.splitlines()]
+
+
+@pytest.fixture(scope="module")
+def built(wheels, tmp_path_factory):
     folder = tmp_path_factory.mktemp("dist")
     extension_tool("build", "--source-dir", REPOSITORY, "--output-dir", folder)
     (path,) = folder.glob("hairloom-*.zip")
@@ -77,7 +88,24 @@ def test_blender_accepts_the_repository_and_the_zip(built):
     extension_tool("validate", built)
 
 
-def test_what_the_validator_does_not_check_is_right(manifest):
+def test_the_zip_brings_the_wheels_of_the_table_and_no_others(names, wheels, manifest):
+    assert manifest["wheels"] == [f"./wheels/{name}" for name in wheels]
+    assert sorted(n for n in names if n.endswith(".whl")) == [f"wheels/{name}" for name in wheels]
+    systems = {name.split("-")[-1].split("_")[0] for name in wheels}
+    assert systems == {"any.whl", "macosx", "manylinux", "win"}
+
+
+def test_a_wheel_that_cannot_be_had_is_named(tmp_path):
+    """No network, and a sum that is not the file's; what is there stays."""
+    import fetch_wheels
+
+    name, digest = next(iter(fetch_wheels.wanted().items()))
+    with pytest.raises(fetch_wheels.FetchError, match=rf"{re.escape(name)} cannot be fetched"):
+        fetch_wheels.fetch(name, "0" * len(digest), tmp_path / "wheels")
+    assert list((tmp_path / "wheels").iterdir()) == []
+
+
+def test_what_the_validator_does_not_check_is_right(wheels, manifest):
     """It accepts unknown licences, schema versions, keys and websites."""
     assert manifest["schema_version"] == "1.0.0"
     assert manifest["id"] == "hairloom"
@@ -93,7 +121,7 @@ def test_what_the_validator_does_not_check_is_right(manifest):
     known |= {"blender_version_min", "license", "copyright", "permissions", "build", "website"}
     known |= {"wheels", "platforms", "blender_version_max"}
     assert set(manifest) <= known
-    assert all((REPOSITORY / wheel).is_file() for wheel in manifest.get("wheels", ()))
+    assert all((REPOSITORY / wheel).is_file() for wheel in manifest["wheels"])
     assert "GNU GENERAL PUBLIC LICENSE" in (REPOSITORY / "LICENSE").read_text(encoding="utf-8")
 
 
@@ -116,7 +144,7 @@ def test_no_module_edits_the_path_or_takes_its_name_for_granted():
 
 
 INSTALL = """
-import json, sys
+import importlib, json, pathlib, sys
 import bpy, addon_utils
 NAME = "bl_ext.user_default.hairloom"
 bpy.ops.extensions.package_install_files(
@@ -144,23 +172,29 @@ bpy.ops.hairloom.grow(strand_count=50, length=0.1)
 bpy.ops.hairloom.preview()
 live = sys.modules[NAME + ".addon.host.live"]
 registration = sys.modules[NAME + ".addon.registration"]
+dds = importlib.import_module(NAME + ".addon.exchange.dds")
 print(json.dumps(dict(
     enabled=enabled,
     after=sorted(after),
     strands=live.sessions()[0].rig.strands.strand_count,
     root=registration.ROOT_PACKAGE,
+    has_compressor=dds.has_compressor(),
+    installed=[p.parent.name for p in pathlib.Path({resources!r}).rglob("_etcpak_none*")],
 )), flush=True)
 """
 
 
 def test_it_installs_from_the_zip_and_goes_on_and_off_ten_times(built, tmp_path):
     script = tmp_path / "install.py"
-    script.write_text(INSTALL.format(zip=str(built)), encoding="utf-8")
+    resources = str(tmp_path / "resources")
+    script.write_text(INSTALL.format(zip=str(built), resources=resources), encoding="utf-8")
     answer, output = in_fresh_blender(script, tmp_path / "resources")
     assert answer["after"] == ["[0, 0, false, 0]"]
     handlers, classes, _, operators = answer["enabled"]
     assert handlers == 10 and classes > 15 and operators >= 7
     assert answer["strands"] == 50
     assert answer["root"] == "bl_ext.user_default.hairloom"
+    assert answer["installed"] == ["etcpak"], "the wheel of this platform, and only that"
+    assert answer["has_compressor"]
     assert "Policy" not in output
     assert not re.search(r"Traceback[\s\S]*hairloom", output), output

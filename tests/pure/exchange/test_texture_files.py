@@ -176,6 +176,44 @@ def test_a_failed_write_keeps_what_was_there(
     assert path.read_bytes() == before and len(list(tmp_path.iterdir())) == 1
 
 
+@pytest.mark.parametrize(("suffix", "depth"), FORMATS)
+@pytest.mark.parametrize("most_bytes", [0, 2000, 12000])
+def test_a_full_disk_is_told_and_keeps_what_was_there(
+    suffix: str, depth: str, most_bytes: int, tmp_path: Path
+) -> None:
+    """Not all writers of OpenImageIO say so."""
+    resource = pytest.importorskip("resource", reason="limits are those of POSIX")
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(b"old")
+    noise = np.random.default_rng(2).random((96, 96, 3)).astype(np.float32)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))
+    try:
+        with pytest.raises(HairloomError, match="cannot be written"):
+            write_texture(path, noise, is_color=True, depth=depth)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert path.read_bytes() == b"old" and len(list(tmp_path.iterdir())) == 1
+
+
+def test_packed_textures_are_never_multiplied(tmp_path: Path) -> None:
+    """What lies in the fourth channel is no alpha to an EXR file, and reads back as it was."""
+    image = random_picture(4)
+    for suffix, depth in FORMATS:
+        path = tmp_path / f"p{suffix}"
+        write_texture(path, image, is_color=False, depth=depth, is_packed=True)
+        stored = oiio.ImageBuf(str(path), 0, 0, straight_spec()).get_pixels(oiio.FLOAT)[::-1]
+        np.testing.assert_allclose(stored, image, atol=0.003)
+        np.testing.assert_allclose(read_texture(path, is_color=False), image, atol=0.003)
+
+
+def straight_spec() -> oiio.ImageSpec:
+    """Asks OpenImageIO for values as they are stored."""
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    return config
+
+
 def test_without_openimageio_there_is_a_plain_message(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

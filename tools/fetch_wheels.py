@@ -1,0 +1,89 @@
+"""Fetches the Python packages that the extension's zip brings along into wheels/.
+
+python tools/fetch_wheels.py
+
+tools/wheels.sha256 has a line for each of them as `sha256sum` writes it: only a file with that sum
+is taken, and one that is there already is not fetched again, so that this needs no network twice.
+Blender installs those of its own platform, which it reads from blender_manifest.toml; both lists
+name the same files. They come from PyPI, or from where pip is told to look (PIP_INDEX_URL,
+PIP_FIND_LINKS).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+TABLE = REPOSITORY / "tools" / "wheels.sha256"
+FOLDER = REPOSITORY / "wheels"
+#: of Blender 5.2, for packages that ask for no more than any Python 3
+PYTHON = "3.13"
+
+
+class FetchError(Exception):
+    """A wheel that could not be had, and what to do about it."""
+
+
+def wanted(table: Path = TABLE) -> dict[str, str]:
+    """File name -> its SHA-256."""
+    lines = [line.split() for line in table.read_text(encoding="utf-8").splitlines() if line]
+    return {name: digest for digest, name in lines}
+
+
+def is_there(path: Path, digest: str) -> bool:
+    return path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == digest
+
+
+def pip_options(name: str) -> list[str]:
+    """What pip must be told to take this wheel and not the one of the machine it runs on."""
+    _, _, *_, python, abi, platforms = name.removesuffix(".whl").split("-")
+    version = python.split(".")[-1][2:]
+    options = ["--python-version", version if len(version) > 1 else PYTHON, "--abi", abi]
+    for platform in platforms.split("."):
+        options += ["--platform", platform]
+    return options
+
+
+def fetch(name: str, digest: str, folder: Path = FOLDER) -> None:
+    """Raises FetchError where there is no such wheel, no network, or no place to write."""
+    package, version, *_ = name.split("-")
+    folder.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder) as temporary:
+        pinned = Path(temporary) / "requirements.txt"
+        pinned.write_text(f"{package}=={version} --hash=sha256:{digest}\n", encoding="utf-8")
+        pip = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check"]
+        exact = ["--no-deps", "--only-binary", ":all:", "--require-hashes", *pip_options(name)]
+        done = subprocess.run(
+            [*pip, *exact, "--dest", temporary, "--requirement", str(pinned)],
+            capture_output=True,
+            text=True,
+        )
+        fetched = Path(temporary) / name
+        if done.returncode or not is_there(fetched, digest):
+            reasons = (done.stderr or done.stdout).strip().splitlines() or ["no reason given"]
+            raise FetchError(
+                f"{name} cannot be fetched ({reasons[-1]}): check the network, or name your "
+                f"package index in PIP_INDEX_URL, or put the file into {folder} yourself"
+            )
+        os.replace(fetched, folder / name)
+
+
+def main() -> int:
+    missing = {n: d for n, d in wanted().items() if not is_there(FOLDER / n, d)}
+    for name, digest in missing.items():
+        print(f"fetch_wheels: {name}", flush=True)
+        try:
+            fetch(name, digest)
+        except (FetchError, OSError) as error:
+            print(f"fetch_wheels: {error}", file=sys.stderr)
+            return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
