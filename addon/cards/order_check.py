@@ -1,0 +1,155 @@
+"""How often cards are drawn in a wrong order: the four passes of Scheuermann 2004, by hand.
+
+A pixel is wrong where the four passes, drawing the triangles in the order at hand, give it another
+colour than all its fragments from the farthest to the nearest, with a colour by chance for each
+card: by more than 1/255 in any channel. So every wrong pair counts that could be seen at all, and
+none that lies behind opaque hair, behind the head, or where one of the two is clear. The share is
+of the pixels that hair covers.
+
+The passes: opaque pixels with a depth test; then, of what is not hidden by them or by the head,
+back faces, and last front faces, which write their depth, so that farther ones that come too late
+are lost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..strands import Surface
+from .card_mesh import CardMesh
+from .order_views import (
+    Fragments,
+    View,
+    fragments,
+    nearest,
+    sphere_of,
+    view_directions,
+)
+
+#: From this alpha on a pixel is opaque, and below the other it is clear: as in the passes.
+OPAQUE_ALPHA, LEAST_ALPHA = 0.99, 0.004
+#: Two colours that differ by more can be told apart in 8 bits.
+VISIBLE = 1.0 / 255.0
+#: Without a texture, cards cover this much everywhere.
+_PLAIN_ALPHA = 0.5
+#: Of the eye from the middle of the hair, in radii of the hair.
+_DISTANCE = 5.0
+
+
+@dataclass(frozen=True)
+class SeenCards:
+    """What a view sees of the cards: in each pixel fragments one after the other, the farthest
+    first, none hidden by opaque ones or the head. alpha: (fragment_count,), 1 for opaque ones.
+    """
+
+    met: Fragments
+    alpha: Floats
+
+
+def wrong_share(
+    mesh: CardMesh,
+    head: Surface | None,
+    *,
+    front: Ints | None = None,
+    back: Ints | None = None,
+    alpha: Floats | None = None,
+    view_count: int = 40,
+    size: int = 128,
+) -> float:
+    """Share of the hair's pixels that are wrong, on average over views around the head.
+
+    Args:
+        front, back: (triangle_count,) triangles in the order in which front and back faces are
+            drawn. Without front the order of the mesh, without back the same for both.
+        alpha: (height, width) of the cards' texture; None takes half covered cards.
+        size: of the views, pixels across; the eye is 5 radii of the hair away.
+    """
+    front = np.arange(len(mesh.triangles)) if front is None else front
+    back = front if back is None else back
+    wrong = covered = 0
+    for view in views_of(mesh, view_count, size):
+        is_wrong = wrong_pixels(mesh, seen_cards(mesh, head, view, alpha), front, back)
+        wrong += int(is_wrong.sum())
+        covered += len(is_wrong)
+    return wrong / max(covered, 1)
+
+
+def views_of(mesh: CardMesh, count: int, size: int) -> list[View]:
+    """Views around the head, other ones than those that the order is learnt from."""
+    middle, radius = sphere_of(mesh)
+    turned = view_directions(count, turn=0.5)
+    return [View(middle, radius, each, size, _DISTANCE * radius) for each in turned]
+
+
+def seen_cards(
+    mesh: CardMesh, head: Surface | None, view: View, alpha: Floats | None = None
+) -> SeenCards:
+    """What this view sees; the texture's nearest texel counts."""
+    met = fragments(view, mesh.positions, mesh.triangles)
+    met = met[met.near > nearest(view, head)[met.pixel]]
+    covers = _alpha_at(mesh, met, alpha)
+    hidden = np.full(view.size * view.size, -np.inf, np.float32)
+    is_opaque = covers >= OPAQUE_ALPHA
+    np.maximum.at(hidden, met.pixel[is_opaque], met.near[is_opaque])
+    # of opaque ones at one depth the first is drawn
+    is_seen = (covers >= LEAST_ALPHA) & (met.near >= hidden[met.pixel])
+    met, covers = met[is_seen], np.where(is_opaque, 1.0, covers)[is_seen]
+    order = np.lexsort((met.near, met.pixel))
+    return SeenCards(met[order], covers[order])
+
+
+def _alpha_at(mesh: CardMesh, met: Fragments, alpha: Floats | None) -> Floats:
+    if alpha is None:
+        return np.full(len(met.pixel), _PLAIN_ALPHA, np.float32)
+    first = 1.0 - met.second - met.third
+    shares = np.stack([first, met.second, met.third], axis=1)
+    uv = np.einsum("nc,nci->ni", shares, mesh.uv[mesh.triangles[met.triangle]])
+    height, width = alpha.shape
+    row = np.clip((uv[:, 1] * height).astype(int), 0, height - 1)
+    column = np.clip((uv[:, 0] * width).astype(int), 0, width - 1)
+    return alpha[row, column]
+
+
+def wrong_pixels(mesh: CardMesh, seen: SeenCards, front: Ints, back: Ints) -> Bools:
+    """Which of the pixels that hair covers are wrong, (covered_count,), by pixel."""
+    color = np.random.default_rng(0).random((len(mesh.group), 3))[mesh.card[seen.met.triangle]]
+    right = _blended(seen, color, np.arange(len(color)), is_written=np.zeros(len(color), bool))
+    is_opaque, is_front = seen.alpha >= 1.0, seen.met.is_front
+    place = np.where(is_front, _places(front)[seen.met.triangle], _places(back)[seen.met.triangle])
+    drawn_in = np.where(is_opaque, 0, np.where(is_front, 2, 1))
+    place[is_opaque] = -np.arange(is_opaque.sum())
+    order = np.lexsort((place, drawn_in, seen.met.pixel))
+    drawn = _blended(seen, color, order, is_written=is_front & ~is_opaque)
+    return (np.abs(drawn - right) > VISIBLE).any(axis=1)
+
+
+def _places(order: Ints) -> Ints:
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    return place
+
+
+def _blended(seen: SeenCards, color: Floats, order: Ints, is_written: Bools) -> Floats:
+    """The colour of each pixel, (covered_count, 3), fragment over fragment in this order.
+
+    Args:
+        order: (fragment_count,), those of a pixel one after the other.
+        is_written: (fragment_count,) whose depth hides farther ones that come later.
+    """
+    pixel = seen.met.pixel[order]
+    starts = np.flatnonzero(np.diff(pixel, prepend=-1))
+    count = np.diff(np.append(starts, len(pixel)))
+    blended = np.zeros((len(starts), 3))
+    depth = np.full(len(starts), -np.inf)
+    for step in range(int(count.max(initial=0))):
+        pixels = np.flatnonzero(count > step)
+        one = order[starts[pixels] + step]
+        is_drawn = seen.met.near[one] > depth[pixels]
+        pixels, one = pixels[is_drawn], one[is_drawn]
+        blended[pixels] += seen.alpha[one, None] * (color[one] - blended[pixels])
+        hides = is_written[one]
+        depth[pixels[hides]] = seen.met.near[one[hides]]
+    return blended

@@ -1,0 +1,146 @@
+"""What lies behind what in each pixel of a view: cards as triangles, sampled at pixel centres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..strands import Surface
+from .card_mesh import CardMesh
+
+#: How far the elevations of views around a head reach [degrees]; few look at hair from below.
+LOWEST, HIGHEST = -20.0, 65.0
+#: Points nearer to the eye than the rest of its distance from the middle count as behind it.
+_BEFORE_EYE = 0.99
+_GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+
+
+@dataclass(frozen=True)
+class View:
+    """A square picture that holds a sphere.
+
+    middle: (3,) and radius: of the sphere [m].
+    direction: (3,) unit vector from its middle towards the eye.
+    size: pixels across.
+    distance: of the eye from the middle [m], more than the radius; infinite looks in parallel.
+    """
+
+    middle: Floats
+    radius: float
+    direction: Floats
+    size: int
+    distance: float = np.inf
+
+    def project(self, points: Floats) -> Floats:
+        """(4, n) float32 of points (n, 3) [m]: x and y in pixels, nearness, scale.
+
+        Nearness grows towards the eye and is linear in the picture. So is the scale, by which a
+        point looks larger than one in the middle of the sphere; 0 behind the eye.
+        """
+        right = np.cross([0.0, 1.0e-3, 1.0], self.direction)
+        right /= np.linalg.norm(right)
+        axes = np.stack([right, np.cross(self.direction, right), self.direction], axis=1)
+        x, y, near = ((points - self.middle) @ axes / self.radius).T
+        reach = self.distance / self.radius
+        half = self.size / 2.0
+        if np.isinf(reach):
+            rows = [x * half + half, y * half + half, near, np.ones_like(near)]
+        else:
+            is_ahead = near < _BEFORE_EYE * reach
+            scale = np.where(is_ahead, reach / (reach - near * is_ahead), 0.0)
+            stretch = scale * half * np.sqrt(1.0 - reach**-2)
+            rows = [x * stretch + half, y * stretch + half, scale, scale]
+        return np.stack(rows).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Fragments:
+    """Samples of triangles, one array each, (fragment_count,).
+
+    pixel: row * size + column. near: see View.project. is_front: counter-clockwise.
+    second, third: barycentric coordinates on the triangle.
+    """
+
+    pixel: Ints
+    triangle: Ints
+    near: Floats
+    is_front: Bools
+    second: Floats
+    third: Floats
+
+    def __getitem__(self, chosen: Ints | Bools) -> Fragments:
+        names = ("pixel", "triangle", "near", "is_front", "second", "third")
+        return Fragments(*(getattr(self, name)[chosen] for name in names))
+
+
+def view_directions(count: int, turn: float = 0.0) -> Floats:
+    """Unit vectors all around, evenly spread over the elevations of views of a head, (count, 3)."""
+    number = np.arange(count) + 0.5
+    low, high = np.sin(np.radians([LOWEST, HIGHEST]))
+    up = low + (high - low) * ((number * _GOLDEN + turn) % 1.0)
+    around, out = 2.0 * np.pi * (number / max(count, 1) + turn), np.sqrt(1.0 - up * up)
+    return np.stack([out * np.cos(around), out * np.sin(around), up], axis=1)
+
+
+def sphere_of(mesh: CardMesh) -> tuple[Floats, float]:
+    """Middle (3,) and radius [m] of a sphere that holds the cards."""
+    low, high = (corner.astype(np.float64) for corner in mesh.bounds())
+    return (low + high) / 2.0, max(float(np.linalg.norm(high - low)) / 2.0, 1e-9)
+
+
+def fragments(view: View, positions: Floats, triangles: Ints) -> Fragments:
+    """Samples of all triangles in this view, in the order of the triangles."""
+    corners = view.project(positions)[:, triangles.T]
+    column, row, triangle = _candidates(corners, view.size)
+    x, y, near, scale = corners
+    xs, ys = (each[1:] - each[0] for each in (x, y))
+    area = xs[0] * ys[1] - ys[0] * xs[1]
+    inverse = np.divide(1.0, area, out=np.zeros_like(area), where=area != 0.0)
+    right = column + np.float32(0.5) - x[0, triangle]
+    up = row + np.float32(0.5) - y[0, triangle]
+    second = (right * ys[1, triangle] - up * xs[1, triangle]) * inverse[triangle]
+    third = (up * xs[0, triangle] - right * ys[0, triangle]) * inverse[triangle]
+    is_in = (second >= 0.0) & (third >= 0.0) & (second + third <= 1.0) & (area[triangle] != 0.0)
+    met = np.flatnonzero(is_in)
+    triangle, second, third = triangle[met], second[met], third[met]
+    first = 1.0 - second - third
+    near, scale = (
+        first * each[0, triangle] + second * each[1, triangle] + third * each[2, triangle]
+        for each in (near, scale)
+    )
+    return Fragments(
+        row[met] * view.size + column[met],
+        triangle,
+        near,
+        area[triangle] > 0.0,
+        second * corners[3, 1, triangle] / scale,
+        third * corners[3, 2, triangle] / scale,
+    )
+
+
+def _candidates(corners: Floats, size: int) -> tuple[Ints, Ints, Ints]:
+    """Columns and rows of the pixels in the boxes around triangles, and whose they are, (n,)."""
+    low = np.clip(np.ceil(corners[:2].min(axis=1) - 0.5), 0, size).astype(np.int32)
+    high = np.clip(np.floor(corners[:2].max(axis=1) - 0.5), -1, size - 1).astype(np.int32)
+    width, height = np.maximum(high - low + 1, 0)
+    count = width * height * (corners[3] > 0.0).all(axis=0)
+    triangle = np.repeat(np.arange(len(count)), count)
+    inside = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
+    row, column = np.divmod(inside, width[triangle])
+    return low[0, triangle] + column, low[1, triangle] + row, triangle
+
+
+def nearest(view: View, surface: Surface | None) -> Floats:
+    """Nearness of the surface in each pixel, (size * size,); -inf where there is none."""
+    near = np.full(view.size * view.size, -np.inf, np.float32)
+    if surface is not None:
+        met = fragments(view, surface.positions, surface.triangles)
+        np.maximum.at(near, met.pixel, met.near)
+    return near
+
+
+def far_to_near(met: Fragments) -> Fragments:
+    """Sorted by pixel, and in a pixel the farthest first; equally near ones keep their order."""
+    return met[np.lexsort((met.near, met.pixel))]

@@ -1,0 +1,190 @@
+"""How often cards of Sintel's hair are drawn in a wrong order, and what it takes to sort them.
+
+What a wrong pixel is, `cards.order_check` says: after the four passes its colour is off by more
+than 1/255, with a colour by chance for each card and the alpha of the procedural texture. The share
+is of the pixels that hair covers, over VIEW_COUNT views around the head; none of them is one that
+the order was learnt from. Times are those of the processor, which others may share.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from _volume_sintel import sintel
+
+from hairloom.addon import pipeline
+from hairloom.addon.cards.atlas_settings import AtlasSettings
+from hairloom.addon.cards.card_mesh import CardMesh
+from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
+from hairloom.addon.cards.order_check import seen_cards, views_of, wrong_pixels
+from hairloom.addon.cards.order_views import View
+from hairloom.addon.cards.settings import CardSettings
+from hairloom.addon.cards.sort import (
+    CardOrders,
+    card_orders,
+    connected_components,
+    order_from,
+    reordered,
+)
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.shading.textures import TextureSettings, hair_textures
+from hairloom.addon.strands import StrandSet, Surface
+
+VIEW_COUNT, SIZE = 200, 128
+#: for the cards along guides
+FEWER_VIEWS = 40
+SORTED_TRIANGLES, ROUNDS = 100_000, 9
+
+#: The triangles for front faces and those for back faces in this view.
+type OrderOf = Callable[[View], tuple[np.ndarray, np.ndarray]]
+
+
+def order_figures() -> dict[str, float]:
+    """The figures by name.
+
+    order_wrong_unsorted: cards in the order in which they were built.
+    order_wrong_sorted: the order of the mesh for front faces, and the one for back faces.
+    order_wrong_perview: whole cards by the distance of their middle from the eye, for each view.
+    order_wrong_perview_triangles: triangles by that of theirs, as `order_from` has them.
+    order_wrong_distance: whole cards by their distance from the head, for all views.
+    order_wrong_cards: whole cards in the order that was learnt, with one for back faces.
+    order_wrong_one_buffer: the order of the mesh for both sides.
+    order_wrong_guides, order_wrong_guides_unsorted: of one card along each guide.
+    sort_ms: 100,000 triangles: pieces found and all moved by given distances, the median.
+    order_seconds: to learn the orders of 800 cards; order_from_ms: to sort them for an eye.
+    """
+    sitter = sintel()
+    count = len(sitter.strands) * sitter.strands.shape[1]
+    strands = StrandSet(
+        points=sitter.strands.reshape(-1, 3),
+        offsets=np.arange(0, count + 1, sitter.strands.shape[1]),
+        radius=np.full(count, 1.0e-4, np.float32),
+        group=np.zeros(len(sitter.strands), np.int32),
+    )
+    rig = pipeline.prepare(strands, sitter.head, GuideSettings(), place="Sintel")
+    found = {"sort_ms": sort_milliseconds()}
+    for way in ("clusters", "guides"):
+        settings, made = CardSettings(way=way, levels=1), AtlasSettings(source="made")
+        mesh = as_built(pipeline.card_build(rig, settings, made, CardOcclusionSettings()).finest)
+        begin = time.process_time()
+        learnt = card_orders(mesh, sitter.head)
+        seconds = time.process_time() - begin
+        unsorted = np.arange(len(mesh.triangles))
+        orders: dict[str, OrderOf] = {"unsorted": always(unsorted), "sorted": both(learnt)}
+        if way == "clusters":
+            found["order_seconds"] = seconds
+            found["order_from_ms"] = eye_milliseconds(mesh)
+            orders |= others(mesh, sitter.head, learnt)
+        view_count = VIEW_COUNT if way == "clusters" else FEWER_VIEWS
+        shares = wrong_shares(mesh, sitter.head, orders, view_count)
+        if way == "clusters":
+            found |= {f"order_wrong_{name}": share for name, share in shares.items()}
+        else:
+            found["order_wrong_guides"] = shares["sorted"]
+            found["order_wrong_guides_unsorted"] = shares["unsorted"]
+    return found
+
+
+def as_built(mesh: CardMesh) -> CardMesh:
+    """The cards by number, and the triangles of each from root to tip."""
+    owner = np.lexsort((mesh.triangles.min(axis=1), mesh.card))
+    return replace(mesh, triangles=mesh.triangles[owner], card=mesh.card[owner])
+
+
+def always(front: np.ndarray, back: np.ndarray | None = None) -> OrderOf:
+    return lambda _: (front, front if back is None else back)
+
+
+def both(orders: CardOrders) -> OrderOf:
+    return always(orders.front, orders.back)
+
+
+def others(mesh: CardMesh, head: Surface, learnt: CardOrders) -> dict[str, OrderOf]:
+    def per_view(view: View) -> tuple[np.ndarray, np.ndarray]:
+        away = mesh.positions[mesh.triangles].mean(axis=1) - eye_of(view)
+        far = np.linalg.norm(away, axis=1)
+        middle = np.bincount(mesh.card, far) / np.maximum(np.bincount(mesh.card), 1)
+        order = np.argsort(-middle[mesh.card], kind="stable")
+        return order, order
+
+    def per_view_triangles(view: View) -> tuple[np.ndarray, np.ndarray]:
+        order = order_from(mesh, np.append(eye_of(view), 1.0))
+        return order, order
+
+    return {
+        "perview": per_view,
+        "perview_triangles": per_view_triangles,
+        "distance": both(card_orders(mesh, head, "distance")),
+        "cards": both(card_orders(mesh, head, "cards")),
+        "one_buffer": always(learnt.front),
+    }
+
+
+def eye_of(view: View) -> np.ndarray:
+    return view.middle + view.direction * view.distance
+
+
+def wrong_shares(
+    mesh: CardMesh, head: Surface, orders: dict[str, OrderOf], view_count: int
+) -> dict[str, float]:
+    """The share of wrong pixels for each order, over the same views."""
+    alpha = tiled_alpha(mesh)
+    wrong, covered = dict.fromkeys(orders, 0), 0
+    for view in views_of(mesh, view_count, SIZE):
+        seen = seen_cards(mesh, head, view, alpha)
+        for name, order_of in orders.items():
+            is_wrong = wrong_pixels(mesh, seen, *order_of(view))
+            wrong[name] += int(is_wrong.sum())
+        covered += len(is_wrong)
+    return {name: count / covered for name, count in wrong.items()}
+
+
+def tiled_alpha(mesh: CardMesh) -> np.ndarray:
+    """The alpha of the procedural texture in every tile of the mesh's atlas."""
+    atlas = mesh.atlas
+    settings = TextureSettings(variant_width=64, height=256)
+    strips = hair_textures(settings, min(atlas.columns, 4)).alpha
+    repeats = -(-atlas.columns // min(atlas.columns, 4))
+    row = np.tile(strips, (1, repeats))[:, : atlas.columns * settings.variant_width]
+    return np.tile(row, (atlas.rows, 1))
+
+
+def sort_milliseconds() -> float:
+    """Strips of 20 triangles, shuffled, with given distances."""
+    random = np.random.default_rng(0)
+    count = SORTED_TRIANGLES // 20
+    strip = np.arange(20)[:, None] + np.arange(3)
+    triangles = (np.arange(count)[:, None, None] * 22 + strip).reshape(-1, 3)
+    points = random.random((count * 22, 3))
+    mesh = CardMesh(
+        positions=points,
+        triangles=triangles,
+        uv=points[:, :2],
+        normal=points,
+        tangent=points,
+        occlusion=points[:, 0],
+        card=np.repeat(np.arange(count), 20),
+        along=points[:, 0],
+    )
+    distance = random.random(count)
+
+    def once() -> float:
+        begin = time.process_time()
+        connected_components(mesh.triangles)
+        reordered(mesh, distance)
+        return time.process_time() - begin
+
+    return 1e3 * float(np.median([once() for _ in range(ROUNDS)]))
+
+
+def eye_milliseconds(mesh: CardMesh) -> float:
+    def once(eye: np.ndarray) -> float:
+        begin = time.process_time()
+        order_from(mesh, eye)
+        return time.process_time() - begin
+
+    eyes = np.random.default_rng(0).standard_normal((ROUNDS, 4))
+    return 1e3 * float(np.median([once(eye) for eye in eyes]))

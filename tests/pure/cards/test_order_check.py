@@ -1,0 +1,129 @@
+"""Wrong pixels of pictures whose right answer is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon.cards.card_mesh import CardMesh
+from hairloom.addon.cards.order_check import (
+    seen_cards,
+    views_of,
+    wrong_pixels,
+    wrong_share,
+)
+from hairloom.addon.cards.order_views import View
+from hairloom.addon.strands import Surface
+
+VIEW = View(np.array([0.01, 0.0, 0.004]), 1.0, np.array([0.0, -1.0, 0.0]), 32)
+
+
+def sheets(depths: tuple[float, ...], turned: tuple[bool, ...] = ()) -> CardMesh:
+    """Square sheets of half the picture's width; the larger depth is nearer to the eye of VIEW."""
+    square = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]) * 0.5
+    points = np.concatenate([square - [0.0, depth, 0.0] for depth in depths])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    turned = turned or (False,) * len(depths)
+    triangles = [4 * card + (faces[:, ::-1] if over else faces) for card, over in enumerate(turned)]
+    ones = np.ones(len(points))
+    return CardMesh(
+        positions=points,
+        triangles=np.concatenate(triangles),
+        uv=np.tile([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], (len(depths), 1)),
+        normal=points,
+        tangent=points,
+        occlusion=ones,
+        card=np.repeat(np.arange(len(depths)), 2),
+        along=ones,
+    )
+
+
+def share(
+    mesh: CardMesh, cards: tuple[int, ...], alpha: float = 0.5, head: Surface | None = None
+) -> float | None:
+    """Share of wrong pixels where whole cards are drawn in this order; None where none is seen."""
+    order = np.concatenate([np.flatnonzero(mesh.card == card) for card in cards])
+    picture = np.full((4, 4), alpha)
+    is_wrong = wrong_pixels(mesh, seen_cards(mesh, head, VIEW, picture), order, order)
+    assert len(is_wrong) in (0, 256)
+    return float(is_wrong.mean()) if len(is_wrong) else None
+
+
+def test_two_sheets() -> None:
+    mesh = sheets((0.1, 0.2))
+    assert share(mesh, (0, 1)) == 0.0
+    assert share(mesh, (1, 0)) == 1.0
+
+
+def test_back_faces_are_drawn_before_front_faces() -> None:
+    behind, before = sheets((0.1, 0.2), (True, False)), sheets((0.1, 0.2), (False, True))
+    for cards in ((0, 1), (1, 0)):
+        assert share(behind, cards) == 0.0
+        assert share(before, cards) == 1.0
+
+
+def test_what_cannot_be_seen_cannot_be_wrong() -> None:
+    mesh = sheets((0.1, 0.2, 0.3))
+    assert share(mesh, (2, 1, 0), alpha=1.0) == 0.0  # the nearest hides the others
+    assert share(mesh, (2, 1, 0), alpha=0.003) is None
+    assert share(mesh, (2, 1, 0), alpha=0.2) == 1.0
+    wall = Surface(np.array([[-9, 0, -9], [9, 0, -9], [0, 0, 9]]) - [0, 0.15, 0], [[0, 1, 2]])
+    assert share(mesh, (2, 1, 0), head=wall) == 1.0
+    assert share(mesh, (1, 0, 2), head=wall) == 0.0  # the wrong one is behind the wall
+    over = Surface(wall.positions - [0, 1.0, 0], wall.triangles)
+    assert share(mesh, (2, 1, 0), head=over) is None
+
+
+def test_depth_that_front_faces_write_loses_what_comes_too_late() -> None:
+    """Two halves of one card have one colour, so that blending them in any order is right; but the
+    farther one is lost after the nearer one, unless both are back faces or it is opaque.
+    """
+    near_first = np.array([2, 3, 0, 1])
+    picture = np.array([[1.0, 0.5]])  # along u
+
+    def is_wrong(is_turned: bool, u_of_far: float) -> np.ndarray:
+        mesh = sheets((0.1, 0.2), (is_turned, is_turned))
+        u = np.repeat([u_of_far, 0.75], 4)
+        mesh = replace(mesh, card=np.zeros(4), uv=np.stack([u, u], axis=1))
+        seen = seen_cards(mesh, None, VIEW, picture)
+        return wrong_pixels(mesh, seen, near_first, near_first)
+
+    assert is_wrong(False, 0.75).all()
+    assert not is_wrong(True, 0.75).any()
+    assert not is_wrong(False, 0.25).any()
+
+
+def test_alpha_is_read_where_the_texture_says() -> None:
+    """Left half clear, right half opaque, and half covered above; seen from the front."""
+    picture = np.array([[0.0, 1.0], [0.0, 0.5]])
+    mesh = sheets((0.1,))
+    for distance in (np.inf, 3.0):
+        view = View(VIEW.middle, VIEW.radius, VIEW.direction, VIEW.size, distance)
+        seen = seen_cards(mesh, None, view, picture)
+        row, column = np.divmod(seen.met.pixel, VIEW.size)
+        assert column.min() >= VIEW.size // 2
+        np.testing.assert_array_equal(seen.alpha, np.where(row < VIEW.size // 2, 1.0, 0.5))
+
+
+@pytest.mark.parametrize("cards", [0, 1])
+def test_nothing_to_sort_is_never_wrong(cards: int) -> None:
+    mesh = sheets((0.1,) * cards) if cards else no_cards()
+    assert wrong_share(mesh, None, view_count=3, size=32) == 0.0
+
+
+def no_cards() -> CardMesh:
+    none = np.zeros((0, 3))
+    flat = np.zeros(0)
+    return CardMesh(none, none, np.zeros((0, 2)), none, none, flat, flat, flat)
+
+
+def test_views_are_from_outside_and_hold_all_cards() -> None:
+    mesh = sheets((0.1, 0.9))
+    for view in views_of(mesh, 9, 64):
+        assert view.distance > view.radius
+        x, y, _, scale = view.project(mesh.positions)
+        assert (scale > 0.0).all()
+        assert min(x.min(), y.min()) >= 0.0
+        assert max(x.max(), y.max()) <= 64.0
