@@ -1,0 +1,293 @@
+"""Cards that an artist has made, as any mesh of triangles with UVs, become a `CardMesh`.
+
+A card is a connected piece. Its triangles, positions and UVs stay as they are; found are the way
+from root to tip, tangents along it, and which side faces away from the head. Vertices on a seam of
+the UVs become several, which does not divide a card.
+
+Limitations: a card whose UVs are cut across, one island the roots and another the tips, counts its
+way from 0 to 1 in each island.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..errors import HairloomError
+from ..strands import Surface
+from ..strands.closest_point import closest_point
+from .card_mesh import CardMesh
+from .sort import connected_components
+from .uv_ways import UvWays, Way, coordinate_gradients, island_bounds, uv_ways
+
+#: A triangle of less than this share of the square of its longest edge has no area.
+_FLAT = 1.0e-7
+#: A card looks away from the head, or towards it, when its mean cosine is at least this.
+_LEAST_FACING = 0.25
+
+
+@dataclass(frozen=True)
+class AdoptedCards:
+    """mesh: its triangles are those of the source, in their order; occlusion is 1.
+    vertex: (vertex_count,) which vertex of the source each vertex is.
+    corner: (triangle_count, 3) the vertex at each corner of the source's triangles, some of which
+        are turned over in the mesh.
+    notes: what is doubtful, a sentence each, for the artist.
+    """
+
+    mesh: CardMesh
+    vertex: Ints
+    corner: Ints
+    notes: tuple[str, ...]
+
+
+def adopt_cards(
+    source: Surface,
+    head: Surface | None,
+    *,
+    group: Ints | None = None,
+    way: Way = "auto",
+    place: str,
+) -> AdoptedCards:
+    """Read cards out of a mesh.
+
+    Args:
+        source: with UVs, in the space of the head.
+        head: what the hair grows from; without one the higher ends of cards are their roots.
+        group: (vertex_count,) of the source's vertices; a card belongs to that of most of them.
+        way: where the UVs of all cards lead from root to tip, or to find it out.
+        place: names the mesh in messages.
+
+    Raises:
+        HairloomError: no triangles, or no UVs.
+    """
+    _check(source, place)
+    assert source.corner_uv is not None
+    vertex, uv, triangles = _split_at_seams(source.triangles, source.corner_uv)
+    card = connected_components(source.triangles)
+    island = connected_components(triangles)
+    toward = _away_from(source.positions, head)
+    corners = source.corners.astype(np.float64)
+    distance = toward.distance[source.triangles]
+    ways = uv_ways(corners, uv[triangles], distance, island, way)
+    normal, is_turned, is_mixed = _facing(source, card, toward.direction)
+    along = _along(uv[triangles], island, ways)
+    mesh = CardMesh(
+        positions=source.positions[vertex],
+        triangles=np.where(is_turned[:, None], triangles[:, ::-1], triangles),
+        uv=uv,
+        along=_at_vertices(triangles, along, len(vertex)),
+        normal=normal[vertex],
+        tangent=_tangents(corners, uv, triangles, along, island, ways),
+        occlusion=np.ones(len(vertex), np.float32),
+        card=card,
+        group=_groups(source.triangles, card, group),
+    )
+    notes = (
+        *_direction_notes(ways, island, card, head if way == "auto" else source),
+        *_shape_notes(source, card, is_mixed),
+        *_uv_notes(uv),
+    )
+    return AdoptedCards(mesh, vertex, triangles, notes)
+
+
+def _check(source: Surface, place: str) -> None:
+    if not len(source.triangles):
+        raise HairloomError("this mesh has no faces", place=place, remedy="Choose a mesh of cards")
+    if source.corner_uv is None:
+        raise HairloomError(
+            "these cards have no UVs, so nobody knows which way the hair on them runs",
+            place=place,
+            remedy="Unwrap them (Edit Mode, UV > Unwrap) and lay them on the hair texture",
+        )
+
+
+def _split_at_seams(triangles: Ints, corner_uv: Floats) -> tuple[Ints, Floats, Ints]:
+    """(source vertex, uv, triangles) with a vertex for each pair of a source vertex and a UV."""
+    flat = np.ascontiguousarray(corner_uv.reshape(-1, 2), np.float32) + np.float32(0.0)
+    key = np.column_stack([triangles.ravel(), flat.view(np.int32)])
+    _, first, index = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return triangles.ravel()[first], flat[first], index.reshape(-1, 3).astype(np.int32)
+
+
+@dataclass(frozen=True)
+class _Away:
+    """direction: (vertex_count, 3) out of the head; distance: (vertex_count,) from it [m]."""
+
+    direction: Floats
+    distance: Floats
+
+
+def _away_from(positions: Floats, head: Surface | None) -> _Away:
+    """Without a head from the middle, and nothing is nearer to it than anything else."""
+    if head is None or not len(head.triangles):
+        middle = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
+        outward = positions - middle
+        return _Away(_unit(outward, outward), np.zeros(len(positions)))
+    nearest = closest_point(positions, head)
+    return _Away(head.triangle_normals()[nearest.triangle], nearest.distance)
+
+
+def _facing(source: Surface, card: Ints, away: Floats) -> tuple[Floats, Bools, Bools]:
+    """Normals away from the head, and which triangles must turn for that.
+
+    A card turns as a whole; where its own triangles disagree, each turns by itself.
+
+    Returns:
+        ((vertex_count, 3) unit, (triangle_count,) turned, (card_count,) whose triangles disagree).
+    """
+    a, b, c = np.moveaxis(source.corners.astype(np.float64), 1, 0)
+    outward = np.cross(b - a, c - a)
+    ahead = np.einsum("ti,tci->t", outward, away[source.triangles]) / 3.0
+    is_mixed = _disagreeing(source.triangles, card)
+    is_inward = _looks_inwards((a + b + c) / 3.0, outward, ahead, card)
+    is_turned = np.where(is_mixed[card], ahead < 0.0, is_inward[card])
+    outward[is_turned] *= -1.0
+    total = np.zeros((len(source.positions), 3))
+    for corner in range(3):
+        np.add.at(total, source.triangles[:, corner], outward)
+    return _unit(total, away), is_turned, is_mixed
+
+
+def _looks_inwards(centers: Floats, outward: Floats, ahead: Floats, card: Ints) -> Bools:
+    """Cards that look towards the head; of those that look to all sides, such as closed locks,
+    those that look towards their own middle: whose volume is negative. (card_count,)
+    """
+    area = np.linalg.norm(outward, axis=1)
+    total = np.maximum(np.bincount(card, area), 1e-30)
+    middle = np.stack([np.bincount(card, area * part) for part in centers.T], axis=1)
+    from_middle = centers - (middle / total[:, None])[card]
+    volume = np.bincount(card, np.einsum("ti,ti->t", outward, from_middle))
+    share = np.bincount(card, ahead) / total
+    is_inward: Bools = np.where(np.abs(share) > _LEAST_FACING, share, volume) < 0.0
+    return is_inward
+
+
+def _disagreeing(triangles: Ints, card: Ints) -> Bools:
+    """Cards in which two triangles run along an edge in the same direction, (card_count,)."""
+    edges = np.concatenate([triangles[:, (0, 1)], triangles[:, (1, 2)], triangles[:, (2, 0)]])
+    key = edges[:, 0].astype(np.int64) * (int(triangles.max()) + 1) + edges[:, 1]
+    order = np.argsort(key, kind="stable")
+    twice = order[1:][np.diff(key[order]) == 0]
+    found = np.zeros(int(card.max()) + 1, bool)
+    found[np.tile(card, 3)[twice]] = True
+    return found
+
+
+def _along(uv: Floats, island: Ints, ways: UvWays) -> Floats:
+    """0 at the roots to 1 at the tips of each island, (triangle_count, 3)."""
+    axis = ways.axis[island]
+    coordinate = np.take_along_axis(uv, axis[:, None, None], axis=2)[:, :, 0]
+    low, high = (bound[island, None] for bound in island_bounds(coordinate, island))
+    size = high - low
+    share = np.divide(coordinate - low, size, out=np.zeros_like(coordinate), where=size > 0.0)
+    return np.where(ways.is_down[island, None], 1.0 - share, share)
+
+
+def _tangents(
+    corners: Floats, uv: Floats, triangles: Ints, along: Floats, island: Ints, ways: UvWays
+) -> Floats:
+    """Unit vectors along the way, (vertex_count, 3); from root to tip where UVs do not tell."""
+    gradients = coordinate_gradients(corners, uv[triangles])
+    chosen = np.take_along_axis(gradients, ways.axis[island][:, None, None], axis=1)[:, 0]
+    chosen *= np.where(ways.is_down[island], -1.0, 1.0)[:, None]
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = np.linalg.norm(np.cross(one, two), axis=1)
+    chosen = _unit(chosen, np.zeros_like(chosen)) * area[:, None]
+    total = np.zeros((len(uv), 3))
+    for corner in range(3):
+        np.add.at(total, triangles[:, corner], chosen)
+    from_root = np.einsum("tc,tci->ti", along - along.mean(axis=1, keepdims=True), corners)
+    whole = np.stack([np.bincount(island, part) for part in from_root.T], axis=1)
+    fallback = np.zeros_like(total)
+    fallback[triangles] = whole[island][:, None]
+    return _unit(total, fallback)
+
+
+def _unit(vectors: Floats, other: Floats) -> Floats:
+    """Unit vectors; where there is none those of `other`, and where there is none either, down."""
+    found = np.tile(np.array([0.0, 0.0, -1.0]), (len(vectors), 1))
+    for candidates in (other, vectors):
+        length = np.linalg.norm(candidates, axis=1)
+        usable = length > 1e-20
+        found[usable] = candidates[usable] / length[usable, None]
+    return found
+
+
+def _at_vertices(triangles: Ints, values: Floats, vertex_count: int) -> Floats:
+    found = np.zeros(vertex_count)
+    found[triangles] = values
+    return found
+
+
+def _groups(triangles: Ints, card: Ints, group: Ints | None) -> Ints:
+    """The group that most corners of each card are in, (card_count,) int32."""
+    count = int(card.max()) + 1
+    if group is None:
+        return np.zeros(count, np.int32)
+    names, number = np.unique(group, return_inverse=True)
+    key = np.repeat(card.astype(np.int64), 3) * len(names) + number[triangles].ravel()
+    votes = np.bincount(key, minlength=count * len(names)).reshape(count, len(names))
+    return names[votes.argmax(axis=1)].astype(np.int32)
+
+
+def _direction_notes(ways: UvWays, island: Ints, card: Ints, head: Surface | None) -> Iterator[str]:
+    if head is None:
+        yield "There is no head, so the higher end of the cards was taken for their roots"
+    doubtful = len(np.unique(card[ways.is_doubtful[island]]))
+    if doubtful:
+        yield f"The UVs of {_cards(doubtful)} run another way than most, or leave the root open"
+
+
+def _shape_notes(source: Surface, card: Ints, is_mixed: Bools) -> Iterator[str]:
+    count = int(card.max()) + 1
+    if count == 1:
+        yield "All faces hang together, so there is nothing to sort: cards must be separate pieces"
+    if is_mixed.any():
+        yield f"The faces of {_cards(int(is_mixed.sum()))} do not all look to the same side"
+    a, b, c = np.moveaxis(source.corners.astype(np.float64), 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    longest = np.max([((x - y) ** 2).sum(axis=1) for x, y in ((a, b), (b, c), (c, a))], axis=0)
+    is_flat = np.bincount(card, area > _FLAT * longest, minlength=count) == 0
+    if is_flat.any():
+        yield f"No face of {_cards(int(is_flat.sum()))} has an area"
+    shared = _crowded(source.triangles, card)
+    if shared:
+        yield f"In {_cards(shared)} more than two faces share an edge"
+    doubled = _doubled(source, card)
+    if doubled:
+        yield f"{_cards(doubled)} {'lies' if doubled == 1 else 'lie'} exactly on another"
+
+
+def _crowded(triangles: Ints, card: Ints) -> int:
+    """Cards with an edge of more than two triangles."""
+    edges = np.concatenate([triangles[:, (0, 1)], triangles[:, (1, 2)], triangles[:, (2, 0)]])
+    _, number, uses = np.unique(
+        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    return len(np.unique(np.tile(card, 3)[uses[number.ravel()] > 2]))
+
+
+def _doubled(source: Surface, card: Ints) -> int:
+    """Cards whose corners all lie where those of a card before them lie."""
+    seen, found = set(), 0
+    order = np.argsort(card, kind="stable")
+    starts = np.searchsorted(card[order], np.arange(1, int(card.max()) + 1))
+    for triangles in np.split(source.triangles[order], starts):
+        places = np.unique(source.positions[triangles.ravel()], axis=0).tobytes()
+        found += places in seen
+        seen.add(places)
+    return found
+
+
+def _uv_notes(uv: Floats) -> Iterator[str]:
+    outside = int(((uv < -1e-4) | (uv > 1.0 + 1e-4)).any(axis=1).sum())
+    if outside:
+        yield f"{outside} of {len(uv)} vertices have UVs beyond the edge of the texture"
+
+
+def _cards(count: int) -> str:
+    return "1 card" if count == 1 else f"{count} cards"

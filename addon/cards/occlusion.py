@@ -1,0 +1,266 @@
+"""Ambient occlusion of card vertices by rays against cards, with their alpha, and bodies.
+
+What is stored is the light that a vertex gets from an even sky, as a share of what a surface of
+its normal gets in the open:  A = sum_i |n . d_i| T_i / sum_i |n . d_i|,  over directions d_i that
+are spread evenly over the half sphere about the normal n, which faces away from the head. So a
+card that lies open on the head has 1. T is the transmittance of the ray: a body lets nothing
+through, each card 1 - alpha at the place that is met (Scheuermann 2004, section 5; Zhukov,
+Iones and Kronin 1998, ambient light under an even sky).
+
+All vertices share one set of axes. Along each axis every vertex has one ray, to that side to which
+its normal leans, and all rays are found together (see parallel_rays.py).
+
+Limitations: alpha is taken from the nearest pixel. A body only holds back rays that enter it, so
+that roots which lie a little below the skin are not dark; its triangles must face outwards.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..strands import Surface
+from .card_mesh import CardMesh
+from .occlusion_settings import CardOcclusionSettings
+from .parallel_rays import crossings, point_grid
+from .sort import card_of_vertex
+
+#: What is nearer than this is met by nobody: cards that cross at a vertex [m].
+_NEAREST = 1.0e-4
+#: Optical depth of what is opaque: exp of its negative is 0 in float32.
+_OPAQUE = 100.0
+#: Directions at work at the same time; numpy lets other threads run most of the time.
+_THREADS = min(4, os.cpu_count() or 1)
+_DIRECTIONS_PER_STEP = 8
+
+
+@dataclass(frozen=True)
+class CardShade:
+    """Cards that shade. alpha: (height, width) in [0, 1], row 0 the lowest; None is opaque."""
+
+    mesh: CardMesh
+    alpha: Floats | None = None
+
+
+def vertex_occlusion(
+    mesh: CardMesh,
+    shades: Sequence[CardShade],
+    bodies: Sequence[Surface],
+    settings: CardOcclusionSettings,
+) -> Floats:
+    """How open each vertex of `mesh` is, (vertex_count,) float32: 1 open, 0 shut in.
+
+    Args:
+        mesh: what is shaded; its own cards shade it when it is among the shades.
+        shades: cards of this groom, and of others by choice, all in one space.
+        bodies: heads and whatever else lets no light through, in the same space.
+    """
+    steps = occlusion_steps(mesh, shades, bodies, settings)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            openness: Floats = end.value
+            return openness
+
+
+def occlusion_steps(
+    mesh: CardMesh,
+    shades: Sequence[CardShade],
+    bodies: Sequence[Surface],
+    settings: CardOcclusionSettings,
+) -> Generator[float, None, Floats]:
+    """As vertex_occlusion, some directions a step; each gives the share that is done."""
+    count = len(mesh.positions)
+    if not count:
+        return np.ones(0, np.float32)
+    scene = _Scene(mesh, shades, bodies, settings)
+    axes = even_axes(settings.rays)
+    light, whole = np.zeros(count), np.zeros(count)
+    with ThreadPoolExecutor(_THREADS) as threads:
+        for first in range(0, len(axes), _DIRECTIONS_PER_STEP):
+            part = axes[first : first + _DIRECTIONS_PER_STEP]
+            # in order, so that the sums are the same every time
+            for share, transmittance in threads.map(scene.seen_along, part):
+                light += share * transmittance
+                whole += share
+            yield (first + len(part)) / len(axes)
+    openness = np.divide(light, whole, out=np.ones(count), where=whole > 0.0)
+    shown: Floats = (1.0 - settings.strength * (1.0 - openness)).astype(np.float32)
+    return shown
+
+
+def even_axes(count: int) -> Floats:
+    """Unit vectors, one of each axis, (count, 3): with their opposites evenly over the sphere.
+
+    A Fibonacci lattice of the upper half (Swinbank and Purser 2006).
+    """
+    step = np.arange(count) + 0.5
+    height = 1.0 - step / count
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * step
+    breadth = np.sqrt(1.0 - height**2)
+    return np.stack([breadth * np.cos(turn), breadth * np.sin(turn), height], axis=1)
+
+
+class _Triangles:
+    """Triangles that parallel rays may meet.
+
+    corners: (3, 3, triangle_count) float32 [m], corner by corner, coordinates first.
+    height: of a typical one [m].
+    """
+
+    def __init__(self, positions: Floats, triangles: Ints, middle: Floats) -> None:
+        corners = (positions - middle)[triangles]
+        self.corners = np.ascontiguousarray(corners.transpose(1, 2, 0))
+        self.height = (
+            float(np.median(np.ptp(corners, axis=1).mean(axis=1))) if len(corners) else 0.0
+        )
+
+
+class _Layer:
+    """The cards of one shade.
+
+    texel: (triangle_count, 6) float32 where the texture is at each triangle's first corner, and
+        how far from there it is at the others, in pixels, x and y.
+    depth: (height, width) float32, optical depth.
+    card: (triangle_count,); -1 where the shaded vertices are of no card of this shade.
+    """
+
+    def __init__(self, shade: CardShade, middle: Floats, is_own: bool) -> None:
+        mesh = shade.mesh
+        alpha = np.ones((1, 1), np.float32) if shade.alpha is None else shade.alpha
+        self.triangles = _Triangles(mesh.positions, mesh.triangles, middle)
+        self.card = mesh.card if is_own else np.full_like(mesh.card, -1)
+        self.depth = -np.log(np.maximum(1.0 - alpha, np.exp(-_OPAQUE))).astype(np.float32)
+        texel = mesh.uv[mesh.triangles] * np.array(alpha.shape[::-1], np.float32)
+        texel[:, 1:] -= texel[:, :1]
+        self._texel = texel.reshape(-1, 6)
+
+    def depth_at(self, triangle: Ints, second: Floats, third: Floats) -> Floats:
+        """Optical depth where triangles are met, (n,)."""
+        texel = self._texel.take(triangle, axis=0)
+        across = texel[:, 0] + second * texel[:, 2] + third * texel[:, 4]
+        upwards = texel[:, 1] + second * texel[:, 3] + third * texel[:, 5]
+        height, width = self.depth.shape
+        column = np.clip(across, 0, width - 1).astype(np.int64)
+        row = np.clip(upwards, 0, height - 1).astype(np.int64)
+        depth: Floats = self.depth.ravel().take(row * width + column)
+        return depth
+
+
+class _Scene:
+    """What is shaded and what shades, made ready for one axis after the other."""
+
+    def __init__(
+        self,
+        mesh: CardMesh,
+        shades: Sequence[CardShade],
+        bodies: Sequence[Surface],
+        settings: CardOcclusionSettings,
+    ) -> None:
+        middle = mesh.positions.mean(axis=0)
+        self._points = np.ascontiguousarray((mesh.positions - middle).T)
+        self._normals = mesh.normal
+        self._card = card_of_vertex(mesh)
+        self._settings = settings
+        self._bodies = [_Triangles(body.positions, body.triangles, middle) for body in bodies]
+        self._layers = [_Layer(shade, middle, shade.mesh is mesh) for shade in shades]
+
+    def seen_along(self, axis: Floats) -> tuple[Floats, Floats]:
+        """(cosine, transmittance) of each vertex' ray along the axis, each (vertex_count,)."""
+        frame = _frame(axis)
+        leaning = self._normals @ frame[2]
+        side = np.where(leaning < 0.0, -1.0, 1.0).astype(np.float32)
+        rays = _Rays(np.arange(len(leaning)), frame @ self._points, side, self._card)
+        for body in self._bodies:
+            rays = rays.taken(~rays.enters(frame @ body.corners, body.height, self._settings))
+        depth = np.zeros(len(rays.vertex))
+        for layer in self._layers:
+            depth += rays.depth(frame @ layer.triangles.corners, layer, self._settings)
+        transmittance = np.zeros(len(leaning))
+        transmittance[rays.vertex] = np.exp(-depth)
+        return np.abs(leaning), transmittance
+
+
+@dataclass(frozen=True)
+class _Met:
+    """Rays and the triangles that they meet, each (m,); distance [m] along the ray."""
+
+    ray: Ints
+    triangle: Ints
+    second: Floats
+    third: Floats
+    distance: Floats
+
+
+@dataclass(frozen=True)
+class _Rays:
+    """Parallel rays, (n,) each.
+
+    vertex, card: where they start; places: (3, n) float32 in the frame of the axis [m];
+    side: 1 for rays along the axis, -1 for those against it.
+    """
+
+    vertex: Ints
+    places: Floats
+    side: Floats
+    card: Ints
+
+    def taken(self, chosen: Bools) -> _Rays:
+        index = np.flatnonzero(chosen)
+        return _Rays(
+            self.vertex[index], self.places.take(index, axis=1), self.side[index], self.card[index]
+        )
+
+    def enters(self, corners: Floats, height: float, settings: CardOcclusionSettings) -> Bools:
+        """Which of the rays enter a body within the reach, (n,)."""
+        one, two = corners[1] - corners[0], corners[2] - corners[0]
+        facing = one[0] * two[1] - one[1] * two[0]
+        found = np.zeros(len(self.vertex), bool)
+        for met in self._met(corners, height, settings.reach):
+            enters = facing.take(met.triangle) * self.side.take(met.ray) < 0.0
+            found[met.ray[enters]] = True
+        return found
+
+    def depth(self, corners: Floats, layer: _Layer, settings: CardOcclusionSettings) -> Floats:
+        """Optical depth of all cards of a layer that each ray meets, (n,)."""
+        total = np.zeros(len(self.vertex))
+        for met in self._met(corners, layer.triangles.height, settings.reach):
+            is_own = layer.card.take(met.triangle) == self.card.take(met.ray)
+            kept = np.flatnonzero(~is_own | (met.distance > settings.own_reach))
+            places = met.triangle.take(kept), met.second.take(kept), met.third.take(kept)
+            depth = layer.depth_at(*places)
+            total += np.bincount(met.ray.take(kept), depth, minlength=len(total))
+        return total
+
+    def _met(self, corners: Floats, height: float, reach: float) -> Iterator[_Met]:
+        """All that rays meet ahead of them within the reach [m], in portions."""
+        if not len(self.vertex):
+            return
+        first, second, third = corners[:, 2]
+        planes = np.stack([first, second - first, third - first], axis=1)
+        for pair in crossings(point_grid(self.places[:2], height), corners[:, :2]):
+            plane = planes.take(pair.triangle, axis=0)
+            met = plane[:, 0] + plane[:, 1] * pair.second + plane[:, 2] * pair.third
+            distance = (met - self.places[2].take(pair.point)) * self.side.take(pair.point)
+            kept = np.flatnonzero((distance > _NEAREST) & (distance < reach))
+            yield _Met(
+                pair.point.take(kept),
+                pair.triangle.take(kept),
+                pair.second.take(kept),
+                pair.third.take(kept),
+                distance.take(kept),
+            )
+
+
+def _frame(axis: Floats) -> Floats:
+    """Rows: two directions across the axis, and the axis, right-handed, (3, 3) float32."""
+    aside = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    across = np.cross(aside, axis)
+    across /= np.linalg.norm(across)
+    return np.stack([across, np.cross(axis, across), axis]).astype(np.float32)

@@ -1,0 +1,49 @@
+"""Parameters of the ambient occlusion of hair cards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..params import Settings, integer, number
+
+
+@dataclass(frozen=True, kw_only=True)
+class CardOcclusionSettings(Settings):
+    """How cards and the body shade the vertices of cards from the light of all sides."""
+
+    section: ClassVar[str] = "card_occlusion"
+    title: ClassVar[str] = "Card occlusion"
+
+    strength: float = number(
+        1.0,
+        label="Strength",
+        description="How much of the shade between the cards is stored",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+    )
+    rays: int = integer(
+        256,
+        label="Rays",
+        description="Directions from which light comes to each vertex; time grows with them",
+        soft=(64, 1024),
+        hard=(1, 65_536),
+    )
+    reach: float = number(
+        1.0,
+        label="Reach",
+        description="How far away cards and bodies still shade",
+        unit="length",
+        soft=(0.02, 2.0),
+        hard=(0.0, 1_000.0),
+    )
+    own_reach: float = number(
+        0.02,
+        label="Own Card",
+        description="From where on a card shades itself: a little more than its width, so that "
+        "only what curls over itself does",
+        unit="length",
+        soft=(0.0, 0.1),
+        hard=(0.0, 1_000.0),
+    )

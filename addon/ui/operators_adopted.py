@@ -1,0 +1,219 @@
+"""The artist's own hair cards: sorted, and shaded, by one button."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from ..errors import HairloomError
+from ..host.adopted_cards import (
+    CardOcclusionSettings,
+    SortChoices,
+    SortedCards,
+    alpha_image,
+    sort_steps,
+)
+from ..host.groups import operator_properties
+from ..host.properties import settings_of
+from .reports import reporting, waiting
+from .selection import active_mesh
+
+_BY = (
+    ("pieces", "Pieces", "Pieces of cards that cross each other are sorted apart: fewest errors"),
+    ("cards", "Whole Cards", "All faces of a card stay together"),
+    ("distance", "Distance", "Whole cards by their distance from the head alone"),
+)
+_WAYS = (
+    ("auto", "Automatic", "Found by which end of the UVs is nearer to the head"),
+    ("down", "Down", "Roots are at the top of the texture"),
+    ("up", "Up", "Roots are at the bottom of the texture"),
+    ("right", "Right", "Roots are at the left of the texture"),
+    ("left", "Left", "Roots are at the right of the texture"),
+)
+
+
+class HAIRLOOM_OT_sort_cards(bpy.types.Operator):
+    """Put the faces of the active mesh of hair cards into the order in which engines have to draw
+    them, from the inside to the outside, and store ambient occlusion"""
+
+    bl_idname = "hairloom.sort_cards"
+    bl_label = "Sort Hair Cards"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = {
+        "head": StringProperty(
+            name="Head",
+            description="The mesh that the hair grows from, which shades it as well",
+        ),
+        "by": EnumProperty(name="Sort", description="What is sorted", items=_BY),
+        "dangling": StringProperty(
+            name="Dangling",
+            description="Vertex group of cards that swing, such as a ponytail: drawn after all "
+            "others",
+        ),
+        "way": EnumProperty(
+            name="Root to Tip",
+            description="Which way hair runs on the texture",
+            items=_WAYS,
+        ),
+        "use_occlusion": BoolProperty(
+            name="Ambient Occlusion",
+            description="Store how open each vertex is, as an attribute and as a UV map",
+            default=True,
+        ),
+        "alpha": StringProperty(
+            name="Alpha",
+            description="Picture that says where cards are clear; empty: that of their material",
+        ),
+        **operator_properties("card_occlusion"),
+    }
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _can_sort(cls, context)
+
+    def invoke(self: Any, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        obj = active_mesh(context)
+        assert obj is not None
+        if not self.head:
+            head = _likely_head(obj, context)
+            self.head = "" if head is None else head.name
+        if not self.alpha:
+            image = alpha_image(obj)
+            self.alpha = "" if image is None else image.name
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop_search(self, "head", bpy.data, "objects")
+        layout.prop(self, "by")
+        layout.prop_search(self, "dangling", context.object, "vertex_groups")
+        layout.prop(self, "way")
+        layout.prop(self, "use_occlusion")
+        column = layout.column()
+        column.active = self.use_occlusion
+        column.prop_search(self, "alpha", bpy.data, "images")
+        for parameter in CardOcclusionSettings.parameters():
+            column.prop(self, parameter.name)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj = active_mesh(context)
+        assert obj is not None
+        choices = SortChoices(
+            head=_named_head(self.head, obj),
+            by=self.by,
+            way=self.way,
+            dangling=self.dangling,
+            occlusion=settings_of(self, CardOcclusionSettings) if self.use_occlusion else None,
+            alpha=_named_image(self.alpha),
+        )
+        steps = sort_steps(obj, context.evaluated_depsgraph_get(), choices)
+        with waiting(context):
+            self._tell(obj, _counted(steps, context.window_manager))
+        return {"FINISHED"}
+
+    def _tell(self, obj: bpy.types.Object, done: SortedCards) -> None:
+        for note in done.notes:
+            self.report({"WARNING"}, f"{obj.name}: {note}")
+        moved = f"{done.moved} of {done.face_count} faces moved"
+        count = "1 card" if done.card_count == 1 else f"{done.card_count} cards"
+        self.report({"INFO"}, f"Sorted {count}; {moved}")
+
+
+def _counted(
+    steps: Generator[float, None, SortedCards], manager: bpy.types.WindowManager
+) -> SortedCards:
+    """The result of all steps, while the mouse pointer shows how far they are."""
+    manager.progress_begin(0, 100)
+    try:
+        while True:
+            manager.progress_update(100.0 * next(steps))
+    except StopIteration as end:
+        done: SortedCards = end.value
+        return done
+    finally:
+        manager.progress_end()
+
+
+def _can_sort(operator: type[Any], context: bpy.types.Context) -> bool:
+    obj = active_mesh(context)
+    if obj is None:
+        operator.poll_message_set("Select a mesh of hair cards")
+    elif not obj.is_editable or not obj.data.is_editable:
+        operator.poll_message_set("It is linked from another file: make it local first")
+    elif obj.mode != "OBJECT":
+        operator.poll_message_set("Go back to Object Mode first")
+    else:
+        return True
+    return False
+
+
+def _likely_head(obj: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Object | None:
+    """Its parent, else the other selected mesh, if there is one."""
+    if obj.parent is not None and obj.parent.type == "MESH":
+        return obj.parent
+    others = [one for one in context.selected_objects if one.type == "MESH" and one != obj]
+    return others[0] if len(others) == 1 else None
+
+
+def _named_head(name: str, cards: bpy.types.Object) -> bpy.types.Object | None:
+    if not name:
+        return None
+    head = bpy.data.objects.get(name)
+    if head is None or head.type != "MESH" or head == cards:
+        raise HairloomError(
+            "it is no mesh that hair could grow from" if head else "there is no such object",
+            place=f"Head '{name}'",
+            remedy="Choose the mesh of the head, or none",
+        )
+    return head
+
+
+def _named_image(name: str) -> bpy.types.Image | None:
+    if not name:
+        return None
+    image = bpy.data.images.get(name)
+    if image is None:
+        raise HairloomError(
+            "there is no such picture", place=f"Alpha '{name}'", remedy="Choose one, or none"
+        )
+    return image
+
+
+def draw_sort(self: Any, _context: bpy.types.Context) -> None:
+    self.layout.operator("hairloom.sort_cards", icon="SORTSIZE")
+
+
+class HAIRLOOM_PT_sidebar_own_cards(bpy.types.Panel):
+    """Hair cards that were made by hand"""
+
+    bl_label = "Own Cards"
+    bl_parent_id = "HAIRLOOM_PT_sidebar"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Hairloom"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return active_mesh(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_sort(self, context)
+
+
+def register() -> None:
+    bpy.types.VIEW3D_MT_object.append(draw_sort)
+
+
+def unregister() -> None:
+    bpy.types.VIEW3D_MT_object.remove(draw_sort)
+
+
+CLASSES = (HAIRLOOM_OT_sort_cards, HAIRLOOM_PT_sidebar_own_cards)
