@@ -149,7 +149,7 @@ class HairTextures:
     """The textures of hair cards, float32 in [0, 1], row 0 at the root; each of its own size.
 
     base: (height, width, 3) linear, to be multiplied by the hair's colour; it goes on where alpha
-        is 0, so that no dark fringe appears.
+        is 0, so that no dark fringe appears. Of an atlas it may exceed 1.
     alpha: (height, width) straight coverage, 0 along both sides of each column.
     shift: (height, width) of the highlights, 0.5 is none; repeats in u and v.
     noise: (height, width) factor of the second highlight; repeats in u and v.
@@ -157,6 +157,8 @@ class HairTextures:
         u; y along the card from root to tip; z away from the head. Where it replaces the shift, the
         strand runs along x side + y tangent + shift_noise z normal. Its x holds for texels that
         are square on the card.
+    normal: (height, width, 3) normal n of the strands as 0.5 n + 0.5, in the axes of `tangent`;
+        None is that of the card everywhere.
     """
 
     base: Floats
@@ -164,6 +166,7 @@ class HairTextures:
     shift: Floats
     noise: Floats
     tangent: Floats
+    normal: Floats | None = None
 
     @property
     def card(self) -> Floats:

@@ -1,0 +1,280 @@
+"""Which strands each tile of the atlas shows, and which tile each card.
+
+Cards that look alike share a tile: k-medoids (Park and Jun 2009, here with the member nearest to
+the mean as the medoid) over what a card is in its own frame. The strands of the medoid are those
+that are baked. Hair of two groups shares no tile, nor do single strands with tufts, as long as
+there are tiles enough for that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import HairloomError
+from .atlas_grid import AtlasGrid
+from .atlas_settings import SIZES, AtlasSettings
+from .clusters import shared_out
+from .strip import CardFrames, Strips
+
+#: How many strands a tile holds at most, as a factor of its width in pixels.
+_MOST_STRANDS = 2
+#: How far a card may be widened or narrowed so that it covers as much as its own strands.
+_WIDTH_RANGE = (0.5, 2.0)
+#: A way aside that counts like another card being twice as wide: the sine of its angle.
+_WAVE = 0.2
+_ROUNDS = 12
+_TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class AtlasPlan:
+    """All that the bake needs beside the strands' points and radii.
+
+    grid: how the atlas is divided. size: its width and height [pixels].
+    tile: (card_count,) of each card; crossed cards have that of their pair.
+    width_factor: (card_count,) by which a card is to be widened so that it covers as much with its
+        tile's strands as it would with its own; 1 where they are its own.
+    strips: the strip of each tile that is used, tiles 0, 1, 2 ...; at CV resolution.
+    strands: which strands are baked, tile after tile; offsets: (used tiles + 1,) where each begins.
+    thickness: (used tiles,) factor of the radii, larger where a tile cannot hold all its strands.
+    notes: what the artist should know.
+    """
+
+    grid: AtlasGrid
+    size: int
+    tile: Ints
+    width_factor: Floats
+    strips: Strips
+    strands: Ints
+    offsets: Ints
+    thickness: Floats
+    notes: tuple[str, ...] = ()
+
+    @property
+    def tile_of_strand(self) -> Ints:
+        """The tile of each baked strand, (baked strands,)."""
+        return np.repeat(np.arange(len(self.strips)), np.diff(self.offsets))
+
+
+def plan_atlas(
+    strips: Strips,
+    grid: Floats,
+    radius: Floats,
+    cluster: Ints,
+    group: Ints,
+    settings: AtlasSettings,
+) -> AtlasPlan:
+    """Choose what the tiles show.
+
+    Args:
+        strips: one a cluster, with as many rows as there are CVs; those of fit_strips, without the
+            crossed ones.
+        grid: (strand_count, cv_count, 3) [m], root first.
+        radius: (strand_count, cv_count) [m], as strands are drawn.
+        cluster: (strand_count,) the card of each strand, from 0 without gaps.
+        group: (strand_count,).
+
+    Raises:
+        HairloomError: the atlas is too small for its tiles, or no strand has a width.
+    """
+    atlas = settings.grid
+    if not (radius > 0.0).any():
+        raise HairloomError(
+            "no strand has a width, so that the atlas would be empty",
+            place="strands",
+            remedy="Give the strands a radius, or raise Width Scale",
+        )
+    shapes = _card_shapes(strips, grid, radius, cluster)
+    kind = _kinds(cluster, group, shapes.strand_count, atlas.tile_count)
+    random = np.random.default_rng(settings.seed)
+    tile, medoid = _shared_tiles(shapes.features, kind, atlas.tile_count, random)
+    chosen = _of_cards(strips, medoid)
+    strands, offsets, crowding = _baked_strands(cluster, medoid, settings, random)
+    notes = (
+        *_cap_note(crowding),
+        *_size_notes(chosen, grid[strands], radius[strands], offsets, settings),
+    )
+    return AtlasPlan(
+        grid=atlas,
+        size=settings.side,
+        tile=tile,
+        width_factor=_width_factors(shapes, strips.width, tile, medoid),
+        strips=chosen,
+        strands=strands,
+        offsets=offsets,
+        thickness=crowding * settings.strand_width,
+        notes=notes,
+    )
+
+
+@dataclass(frozen=True)
+class _CardShapes:
+    """What cards are like.
+
+    strand_count: (n,).
+    covered: (n, row_count) share of each row that its strands cover.
+    pace: (n, row_count) way from row to row [m].
+    features: (n, 5), of which each counts for as much as it is seen.
+    """
+
+    strand_count: Ints
+    covered: Floats
+    pace: Floats
+    features: Floats
+
+
+def _card_shapes(strips: Strips, grid: Floats, radius: Floats, cluster: Ints) -> _CardShapes:
+    card_count = len(strips)
+    count = np.bincount(cluster, minlength=card_count)
+    width = np.maximum(strips.width, _TINY)
+    thick = [np.bincount(cluster, 2.0 * row, card_count) for row in radius.T]
+    fill = np.stack(thick, axis=1) / width
+    # n strands anywhere across, each of which covers fill / n of the width
+    covered = 1.0 - (1.0 - np.clip(fill / count[:, None], 0.0, 1.0)) ** count[:, None]
+    pace = np.gradient(strips.frames.center, axis=1)
+    pace = np.linalg.norm(pace, axis=-1)
+    scales = (width.mean(axis=1), pace.sum(axis=1), fill.mean(axis=1), count)
+    octaves = [np.log2(np.maximum(scale, _TINY)) for scale in scales]
+    wave = np.bincount(cluster, _asides(strips.frames, grid, cluster), card_count) / count
+    return _CardShapes(count, covered, pace, np.stack([*octaves, wave / _WAVE], axis=1))
+
+
+def _asides(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
+    """The sine of the angle between each strand and its strip, (strand_count,), on the mean."""
+    way = np.diff(grid, axis=1)
+    ahead = np.einsum("sri,sri->sr", way, frames.tangent[cluster, :-1])
+    length = np.linalg.norm(way, axis=-1)
+    aside = np.sqrt(np.maximum(length**2 - ahead**2, 0.0))
+    mean: Floats = aside.sum(axis=1) / np.maximum(length.sum(axis=1), _TINY)
+    return mean
+
+
+def _kinds(cluster: Ints, group: Ints, strand_count: Ints, tile_count: int) -> Ints:
+    """Cards of different kinds share no tile, (card_count,): groups, and single strands in each."""
+    _, first = np.unique(cluster, return_index=True)
+    _, groups = np.unique(group[first], return_inverse=True)
+    pairs, kind = np.unique(2 * groups + (strand_count == 1), return_inverse=True)
+    return kind if len(pairs) <= tile_count else np.zeros_like(kind)
+
+
+def _shared_tiles(
+    features: Floats, kind: Ints, tile_count: int, random: np.random.Generator
+) -> tuple[Ints, Ints]:
+    """The tile of each card, (card_count,), and the card that each tile shows, (used tiles,)."""
+    parts = shared_out(min(tile_count, len(kind)), np.bincount(kind))
+    while parts.sum() > tile_count:  # each kind has one at least
+        parts[parts.argmax()] -= 1
+    tile = np.zeros(len(kind), np.int32)
+    medoids = np.zeros(0, np.int64)
+    for number, wanted in enumerate(parts):
+        own = np.flatnonzero(kind == number)
+        label, medoid = _medoids(features[own], int(wanted), random)
+        tile[own] = len(medoids) + label
+        medoids = np.concatenate([medoids, own[medoid]])
+    return tile, medoids
+
+
+def _medoids(features: Floats, count: int, random: np.random.Generator) -> tuple[Ints, Ints]:
+    """The group of each, (n,), and the member that stands for each group, (count,)."""
+    if count >= len(features):
+        return np.arange(len(features)), np.arange(len(features))
+    medoid = _far_apart(features, count, random)
+    for _ in range(_ROUNDS):
+        label = _gaps(features, features[medoid]).argmin(axis=1)
+        label[medoid] = np.arange(count)
+        size = np.bincount(label, minlength=count)
+        mean = np.stack([np.bincount(label, f, count) for f in features.T], axis=1) / size[:, None]
+        gap = ((features - mean[label]) ** 2).sum(axis=1)
+        order = np.lexsort((gap, label))
+        medoid = order[np.cumsum(size) - size]
+    label = _gaps(features, features[medoid]).argmin(axis=1)
+    label[medoid] = np.arange(count)
+    return label, medoid
+
+
+def _far_apart(features: Floats, count: int, random: np.random.Generator) -> Ints:
+    """k-means++: so many different ones, far from each other by chance."""
+    chosen = [int(random.integers(len(features)))]
+    gap = np.full(len(features), np.inf)
+    for _ in range(1, count):
+        gap = np.minimum(gap, ((features - features[chosen[-1]]) ** 2).sum(axis=1))
+        chance = gap + 1e-9
+        chance[chosen] = 0.0
+        chosen.append(int(random.choice(len(features), p=chance / chance.sum())))
+    return np.array(chosen)
+
+
+def _gaps(features: Floats, medoids: Floats) -> Floats:
+    """Squared distances, (n, count)."""
+    gaps = np.zeros((len(features), len(medoids)))
+    for one, other in zip(features.T, medoids.T, strict=True):
+        gaps += (one[:, None] - other) ** 2
+    return gaps
+
+
+def _baked_strands(
+    cluster: Ints, medoid: Ints, settings: AtlasSettings, random: np.random.Generator
+) -> tuple[Ints, Ints, Floats]:
+    """Strands, tile after tile, where each tile begins, and for how many each of its stands."""
+    order = np.argsort(cluster, kind="stable")
+    ends = np.cumsum(np.bincount(cluster))
+    most = max(int(_MOST_STRANDS * settings.side / settings.columns), 1)
+    tiles, crowding = [], []
+    for card in medoid:
+        own = order[ends[card - 1] if card else 0 : ends[card]]
+        kept = own if len(own) <= most else np.sort(random.choice(own, most, replace=False))
+        crowding.append(len(own) / len(kept))
+        tiles.append(kept)
+    offsets = np.cumsum([0, *map(len, tiles)])
+    return np.concatenate(tiles), offsets, np.array(crowding)
+
+
+def _width_factors(shapes: _CardShapes, width: Floats, tile: Ints, medoid: Ints) -> Floats:
+    """How much wider each card must be to cover as much as with its own strands, (card_count,)."""
+    area = width * shapes.pace
+    own = (shapes.covered * area).sum(axis=1)
+    shown = (shapes.covered[medoid[tile]] * area).sum(axis=1)
+    return np.clip(np.where(shown > 0.0, own / np.maximum(shown, _TINY**2), 1.0), *_WIDTH_RANGE)
+
+
+def _cap_note(crowding: Floats) -> tuple[str, ...]:
+    full = int((crowding > 1.0).sum())
+    if not full:
+        return ()
+    return (
+        f"{full} tiles cannot hold all their strands; they show some of them, up to "
+        f"{crowding.max():.1f} times as wide",
+    )
+
+
+def _size_notes(
+    strips: Strips, grid: Floats, radius: Floats, offsets: Ints, settings: AtlasSettings
+) -> tuple[str, ...]:
+    """What is smaller than a pixel of the atlas."""
+    tile = np.repeat(np.arange(len(strips)), np.diff(offsets))
+    across, along = settings.inner_tile
+    pace = np.linalg.norm(np.diff(strips.frames.center, axis=1), axis=-1).sum(axis=1)
+    wide, high = strips.width.mean(axis=1)[tile] / across, pace[tile] / along
+    length = np.linalg.norm(np.diff(grid, axis=1), axis=-1).sum(axis=1)
+    notes = []
+    share = float(np.median(2.0 * radius.mean(axis=1) / np.maximum(wide, _TINY)))
+    if share < 1.0:
+        larger = settings.side / max(share, _TINY)
+        fitting = next((f"an atlas of {size}" for size in SIZES if size >= larger), "fewer columns")
+        notes.append(
+            f"strands are {share:.2g} pixels of the atlas wide and show as fainter lines; "
+            f"{fitting} would show them as they are"
+        )
+    short = int((length < high).sum())
+    if short:
+        notes.append(f"{short} strands are shorter than a pixel of the atlas and hardly show")
+    return tuple(notes)
+
+
+def _of_cards(strips: Strips, cards: Ints) -> Strips:
+    frames = strips.frames
+    names = ("center", "tangent", "normal", "side")
+    return Strips(CardFrames(*(getattr(frames, n)[cards] for n in names)), strips.width[cards])

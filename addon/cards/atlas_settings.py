@@ -1,0 +1,112 @@
+"""Parameters of the atlas: the texture that all cards of a groom share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import HairloomError
+from ..params import Settings, choice, integer, number
+from .atlas_grid import AtlasGrid
+
+#: Sizes that engines take: powers of two, so that each mip map halves it.
+SIZES = (512, 1024, 2048, 4096)
+#: What a tile must have left between its padding, across and along [pixels].
+LEAST_TILE = (4, 8)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtlasSettings(Settings):
+    """How large the atlas is, how it is divided, and what it shows."""
+
+    section = "atlas"
+    title = "Atlas"
+
+    source: str = choice(
+        "baked",
+        (
+            ("made", "Made", "Strips of hair made by chance, as Card Texture has them"),
+            ("baked", "Baked", "The strands themselves, laid flat; for cards from clusters"),
+        ),
+        label="Shows",
+        description="What hair the texture of the cards shows",
+    )
+    size: str = choice(
+        "2048",
+        tuple((str(size), str(size), f"{size} x {size} pixels") for size in SIZES),
+        label="Size",
+        description="Width and height of the atlas in pixels",
+    )
+    columns: int = integer(
+        16,
+        label="Columns",
+        description="Tiles side by side; a power of two keeps tiles apart in all mip maps",
+        soft=(1, 32),
+        hard=(1, 64),
+    )
+    rows: int = integer(
+        4,
+        label="Rows",
+        description="Rows of tiles; a power of two keeps tiles apart in all mip maps",
+        soft=(1, 16),
+        hard=(1, 64),
+    )
+    padding: int = integer(
+        4,
+        label="Padding",
+        description="Pixels left free on each side of a tile, so that no tile shows in another",
+        soft=(0, 16),
+        hard=(0, 256),
+    )
+    strand_width: float = number(
+        1.57,  # pi / 2: the mean of |cos| over all turns of a card is 2 / pi
+        label="Strand Width",
+        description="Factor of the strands' width in the atlas; cards are mostly seen at a slant, "
+        "which makes what is on them narrower, and strands are not",
+        soft=(1.0, 2.0),
+        hard=(0.01, 100.0),
+        unit="factor",
+    )
+    seed: int = integer(
+        0,
+        label="Seed",
+        description="Another number chooses other strands for the tiles",
+        soft=(0, 100),
+        hard=(0, 2**31 - 1),
+    )
+
+    @property
+    def side(self) -> int:
+        """Width and height [pixels]."""
+        return int(self.size)
+
+    @property
+    def inner_tile(self) -> tuple[float, float]:
+        """What a tile has between its padding, across and along [pixels]; may be negative."""
+        parts = (self.columns, self.rows)
+        across, along = (self.side / count - 2.0 * self.padding for count in parts)
+        return across, along
+
+    @property
+    def grid(self) -> AtlasGrid:
+        """The tiles.
+
+        Raises:
+            HairloomError: the padding leaves too little of a tile; it says how large the atlas
+                would have to be.
+        """
+        if any(there < least for there, least in zip(self.inner_tile, LEAST_TILE, strict=True)):
+            raise self._too_small()
+        share = self.padding / self.side
+        return AtlasGrid(self.columns, self.rows, (share * self.columns, share * self.rows))
+
+    def _too_small(self) -> HairloomError:
+        across, along = (self.side / count for count in (self.columns, self.rows))
+        parts = zip((self.columns, self.rows), LEAST_TILE, strict=True)
+        needed = max(count * (least + 2 * self.padding) for count, least in parts)
+        return HairloomError(
+            f"{self.columns} x {self.rows} tiles of {across:g} x {along:g} pixels with "
+            f"{self.padding} pixels of padding do not fit in {self.side} pixels; that takes "
+            f"{needed}, which is {needed - self.side} more",
+            place="atlas",
+            remedy="Use a larger atlas, fewer columns and rows, or less padding",
+        )

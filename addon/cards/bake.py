@@ -1,0 +1,238 @@
+"""The atlas from strands that were laid flat: the reference, sample by sample.
+
+Twin of gpu_shaders/lib_atlas.glsl and of what render/atlas_pass.py does with it. Of each texel
+SAMPLES x SAMPLES places are looked at; each shows the outermost strand there. The texel's alpha is
+the share of the samples that show one, and its maps are the means over those.
+
+Each row of samples lies a quarter of a sample further left than the one below, so that a texel's
+are all at different places across: hair runs along a tile, and upright samples would stand in line
+with it. A GPU draws that by leaning everything to the right.
+
+Slow, a loop over the triangles of all strands; for machines without a GPU too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from .atlas_maps import AtlasMaps
+from .bake_strands import FlatStrands
+
+#: Samples of a texel across, and along.
+SAMPLES = 4
+#: Steps of the R2 sequence (Roberts 2018) in x and y, and from strand to strand, of 2^24.
+SPARSE_STEPS = (12664745, 9560333, 10368890)
+SPARSE_RANGE = 1 << 24
+#: Samples that are held at a time.
+_MOST_SAMPLES = 1 << 22
+#: Texels across that are made at a time, so that leaning samples fit a texture.
+_MOST_ACROSS = 2048
+_EDGES = np.array([[-1.0], [1.0]])
+_TINY = 1e-12
+
+
+def at_least_a_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
+    """Half widths of ribbons a sample wide at least, and the share of their samples that counts.
+
+    So a strand thinner than a sample still covers as much as it is wide, see `is_counted`.
+
+    Args:
+        size: of the atlas [pixels].
+
+    Returns:
+        half as in FlatStrands, and share (n, cv_count) in [0, 1].
+    """
+    side = size * SAMPLES
+    way = np.gradient(flat.place, axis=1) * side
+    length = np.linalg.norm(way, axis=-1)
+    half = flat.half * side
+    across = np.abs(half[..., 0] * way[..., 1] - half[..., 1] * way[..., 0])
+    across = np.where(length > _TINY, across / np.maximum(length, _TINY), 0.0)
+    share = np.clip(across / 0.5, 0.0, 1.0)
+    is_thin = share < 1.0
+    # what has no width at all lies across its way
+    turned = np.stack([way[..., 1], -way[..., 0]], axis=-1)
+    turned = 0.5 * turned / np.maximum(length, _TINY)[..., None]
+    wide = np.where(is_thin[..., None], turned, half) / side
+    return wide.astype(np.float32), share.astype(np.float32)
+
+
+def is_counted(column: Ints, row: Ints, strand: int, share: Floats) -> Bools:
+    """Whether a sample of a ribbon that was widened counts: `share` of them do, evenly spread."""
+    x, y, z = SPARSE_STEPS
+    place = (column * x + row * y + strand * z) % SPARSE_RANGE
+    counted: Bools = place < share * SPARSE_RANGE
+    return counted
+
+
+def fibre_normal(tangent: Floats, side: Floats) -> Floats:
+    """Normal of a round strand seen from outside the card, (..., 3).
+
+    Args:
+        tangent: (..., 3) unit vectors in the card's frame.
+        side: (...) where across the strand, from -1 to 1.
+    """
+    right = np.stack([tangent[..., 1], -tangent[..., 0], np.zeros_like(side)], axis=-1)
+    right = _unit(right, (1.0, 0.0, 0.0))
+    front = np.cross(right, tangent)
+    up = np.sqrt(np.maximum(1.0 - side * side, 0.0))
+    normal: Floats = right * side[..., None] + front * up[..., None]
+    return normal
+
+
+@dataclass(frozen=True)
+class Block:
+    """A part of the atlas that is made at a time: its lowest left texel and its size [pixels]."""
+
+    left: int
+    low: int
+    width: int
+    height: int
+
+    @property
+    def samples_across(self) -> int:
+        """Columns of samples; the uppermost row leans a sample a texel further than the lowest."""
+        return SAMPLES * self.width + self.height
+
+    def leaning(self, place: Floats, size: int) -> Floats:
+        """Where places of the atlas, (..., 2) in 0 to 1, are among the samples, (..., 2)."""
+        x, y = np.moveaxis((place * size - (self.left, self.low)) * SAMPLES, -1, 0)
+        return np.stack([x + y / SAMPLES - 0.5, y], axis=-1)
+
+    def reached(self, flat: FlatStrands, half: Floats, size: int) -> Ints:
+        """The strands that may lie in it."""
+        reach = np.abs(half)
+        low = (flat.place - reach).min(axis=1) * size
+        high = (flat.place + reach).max(axis=1) * size
+        corner = np.array([self.left, self.low])
+        inside = (low < corner + (self.width, self.height)) & (high > corner)
+        return np.flatnonzero(inside.all(axis=1))
+
+
+def blocks_of(size: int) -> list[Block]:
+    """The blocks of an atlas, all of one size but for those at the top."""
+    width = min(size, _MOST_ACROSS)
+    height = max(min(_MOST_SAMPLES // (width * SAMPLES**2), size), 1)
+    starts = range(0, size, height), range(0, size, width)
+    return [Block(x, y, width, min(height, size - y)) for y in starts[0] for x in starts[1]]
+
+
+def sampled_maps(flat: FlatStrands, size: int) -> AtlasMaps:
+    """The maps of an atlas, with zeros where no strand is."""
+    half, share = at_least_a_sample(flat, size)
+    maps: dict[str, Any] = {}
+    for block in blocks_of(size):
+        for name, part in _sampled_block(flat, half, share, size, block).items():
+            whole = maps.setdefault(name, np.zeros((size, size, *part.shape[2:]), np.float32))
+            rows = slice(block.low, block.low + block.height)
+            whole[rows, block.left : block.left + block.width] = part
+    return AtlasMaps(**maps, base_gain=flat.base_gain)
+
+
+def _sampled_block(
+    flat: FlatStrands, half: Floats, share: Floats, size: int, block: Block
+) -> dict[str, Any]:
+    """The maps of its texels."""
+    shape = block.height * SAMPLES, block.samples_across
+    nearest = np.full(shape, -np.inf, np.float32)
+    values = np.zeros((*shape, 10), np.float32)  # along, id, depth, occlusion, tangent, base
+    normal = np.zeros((*shape, 3), np.float32)
+    for strand in block.reached(flat, half, size):
+        edges = flat.place[strand, :, None] + half[strand, :, None] * _EDGES
+        corners = block.leaning(edges, size).reshape(-1, 2)
+        for row, column, vertices, weights in _samples(corners, shape):
+            seen = weights @ _vertex_values(flat, share, strand, vertices)
+            place = column + block.left * SAMPLES, row + block.low * SAMPLES
+            counts = is_counted(*place, int(strand), seen[:, 0])
+            # the later one of two that lie equally far outside shows
+            counts &= seen[:, 4] >= nearest[row, column]
+            row, column, seen = row[counts], column[counts], seen[counts]
+            nearest[row, column] = seen[:, 4]
+            tangent = _unit(seen[:, 6:9], (0.0, 1.0, 0.0))
+            values[row, column] = np.concatenate([seen[:, 2:6], tangent, seen[:, 9:]], axis=1)
+            normal[row, column] = fibre_normal(tangent, seen[:, 1])
+    return _filtered(*(_upright(image, block) for image in (nearest, values, normal)))
+
+
+def _upright(image: Floats, block: Block) -> Floats:
+    """What leant to the right, (rows, samples across, ...), again as wide as the block."""
+    row = np.arange(block.height * SAMPLES)[:, None]
+    return image[row, row // SAMPLES + np.arange(block.width * SAMPLES)]
+
+
+def _samples(corners: Floats, shape: tuple[int, int]) -> Iterator[tuple[Ints, Ints, Ints, Floats]]:
+    """Triangle after triangle of a ribbon: rows and columns of its samples, its three vertices as
+    numbers 2 station + (1 on the right), and their weights (n, 3).
+
+    Args:
+        corners: (2 * station_count, 2) left and right, station after station [samples].
+        shape: rows and columns of samples that there are.
+    """
+    lowest = np.minimum(np.minimum(corners[:-2], corners[1:-1]), corners[2:])
+    highest = np.maximum(np.maximum(corners[:-2], corners[1:-1]), corners[2:])
+    low = np.maximum(np.floor(lowest).astype(int), 0)
+    high = np.minimum(np.ceil(highest).astype(int), shape[::-1])
+    for first in np.flatnonzero((low < high).all(axis=1)):
+        vertices = np.arange(first, first + 3)
+        a, b, c = corners[vertices]
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if abs(area) < _TINY:
+            continue
+        rows, columns = slice(low[first, 1], high[first, 1]), slice(low[first, 0], high[first, 0])
+        row, column = (i.ravel() for i in np.mgrid[rows, columns])
+        x, y = column + 0.5 - a[0], row + 0.5 - a[1]
+        second = (x * (c[1] - a[1]) - y * (c[0] - a[0])) / area
+        third = ((b[0] - a[0]) * y - (b[1] - a[1]) * x) / area
+        weights = np.stack([1.0 - second - third, second, third], axis=1)
+        inside = (weights >= 0.0).all(axis=1)
+        yield row[inside], column[inside], vertices, weights[inside]
+
+
+def _vertex_values(flat: FlatStrands, share: Floats, strand: int, vertices: Ints) -> Floats:
+    """share, side, along, id, depth, occlusion, tangent, base of the vertices, (3, 12)."""
+    cv, sign = vertices // 2, 2.0 * (vertices % 2) - 1.0
+    along = cv / (flat.place.shape[1] - 1)
+    number = np.full(3, flat.strand_id[strand])
+    depth, occlusion = flat.depth[strand, cv], flat.occlusion[strand, cv]
+    single = np.stack([share[strand, cv], sign, along, number, depth, occlusion], axis=1)
+    return np.concatenate([single, flat.tangent[strand, cv], flat.base[strand, cv]], axis=1)
+
+
+def _filtered(nearest: Floats, values: Floats, normal: Floats) -> dict[str, Any]:
+    """Texels of their samples, by the names of the maps."""
+    rows, columns = nearest.shape[0] // SAMPLES, nearest.shape[1] // SAMPLES
+    shape = (rows, SAMPLES, columns, SAMPLES)
+    count = np.isfinite(nearest).reshape(shape).sum(axis=(1, 3))
+    most = np.maximum(count, 1)[..., None]
+    means = values.reshape(*shape, -1).sum(axis=(1, 3)) / most
+    normals = normal.reshape(*shape, -1).sum(axis=(1, 3))
+    depths = np.moveaxis(nearest.reshape(shape), 2, 1).reshape(rows, columns, -1)
+    numbers = np.moveaxis(values[..., 1].reshape(shape), 2, 1).reshape(rows, columns, -1)
+    outermost = depths.argmax(axis=-1)[..., None]
+    is_hair = count > 0
+    maps = {
+        "alpha": count / SAMPLES**2,
+        "base": means[..., 7:],
+        "normal": _encoded(normals, (0.0, 0.0, 1.0), is_hair),
+        "tangent": _encoded(means[..., 4:7], (0.0, 1.0, 0.0), is_hair),
+        "depth": means[..., 2],
+        "along": means[..., 0],
+        "strand_id": np.take_along_axis(numbers, outermost, axis=-1)[..., 0] * is_hair,
+        "occlusion": means[..., 3],
+    }
+    return {name: value.astype(np.float32) for name, value in maps.items()}
+
+
+def _encoded(vectors: Floats, fallback: tuple[float, ...], is_hair: Bools) -> Floats:
+    return (0.5 * _unit(vectors, fallback) + 0.5) * is_hair[..., None]
+
+
+def _unit(vectors: Floats, fallback: tuple[float, ...]) -> Floats:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    unit: Floats = np.where(length > 1e-6, vectors / np.maximum(length, 1e-6), fallback)
+    return unit

@@ -1,0 +1,184 @@
+"""The strands of an atlas laid flat into its tiles.
+
+A strip has its rows where the strands have their CVs. So CV r of a strand lies at row r, moved on
+by as much as it is ahead of that row along the strip; across it lies as far aside as it is along
+the strip's side. What stands out of the strip's plane is its depth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from .atlas import AtlasPlan
+
+#: Part of a card's width in which strands in front of another take light from it.
+_NEAR = 0.25
+#: Part of a card's width, from its middle, in which strands stay where they are in any case.
+_KEPT = 0.35
+#: Stations in place of each segment, so that bends are round.
+PIECES = 4
+_TINY = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class FlatStrands:
+    """Ribbons on the atlas, straight from station to station, all float32; tile after tile.
+
+    place: (n, station_count, 2) in the atlas, 0 to 1.
+    half: (n, station_count, 2) from there to the right edge.
+    depth: (n, station_count) 0 to 1 as in AtlasMaps.
+    tangent: (n, station_count, 3) unit vectors in the card's frame.
+    base: (n, station_count, 3) the strand's colour as a factor of the hair's, over base_gain.
+    occlusion: (n, station_count) share of the light from the front that the tile's other strands
+        let through.
+    strand_id: (n,) from 0 to 1, by chance, no two the same.
+    """
+
+    place: Floats
+    half: Floats
+    depth: Floats
+    tangent: Floats
+    base: Floats
+    occlusion: Floats
+    strand_id: Floats
+    base_gain: float = 1.0
+
+    def __len__(self) -> int:
+        return len(self.strand_id)
+
+
+def flat_strands(
+    plan: AtlasPlan, grid: Floats, radius: Floats, base: Floats | None = None, seed: int = 0
+) -> FlatStrands:
+    """The strands of the plan in its tiles; none reaches beyond its tile.
+
+    Args:
+        grid: (strand_count, cv_count, 3) [m] of all strands, as in plan_atlas.
+        radius: (strand_count, cv_count) [m], as strands are drawn.
+        base: (strand_count, cv_count, 3) the colour of each strand as a factor of the hair's, see
+            shading.drawn_strands; 1 where there is none.
+    """
+    tile, strips = plan.tile_of_strand, plan.strips
+    points, frames = grid[plan.strands], strips.frames
+    away = points - frames.center[tile]
+    axes = (frames.side, frames.tangent, frames.normal)
+    aside, ahead, outside = (np.einsum("sri,sri->sr", away, axis[tile]) for axis in axes)
+    width: Floats = np.maximum(strips.width[tile], _TINY)
+    row_count = points.shape[1]
+    pace = np.linalg.norm(np.gradient(frames.center, axis=1), axis=-1)[tile] * (row_count - 1)
+    pace = np.maximum(pace, _TINY)
+    radii = radius[plan.strands] * plan.thickness[tile, None] / width
+    shade, gain = _shades(plan, base, points.shape)
+    at_cvs = (
+        aside / width,
+        _within(np.linspace(0.0, 1.0, row_count) + ahead / pace),
+        np.clip(0.5 + outside / np.maximum(strips.width.mean(axis=1), _TINY)[tile, None], 0.0, 1.0),
+        radii,
+        width / pace,
+        _occlusion(plan, aside / width, radii, outside),
+    )
+    fine = [_finer(value[..., None])[..., 0] for value in at_cvs]
+    across, along, depth, thick, shape, occlusion = fine
+
+    half = _half_width(across, along, np.maximum(thick, 0.0), shape)
+    across = 0.5 + _squeezed(across, np.abs(half[..., 0]), plan)
+    along = np.clip(along, np.abs(half[..., 1]), 1.0 - np.abs(half[..., 1]))
+    place = plan.grid.uv(tile[:, None], across, along)
+    edge = plan.grid.uv(tile[:, None], across + half[..., 0], along + half[..., 1])
+    parts = {
+        "place": place,
+        "half": edge - place,
+        "depth": np.clip(depth, 0.0, 1.0),
+        "tangent": _tangents(points, *(axis[tile] for axis in axes)),
+        "base": np.clip(_finer(shade), 0.0, 1.0),
+        "occlusion": np.clip(occlusion, 0.0, 1.0),
+        "strand_id": (np.random.default_rng(seed).permutation(len(points)) + 0.5) / len(points),
+    }
+    single = {name: part.astype(np.float32) for name, part in parts.items()}
+    return FlatStrands(**single, base_gain=gain)
+
+
+def _half_width(across: Floats, along: Floats, thick: Floats, shape: Floats) -> Floats:
+    """From a ribbon's middle to its edge, across the strand as the card shows it, (n, stations, 2).
+
+    Args:
+        across, along: place in the tile. thick: radius in widths of the card.
+        shape: width of the card in its lengths.
+    """
+    way = np.gradient(np.stack([across * shape, along], axis=-1), axis=1)
+    way /= np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), _TINY)
+    half = np.stack([way[..., 1], -way[..., 0] * shape], axis=-1) * thick[..., None]
+    clipped: Floats = np.clip(half, -0.5, 0.5)
+    return clipped
+
+
+def _finer(values: Floats) -> Floats:
+    """PIECES stations in place of each segment, (n, stations, channels): Catmull and Rom 1974."""
+    ends = 2.0 * values[:, [0, -1]] - values[:, [1, -2]]
+    wide = np.concatenate([ends[:, :1], values, ends[:, 1:]], axis=1)
+    p0, p1, p2, p3 = (wide[:, i : wide.shape[1] - 3 + i, None] for i in range(4))
+    u = (np.arange(PIECES) / PIECES)[:, None]
+    a, b, c = p0 - p1, p2 - p1, p3 - p1
+    fine = p1 + 0.5 * u * (b - a + u * (2.0 * a + 4.0 * b - c + u * (c - a - 3.0 * b)))
+    inner = fine.reshape(len(values), -1, values.shape[-1])
+    return np.concatenate([inner, values[:, -1:]], axis=1)
+
+
+def _within(along: Floats) -> Floats:
+    """Strands that begin before the strip or end behind it squeezed into it, each as a whole."""
+    low = np.minimum(along.min(axis=1, keepdims=True), 0.0)
+    high = np.maximum(along.max(axis=1, keepdims=True), 1.0)
+    return (along - low) / (high - low)
+
+
+def _squeezed(across: Floats, half: Floats, plan: AtlasPlan) -> Floats:
+    """Places across from -0.5 to 0.5: where strands reach further out, all beyond _KEPT give way.
+
+    So nothing is cut off, and each strand keeps its neighbours.
+    """
+    far = np.maximum.reduceat(np.abs(across) + half, plan.offsets[:-1], axis=0)
+    far = np.maximum(far, 0.5)[plan.tile_of_strand]
+    beyond = (np.abs(across) - _KEPT) * (0.5 - _KEPT) / (far - _KEPT)
+    place = np.where(np.abs(across) <= _KEPT, across, np.sign(across) * (_KEPT + beyond))
+    return np.clip(place, half - 0.5, 0.5 - half)
+
+
+def _tangents(points: Floats, side: Floats, tangent: Floats, normal: Floats) -> Floats:
+    way = np.gradient(points, axis=1)
+    parts = [np.einsum("sri,sri->sr", way, axis) for axis in (side, tangent, normal)]
+    ways = _finer(np.stack(parts, axis=-1))
+    length = np.linalg.norm(ways, axis=-1, keepdims=True)
+    return np.where(length > _TINY, ways / np.maximum(length, _TINY), (0.0, 1.0, 0.0))
+
+
+def _shades(plan: AtlasPlan, base: Floats | None, shape: tuple[int, ...]) -> tuple[Floats, float]:
+    """Colours no brighter than 1, and what they were divided by."""
+    if base is None:
+        return np.ones(shape), 1.0
+    shade = base[plan.strands]
+    gain = max(float(shade.max(initial=0.0)), 1.0)
+    return shade / gain, gain
+
+
+def _occlusion(plan: AtlasPlan, across: Floats, radius: Floats, outside: Floats) -> Floats:
+    """exp(-tau), tau the strands before each CV that light from the front meets by chance.
+
+    Those of the same row within _NEAR of the card's width count, by the share of that which they
+    cover.
+
+    Args:
+        across, radius: (n, cv_count) in widths of the card. outside: (n, cv_count) [m].
+    """
+    occlusion = np.ones_like(across)
+    for first, last in zip(plan.offsets[:-1], plan.offsets[1:], strict=True):
+        own = slice(first, last)
+        for row in range(across.shape[1]):
+            place, thick, depth = across[own, row], radius[own, row], outside[own, row]
+            is_before = depth > depth[:, None]
+            is_near = np.abs(place - place[:, None]) < 0.5 * _NEAR
+            tau = (is_before & is_near) @ (2.0 * thick / _NEAR)
+            occlusion[own, row] = np.exp(-tau)
+    return occlusion

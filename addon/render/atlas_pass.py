@@ -1,0 +1,185 @@
+"""Bakes an atlas: strands that were laid flat drawn into it from straight above, on the GPU.
+
+Block after block of the atlas: all samples of it in one draw, three targets and a depth, then a
+compute shader that makes texels of them. Reference: cards/bake.py. The textures' texels:
+
+    cv_places  RGBA32F: xy place, zw half width             of each CV
+    cv_ways    RGBA32F: xyz tangent, w depth
+    cv_looks   RGBA32F: xyz base, w occlusion
+    cv_rest    RG32F:   x share of samples that count, y strand_id
+
+    sample_place  RGBA16F: x along, y strand_id, z depth, w occlusion
+    sample_way    RGBA16F: xyz tangent, w place across the strand
+    sample_base   RGBA16F: xyz base, w 1 where there is hair
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats
+from ..cards.atlas_maps import AtlasMaps
+from ..cards.bake import SAMPLES, Block, at_least_a_sample, blocks_of
+from ..cards.bake_strands import FlatStrands
+from .shader_program import ShaderProgram, ShaderRecipe, program
+from .textures import drawing_into, drawing_state, strand_rows, texture_from, texture_to_array
+
+#: Texels that a compute group works on, along each side.
+_GROUP = 8
+_SAMPLES_OF = ("sample_place", "sample_way", "sample_base")
+_TEXELS_OF = ("texel_place", "texel_base", "texel_tangent", "texel_normal")
+_CVS = ("cv_places", "cv_ways", "cv_looks", "cv_rest")
+
+
+def atlas_recipe(*, is_sparse: bool) -> ShaderRecipe:
+    """The program that draws strands; `is_sparse` where some are thinner than a sample."""
+    return ShaderRecipe(
+        name=f"atlas{'_sparse' * is_sparse}",
+        vertex="atlas.vert.glsl",
+        fragment="atlas.frag.glsl",
+        textures=tuple(("FLOAT_2D", name) for name in _CVS),
+        integers=(
+            "cv_count",
+            "first_strand",
+            *(("first_column", "first_row") if is_sparse else ()),
+        ),
+        numbers=(("VEC2", "block_start"), ("FLOAT", "atlas_size"), ("VEC2", "block_samples")),
+        varyings=(
+            ("flat", "INT", "strand_number"),
+            ("flat", "FLOAT", "strand_id"),
+            ("smooth", "VEC2", "along_and_side"),
+            ("smooth", "VEC2", "depth_and_share"),
+            ("smooth", "VEC3", "strand_tangent"),
+            ("smooth", "VEC4", "base_and_occlusion"),
+        ),
+        outputs=tuple(("VEC4", name) for name in _SAMPLES_OF),
+        defines=(("SPARSE", int(is_sparse)),),
+    )
+
+
+_TEXEL_RECIPE = ShaderRecipe(
+    name="atlas_texels",
+    compute="atlas_texels.comp.glsl",
+    textures=tuple(("FLOAT_2D", name) for name in _SAMPLES_OF),
+    images=tuple(("RGBA32F", name) for name in _TEXELS_OF),
+    group_size=(_GROUP, _GROUP),
+)
+
+
+def baked_maps(flat: FlatStrands, size: int) -> AtlasMaps:
+    """The maps of an atlas, with zeros where no strand is: as cards.bake.sampled_maps.
+
+    Args:
+        size: of the atlas [pixels].
+
+    Raises:
+        ShaderError: a shader does not compile here.
+    """
+    texels = np.zeros((4, size, size, 4), np.float32)
+    if len(flat):
+        for block, made in _blocks(_Bake.of(flat, size)):
+            rows = slice(block.low, block.low + block.height)
+            texels[:, rows, block.left : block.left + block.width] = made
+    place, base, tangent, normal = texels
+    return AtlasMaps(
+        alpha=base[..., 3].copy(),
+        base=base[..., :3].copy(),
+        normal=normal[..., :3].copy(),
+        tangent=tangent[..., :3].copy(),
+        depth=place[..., 2].copy(),
+        along=place[..., 0].copy(),
+        strand_id=place[..., 1].copy(),
+        occlusion=place[..., 3].copy(),
+        base_gain=flat.base_gain,
+    )
+
+
+@dataclass(frozen=True)
+class _Bake:
+    """What blocks are drawn from.
+
+    half: of the strands as they are drawn.
+    textures: of the stations. is_sparse: some strands are thinner than a sample.
+    """
+
+    flat: FlatStrands
+    half: Floats
+    size: int
+    textures: dict[str, Any]
+    is_sparse: bool
+
+    @classmethod
+    def of(cls, flat: FlatStrands, size: int) -> _Bake:
+        half, share = at_least_a_sample(flat, size)
+        number = np.broadcast_to(flat.strand_id[:, None], share.shape)
+        values = (
+            np.concatenate([flat.place, half], axis=-1),
+            np.concatenate([flat.tangent, flat.depth[..., None]], axis=-1),
+            np.concatenate([flat.base, flat.occlusion[..., None]], axis=-1),
+            np.stack([share, number], axis=-1),
+        )
+        textures = {
+            name: texture_from(strand_rows(value), "RG32F" if name == "cv_rest" else "RGBA32F")
+            for name, value in zip(_CVS, values, strict=True)
+        }
+        return cls(flat, half, size, textures, is_sparse=bool((share < 1.0).any()))
+
+
+def _blocks(bake: _Bake) -> Iterator[tuple[Block, Floats]]:
+    """Each block that has hair, and its texels (4, height, width, 4)."""
+    blocks = blocks_of(bake.size)
+    width, height = blocks[0].width, blocks[0].height
+    shape = blocks[0].samples_across, height * SAMPLES
+    samples = {name: _texture(*shape, "RGBA16F") for name in _SAMPLES_OF}
+    depth = _texture(*shape, "DEPTH_COMPONENT32F")
+    target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=tuple(samples.values()))
+    texels = {name: _texture(width, height, "RGBA32F") for name in _TEXELS_OF}
+    ribbon = _ribbon(bake.flat.place.shape[1])
+    for block in blocks:
+        reached = block.reached(bake.flat, bake.half, bake.size)
+        if len(reached):
+            first, last = int(reached[0]), int(reached[-1])
+            with drawing_into(target), drawing_state(depth_test="LESS_EQUAL"):
+                target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
+                shader = _bound(bake, block, shape, first)
+                ribbon.draw_instanced(
+                    shader.shader, instance_start=0, instance_count=last - first + 1
+                )
+            shader = program(_TEXEL_RECIPE)
+            shader.bind(textures=samples, images=texels)
+            gpu.compute.dispatch(shader.shader, -(-width // _GROUP), -(-height // _GROUP), 1)
+            gpu.shader.unbind()
+            made = [texture_to_array(texels[name])[: block.height] for name in _TEXELS_OF]
+            yield block, np.stack(made)
+
+
+def _bound(bake: _Bake, block: Block, shape: tuple[int, int], first_strand: int) -> ShaderProgram:
+    shader = program(atlas_recipe(is_sparse=bake.is_sparse))
+    integers = {"cv_count": bake.flat.place.shape[1], "first_strand": first_strand}
+    if bake.is_sparse:
+        integers["first_column"] = block.left * SAMPLES
+        integers["first_row"] = block.low * SAMPLES
+    numbers = {
+        "block_start": (block.left, block.low),
+        "atlas_size": float(bake.size),
+        "block_samples": shape,
+    }
+    shader.bind(textures=bake.textures, integers=integers, numbers=numbers)
+    return shader
+
+
+def _texture(width: int, height: int, texture_format: str) -> Any:
+    return gpu.types.GPUTexture((width, height), format=texture_format)
+
+
+def _ribbon(cv_count: int) -> Any:
+    """A strip of vertices without attributes: two a CV."""
+    layout = gpu.types.GPUVertFormat()
+    layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
+    vertices = gpu.types.GPUVertBuf(layout, 2 * cv_count)
+    return gpu.types.GPUBatch(type="TRI_STRIP", buf=vertices)

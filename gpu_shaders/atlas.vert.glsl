@@ -1,0 +1,25 @@
+// Strands laid flat into the atlas, vertex stage: ribbons straight from CV to CV, see
+// addon/cards/bake_strands.py. The target holds the samples of a block of the atlas.
+#include "lib_strand_texel.glsl"
+#include "lib_atlas.glsl"
+
+void main()
+{
+  int station = gl_VertexID >> 1;
+  float side = float(gl_VertexID & 1) * 2.0 - 1.0;
+  int strand = first_strand + gl_InstanceID;
+  ivec2 texel = strand_texel(strand, station, cv_count);
+  vec4 where = texelFetch(cv_places, texel, 0);  // xy place, zw half
+  vec4 way = texelFetch(cv_ways, texel, 0);      // xyz tangent, w depth
+  vec4 look = texelFetch(cv_looks, texel, 0);    // xyz base, w occlusion
+  vec4 rest = texelFetch(cv_rest, texel, 0);     // x share, y strand_id
+
+  vec2 place = leaning(where.xy + side * where.zw, atlas_size, block_start) / block_samples;
+  strand_number = strand;
+  strand_id = rest.y;
+  along_and_side = vec2(float(station) / float(cv_count - 1), side);
+  depth_and_share = vec2(way.w, rest.x);
+  strand_tangent = way.xyz;
+  base_and_occlusion = look;
+  gl_Position = vec4(2.0 * place - 1.0, 1.0 - 2.0 * way.w, 1.0);
+}

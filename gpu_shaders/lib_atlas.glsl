@@ -1,0 +1,33 @@
+// Strands in an atlas: what a sample sees of a round strand, and which samples of thin ones count.
+//
+// Twin of addon/cards/bake.py: same names. Holds no resources.
+
+// Normal of a round strand seen from outside the card; `side` is -1 to 1 across it.
+vec3 fibre_normal(vec3 tangent, float side)
+{
+  vec3 right = vec3(tangent.y, -tangent.x, 0.0);
+  float size = length(right);
+  right = size > 1.0e-6 ? right / size : vec3(1.0, 0.0, 0.0);
+  return right * side + cross(right, tangent) * sqrt(max(1.0 - side * side, 0.0));
+}
+
+// Whether a sample of a ribbon that was widened counts: `share` of them do, evenly spread by the R2
+// sequence of Roberts 2018.
+bool is_counted(uint column, uint row, uint strand, float share)
+{
+  uint place = column * {{sparse_step_x}}u + row * {{sparse_step_y}}u + strand * {{sparse_step_z}}u;
+  return float(place & {{sparse_mask}}u) < share * float({{sparse_mask}}u + 1u);
+}
+
+// Where a place of the atlas, in 0..1, is among the samples of a block of it: Block.leaning.
+vec2 leaning(vec2 place, float size, vec2 start)
+{
+  vec2 upright = (place * size - start) * float({{atlas_samples}});
+  return vec2(upright.x + upright.y / float({{atlas_samples}}) - 0.5, upright.y);
+}
+
+vec3 unit_of(vec3 vector, vec3 fallback)
+{
+  float size = length(vector);
+  return size > 1.0e-6 ? vector / size : fallback;
+}

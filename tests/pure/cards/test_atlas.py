@@ -1,0 +1,159 @@
+"""Which strands the tiles of an atlas show, and how an atlas is divided."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.cards.atlas import AtlasPlan, plan_atlas
+from hairloom.addon.cards.atlas_settings import AtlasSettings
+from hairloom.addon.cards.strip import CardFrames, Strips
+from hairloom.addon.errors import HairloomError
+
+ROWS = 8
+
+
+def strips_of(width: np.ndarray, length: np.ndarray) -> Strips:
+    """Upright strips side by side, a metre apart, that face -Y."""
+    count = len(width)
+    center = np.zeros((count, ROWS, 3), np.float32)
+    center[..., 0] = np.arange(count)[:, None]
+    center[..., 2] = np.linspace(0.0, 1.0, ROWS) * length[:, None]
+    axes = np.broadcast_to(np.eye(3, dtype=np.float32), (count, ROWS, 3, 3))
+    frames = CardFrames(center, axes[..., 2, :], -axes[..., 1, :], axes[..., 0, :])
+    return Strips(frames, np.repeat(width[:, None], ROWS, axis=1).astype(np.float32))
+
+
+def tufts(
+    width: np.ndarray, length: np.ndarray, strand_count: np.ndarray, radius: float
+) -> tuple[Strips, np.ndarray, np.ndarray, np.ndarray]:
+    """Strips with evenly spread straight strands: strips, grid, radius, cluster."""
+    strips = strips_of(width, length)
+    cluster = np.repeat(np.arange(len(width)), strand_count)
+    number = np.concatenate([np.arange(count) for count in strand_count])
+    share = (number + 0.5) / strand_count[cluster] - 0.5
+    grid = strips.frames.center[cluster]
+    grid = grid + strips.frames.side[cluster] * (share * width[cluster])[:, None, None]
+    return strips, grid, np.full(grid.shape[:2], radius, np.float32), cluster
+
+
+def test_few_cards_have_a_tile_each() -> None:
+    parts = tufts(np.full(3, 0.02), np.full(3, 0.2), np.array([5, 7, 9]), 1e-4)
+    plan = plan_atlas(*parts, np.zeros(21, int), AtlasSettings(size="512", columns=4, rows=1))
+    assert plan.tile.tolist() == [0, 1, 2]
+    assert np.diff(plan.offsets).tolist() == [5, 7, 9]
+    assert parts[3][plan.strands].tolist() == plan.tile_of_strand.tolist()
+    np.testing.assert_array_equal(plan.width_factor, 1.0)
+
+
+def many(seed: int = 0) -> AtlasPlan:
+    """60 cards of three kinds that are plain to see: narrow, wide, and long with few strands."""
+    random = np.random.default_rng(4)
+    kind = random.integers(3, size=60)
+    wobble = random.uniform(0.95, 1.05, size=60)
+    width = np.array([0.005, 0.04, 0.02])[kind] * wobble
+    length = np.array([0.1, 0.1, 0.6])[kind] * wobble
+    parts = tufts(width, length, np.array([6, 40, 3])[kind], 1e-4)
+    settings = AtlasSettings(size="512", columns=3, rows=1, seed=seed)
+    plan = plan_atlas(*parts, np.zeros(len(parts[1]), int), settings)
+    for tile in range(3):
+        assert len(np.unique(kind[plan.tile == tile])) == 1
+    return plan
+
+
+def test_cards_that_look_alike_share_a_tile() -> None:
+    for seed in range(4):
+        assert len(np.unique(many(seed).tile)) == 3
+
+
+def test_the_same_seed_gives_the_same_plan() -> None:
+    np.testing.assert_array_equal(many().strands, many().strands)
+
+
+def test_groups_and_single_strands_share_no_tile() -> None:
+    count = np.array([6] * 10 + [1] * 10)
+    parts = tufts(np.full(20, 0.02), np.full(20, 0.2), count, 1e-4)
+    card_group = np.arange(20) % 2
+    settings = AtlasSettings(size="512", columns=4, rows=1)
+    plan = plan_atlas(*parts, 7 + card_group[parts[3]], settings)
+    assert len(plan.strips) == 4
+    for tile in range(4):
+        shown = plan.tile == tile
+        assert len(np.unique(card_group[shown])) == 1
+        assert len(np.unique(count[shown])) == 1
+
+
+def test_single_strands_share_no_tile_with_tufts_that_are_as_wide() -> None:
+    """Half of both kinds are ten times as wide as the other half, which is a larger difference."""
+    count = np.repeat([2, 1], 10)
+    parts = tufts(np.resize([0.005, 0.05], 20), np.full(20, 0.2), count, 1e-4)
+    settings = AtlasSettings(size="512", columns=2, rows=1)
+    plan = plan_atlas(*parts, np.zeros(30, int), settings)
+    shown = [set(count[plan.tile == tile]) for tile in range(2)]
+    assert sorted(shown, key=min) == [{1}, {2}]
+
+
+def test_more_groups_than_tiles_share_them() -> None:
+    parts = tufts(np.full(9, 0.02), np.full(9, 0.2), np.full(9, 4), 1e-4)
+    plan = plan_atlas(*parts, parts[3], AtlasSettings(size="512", columns=2, rows=1))
+    assert plan.tile.max() == 1
+
+
+def test_a_thin_card_is_narrowed_to_cover_as_much_as_its_own_strands() -> None:
+    """Two cards share a tile of 10 strands; the other one has but 8 of them."""
+    parts = tufts(np.full(2, 0.1), np.full(2, 0.2), np.array([10, 8]), 1e-4)
+    for seed in range(8):
+        settings = AtlasSettings(size="512", columns=1, rows=1, seed=seed)
+        plan = plan_atlas(*parts, np.zeros(18, int), settings)
+        expected = (1.0, 0.8) if len(plan.strands) == 10 else (1.25, 1.0)
+        # covering by chance: a strand hides 0.2 % of the width, so hardly one another
+        np.testing.assert_allclose(plan.width_factor, expected, rtol=0.01)
+
+
+def test_a_full_tile_keeps_its_thickness() -> None:
+    parts = tufts(np.array([0.1]), np.array([0.2]), np.array([3000]), 1e-5)
+    settings = AtlasSettings(size="512", columns=1, rows=1, strand_width=1.5)
+    plan = plan_atlas(*parts, np.zeros(3000, int), settings)
+    assert len(plan.strands) == 1024
+    assert plan.thickness[0] * len(plan.strands) == pytest.approx(1.5 * 3000)
+    assert any("cannot hold all their strands" in note for note in plan.notes)
+
+
+def test_notes_say_what_is_smaller_than_a_pixel() -> None:
+    """0.1 m on 504 pixels; strands of 0.05 mm are a quarter of one, and would be one in 2048."""
+    parts = tufts(np.array([0.1]), np.array([0.2]), np.array([30]), 2.5e-5)
+    settings = AtlasSettings(size="512", columns=1, rows=1)
+    (note,) = plan_atlas(*parts, np.zeros(30, int), settings).notes
+    assert "0.25 pixels" in note
+    assert "an atlas of 2048 would" in note
+    thick = (*parts[:2], parts[2] * 10.0, parts[3])
+    assert plan_atlas(*thick, np.zeros(30, int), settings).notes == ()
+
+
+def test_notes_count_short_strands() -> None:
+    strips, grid, radius, cluster = tufts(np.array([0.1]), np.array([0.2]), np.array([4]), 1e-3)
+    grid[2] = grid[2, :1] + 1e-6 * (grid[2] - grid[2, :1])
+    settings = AtlasSettings(size="512", columns=1, rows=1)
+    (note,) = plan_atlas(strips, grid, radius, cluster, np.zeros(4, int), settings).notes
+    assert note.startswith("1 strands are shorter than a pixel")
+
+
+def test_an_atlas_that_is_too_small_says_by_how_much() -> None:
+    settings = AtlasSettings(size="512", columns=32, rows=4, padding=8)
+    with pytest.raises(HairloomError, match=r"takes 640, which is 128 more"):
+        _ = settings.grid
+    assert AtlasSettings(size="1024", columns=32, rows=4, padding=8).grid.tile_count == 128
+
+
+def test_strands_without_width_are_refused() -> None:
+    parts = tufts(np.array([0.1]), np.array([0.2]), np.array([4]), 0.0)
+    with pytest.raises(HairloomError, match="no strand has a width"):
+        plan_atlas(*parts, np.zeros(4, int), AtlasSettings())
+
+
+def test_padding_is_what_the_grid_leaves_free() -> None:
+    settings = AtlasSettings(size="1024", columns=16, rows=2, padding=6)
+    low = settings.grid.uv(np.array(17), np.array(0.0), np.array(0.0)) * 1024
+    high = settings.grid.uv(np.array(17), np.array(1.0), np.array(1.0)) * 1024
+    np.testing.assert_allclose(low, [64 + 6, 512 + 6], atol=1e-3)
+    np.testing.assert_allclose(high, [128 - 6, 1024 - 6], atol=1e-3)

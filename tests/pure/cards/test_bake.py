@@ -1,0 +1,245 @@
+"""Strands laid flat and baked, against what is known of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon.cards.atlas import AtlasPlan
+from hairloom.addon.cards.atlas_grid import AtlasGrid
+from hairloom.addon.cards.atlas_maps import AtlasMaps
+from hairloom.addon.cards.bake import sampled_maps
+from hairloom.addon.cards.bake_dilation import dilated, tile_edges
+from hairloom.addon.cards.bake_strands import FlatStrands, flat_strands
+from hairloom.addon.cards.strip import CardFrames, Strips
+
+ROWS = 6
+WIDTH, LENGTH = 0.02, 0.02
+
+
+def upright(count: int, rows: int = ROWS) -> Strips:
+    """Square strips that stand on the ground, face -Y and run along X across."""
+    center = np.zeros((count, rows, 3), np.float32)
+    center[..., 2] = np.linspace(0.0, LENGTH, rows)
+    axes = np.broadcast_to(np.eye(3, dtype=np.float32), (count, rows, 3, 3))
+    frames = CardFrames(center, axes[..., 2, :], -axes[..., 1, :], axes[..., 0, :])
+    return Strips(frames, np.full((count, rows), WIDTH, np.float32))
+
+
+def plan_of(per_tile: list[int], atlas: AtlasGrid | None = None, rows: int = ROWS) -> AtlasPlan:
+    count = len(per_tile)
+    return AtlasPlan(
+        grid=atlas or AtlasGrid(),
+        size=512,
+        tile=np.arange(count),
+        width_factor=np.ones(count),
+        strips=upright(count, rows),
+        strands=np.arange(sum(per_tile)),
+        offsets=np.cumsum([0, *per_tile]),
+        thickness=np.ones(count),
+    )
+
+
+def lines(
+    across: np.ndarray, *, end: np.ndarray | None = None, depth: float = 0.0, rows: int = ROWS
+) -> np.ndarray:
+    """Straight strands from root to tip; across from -0.5 to 0.5, at the tip `end`."""
+    end = across if end is None else end
+    along = np.linspace(0.0, 1.0, rows)
+    grid = np.zeros((len(across), rows, 3), np.float32)
+    grid[..., 0] = WIDTH * (across[:, None] + (end - across)[:, None] * along)
+    grid[..., 1] = -depth
+    grid[..., 2] = LENGTH * along
+    return grid
+
+
+def baked(
+    plan: AtlasPlan, grid: np.ndarray, width: float, size: int, base: np.ndarray | None = None
+) -> tuple[FlatStrands, AtlasMaps]:
+    """Strands of this width as a share of the card's."""
+    radius = np.full(grid.shape[:2], 0.5 * width * WIDTH, np.float32)
+    flat = flat_strands(plan, grid, radius, base)
+    return flat, sampled_maps(flat, size)
+
+
+@pytest.mark.parametrize("width", [0.05, 0.03, 0.0051, 0.0007])
+def test_parallel_strands_cover_what_they_are_wide(width: float) -> None:
+    """Of 64 pixels 0.05 are three and 0.0007 a twentieth, which no sample may hit."""
+    across = np.linspace(-0.34, 0.33, 8)
+    _, maps = baked(plan_of([8]), lines(across, rows=ROWS), width, 64)
+    assert maps.alpha.mean() == pytest.approx(8 * width, rel=0.05)
+
+
+def test_overlapping_strands_are_fully_opaque() -> None:
+    across = np.linspace(-0.3, 0.3, 80)
+    _, maps = baked(plan_of([80]), lines(across), 0.02, 32)
+    middle = maps.alpha[1:-1, 8:24]
+    np.testing.assert_array_equal(middle, 1.0)
+
+
+def test_slanting_strands_cover_their_projected_area() -> None:
+    """Ribbons lie across their way: one by 30 degrees is longer, and as wide."""
+    across = np.array([-0.33, -0.1, 0.1])
+    slope = np.tan(np.radians(12.0))
+    _, maps = baked(plan_of([3]), lines(across, end=across + slope), 0.03, 96)
+    length = np.hypot(1.0, slope)
+    assert maps.alpha.mean() == pytest.approx(3 * 0.03 * length, rel=0.04)
+
+
+def test_a_diagonal_strand_knows_its_way() -> None:
+    """Straight up and aside by 30 degrees, and out of the card by 20: known as a unit vector."""
+    grid = lines(np.array([-0.3]), end=np.array([-0.3 + np.tan(np.radians(30.0))]))
+    grid[0, :, 1] = -np.linspace(0.0, LENGTH * np.tan(np.radians(20.0)), ROWS)
+    flat, maps = baked(plan_of([1]), grid, 0.05, 64)
+    way = np.array([np.tan(np.radians(30.0)), 1.0, np.tan(np.radians(20.0))])
+    way /= np.linalg.norm(way)
+    shown = maps.tangent[maps.alpha > 0.0]
+    np.testing.assert_allclose(shown, np.broadcast_to(0.5 * way + 0.5, shown.shape), atol=1e-3)
+    row, column = np.nonzero(maps.alpha > 0.5)
+    slope = np.polyfit(row, column, 1)[0]
+    assert slope == pytest.approx(np.tan(np.radians(30.0)), rel=0.02)
+    assert flat.depth[0, 0] == pytest.approx(0.5)
+    assert flat.depth[0, -1] == pytest.approx(0.5 + np.tan(np.radians(20.0)) * LENGTH / WIDTH)
+
+
+def test_a_strand_is_round() -> None:
+    """Across a strand the normal's x goes evenly from -1 to 1, and z is what is left of 1."""
+    _, maps = baked(plan_of([1]), lines(np.array([0.0])), 0.5, 64)
+    x, y, z = np.moveaxis(2.0 * maps.normal[32, 17:47] - 1.0, -1, 0)
+    place = (np.arange(17, 47) + 0.5 - 32.0) / 16.0
+    np.testing.assert_allclose(x, place, atol=0.03)
+    np.testing.assert_allclose(y, 0.0, atol=1e-6)
+    np.testing.assert_allclose(z, np.sqrt(1.0 - place**2), atol=0.04)
+
+
+def test_a_curl_goes_evenly_from_root_to_tip() -> None:
+    """A helix about the strip: at height z of the card it is z of its own way, and it lies where
+    the helix does."""
+    rows = 64
+    turn = np.linspace(0.0, 4.0 * np.pi, rows)
+    grid = lines(np.array([0.0]), rows=rows)
+    grid[0, :, 0] += 0.3 * WIDTH * np.cos(turn)
+    grid[0, :, 1] -= 0.3 * WIDTH * np.sin(turn)
+    _, maps = baked(plan_of([1], rows=rows), grid, 0.05, 128)
+    row, column = np.nonzero(maps.alpha > 0.9)
+    height = (row + 0.5) / 128
+    np.testing.assert_allclose(maps.along[row, column], height, atol=0.03)
+    turns = 4.0 * np.pi * maps.along[row, column]
+    np.testing.assert_allclose((column + 0.5) / 128, 0.5 + 0.3 * np.cos(turns), atol=0.04)
+    outside = 0.5 + 0.3 * np.sin(turns)
+    np.testing.assert_allclose(maps.depth[row, column], outside, atol=0.02)
+
+
+def test_the_outermost_strand_shows() -> None:
+    grid = np.concatenate([lines(np.array([0.0]), depth=0.004), lines(np.array([0.0]))])
+    for order in ([0, 1], [1, 0]):
+        flat, maps = baked(plan_of([2]), grid[order], 0.2, 32)
+        front = order.index(0)
+        assert maps.strand_id[16, 16] == flat.strand_id[front]
+        assert maps.depth[16, 16] == pytest.approx(0.7)
+
+
+def test_what_lies_behind_gets_less_light() -> None:
+    """exp(-tau): nothing is before the front one; of a quarter of the card's width it hides 0.4."""
+    grid = np.concatenate([lines(np.array([0.05]), depth=0.004), lines(np.array([0.0]))])
+    flat, _ = baked(plan_of([2]), grid, 0.1, 32)
+    np.testing.assert_allclose(flat.occlusion[0], 1.0)
+    np.testing.assert_allclose(flat.occlusion[1], np.exp(-0.4), rtol=1e-5)
+    apart = np.concatenate([lines(np.array([0.3]), depth=0.004), lines(np.array([0.0]))])
+    np.testing.assert_allclose(baked(plan_of([2]), apart, 0.1, 32)[0].occlusion, 1.0)
+
+
+def test_colours_are_kept_below_one_and_the_gain_gives_them_back() -> None:
+    base = np.ones((2, ROWS, 3), np.float32)
+    base[0] *= (1.6, 0.8, 0.4)
+    flat, maps = baked(plan_of([2]), lines(np.array([-0.2, 0.2])), 0.2, 32, base)
+    assert maps.base.max() <= 1.0
+    np.testing.assert_allclose(maps.base[16, 9] * maps.base_gain, (1.6, 0.8, 0.4), rtol=1e-5)
+    np.testing.assert_allclose(maps.base[16, 22] * flat.base_gain, 1.0, rtol=1e-5)
+
+
+def test_strands_beyond_the_strip_are_squeezed_into_it() -> None:
+    """Nothing is cut off: neither aside, nor before the root, nor behind the tip."""
+    across = np.array([-0.9, -0.2, 0.0, 0.2, 0.9])
+    grid = lines(across)
+    grid[2, :, 2] = np.linspace(-0.3 * LENGTH, 1.4 * LENGTH, ROWS)
+    flat, maps = baked(plan_of([5]), grid, 0.04, 64)
+    edges = np.stack([flat.place - flat.half, flat.place + flat.half])
+    assert edges.min() >= 0.0
+    assert edges.max() <= 1.0
+    np.testing.assert_allclose(flat.place[1:4, 0, 0], 0.5 + across[1:4], atol=1e-6)
+    assert maps.alpha.mean() == pytest.approx(5 * 0.04, rel=0.08)
+
+
+def test_strips_without_size_do_no_harm() -> None:
+    plan = plan_of([2])
+    frames = replace(plan.strips.frames, center=np.zeros_like(plan.strips.frames.center))
+    flat_plan = replace(plan, strips=Strips(frames, np.zeros_like(plan.strips.width)))
+    flat, maps = baked(flat_plan, np.zeros((2, ROWS, 3), np.float32), 0.1, 16)
+    for values in (flat.place, flat.half, flat.depth, flat.tangent, *maps.by_name.values()):
+        assert np.isfinite(values).all()
+
+
+def red_and_green(grid: AtlasGrid, size: int) -> AtlasMaps:
+    """A tile of red strands beside one of green ones, and so on in rows."""
+    count = grid.tile_count
+    plan = plan_of([3] * count, grid)
+    strands = np.concatenate([lines(np.array([-0.5, 0.1, 0.5]))] * count)
+    base = np.zeros((len(strands), ROWS, 3), np.float32)
+    parity = np.arange(count) % grid.columns + np.arange(count) // grid.columns
+    base[np.arange(len(strands)), :, np.repeat(parity % 2, 3)] = 1.0
+    return dilated(baked(plan, strands, 0.02, size, base)[1], grid)
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(4, 2), (5, 3)])
+def test_no_tile_reaches_into_another(columns: int, rows: int) -> None:
+    """Each texel, the padding's too, is of its tile's colour; no hair is in the padding."""
+    size, share = 128, 4 / 128
+    grid = AtlasGrid(columns, rows, (share * columns, share * rows))
+    maps = red_and_green(grid, size)
+    row, column = np.indices((size, size)) + 0.5
+    tile_row, tile_column = (row * rows / size).astype(int), (column * columns / size).astype(int)
+    is_green = (tile_row + tile_column) % 2
+    np.testing.assert_allclose(maps.base[..., 0], 1 - is_green, atol=1e-6)
+    np.testing.assert_allclose(maps.base[..., 1], is_green, atol=1e-6)
+    within = [
+        np.minimum(place % (size / count), -place % (size / count))
+        for place, count in ((row, rows), (column, columns))
+    ]
+    assert maps.alpha[np.minimum(*within) < 3.5].max() == 0.0
+    assert maps.alpha.max() > 0.3
+
+
+def test_no_tile_reaches_into_another_in_mip_maps() -> None:
+    """Down to where a tile is 4 texels wide; the colours are those of the tile alone."""
+    grid = AtlasGrid(4, 4, (1 / 8, 1 / 8))
+    base = red_and_green(grid, 128).base
+    while len(base) > 16:
+        base = base.reshape(len(base) // 2, 2, len(base) // 2, 2, 3).mean(axis=(1, 3))
+    row, column = np.indices((16, 16)) // 4
+    np.testing.assert_allclose(base[..., 1], (row + column) % 2, atol=1e-6)
+
+
+def test_tiles_without_hair_are_plain() -> None:
+    grid = AtlasGrid(2, 1)
+    maps = dilated(baked(plan_of([3], grid), lines(np.array([-0.2, 0.0, 0.2])), 0.1, 32)[1], grid)
+    np.testing.assert_array_equal(maps.normal[:, 16:], np.full((32, 16, 3), (0.5, 0.5, 1.0)))
+    np.testing.assert_array_equal(maps.occlusion[:, 16:], 1.0)
+
+
+def test_values_go_over_from_hair_to_hair() -> None:
+    """Between two strands depth is between theirs; a strand's number is one of theirs."""
+    grid = np.concatenate([lines(np.array([-0.3]), depth=0.008), lines(np.array([0.3]))])
+    flat, maps = baked(plan_of([2]), grid, 0.1, 64)
+    whole = dilated(maps, AtlasGrid())
+    between = slice(16, 48)
+    assert (np.diff(whole.depth[32, between]) < 0.0).all()
+    assert set(whole.strand_id[32, between]) == set(flat.strand_id)
+    np.testing.assert_array_equal(whole.alpha, maps.alpha)
+
+
+def test_tiles_begin_where_the_middle_of_a_texel_does() -> None:
+    assert tile_edges(128, 5).tolist() == [0, 26, 51, 77, 102, 128]
+    assert tile_edges(64, 4).tolist() == [0, 16, 32, 48, 64]

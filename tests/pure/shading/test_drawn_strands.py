@@ -1,0 +1,48 @@
+"""Width and colour of strands for those who bake them, against what strands are drawn by."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.shading.card_look import card_base
+from hairloom.addon.shading.drawn_strands import drawn_radius, strand_variation
+from hairloom.addon.shading.kajiya_kay import GREY_COLOR
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+
+BROWN = (0.4, 0.25, 0.15)
+
+
+def test_radii_are_scaled_and_taper_evenly() -> None:
+    radius = drawn_radius(np.full((2, 5), 1e-4), StrandSettings(width_scale=3.0, tip_width=0.2))
+    np.testing.assert_allclose(radius, np.tile([3e-4, 2.4e-4, 1.8e-4, 1.2e-4, 0.6e-4], (2, 1)))
+
+
+@pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
+def test_strands_vary_about_the_mean(model: str) -> None:
+    """Evenly about 1 where the colour itself varies; where its absorption does, a little more."""
+    shading = ShadingSettings(model=model, base_color=BROWN, color_variation=0.5)
+    factor = strand_variation(np.arange(4000), 6, shading)
+    assert factor.shape == (4000, 6, 3)
+    assert factor.mean() == pytest.approx(1.0, abs=0.01 if model == "kajiya_kay" else 0.05)
+    if model == "kajiya_kay":
+        assert factor.min() == pytest.approx(0.5, abs=0.01)
+        assert factor.max() == pytest.approx(1.5, abs=0.01)
+    even = ShadingSettings(model=model, base_color=BROWN, color_variation=0.0, tip_tint=0.7)
+    np.testing.assert_allclose(strand_variation(np.arange(9), 6, even), 1.0, rtol=1e-5)
+
+
+def test_grey_strands_are_grey_on_the_card_as_well() -> None:
+    shading = ShadingSettings(base_color=BROWN, color_variation=0.0, grey_share=0.25)
+    factor = strand_variation(np.arange(4000), 3, shading)
+    colors = factor * card_base(np.linspace(0.0, 1.0, 3), shading)
+    is_grey = np.isclose(colors, GREY_COLOR, rtol=1e-4).all(axis=(1, 2))
+    assert is_grey.mean() == pytest.approx(0.25, abs=0.03)
+    np.testing.assert_allclose(colors[~is_grey], np.broadcast_to(BROWN, colors[~is_grey].shape))
+
+
+def test_grey_on_black_hair_stays_within_bounds() -> None:
+    shading = ShadingSettings(base_color=(0.0, 0.0, 0.0), grey_share=0.01)
+    factor = strand_variation(np.arange(1000), 3, shading)
+    assert np.isfinite(factor).all()
+    assert 0.0 <= factor.min() <= factor.max() == 4.0
