@@ -6,17 +6,19 @@ artist's buttons and from the command line alike.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from .arrays import Floats, Ints
+from .cards.atlas_settings import AtlasSettings
+from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps
 from .cards.card_mesh import CardMesh
-from .cards.fit import cluster_cards
+from .cards.follow import CardBinding, bind_cards, card_lines, follow_guides
+from .cards.occlusion_settings import CardOcclusionSettings
 from .cards.settings import CardSettings
-from .cards.sort import inside_out_order
-from .cards.strip import build_cards
 from .dynamics.colliders import PosedCollider
 from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, start
@@ -280,16 +282,74 @@ def strand_ranks(rig: Rig) -> Floats:
     return ranks
 
 
-def cards_of(rig: Rig, settings: CardSettings, ambient: AmbientSettings) -> CardMesh:
-    """Cards at rest, with ambient occlusion, in order from the inside to the outside."""
-    strands, normals = rig.strands, root_normals(rig)
-    if settings.way == "guides":
-        mesh = build_cards(strands.grid[rig.guides], normals[rig.guides], settings)
-    else:
-        radius = strands.radius.reshape(strands.strand_count, -1)
-        mesh = cluster_cards(strands.grid, radius, strands.group, normals, settings)
-    occlusion = ambient_occlusion(rig.strands, mesh.positions, rig.head, ambient)
-    return inside_out_order(mesh.with_occlusion(occlusion), rig.head)
+def card_build_steps(
+    rig: Rig,
+    settings: CardSettings,
+    atlas: AtlasSettings,
+    occlusion: CardOcclusionSettings,
+    alpha_of: AlphaOf = lambda _build: None,
+) -> Generator[str, None, CardBuild]:
+    """Cards at rest in all levels of detail, with occlusion, from inside to outside.
+
+    Args:
+        alpha_of: the alpha of the atlas, which is best baked here; see `cards.build`.
+
+    Yields what comes next, and returns the cards.
+
+    Raises:
+        HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
+    """
+    groom = CardGroom(rig.strands, rig.guides, root_normals(rig), rig.head)
+    return card_steps(groom, settings, atlas, occlusion, alpha_of)
+
+
+def card_build(
+    rig: Rig,
+    settings: CardSettings,
+    atlas: AtlasSettings,
+    occlusion: CardOcclusionSettings,
+    alpha_of: AlphaOf = lambda _build: None,
+) -> CardBuild:
+    """All steps of `card_build_steps` at once."""
+    steps = card_build_steps(rig, settings, atlas, occlusion, alpha_of)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            build: CardBuild = end.value
+            return build
+
+
+def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:
+    """Cards at rest, tied to the guides that they ride on from then on."""
+    used, lines = card_lines(mesh)
+    guides, guide_group = rig.strands.grid[rig.guides], rig.strands.group[rig.guides]
+    group = mesh.group[used]
+    if not np.isin(group, guide_group).all():  # cards that know of no groups
+        group, guide_group = np.zeros_like(group), np.zeros_like(guide_group)
+    weights = guide_weights(
+        lines[:, 0], group, guides[:, 0], guide_group, strand_grid=lines, guide_grid=guides
+    )
+    return bind_cards(mesh, guides, weights.guide, weights.weight)
+
+
+def cards_at(rig: Rig, cards: CardBinding, pose: Pose, guides_now: Floats) -> CardMesh:
+    """Cards riding on guides, world space; arguments as of `strands_at`."""
+    return follow_guides(cards, guides_now, root_turns(rig, pose))
+
+
+def root_turns(rig: Rig, pose: Pose) -> Floats:
+    """How the body has turned the root of each guide since rest, (guide_count, 3, 3)."""
+    count, frames = len(rig.guides), rig.rest_frames
+    if rig.head is None or pose.head_positions is None or frames is None:
+        return np.broadcast_to(pose.matrix[:3, :3], (count, 3, 3))
+    triangle, barycentric = rig.strands.root_triangle, rig.strands.root_barycentric
+    assert triangle is not None and barycentric is not None
+    now = root_frames(
+        pose.head_positions, rig.head.triangles, triangle[rig.guides], barycentric[rig.guides]
+    )
+    turns: Floats = now.rotation @ frames.rotation[rig.guides].transpose(0, 2, 1)
+    return turns
 
 
 def root_normals(rig: Rig) -> Floats:

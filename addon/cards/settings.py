@@ -15,10 +15,10 @@ class CardSettings(Settings):
     title = "Hair cards"
 
     way: str = choice(
-        "guides",
+        "clusters",
         (
-            ("guides", "Guides", "A card along each guide"),
             ("clusters", "Clusters", "A card for each cluster of strands that lie together"),
+            ("guides", "Guides", "A card along each guide"),
         ),
         label="Cards From",
         description="What a card stands for",
@@ -60,6 +60,29 @@ class CardSettings(Settings):
         soft=(0.0, 0.5),
         hard=(0.0, 1.0),
         unit="factor",
+    )
+    layers: int = integer(
+        3,
+        label="Layers",
+        description="Into how many layers from the scalp to the surface the cards are told apart",
+        soft=(1, 5),
+        hard=(1, 16),
+    )
+    base_width: float = number(
+        1.0,
+        label="Base Width",
+        description="How much wider the cards of the lowest layer are, so that the head does not "
+        "show through; the outermost layer is never widened",
+        soft=(1.0, 2.0),
+        hard=(1.0, 10.0),
+    )
+    levels: int = integer(
+        3,
+        label="Levels of Detail",
+        description="How many meshes are made, each with about half the triangles of the one "
+        "before; all use the same textures",
+        soft=(1, 5),
+        hard=(1, 5),
     )
     segment_count: int = integer(
         12,

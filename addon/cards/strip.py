@@ -52,9 +52,35 @@ class Strips:
     def __len__(self) -> int:
         return len(self.width)
 
+    def of(self, cards: Ints) -> Strips:
+        """Those of the chosen cards."""
+        frames = self.frames
+        parts = (frames.center, frames.tangent, frames.normal, frames.side)
+        return Strips(CardFrames(*(part[cards] for part in parts)), self.width[cards])
 
-def build_cards(guides: Floats, root_normal: Floats, settings: CardSettings) -> CardMesh:
-    """One card for each guide, in the order of the guides; occlusion is 1 until it is computed.
+
+@dataclass(frozen=True)
+class UncutCards:
+    """All cards of a groom before they are cut into triangles; a card's number is its place here.
+
+    strand_count, group, layer, tile: (card_count,) int32 of each card: the strands that it stands
+        for, its group of hair, its layer, 0 next to the head, and its tile of the atlas.
+    atlas: how the texture is divided into tiles.
+    """
+
+    strips: Strips
+    strand_count: Ints
+    group: Ints
+    layer: Ints
+    tile: Ints
+    atlas: AtlasGrid
+
+    def __len__(self) -> int:
+        return len(self.strips)
+
+
+def guide_strips(guides: Floats, root_normal: Floats, settings: CardSettings) -> Strips:
+    """One strip along each guide, in the order of the guides.
 
     Args:
         guides: (guide_count, cv_count, 3) [m], finite, root first.
@@ -66,30 +92,35 @@ def build_cards(guides: Floats, root_normal: Floats, settings: CardSettings) -> 
     frames = card_frames(guides, root_normal, settings.segment_count)
     along = np.linspace(0.0, 1.0, settings.segment_count + 1, dtype=np.float32)
     width = settings.width_factor * mean_spacing(guides[:, 0]) * taper(along, settings.tip_width)
-    strips = Strips(frames, np.broadcast_to(width, (len(guides), len(along))))
-    atlas = AtlasGrid(columns=settings.atlas_columns)
-    tile = scattered_tiles(len(guides), atlas, settings.seed)
-    parts = [(np.arange(len(guides)), strips)]
-    return strip_mesh(parts, np.zeros_like(tile), tile, atlas, settings)
+    return Strips(frames, np.broadcast_to(width, (len(guides), len(along))))
+
+
+def build_cards(guides: Floats, root_normal: Floats, settings: CardSettings) -> CardMesh:
+    """One card for each guide, as a mesh of one group and layer; see `guide_strips`."""
+    strips = guide_strips(guides, root_normal, settings)
+    atlas, none = AtlasGrid(columns=settings.atlas_columns), np.zeros(len(strips), np.int32)
+    tile = scattered_tiles(len(strips), atlas, settings.seed)
+    cards = UncutCards(strips, none + 1, none, none, tile, atlas)
+    return strip_mesh([(np.arange(len(strips)), strips)], cards, settings.column_count, settings)
 
 
 def strip_mesh(
     parts: Sequence[tuple[Ints, Strips]],
-    group: Ints,
-    tile: Ints,
-    atlas: AtlasGrid,
+    cards: UncutCards,
+    column_count: int,
     settings: CardSettings,
 ) -> CardMesh:
     """Strips as triangles, card after card; occlusion is 1 until it is computed.
 
     Args:
-        parts: strips with the numbers of their cards, which are 0, 1, 2 ... all together.
-        group: (card_count,) of the hair, that each card belongs to.
-        tile: (card_count,) of the atlas, that each card shows.
+        parts: strips with the numbers of their cards, each number once at most.
+        cards: all cards there are; of their strips nothing is used.
+        column_count: pieces of a card across.
     """
-    cards = {"group": group, "layer": np.zeros_like(tile), "tile": tile}
-    meshes = [_part_mesh(strips, numbers, cards, atlas, settings) for numbers, strips in parts]
-    return reordered(joined(meshes), np.arange(len(tile)))
+    meshes = [
+        _part_mesh(strips, numbers, cards, column_count, settings) for numbers, strips in parts
+    ]
+    return reordered(joined(meshes), np.arange(len(cards)))
 
 
 def scattered_tiles(card_count: int, atlas: AtlasGrid, seed: int) -> Ints:
@@ -100,28 +131,30 @@ def scattered_tiles(card_count: int, atlas: AtlasGrid, seed: int) -> Ints:
 def _part_mesh(
     strips: Strips,
     numbers: Ints,
-    cards: dict[str, Ints],
-    atlas: AtlasGrid,
+    cards: UncutCards,
+    column_count: int,
     settings: CardSettings,
 ) -> CardMesh:
     frames = strips.frames
     card_count, row_count = strips.width.shape
-    across = np.linspace(0.0, 1.0, settings.column_count + 1, dtype=np.float32)
+    across = np.linspace(0.0, 1.0, column_count + 1, dtype=np.float32)
     along = np.linspace(0.0, 1.0, row_count, dtype=np.float32)[:, None]
-    triangles = strip_triangles(row_count, settings.column_count)
+    triangles = strip_triangles(row_count, column_count)
     vertices_per_card = row_count * len(across)
     first = np.arange(card_count, dtype=np.int32) * vertices_per_card
     return CardMesh(
         positions=_positions(frames, strips.width, across, settings).reshape(-1, 3),
         triangles=(first[:, None, None] + triangles).reshape(-1, 3),
-        uv=atlas.uv(cards["tile"][numbers, None, None], across, along).reshape(-1, 2),
+        uv=cards.atlas.uv(cards.tile[numbers, None, None], across, along).reshape(-1, 2),
         along=np.broadcast_to(along, (card_count, row_count, len(across))).reshape(-1),
         normal=_normals(frames, across, settings).reshape(-1, 3),
         tangent=np.repeat(frames.tangent.reshape(-1, 3), len(across), axis=0),
         occlusion=np.ones(card_count * vertices_per_card, np.float32),
         card=np.repeat(numbers.astype(np.int32), len(triangles)),
-        atlas=atlas,
-        **cards,
+        group=cards.group,
+        layer=cards.layer,
+        tile=cards.tile,
+        atlas=cards.atlas,
     )
 
 
@@ -177,9 +210,11 @@ def strip_triangles(row_count: int, column_count: int) -> Ints:
 
 
 def _positions(frames: CardFrames, width: Floats, across: Floats, settings: CardSettings) -> Floats:
-    """The guide runs through the middle; the edges fall back by a parabola of height `bend`."""
+    """The guide runs through the middle; the edges fall back by a parabola of height `bend`. A card
+    of one column is flat, and lies where the parabola does on average."""
     aside = (across - 0.5) * width[..., None]
-    behind = -settings.bend * width[..., None] * (2.0 * across - 1.0) ** 2
+    parabola = (2.0 * across - 1.0) ** 2 if len(across) > 2 else np.full_like(across, 1.0 / 3.0)
+    behind = -settings.bend * width[..., None] * parabola
     return (
         frames.center[:, :, None]
         + frames.side[:, :, None] * aside[..., None]

@@ -1,0 +1,165 @@
+"""From a groom to its cards in all levels of detail: strips, tiles, occlusion, order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..strands import StrandSet, Surface
+from .atlas import AtlasPlan, plan_atlas
+from .atlas_grid import AtlasGrid
+from .atlas_settings import AtlasSettings
+from .card_mesh import CardMesh
+from .fit import cluster_of_strands, fit_strips
+from .layers import card_layers
+from .levels import card_levels
+from .occlusion import CardShade, vertex_occlusion
+from .occlusion_settings import CardOcclusionSettings
+from .settings import CardSettings
+from .sort import card_of_vertex, sorted_both_ways
+from .strip import Strips, UncutCards, guide_strips, scattered_tiles
+
+
+@dataclass(frozen=True)
+class CardGroom:
+    """What cards are made from.
+
+    strands: uniform, one at least.
+    guides: (guide_count,) which of them are guides.
+    root_normal: (strand_count, 3) unit normals of the head under the roots.
+    head: in the space of the strands, or None.
+    """
+
+    strands: StrandSet
+    guides: Ints
+    root_normal: Floats
+    head: Surface | None
+
+
+@dataclass(frozen=True)
+class CardBuild:
+    """Cards of a groom, ready to be drawn and written.
+
+    levels: finest first; all show the same atlas, and a card has the same number in each. The order
+        of triangles is that in which front faces are drawn.
+    backs: the triangles of each level once more, in the order in which back faces are drawn.
+    errors: of each level [m], see `levels.CardLevel`: how far it is from the strands' own way.
+    plan: what is to be baked into the atlas; None where its tiles are made by chance.
+    """
+
+    levels: tuple[CardMesh, ...]
+    backs: tuple[Ints, ...]
+    errors: tuple[float, ...]
+    plan: AtlasPlan | None
+
+    @property
+    def finest(self) -> CardMesh:
+        return self.levels[0]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the artist should know."""
+        return () if self.plan is None else self.plan.notes
+
+
+#: Gives the alpha of the atlas, (height, width), or None for opaque cards; may bake it from the
+#: plan of this build, whose cards have no occlusion and order yet.
+type AlphaOf = Callable[[CardBuild], Floats | None]
+
+
+def card_steps(
+    groom: CardGroom,
+    settings: CardSettings,
+    atlas: AtlasSettings,
+    occlusion: CardOcclusionSettings,
+    alpha_of: AlphaOf,
+) -> Generator[str, None, CardBuild]:
+    """Build the cards; each step names what comes next, and the result is returned.
+
+    Raises:
+        HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
+    """
+    yield "Cards from strands"
+    cards, plan = uncut_cards(groom, settings, atlas)
+    yield "Levels of detail"
+    error = settings.error if settings.way == "clusters" else None
+    levels = card_levels(cards, settings, error)
+    meshes, errors = zip(*((level.mesh, level.error) for level in levels), strict=True)
+    build = CardBuild(meshes, tuple(mesh.triangles for mesh in meshes), errors, plan)
+    yield "Atlas"
+    alpha = alpha_of(build)
+    yield "Ambient occlusion"
+    bodies = [] if groom.head is None else [groom.head]
+    shades = [CardShade(build.finest, alpha)]
+    open_share = vertex_occlusion(build.finest, shades, bodies, occlusion)
+    yield "Order"
+    finest = build.finest.with_occlusion(open_share)
+    shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))
+    meshes, backs = zip(*(sorted_both_ways(mesh, groom.head) for mesh in shaded), strict=True)
+    return replace(build, levels=meshes, backs=backs)
+
+
+def uncut_cards(
+    groom: CardGroom, settings: CardSettings, atlas: AtlasSettings
+) -> tuple[UncutCards, AtlasPlan | None]:
+    """The strips of all cards, with their groups, layers and tiles; and what the tiles show."""
+    strands, guides = groom.strands, groom.guides
+    if settings.way == "guides":
+        strips = guide_strips(strands.grid[guides], groom.root_normal[guides], settings)
+        one = np.ones(len(guides), np.int32)
+        return _by_chance(strips, one, strands.group[guides], settings), None
+    grid, radius = strands.grid, strands.radius.reshape(strands.grid.shape[:2])
+    cluster = cluster_of_strands(grid, strands.group, settings)
+    strips = fit_strips(grid, radius, cluster, groom.root_normal, settings)
+    _, first, count = np.unique(cluster, return_index=True, return_counts=True)
+    # crossed cards come after all others, and stand for the same strands
+    owner = np.resize(np.arange(len(first)), len(strips))
+    cards = _by_chance(strips, count[owner], strands.group[first][owner], settings)
+    if atlas.source != "baked":
+        return cards, None
+    plan = plan_atlas(strips.of(np.arange(len(first))), grid, radius, cluster, strands.group, atlas)
+    strips = _wider(cards.strips, plan.width_factor[owner])
+    return replace(cards, strips=strips, tile=plan.tile[owner], atlas=plan.grid), plan
+
+
+def _by_chance(
+    strips: Strips, strand_count: Ints, group: Ints, settings: CardSettings
+) -> UncutCards:
+    """Cards with tiles by chance."""
+    layer = card_layers(strips, settings.layers)
+    # loose strands lie on everything, as artists lay them
+    is_loose = (strand_count == 1) & (strand_count.max() > 1)
+    layer = np.where(is_loose, settings.layers - 1, layer).astype(np.int32)
+    atlas = AtlasGrid(columns=settings.atlas_columns)
+    tile = scattered_tiles(len(strips), atlas, settings.seed)
+    strips = _wider(strips, _base_widths(layer, settings))
+    return UncutCards(strips, strand_count.astype(np.int32), group, layer, tile, atlas)
+
+
+def _base_widths(layer: Ints, settings: CardSettings) -> Floats:
+    """`base_width` for the lowest layer, 1 for the outermost, steps between, (card_count,)."""
+    depth = 1.0 - layer / max(settings.layers - 1, 1)
+    return 1.0 + (settings.base_width - 1.0) * depth * (settings.layers > 1)
+
+
+def _wider(strips: Strips, factor: Floats) -> Strips:
+    return replace(strips, width=(strips.width * factor[:, None]).astype(np.float32))
+
+
+def with_occlusion_of(finest: CardMesh, level: CardMesh) -> CardMesh:
+    """A coarser level, each vertex with the occlusion of the nearest of its card in the atlas."""
+    owner = card_of_vertex(finest)
+    vertices = np.argsort(owner, kind="stable")
+    count = np.bincount(owner, minlength=len(finest.group))
+    start = np.cumsum(count) - count
+    mine = card_of_vertex(level)
+    step = np.arange(int(count.max(initial=0)))
+    candidate = vertices[start[mine, None] + np.minimum(step, count[mine, None] - 1)]
+    # along and across count the same, however a tile is shaped
+    tiles = np.array([finest.atlas.columns, finest.atlas.rows])
+    gap = (finest.uv[candidate] - level.uv[:, None]) * tiles
+    nearest = np.einsum("vci,vci->vc", gap, gap).argmin(axis=1)
+    return level.with_occlusion(finest.occlusion[candidate[np.arange(len(mine)), nearest]])

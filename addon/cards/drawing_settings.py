@@ -1,0 +1,55 @@
+"""Parameters of how hair cards are drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..params import Settings, choice, toggle
+
+
+@dataclass(frozen=True, kw_only=True)
+class CardDrawingSettings(Settings):
+    """How cards are shown, and in which passes and which order they are drawn."""
+
+    section = "card_drawing"
+    title = "Card drawing"
+
+    shown_as: str = choice(
+        "strands",
+        (
+            ("strands", "Strands", "Every strand as a ribbon"),
+            ("cards", "Cards", "The hair cards that stand for the strands"),
+        ),
+        label="Show As",
+        description="As what the hair is drawn, in the viewport and in renders",
+    )
+    passes: str = choice(
+        "four",
+        (
+            ("four", "Four", "Depth of opaque pixels first, so that hidden ones are not shaded"),
+            ("three", "Three", "Opaque pixels, then both sides, with an alpha test in each pass"),
+        ),
+        label="Passes",
+        description="The scheme by which cards are drawn",
+        source="Scheuermann 2004, optimized scheme and its fall-back",
+    )
+    order: str = choice(
+        "static",
+        (
+            ("static", "Static", "From the inside of the hair to the outside, sorted once"),
+            (
+                "view",
+                "For Each View",
+                "From the farthest card to the nearest, for hair that swings",
+            ),
+        ),
+        label="Order",
+        description="In which order cards are drawn over each other",
+        source="Scheuermann 2004, rendering with approximate depth sorting",
+    )
+    skip_clear: bool = toggle(
+        True,
+        label="Skip Clear Pixels",
+        description="Four passes: the last one tests alpha, so that clear pixels hide nothing; "
+        "without it that pass is as in the paper, and quicker on some GPUs",
+    )

@@ -1,0 +1,285 @@
+"""Cards that ride on guides: bound at rest, carried as whole strips.
+
+A card has a bone: the mixture of its guides, moved to its root, with a frame that does not twist
+from root to tip (Bishop 1975). A row of the card (its vertices at one place along it) keeps its
+place in that frame. So strips bend and do not shear, a row stays as wide as it was, and nothing
+twists but what the root turns.
+
+Vectors lie as planes here, (3, ...): that is several times as fast.
+
+Limitations: guides that wind around each other do not twist the card between them. Where they go
+apart the bone, their mean, gets shorter, as strands that ride on them do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..strands.affine import moved
+from .card_mesh import CardMesh
+from .sort import card_of_vertex
+
+#: How far along a card its first row may reach.
+_ROOT_ROW = 1.0e-4
+#: Vectors shorter than this [m, or of unit ones] have no direction.
+_SHORTEST = 1.0e-12
+#: Added to 1 + cos between two ways, which is 0 where the second is the first reversed.
+_REVERSED = 1.0e-6
+
+
+@dataclass(frozen=True, eq=False)
+class CardBinding:
+    """What of cards and guides at rest is needed to place the cards later.
+
+    mesh: at rest.
+    guide, weight: (n, k) for each of n cards: indices of its guides, and weights of sum 1.
+    root: (3, n) from the mixture of the guides' roots to the card's root [m].
+    way, side: (3, n) unit vectors of the bone's first frame at rest.
+    row: (vertex_count,) which row each vertex lies in.
+    row_card, row_cv: (row_count,) the card of each row, and the CV before it; row_share: how far
+        it lies towards the next one.
+    local: (3, 3, vertex_count) in the frame of the row at rest: the way from the bone [m], the
+        normal, and the tangent.
+    """
+
+    mesh: CardMesh
+    guide: Ints
+    weight: Floats
+    root: Floats
+    way: Floats
+    side: Floats
+    row: Ints
+    row_card: Ints
+    row_cv: Ints
+    row_share: Floats
+    local: Floats
+
+
+def card_lines(mesh: CardMesh) -> tuple[Ints, Floats]:
+    """The card numbers that have triangles, (n,), and the middles of these cards at the root, a
+    third, two thirds and the tip, (n, 4, 3) [m].
+    """
+    owner, used = card_of_vertex(mesh), np.unique(mesh.card)
+    count = int(used.max(initial=-1)) + 1
+    first = np.full(count, np.inf, np.float32)
+    np.minimum.at(first, owner, mesh.along)
+    lines = np.empty((len(used), 4, 3), np.float32)
+    for third in range(4):
+        share = np.maximum(1.0 - np.abs(3.0 * mesh.along - third), 1.0e-6)
+        if not third:
+            share = mesh.along <= first[owner] + _ROOT_ROW
+        whole = np.bincount(owner, weights=share, minlength=count)[used]
+        for axis in range(3):
+            placed = share * mesh.positions[:, axis]
+            lines[:, third, axis] = (
+                np.bincount(owner, weights=placed, minlength=count)[used] / whole
+            )
+    return used.astype(np.int32), lines
+
+
+def bind_cards(mesh: CardMesh, guides: Floats, guide: Ints, weight: Floats) -> CardBinding:
+    """Tie cards to the guides that they ride on.
+
+    Args:
+        mesh: at rest, world space.
+        guides: (guide_count, cv_count, 3) [m] at rest, CVs evenly along each.
+        guide, weight: (n, k) for the cards of `card_lines`, in its order.
+    """
+    used, lines = card_lines(mesh)
+    mixed = _mixed(guides, guide, weight)
+    root = lines[:, 0].T - mixed[:, 0]
+    bone = mixed + root[:, None]
+    place = np.zeros(int(used.max(initial=0)) + 1, np.int64)
+    place[used] = np.arange(len(used))
+    owner = place[card_of_vertex(mesh)]
+    rows, row = np.unique(
+        np.stack([owner, mesh.along.view(np.int32)], axis=1), axis=0, return_inverse=True
+    )
+    along = np.ascontiguousarray(rows[:, 1], np.int32).view(np.float32)
+    at = np.clip(along, 0.0, 1.0) * (bone.shape[1] - 1)
+    before = np.minimum(at.astype(np.int64), bone.shape[1] - 2)
+    ways = _ways(bone)
+    side = _across(ways[:, 0])
+    binding = CardBinding(
+        mesh,
+        guide,
+        np.asarray(weight, np.float32),
+        root,
+        ways[:, 0],
+        side,
+        row.reshape(-1),
+        rows[:, 0].astype(np.int64),
+        before,
+        (at - before).astype(np.float32),
+        np.zeros((3, 3, 0), np.float32),
+    )
+    places, frame = _rows(binding, bone, ways, side, np.ones(len(used), np.float32))
+    arms = mesh.positions.T - places[:, binding.row]
+    vectors = np.stack([arms, mesh.normal.T, mesh.tangent.T])
+    local = np.einsum("fav,cav->cfv", frame[:, :, binding.row], vectors)
+    return replace(binding, local=local.astype(np.float32))
+
+
+def follow_guides(binding: CardBinding, guides: Floats, turn: Floats) -> CardMesh:
+    """The cards where their guides are now; what does not move is the same arrays.
+
+    Args:
+        guides: (guide_count, cv_count, 3) [m] now.
+        turn: (guide_count, 3, 3), how the body has turned each guide's root since rest.
+    """
+    if not len(binding.guide):
+        return binding.mesh
+    first = np.asarray(turn, np.float32)[binding.guide[:, 0]]
+    volume = np.linalg.det(first)
+    bone = _mixed(guides, binding.guide, binding.weight)
+    bone += np.einsum("nij,jn->in", first, binding.root)[:, None]
+    ways = _ways(bone)
+    was = _unit(np.einsum("nij,jn->in", first, binding.way))
+    side = np.einsum("nij,jn->in", first, binding.side)
+    side = _perpendicular(_turned(side, was, ways[:, 0]), ways[:, 0])
+    places, frame = _rows(binding, bone, ways, side, np.sign(volume))
+    at = np.take(places, binding.row, axis=1, mode="clip")
+    frame = np.take(frame, binding.row, axis=2, mode="clip")
+    size = np.cbrt(np.abs(volume))[binding.row_card][binding.row]
+    arms, normal, tangent = (_placed(frame, local) for local in binding.local)
+    positions = np.multiply(arms, size[:, None], out=arms)
+    positions += at.T
+    return replace(binding.mesh, positions=positions, normal=normal, tangent=tangent)
+
+
+def moved_mesh(mesh: CardMesh, matrix: Floats) -> CardMesh:
+    """Cards moved by an affine (4, 4) matrix; the same object for no motion."""
+    if np.array_equal(matrix, np.eye(4)):
+        return mesh
+    turn = np.asarray(matrix, np.float64)[:3, :3]
+    is_mirrored = np.linalg.det(turn) < 0.0
+    linear = np.eye(4)
+    linear[:3, :3] = turn
+    normal, tangent = (moved(each, linear).T for each in (mesh.normal, mesh.tangent))
+    return replace(
+        mesh,
+        positions=moved(mesh.positions, matrix),
+        normal=_unit(normal).T,
+        tangent=_unit(tangent).T,
+        triangles=mesh.triangles[:, ::-1] if is_mirrored else mesh.triangles,
+    )
+
+
+def _placed(frame: Floats, local: Floats) -> Floats:
+    """Vectors in frames (3, 3, n) as they are in the world, (n, 3)."""
+    vectors = np.empty((local.shape[1], 3), np.float32)
+    for axis in range(3):
+        part = frame[0, axis] * local[0]
+        part += frame[1, axis] * local[1]
+        part += frame[2, axis] * local[2]
+        vectors[:, axis] = part
+    return vectors
+
+
+def _rows(
+    binding: CardBinding, bone: Floats, ways: Floats, side: Floats, hand: Floats
+) -> tuple[Floats, Floats]:
+    """Places of all rows (3, row_count), and their frames: way, side and up, (3, 3, row_count).
+
+    Args:
+        bone, ways: (3, cv_count, n). side: (3, n) at the root. hand: (n,) -1 for mirrored cards.
+    """
+    way = _unit(_on_rows(ways, binding))
+    across = _perpendicular(_on_rows(_transported(ways, side), binding), way)
+    up = _cross(way, across) * hand[binding.row_card].astype(np.float32)
+    return _on_rows(bone, binding), np.stack([way, across, up])
+
+
+def _on_rows(of_cvs: Floats, binding: CardBinding) -> Floats:
+    """Values (3, cv_count, n) of bones at the rows of their cards, straight between CVs."""
+    flat = of_cvs.reshape(3, -1)
+    count = of_cvs.shape[2]
+    before = binding.row_cv * count + binding.row_card
+    values = np.take(flat, before, axis=1, mode="clip")
+    further = np.take(flat, before + count, axis=1, mode="clip")
+    further -= values
+    further *= binding.row_share
+    values += further
+    return values
+
+
+def _transported(ways: Floats, side: Floats) -> Floats:
+    """The side at the root carried along without twist, (3, cv_count, n), as
+    strands.frames.transported_normals does.
+    """
+    sides = np.empty_like(ways)
+    sides[:, 0] = side
+    for cv in range(1, ways.shape[1]):
+        turned = _turned(sides[:, cv - 1], ways[:, cv - 1], ways[:, cv])
+        sides[:, cv] = _perpendicular(turned, ways[:, cv])
+    return sides
+
+
+def _turned(vector: Floats, one: Floats, other: Floats) -> Floats:
+    """Vectors across `one`, by the least turn that takes `one` to `other`: v - (v . b)(a + b) /
+    (1 + a . b), which is Rodrigues' formula for them; (3, n) each.
+    """
+    share = _dot(vector, other) / (1.0 + _dot(one, other) + np.float32(_REVERSED))
+    return vector - (one + other) * share
+
+
+def _mixed(guides: Floats, guide: Ints, weight: Floats) -> Floats:
+    """Guides mixed, (3, cv_count, n) float32."""
+    grid = np.ascontiguousarray(np.asarray(guides, np.float32).transpose(2, 1, 0))
+    mixed = np.zeros((*grid.shape[:2], len(guide)), np.float32)
+    for column in range(guide.shape[1]):
+        mixed += grid[:, :, guide[:, column]] * np.asarray(weight[:, column], np.float32)
+    return mixed
+
+
+def _ways(bone: Floats) -> Floats:
+    """Unit directions from root to tip at the CVs, (3, cv_count, n): those of strands.frames."""
+    step = bone[:, 1:] - bone[:, :-1]
+    ways = np.concatenate([step[:, :1], step[:, 1:] + step[:, :-1], step[:, -1:]], axis=1)
+    length = np.sqrt(_dot(ways, ways))
+    is_short = length < _SHORTEST
+    ways /= np.maximum(length, np.float32(_SHORTEST))
+    if is_short.any():
+        ways[:, 0, is_short[0]] = np.array([[0.0], [0.0], [1.0]], np.float32)
+        for cv in range(1, ways.shape[1]):
+            ways[:, cv, is_short[cv]] = ways[:, cv - 1, is_short[cv]]
+    return ways
+
+
+def _perpendicular(vector: Floats, way: Floats) -> Floats:
+    """The unit part across unit vectors, (3, n); any one across where they are parallel."""
+    across = vector - way * _dot(vector, way)
+    length = np.sqrt(_dot(across, across))
+    is_short = length < np.float32(1.0e-5)
+    across /= np.maximum(length, np.float32(1.0e-5))
+    if is_short.any():
+        across[:, is_short] = _across(way[:, is_short])
+    return across
+
+
+def _across(way: Floats) -> Floats:
+    """Unit vectors across unit vectors, (3, n)."""
+    axis = np.zeros_like(way)
+    axis[np.abs(way).argmin(axis=0), np.arange(way.shape[1])] = 1.0
+    return _unit(axis - way * _dot(axis, way))
+
+
+def _unit(vectors: Floats) -> Floats:
+    return vectors / np.maximum(np.sqrt(_dot(vectors, vectors)), np.float32(_SHORTEST))
+
+
+def _dot(one: Floats, other: Floats) -> Floats:
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+
+
+def _cross(one: Floats, other: Floats) -> Floats:
+    return np.stack(
+        [
+            one[1] * other[2] - one[2] * other[1],
+            one[2] * other[0] - one[0] * other[2],
+            one[0] * other[1] - one[1] * other[0],
+        ]
+    )

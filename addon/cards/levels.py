@@ -1,0 +1,197 @@
+"""Levels of detail: the same cards with ever fewer triangles, for ever greater distances.
+
+Each level has about half the triangles of the one before: first by fewer rows, where the allowed
+error lets them go, which doubles from level to level up to a share of a card's width; then by fewer
+columns; then by fewer cards, where two that lie together become one that covers both. All levels
+show the same tiles of the same atlas, and a card keeps its number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .card_mesh import CardMesh
+from .merging import pairs_to_join, with_joined
+from .segments import edges_of, fewest_segments, interpolated, segment_errors, with_segments
+from .settings import CardSettings
+from .strip import Strips, UncutCards, strip_mesh
+
+#: Share of the triangles that a level keeps of the one before, at most, to be worth having.
+_MOST_KEPT = 0.6
+#: Where no error is allowed, levels start from this share of the cards' usual width; and from this
+#: one on rows stay: straighter cards would run through the head.
+_LEAST_ERROR, _MOST_ERROR = 0.05, 0.4
+_BISECTIONS = 24
+#: Share of the places on the edges of all cards, in percent, that a level's error holds for.
+_HELD = 90.0
+
+
+@dataclass(frozen=True)
+class CardLevel:
+    """One level of detail.
+
+    error: nine tenths of the places on the edges of all cards are so near to this level's [m].
+    """
+
+    mesh: CardMesh
+    error: float
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """How the cards of one level are cut; what is known of each card number is (card_count, ...).
+
+    strips: at full resolution; those of numbers that are gone are not used.
+    owner: the number that stands for each card of the finest level.
+    segments: 0 for numbers that are gone.
+    errors: of the strips by number of segments, see `segment_errors`.
+    error: that rows are allowed [m]; most_error: that they are ever allowed, as long as there are
+        cards to be joined.
+    """
+
+    strips: Strips
+    strand_count: Ints
+    owner: Ints
+    segments: Ints
+    errors: Floats
+    columns: int
+    error: float
+    most_error: float
+
+    @property
+    def triangle_count(self) -> int:
+        return int(self.segments.sum()) * self.columns * 2
+
+
+def card_levels(
+    cards: UncutCards, settings: CardSettings, error: float | None
+) -> tuple[CardLevel, ...]:
+    """The levels, finest first: as many as the settings ask for, or fewer where so few triangles
+    are left that they cannot be halved.
+
+    Args:
+        error: that the rows of the finest level are allowed [m]; None keeps as many as there are.
+    """
+    cuts = [_finest(cards, settings, error)]
+    while cuts[-1].triangle_count and len(cuts) < settings.levels:
+        coarser = _coarser(cuts[-1], cards.group, settings.segment_count)
+        if coarser.triangle_count > _MOST_KEPT * cuts[-1].triangle_count:
+            break
+        cuts.append(coarser)
+    return tuple(
+        CardLevel(_mesh(cut, cards, settings), _silhouette_error(cut, cards.strips)) for cut in cuts
+    )
+
+
+def _finest(cards: UncutCards, settings: CardSettings, error: float | None) -> _Cut:
+    most = settings.segment_count
+    errors = segment_errors(cards.strips, most)
+    segments: Ints = np.full(len(cards), most, np.int32)
+    if error is not None:
+        segments = fewest_segments(errors, error, most)
+    median = float(np.median(cards.strips.width)) if len(cards) else 0.0
+    numbers = np.arange(len(cards), dtype=np.int32)
+    columns, allowed = settings.column_count, error or _LEAST_ERROR * median
+    most_allowed = max(allowed, _MOST_ERROR * median)
+    strips, count = cards.strips, cards.strand_count
+    return _Cut(strips, count, numbers, segments, errors, columns, allowed, most_allowed)
+
+
+def _coarser(cut: _Cut, group: Ints, most: int) -> _Cut:
+    """Half the triangles, or as near as may be."""
+    half, allowed = cut.triangle_count / 2.0, min(2.0 * cut.error, cut.most_error)
+    if _fewer_rows(cut, allowed, most).triangle_count > half and cut.columns > 1:
+        cut = replace(cut, columns=(cut.columns + 1) // 2)
+    least = _fewer_rows(cut, allowed, most)
+    if least.triangle_count > half:
+        cut = _fewer_cards(cut, least.segments, half, group, most)
+        least = _fewer_rows(cut, allowed, most)
+    halved = _halved(cut, half, allowed, most)
+    if halved.triangle_count > half:  # no other way is left
+        halved = _halved(cut, half, float(cut.errors.max(initial=0.0)), most)
+    return replace(halved, error=allowed)
+
+
+def _halved(cut: _Cut, half: float, allowed: float, most: int) -> _Cut:
+    """Rows by the least error that leaves no more triangles than `half`, or by the allowed one."""
+    low, high = 0.0, allowed
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2.0
+        if _fewer_rows(cut, middle, most).triangle_count > half:
+            low = middle
+        else:
+            high = middle
+    return _fewer_rows(cut, high, most)
+
+
+def _fewer_rows(cut: _Cut, error: float, most: int) -> _Cut:
+    """No card gets more rows than it has."""
+    enough = fewest_segments(cut.errors, error, most)
+    return replace(cut, segments=np.minimum(cut.segments, enough))
+
+
+def _fewer_cards(cut: _Cut, segments: Ints, half: float, group: Ints, most: int) -> _Cut:
+    """Cards are joined until no more triangles than `half` are left, if cards have these segments.
+
+    Where one round of pairs does not do, there is another.
+    """
+    while True:
+        there = np.flatnonzero(cut.segments)
+        over = segments[there].sum() - half / (2.0 * cut.columns)
+        pairs = pairs_to_join(cut.strips, cut.strand_count, group, there)
+        if over <= 0.0 or not len(pairs):
+            break
+        freed = np.cumsum(segments[pairs[:, 1]])
+        pairs = pairs[: int(np.searchsorted(freed, over)) + 1]
+        cut = _joined(cut, pairs)
+    return replace(cut, errors=segment_errors(cut.strips, most))
+
+
+def _joined(cut: _Cut, pairs: Ints) -> _Cut:
+    strips, strand_count = with_joined(cut.strips, cut.strand_count, pairs)
+    kept, gone = pairs.T
+    stands_for = np.arange(len(cut.owner), dtype=np.int32)
+    stands_for[gone] = kept
+    segments = cut.segments.copy()
+    segments[kept] = np.maximum(segments[kept], segments[gone])
+    segments[gone] = 0
+    owner = stands_for[cut.owner]
+    return replace(cut, strips=strips, strand_count=strand_count, owner=owner, segments=segments)
+
+
+def _mesh(cut: _Cut, cards: UncutCards, settings: CardSettings) -> CardMesh:
+    return strip_mesh(_parts(cut), cards, cut.columns, settings)
+
+
+def _parts(cut: _Cut) -> list[tuple[Ints, Strips]]:
+    """Strips with the same number of segments together, with the numbers of their cards."""
+    by_count = {int(n): np.flatnonzero(cut.segments == n) for n in np.unique(cut.segments) if n}
+    parts: list[tuple[Ints, Strips]] = [
+        (cards, with_segments(cut.strips, cards, n)) for n, cards in by_count.items()
+    ]
+    return parts or [(np.zeros(0, np.int32), cut.strips)]
+
+
+def _silhouette_error(cut: _Cut, finest: Strips) -> float:
+    """How far the edges of all cards at full resolution are from this level's strips, across them
+    [m]: of those nine tenths that are nearest the farthest."""
+    along = np.linspace(0.0, 1.0, finest.width.shape[1])
+    center, side, tangent = (np.zeros_like(finest.frames.center) for _ in range(3))
+    half = np.zeros_like(finest.width)
+    for cards, strips in _parts(cut):
+        center[cards] = interpolated(strips.frames.center, along)
+        side[cards] = interpolated(strips.frames.side, along)
+        tangent[cards] = interpolated(strips.frames.tangent, along)
+        half[cards] = interpolated(strips.width[..., None], along)[..., 0] / 2.0
+    owner = cut.owner
+    away = edges_of(finest) - center[owner][:, :, None]
+    aside = np.einsum("crei,cri->cre", away, side[owner])
+    held = np.clip(aside, -half[owner][..., None], half[owner][..., None])
+    ahead = np.einsum("crei,cri->cre", away, tangent[owner])
+    off = away - side[owner][:, :, None] * held[..., None]
+    off -= tangent[owner][:, :, None] * ahead[..., None]
+    distance = np.linalg.norm(off, axis=-1)
+    return float(np.percentile(distance, _HELD)) if distance.size else 0.0

@@ -1,0 +1,78 @@
+"""Into how many segments a strip is cut: as few as the allowed error asks for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .strip import CardFrames, Strips
+
+#: Numbers of segments that are tried.
+_TRIED = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32)
+
+
+def tried_segments(most: int) -> Ints:
+    """The numbers of segments that a strip may be cut into, ascending, `most` the last."""
+    return np.array([*(each for each in _TRIED if each < most), most], np.int32)
+
+
+def segment_errors(strips: Strips, most: int) -> Floats:
+    """How far the edges stray with each of `tried_segments`, (card_count, tried) float32 [m].
+
+    That is the largest distance of a CV's row from the cut strip at the same place along it; that
+    a place slides along the strip does not count. With `most` segments it is 0: there is no finer
+    way. Never more than with fewer segments.
+    """
+    edges, tried = edges_of(strips), tried_segments(most)
+    tangent = strips.frames.tangent[:, :, None]
+    errors = np.zeros((len(edges), len(tried)), np.float32)
+    for index, segments in enumerate(tried[:-1]):
+        coarse = interpolated(edges, np.linspace(0.0, 1.0, segments + 1))
+        again = interpolated(coarse, np.linspace(0.0, 1.0, edges.shape[1]))
+        away = again - edges
+        away -= tangent * np.sum(away * tangent, axis=-1, keepdims=True)
+        errors[:, index] = np.linalg.norm(away, axis=-1).max(axis=(1, 2))
+    return np.minimum.accumulate(errors, axis=1)
+
+
+def fewest_segments(errors: Floats, error: float, most: int) -> Ints:
+    """The fewest segments with which each strip stays within `error` [m], (card_count,) int32.
+
+    Args:
+        errors: what `segment_errors` found with the same `most`.
+    """
+    fits = errors <= error
+    fits[:, -1] = True
+    return tried_segments(most)[fits.argmax(axis=1)]
+
+
+def with_segments(strips: Strips, chosen: Ints, segments: int) -> Strips:
+    """The chosen strips with this many segments, equally spaced in CVs."""
+    along = np.linspace(0.0, 1.0, segments + 1)
+    frames = strips.frames
+    center = interpolated(frames.center[chosen], along)
+    tangent = unit(interpolated(frames.tangent[chosen], along))
+    normal = interpolated(frames.normal[chosen], along)
+    normal = unit(normal - tangent * np.einsum("cri,cri->cr", normal, tangent)[..., None])
+    width = interpolated(strips.width[chosen][..., None], along)[..., 0]
+    return Strips(CardFrames(center, tangent, normal, np.cross(tangent, normal)), width)
+
+
+def edges_of(strips: Strips) -> Floats:
+    """Both edges of each strip, (card_count, row_count, 2, 3) [m]."""
+    half = strips.frames.side * (strips.width / 2.0)[..., None]
+    return np.stack([strips.frames.center - half, strips.frames.center + half], axis=2)
+
+
+def interpolated(rows: Floats, along: Floats) -> Floats:
+    """Rows at these places from 0 to 1, linearly between, (card_count, len(along), ...)."""
+    place = along * (rows.shape[1] - 1)
+    left = np.minimum(place.astype(int), rows.shape[1] - 2)
+    share = (place - left).astype(np.float32).reshape(1, -1, *[1] * (rows.ndim - 2))
+    mixed: Floats = rows[:, left] * (1.0 - share) + rows[:, left + 1] * share
+    return mixed
+
+
+def unit(vectors: Floats) -> Floats:
+    """Vectors of length 1; those of no length stay 0."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

@@ -1,0 +1,180 @@
+"""From a groom to all its levels: what holds in each, and what bad input gives."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon import pipeline
+from hairloom.addon.cards.atlas_settings import AtlasSettings
+from hairloom.addon.cards.build import CardBuild, CardGroom, uncut_cards, with_occlusion_of
+from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
+from hairloom.addon.cards.settings import CardSettings
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.strands import StrandSet
+
+MADE = AtlasSettings(source="made")
+FEW_RAYS = CardOcclusionSettings(rays=16)
+
+
+def falling(count: int, *, groups: int = 2, cv_count: int = 12, seed: int = 0) -> StrandSet:
+    """Strands that leave a ball along its normal and fall."""
+    random = np.random.default_rng(seed)
+    normal = random.normal(size=(count, 3))
+    normal[:, 2] = np.abs(normal[:, 2])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    along = np.linspace(0.0, 1.0, cv_count)[:, None]
+    grid = normal[:, None] * (0.1 + 0.05 * np.sqrt(along)) + along**2 * [0.0, 0.0, -0.15]
+    return StrandSet(
+        points=grid.reshape(-1, 3),
+        offsets=np.arange(count + 1) * cv_count,
+        radius=np.full(count * cv_count, 5e-5),
+        group=np.arange(count) % groups,
+    )
+
+
+def built(strands: StrandSet, atlas: AtlasSettings = MADE, **changed: object) -> CardBuild:
+    rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
+    settings = CardSettings(**{"way": "clusters", "card_count": 30, **changed})  # type: ignore[arg-type]
+    return pipeline.card_build(rig, settings, atlas, FEW_RAYS)
+
+
+@pytest.mark.parametrize("way", ["clusters", "guides"])
+@pytest.mark.parametrize("source", ["made", "baked"])
+def test_levels_share_one_atlas_and_all_that_is_known_of_cards(way: str, source: str) -> None:
+    build = built(falling(1500), AtlasSettings(source=source, columns=8, rows=2), way=way)
+    assert len(build.levels) == len(build.errors) == len(build.backs) == 3
+    assert (build.plan is None) == (way == "guides" or source == "made")
+    finest = build.finest
+    assert set(finest.group[np.unique(finest.card)].tolist()) == {0, 1}
+    for mesh, back in zip(build.levels, build.backs, strict=True):
+        assert mesh.atlas == finest.atlas
+        np.testing.assert_array_equal(mesh.tile, finest.tile)
+        np.testing.assert_array_equal(mesh.layer, finest.layer)
+        assert 0.0 <= mesh.occlusion.min() < mesh.occlusion.max() <= 1.0
+        same = (np.sort(triangles.ravel()) for triangles in (mesh.triangles, back))
+        np.testing.assert_array_equal(*same)
+    if build.plan is not None:
+        assert finest.atlas == build.plan.grid
+        np.testing.assert_array_equal(finest.tile, build.plan.tile)
+
+
+def test_crossed_cards_have_the_tile_and_group_of_their_pair() -> None:
+    build = built(falling(800), AtlasSettings(columns=8, rows=2), crossed=True, fly_aways=0.0)
+    count = build.finest.card_count // 2
+    for name in ("tile", "group"):
+        value = getattr(build.finest, name)
+        np.testing.assert_array_equal(value[:count], value[count:])
+    assert build.plan is not None and len(build.plan.tile) == count
+
+
+def test_guides_keep_their_groups() -> None:
+    strands = falling(600, groups=3)
+    build = built(strands, way="guides")
+    rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
+    np.testing.assert_array_equal(build.finest.group, rig.strands.group[rig.guides])
+
+
+def test_the_lowest_layer_is_wider_by_choice_and_the_outermost_is_not() -> None:
+    groom = _groom(falling(1500))
+    plain, _ = uncut_cards(groom, CardSettings(way="clusters", card_count=60), MADE)
+    wide, _ = uncut_cards(groom, CardSettings(way="clusters", card_count=60, base_width=1.6), MADE)
+    factor = (wide.strips.width / plain.strips.width).mean(axis=1)
+    for layer, expected in enumerate((1.6, 1.3, 1.0)):
+        np.testing.assert_allclose(factor[plain.layer == layer], expected, rtol=1e-5)
+
+
+def test_single_strands_are_the_outermost_layer() -> None:
+    settings = CardSettings(way="clusters", card_count=60, fly_aways=0.2)
+    cards, _ = uncut_cards(_groom(falling(1500)), settings, MADE)
+    loose = cards.strand_count == 1
+    assert loose.sum() >= 12
+    np.testing.assert_array_equal(cards.layer[loose], 2)
+    assert set(cards.layer[~loose].tolist()) == {0, 1, 2}
+
+
+def _groom(strands: StrandSet) -> CardGroom:
+    rig = pipeline.prepare(strands, None, GuideSettings(), place="hair")
+    return CardGroom(rig.strands, rig.guides, pipeline.root_normals(rig), None)
+
+
+def test_a_vertex_that_is_in_both_levels_has_the_same_occlusion() -> None:
+    finest, coarser = built(falling(900), levels=2).levels
+    shade = np.random.default_rng(0).random(len(finest.positions)).astype(np.float32)
+    finest = finest.with_occlusion(shade)
+    level = with_occlusion_of(finest, coarser)
+    known = {tuple(key): value for key, value in zip(_keys(finest), shade, strict=True)}
+    shared = [
+        (value, known[tuple(key)])
+        for key, value in zip(_keys(level), level.occlusion, strict=True)
+        if tuple(key) in known
+    ]
+    assert len(shared) > 200
+    np.testing.assert_allclose(*zip(*shared, strict=True))
+
+
+def _keys(mesh):  # type: ignore[no-untyped-def]
+    """Card and place in the atlas of each vertex."""
+    owner = np.zeros(len(mesh.positions), int)
+    owner[mesh.triangles] = mesh.card[:, None]
+    return np.column_stack([owner, (mesh.uv * 1e5).round().astype(int)])
+
+
+@pytest.mark.parametrize("way", ["clusters", "guides"])
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_few_strands_give_a_few_cards(way: str, count: int) -> None:
+    build = built(falling(count, groups=1), way=way, card_count=800)
+    assert 1 <= build.finest.card_count <= count
+    for mesh in build.levels:
+        a, b, c = np.moveaxis(mesh.positions[mesh.triangles], 1, 0)
+        assert (np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0.0).all()
+
+
+def test_strands_that_are_all_the_same_give_one_card() -> None:
+    one = falling(1, groups=1)
+    grid = np.tile(one.points, (200, 1))
+    strands = StrandSet(
+        points=grid,
+        offsets=np.arange(201) * 12,
+        radius=np.full(len(grid), 5e-5),
+        group=np.zeros(200, np.int32),
+    )
+    build = built(strands, fly_aways=0.0)
+    assert build.finest.card_count == 1
+    assert np.isfinite(build.finest.positions).all()
+
+
+def test_an_atlas_that_is_too_small_says_by_how_much() -> None:
+    small = AtlasSettings(size="512", columns=64, rows=64, padding=4)
+    with pytest.raises(HairloomError, match="more"):
+        built(falling(100), small)
+
+
+def test_alpha_is_asked_for_once_and_darkens_less_than_opaque_cards() -> None:
+    rig = pipeline.prepare(falling(900), None, GuideSettings(), place="hair")
+    settings = CardSettings(way="clusters", card_count=30, levels=1)
+    asked: list[CardBuild] = []
+
+    def clear(build: CardBuild) -> np.ndarray:
+        asked.append(build)
+        return np.zeros((8, 8), np.float32)
+
+    opaque = pipeline.card_build(rig, settings, MADE, FEW_RAYS)
+    seen_through = pipeline.card_build(rig, settings, MADE, FEW_RAYS, clear)
+    assert len(asked) == 1
+    np.testing.assert_allclose(seen_through.finest.occlusion, 1.0, atol=1e-5)
+    assert opaque.finest.occlusion.mean() < 0.9
+
+
+def test_half_a_million_strands_take_less_than_a_minute() -> None:
+    strands = falling(500_000, cv_count=8)
+    normal = np.tile(np.float32([0.0, 0.0, 1.0]), (500_000, 1))
+    groom = CardGroom(strands, np.arange(0, 500_000, 500), normal, None)
+    start = time.process_time()
+    cards, _ = uncut_cards(groom, CardSettings(way="clusters"), replace(MADE))
+    assert len(cards) >= 800
+    assert time.process_time() - start < 60.0

@@ -1,0 +1,105 @@
+"""Draws the pictures of docs/cards.md: both ways to make cards, their layers and their levels.
+
+python tools/cards_pictures.py FOLDER
+"""
+
+import importlib
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import bpy  # noqa: F401  it must come before gpu, which lives inside it
+import gpu
+import numpy as np
+from extension_loader import PACKAGE, load_package
+
+STRANDS, CARDS = 8000, 500
+WIDTH, HEIGHT, SAMPLES = 420, 480, 2
+
+
+def of_addon(module: str) -> Any:
+    return importlib.import_module(f"{PACKAGE}.addon.{module}")
+
+
+class Shots:
+    """A groom on the built-in head, and pictures of it as strands and as cards."""
+
+    def __init__(self) -> None:
+        settings = of_addon("parameters").ALL_SETTINGS
+        head = of_addon("host.built_in_head").built_in_head()
+        grow, studio = of_addon("groom.grow"), of_addon("host.studio")
+        grown = settings["grow"](strand_count=STRANDS, clump=0.4)
+        strands = grow.grow(head, grown, grow.scalp_density(head))
+        self.settings, self._pipeline = settings, of_addon("pipeline")
+        self.rig = self._pipeline.prepare(
+            strands, head, settings["guides"](guide_count=CARDS), place="the built-in groom"
+        )
+        self._shading, self._drawn = settings["shading"](), settings["strands"]()
+        look = studio.Look(self._shading, self._drawn, settings["detail"]())
+        ambient = settings["ambient"]()
+        occlusion = self._pipeline.rest_occlusion(self.rig, ambient)
+        under = self._pipeline.head_occlusion(self.rig, ambient)
+        self._studio = studio.Studio(self.rig, occlusion, under, look)
+
+    def strands(self) -> Any:
+        rig = self.rig
+        return self._studio.picture(rig.rest_pose, rig.strands.grid, WIDTH, HEIGHT, SAMPLES)
+
+    def built(self, way: str, levels: int = 1) -> tuple[Any, Any]:
+        """Cards in this way, and their textures."""
+        settings, maps = self.settings, of_addon("host.card_maps")
+        choices = of_addon("host.card_files").CardChoices(
+            settings["cards"](way=way, card_count=CARDS, levels=levels),
+            settings["atlas"](),
+            settings["card_occlusion"](rays=64),
+            settings["card_texture"](),
+            self._shading,
+            self._drawn,
+        )
+        made: list[Any] = []
+
+        def alpha_of(build: Any) -> Any:
+            made.append(maps.made_maps(self.rig, build, choices))
+            return made[0].textures.alpha
+
+        build = self._pipeline.card_build(
+            self.rig, choices.cards, choices.atlas, choices.occlusion, alpha_of
+        )
+        return build, made[0].textures
+
+    def cards(self, mesh: Any, textures: Any) -> Any:
+        shown = of_addon("render.card_snapshot").CardSnapshot(mesh, textures)
+        return self._studio.card_picture(shown, WIDTH, HEIGHT, SAMPLES)
+
+
+def of_layer(mesh: Any, layer: int) -> Any:
+    """The cards of one layer alone."""
+    kept = mesh.layer[mesh.card] == layer
+    return replace(mesh, triangles=mesh.triangles[kept], card=mesh.card[kept])
+
+
+def main(folder: Path) -> None:
+    gpu.init()
+    load_package().register()
+    images, shots = of_addon("host.images"), Shots()
+
+    def sheet(name: str, pictures: list[Any]) -> None:
+        images.write_png(folder / name, images.contact_sheet(pictures, len(pictures)))
+
+    guides, along = shots.built("guides")
+    build, baked = shots.built("clusters", levels=5)
+    sheet(
+        "card_ways.png",
+        [shots.strands(), shots.cards(guides.finest, along), shots.cards(build.finest, baked)],
+    )
+    layers = np.unique(build.finest.layer)
+    sheet("card_layers.png", [shots.cards(of_layer(build.finest, n), baked) for n in layers])
+    sheet("card_levels.png", [shots.cards(build.levels[n], baked) for n in (0, 2, 4)])
+    for mesh, error in zip(build.levels, build.errors, strict=True):
+        triangles, millimetres = len(mesh.triangles), error * 1000.0
+        print(f"{triangles:,} triangles, {mesh.card_count} cards, within {millimetres:.1f} mm")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
