@@ -1,7 +1,8 @@
 // Cards, fragment stage: strands in textures, see addon/shading/textures.py.
 //
-// PRIME 1: depth alone, of opaque pixels. TANGENT_MAP 1: a map says which way strands run, in place
-// of the shift texture. SHADOWS of hair on hair, and SCATTERING from strand to strand, as strands have
+// PRIME 1: depth alone, of opaque pixels. CLIPPED 1: pixels of alpha_range alone; without it nothing
+// is left out here, so that the depth test may come first. TANGENT_MAP 1: a map says which way strands
+// run, in place of the shift texture. NORMAL_MAP 1: a map bends the normal. SHADOWS of hair on hair, and SCATTERING from strand to strand, as strands have
 // them; where a light has no map, the occlusion stands in.
 #if PRIME
 void main()
@@ -16,6 +17,7 @@ void main()
 #  include "lib_card.glsl"
 #  include "lib_hair_light.glsl"
 #  include "lib_card_shadows.glsl"
+#  include "lib_output.glsl"
 
 void main()
 {
@@ -30,6 +32,11 @@ void main()
   float shift_noise = 0.5;
 #  else
   float shift_noise = texture(shift_texture, card_uv).x;
+#  endif
+#  if NORMAL_MAP
+  normal = mapped_normal(texture(normal_texture, card_uv).xyz,
+                         unit_or(card_tangent, vec3(0.0, 0.0, 1.0)),
+                         normal);
 #  endif
   float sparkle_noise = texture(noise_texture, card_uv).x;
   vec3 absorption = vec3(0.0);
@@ -66,9 +73,11 @@ void main()
   }
   radiance *= texture(base_texture, card_uv).xyz;
   float covered = is_opaque == 1 ? 1.0 : alpha;
-  if (covered < least_alpha) {
+#  if CLIPPED
+  if (alpha < alpha_range.x || alpha >= alpha_range.y) {
     discard;  // at the end, because derivatives want all pixels until then
   }
-  color = vec4(radiance * covered, covered);
+#  endif
+  color = vec4(output_encoded(radiance, output_encoding) * covered, covered);
 }
 #endif

@@ -12,6 +12,14 @@ vec3 mapped_tangent(vec3 texel, vec3 tangent, vec3 normal, float shift_noise)
   return unit_or(strand, tangent);
 }
 
+// The normal by a texel of a normal map.
+vec3 mapped_normal(vec3 texel, vec3 tangent, vec3 normal)
+{
+  vec3 way = 2.0 * texel - 1.0;
+  vec3 side = cross(tangent, normal);
+  return unit_or(way.x * side + way.y * tangent + way.z * normal, normal);
+}
+
 // Mean colour of the strands, of which some are grey: times the base texture it is the hair's.
 vec3 card_base(float along, ShadingSettings shading)
 {

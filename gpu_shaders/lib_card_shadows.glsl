@@ -38,7 +38,8 @@ vec3 way_of_light_to_card(int index, vec3 point, float alpha)
   vec3 way = way_of_light(index, point);
 #if SHADOWS
   if (way.x > 0.0) {
-    float own = opacity.extinction * own_share(index, point) * card_optical_depth(alpha);
+    float own = opacity.extinction * own_share(index, point) * card_thickness *
+                card_optical_depth(alpha);
     way.x = max(way.x - own, 0.0);
   }
 #endif

@@ -20,7 +20,11 @@ from .overlay import Drawing
 from .redraw import redraw_panels
 from .session import Session
 from .shown import with_all_strands
+from .shown_cards import as_shown
 from .simulated import Simulated
+
+#: Cards that are being built are looked for this often [s].
+CARDS_TIME = 0.1
 
 _sessions: dict[int, Simulated] = {}
 _notice = ""
@@ -239,6 +243,8 @@ def _publish(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     if not isinstance(session, Session):
         return
     hair = session.hair.found()
+    if session.cards.is_pending:
+        _await_cards()
     overlay.show(session.uid, _drawing(session, hair))
     is_replaced = hair.mode == "OBJECT" and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original
@@ -247,8 +253,25 @@ def _publish(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     show_originals(hair, depsgraph, show=not hides, has_own_shadow=has_own_shadow)
 
 
+def _await_cards() -> None:
+    """Show cards when they are built."""
+    if not bpy.app.timers.is_registered(_take_cards):
+        bpy.app.timers.register(_take_cards, first_interval=CARDS_TIME)
+
+
+def _take_cards() -> float | None:
+    """A timer of Blender's: cards that were built beside the window's work."""
+    depsgraph = bpy.context.view_layer.depsgraph
+    for session in sessions():
+        if session.cards.is_pending:
+            attempt(session, depsgraph, Session.take_cards)
+            redraw_panels()
+    is_pending = any(session.cards.is_pending for session in sessions())
+    return CARDS_TIME if is_pending else None
+
+
 def _drawing(session: Session, hair: bpy.types.Object) -> Drawing:
-    snapshot, head = session.snapshot, None
+    snapshot, head = as_shown(session.snapshot), None
     if session.head is not None:
         head = session.head.handle.find()
     if head is None or not is_solid(head):
@@ -259,5 +282,6 @@ def _drawing(session: Session, hair: bpy.types.Object) -> Drawing:
         hidden_in=spaces_without(hair),
         bare_in=frozenset() if head is None else spaces_without(head),
         guide_count=len(session.rig.guides),
+        card_counts=session.cards.counts if snapshot.cards is not None else (),
         counts_of=hair.name if hair.hairloom.show_counts or snapshot.debug_view != "none" else "",
     )

@@ -16,13 +16,14 @@ import numpy as np
 
 from ..render.body_shadow import BodyShadow
 from ..render.camera import Camera
+from ..render.card_pass import CardPass
 from ..render.scene_pass import ONE_AT_A_TIME
 from ..render.snapshot import Snapshot
 from ..render.strand_pass import StrandPass
 from ..shading.lights import Light, three_point_lights
 from . import view_transform
 from .lights import uses_scene_light
-from .overlay_text import counts_line, write_lines
+from .overlay_text import card_counts_line, counts_line, write_lines
 from .redraw import redraw_panels, redraw_views
 from .shown import with_all_strands
 
@@ -33,6 +34,7 @@ class Drawing:
 
     hidden_in: addresses of the 3D views that do not show it.
     bare_in: of those that do not show its head, which hides nothing there.
+    card_counts: cards, triangles and vertices where it is shown as cards.
     counts_of: the name under which its counts are written; empty: they are not.
     """
 
@@ -41,6 +43,7 @@ class Drawing:
     hidden_in: frozenset[int] = frozenset()
     bare_in: frozenset[int] = frozenset()
     guide_count: int = 0
+    card_counts: tuple[int, ...] = ()
     counts_of: str = ""
 
 
@@ -48,6 +51,7 @@ class Drawing:
 ENGINE = "HAIRLOOM"
 _drawings: dict[int, Drawing] = {}
 _passes: dict[int, StrandPass] = {}
+_card_passes: dict[int, CardPass] = {}
 _shadows: dict[int, BodyShadow] = {}
 _handles: tuple[Any, ...] = ()
 _failure = ""
@@ -71,6 +75,7 @@ def drop(uid: int) -> None:
     """No longer draw this groom; with the last one the draw handlers go."""
     _drawings.pop(uid, None)
     _passes.pop(uid, None)
+    _card_passes.pop(uid, None)
     _shadows.pop(uid, None)
     if not _drawings:
         _remove_handlers()
@@ -115,16 +120,29 @@ def _draw_strands(context: Any) -> None:
         if is_seen_through(space.shading) or address in drawing.bare_in:
             snapshot = with_all_strands(snapshot)
         strand_pass = _passes.setdefault(uid, StrandPass())
+        card_pass = _card_passes.setdefault(uid, CardPass())
         snapshot = lit(snapshot, space.shading, studio)
         # colours that stand for numbers are no light
         shown_by = display if snapshot.debug_view == "none" else None
         with ONE_AT_A_TIME:
+            maps = None
+            if snapshot.cards is not None:
+                maps = card_pass.opacity(snapshot)
             if _shades_body(snapshot, space) and address not in drawing.bare_in:
-                maps = strand_pass.opacity(snapshot)
+                maps = maps or strand_pass.opacity(snapshot)
                 if maps is not None:
                     shadow = _shadows.setdefault(uid, BodyShadow())
                     shadow.draw(snapshot, maps, camera, width, height, display=display)
             strand_pass.draw(snapshot, camera, width, height, output="viewport", display=shown_by)
+            card_pass.draw(
+                snapshot,
+                camera,
+                width,
+                height,
+                opacity=maps,
+                output="viewport",
+                display=shown_by,
+            )
 
 
 def _draw_counts(context: Any) -> None:
@@ -132,7 +150,9 @@ def _draw_counts(context: Any) -> None:
     if not context.space_data.overlay.show_overlays:
         return
     lines = [
-        counts_line(
+        card_counts_line(drawing.counts_of, drawing.guide_count, drawing.card_counts)
+        if drawing.card_counts
+        else counts_line(
             drawing.counts_of,
             drawing.guide_count,
             drawing.snapshot.strand_count,

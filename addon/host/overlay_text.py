@@ -10,6 +10,7 @@ from ..render.strand_pass import Statistics
 
 #: In pixels at UI scale 1: from the edges, and from line to line as a factor of the letters' size.
 _MARGIN, _LINE = 12.0, 1.5
+_OF_CARDS = ("cards", "triangles", "vertices")
 _FONT = 0  # Blender's own
 
 
@@ -23,6 +24,16 @@ def counts_line(name: str, guide_count: int, strand_count: int, drawn: Statistic
         f"vertices {drawn.vertices:,}",
     )
     return "   ".join((f"Hairloom {name}", *counts))
+
+
+def card_counts_line(name: str, guide_count: int, drawn: tuple[int, ...]) -> str:
+    """Such as "Hairloom Hair   guides 762   cards 800   triangles 9,600   vertices 13,200".
+
+    Args:
+        drawn: cards, triangles and vertices.
+    """
+    counts = (f"{kind} {n:,}" for kind, n in zip(_OF_CARDS, drawn, strict=True))
+    return "   ".join((f"Hairloom {name}", f"guides {guide_count:,}", *counts))
 
 
 def write_lines(context: Any, lines: list[str]) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import HairloomError
+from ..pipeline import Pose
 from .bake_settings import absolute, folder_of
 from .baked_rig import BakedRig, rig_of
 from .cache import FACTS, Cache
@@ -81,6 +82,24 @@ def strands_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
     there = rig.strands(cache.frame(frame + 1))
     between: Floats = here + (there - here) * np.float32(subframe)
     return between
+
+
+def pose_in(cache: Cache, frame: int, subframe: float = 0.0) -> Pose:
+    """Where the body of a groom was; in time as `strands_in`.
+
+    Raises:
+        HairloomError: the bake is damaged.
+    """
+    facts, rig = cache.facts, rig_in(cache)
+    here = rig.pose(cache.frame(min(max(frame, facts.first), facts.last)))
+    if not subframe or not facts.first <= frame < facts.last:
+        return here
+    there = rig.pose(cache.frame(frame + 1))
+    matrix = here.matrix + (there.matrix - here.matrix) * subframe
+    if here.head_positions is None or there.head_positions is None:
+        return Pose(None, matrix)
+    way = there.head_positions - here.head_positions
+    return Pose(here.head_positions + way * np.float32(subframe), matrix)
 
 
 def show_fins(scene: bpy.types.Scene) -> None:

@@ -155,7 +155,7 @@ def _read(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
         return
     else:
         session.read_again(depsgraph)
-    timeline.check(session, depsgraph)
+        timeline.check(session, depsgraph)
 
 
 def clear() -> None:

@@ -29,6 +29,7 @@ from .objects import Body
 from .obstacles import Obstacles
 from .reading import Reading
 from .shown import shapes_alike, snapshot_of, with_choices, with_tables
+from .shown_cards import ShownCards
 from .simulated import Arrays
 from .solvers import Solver, computed_on, form_of, solver_of
 from .source import Source, dynamics_warnings, refuse_own_dynamics
@@ -62,6 +63,7 @@ class Session:
         self._is_drawn = is_drawn
         self._light_warnings: tuple[str, ...] = ()
         self._ball = HairBall()
+        self.cards = ShownCards()
         self._take_rig(self._reading.rig(baked), depsgraph)
 
     @property
@@ -98,7 +100,8 @@ class Session:
         notes = (f"{self.name}: {note}" for note in self.rig.notes)
         dark = no_light_warnings(self.snapshot.lights, self.snapshot.ambient)
         lights = (*self._light_warnings, *dark, *self._shadow_warnings())
-        return (*self.source.warnings, *notes, *doubled, *found, *lights)
+        cards = (f"{self.name}: {note}" for note in self.cards.warnings)
+        return (*self.source.warnings, *notes, *cards, *doubled, *found, *lights)
 
     def _shadow_warnings(self) -> tuple[str, ...]:
         snapshot = self.snapshot
@@ -134,6 +137,7 @@ class Session:
             rank = pipeline.strand_ranks(rig)
             self._hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
         self.snapshot = with_choices(snapshot_of(rig, occlusion, rank), self.choices)
+        self._want_cards()
         self.light(depsgraph)
         if motion is None:
             self.rest(depsgraph)
@@ -171,10 +175,28 @@ class Session:
         if not shapes_alike(before.shading, self.choices.shading) and not bpy.app.background:
             self.snapshot = with_tables(self.snapshot, PREVIEW_SIZE)
         was, now = before, self.choices
-        if (was.detail.culling, was.volume.shadows) != (now.detail.culling, now.volume.shadows):
+        is_other = (was.detail.culling, was.volume.shadows) != (
+            now.detail.culling,
+            now.volume.shadows,
+        )
+        if self._want_cards() or is_other:
             self._show()
         if self.choices.dynamics.form != before.dynamics.form:
             self._change_form(self.choices.dynamics.form)
+
+    def _want_cards(self) -> bool:
+        """Have cards built if they are to be shown; whether what is shown of them changes now."""
+        choices, before = self.choices, self.snapshot.cards
+        if not (self._is_drawn and choices.shows_cards):
+            self.cards.forget()
+            return before is not None
+        self.cards.want(self.hair.found(), self.rig, choices.card_form)
+        return True
+
+    def take_cards(self) -> None:
+        """Show the cards that were built meanwhile, if there are any."""
+        if self.cards.collect(self.hair.found()):
+            self._show()
 
     @property
     def is_coarse(self) -> bool:
@@ -308,8 +330,12 @@ class Session:
         hiders = None
         if self._hiders is not None and self.choices.detail.culling == "hidden":
             hiders = self._hiders.at(self.solver.pose)
+        solver, drawn = self.solver, self.choices.cards_drawn
         self.snapshot = replace(
-            self.solver.shown(self.snapshot), hiders=hiders, casters=self._casters()
+            solver.shown(self.snapshot),
+            hiders=hiders,
+            casters=self._casters(),
+            cards=self.cards.now(self.rig, solver.pose, solver.guides, drawn),
         )
 
     def _casters(self) -> tuple[Surface, ...]:

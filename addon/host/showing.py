@@ -11,6 +11,7 @@ from .. import pipeline
 from ..arrays import Floats
 from ..pipeline import Pose, Rig
 from . import live
+from .card_images import chosen_pictures
 from .choices import Choices
 from .reading import Reading
 from .session import Session
@@ -39,11 +40,11 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
     """
     session = live.session_of(hair)
     if isinstance(session, Session):
-        studio = _studio(session.rig, session.choices)
+        studio = _studio(hair, session.rig, session.choices)
         return ShownGroom(studio, session.solver.pose, session.strands, studio.warnings)
     reading = Reading(hair, depsgraph)
     rig = reading.rig()
-    studio = _studio(rig, reading.choices)
+    studio = _studio(hair, rig, reading.choices)
     notes = (*reading.source.warnings, *rig.notes, *studio.warnings)
     return ShownGroom(studio, rig.rest_pose, rig.strands.grid, notes)
 
@@ -53,7 +54,7 @@ def file_name(name: str) -> str:
     return re.sub(r"[^\w .-]+", "_", name).strip(" .") or "groom"
 
 
-def _studio(rig: Rig, choices: Choices) -> Studio:
+def _studio(hair: bpy.types.Object, rig: Rig, choices: Choices) -> Studio:
     occlusion = pipeline.rest_occlusion(rig, choices.ambient)
     head_occlusion = pipeline.head_occlusion(rig, choices.ambient)
     look = Look(
@@ -64,5 +65,8 @@ def _studio(rig: Rig, choices: Choices) -> Studio:
         volume=choices.volume,
         skin=choices.skin,
         shafts=choices.shafts,
+        card_drawing=choices.card_drawing,
+        card_form=choices.card_form,
+        card_pictures=chosen_pictures(hair.data.hairloom.card_images)[0],
     )
     return Studio(rig, occlusion, head_occlusion, look)

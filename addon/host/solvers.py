@@ -21,8 +21,8 @@ from ..pipeline import Motion, Pose, Rig
 from ..render.snapshot import Snapshot
 from ..strands import StrandSet
 from .compute_solver import ComputeSolver
+from .gpu_context import gpu_in_use
 from .numpy_solver import NumpySolver
-from .studio import gpu_in_use
 
 #: How far apart [m] the two may be after the frame that is tried out.
 _AGREEMENT = 1.0e-4

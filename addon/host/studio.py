@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-import bpy
-import gpu
 import numpy as np
 
 from .. import pipeline
 from ..arrays import Floats
+from ..cards.drawing_settings import CardDrawingSettings
 from ..pipeline import Pose, Rig
 from ..refine.settings import DetailSettings
 from ..render.camera import Camera, frame_camera
@@ -28,8 +28,11 @@ from ..shading.skin.settings import SkinSettings
 from ..shading.volume.settings import VolumeSettings
 from ..shading.volume.shadow_lights import shadow_warnings
 from ..strands import Surface
+from .card_builds import BuiltCards, CardForm, built_cards
+from .gpu_context import ensure_gpu
 from .hiders import Hiders
 from .shown import snapshot_of
+from .shown_cards import as_shown
 from .skin_picture import shown_skin_shadow
 from .slices import shown_slices
 
@@ -47,7 +50,11 @@ type Rgba = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Look:
-    """How strands are drawn. debug_view: what they are coloured by, see render.snapshot."""
+    """How hair is drawn.
+
+    debug_view: what strands are coloured by, see render.snapshot.
+    card_form, card_pictures: what cards are built by where card_drawing shows them.
+    """
 
     shading: ShadingSettings
     strands: StrandSettings
@@ -56,6 +63,9 @@ class Look:
     volume: VolumeSettings = field(default_factory=VolumeSettings)
     skin: SkinSettings = field(default_factory=SkinSettings)
     shafts: ShaftSettings = field(default_factory=ShaftSettings)
+    card_drawing: CardDrawingSettings = field(default_factory=CardDrawingSettings)
+    card_form: CardForm = field(default_factory=CardForm)
+    card_pictures: Mapping[str, Floats] = field(default_factory=dict)
 
 
 class Studio:
@@ -76,6 +86,7 @@ class Studio:
         ensure_gpu()
         self._rig, self._head_occlusion = rig, head_occlusion
         self._passes, self._card_pass = (MeshPass(), StrandPass()), CardPass()
+        self._cards: BuiltCards | None = None
         self._hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
         self._groom = snapshot_of(rig, occlusion, pipeline.strand_ranks(rig))
         self.look = look
@@ -122,10 +133,28 @@ class Studio:
             meshes=self._meshes(pose),
             lights=three_point_lights(camera.view) if lights is None else lights,
             hiders=None if self._hiders is None else self._hiders.at(pose),
+            cards=self._cards_at(pose, points),
         )
         return render_image(
-            snapshot, camera, width, height, samples, background=background, passes=self._passes
+            as_shown(snapshot),
+            camera,
+            width,
+            height,
+            samples,
+            background=background,
+            passes=self._passes,
+            card_pass=self._card_pass,
         )
+
+    def _cards_at(self, pose: Pose, points: Floats) -> CardSnapshot | None:
+        """The cards riding on the guides among these strands, where cards are shown."""
+        look = self.look
+        if look.card_drawing.shown_as != "cards":
+            return None
+        if self._cards is None or self._cards.form != look.card_form:
+            self._cards = built_cards(self._rig, look.card_form, look.card_pictures)
+        drawn = look.card_drawing, look.strands
+        return self._cards.at(pose, points[self._rig.guides], drawn)
 
     def slices(self, pose: Pose, points: Floats) -> Floats:
         """The layers of the shadow maps in the studio's light, see opacity_tiles.
@@ -221,21 +250,3 @@ class Studio:
         head = self._rig.head
         surface = Surface(pose.head_positions, head.triangles, head.corner_uv)
         return (MeshSnapshot.of(surface, occlusion=self._head_occlusion, is_skin=True),)
-
-
-def ensure_gpu() -> None:
-    """A GPU context in background mode, where Blender makes one only when asked."""
-    if bpy.app.background:
-        gpu.init()
-
-
-def gpu_in_use() -> dict[str, str]:
-    """Backend, renderer and driver; empty strings where this process has no GPU context."""
-    try:
-        return {
-            "backend": gpu.platform.backend_type_get(),
-            "renderer": gpu.platform.renderer_get(),
-            "driver": gpu.platform.version_get(),
-        }
-    except SystemError:  # what gpu raises where no context was ever made
-        return {"backend": "", "renderer": "", "driver": ""}

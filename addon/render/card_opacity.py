@@ -20,10 +20,10 @@ from ..shading.settings import StrandSettings
 from ..shading.volume.light_frame import Ball, ball_around
 from ..shading.volume.map_size import START_TEXELS
 from ..shading.volume.settings import VolumeSettings
-from ..strands import Surface
 from .opacity_maps import OpacityMaps
 from .opacity_pass import OpacityPass
 from .shader_program import ShaderRecipe, program
+from .snapshot import Caster
 from .textures import drawing_into, drawing_state
 
 _BLOCKS = (("Opacity", "opacity"),)
@@ -42,6 +42,7 @@ def card_opacity_recipe(slots: int, *, is_deep: bool) -> ShaderRecipe:
         blocks=_BLOCKS,
         textures=(("FLOAT_2D", "alpha_texture"), *starts),
         integers=("light_index", "first_texel", *(("map_index",) if is_deep else ())),
+        numbers=(("FLOAT", "card_thickness"),),
         inputs=_INPUTS,
         varyings=_VARYINGS,
         outputs=tuple(("VEC4", f"layers_{slot}") for slot in range(slots)),
@@ -80,6 +81,7 @@ class CardOpacity(OpacityPass):
         super().release()
         self._batch: Any = None
         self._alpha: Any = None
+        self._thickness = 1.0
         self._serial = 0
         self._extent: tuple[CardMesh | None, Ball] = (None, Ball(np.zeros(3), 1.0))
 
@@ -90,16 +92,20 @@ class CardOpacity(OpacityPass):
         alpha: Any,
         lights: Sequence[Light],
         settings: VolumeSettings,
-        casters: tuple[Surface, ...] = (),
+        casters: tuple[Caster, ...] = (),
+        thickness: float = 1.0,
     ) -> OpacityMaps:
         """The maps of these cards.
 
         Args:
             batch: the mesh on the GPU. alpha: its texture; another object whenever it is another.
             lights, casters: as in OpacityPass.maps.
+            thickness: see CardSnapshot.
         """
-        if self._batch is not batch or self._alpha is not alpha:
+        is_same = self._batch is batch and self._alpha is alpha and self._thickness == thickness
+        if not is_same:
             self._batch, self._alpha, self._serial = batch, alpha, self._serial + 1
+            self._thickness = thickness
         if self._extent[0] is not mesh:
             self._extent = mesh, ball_around(mesh.positions)
         ball, lit_by = self._extent[1], kept_lights(lights)
@@ -132,6 +138,7 @@ class CardOpacity(OpacityPass):
                     blocks=blocks,
                     textures=textures,
                     integers={**integers, "first_texel": turn * slots},
+                    numbers={"card_thickness": self._thickness},
                 )
                 self._batch.draw(shader.shader)
 

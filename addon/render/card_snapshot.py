@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from ..arrays import Ints
 from ..cards.card_mesh import CardMesh
+from ..cards.drawing_settings import CardDrawingSettings
 from ..shading.textures import HairTextures
 
 
@@ -13,10 +15,17 @@ class CardSnapshot:
     """Cards in world space, in the order in which they are drawn: from the inside to the outside.
 
     has_tangent_map: the tangent map takes the place of the shift texture.
+    back_triangles: (n, 3) the triangles in the order in which their back faces are drawn; None is
+        the order of the mesh. Neither counts where cards are sorted for each view.
+    thickness: of the hair that alpha stands for in shadows, see shading/volume/card_opacity.py.
 
-    Mesh and textures are uploaded again only when they are other objects than before.
+    Mesh and textures are uploaded again only when they are other objects than before; triangles
+    that are the same array stay on the GPU while cards move.
     """
 
     mesh: CardMesh
     textures: HairTextures
     has_tangent_map: bool = False
+    back_triangles: Ints | None = None
+    drawing: CardDrawingSettings = field(default_factory=CardDrawingSettings)
+    thickness: float = 1.0

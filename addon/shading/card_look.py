@@ -29,6 +29,20 @@ def mapped_tangent(texel: Floats, tangent: Floats, normal: Floats, shift_noise: 
     return np.where(length > 1.0e-6, strand / np.maximum(length, 1.0e-6), tangent)
 
 
+def mapped_normal(texel: Floats, tangent: Floats, normal: Floats) -> Floats:
+    """The normal by a normal map, (..., 3) unit vectors, see textures.HairTextures.
+
+    Args:
+        texel: (..., 3) of the map.
+        tangent, normal: (..., 3) of the card, unit vectors.
+    """
+    way = 2.0 * texel - 1.0
+    side = np.cross(tangent, normal)
+    bent = way[..., 0:1] * side + way[..., 1:2] * tangent + way[..., 2:3] * normal
+    length = np.linalg.norm(bent, axis=-1, keepdims=True)
+    return np.where(length > 1.0e-6, bent / np.maximum(length, 1.0e-6), normal)
+
+
 def card_base(along: Floats, shading: ShadingSettings) -> Floats:
     """Mean colour of the strands at places of a card, (..., 3); `along` is 0 at the root.
 

@@ -113,6 +113,29 @@ def test_a_card_behind_cards_has_the_light_that_they_leave(
 
 
 @pytest.mark.parametrize("form", FORMS)
+def test_thin_cards_take_less_of_the_light(frame: Any, form: str) -> None:
+    """tau counts by the thickness, of those in front and of the card itself."""
+    back = card(1.0, 0.0, 0.6, (1.0, 1.0))
+    back["normal"] = -back["normal"]
+    mesh = mesh_of(card(0.0, 0.5, 0.0, (0.0, 0.0)), back)
+    snapshot = snapshot_of(
+        mesh,
+        textures_of([0.7, 1.0]),
+        volume=of_form(form),
+        lights=(SUN,),
+        ambient=(0.0, 0.0, 0.0),
+        shading=PLAIN,
+    )
+    thin = dataclasses.replace(snapshot.cards, thickness=0.25)
+    shown = dataclasses.replace(snapshot, cards=thin)
+    found = frame.render_image(shown, behind(frame), SIZE, SIZE, 1)[16, :, 0]
+    whole = dataclasses.replace(snapshot, volume=VolumeSettings(shadows="none"))
+    open_light = frame.render_image(whole, behind(frame), SIZE, SIZE, 1)[16, :, 0]
+    assert found[20:30] / open_light[20:30] == pytest.approx(0.3**0.25, rel=0.02)
+    assert found[2:12] == pytest.approx(open_light[2:12], rel=0.02)
+
+
+@pytest.mark.parametrize("form", FORMS)
 def test_cards_shade_the_skin_and_a_mesh_shades_cards(frame: Any, form: str) -> None:
     def wall(y: float, low: float, high: float) -> Any:
         corners = np.array([[low, y, -1], [high, y, -1], [high, y, 2], [low, y, 2]], np.float32)

@@ -2,23 +2,73 @@
 
 Strands that cover a place at random, tau times over, leave exp(-tau) of it open (Poisson). A card
 whose texture covers alpha of a place leaves 1 - alpha open, so it stands for -log(1 - alpha)
-strands, one behind the other. Twin of gpu_shaders/lib_card_opacity.glsl and
+strands, one behind the other. That is more than a groom has, because cards are opaque where they
+stand for few strands too, so cards of a groom count by a thickness at which all of them together
+throw as much shadow as its strands. Twin of gpu_shaders/lib_card_opacity.glsl and
 lib_card_shadows.glsl.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, Ints
+from ..settings import StrandSettings
 
 #: a card lets at least as much light through as this leaves: four strands are as good as a wall
 MOST_ALPHA = 0.98
 
 
 def card_optical_depth(alpha: Floats) -> Floats:
-    """tau that light meets in a card, (...)."""
+    """tau that light meets in a card of thickness 1, (...)."""
     return -np.log1p(-np.minimum(alpha, MOST_ALPHA))
+
+
+@dataclass(frozen=True)
+class StrandArea:
+    """Areas of all strands [m^2], the sums of their lengths times widths.
+
+    whole: as wide as they are everywhere. weighted: each place counts by how far it is from the
+        root, 0 to 1.
+    """
+
+    whole: float
+    weighted: float
+
+    @classmethod
+    def of(cls, grid: Floats, radius: Floats) -> StrandArea:
+        """Of strands (strand_count, cv_count, 3) [m] with radii (strand_count, cv_count) [m]."""
+        length = np.linalg.norm(np.diff(grid, axis=1), axis=2)
+        area = (length * (radius[:, 1:] + radius[:, :-1])).sum(axis=0, dtype=np.float64)
+        along = (np.arange(len(area)) + 0.5) / max(len(area), 1)
+        return cls(float(area.sum()), float((area * along).sum()))
+
+    def shade(self, strands: StrandSettings) -> float:
+        """What they take of light from everywhere [m^2]: pi / 4 of their area, as cylinders."""
+        tapered = self.whole + (strands.tip_width - 1.0) * self.weighted
+        return 0.25 * np.pi * strands.width_scale * strands.as_drawn.opacity * tapered
+
+
+#: places in a triangle, barycentric, where its alpha is looked up
+_PLACES = (np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6.0).astype(np.float32)
+
+
+def card_shade(positions: Floats, triangles: Ints, uv: Floats, alpha: Floats) -> float:
+    """What cards of thickness 1 would take of light from everywhere [m^2]: half of their area,
+    as flat things, times tau.
+
+    Args:
+        positions: (vertex_count, 3) [m]. uv: (vertex_count, 2). alpha: (height, width).
+    """
+    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    at = np.einsum("pk,tkj->ptj", _PLACES, uv[triangles])
+    size = np.array(alpha.shape)
+    column, row = np.clip((at * size[::-1]).astype(np.int64), 0, size[::-1] - 1).transpose(2, 0, 1)
+    tau = card_optical_depth(alpha[row, column]).mean(axis=0)
+    return 0.5 * float((area * tau).sum(dtype=np.float64))
 
 
 def own_share(depth: Floats, bias: float, ends: Floats) -> Floats:

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon.shading.volume.card_opacity import MOST_ALPHA, card_optical_depth, own_share
+from hairloom.addon.shading.settings import StrandSettings
+from hairloom.addon.shading.volume.card_opacity import (
+    MOST_ALPHA,
+    StrandArea,
+    card_optical_depth,
+    card_shade,
+    own_share,
+)
 from hairloom.addon.shading.volume.opacity import adds_to, layer_ends, layer_weights
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
@@ -30,3 +37,39 @@ def test_own_share_is_what_a_look_up_finds_of_a_single_card(shadows: str, bias: 
         sums = 0.7 * adds_to(np.array(depth), ends)
         found = sums @ layer_weights(np.array(depth - bias), ends)
         assert 0.7 * own_share(np.array(depth), bias, ends) == pytest.approx(found, abs=1e-9)
+
+
+def directions(count: int = 4000) -> np.ndarray:
+    ways = np.random.default_rng(5).normal(size=(count, 3))
+    return ways / np.linalg.norm(ways, axis=1, keepdims=True)
+
+
+def test_shade_of_strands_is_their_mean_shadow() -> None:
+    """Cylinders seen from many directions: length across the view times width, and the taper."""
+    random = np.random.default_rng(7)
+    grid = np.cumsum(random.normal(0.0, 0.01, (20, 40, 3)), axis=1)
+    radius = np.full((20, 40), 5.0e-5)
+    settings = StrandSettings(width_scale=2.0, tip_width=0.25, transparency="layers", opacity=0.5)
+    steps = np.diff(grid, axis=1)
+    across = np.linalg.norm(np.cross(steps[None], directions()[:, None, None]), axis=3).mean(axis=0)
+    width = 2.0 * 5.0e-5 * 2.0 * np.linspace(1.0, 0.25, 40)
+    expected = 0.5 * (across * 0.5 * (width[1:] + width[:-1])).sum()
+    shade = StrandArea.of(grid, radius).shade(settings)
+    assert shade == pytest.approx(expected, rel=0.01)
+
+
+def test_shade_of_cards_is_their_mean_shadow() -> None:
+    """A bent strip of half-clear texture from many directions: |area . view| tau."""
+    t = np.linspace(0.0, 2.0, 30)
+    line = np.stack([np.cos(t), np.sin(t), np.zeros(30)], axis=1)
+    positions = np.stack([line, line + [0.0, 0.0, 0.3]], axis=1).reshape(-1, 3)
+    first = 2 * np.arange(29)[:, None]
+    triangles = np.concatenate([first + [0, 2, 3], first + [0, 3, 1]])
+    uv = np.stack([np.tile([0.0, 1.0], 30), np.repeat(t / 2.0, 2)], axis=1)
+    alpha = np.full((64, 64), 0.4)
+    alpha[32:] = 0.8  # its half towards the tip
+    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
+    area = 0.5 * np.cross(b - a, c - a)
+    tau = np.where(uv[triangles].mean(axis=1)[:, 1] < 0.5, -np.log(0.6), -np.log(0.2))
+    expected = (np.abs(directions() @ area.T) * tau).sum(axis=1).mean()
+    assert card_shade(positions, triangles, uv, alpha) == pytest.approx(expected, rel=0.02)

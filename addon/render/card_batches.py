@@ -1,0 +1,105 @@
+"""Hair cards on the GPU: vertices of the moment, and triangles in the orders they are drawn in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..cards.card_mesh import CardMesh
+from ..cards.sort import order_from
+from .card_snapshot import CardSnapshot
+
+#: vertex attribute of a CardMesh -> its length
+ATTRIBUTES = {"position": 3, "normal": 3, "tangent": 3, "uv": 2, "occlusion": 1, "along": 1}
+
+
+@dataclass(eq=False)
+class _Order:
+    """One order of triangles, and what draws it with the vertices of the moment."""
+
+    triangles: Ints
+    indices: Any
+    batch: Any = None
+
+
+class CardBatches:
+    """Keeps one groom's cards; making one touches no GPU.
+
+    Vertices go up with every new mesh, triangles only where they are others than before.
+    """
+
+    def __init__(self) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU."""
+        self._mesh: CardMesh | None = None
+        self._vertices: Any = None
+        self._orders: dict[str, _Order] = {}
+        self._eye: Floats | None = None
+
+    def static(self, cards: CardSnapshot) -> Any:
+        """All triangles in the order of the mesh."""
+        self._upload(cards.mesh)
+        return self._batch("static", cards.mesh.triangles)
+
+    def of(self, cards: CardSnapshot, eye: Floats) -> dict[str, Any]:
+        """What draws front faces and what draws back faces, by "front" and "back".
+
+        Args:
+            eye: (4,) homogeneous, see Camera.eye.
+        """
+        if cards.drawing.order == "view":
+            batch = self._sorted(cards.mesh, eye)
+            return {"front": batch, "back": batch}
+        front = self.static(cards)
+        if cards.back_triangles is None:
+            return {"front": front, "back": front}
+        return {"front": front, "back": self._batch("back", cards.back_triangles)}
+
+    def _sorted(self, mesh: CardMesh, eye: Floats) -> Any:
+        """For this eye; nothing goes up where the order is that of the draw before."""
+        is_same = self._mesh is mesh and self._eye is not None and (self._eye == eye).all()
+        self._upload(mesh)
+        if not is_same or "view" not in self._orders:
+            triangles, known = mesh.triangles[order_from(mesh, eye)], self._orders.get("view")
+            if known is not None and np.array_equal(known.triangles, triangles):
+                triangles = known.triangles
+            self._eye = np.array(eye)
+            return self._batch("view", triangles)
+        return self._batch("view", self._orders["view"].triangles)
+
+    def _upload(self, mesh: CardMesh) -> None:
+        if self._mesh is not mesh:
+            self._vertices, self._mesh = _vertices(mesh), mesh
+            for order in self._orders.values():
+                order.batch = None
+
+    def _batch(self, name: str, triangles: Ints) -> Any:
+        order = self._orders.get(name)
+        if order is None or order.triangles is not triangles:
+            whole = np.ascontiguousarray(triangles, np.int32)
+            indices = gpu.types.GPUIndexBuf(type="TRIS", seq=whole)
+            order = self._orders[name] = _Order(triangles, indices)
+        if order.batch is None:
+            order.batch = gpu.types.GPUBatch(type="TRIS", buf=self._vertices, elem=order.indices)
+        return order.batch
+
+
+def _vertices(mesh: CardMesh) -> Any:
+    layout = gpu.types.GPUVertFormat()
+    for name, length in ATTRIBUTES.items():
+        layout.attr_add(id=name, comp_type="F32", len=length, fetch_mode="FLOAT")
+    vertices = gpu.types.GPUVertBuf(layout, len(mesh.positions))
+    values = {
+        "position": mesh.positions,
+        "occlusion": mesh.occlusion[:, None],
+        "along": mesh.along[:, None],
+    }
+    for name in ATTRIBUTES:  # a CardMesh holds contiguous float32, as attr_fill needs it
+        vertices.attr_fill(name, values[name] if name in values else getattr(mesh, name))
+    return vertices

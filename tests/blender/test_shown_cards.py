@@ -1,0 +1,122 @@
+"""Hair shown as cards: in the overlay, while it moves, and in renders."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
+
+from hairloom.addon.host import live, overlay, reactions  # noqa: E402
+from hairloom.addon.host.engine_hair import read_groom  # noqa: E402
+
+
+@pytest.fixture
+def preview(new_hair, sphere, evaluated):
+    """Hair on the sphere, shown as cards."""
+    hair = new_hair(sphere)
+    hair.data.hairloom.cards.way = "guides"
+    hair.data.hairloom.card_drawing.shown_as = "cards"
+    session = live.start(hair, evaluated())
+    yield hair, sphere, session
+    live.stop_all()
+
+
+def drawn(session):
+    return overlay.drawing_of(session.uid).snapshot
+
+
+def test_cards_are_drawn_in_place_of_strands(preview):
+    hair, _, session = preview
+    snapshot = drawn(session)
+    assert snapshot.strand_count == 0 and snapshot.cards.mesh.card_count > 0
+    assert overlay.drawing_of(session.uid).card_counts[0] == snapshot.cards.mesh.card_count
+    hair.data.hairloom.card_drawing.shown_as = "strands"
+    snapshot = drawn(session)
+    assert snapshot.strand_count == 60 and snapshot.cards is None
+    assert overlay.drawing_of(session.uid).card_counts == ()
+
+
+def test_settings_of_cards_act(preview):
+    hair, _, session = preview
+    before = drawn(session).cards
+    hair.data.hairloom.cards.segment_count = 5
+    now = drawn(session).cards
+    assert len(now.mesh.triangles) != len(before.mesh.triangles)
+    hair.data.hairloom.card_drawing.passes = "three"
+    assert drawn(session).cards.drawing.passes == "three"
+    assert drawn(session).cards.mesh.triangles is now.mesh.triangles, "nothing is built for that"
+    hair.data.hairloom.shading.base_color = (1.0, 0.5, 0.25)
+    assert drawn(session).cards.mesh.triangles is now.mesh.triangles
+
+
+def test_colourings_are_seen_on_strands(preview):
+    hair, _, session = preview
+    hair.hairloom.debug_view = "guide"
+    assert drawn(session).strand_count == 60 and drawn(session).cards is None
+
+
+def test_cards_go_with_the_head(preview, evaluated):
+    _, head, session = preview
+    before = drawn(session).cards.mesh
+    head.location.x = 0.5
+    head.rotation_euler.z = 1.0
+    bpy.context.view_layer.update()
+    reactions.updated(evaluated())
+    after = drawn(session).cards.mesh
+    turn = np.array(head.matrix_world)
+    expected = before.positions @ turn[:3, :3].T + turn[:3, 3]
+    np.testing.assert_allclose(after.positions, expected, atol=2e-6)
+    np.testing.assert_allclose(after.normal, before.normal @ turn[:3, :3].T, atol=1e-3)
+
+
+def test_cards_swing_with_their_guides(preview, evaluated):
+    _, head, session = preview
+    session.play(evaluated())
+    before = drawn(session).cards
+    head.location.x = 0.1
+    bpy.context.view_layer.update()
+    for _ in range(5):
+        live.attempt(session, evaluated(), lambda each: each.advance(evaluated(), 0.04))
+    after = drawn(session).cards
+    assert after.mesh.triangles is before.mesh.triangles
+    moved = after.mesh.positions - before.mesh.positions
+    roots, tips = moved[after.mesh.along < 0.01], moved[after.mesh.along > 0.99]
+    assert roots[:, 0] == pytest.approx(0.1, abs=0.01)
+    assert np.abs(tips[:, 0] - 0.1).max() > 0.002, "tips lag behind or fall"
+    assert np.isfinite(after.mesh.positions).all()
+
+
+def test_undo_brings_strands_back(preview, evaluated):
+    hair, _, session = preview
+    hair.data.hairloom.card_drawing.shown_as = "strands"
+    hair.data.hairloom.card_drawing.shown_as = "cards"
+    reactions.undone()
+    reactions.catch_up(evaluated())
+    assert drawn(session).cards is not None
+
+
+def test_a_render_shows_the_same_cards(preview, evaluated):
+    hair, _, session = preview
+    shown = read_groom(hair, evaluated())
+    assert shown.strand_count == 0
+    np.testing.assert_allclose(
+        shown.cards.mesh.positions, drawn(session).cards.mesh.positions, atol=1e-6
+    )
+    again = read_groom(hair, evaluated())
+    assert again.cards.mesh.triangles is shown.cards.mesh.triangles, "nothing is built again"
+    hair.data.hairloom.card_drawing.shown_as = "strands"
+    assert read_groom(hair, evaluated()).strand_count == 60
+
+
+def test_in_a_window_old_cards_stay_until_others_are_built(preview, monkeypatch):
+    hair, _, session = preview
+    before = drawn(session).cards.mesh
+    monkeypatch.setattr(session.cards, "_is_awaited", lambda: False)
+    for count in (4, 6, 7):  # a slider is dragged
+        hair.data.hairloom.cards.segment_count = count
+        assert len(drawn(session).cards.mesh.triangles) == len(before.triangles)
+    while session.cards.is_pending:
+        live._take_cards()
+    mesh = drawn(session).cards.mesh
+    assert len(mesh.triangles) == len(before.triangles) * 7 // 12
