@@ -1,13 +1,13 @@
 # All that one does here, in one place. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-ui bench docs pictures zip lock clean
+.PHONY: help setup demo test test-ui test-engines bench docs pictures zip lock clean
 
 PYTHON = .venv/bin/python
 OUT = out
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1|\2/' | \
-	    awk -F '|' '{ printf "  make %-10s %s\n", $$1, $$2 }'
+	    awk -F '|' '{ printf "  make %-13s %s\n", $$1, $$2 }'
 
 setup: ## make .venv from the lock file; nothing to do when it is there
 	@tools/setup
@@ -27,6 +27,9 @@ test-ui: zip ## the tests in a Blender with a window, OpenGL and Vulkan; SESSION
 	tools/window_blender install
 	$(PYTHON) tools/test_ui.py $(SESSIONS)
 
+test-engines: setup ## exported cards drawn by Godot and by three.js, held against our own picture
+	$(PYTHON) -m pytest -q tests/engines
+
 bench: setup ## one benchmark: NAME=x runs bench/x.py, no NAME lists them
 	@$(PYTHON) tools/bench.py $(NAME)
 
@@ -37,6 +40,7 @@ pictures: setup ## draw the documentation's pictures anew
 	$(PYTHON) tools/make_docs.py --pictures
 
 zip: setup ## the extension's zip, into dist/
+	@$(PYTHON) tools/fetch_wheels.py
 	@rm -rf dist && mkdir dist
 	$(PYTHON) .venv/lib/python*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py \
 	    build --source-dir . --output-dir dist

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from .cards.atlas_settings import AtlasSettings
+from .cards.drawing_settings import CardDrawingSettings
+from .cards.occlusion_settings import CardOcclusionSettings
 from .cards.settings import CardSettings
 from .dynamics.cloth.settings import FinSettings
 from .dynamics.fitting.sphere_fit import SphereFitSettings
@@ -11,6 +14,7 @@ from .groom.settings import GrowSettings, GuideSettings
 from .params import Settings
 from .refine.settings import DetailSettings
 from .shading.ambient import AmbientSettings
+from .shading.mesh_shadow_settings import MeshShadowSettings
 from .shading.picture_settings import PictureSettings
 from .shading.settings import ShadingSettings, StrandSettings
 from .shading.shafts_settings import ShaftSettings
@@ -35,7 +39,11 @@ ALL_SETTINGS: dict[str, type[Settings]] = {
         ShaftSettings,
         AmbientSettings,
         CardSettings,
+        AtlasSettings,
+        CardOcclusionSettings,
+        CardDrawingSettings,
         TextureSettings,
         PictureSettings,
+        MeshShadowSettings,
     )
 }

@@ -15,7 +15,10 @@ from .host.command_line import run
 from .ui import (
     engine_panels,
     look,
+    operators_adopted,
     operators_bake,
+    operators_card_export,
+    operators_cards,
     operators_colliders,
     operators_files,
     operators_fins,
@@ -38,12 +41,15 @@ CLASSES: tuple[type[Any], ...] = (
     *operators_bake.CLASSES,
     *operators_colliders.CLASSES,
     *operators_files.CLASSES,
+    *operators_card_export.CLASSES,
+    *operators_cards.CLASSES,
     *operators_presets.CLASSES,
     *operators_show.CLASSES,
     *operators_slices.CLASSES,
     *look.CLASSES,
     *panels.CLASSES,
     *operators_fins.CLASSES,
+    *operators_adopted.CLASSES,
     *operators_bake.FIN_CLASSES,
     *engine_panels.CLASSES,
 )
@@ -70,6 +76,7 @@ def unregister() -> None:
     """The exact mirror image, after the previews have ended."""
     operators_preview.stop_ticking()
     operators_bake.stop()
+    operators_cards.stop()
     operators_show.stop()
     reactions.clear()
     engine.unregister()
@@ -86,6 +93,7 @@ def _steps() -> tuple[Step, ...]:
         (engine_panels.register, engine_panels.unregister),
         (previews.register, previews.unregister),
         (panels.register, panels.unregister),
+        (operators_adopted.register, operators_adopted.unregister),
         (handlers.register, handlers.unregister),
         (_register_command, _unregister_command),
     )

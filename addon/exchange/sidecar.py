@@ -1,21 +1,32 @@
-"""NAME.hairloom.json beside a GLB: what a glTF file cannot say about how its hair is to be drawn.
+"""NAME.hairloom.json beside a mesh: what its file cannot say about how its hair is to be drawn.
 
-For the engine programmer who writes the hair material. Plain data; all vectors in the GLB's axes.
+For the engine programmer who writes the hair material. Plain data, by docs/sidecar.schema.json; all
+lengths and vectors in the file's own units and axes.
 """
 
 from __future__ import annotations
 
 import json
+import math
+import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from ..cards.card_mesh import CardMesh
-from .atomic import write_text_atomic
-from .axes import from_z_up
+import numpy as np
 
-SIDECAR_VERSION = 1
+from ..cards.card_mesh import CardMesh
+from . import sidecar_texts as texts
+from .card_formats import CardFormat
+from .draw_ranges import card_ranges, group_ranges
+from .index_buffer import IndexBuffer
+
+#: Version 1 knew GLB alone, one level and no material. Its readers find what they read: file,
+#: counts, bounds, attributes, draw_order, passes, opaque_alpha, least_alpha and textures are where
+#: they were; `texture` became `atlas`, `axes` became `space`.
+SIDECAR_VERSION = 2
+#: name of the sidecar of NAME.glb
+SUFFIX = ".hairloom.json"
 
 #: From this alpha on a pixel counts as opaque: nearly 1, for textures that were compressed.
 OPAQUE_ALPHA = 0.99
@@ -40,6 +51,14 @@ class DrawPass:
     @property
     def is_blended(self) -> bool:
         return "transparent" in self.name
+
+    @property
+    def alpha_range(self) -> tuple[float, float] | None:
+        """Alpha of what it draws, from the first to below the second; None without a test."""
+        if self.pixels == "all":
+            return None
+        least = {_OPAQUE: OPAQUE_ALPHA, _REST: 0.0}.get(self.pixels, LEAST_ALPHA)
+        return least, OPAQUE_ALPHA if _REST in self.pixels else math.inf
 
     def as_dict(self) -> dict[str, Any]:
         blend = "source alpha, one minus source alpha" if self.is_blended else "off"
@@ -66,129 +85,128 @@ THREE_PASSES = (
 )
 
 
-def write_sidecar(
-    glb_path: Path,
-    mesh: CardMesh,
-    *,
-    portable: bool = True,
-    textures: Mapping[str, str] | None = None,
-    highlights: str = "shift",
-) -> Path:
-    """Write the description of the cards in `glb_path` beside it; its path is returned.
+@dataclass(frozen=True)
+class CardFile:
+    """A file of cards that was written.
 
-    Args:
-        mesh: the cards as they were written, world space, Z up.
-        portable: whether ambient occlusion is in TEXCOORD_1 only.
-        textures: name -> file of those of the five hair textures that lie beside it.
-        highlights: which of them breaks up the highlights, "shift" or "tangent".
-
-    Raises:
-        HairloomError: nothing can be written there.
+    levels: as they were written, world space, Z up [m], the finest first; nodes: their names there.
+    errors: of each level [m], how far it is from the strands' own way; empty: not known.
+    portable: without custom attributes.
+    textures: role -> {"file", "channels"} of those that lie beside it; texture_files: file -> what
+        its channels hold. highlights: which of them breaks up the highlights, "shift" or "tangent".
+    base_gain: what the base texture is to be multiplied by.
+    material: model, values, units, fibre and tables, see host/card_material.py.
+    indices: the index buffer and its file, or None.
+    generator: version of Hairloom.
     """
-    path = glb_path.with_suffix(".hairloom.json")
-    content = {"file": glb_path.name, **description(mesh, portable=portable)}
-    if textures:
-        files = {name: {"file": file, **_TEXTURES[name]} for name, file in textures.items()}
-        content["textures"] = {**_TEXTURES_ARE, "highlights_by": highlights, **files}
-    write_text_atomic(path, json.dumps(content, indent=2) + "\n")
-    return path
+
+    name: str
+    format: CardFormat
+    levels: tuple[CardMesh, ...]
+    nodes: tuple[str, ...]
+    errors: tuple[float, ...] = ()
+    portable: bool = True
+    textures: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    texture_files: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    base_gain: float = 1.0
+    highlights: str = "shift"
+    material: Mapping[str, Any] = field(default_factory=dict)
+    indices: tuple[str, IndexBuffer] | None = None
+    generator: str = ""
 
 
-def description(mesh: CardMesh, *, portable: bool = True) -> dict[str, Any]:
-    """The sidecar's content but for the files."""
-    return {
+def sidecar_text(cards: CardFile) -> str:
+    """The whole sidecar; numbers of a list stand in one line."""
+    text = json.dumps(description(cards), indent=2, ensure_ascii=False)
+    lists = re.compile(r"\[\s+(-?[\d.][^\[\]{}\"]*?)\s+\]")
+    return lists.sub(lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
+
+
+def description(cards: CardFile) -> dict[str, Any]:
+    """The sidecar as plain data."""
+    atlas, finest = cards.levels[0].atlas, cards.levels[0]
+    content = {
         "hairloom_sidecar": SIDECAR_VERSION,
-        "generator": "Hairloom",
-        "axes": "right-handed, +Y up, metres, triangles counter-clockwise seen from outside",
-        "counts": {
-            "cards": mesh.card_count,
-            "triangles": len(mesh.triangles),
-            "vertices": len(mesh.positions),
+        "generator": {"name": "Hairloom", "version": cards.generator},
+        "file": cards.name,
+        "format": cards.format.name,
+        "space": cards.format.space,
+        "counts": _counts(finest),
+        "bounds": _bounds(cards.format, *cards.levels),
+        "attributes": {**cards.format.attributes, **({} if cards.portable else cards.format.extra)},
+        "levels": [_level(cards, number) for number in range(len(cards.levels))],
+        "atlas": {
+            "columns": atlas.columns,
+            "rows": atlas.rows,
+            "padding": list(atlas.padding),
+            **texts.ATLAS,
         },
-        "bounds": _bounds(mesh),
-        "attributes": _ATTRIBUTES | ({} if portable else {"_AO": _OCCLUSION}),
-        "texture": {"columns": mesh.atlas.columns, **_TEXTURE},
-        "draw_order": _DRAW_ORDER,
+        "draw_order": {**texts.DRAW_ORDER, **_back_order(cards)},
         "opaque_alpha": OPAQUE_ALPHA,
         "least_alpha": LEAST_ALPHA,
         "passes": [each.as_dict() for each in FOUR_PASSES],
         "passes_fallback": [each.as_dict() for each in THREE_PASSES],
-        "shading": _SHADING,
-        "engines": _ENGINES,
+        "textures": _textures(cards),
+        "texture_files": dict(cards.texture_files),
+        "material": {**cards.material, **texts.MATERIAL} if cards.material else {},
+        "shading": texts.SHADING,
+        "engines": texts.ENGINES,
     }
+    if cards.indices is not None:
+        file, buffer = cards.indices
+        content["index_buffer"] = {
+            "file": file,
+            "type": buffer.type,
+            "byte_order": "little-endian",
+            "vertices": "of each level counted from 0, as the file lists them",
+        }
+    return content
 
 
-def _bounds(mesh: CardMesh) -> dict[str, list[float]]:
-    corners = from_z_up(mesh.positions, "Y")
-    if not len(corners):
-        return {"minimum": [0.0] * 3, "maximum": [0.0] * 3}
+def _level(cards: CardFile, number: int) -> dict[str, Any]:
+    mesh, scale = cards.levels[number], cards.format.units_per_metre
+    level: dict[str, Any] = {
+        "node": cards.nodes[number],
+        **_counts(mesh),
+        "bounds": _bounds(cards.format, mesh),
+        **({"error": cards.errors[number] * scale} if cards.errors else {}),
+        "indices": len(mesh.triangles) * 3,
+        "ranges": group_ranges(mesh),
+        "cards_in_order": card_ranges(mesh),
+    }
+    if cards.indices is not None:
+        buffer = cards.indices[1]
+        level["buffer_first"] = buffer.first[number]
+        if buffer.back_first:
+            level["buffer_back_first"] = buffer.back_first[number]
+    return level
+
+
+def _counts(mesh: CardMesh) -> dict[str, int]:
     return {
-        "minimum": [float(value) for value in corners.min(axis=0)],
-        "maximum": [float(value) for value in corners.max(axis=0)],
+        "cards": mesh.card_count,
+        "triangles": len(mesh.triangles),
+        "vertices": len(mesh.positions),
     }
 
 
-_OCCLUSION = "ambient occlusion per vertex, 0 shut in to 1 open"
-_ATTRIBUTES = {
-    "POSITION": "rest pose",
-    "NORMAL": "of the card, away from the head, rounded across the card",
-    "TANGENT": "xyz across the strands, along u; strands run from root to tip along "
-    "cross(NORMAL, TANGENT.xyz)",
-    "TEXCOORD_0": "u across the card within its column of the texture, v from 1 at the root "
-    "to 0 at the tip",
-    "TEXCOORD_1": f"{_OCCLUSION}, the same in both components; multiply the shaded colour with it",
-}
-_TEXTURE = {
-    "columns_are": "variants of a strip of hair, side by side in u; each card uses one",
-    "rgb": "sRGB, stretched noise: multiply by baseColorFactor, the colour of the hair",
-    "alpha": "straight coverage; 0 at both sides of a column, fully opaque in its middle",
-}
-_TEXTURES_ARE = {
-    "place": "read with TEXCOORD_0; the lowest row of a picture is the root",
-    "shift_and_noise": "repeat in u and v, so that they may be scaled; base, alpha and tangent "
-    "hold one strip a column",
-}
-_LINEAR = "linear: no sRGB decoding"
-_TEXTURES = {
-    "base": {
-        "color_space": "sRGB",
-        "rgb": "stretched noise: multiply by baseColorFactor; the same as in the GLB",
-    },
-    "alpha": {"color_space": _LINEAR, "r": "straight coverage; the same as in the GLB"},
-    "shift": {
-        "color_space": _LINEAR,
-        "r": "moves both highlights: shift + shift_noise (r - 0.5)",
-    },
-    "noise": {
-        "color_space": _LINEAR,
-        "r": "breaks up the second highlight: times mix(1, r, sparkle)",
-    },
-    "tangent": {
-        "color_space": _LINEAR,
-        "rgb": "the way of a strand, d = 2 rgb - 1: x across the card along u, y from root to "
-        "tip, z along NORMAL. In place of shift: T = normalize(d.x TANGENT.xyz + "
-        "d.y cross(NORMAL, TANGENT.xyz) + shift_noise d.z NORMAL)",
-    },
-}
-_DRAW_ORDER = {
-    "order": "cards from the inside to the outside of the hair; draw the indices as they stand",
-    "first": "all opaque meshes, the head included, before the first hair pass",
-    "valid_while": "the hair keeps its place on the head; sort hanging parts at run time, by card",
-    "keep": "index order; optimisers that reorder triangles for vertex caches destroy it",
-}
+def _bounds(file_format: CardFormat, *meshes: CardMesh) -> dict[str, list[float]]:
+    corners = file_format.placed(np.concatenate([mesh.positions for mesh in meshes]))
+    return {"minimum": corners.min(axis=0).tolist(), "maximum": corners.max(axis=0).tolist()}
 
 
-_SHADING = {
-    "model": "Scheuermann 2004; T from root to tip, N, L, V unit vectors, H = normalize(L + V)",
-    "diffuse": "max(0, 0.75 dot(N, L) + 0.25)",
-    "shifted_tangent": "normalize(T + shift N); positive moves the highlight to the tip",
-    "specular": "smoothstep(-1, 0, dot(T, H)) pow(sqrt(1 - dot(T, H)^2), exponent)",
-    "sum": "(diffuse + two speculars, shifted apart) rgb baseColorFactor occlusion",
-}
-_ENGINES = {
-    "three.js": "draws blended double-sided materials twice, back faces first; "
-    "material.forceSinglePass = true draws the file's order once",
-    "Godot": "gives blended materials a depth pre-pass; set Transparency to Alpha for the file's "
-    "order in one pass",
-    "others": "one blended double-sided pass in index order is nearly right from every side",
-}
+def _back_order(cards: CardFile) -> dict[str, str]:
+    has_one = cards.indices is not None and cards.indices[1].back_first
+    return {"back_faces": texts.BACK_ORDER} if has_one else {}
+
+
+def _textures(cards: CardFile) -> dict[str, Any]:
+    """Role -> file, channels and how they are read."""
+    if not cards.textures:
+        return {}
+    roles = {}
+    for role, where in cards.textures.items():
+        space, meaning = texts.ROLES[role]
+        gain = {"gain": cards.base_gain} if role == "base" else {}
+        roles[role] = {**where, "color_space": space, **gain, "meaning": meaning}
+    return {**texts.TEXTURES, "highlights_by": cards.highlights, **roles}

@@ -15,6 +15,7 @@ from ..errors import HairloomError
 from ..parameters import ALL_SETTINGS
 from ..params import Settings
 from .bake_job import bake
+from .card_choices import add_card_options
 from .inputs import Sources
 from .job_steps import Job
 from .jobs import cards, demo, export, render, sheet, simulate, turntable
@@ -153,6 +154,8 @@ def _add_job_options(verb: argparse.ArgumentParser, name: str) -> None:
             help="a picture in place of a generated texture of the cards: base, alpha, shift, "
             "noise or tangent; can be given again",
         )
+    if name == "cards":
+        add_card_options(job)
     if name in ("simulate", "demo"):
         job.add_argument("--seconds", type=float, default=2.0, help="length of the head's shake")
         job.add_argument("--frame-rate", type=float, default=60.0, help="frames a second")
@@ -218,7 +221,7 @@ _OUTPUTS = {
     "render": "picture to write (.png)",
     "turntable": "folder for the pictures and the video",
     "sheet": "picture to write (.png); --width and --height are of each picture in it",
-    "cards": "hair cards to write (.glb)",
+    "cards": "hair cards to write (.glb, .fbx, .usd, .usda, .usdc or .obj)",
     "export": "strands to write (.tfx)",
     "demo": "folder to write into (default: out)",
 }

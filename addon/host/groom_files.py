@@ -10,6 +10,8 @@ from typing import Any
 import bpy
 
 from .. import pipeline
+from ..cards.atlas_settings import AtlasSettings
+from ..cards.occlusion_settings import CardOcclusionSettings
 from ..cards.settings import CardSettings
 from ..exchange.tressfx import read_tfx, write_tfx
 from ..groom.children_settings import ChildrenSettings
@@ -17,11 +19,10 @@ from ..groom.grow import grow, scalp_density
 from ..groom.roots import bind_roots
 from ..groom.settings import GrowSettings, GuideSettings
 from ..pipeline import Rig
-from ..shading.ambient import AmbientSettings
-from ..shading.settings import ShadingSettings
-from ..shading.textures import TEXTURES, TextureSettings
+from ..shading.settings import ShadingSettings, StrandSettings
+from ..shading.textures import TextureSettings
 from ..strands import StrandSet
-from .card_files import CardChoices, write_cards
+from .card_files import CardChoices, CardOutput, write_cards
 from .card_images import chosen_pictures
 from .curves import write_curves
 from .properties import settings_of
@@ -92,26 +93,35 @@ def grow_on(
     return write_curves(f"{head.name} Hair", strands, head, collection)
 
 
-def export_cards(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, path: Path) -> Outcome:
-    """Write the groom as hair cards (GLB, textures and sidecar), one for each guide.
+def export_cards(
+    hair: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    path: Path,
+    output: CardOutput | None = None,
+    *,
+    levels: int | None = None,
+) -> Outcome:
+    """Write the groom as hair cards: the mesh, its textures and its sidecar.
+
+    Args:
+        levels: of detail; None is what the groom's own settings say.
 
     Raises:
-        HairloomError: no hair that can be used, or the file cannot be written.
+        HairloomError: no hair that can be used, or the files cannot be written.
     """
-    source, groom = read_source(hair, depsgraph), hair.data.hairloom
-    rig = _rig(hair, source)
-    pictures, warnings = chosen_pictures(groom.card_images)
-    choices = CardChoices(
-        settings_of(groom.cards, CardSettings),
-        settings_of(groom.card_texture, TextureSettings),
-        settings_of(groom.ambient, AmbientSettings),
-        settings_of(groom.shading, ShadingSettings),
-        pictures,
+    source = read_source(hair, depsgraph)
+    rig = rig_of(hair, source)
+    choices, warnings = card_choices(hair)
+    if levels is not None:
+        choices = replace(choices, cards=replace(choices.cards, levels=levels))
+    written = write_cards(path, rig, choices, output or CardOutput(name=hair.name))
+    first, *beside = (file.name for file in written.files)
+    result = (
+        f"Wrote {written.mesh.card_count:,} cards in {len(written.levels)} levels of detail to "
+        f"{first}, with {len(beside)} files beside it"
     )
-    written = write_cards(path, rig, choices)
-    names = f"{path.name}, {len(TEXTURES)} textures and {written.files[-1].name}"
-    result = f"Wrote {written.mesh.card_count:,} cards to {names}"
-    return Outcome(result, source.dropped, (*source.warnings, *_told(hair, rig), *warnings))
+    told = (*source.warnings, *notes_of(hair, rig), *written.notes, *warnings)
+    return Outcome(result, source.dropped, told)
 
 
 def export_tfx(
@@ -125,8 +135,8 @@ def export_tfx(
     source = read_source(hair, depsgraph)
     strands, notes = source.strands, tuple[str, ...]()
     if hair.data.hairloom.children.way != "none":
-        rig = _rig(hair, source)
-        strands, notes = rig.strands, _told(hair, rig)
+        rig = rig_of(hair, source)
+        strands, notes = rig.strands, notes_of(hair, rig)
     elif source.head is not None and strands.strand_count:
         strands = bind_roots(strands, source.head, place=hair.name).strands
     write_tfx(path, strands, up=up, scale=scale)
@@ -134,7 +144,28 @@ def export_tfx(
     return Outcome(result, source.dropped, (*source.warnings, *notes))
 
 
-def _rig(hair: bpy.types.Object, source: Source) -> Rig:
+def card_choices(hair: bpy.types.Object) -> tuple[CardChoices, tuple[str, ...]]:
+    """What the groom's own settings say of its cards, and warnings of pictures that are no use."""
+    groom = hair.data.hairloom
+    pictures, warnings = chosen_pictures(groom.card_images)
+    choices = CardChoices(
+        settings_of(groom.cards, CardSettings),
+        settings_of(groom.atlas, AtlasSettings),
+        settings_of(groom.card_occlusion, CardOcclusionSettings),
+        settings_of(groom.card_texture, TextureSettings),
+        settings_of(groom.shading, ShadingSettings),
+        settings_of(groom.strands, StrandSettings),
+        pictures,
+    )
+    return choices, warnings
+
+
+def rig_of(hair: bpy.types.Object, source: Source) -> Rig:
+    """The hair made ready by its own settings, at rest as it was read.
+
+    Raises:
+        HairloomError: no hair that can be used.
+    """
     groom = hair.data.hairloom
     return pipeline.prepare(
         source.strands,
@@ -146,7 +177,8 @@ def _rig(hair: bpy.types.Object, source: Source) -> Rig:
     )
 
 
-def _told(hair: bpy.types.Object, rig: Rig) -> tuple[str, ...]:
+def notes_of(hair: bpy.types.Object, rig: Rig) -> tuple[str, ...]:
+    """What the artist should know of how the hair was made ready."""
     return tuple(f"{hair.name}: {note}" for note in rig.notes)
 
 

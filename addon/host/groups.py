@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringPropert
 from ..parameters import ALL_SETTINGS
 from . import reactions
 from .bake_group import HAIRLOOM_PG_bake
+from .card_group import HAIRLOOM_PG_card_object
 from .card_images import HAIRLOOM_PG_card_images
 from .fin_group import FIN_PROPERTIES
 from .objects import head_of
@@ -28,7 +29,10 @@ GROOM_SECTIONS = (
     "shafts",
     "ambient",
     "cards",
+    "atlas",
+    "card_occlusion",
     "card_texture",
+    "card_drawing",
 )
 CHARACTER_SECTIONS = ("dynamics", "fin")
 
@@ -106,6 +110,11 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         "bake": PointerProperty(
             type=HAIRLOOM_PG_bake, name="Bake", description="How and where this object is baked"
         ),
+        "card_object": PointerProperty(
+            type=HAIRLOOM_PG_card_object,
+            name="Cards",
+            description="Whose cards this mesh holds, if it does",
+        ),
         "children_density": StringProperty(
             name="Density",
             description="Vertex group or float attribute on points of the surface that says how "
@@ -155,6 +164,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
 CLASSES = (
     *SECTION_GROUPS.values(),
     HAIRLOOM_PG_bake,
+    HAIRLOOM_PG_card_object,
     HAIRLOOM_PG_card_images,
     HAIRLOOM_PG_groom,
     HAIRLOOM_PG_character,

@@ -8,6 +8,10 @@ from pathlib import Path
 
 from .. import pipeline
 from ..arrays import Floats
+from ..cards.atlas_settings import AtlasSettings
+from ..cards.drawing_settings import CardDrawingSettings
+from ..cards.occlusion_settings import CardOcclusionSettings
+from ..cards.settings import CardSettings
 from ..errors import HairloomError
 from ..groom.children_settings import ChildrenSettings
 from ..groom.settings import GrowSettings, GuideSettings
@@ -18,7 +22,9 @@ from ..shading.ambient import AmbientSettings
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..shading.shafts_settings import ShaftSettings
 from ..shading.skin.settings import SkinSettings
+from ..shading.textures import TextureSettings
 from ..shading.volume.settings import VolumeSettings
+from .card_builds import CardForm
 from .inputs import Inputs, Sources, read_inputs
 from .report import Report
 from .studio import Look, Studio
@@ -122,6 +128,15 @@ def open_studio(job: Job, rig: Rig, report: Report) -> Studio:
         volume=job.set(VolumeSettings),
         skin=job.set(SkinSettings),
         shafts=job.set(ShaftSettings),
+        card_drawing=job.set(CardDrawingSettings),
+        card_form=CardForm(
+            job.set(CardSettings),
+            job.set(AtlasSettings),
+            job.set(CardOcclusionSettings),
+            job.set(TextureSettings),
+            job.set(StrandSettings),
+            shading=job.set(ShadingSettings),
+        ),
     )
     studio = Studio(rig, occlusion, head_occlusion, look)
     tell_notes(list(studio.warnings), report)

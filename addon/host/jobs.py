@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from .. import pipeline
 from ..arrays import Floats
+from ..cards.atlas_settings import AtlasSettings
+from ..cards.occlusion_settings import CardOcclusionSettings
 from ..cards.settings import CardSettings
 from ..dynamics.colliders import DistanceField
 from ..dynamics.settings import DynamicsSettings
 from ..errors import HairloomError
+from ..exchange.card_formats import format_of
 from ..exchange.tressfx import write_tfx
 from ..pipeline import Pose, Rig
 from ..render.card_snapshot import CardSnapshot
-from ..shading.ambient import AmbientSettings
-from ..shading.settings import ShadingSettings
+from ..shading.settings import ShadingSettings, StrandSettings
 from ..shading.textures import TextureSettings
 from ..shading.volume.settings import VolumeSettings
-from .card_files import CardChoices, WrittenCards, write_cards
+from .card_files import CardChoices, CardOutput, WrittenCards, write_cards
 from .card_images import named_pictures
+from .card_textures import TextureFiles
 from .images import contact_sheet, write_png
 from .inputs import Inputs
 from .job_steps import Job, finish, moment_of, open_studio, read_rig, rest_of, tell_notes
@@ -79,12 +83,19 @@ def render(job: Job) -> None:
 
 
 def cards(job: Job) -> None:
-    """Turn the guides into hair cards, sorted from inside to outside: a GLB and its textures."""
-    report = Report(job.verb)
-    pictures = named_pictures(job.options.texture)
+    """Turn hair into cards, sorted from inside to outside: GLB, FBX, USD or OBJ, and textures."""
+    options, report = job.options, Report(job.verb)
+    pictures = named_pictures(options.texture)
+    path, _ = format_of(job.output, options.format)
+    output = CardOutput(
+        options.format,
+        portable=options.portable,
+        index_buffer=options.index_buffer,
+        textures=TextureFiles(options.packing, options.textures),
+    )
     rig, _ = read_rig(job, report)
-    _write_cards(job, job.output, rig, pictures, report)
-    finish(job, report, job.output)
+    _write_cards(job, path, rig, pictures, report, output)
+    finish(job, report, path)
 
 
 def export(job: Job) -> None:
@@ -245,18 +256,32 @@ def _write_skin_shadow(
 
 
 def _write_cards(
-    job: Job, path: Path, rig: Rig, pictures: Mapping[str, Floats], report: Report
+    job: Job,
+    path: Path,
+    rig: Rig,
+    pictures: Mapping[str, Floats],
+    report: Report,
+    output: CardOutput | None = None,
 ) -> WrittenCards:
     print("building hair cards", flush=True)
+    levels = getattr(job.options, "levels", None)
+    cards = job.set(CardSettings)
     choices = CardChoices(
-        job.set(CardSettings),
+        cards if levels is None else replace(cards, levels=levels),
+        job.set(AtlasSettings),
+        job.set(CardOcclusionSettings),
         job.set(TextureSettings),
-        job.set(AmbientSettings),
         job.set(ShadingSettings),
+        job.set(StrandSettings),
         pictures,
     )
-    written = write_cards(path, rig, choices, report.stage)
-    report.facts.update(cards=written.mesh.card_count, card_triangles=len(written.mesh.triangles))
+    written = write_cards(path, rig, choices, output, report.stage)
+    report.facts.update(
+        cards=written.mesh.card_count,
+        card_triangles=len(written.mesh.triangles),
+        card_levels=[len(level.triangles) for level in written.levels],
+    )
+    tell_notes(list(written.notes), report)
     for file in written.files:
         report.add_output(file)
     return written

@@ -12,6 +12,7 @@ from ..parameters import ALL_SETTINGS
 def overrides(assignments: list[str], section: str) -> dict[str, Any]:
     """The values that --set gives to one section."""
     values: dict[str, Any] = {}
+    choices = {each.name for each in ALL_SETTINGS[section].parameters() if each.choices}
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
         owner, dot, parameter = name.partition(".")
@@ -22,7 +23,7 @@ def overrides(assignments: list[str], section: str) -> dict[str, Any]:
                 remedy="Write SECTION.NAME=VALUE with a section of " + ", ".join(ALL_SETTINGS),
             )
         if owner == section:
-            values[parameter] = _value(text)
+            values[parameter] = text if parameter in choices else _value(text)
     return values
 
 

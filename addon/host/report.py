@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 
 from ..exchange.atomic import write_text_atomic
-from .studio import gpu_in_use
+from .gpu_context import gpu_in_use
 
 _MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
 

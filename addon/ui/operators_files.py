@@ -1,4 +1,4 @@
-"""Grooms in and out: grow, import TressFX, export TressFX and hair cards."""
+"""Grooms in and out: grow, import and export TressFX."""
 
 from __future__ import annotations
 
@@ -213,28 +213,6 @@ class HAIRLOOM_OT_export_tfx(bpy.types.Operator, ExportHelper):
         return {"FINISHED"}
 
 
-class HAIRLOOM_OT_export_cards(bpy.types.Operator, ExportHelper):
-    """Write the active hair as textured cards, sorted from inside to outside, for engines"""
-
-    bl_idname = "hairloom.export_cards"
-    bl_label = "Export Hair Cards"
-    filename_ext = ".glb"
-
-    filter_glob: StringProperty(default="*.glb", options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return needs_hair(cls, context)
-
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        hair, depsgraph = chosen_hair(context)[0], context.evaluated_depsgraph_get()
-        with waiting(context):
-            outcome = groom_files.export_cards(hair, depsgraph, Path(self.filepath))
-        tell(self, outcome)
-        return {"FINISHED"}
-
-
 def _make_active(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
     for selected in context.selected_objects:
         selected.select_set(False)
@@ -248,5 +226,4 @@ CLASSES = (
     HAIRLOOM_OT_import_tfx,
     HAIRLOOM_FH_tfx,
     HAIRLOOM_OT_export_tfx,
-    HAIRLOOM_OT_export_cards,
 )

@@ -146,7 +146,7 @@ def draw_import(self: Any, _context: bpy.types.Context) -> None:
 
 
 def draw_exports(self: Any, _context: bpy.types.Context) -> None:
-    self.layout.operator("hairloom.export_cards", text="Hair cards (.glb)")
+    self.layout.operator("hairloom.export_cards", text="Hair cards (.glb/.fbx/.usd/.obj)")
     self.layout.operator("hairloom.export_tfx", text="TressFX (.tfx)")
 
 

@@ -11,6 +11,7 @@ from ..host.card_images import HAIRLOOM_PG_card_images
 from ..params import Parameter
 from .look import LOOK, draw_preset_row, is_idle, look_names
 from .operators_bake import draw_bake
+from .operators_cards import draw_made_cards
 from .operators_colliders import draw_colliders
 from .operators_show import draw_show
 
@@ -138,16 +139,58 @@ def _dynamics_section(label: str) -> Draw:
     return draw
 
 
+def draw_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """What acts while strands are shown is only what shows cards."""
+    draw_made_cards(layout, hair)
+    group = hair.data.hairloom.card_drawing
+    layout.prop(group, "shown_as")
+    column = layout.column()
+    column.active = group.shown_as == "cards"
+    names = [p.name for p in group.settings.parameters() if p.name != "shown_as"]
+    if group.passes != "four":
+        names.remove("skip_clear")
+    _draw_named(column, group, names)
+
+
 def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     layout.operator("hairloom.export_cards", icon="EXPORT")
     layout.operator("hairloom.export_tfx", icon="EXPORT")
-    _draw_titled(layout, hair.data.hairloom.cards)
-    _draw_titled(layout, hair.data.hairloom.card_texture)
+
+
+def draw_strips(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Only what acts on cards of this kind."""
+    group = hair.data.hairloom.cards
+    hidden = {name for way, names in CARDS.items() if way != group.way for name in names}
+    if _is_baked(hair):
+        hidden.add("atlas_columns")
+    _draw_named(
+        layout, group, [p.name for p in group.settings.parameters() if p.name not in hidden]
+    )
+
+
+def draw_card_texture(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """The atlas that is baked, or the texture that is made; what is made breaks up highlights in
+    both."""
+    groom = hair.data.hairloom
+    if groom.cards.way == "clusters":
+        layout.prop(groom.atlas, "source")
+    if _is_baked(hair):
+        _draw_named(layout, groom.atlas, [p.name for p in groom.atlas.settings.parameters()][1:])
+    _draw_titled(layout, groom.card_texture)
     layout.label(text="Own Pictures")
     pictures = hair.data.hairloom.card_images
     for name in HAIRLOOM_PG_card_images.__annotations__:
         label = pictures.bl_rna.properties[name].name
         layout.template_ID(pictures, name, open="image.open", text=label)
+
+
+def _is_baked(hair: bpy.types.Object) -> bool:
+    groom = hair.data.hairloom
+    return bool(groom.cards.way == "clusters" and groom.atlas.source == "baked")
+
+
+def draw_card_occlusion(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    _draw_group(layout, hair.data.hairloom.card_occlusion)
 
 
 def _draw_titled(layout: bpy.types.UILayout, group: Any) -> None:
@@ -191,6 +234,11 @@ DETAIL: dict[str, tuple[str, ...]] = {
 }
 #: form of shadows -> the parameters that act in it alone
 VOLUME: dict[str, tuple[str, ...]] = {"deep": ("layers", "layer_depth"), "slices": ("slices",)}
+#: what cards are made from -> the parameters that act on them alone
+CARDS: dict[str, tuple[str, ...]] = {
+    "guides": ("width_factor", "tip_width"),
+    "clusters": ("card_count", "error", "cover", "crossed", "fly_aways"),
+}
 #: section below Dynamics -> its parameters; all others stand in Dynamics itself
 DYNAMICS: dict[str, tuple[str, ...]] = {
     "Style": ("style_root", "style_tip", "style_along", "style_damping", "bend", "bend_along"),
@@ -211,6 +259,7 @@ SECTIONS: tuple[tuple[str, str, Draw], ...] = (
     ("children", "Children", draw_children),
     ("dynamics", "Dynamics", draw_dynamics),
     ("show", "Show", draw_show),
+    ("cards", "Cards", draw_cards),
     ("export", "Export", draw_export),
 )
 #: section -> those below it
@@ -224,5 +273,10 @@ SUB_SECTIONS: dict[str, tuple[tuple[str, str, Draw], ...]] = {
         ("lengths", "Lengths", _dynamics_section("Lengths")),
         ("collisions", "Collisions", draw_collisions),
         ("bake", "Bake", draw_bake),
+    ),
+    "cards": (
+        ("card_strips", "Strips", draw_strips),
+        ("card_texture", "Texture", draw_card_texture),
+        ("card_occlusion", "Ambient Occlusion", draw_card_occlusion),
     ),
 }

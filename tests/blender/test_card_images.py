@@ -66,6 +66,7 @@ def test_pictures_that_were_never_saved_are_read_as_they_are() -> None:
 def hair(sphere: Any, new_hair: Any) -> Any:
     hair = new_hair(sphere)
     hair.data.hairloom.guides.guide_count = 12
+    hair.data.hairloom.cards.way = "guides"
     texture = hair.data.hairloom.card_texture
     texture.variant_width, texture.height, texture.strand_count = 16, 32, 4
     return hair
@@ -115,13 +116,14 @@ def test_a_picture_that_is_gone_is_told_and_replaced(
 def test_the_command_line_takes_pictures(write: Any, tmp_path: Path, gpu_context: Any) -> None:
     shift, tangent = values(1), values(3)
     arguments = ["cards", "--set", "grow.strand_count=60", "--set", "guides.guide_count=10"]
+    arguments += ["--set", "cards.way=guides"]
     arguments += ["--set", "card_texture.highlights=tangent", "--output", str(tmp_path / "c.glb")]
     for name, pixels in (("shift", shift), ("tangent", tangent)):
         file = write(f"{name}.exr", pixels, is_color=False)
         arguments += ["--texture", f"{name}={file}"]
     report = tmp_path / "report.json"
     assert command_line.run([*arguments, "--report", str(report)]) == 0
-    names = ["c.glb", *(f"c_{name}.png" for name in TEXTURES), "c.hairloom.json"]
+    names = ["c.glb", *(f"c_{name}.png" for name in sorted(TEXTURES)), "c.hairloom.json"]
     assert json.loads(report.read_text())["outputs"] == names
     sidecar = json.loads((tmp_path / "c.hairloom.json").read_text())["textures"]
     assert sidecar["highlights_by"] == "tangent"

@@ -286,8 +286,9 @@ def test_undo_brings_the_children_back(hair, evaluated):
 
 
 def test_cards_are_one_a_guide_and_tressfx_holds_all(hair, evaluated, tmp_path):
+    hair.data.hairloom.cards.way = "guides"
     cards = export_cards(hair, evaluated(), tmp_path / "cards.glb")
-    assert "60 cards" in cards.result
+    assert "Wrote 60 cards" in cards.result
     outcome = export_tfx(hair, evaluated(), tmp_path / "hair.tfx", up="Z", scale=1.0)
     assert "260 strands" in outcome.result
     written = read_tfx(tmp_path / "hair.tfx", up="Z", scale=1.0).strands

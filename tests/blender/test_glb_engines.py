@@ -22,10 +22,28 @@ from hairloom.addon.shading.textures import TextureSettings, hair_textures
 
 pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 
-from hairloom.addon.host.glb import write_glb
+from hairloom.addon.exchange.card_formats import GLB
+from hairloom.addon.exchange.file_set import written_together
+from hairloom.addon.host.card_export import write_card_mesh
+from hairloom.addon.host.card_scene import CardLook
 
 VALIDATOR_FOLDER = Path(__file__).parents[2] / "tools" / "node"
 PANDA_VIEW = Path(__file__).parent / "panda_view.py"
+
+
+def write_glb(
+    path: Path,
+    mesh: CardMesh,
+    texture: np.ndarray | None,
+    *,
+    name: str = "Hair cards",
+    base_color: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    portable: bool = True,
+) -> None:
+    """One level, alone."""
+    look = CardLook(card=texture, color=base_color)
+    with written_together(path) as folder:
+        write_card_mesh(folder / path.name, [mesh], GLB, look, name=name, portable=portable)
 
 
 @pytest.fixture(scope="module")
@@ -155,6 +173,34 @@ def test_panda3d_draws_what_a_slow_compositor_draws(
     assert overlap(upside_down) < 0.7
     assert np.abs(drawn - expected).mean() < 0.04
     assert np.abs(drawn - upside_down).mean() > 0.1
+
+
+def test_panda3d_composes_what_a_slow_compositor_composes(
+    curtain: tuple[CardMesh, np.ndarray], tmp_path: Path
+) -> None:
+    """Cards of one colour and alpha each, so that no filter of textures is in the way."""
+    mesh, _ = curtain
+    random, columns = np.random.default_rng(7), mesh.atlas.columns
+    colors = np.concatenate([random.random((columns, 3)), np.full((columns, 1), 0.5)], axis=1)
+    flat = np.tile(colors.repeat(16, axis=0), (16, 1, 1)).astype(np.float32)
+    middle = (np.floor(mesh.uv[:, 0] * columns).clip(0, columns - 1) + 0.5) / columns
+    card_middle = np.zeros(int(mesh.card.max()) + 1)
+    card_middle[mesh.card] = middle[mesh.triangles].min(axis=1)
+    owner = np.zeros(len(mesh.positions), int)
+    owner[mesh.triangles] = mesh.card[:, None]
+    plain = replace(mesh, uv=np.stack([card_middle[owner], np.full(len(owner), 0.5)], axis=1))
+    path = tmp_path / "plain.glb"
+    write_glb(path, plain, flat)
+
+    def off(other: CardMesh) -> float:
+        expected = composed(other, flat, 400, 0.3)
+        return (np.abs(drawn - expected).max(axis=-1) > 4.0 / 255.0).mean()
+
+    drawn = drawn_by_panda(path, 400, 0.3)
+    assert (drawn.max(axis=-1) > 0.1).mean() > 0.1
+    assert off(plain) < 0.01
+    other_order = replace(plain, triangles=plain.triangles[::-1], card=plain.card[::-1])
+    assert off(other_order) > 0.05
 
 
 def test_panda3d_blends_in_index_order(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "refine": {"params", "strands"},
     "shading": {"params", "strands"},
     "cards": {"params", "strands"},
-    "exchange": {"params", "strands", "cards", "OpenImageIO"},
+    "exchange": {"params", "strands", "cards", "OpenImageIO", "etcpak"},
     "pipeline": PURE,
     "parameters": PURE,
     "render": PURE | {"gpu"},

@@ -3,43 +3,134 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import jsonschema
 import numpy as np
+import pytest
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.exchange.sidecar import write_sidecar
+from hairloom.addon.exchange.card_formats import FBX, FORMATS, GLB, USD
+from hairloom.addon.exchange.index_buffer import index_buffer
+from hairloom.addon.exchange.sidecar import CardFile, description, sidecar_text
+
+SCHEMA = json.loads(
+    (Path(__file__).parents[3] / "docs" / "sidecar.schema.json").read_text(encoding="utf-8")
+)
 
 
-def one_triangle() -> CardMesh:
+def triangles(count: int = 1, **cards: np.ndarray) -> CardMesh:
+    """Triangles beside each other, of which two make a card."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 3.0]])
     return CardMesh(
-        positions=np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 3.0]]),
-        triangles=np.array([[0, 1, 2]]),
-        uv=np.zeros((3, 2)),
-        normal=np.tile([0.0, 0.0, 1.0], (3, 1)),
-        tangent=np.tile([0.0, 1.0, 0.0], (3, 1)),
-        occlusion=np.ones(3),
-        card=np.array([0]),
-        along=np.zeros(3),
-        atlas=AtlasGrid(columns=4),
+        positions=np.concatenate([corners + [number, 0.0, 0.0] for number in range(count)]),
+        triangles=np.arange(count * 3).reshape(-1, 3),
+        uv=np.zeros((count * 3, 2)),
+        normal=np.tile([0.0, 0.0, 1.0], (count * 3, 1)),
+        tangent=np.tile([0.0, 1.0, 0.0], (count * 3, 1)),
+        occlusion=np.ones(count * 3),
+        card=np.arange(count) // 2,
+        along=np.zeros(count * 3),
+        atlas=AtlasGrid(columns=4, rows=2, padding=(0.1, 0.05)),
+        **cards,
     )
 
 
-def test_written_beside_as_plain_data(tmp_path: Path) -> None:
-    path = write_sidecar(tmp_path / "hair.v1.glb", one_triangle())
-    assert path == tmp_path / "hair.v1.hairloom.json"
-    content = json.loads(path.read_text(encoding="utf-8"))
+def card_file(**changes: Any) -> CardFile:
+    return replace(CardFile("hair.v1.glb", GLB, (triangles(),), ("hair_v1",)), **changes)
+
+
+def read(cards: CardFile) -> dict[str, Any]:
+    """What is in the file, which follows the schema."""
+    content = json.loads(sidecar_text(cards))
+    jsonschema.Draft202012Validator(SCHEMA).validate(content)
+    return content
+
+
+def test_the_schema_is_one_and_can_refuse() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    for damage in ({"format": "stl"}, {"hairloom_sidecar": 1}, {"unknown": 1}, {"levels": []}):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(description(card_file()) | damage, SCHEMA)
+
+
+def test_it_tells_what_the_mesh_is() -> None:
+    content = read(card_file())
     assert content["file"] == "hair.v1.glb"
     assert content["counts"] == {"cards": 1, "triangles": 1, "vertices": 3}
     assert content["bounds"] == {"minimum": [0.0, 0.0, -2.0], "maximum": [1.0, 3.0, 0.0]}
-    assert content["texture"]["columns"] == 4
+    atlas = content["atlas"]
+    assert (atlas["columns"], atlas["rows"], atlas["padding"]) == (4, 2, [0.1, 0.05])
     assert "_AO" not in content["attributes"]
+    assert "_AO" in read(card_file(portable=False))["attributes"]
 
 
-def test_passes_are_those_of_the_paper(tmp_path: Path) -> None:
-    path = write_sidecar(tmp_path / "hair.glb", one_triangle(), portable=False)
-    content = json.loads(path.read_text(encoding="utf-8"))
+@pytest.mark.parametrize(
+    ("file_format", "lowest"),
+    [(GLB, [0.0, 0.0, -2.0]), (FBX, [0.0, 0.0, -200.0]), (USD, [0.0, 0.0, 0.0])],
+)
+def test_lengths_are_in_the_units_and_axes_of_the_file(file_format, lowest) -> None:
+    content = read(card_file(format=file_format, errors=(0.5,)))
+    assert content["bounds"]["minimum"] == lowest
+    in_metres = content["levels"][0]["error"] * content["space"]["metres_per_unit"]
+    assert in_metres == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("file_format", FORMATS, ids=lambda each: each.name)
+def test_every_format_follows_the_schema(file_format) -> None:
+    assert read(card_file(format=file_format))["format"] == file_format.name
+
+
+def test_ranges_tell_groups_layers_and_cards_apart() -> None:
+    """Six triangles of three cards, of which the first comes between the others."""
+    mesh = triangles(6, group=np.array([0, 0, 7]), layer=np.array([1, 0, 0]))
+    mesh = replace(mesh, card=np.array([1, 1, 0, 0, 2, 2]))
+    (level,) = read(card_file(levels=(mesh,)))["levels"]
+    assert level["ranges"] == {
+        "group": [0, 0, 7],
+        "layer": [0, 1, 0],
+        "first": [0, 6, 12],
+        "count": [6, 6, 6],
+    }
+    assert level["cards_in_order"] == {
+        "card": [1, 0, 2],
+        "first": [0, 6, 12],
+        "count": [6, 6, 6],
+    }
+    assert level["indices"] == 18
+
+
+def test_levels_are_found_in_the_index_buffer() -> None:
+    levels = (triangles(6), triangles(2))
+    back = [mesh.triangles[::-1] for mesh in levels]
+    buffer = index_buffer(levels, back)
+    indices = np.frombuffer(buffer.content, "<u2")
+    content = read(
+        card_file(levels=levels, nodes=("a_LOD0", "a_LOD1"), indices=("a.indices.bin", buffer))
+    )
+    assert content["index_buffer"]["type"] == buffer.type == "uint16"
+    assert "back_faces" in content["draw_order"]
+    for level, mesh, other in zip(content["levels"], levels, back, strict=True):
+        for first, expected in (("buffer_first", mesh.triangles), ("buffer_back_first", other)):
+            found = indices[level[first] :][: level["indices"]]
+            np.testing.assert_array_equal(found.reshape(-1, 3), expected)
+
+
+def test_many_vertices_need_wide_indices() -> None:
+    """An index of 65,535 is what some engines end a strip with."""
+    for count, kind, width in ((21_845, "uint16", 2), (21_846, "uint32", 4)):
+        mesh = triangles(count)
+        buffer = index_buffer([mesh])
+        assert (buffer.type, len(buffer.content)) == (kind, count * 3 * width)
+        last = np.frombuffer(buffer.content, f"<u{width}")[-1]
+        assert last == len(mesh.positions) - 1
+
+
+def test_passes_are_those_of_the_paper() -> None:
+    content = read(card_file())
     states = [
         (p["color_write"], p["depth_write"], p["depth_test"], p["cull"]) for p in content["passes"]
     ]
@@ -51,19 +142,27 @@ def test_passes_are_those_of_the_paper(tmp_path: Path) -> None:
     ]
     assert [p["blend"] != "off" for p in content["passes"]] == [False, False, True, True]
     assert len(content["passes_fallback"]) == 3
-    assert "_AO" in content["attributes"]
 
 
-def test_textures_beside_are_named_with_how_they_are_read(tmp_path: Path) -> None:
-    files = {name: f"hair_{name}.png" for name in ("base", "alpha", "shift", "noise", "tangent")}
-    path = write_sidecar(
-        tmp_path / "hair.glb", one_triangle(), textures=files, highlights="tangent"
-    )
-    content = json.loads(path.read_text(encoding="utf-8"))["textures"]
-    assert {name: content[name]["file"] for name in files} == files
-    spaces = {name: content[name]["color_space"].split(":")[0] for name in files}
-    assert spaces == {name: "sRGB" if name == "base" else "linear" for name in files}
-    assert all({"r", "rgb"} & set(content[name]) for name in files)
+def test_textures_beside_are_named_with_how_they_are_read() -> None:
+    roles = {
+        "base": {"file": "hair_color.png", "channels": "rgb"},
+        "alpha": {"file": "hair_color.png", "channels": "a"},
+        "tangent": {"file": "hair_tangent.png", "channels": "rgb", "inverted": "g"},
+    }
+    content = read(card_file(textures=roles, highlights="tangent", base_gain=1.5))["textures"]
+    assert {name: content[name]["file"] for name in roles} == {
+        name: role["file"] for name, role in roles.items()
+    }
+    spaces = [content[name]["color_space"] for name in roles]
+    assert spaces == ["sRGB", "linear", "linear"]
+    assert content["base"]["gain"] == 1.5 and "gain" not in content["alpha"]
+    assert content["tangent"]["inverted"] == "g"
     assert content["highlights_by"] == "tangent"
-    alone = json.loads(write_sidecar(tmp_path / "hair.glb", one_triangle()).read_text())
-    assert "textures" not in alone
+    assert read(card_file())["textures"] == {}
+
+
+def test_lists_of_numbers_stand_in_one_line() -> None:
+    text = sidecar_text(card_file(levels=(triangles(6),)))
+    assert '"minimum": [0.0, 0.0, -2.0]' in text
+    assert '"first": [0, 6, 12]' in text

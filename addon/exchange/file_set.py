@@ -1,0 +1,90 @@
+"""Writing files that belong together: all of them are there complete, or the old ones stay."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from .atomic import flush_to_disk, unwritable
+
+
+@contextmanager
+def written_together(path: Path) -> Iterator[Path]:
+    """A new, hidden folder beside `path`; its files move beside `path` when the block ends well.
+
+    They keep their names, so that they may name each other. Missing folders are made. When the
+    block fails or is interrupted, or when one of the files cannot be put into its place, all that
+    was there before stays as it was.
+
+    Raises:
+        HairloomError: nothing can be written there, or the block wrote no file of `path`'s name.
+    """
+    folder = path.parent
+    staging = folder / f".{secrets.token_hex(6)}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        staging.mkdir()
+    except OSError as error:
+        raise unwritable(path, error.strerror or str(error)) from error
+    try:
+        (staging / path.name).touch(exist_ok=False)  # fails now for a name that cannot be
+        (staging / path.name).unlink()
+        yield staging
+        if not (staging / path.name).is_file():
+            raise unwritable(path, "nothing was written")
+        _put_in_place(staging, folder)
+    except OSError as error:
+        raise unwritable(path, error.strerror or str(error)) from error
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def _put_in_place(staging: Path, folder: Path) -> None:
+    """Replace file by file; when one fails, those before it get their old content back."""
+    files = sorted(file for file in staging.iterdir() if file.is_file())
+    backups = staging / "old"
+    backups.mkdir()
+    for file in files:
+        _check_and_flush(file, folder / file.name)
+    done: list[Path] = []
+    try:
+        for file in files:
+            target = Path(os.path.realpath(folder / file.name))  # through a link
+            _keep(target, backups / file.name)
+            done.append(target)
+            shutil.move(file, target) if target.parent != folder else os.replace(file, target)
+    except BaseException:
+        for target, file in zip(done, files, strict=False):
+            _restore(target, backups / file.name)
+        raise
+    if os.name == "posix":
+        flush_to_disk(folder, os.O_RDONLY)
+
+
+def _check_and_flush(file: Path, target: Path) -> None:
+    if target.is_dir():
+        raise unwritable(target, "a folder has this name")
+    if target.exists():
+        shutil.copymode(target, file)
+    flush_to_disk(file, os.O_RDWR)
+
+
+def _keep(target: Path, backup: Path) -> None:
+    """A second name for the old file, or a copy where file systems have no such names."""
+    if not target.exists():
+        return
+    try:
+        os.link(target, backup)
+    except OSError:
+        shutil.copy2(target, backup)
+
+
+def _restore(target: Path, backup: Path) -> None:
+    if backup.exists():
+        os.replace(backup, target)
+    else:
+        target.unlink(missing_ok=True)

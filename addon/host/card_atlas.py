@@ -1,0 +1,44 @@
+"""The atlas of a groom's cards: its strands laid flat and drawn, on the GPU where there is one."""
+
+from __future__ import annotations
+
+import gpu
+import numpy as np
+
+from ..cards.atlas import AtlasPlan
+from ..cards.atlas_maps import AtlasMaps
+from ..cards.bake import sampled_maps
+from ..cards.bake_dilation import dilated
+from ..cards.bake_strands import flat_strands
+from ..pipeline import Rig
+from ..render.atlas_pass import baked_maps
+from ..shading.drawn_strands import drawn_radius, strand_variation
+from ..shading.settings import ShadingSettings, StrandSettings
+from .gpu_context import ensure_gpu
+
+
+def baked_atlas(
+    rig: Rig, plan: AtlasPlan, shading: ShadingSettings, drawn: StrandSettings
+) -> AtlasMaps:
+    """The maps of all tiles, which go on where there is no hair.
+
+    Args:
+        drawn: how wide strands are drawn.
+    """
+    grid = rig.strands.grid
+    count, cv_count = grid.shape[:2]
+    radius = drawn_radius(rig.strands.radius.reshape(count, cv_count), drawn)
+    colors = strand_variation(np.arange(count), cv_count, shading)
+    flat = flat_strands(plan, grid, radius, colors)
+    maps = baked_maps(flat, plan.size) if _has_gpu() else sampled_maps(flat, plan.size)
+    return dilated(maps, plan.grid)
+
+
+def _has_gpu() -> bool:
+    """Blender in the background has none until it is asked for, and on some machines none then."""
+    try:
+        ensure_gpu()
+        gpu.platform.backend_type_get()
+    except (SystemError, RuntimeError):
+        return False
+    return True

@@ -1,0 +1,67 @@
+"""The maps of a groom's cards: baked from its strands or made by chance, with the artist's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from ..arrays import Floats
+from ..cards.build import CardBuild
+from ..pipeline import Rig
+from ..shading.settings import ShadingSettings, StrandSettings
+from ..shading.textures import TEXTURES, HairTextures, TextureSettings, hair_textures
+from .card_atlas import baked_atlas
+
+
+class MapChoices(Protocol):
+    """What maps hang on, beside the cards."""
+
+    @property
+    def texture(self) -> TextureSettings: ...
+    @property
+    def shading(self) -> ShadingSettings: ...
+    @property
+    def strands(self) -> StrandSettings: ...
+    @property
+    def pictures(self) -> Mapping[str, Floats]: ...
+
+
+@dataclass(frozen=True)
+class CardMaps:
+    """by_name: those that are written, see exchange.texture_packing.MEANINGS.
+
+    textures: those that our own pictures are drawn with; their base has the gain in it.
+    base_gain: what the written base is to be multiplied by.
+    """
+
+    by_name: dict[str, Floats]
+    textures: HairTextures
+    base_gain: float = 1.0
+
+    @property
+    def card(self) -> Floats:
+        """Base as it is written and alpha, (height, width, 4)."""
+        return replace(self.textures, base=self.by_name["base"]).card
+
+
+def made_maps(rig: Rig, build: CardBuild, choices: MapChoices) -> CardMaps:
+    """The maps of these cards.
+
+    Shift and noise break up highlights from strand to strand and are made by chance in any case.
+    """
+    made = hair_textures(choices.texture, build.finest.atlas.columns)
+    if build.plan is None:
+        textures = made.with_pictures(choices.pictures)
+        return CardMaps({name: getattr(textures, name) for name in TEXTURES}, textures)
+    maps = baked_atlas(rig, build.plan, choices.shading, choices.strands)
+    # as many strips above each other as the atlas has rows
+    rows = (build.plan.grid.rows, 1)
+    noises = {"shift": np.tile(made.shift, rows), "noise": np.tile(made.noise, rows)}
+    by_name = {**maps.by_name, **noises, **choices.pictures}
+    gain = 1.0 if "base" in choices.pictures else maps.base_gain
+    names = ("alpha", "shift", "noise", "tangent", "normal")
+    shown = {name: by_name[name] for name in names}
+    return CardMaps(by_name, HairTextures(base=by_name["base"] * gain, **shown), gain)

@@ -1,0 +1,238 @@
+"""Hair cards with all that lies beside them: from the command line, a button and a collection."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from hairloom.addon.exchange.card_formats import FORMATS
+from hairloom.addon.exchange.card_textures import FORMATS as TEXTURE_FORMATS
+from hairloom.addon.exchange.texture_packing import PRESETS
+from hairloom.addon.shading.marschner.look import fibre_of
+from hairloom.addon.shading.marschner.tables import marschner_tables, shape_of
+from hairloom.addon.shading.settings import ShadingSettings
+
+bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy module")
+
+from hairloom.addon.host import card_files, command_line  # noqa: E402
+from hairloom.addon.host.card_choices import suffix_of  # noqa: E402
+from hairloom.addon.host.card_material import TABLE_SIZE  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+SCHEMA = json.loads(
+    (Path(__file__).parents[2] / "docs" / "sidecar.schema.json").read_text(encoding="utf-8")
+)
+SMALL = (
+    *("--set", "grow.strand_count=100", "--set", "guides.guide_count=10"),
+    *("--set", "card_occlusion.rays=16", "--set", "cards.way=guides"),
+)
+BAKED = (
+    *("--set", "cards.way=clusters", "--set", "cards.card_count=8"),
+    *("--set", "atlas.size=512", "--set", "atlas.columns=4", "--set", "atlas.rows=2"),
+)
+
+
+def cards(output: Path, *more: str) -> int:
+    return command_line.run(["cards", *SMALL, *more, "--output", str(output)])
+
+
+def sidecar_of(path: Path) -> dict[str, Any]:
+    """The sidecar, which follows the schema and names files that are there."""
+    content = json.loads(path.with_suffix(".hairloom.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(SCHEMA).validate(content)
+    roles = [value for value in content["textures"].values() if isinstance(value, dict)]
+    tables = content["material"]["tables"].values()
+    beside = [each["file"] for each in (*roles, *tables, content.get("index_buffer", roles[0]))]
+    for file in (content["file"], *beside, *content["texture_files"]):
+        assert (path.parent / file).is_file(), file
+    return content
+
+
+def oiio_pixels(path: Path) -> np.ndarray:
+    """All channels as they are stored, the lowest row first."""
+    library = pytest.importorskip("OpenImageIO")
+    source = library.ImageInput.open(str(path))
+    spec = source.spec()
+    pixels = np.asarray(source.read_image(0, 0, 0, spec.nchannels, library.FLOAT), np.float32)
+    source.close()
+    return pixels.reshape(spec.height, spec.width, spec.nchannels)[::-1]
+
+
+def glb_parts(path: Path) -> tuple[dict[str, Any], bytes]:
+    content = path.read_bytes()
+    (length,) = struct.unpack_from("<I", content, 12)
+    return json.loads(content[20 : 20 + length]), content[28 + length :]
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usda", ".obj"])
+def test_every_format_comes_with_a_sidecar_that_follows_the_schema(
+    tmp_path: Path, suffix: str
+) -> None:
+    assert cards(tmp_path / f"hair{suffix}", "--levels", "2") == 0
+    content = sidecar_of(tmp_path / f"hair{suffix}")
+    assert [level["node"] for level in content["levels"]] == ["hair_LOD0", "hair_LOD1"]
+    assert content["levels"][1]["triangles"] < 0.6 * content["levels"][0]["triangles"]
+    assert set(content["textures"]) >= {"base", "alpha", "shift", "noise", "tangent"}
+    assert "index_buffer" not in content
+    for written in tmp_path.iterdir():
+        assert not written.name.startswith(".")
+
+
+def test_the_index_buffer_holds_the_indices_of_the_glb(tmp_path: Path) -> None:
+    """As an engine would use it: with the vertices of the GLB."""
+    assert cards(tmp_path / "hair.glb", *BAKED, "--levels", "3", "--index-buffer") == 0
+    content, (file, binary) = sidecar_of(tmp_path / "hair.glb"), glb_parts(tmp_path / "hair.glb")
+    indices = np.frombuffer((tmp_path / "hair.indices.bin").read_bytes(), "<u2")
+    nodes = {node["name"]: node for node in file["nodes"]}
+    assert len(content["levels"]) == 3
+    for level in content["levels"]:
+        (primitive,) = file["meshes"][nodes[level["node"]]["mesh"]]["primitives"]
+        accessor = file["accessors"][primitive["indices"]]
+        view = file["bufferViews"][accessor["bufferView"]]
+        dtype = {5123: "<u2", 5125: "<u4"}[accessor["componentType"]]
+        expected = np.frombuffer(binary, dtype, accessor["count"], view.get("byteOffset", 0))
+        found = indices[level["buffer_first"] :][: level["indices"]]
+        np.testing.assert_array_equal(found, expected)
+        back = indices[level["buffer_back_first"] :][: level["indices"]]
+        corners = {tuple(triangle) for triangle in found.reshape(-1, 3).tolist()}
+        assert {tuple(triangle) for triangle in back.reshape(-1, 3).tolist()} == corners
+        assert not np.array_equal(back, found)
+        positions = file["accessors"][primitive["attributes"]["POSITION"]]
+        assert positions["count"] == level["vertices"]
+        np.testing.assert_allclose(positions["min"], level["bounds"]["minimum"], atol=1e-6)
+        np.testing.assert_allclose(positions["max"], level["bounds"]["maximum"], atol=1e-6)
+
+
+def test_a_baked_atlas_is_packed_as_the_engine_wants_it(tmp_path: Path) -> None:
+    assert cards(tmp_path / "hair.fbx", *BAKED, "--packing", "gltf", "--levels", "1") == 0
+    content = sidecar_of(tmp_path / "hair.fbx")
+    base, alpha = (content["textures"][role] for role in ("base", "alpha"))
+    assert base["file"] == alpha["file"] == "hair_baseColor.png"
+    assert (base["channels"], alpha["channels"]) == ("rgb", "a")
+    assert b"hair_baseColor.png" in (tmp_path / "hair.fbx").read_bytes()
+    assert (content["atlas"]["columns"], content["atlas"]["rows"]) == (4, 2)
+
+
+def test_both_models_give_all_their_values(tmp_path: Path) -> None:
+    for model in ("kajiya_kay", "marschner"):
+        path = tmp_path / f"{model}.glb"
+        assert cards(path, "--set", f"shading.model={model}", "--levels", "1") == 0
+        material = sidecar_of(path)["material"]
+        assert material["model"] == model
+        assert set(material["values"]) == set(material["units"]) == set(material["meanings"])
+        assert ("primary_shift" in material["values"]) == (model == "kajiya_kay")
+        assert ("cuticle_tilt" in material["values"]) == (model == "marschner")
+        assert {"base_color", "shift_noise"} <= set(material["values"])
+        assert bool(material["tables"]) == bool(material["fibre"]) == (model == "marschner")
+    assert material["units"]["cuticle_tilt"] == "rad"
+    tables = marschner_tables(shape_of(fibre_of(ShadingSettings())), TABLE_SIZE)
+    expected = {"longitudinal": tables.longitudinal[0]}
+    expected |= {name: getattr(tables, name) for name in ("azimuthal", "paths")}
+    for name, values in expected.items():
+        stored = oiio_pixels(tmp_path / material["tables"][name]["file"])
+        np.testing.assert_array_equal(stored, values.astype(np.float32))
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".obj"])
+def test_a_failure_in_the_middle_leaves_the_old_files(
+    tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The disk is full when the last file is written."""
+    assert cards(tmp_path / f"hair{suffix}", "--levels", "1") == 0
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def full(_content: object) -> str:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(card_files, "sidecar_text", full)
+    assert cards(tmp_path / f"hair{suffix}", "--set", "grow.length=0.3", "--levels", "2") == 1
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_the_format_may_be_named_and_others_are_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert cards(tmp_path / "hair.v1", "--format", "obj", "--levels", "1") == 0
+    assert (tmp_path / "hair.v1.obj").is_file()
+    assert sidecar_of(tmp_path / "hair.v1.obj")["levels"][0]["node"] == "hair_v1"
+    capfd.readouterr()
+    assert cards(tmp_path / "hair.stl") == 1
+    assert "Use .glb" in capfd.readouterr().err
+    assert cards(tmp_path / "hair.glb", "--levels", "9") == 1
+    assert "levels" in capfd.readouterr().err
+
+
+def grown(sphere: Any, name: str) -> Any:
+    bpy.ops.object.select_all(action="DESELECT")
+    sphere.select_set(True)
+    bpy.context.view_layer.objects.active = sphere
+    bpy.ops.hairloom.grow(strand_count=200, length=0.05)
+    hair = bpy.context.object
+    hair.name = name
+    hair.data.hairloom.guides.guide_count = 10
+    hair.data.hairloom.card_occlusion.rays = 16
+    hair.data.hairloom.cards.way = "guides"
+    return hair
+
+
+def test_a_button_writes_under_the_hairs_name(sphere: Any, tmp_path: Path) -> None:
+    grown(sphere, "Haar/Ä.001")
+    out = tmp_path / "Haar_Ä.obj"
+    options = {"own_levels": True, "levels": 2, "index_buffer": True}
+    assert bpy.ops.hairloom.export_cards(filepath=str(out), **options) == {"FINISHED"}
+    nodes = [level["node"] for level in sidecar_of(out)["levels"]]
+    assert nodes == ["Haar_Ä_001_LOD0", "Haar_Ä_001_LOD1"]
+    assert [line[2:] for line in out.read_text("utf-8").splitlines() if line[:2] == "o "] == nodes
+
+
+def test_all_that_there_is_can_be_chosen() -> None:
+    properties = bpy.ops.hairloom.export_cards.get_rna_type().properties
+    offered = {
+        "format": [each.name for each in FORMATS],
+        "packing": list(PRESETS),
+        "textures": list(TEXTURE_FORMATS),
+    }
+    for name, choices in offered.items():
+        assert sorted(properties[name].enum_items.keys()) == sorted(choices)
+    assert all(properties[name].description for name in (*offered, "levels", "index_buffer"))
+
+
+def test_the_suffix_follows_the_format() -> None:
+    assert suffix_of("glb", "hair.fbx") == ".glb"
+    assert suffix_of("usd", "hair.usda") == ".usda"
+    assert suffix_of("usd", "hair") == ".usd"
+
+
+def test_a_collections_exporter_writes_all_its_hair(sphere: Any, tmp_path: Path) -> None:
+    """With something else selected, or nothing."""
+    collection = bpy.data.collections.new("Assets")
+    bpy.context.scene.collection.children.link(collection)
+    for name in ("Front", "Haar/Ä.001"):
+        collection.objects.link(grown(sphere, name))
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.context.view_layer.objects.active = None
+    layer = bpy.context.view_layer.layer_collection.children["Assets"]
+    bpy.context.view_layer.active_layer_collection = layer
+    assert bpy.ops.collection.exporter_add(name="HAIRLOOM_FH_cards") == {"FINISHED"}
+    (exporter,) = collection.exporters
+    exporter.export_properties.filepath = str(tmp_path / "hair.glb")
+    assert bpy.ops.collection.export_all() == {"FINISHED"}
+    for name in ("Front", "Haar_Ä_001"):
+        (level, *_) = sidecar_of(tmp_path / f"hair_{name}.glb")["levels"]
+        assert level["node"].startswith(name)
+
+
+def test_a_collection_without_hair_is_told(sphere: Any, tmp_path: Path) -> None:
+    grown(sphere, "Hair")
+    bpy.data.collections.new("Empty")
+    for name in ("Empty", "Nowhere"):
+        with pytest.raises(RuntimeError, match=f"Collection '{name}': there is no hair to write"):
+            bpy.ops.hairloom.export_cards(filepath=str(tmp_path / "a.glb"), collection=name)
+    assert list(tmp_path.iterdir()) == []

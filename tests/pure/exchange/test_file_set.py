@@ -1,0 +1,109 @@
+"""Files that belong together are there all at once, or the old ones stay."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange import file_set
+from hairloom.addon.exchange.file_set import written_together
+
+FILES = ("hair.glb", "hair_base.png", "hair.json")
+
+
+def write(folder: Path, content: str, names: tuple[str, ...] = FILES) -> None:
+    for name in names:
+        (folder / name).write_text(content)
+
+
+def contents(folder: Path) -> dict[str, str]:
+    return {path.name: path.read_text() for path in sorted(folder.iterdir())}
+
+
+def test_all_files_come_at_the_end_under_their_names(tmp_path: Path) -> None:
+    target = tmp_path / "new" / "hair.glb"
+    with written_together(target) as folder:
+        write(folder, "whole")
+        assert [path.name.startswith(".") for path in target.parent.iterdir()] == [True]
+    assert contents(target.parent) == dict.fromkeys(sorted(FILES), "whole")
+
+
+@pytest.mark.parametrize("failure", [ValueError, KeyboardInterrupt])
+def test_a_failing_writer_leaves_what_was_there(
+    tmp_path: Path, failure: type[BaseException]
+) -> None:
+    write(tmp_path, "old")
+    with pytest.raises(failure), written_together(tmp_path / "hair.glb") as folder:
+        write(folder, "new", FILES[:2])
+        raise failure
+    assert contents(tmp_path) == dict.fromkeys(sorted(FILES), "old")
+
+
+@pytest.mark.parametrize("last", range(3))
+def test_a_disk_that_fills_up_while_files_are_replaced_leaves_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, last: int
+) -> None:
+    """One of the old files was not there, and is not there then."""
+    write(tmp_path, "old", FILES[:2])
+    replace, left = os.replace, [last]
+
+    def full(source: Path, target: Path) -> None:
+        if "old" not in Path(source).parts:  # what was there can be put back
+            left[0] -= 1
+            if left[0] == -1:
+                raise OSError(errno.ENOSPC, "No space left on device")
+        replace(source, target)
+
+    monkeypatch.setattr(file_set.os, "replace", full)
+    with (
+        pytest.raises(HairloomError, match="No space left"),
+        written_together(tmp_path / "hair.glb") as folder,
+    ):
+        write(folder, "new")
+    assert contents(tmp_path) == dict.fromkeys(FILES[:2], "old")
+
+
+def test_a_name_that_a_folder_has_replaces_nothing(tmp_path: Path) -> None:
+    (tmp_path / "hair_base.png").mkdir()
+    with (
+        pytest.raises(HairloomError, match="a folder has this name") as caught,
+        written_together(tmp_path / "hair.glb") as folder,
+    ):
+        write(folder, "new")
+    assert caught.value.place == str(tmp_path / "hair_base.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["hair_base.png"]
+
+
+def test_impossible_places_are_named_before_anything_is_written(tmp_path: Path) -> None:
+    in_the_way = tmp_path / "file"
+    in_the_way.write_text("")
+    for target in (in_the_way / "hair.glb", tmp_path / ("x" * 300)):
+        with pytest.raises(HairloomError) as caught, written_together(target):
+            pytest.fail("the block must not run")
+        assert caught.value.place == str(target)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_writer_without_the_main_file_is_an_error(tmp_path: Path) -> None:
+    with (
+        pytest.raises(HairloomError, match="nothing was written"),
+        written_together(tmp_path / "hair.glb") as folder,
+    ):
+        write(folder, "new", FILES[1:])
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links need rights on Windows")
+def test_a_link_stays_a_link_and_keeps_its_content_in_a_failure(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    real = tmp_path / "elsewhere" / "hair.glb"
+    real.write_text("old")
+    link = tmp_path / "hair.glb"
+    link.symlink_to(real)
+    with written_together(link) as folder:
+        write(folder, "new")
+    assert link.is_symlink() and real.read_text() == "new"
