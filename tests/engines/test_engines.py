@@ -1,0 +1,195 @@
+"""Cards in real engines: three.js in Chromium, and Godot, by the shaders of docs/engines.
+
+Both run where `tools/window_blender run` runs; `tools/window_blender engines` gets them there.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from extension_loader import REPOSITORY
+
+pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
+
+from hairloom.addon import pipeline
+from hairloom.addon.cards.atlas_settings import AtlasSettings
+from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
+from hairloom.addon.cards.settings import CardSettings
+from hairloom.addon.exchange.texture_files import read_texture
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.host.card_files import CardChoices, CardOutput, WrittenCards, write_cards
+from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.textures import TextureSettings
+from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands import StrandSet
+
+HERE = Path(__file__).parent
+ENGINES = REPOSITORY / "docs" / "engines"
+THREE = REPOSITORY / "tools" / "node" / "node_modules" / "three"
+SANDBOX = str(REPOSITORY / "tools" / "window_blender")
+#: the engines run where nothing but the repository is seen
+OUTPUT = REPOSITORY / "out" / "engines"
+
+SIZE, FIELD_OF_VIEW = 480, 30.0
+EYE, TARGET = (0.25, -0.45, 0.1), (0.0, 0.0, -0.01)
+TO_SUN = tuple(np.array([0.5, -0.7, 0.5]) / np.linalg.norm([0.5, -0.7, 0.5]))
+IRRADIANCE = 4.0
+NEAR, FAR = 0.05, 5.0
+
+#: A card seen edge-on is drawn with mip maps there and without them here.
+MOST_MEAN = 1.5 / 255.0
+MOST_DIFFERENT = 0.05
+
+
+@dataclass(frozen=True)
+class Asset:
+    """A folder with all that an engine reads, and the same picture by Hairloom, row 0 on top."""
+
+    folder: Path
+    picture: np.ndarray
+
+
+def curtain() -> StrandSet:
+    """Strands that hang around a circle."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    out = np.stack([np.cos(angle), np.sin(angle), np.zeros(40)], axis=-1)
+    fall = np.linspace([0.0, 0.0, 0.1], [0.0, 0.0, -0.1], 8)
+    points = out[:, None] * 0.1 + fall + out[:, None] * np.linspace(0.0, 0.05, 8)[:, None] ** 2
+    return StrandSet(
+        points=points.reshape(-1, 3),
+        offsets=np.arange(41) * 8,
+        radius=np.full(320, 2.0e-3),
+        group=np.zeros(40, np.int32),
+    )
+
+
+def glb_axes(vector: Any) -> list[float]:
+    return [float(vector[0]), float(vector[2]), -float(vector[1])]
+
+
+@pytest.fixture(scope="module", params=["kajiya_kay", "marschner", "baked"])
+def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
+    is_baked = request.param == "baked"
+    model = "marschner" if is_baked else request.param
+    folder = OUTPUT / request.param
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    look = ShadingSettings(
+        model=model,
+        base_color=(0.5, 0.3, 0.15),
+        tip_color=(0.3, 0.1, 0.05),
+        tip_tint=0.6,
+        grey_share=0.1,
+    )
+    texture = TextureSettings(
+        variant_width=16,
+        height=64,
+        strand_count=6,
+        highlights="shift" if model == "kajiya_kay" else "tangent",
+    )
+    rig = pipeline.prepare(curtain(), None, GuideSettings(), place="curtain")
+    choices = CardChoices(
+        CardSettings(way="clusters" if is_baked else "guides", width_factor=1.5, card_count=40),
+        AtlasSettings(source="baked" if is_baked else "made", size="512", columns=8),
+        CardOcclusionSettings(),
+        texture,
+        look,
+        StrandSettings(),
+    )
+    written = write_cards(folder / "cards.glb", rig, choices, CardOutput(index_buffer=True))
+    view = {
+        "eye": glb_axes(EYE),
+        "target": glb_axes(TARGET),
+        "to_sun": glb_axes(TO_SUN),
+        "irradiance": IRRADIANCE,
+        "size": SIZE,
+        "field_of_view": FIELD_OF_VIEW,
+        "near": NEAR,
+        "far": FAR,
+    }
+    (folder / "view.json").write_text(json.dumps(view), encoding="utf-8")
+    has_map = is_baked or texture.highlights == "tangent"
+    return Asset(folder, by_hairloom(written, look, has_map))
+
+
+def by_hairloom(written: WrittenCards, look: ShadingSettings, has_map: bool) -> np.ndarray:
+    from hairloom.addon.render.camera import Camera, look_at, perspective
+    from hairloom.addon.render.card_snapshot import CardSnapshot
+    from hairloom.addon.render.frame import render_image
+    from hairloom.addon.render.snapshot import Snapshot
+
+    snapshot = Snapshot(
+        np.zeros((0, 2, 3), np.float32),
+        np.zeros((0, 2), np.float32),
+        cards=CardSnapshot(written.mesh, written.textures, has_map),
+        lights=(Light.sun(tuple(-x for x in TO_SUN), (1.0, 1.0, 1.0), IRRADIANCE),),
+        ambient=(0.0, 0.0, 0.0),
+        shading=look,
+        volume=VolumeSettings(shadows="none"),
+    )
+    projection = perspective(math.radians(FIELD_OF_VIEW), 1.0, NEAR, FAR)
+    return render_image(snapshot, Camera(look_at(EYE, TARGET), projection), SIZE, SIZE, 1)
+
+
+@pytest.fixture(scope="module")
+def sandbox() -> str:
+    """The program that runs a command where the engines are."""
+    result = subprocess.run([SANDBOX, "engines"], capture_output=True, text=True)
+    if result.returncode == 77:
+        pytest.skip(result.stderr.strip().splitlines()[-1])
+    assert result.returncode == 0, result.stderr
+    return SANDBOX
+
+
+def check(asset: Asset, drawn: Path) -> None:
+    """The engine's picture is ours, as a screen shows both."""
+    theirs = read_texture(drawn, is_color=False)[..., :3]
+    ours = read_encoded(asset.picture)
+    difference = np.abs(theirs - ours)
+    assert (ours.max(axis=-1) > 0.1).mean() > 0.1  # there is hair in it
+    assert difference.mean() < MOST_MEAN
+    assert (difference.max(axis=-1) > 8.0 / 255.0).mean() < MOST_DIFFERENT
+
+
+def read_encoded(linear: np.ndarray) -> np.ndarray:
+    """Scene-linear in front of black, (height, width, 3), by the sRGB curve."""
+    color = np.clip(linear[..., :3], 0.0, 1.0)
+    return np.where(color <= 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)
+
+
+def test_godot_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
+    project = asset.folder / "godot"
+    shutil.copytree(HERE / "godot", project)
+    shutil.copytree(ENGINES, project / "hairloom")
+    shutil.copytree(asset.folder, project / "asset", ignore=shutil.ignore_patterns("godot", "web"))
+    command = [sandbox, "run", str(REPOSITORY / "tools" / "with_xvfb"), "godot"]
+    command += ["--path", str(project), "--rendering-driver", "vulkan"]
+    command += ["--resolution", f"{SIZE}x{SIZE}", "--quit-after", "1000"]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    drawn = project / "asset" / "godot.png"
+    assert drawn.is_file(), result.stdout + result.stderr
+    assert "SCRIPT ERROR" not in result.stderr and "SHADER ERROR" not in result.stderr
+    check(asset, drawn)
+
+
+def test_three_js_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
+    if not THREE.is_dir():
+        pytest.skip("three.js is missing: `make setup` installs it")
+    site = asset.folder / "web"
+    shutil.copytree(HERE / "three", site)
+    shutil.copytree(ENGINES, site / "hairloom")
+    shutil.copytree(THREE, site / "three")
+    shutil.copytree(asset.folder, site / "asset", ignore=shutil.ignore_patterns("godot", "web"))
+    command = [sandbox, "run", "python3", str(site / "draw.py")]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, result.stderr
+    check(asset, site / "three.png")
