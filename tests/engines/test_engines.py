@@ -25,7 +25,8 @@ from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.exchange.texture_files import read_texture
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.host.card_files import CardChoices, CardOutput, WrittenCards, write_cards
+from hairloom.addon.host.card_files import CardOutput, WrittenCards, write_cards
+from hairloom.addon.host.card_making import CardChoices
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.textures import TextureSettings
@@ -47,7 +48,7 @@ NEAR, FAR = 0.05, 5.0
 
 #: A card seen edge-on is drawn with mip maps there and without them here.
 MOST_MEAN = 1.5 / 255.0
-MOST_DIFFERENT = 0.05
+MOST_DIFFERENT = 0.08
 
 
 @dataclass(frozen=True)
@@ -117,11 +118,10 @@ def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
         "far": FAR,
     }
     (folder / "view.json").write_text(json.dumps(view), encoding="utf-8")
-    has_map = is_baked or texture.highlights == "tangent"
-    return Asset(folder, by_hairloom(written, look, has_map))
+    return Asset(folder, by_hairloom(written, look))
 
 
-def by_hairloom(written: WrittenCards, look: ShadingSettings, has_map: bool) -> np.ndarray:
+def by_hairloom(written: WrittenCards, look: ShadingSettings) -> np.ndarray:
     from hairloom.addon.render.camera import Camera, look_at, perspective
     from hairloom.addon.render.card_snapshot import CardSnapshot
     from hairloom.addon.render.frame import render_image
@@ -130,7 +130,9 @@ def by_hairloom(written: WrittenCards, look: ShadingSettings, has_map: bool) -> 
     snapshot = Snapshot(
         np.zeros((0, 2, 3), np.float32),
         np.zeros((0, 2), np.float32),
-        cards=CardSnapshot(written.mesh, written.textures, has_map),
+        cards=CardSnapshot(
+            written.mesh, written.maps.textures, written.maps.has_tangent_map
+        ),
         lights=(Light.sun(tuple(-x for x in TO_SUN), (1.0, 1.0, 1.0), IRRADIANCE),),
         ambient=(0.0, 0.0, 0.0),
         shading=look,

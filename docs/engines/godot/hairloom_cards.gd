@@ -71,14 +71,14 @@ static func _values(sidecar: Dictionary, folder: String) -> Dictionary:
 	for name in TEXTURES:
 		if name in sidecar["textures"]:
 			var entry: Dictionary = sidecar["textures"][name]
-			values[name + "_texture"] = _texture(entry, folder, true)
+			values[name + "_texture"] = _texture(entry, folder, false)
 			values[name + "_mask"] = _mask(entry)
 	values["base_gain"] = sidecar["textures"].get("base", {}).get("gain", 1.0)
 	values["has_normal_map"] = "normal" in sidecar["textures"]
 	values["has_shift"] = "shift" in sidecar["textures"]
 	for name in TABLES:
 		if name in material.get("tables", {}):
-			values[name] = _texture(material["tables"][name], folder, false)
+			values[name] = _texture(material["tables"][name], folder, true)
 	return values
 
 
@@ -89,8 +89,10 @@ static func _mask(entry: Dictionary) -> Vector4:
 	return mask
 
 
-static func _texture(entry: Dictionary, folder: String, mip_maps: bool) -> ImageTexture:
+static func _texture(entry: Dictionary, folder: String, is_table: bool) -> ImageTexture:
 	var image := Image.load_from_file(folder.path_join(entry["file"]))
-	if mip_maps:
+	if is_table:
+		image.flip_y()  # the lowest row comes first
+	else:
 		image.generate_mipmaps()
 	return ImageTexture.create_from_image(image)
