@@ -1,84 +1,54 @@
 """TressFX .tfx grooms, versions 3 and 4: little-endian, strand after strand, root first.
 
 Layout after AMD's TressFXFileFormat.h (versions 3.1 and 4.x). Version 3 stores positions as
-float3, version 4 as float4 whose w is the inverse mass, 0 where a vertex is held. Everything else
-a file may hold (colours, vertex UVs, guide indices) is not read.
+float3, version 4 as float4 whose w is the inverse mass, 0 where a vertex is held. All strands of a
+file are what TressFX calls guides: it grows follow hairs around them when it loads them, in version
+3 as many as the file says, in version 4 as many as the game says. `tfxbone` is the skinning.
 
-Limitations: a file has one radius a strand, so a taper is not kept; groups are not stored.
+Limitations: a file has one radius a strand, so a taper is not kept; groups are not stored, for
+which TressFX takes a file each (`group_files`). No loader of AMD reads the thickness, whose header
+names no unit; here it is the radius, as what their shaders multiply it with is one.
 """
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from ..errors import HairloomError
 from ..strands import StrandSet
-from ..strands.clean import clean
-from ..strands.resample import resample
-from .atomic import write_bytes_atomic
+from ..strands.resample import arc_length_positions, resample
 from .axes import from_z_up, to_z_up
+from .binary_file import write_blocks
+from .groom import Groom
+from .groom_presets import chosen_parts
+from .read_groom import ReadGroom, finite, kept_points, plausible, usable
+from .tressfx_layout import HEADER_4, VERTEX_COUNTS, TressfxFile
 
-#: Thicker than any hair [m]: such a thickness is a coefficient or in another unit.
-THICKEST_RADIUS = 5.0e-3
-#: What TressFX's own loader accepts.
-VERTEX_COUNTS = (4, 8, 16, 32, 64)
-
-_HEADER_4 = np.dtype(
-    [
-        ("version", "<f4"),
-        ("strand_count", "<u4"),
-        ("vertex_count", "<u4"),
-        ("positions", "<u4"),
-        ("strand_uv", "<u4"),
-        ("vertex_uv", "<u4"),
-        ("thickness", "<u4"),
-        ("color", "<u4"),
-        ("reserved", "<u4", (32,)),
-    ]
-)
-_HEADER_3 = np.dtype(
-    [
-        ("version", "<f4"),
-        ("strand_count", "<u4"),
-        ("vertex_count", "<u4"),
-        ("follow_count", "<u4"),
-        ("both_ends_immovable", "<u4"),
-        ("reserved", "<u4", (31,)),
-        ("positions", "<u4"),
-        ("thickness", "<u4"),
-        ("strand_uv", "<u4"),
-        ("color", "<u4"),
-        ("guide", "<u4"),
-        ("vertex_uv", "<u4"),
-        ("reserved_end", "<u4", (32,)),
-    ]
-)
-#: major version -> header, floats of a position
-_LAYOUTS = {3: (_HEADER_3, 3), 4: (_HEADER_4, 4)}
+#: TressFX simulates so many strands at a time.
+STRANDS_AT_ONCE = 64
 
 
 @dataclass(frozen=True)
-class ReadGroom:
-    """What a file held that can be used.
+class ReadTressfx(ReadGroom):
+    """A .tfx file.
 
-    strands: Z up, metres.
-    dropped: reason -> number of strands left out.
-    version: as the file says, such as 4.0.
-    source: the file.
+    is_held: (point_count,) bool, vertices with an inverse mass of 0.
+    vertex_uv: (point_count, 2) float32, or None.
+    follow_count: follow hairs that TressFX grows for each strand, as a file of version 3 says.
     """
 
-    strands: StrandSet
-    dropped: dict[str, int]
-    version: float
-    source: Path
+    is_held: Bools
+    vertex_uv: Floats | None
+    follow_count: int
 
 
-def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadGroom:
+def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadTressfx:
     """Read a groom.
 
     Args:
@@ -89,76 +59,123 @@ def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadGroom:
         HairloomError: the file cannot be read, is no TressFX 3 or 4 file, is cut short, or holds
             no usable strand.
     """
-    file = _File(path)
-    version = file.version()
-    header_type, width = _LAYOUTS[int(version)]
-    header = file.array("header", 0, header_type, 1)[0]
-    strand_count, vertex_count = file.counts(header)
-
-    points = file.block("positions", header, strand_count * vertex_count, width)[:, :3]
-    radius = file.block("thickness", header, strand_count, 1) if header["thickness"] else None
-    uv = file.block("strand_uv", header, strand_count, 2) if header["strand_uv"] else None
+    file = TressfxFile(path)
+    count, positions = file.vertex_count, file.positions()
+    thickness, strand_uv = file.of_strands("thickness", 1), file.of_strands("strand_uv", 2)
     # What overflows becomes infinite, and what is not finite is dropped and counted.
     with np.errstate(over="ignore", invalid="ignore"):
-        points = to_z_up(points, up) * np.float32(scale)
-        radius = None if radius is None else _plausible(radius[:, 0] * np.float32(scale))
-        cleaned = clean(
-            points,
-            np.arange(strand_count + 1) * vertex_count,
-            radius=None if radius is None else np.repeat(radius, vertex_count),
-            root_uv=uv,
-        )
-    if not cleaned.strands.strand_count:
-        reasons = ", ".join(f"{count} with {reason}" for reason, count in cleaned.dropped.items())
-        raise file.error(f"none of its strands can be used ({reasons})", "Export the groom again")
-    return ReadGroom(cleaned.strands, cleaned.dropped, version, path)
+        points = to_z_up(positions[:, :3], up) * np.float32(scale)
+        radius = None if thickness is None else plausible(thickness[:, 0] * np.float32(scale))
+    offsets = np.arange(file.strand_count + 1) * count
+    cleaned = usable(
+        file,
+        points,
+        offsets,
+        None if radius is None else np.repeat(radius, count),
+        strand_uv,
+    )
+    if file.position_width == 4:
+        is_held = kept_points(positions[:, 3], offsets, cleaned) == 0.0
+    else:
+        is_held = file.held(cleaned.strands.strand_count)
+    color, vertex_uv = file.of_vertices("color", 4), file.of_vertices("vertex_uv", 2)
+    groom = Groom(
+        cleaned.strands,
+        name=path.stem,
+        color=None if color is None else finite(kept_points(color[:, :3], offsets, cleaned), 0.0),
+        dropped=cleaned.dropped,
+        source=path,
+    )
+    return ReadTressfx(
+        groom,
+        file.version,
+        _reading_notes(path.name, file, color),
+        is_held,
+        None if vertex_uv is None else finite(kept_points(vertex_uv, offsets, cleaned)),
+        file.follow_count,
+    )
 
 
 def write_tfx(
     path: Path,
-    strands: StrandSet,
+    hair: StrandSet | Groom,
     *,
     up: str = "Y",
     scale: float = 1.0,
     vertex_count: int | None = None,
-) -> None:
-    """Write a groom as version 4: root held, radius of the root as thickness, root UVs if known.
+    parts: Literal["strands", "guides", "both"] = "strands",
+    held_count: int = 1,
+    multiple_of_64: bool = False,
+    vertex_uv: bool = False,
+) -> tuple[str, ...]:
+    """Write a groom as version 4: radius of the root as thickness, root UVs and colours if known.
 
     Args:
-        strands: Z up, metres; resampled where their CV count is not `vertex_count`.
+        hair: Z up, metres; resampled where the CV count is not `vertex_count`.
         up: the file's up axis, "Y" or "Z".
         scale: metres in one unit of the file.
         vertex_count: 4, 8, 16, 32 or 64; the smallest that holds the longest strand when None.
+        parts: the strands that are seen, the guides alone (TressFX grows follow hairs around
+            them), or both.
+        held_count: vertices from the root on whose inverse mass is 0; AMD's exporter holds two.
+        multiple_of_64: repeat the last strand until TressFX's thread groups are full. Version 4
+            does so when it loads a file, version 3 leaves out the strands beyond.
+        vertex_uv: write UVs of vertices as well, u across the strands by their number, v from 0 at
+            the root to 1 at the tip.
+
+    Returns:
+        What the file cannot say of this groom.
 
     Raises:
-        HairloomError: no strands, a vertex count TressFX refuses, or nothing can be written there.
+        HairloomError: no strands, a vertex count TressFX refuses, a file beyond 4 GiB, or nothing
+            can be written there.
     """
+    groom = chosen_parts(hair if isinstance(hair, Groom) else Groom(hair), parts)
+    strands = groom.strands
     if not strands.strand_count:
         raise HairloomError(
             "there are no strands to write", place=str(path), remedy="Choose hair that has strands"
         )
-    uniform = resample(strands, _vertex_count(vertex_count, strands, path))
-    vertices = np.ones((*uniform.grid.shape[:2], 4), "<f4")
-    vertices[..., :3] = from_z_up(uniform.grid, up) / np.float32(scale)
-    vertices[:, 0, 3] = 0.0
-    blocks = {"positions": vertices, "thickness": uniform.radius[uniform.offsets[:-1]] / scale}
+    count = _vertex_count(vertex_count, strands, path)
+    uniform = resample(strands, count)
+    grid = uniform.grid
+    vertices = np.empty((len(grid), count, 4), "<f4")
+    np.divide(from_z_up(grid, up), np.float32(scale), out=vertices[..., :3])
+    vertices[..., 3] = 1.0
+    vertices[:, :held_count, 3] = 0.0
+    blocks = {"positions": vertices}
     if uniform.root_uv is not None:
         blocks["strand_uv"] = uniform.root_uv
+    if vertex_uv:
+        blocks["vertex_uv"] = _vertex_uv(len(grid), count)
+    if groom.color is not None:
+        blocks["color"] = _color(groom, count)
+    blocks["thickness"] = uniform.radius[uniform.offsets[:-1]] / np.float32(scale)
+    added = -len(grid) % STRANDS_AT_ONCE if multiple_of_64 else 0
+    if added:
+        blocks = {name: _padded(block, added) for name, block in blocks.items()}
+    _write(path, blocks)
+    return _writing_notes(path.name, groom, uniform, added)
 
-    header = np.zeros(1, _HEADER_4)
+
+def _write(path: Path, blocks: dict[str, Floats]) -> None:
+    header = np.zeros(1, HEADER_4)
     header["version"] = 4.0
-    header["strand_count"], header["vertex_count"] = vertices.shape[:2]
-    content = bytearray(_HEADER_4.itemsize)
+    header["strand_count"], header["vertex_count"] = blocks["positions"].shape[:2]
+    end = HEADER_4.itemsize
+    filed: list[NDArray[Any] | bytes] = []
     for name, block in blocks.items():
-        header[name] = len(content)
-        content += np.ascontiguousarray(block, "<f4").tobytes()
-    content[: _HEADER_4.itemsize] = header.tobytes()
-    write_bytes_atomic(path, content)
-
-
-def _plausible(radius: Floats) -> Floats:
-    """NaN, which `clean` replaces, where this cannot be a radius in metres."""
-    return np.where((radius > 0.0) & (radius <= THICKEST_RADIUS), radius, np.float32(np.nan))
+        gap = -end % 8  # the format asks for it
+        if end + gap > np.iinfo(np.uint32).max:
+            raise HairloomError(
+                "TressFX files end at 4 GiB, and this groom is larger",
+                place=str(path),
+                remedy="Write fewer strands, or fewer vertices a strand",
+            )
+        header[name] = end + gap
+        filed += [bytes(gap), np.ascontiguousarray(block, "<f4")]
+        end += gap + block.size * 4
+    write_blocks(path, [header, *filed])
 
 
 def _vertex_count(wanted: int | None, strands: StrandSet, path: Path) -> int:
@@ -174,70 +191,56 @@ def _vertex_count(wanted: int | None, strands: StrandSet, path: Path) -> int:
     return wanted
 
 
-class _File:
-    """A file whose every read is first checked against its size, and fails with its place."""
+def _color(groom: Groom, count: int) -> Floats:
+    """(strand_count, count, 4), opaque."""
+    strands, color = groom.strands, groom.color
+    assert color is not None
+    if (strands.point_counts != count).any():
+        left, weight = arc_length_positions(strands, count)
+        color = color[left] * (1.0 - weight[..., None]) + color[left + 1] * weight[..., None]
+    opaque = np.ones((strands.strand_count, count, 4), "<f4")
+    opaque[..., :3] = color.reshape(-1, count, 3)
+    return opaque
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        if path.is_dir():
-            raise self.error("this is a folder, not a file", "Choose a .tfx file")
-        try:
-            self._size = os.stat(path).st_size
-        except OSError as error:
-            raise self._unreadable(error) from error
-        if not self._size:
-            raise self.error("the file is empty", "Export the groom again")
 
-    def version(self) -> float:
-        """The version at byte 0, when it is one that we read."""
-        version = float(self.array("version", 0, "<f4", 1)[0])
-        if 3.0 <= version < 5.0:
-            return version
-        raise self.error(
-            f"this is no TressFX 3 or 4 file: its version, at byte 0, reads as {version:.6g}",
-            "Choose a .tfx file, or export it again as version 4",
+def _vertex_uv(strand_count: int, count: int) -> Floats:
+    uv = np.empty((strand_count, count, 2), "<f4")
+    uv[..., 0] = ((np.arange(strand_count) + 0.5) / strand_count)[:, None]
+    uv[..., 1] = np.linspace(0.0, 1.0, count)
+    return uv
+
+
+def _padded(block: Floats, added: int) -> Floats:
+    return np.concatenate([block, np.repeat(block[-1:], added, axis=0)])
+
+
+def _reading_notes(name: str, file: TressfxFile, color: Floats | None) -> tuple[str, ...]:
+    notes = []
+    if file.follow_count:
+        notes.append(
+            f"{name}: TressFX grows {file.follow_count} follow hairs around each strand of this "
+            "file; they are not in it. Children from guides do the same here."
         )
+    if color is not None and not (color[:, 3] == 1.0).all():
+        notes.append(f"{name}: the alpha of its colours is not kept.")
+    return tuple(notes)
 
-    def counts(self, header: np.void) -> tuple[int, int]:
-        strand_count, vertex_count = int(header["strand_count"]), int(header["vertex_count"])
-        for name, place, count in (
-            ("strands", 4, strand_count),
-            ("vertices a strand", 8, vertex_count),
-        ):
-            if not count:
-                raise self.error(f"it holds no {name} (byte {place})", "Export the groom again")
-        return strand_count, vertex_count
 
-    def block(self, name: str, header: np.void, count: int, width: int) -> Floats:
-        """The floats that the header's offset of this name points to, (count, width) float32."""
-        offset = int(header[name])
-        if offset < header.dtype.itemsize:
-            raise self.error(
-                f"the {name} would start at byte {offset}, inside the header",
-                "The file is damaged: copy or export it again",
-            )
-        return self.array(name, offset, "<f4", count * width).reshape(count, width)
-
-    def array(self, name: str, offset: int, dtype: str | np.dtype[np.void], count: int) -> Floats:
-        """`count` items from byte `offset`; nothing is allocated before the file is known to
-        hold them."""
-        end = offset + count * np.dtype(dtype).itemsize
-        if end > self._size:
-            raise self.error(
-                f"the {name}, bytes {offset:,} to {end:,}, reach past the end of the file, "
-                f"which has {self._size:,} bytes",
-                "The file is cut short or damaged: copy or export it again",
-            )
-        try:
-            return np.fromfile(self._path, dtype, count, offset=offset)
-        except OSError as error:
-            raise self._unreadable(error) from error
-
-    def error(self, problem: str, remedy: str) -> HairloomError:
-        return HairloomError(problem, place=str(self._path), remedy=remedy)
-
-    def _unreadable(self, error: OSError) -> HairloomError:
-        return self.error(
-            f"this file cannot be read ({error.strerror or error})",
-            "Check the path and that you may read it",
+def _writing_notes(name: str, groom: Groom, uniform: StrandSet, added: int) -> tuple[str, ...]:
+    strands, notes = groom.strands, []
+    longest = int(strands.point_counts.max())
+    count = len(uniform.grid[0])
+    if longest > count:
+        notes.append(f"{name}: strands of up to {longest} points were resampled to {count}.")
+    if (strands.group != strands.group[0]).any():
+        notes.append(f"{name}: .tfx holds no groups. Write a file for each group to keep them.")
+    radius = uniform.radius.reshape(-1, count)
+    if (radius != radius[:, :1]).any():
+        notes.append(
+            f"{name}: .tfx holds one thickness a strand, that of the root; tapers are lost."
         )
+    if groom.strand_id is not None or groom.closest_guides is not None:
+        notes.append(f"{name}: .tfx holds no strand IDs and no closest guides.")
+    if added:
+        notes.append(f"{name}: the last strand was repeated {added} times, to a multiple of 64.")
+    return tuple(notes)

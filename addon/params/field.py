@@ -42,7 +42,7 @@ class Parameter:
         """The value in its canonical type, or HairloomError naming the value and its range."""
         try:
             return self._canonical(value)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise HairloomError(
                 f"'{self.name}' is {value!r}, but {error}", place=place, remedy=self._remedy()
             ) from error

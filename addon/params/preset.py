@@ -17,6 +17,8 @@ from ..errors import HairloomError
 from .field import Settings
 
 PRESET_VERSION = 1
+#: A preset has some thousand bytes; JSON may take twenty times its size in memory.
+LARGEST_PRESET = 1_000_000
 
 #: version n -> the step that makes it version n + 1; one entry for each version that ever shipped
 MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
@@ -83,8 +85,10 @@ def _also(data: Any, kinds: Mapping[str, type[Settings]], place: str) -> tuple[S
 
 def _content(path: Path) -> Any:
     try:
+        if path.stat().st_size > LARGEST_PRESET:
+            raise ValueError(f"it has more than {LARGEST_PRESET:,} bytes")
         return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise HairloomError(
             f"this preset cannot be read ({error})", place=str(path), remedy="Save it again"
         ) from error

@@ -17,7 +17,7 @@ BLENDER = {"bpy", "bmesh", "bpy_extras", "addon_utils", "blf", "imbuf", "mathuti
 #: modules that stand beside the rooms: the ground floor, and the flows over the pure rooms
 GROUND = {"errors", "arrays"}
 PURE = {"params", "strands", "groom", "dynamics", "refine", "shading", "cards", "exchange"}
-FLOWS = {"pipeline", "parameters"}
+FLOWS = {"pipeline", "card_flow", "parameters"}
 
 #: room -> what it may import, beside itself, the ground floor, the standard library and numpy
 MAY_IMPORT: dict[str, set[str]] = {
@@ -30,8 +30,18 @@ MAY_IMPORT: dict[str, set[str]] = {
     "refine": {"params", "strands"},
     "shading": {"params", "strands"},
     "cards": {"params", "strands"},
-    "exchange": {"params", "strands", "cards", "OpenImageIO", "etcpak"},
+    "exchange": {
+        "params",
+        "strands",
+        "cards",
+        "OpenImageIO",
+        "etcpak",
+        "alembic3d",
+        "imath",
+        "pxr",
+    },
     "pipeline": PURE,
+    "card_flow": PURE | {"pipeline"},
     "parameters": PURE,
     "render": PURE | {"gpu"},
     "host": PURE | FLOWS | {"render", "gpu"} | BLENDER,

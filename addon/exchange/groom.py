@@ -1,0 +1,134 @@
+"""`Groom`, what every strand format is written from and read into: strands, and what engines ask.
+
+Positions are in Blender's space: right-handed, Z up, metres. Units and axes of a file are the
+business of its writer and its reader.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..errors import HairloomError
+from ..strands import StrandSet
+
+
+@dataclass(frozen=True)
+class Groom:
+    """Strands with all that a file can say of them, checked when made; what is None is not known.
+
+    strands: points and radii [m], groups, root UVs; guides are among them, marked by `is_guide`.
+    name: of the groom, for objects in the file.
+    color: (point_count, 3) float32, scene-linear.
+    strand_id: (strand_count,) int32, a number of its own for each strand.
+    is_guide: (strand_count,) bool; None: no strand is a guide.
+    closest_guides: (strand_count, 3) int32, the strand_id of guides, nearest first.
+    guide_weights: (strand_count, 3) float32, their sum is 1.
+    group_names: group -> name, for some of the groups.
+    dropped: by a reader: reason -> number of strands left out.
+    source: by a reader: the file.
+
+    Raises:
+        HairloomError: shapes that do not fit the strands, or closest guides without IDs.
+    """
+
+    strands: StrandSet
+    name: str = "hair"
+    color: Floats | None = None
+    strand_id: Ints | None = None
+    is_guide: Bools | None = None
+    closest_guides: Ints | None = None
+    guide_weights: Floats | None = None
+    group_names: Mapping[int, str] = field(default_factory=lambda: MappingProxyType({}))
+    dropped: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+    source: Path | None = None
+
+    def __post_init__(self) -> None:
+        strands, points = self.strands.strand_count, self.strands.point_count
+        shapes = {
+            "color": (points, 3),
+            "strand_id": (strands,),
+            "is_guide": (strands,),
+            "closest_guides": (strands, 3),
+            "guide_weights": (strands, 3),
+        }
+        for name, dtype in _DTYPES.items():
+            value = getattr(self, name)
+            if value is None:
+                continue
+            value = np.ascontiguousarray(value, dtype)
+            if value.shape != shapes[name]:
+                raise _broken(f"{name} has shape {value.shape} instead of {shapes[name]}")
+            object.__setattr__(self, name, value)
+        if (self.closest_guides is None) != (self.guide_weights is None):
+            raise _broken("closest_guides and guide_weights come together or not at all")
+        if self.closest_guides is not None and self.strand_id is None:
+            raise _broken("closest_guides name strands by strand_id, which is missing")
+
+    def take(self, strands: Ints) -> Groom:
+        """The strands with these indices, in this order, with all that belongs to them."""
+        points = points_of(self.strands, strands)
+        changes: dict[str, Any] = {"strands": self.strands.take(strands)}
+        for name in _DTYPES:
+            value = getattr(self, name)
+            if value is not None:
+                changes[name] = value[points if name == "color" else strands]
+        return replace(self, **changes)
+
+    def guides(self) -> Groom:
+        """The guides alone; empty where none are marked."""
+        return self.take(np.flatnonzero(self._guide_flags()))
+
+    def without_guides(self) -> Groom:
+        """The strands that are seen, the groom itself where no guides are marked."""
+        flags = self._guide_flags()
+        return self.take(np.flatnonzero(~flags)) if flags.any() else self
+
+    def _guide_flags(self) -> Bools:
+        if self.is_guide is None:
+            return np.zeros(self.strands.strand_count, bool)
+        return self.is_guide
+
+
+@dataclass(frozen=True)
+class GroomMotion:
+    """The groom's points at each frame, for formats that hold motion.
+
+    positions: for each frame (point_count, 3) float32 [m], in the order of the groom's points and
+        in its space; read once, so that a generator serves and not all frames need be in memory.
+    rate: frames in a second.
+    first_frame: the number of the first one; frame f is at f / rate seconds.
+    """
+
+    positions: Iterable[Floats]
+    rate: float
+    first_frame: int = 1
+
+
+def points_of(strands: StrandSet, chosen: Ints) -> Ints:
+    """Indices of the points of the chosen strands, strand after strand."""
+    counts = strands.point_counts[chosen].astype(np.int64)
+    ends = np.cumsum(counts)
+    total = int(ends[-1]) if len(ends) else 0
+    begins = strands.offsets[:-1][chosen].astype(np.int64)
+    return np.arange(total) + np.repeat(begins - (ends - counts), counts)
+
+
+_DTYPES = {
+    "color": np.float32,
+    "strand_id": np.int32,
+    "is_guide": np.bool_,
+    "closest_guides": np.int32,
+    "guide_weights": np.float32,
+}
+assert set(_DTYPES) < {each.name for each in fields(Groom)}
+
+
+def _broken(problem: str) -> HairloomError:
+    return HairloomError(problem, place="groom", remedy="Pass it through a reader of grooms")

@@ -1,0 +1,144 @@
+"""What engines want of a groom Alembic, and what they will see of one before it is written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .file_space import FileSpace
+from .groom import Groom
+
+#: Thinner than any hair [m]. A width of 0 makes Unity drop all widths.
+LEAST_WIDTH = 1.0e-6
+#: Wider than any hair [m]: a mistake in units.
+WIDEST = 5.0e-3
+
+
+@dataclass(frozen=True)
+class GroomPreset:
+    """How a groom Alembic is laid out for one engine.
+
+    space: the file's unit and axes.
+    most_points: longer curves are resampled to so many points; the engine would cut or refuse them.
+    least_points: of a curve that the engine takes.
+    most_strands: of a group that the engine takes.
+    parts: "strands" without guides, "guides" alone, or "both".
+    is_split: one curves object for each group instead of one for all.
+    has_curve_uv: root UVs are written as the curves' own, one for each point, too.
+    basis: "linear", or "cubic" for Catmull-Rom, which goes through the points as well.
+    """
+
+    name: str
+    space: FileSpace
+    most_points: int
+    least_points: int = 2
+    most_strands: int | None = None
+    parts: str = "both"
+    is_split: bool = False
+    has_curve_uv: bool = False
+    basis: str = "linear"
+
+
+#: Unreal adds nothing to a groom's axes on import: it is left-handed with Z up, and meshes from
+#: Blender arrive there with y mirrored. It keeps 8 bits for a point's number, 22 for a curve's.
+UNREAL = GroomPreset(
+    "unreal",
+    FileSpace("Z", 100.0, is_mirrored=True),
+    most_points=255,
+    most_strands=(1 << 22) - 1,
+)
+#: Unity's Alembic importer takes files as right-handed with Y up and scales them by 0.01, unless
+#: told otherwise: so centimetres. Its hair wants all strands, a curves object for a strand group,
+#: and reads root UVs from the curves.
+UNITY = GroomPreset(
+    "unity",
+    FileSpace("Y", 100.0),
+    most_points=128,
+    least_points=3,
+    most_strands=64_000,
+    parts="strands",
+    is_split=True,
+    has_curve_uv=True,
+)
+#: As Blender's own Alembic files are, bit-exact.
+BLENDER = GroomPreset("blender", FileSpace("Y", 1.0), most_points=1 << 16)
+PRESETS = {preset.name: preset for preset in (UNREAL, UNITY, BLENDER)}
+
+
+def chosen_parts(groom: Groom, parts: str) -> Groom:
+    """The strands, the guides, or both."""
+    if parts == "strands":
+        return groom.without_guides()
+    return groom.guides() if parts == "guides" else groom
+
+
+def preflight(groom: Groom, preset: GroomPreset) -> dict[str, Any]:
+    """What the engine will see of a groom that is written so, in the units and axes of the file.
+
+    Returns:
+        strands, guides, points: counts; groups: group -> strands of it.
+        points_per_curve, width: least and most; length: shortest and longest.
+        lowest, highest: corners of the bounds.
+        resampled: strands with more points than the engine takes.
+        warnings: sentences for the artist; the groom can be written in spite of them, but for
+            having no strands.
+    """
+    written = chosen_parts(groom, preset.parts)
+    strands = written.strands
+    guides = 0 if written.is_guide is None else int(written.is_guide.sum())
+    counts = np.minimum(strands.point_counts, preset.most_points)
+    ids, sizes = np.unique(strands.group, return_counts=True)
+    corners = preset.space.to_file(np.stack(strands.bounds()))
+    scale = preset.space.per_metre
+    return {
+        "preset": preset.name,
+        "strands": strands.strand_count - guides,
+        "guides": guides,
+        "points": int(counts.sum()),
+        "groups": dict(zip(ids.tolist(), sizes.tolist(), strict=True)),
+        "points_per_curve": _range(counts),
+        "width": _range(np.maximum(strands.radius * 2.0, LEAST_WIDTH) * scale),
+        "length": _range(strands.lengths() * scale),
+        "lowest": corners.min(axis=0).tolist(),
+        "highest": corners.max(axis=0).tolist(),
+        "resampled": int((strands.point_counts > preset.most_points).sum()),
+        "warnings": list(_warnings(groom, written, preset)),
+    }
+
+
+def _warnings(groom: Groom, written: Groom, preset: GroomPreset) -> list[str]:
+    strands = written.strands
+    if not strands.strand_count:
+        what = "guides" if preset.parts == "guides" else "strands"
+        return [f"The engine will see no {what}"]
+    warnings = []
+    zero = int((strands.radius <= 0.0).sum())
+    if zero:
+        warnings.append(f"{zero} points have no width: they are written as {LEAST_WIDTH * 1e3} mm")
+    if strands.radius.max() * 2.0 > WIDEST:
+        warnings.append(f"Widths reach {strands.radius.max() * 2e3:.3g} mm: check the units")
+    if len(np.unique(strands.group)) == 1:
+        warnings.append("All strands are in one group: they can have only one material")
+    if strands.root_uv is None:
+        warnings.append("There are no root UVs: the engine makes some up, or has none")
+    long = int((strands.point_counts > preset.most_points).sum())
+    if long:
+        warnings.append(f"{long} strands are resampled to {preset.most_points} points")
+    short = int((strands.point_counts < preset.least_points).sum())
+    if short:
+        warnings.append(f"{short} strands have fewer than {preset.least_points} points")
+    most = int(np.unique(strands.group, return_counts=True)[1].max())
+    if preset.most_strands is not None and most > preset.most_strands:
+        warnings.append(f"A group has {most} strands; the engine takes {preset.most_strands}")
+    if written.closest_guides is not None and preset.parts != "both":
+        warnings.append("Closest guides are left out: they need strands and guides in one file")
+    if preset.parts == "both" and (groom.is_guide is None or not groom.is_guide.any()):
+        warnings.append("No strand is marked as a guide: the engine chooses some")
+    return warnings
+
+
+def _range(values: Floats | Ints) -> tuple[float, float]:
+    return (values.min().item(), values.max().item()) if len(values) else (0, 0)

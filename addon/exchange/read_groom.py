@@ -1,0 +1,80 @@
+"""What a reader of a groom's file gives back, and the checks that readers share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..strands import StrandSet
+from ..strands.clean import Cleaned, clean
+from .binary_file import BinaryFile
+from .groom import Groom
+
+#: Thicker than any hair [m]: such a thickness is a coefficient or in another unit.
+THICKEST_RADIUS = 5.0e-3
+
+
+@dataclass(frozen=True)
+class ReadGroom:
+    """What a file held that can be used.
+
+    groom: Z up, metres.
+    version: as the file says, such as 4.0; 0 where the format has none.
+    notes: what the file also holds, and the groom does not.
+    """
+
+    groom: Groom
+    version: float
+    notes: tuple[str, ...]
+
+    @property
+    def strands(self) -> StrandSet:
+        return self.groom.strands
+
+    @property
+    def dropped(self) -> dict[str, int]:
+        """Reason -> number of strands left out."""
+        return dict(self.groom.dropped)
+
+    @property
+    def source(self) -> Path:
+        return self.groom.source or Path()
+
+
+def usable(
+    file: BinaryFile, points: Floats, offsets: Ints, radius: Floats | None, root_uv: Floats | None
+) -> Cleaned:
+    """The file's strands without those that cannot be used.
+
+    Raises:
+        HairloomError: none is left.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        cleaned = clean(points, offsets, radius=radius, root_uv=root_uv)
+    if not cleaned.strands.strand_count:
+        reasons = ", ".join(f"{count} with {reason}" for reason, count in cleaned.dropped.items())
+        raise file.error(f"none of its strands can be used ({reasons})", "Export the groom again")
+    return cleaned
+
+
+def plausible(radius: Floats) -> Floats:
+    """NaN, which `clean` replaces, where this cannot be a radius in metres."""
+    return np.where((radius > 0.0) & (radius <= THICKEST_RADIUS), radius, np.float32(np.nan))
+
+
+def finite(values: Floats, least: float = -np.inf) -> Floats:
+    """0 where a value is not finite or less than `least`."""
+    is_sound = np.isfinite(values) & (values >= least)
+    return values if is_sound.all() else np.where(is_sound, values, np.float32(0.0))
+
+
+def kept_points(values: Floats, offsets: Ints, cleaned: Cleaned) -> Floats:
+    """Values of all points of the file, (point_count, ...), without those of dropped strands."""
+    if not cleaned.dropped:
+        return values
+    is_kept = np.zeros(len(offsets) - 1, bool)
+    is_kept[cleaned.kept] = True
+    return values[np.repeat(is_kept, np.diff(offsets))]

@@ -1,0 +1,120 @@
+"""Damaged files of all formats we parse ourselves, and writers killed in their work.
+
+`bench/_exchange_files.py` does the same with 10,000 files and 100 kills of each format.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import damaged_files
+import fuzz_files
+import kill_writes
+import pytest
+from extension_loader import REPOSITORY
+
+from hairloom.addon.errors import HairloomError
+
+FORMATS = ("tfx", "tfxbone", "hair", "preset")
+FILES, KILLS = 300, 12
+
+
+def report(tool: str, *arguments: str) -> dict[str, Any]:
+    """What a tool says in a process of its own, which may crash."""
+    in_package = str(REPOSITORY / "tools" / "in_package.py")
+    command = [sys.executable, in_package, tool, *arguments]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    run = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=120)
+    assert run.returncode == 0, run.stderr
+    return json.loads(run.stdout.splitlines()[-1])
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_no_damage_ends_in_anything_but_a_groom_or_a_message(kind: str) -> None:
+    found = report("fuzz_files", kind, str(FILES))
+    assert found["failures"] == []
+    assert min(found["read"], found["refused"]) > FILES // 20, found
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_a_killed_writer_leaves_the_old_file_or_the_new_one(kind: str) -> None:
+    found = report("kill_writes", kind, str(KILLS))
+    assert (found["trials"], found["failures"]) == (KILLS, 0)
+
+
+def test_killing_a_plain_writer_is_seen() -> None:
+    """The trials above can fail."""
+    assert report("kill_writes", "plain", str(KILLS))["failures"] > 0
+
+
+def test_kills_come_in_the_midst_of_writing() -> None:
+    assert report("kill_writes", "hair", str(3 * KILLS))["amid"] > 0
+
+
+@pytest.mark.parametrize(
+    ("read", "seen"),
+    [
+        (lambda path: path.read_bytes()[10**9], "IndexError"),
+        (lambda path: bytearray(20 * 10**6), "memory"),
+        (lambda path: "something else", "a str"),
+        (lambda path: _raise(HairloomError("bad", place="somewhere", remedy="Do")), "unclear"),
+        (lambda path: _raise(HairloomError("bad", place=str(path), remedy="")), "unclear"),
+        (lambda path: _wait(), " s"),
+    ],
+)
+def test_readers_that_fail_are_seen(monkeypatch: pytest.MonkeyPatch, read: Any, seen: str) -> None:
+    """The fuzzing above can fail."""
+    monkeypatch.setitem(fuzz_files.READERS, "tfx", read)
+    monkeypatch.setattr(fuzz_files, "SLOWEST", 0.5)
+    (failure,) = fuzz_files.fuzzed("tfx", 1)["failures"]
+    assert seen in failure
+
+
+def _raise(error: Exception) -> None:
+    raise error
+
+
+def _wait() -> None:
+    while True:
+        pass
+
+
+def test_damage_is_the_same_for_the_same_number() -> None:
+    assert damaged_files.mutated("hair", 3, 7) == damaged_files.mutated("hair", 3, 7)
+    assert len({damaged_files.mutated("hair", 3, number) for number in range(50)}) > 45
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_the_files_to_be_damaged_are_sound(kind: str, tmp_path: Path) -> None:
+    small, large = damaged_files.originals(kind)
+    path = tmp_path / f"sound.{kind}"
+    for content in (*small, *large):
+        path.write_bytes(content)
+        assert fuzz_files.unsound(fuzz_files.READERS[kind](path)) == ""
+    assert set(kill_writes.WRITERS) == {*FORMATS, "plain"}
+
+
+def test_a_large_preset_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    """JSON takes twenty times its size and more in memory."""
+    path = tmp_path / "damaged.tfx"
+    path.write_text("[" + "[]," * 400_000 + "[]]")
+    fuzz_files.tracemalloc.start()
+    outcome, _, peak = fuzz_files.judged(fuzz_files.read_preset_file, path)
+    fuzz_files.tracemalloc.stop()
+    assert outcome == "refused" and peak < 100_000
+
+
+@pytest.mark.parametrize("value", ["9" * 400, "Infinity", "-1e999", "9" * 5000, "[" * 100_000])
+def test_values_beyond_reason_are_no_value_of_a_preset(tmp_path: Path, value: str) -> None:
+    """Each of these raises an error of its own in Python: they all become messages."""
+    path = tmp_path / "preset.json"
+    values = f'{{"cv_count": {value}}}'
+    path.write_text(f'{{"hairloom": 1, "section": "guides", "values": {values}}}')
+    with pytest.raises(HairloomError) as caught:
+        fuzz_files.read_preset_file(path)
+    assert path.name in caught.value.place and caught.value.remedy

@@ -1,0 +1,238 @@
+"""Sound files of every format that Hairloom parses itself, and ways to damage them.
+
+Every file comes from a seed and a number, so that `mutated(FORMAT, SEED, number)` makes it again.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from extension_loader import REPOSITORY
+
+from hairloom.addon.exchange.groom import Groom
+from hairloom.addon.exchange.hair_file import HEADER, write_hair_file
+from hairloom.addon.exchange.tfxbone import strongest_bones, write_tfxbone
+from hairloom.addon.exchange.tressfx import write_tfx
+from hairloom.addon.exchange.tressfx_layout import HEADER_3, HEADER_4
+from hairloom.addon.strands import StrandSet
+
+#: counts and offsets that hurt
+EXTREMES = (0, 1, 2, 3, 63, 65, 255, 0xFFFF, 0x10000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
+NUMBERS = (np.nan, np.inf, -np.inf, 3.0e38, -3.0e38, 1.0e-45, -0.0, 1.0e9)
+TOKENS = (
+    *("NaN", "Infinity", "-Infinity", "1e999", "-1", "null", "true", "[]", "{}", '"x"', '""'),
+    *(
+        "9" * 400,
+        "9" * 5000,
+        "[" * 200_000,
+        '{"a":' * 50_000,
+        '"\\ud800"',
+        "0.0000001",
+        "[[1,2],3]",
+    ),
+    *("0.5", "0.25", "1", "0", '"other"'),
+)
+
+
+def mutated(kind: str, seed: int, number: int) -> bytes:
+    """The damaged file of this number."""
+    random = np.random.default_rng([seed, number])
+    small, large = originals(kind)
+    originals_here = large if number % 20 == 0 and large else small
+    content = bytearray(originals_here[int(random.integers(len(originals_here)))])
+    ways = TEXT_WAYS if kind == "preset" else WAYS
+    for _ in range(int(random.integers(1, 4))):
+        content = ways[int(random.integers(len(ways)))](content, random)
+    return bytes(content)
+
+
+@cache
+def originals(kind: str) -> tuple[tuple[bytes, ...], tuple[bytes, ...]]:
+    """Sound files of a format, small ones and large ones, to be damaged."""
+    if kind == "preset":
+        return tuple(file.read_bytes() for file in sorted(REPOSITORY.glob("presets/*/*.json"))), ()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"sound.{kind}"
+        makers = {"tfx": _tfx_files, "tfxbone": _bone_files, "hair": _hair_files}[kind]
+        small = tuple(makers(path, 5))
+        return small, tuple(makers(path, 6000))
+
+
+def sample(strand_count: int, seed: int = 0, *, point_count: int = 0) -> Groom:
+    """A groom with all that formats hold; strands of 3 to 8 points, or of `point_count`."""
+    random = np.random.default_rng([strand_count, seed])
+    counts = random.integers(3, 9, strand_count)
+    if point_count:
+        counts[:] = point_count
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    points = random.uniform(-0.2, 0.2, (offsets[-1], 3)).astype(np.float32)
+    radius = random.uniform(2.0e-5, 9.0e-5, strand_count).astype(np.float32)
+    strands = StrandSet(
+        points,
+        offsets,
+        np.repeat(radius, counts),
+        np.arange(strand_count) % 3,
+        random.random((strand_count, 2)),
+    )
+    return Groom(strands, color=random.random((len(points), 3)))
+
+
+def _tfx_files(path: Path, strand_count: int) -> Iterator[bytes]:
+    groom = sample(strand_count, point_count=8)
+    for more in ({"vertex_uv": True}, {"multiple_of_64": True}):
+        write_tfx(path, groom, **more)
+        yield path.read_bytes()
+    yield tressfx_3(groom.strands, path.read_bytes())
+
+
+def tressfx_3(strands: StrandSet, floats: bytes) -> bytes:
+    """A file of version 3 with all blocks; `floats` fill those beyond the positions."""
+    header = np.zeros(1, HEADER_3)
+    count, vertices = strands.strand_count, len(strands.grid[0])
+    header["version"], header["strand_count"], header["vertex_count"] = 3.0, count, vertices
+    header["follow_count"] = 2
+    body, at = strands.points.tobytes(), HEADER_3.itemsize
+    header["positions"] = at
+    widths = {"thickness": 1, "strand_uv": 2, "color": 4 * vertices, "vertex_uv": 2 * vertices}
+    for name, width in widths.items():
+        header[name] = at + len(body)
+        body += floats[HEADER_4.itemsize :][: 4 * width * count]
+    return header.tobytes() + body
+
+
+def _bone_files(path: Path, strand_count: int) -> Iterator[bytes]:
+    random = np.random.default_rng(strand_count)
+    for bone_count in (1, 7):
+        names = tuple(f"bone.{'x' * index}" for index in range(bone_count))
+        write_tfxbone(path, strongest_bones(names, random.random((strand_count, bone_count))))
+        yield path.read_bytes()
+
+
+def _hair_files(path: Path, strand_count: int) -> Iterator[bytes]:
+    write_hair_file(path, sample(strand_count), uv=True)
+    content = path.read_bytes()
+    yield content
+    write_hair_file(path, sample(strand_count, point_count=4).strands)
+    yield path.read_bytes()
+    # all arrays, transparency among them
+    header = np.frombuffer(content, HEADER, 1).copy()
+    points = int(header["point_count"][0])
+    cut = HEADER.itemsize + 2 * strand_count + 16 * points
+    header["arrays"] |= 8
+    clear = np.zeros(points, "<f4").tobytes()
+    yield header.tobytes() + content[HEADER.itemsize : cut] + clear + content[cut:]
+
+
+def _flip_bits(content: bytearray, random: np.random.Generator) -> bytearray:
+    for _ in range(int(random.integers(1, 17))):
+        if content:
+            content[int(random.integers(len(content)))] ^= 1 << int(random.integers(8))
+    return content
+
+
+def _damage_head(content: bytearray, random: np.random.Generator) -> bytearray:
+    for _ in range(int(random.integers(1, 5))):
+        end = min(len(content), 300)
+        if end:
+            content[int(random.integers(end))] = int(random.integers(256))
+    return content
+
+
+def _extreme_count(content: bytearray, random: np.random.Generator) -> bytearray:
+    near = len(content) + int(random.integers(-20, 20))
+    value = int(random.choice([*EXTREMES, near & 0xFFFFFFFF, len(content) // 16]))
+    return _put(content, random, 64, value.to_bytes(4, "little"))
+
+
+def _extreme_number(content: bytearray, random: np.random.Generator) -> bytearray:
+    for _ in range(int(random.integers(1, 9))):
+        value = np.array([random.choice(NUMBERS)]).astype("<f4").tobytes()
+        content = _put(content, random, len(content), value)
+    return content
+
+
+def _swap_words(content: bytearray, random: np.random.Generator) -> bytearray:
+    end = min(len(content), 176) // 4
+    if end > 1:
+        a, b = (4 * int(word) for word in random.choice(end, 2, replace=False))
+        content[a : a + 4], content[b : b + 4] = content[b : b + 4], content[a : a + 4]
+    return content
+
+
+def _cut(content: bytearray, random: np.random.Generator) -> bytearray:
+    return content[: int(random.integers(len(content) + 1))]
+
+
+def _extend(content: bytearray, random: np.random.Generator) -> bytearray:
+    return content + random.bytes(int(random.integers(1, 200)))
+
+
+def _lose_some(content: bytearray, random: np.random.Generator) -> bytearray:
+    begin = int(random.integers(len(content) + 1))
+    del content[begin : begin + int(random.integers(1, 64))]
+    return content
+
+
+def _repeat_some(content: bytearray, random: np.random.Generator) -> bytearray:
+    begin = int(random.integers(len(content) + 1))
+    part = content[begin : begin + int(random.integers(1, 200))]
+    return content[:begin] + part + content[begin:]
+
+
+def _clear_some(content: bytearray, random: np.random.Generator) -> bytearray:
+    begin = int(random.integers(len(content) + 1))
+    part = content[begin : begin + int(random.integers(1, 200))]
+    content[begin : begin + len(part)] = bytes([int(random.choice([0, 0xFF]))]) * len(part)
+    return content
+
+
+def _other_token(content: bytearray, random: np.random.Generator) -> bytearray:
+    """A number or a text of a JSON file becomes something else."""
+    tokens = list(re.finditer(rb'-?\d[\d.eE+-]*|"[^"]*"|true|false', content))
+    if not tokens:
+        return content
+    token = tokens[int(random.integers(len(tokens)))]
+    other = TOKENS[int(random.integers(len(TOKENS)))].encode()
+    return content[: token.start()] + other + content[token.end() :]
+
+
+def _near_number(content: bytearray, random: np.random.Generator) -> bytearray:
+    """A number of a JSON file changes by up to a tenth, which may stay in its range."""
+    numbers = list(re.finditer(rb"-?\d+\.\d+", content))
+    if not numbers:
+        return content
+    number = numbers[int(random.integers(len(numbers)))]
+    near = repr(float(number[0]) * float(random.uniform(0.9, 1.1))).encode()
+    return content[: number.start()] + near + content[number.end() :]
+
+
+def _put(content: bytearray, random: np.random.Generator, end: int, value: bytes) -> bytearray:
+    words = min(end, len(content)) // 4
+    if words:
+        at = 4 * int(random.integers(words))
+        content[at : at + 4] = value
+    return content
+
+
+WAYS = (
+    _flip_bits,
+    _damage_head,
+    _extreme_count,
+    _extreme_number,
+    _swap_words,
+    _cut,
+    _extend,
+    _lose_some,
+    _repeat_some,
+    _clear_some,
+)
+TEXT_WAYS = (
+    *(_flip_bits, _cut, _extend, _lose_some, _repeat_some, _clear_some),
+    *[_other_token] * 4,
+    *[_near_number] * 4,
+)

@@ -1,0 +1,148 @@
+"""Damaged files of every format that Hairloom parses itself: a clear error or a sound groom.
+
+python tools/in_package.py fuzz_files FORMAT COUNT [SEED]    a line of JSON
+
+The files are those of `damaged_files`. A failure is any other exception than HairloomError, one
+without a place or a remedy, a groom that is not sound, more than SLOWEST seconds, or more memory
+than MOST_TIMES the file and MOST_BESIDE.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import signal
+import tempfile
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from damaged_files import mutated
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.hair_file import read_hair_file
+from hairloom.addon.exchange.read_groom import ReadGroom
+from hairloom.addon.exchange.tfxbone import ReadBones, read_tfxbone
+from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.parameters import ALL_SETTINGS
+from hairloom.addon.params.preset import Preset, read_any_preset
+
+SLOWEST = 2.0
+MOST_TIMES, MOST_BESIDE = 10, 1_000_000
+LONGEST_MESSAGE = 2000
+#: address space of the child beyond what it has at the start [bytes]
+ADDRESSES = 1 << 29
+
+
+def read_preset_file(path: Path) -> Preset[Any]:
+    return read_any_preset(path, ALL_SETTINGS)
+
+
+READERS: dict[str, Callable[[Path], Any]] = {
+    "tfx": read_tfx,
+    "tfxbone": read_tfxbone,
+    "hair": read_hair_file,
+    "preset": read_preset_file,
+}
+
+
+def main(arguments: list[str]) -> int:
+    kind, count, seed = arguments[0], int(arguments[1]), int((arguments[2:] or ["0"])[0])
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    limit = pages * resource.getpagesize() + ADDRESSES
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    found = fuzzed(kind, count, seed)
+    print(json.dumps(found))
+    return 0
+
+
+def fuzzed(kind: str, count: int, seed: int = 0) -> dict[str, Any]:
+    """Read `count` damaged files of a format; failures are named with their numbers."""
+    outcomes = {"read": 0, "refused": 0}
+    failures: list[str] = []
+    slowest, hungriest = 0.0, 0.0
+    tracemalloc.start()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"damaged.{kind}"
+        for number in range(count):
+            content = mutated(kind, seed, number)
+            path.write_bytes(content)
+            outcome, seconds, peak = judged(READERS[kind], path)
+            slowest = max(slowest, seconds)
+            hungriest = max(hungriest, (peak - MOST_BESIDE) / max(len(content), 1))
+            if peak > MOST_TIMES * len(content) + MOST_BESIDE:
+                outcome = f"{peak:,} bytes of memory for a file of {len(content):,}"
+            if seconds > SLOWEST:
+                outcome = f"{seconds:.1f} s"
+            if outcome in outcomes:
+                outcomes[outcome] += 1
+            else:
+                failures.append(f"{kind} {seed} {number}: {outcome}")
+    tracemalloc.stop()
+    return {
+        "files": count,
+        "failures": failures,
+        **outcomes,
+        "slowest": slowest,
+        "memory_times": hungriest,
+    }
+
+
+def judged(read: Callable[[Path], Any], path: Path) -> tuple[str, float, int]:
+    """How reading a file went: "read", "refused" or what was wrong; seconds; bytes at the most."""
+    tracemalloc.reset_peak()
+    before = tracemalloc.get_traced_memory()[0]
+    started = time.perf_counter()
+    try:
+        with _interrupted_after(3.0 * SLOWEST):
+            outcome = unsound(read(path)) or "read"
+    except HairloomError as error:
+        is_told = bool(error.problem and error.remedy and path.name in error.place)
+        is_clear = is_told and len(str(error)) < LONGEST_MESSAGE
+        outcome = "refused" if is_clear else f"an unclear message: {error}"
+    except (Exception, _Hang) as error:
+        outcome = f"{type(error).__name__}: {error}"
+    seconds = time.perf_counter() - started
+    return outcome, seconds, tracemalloc.get_traced_memory()[1] - before
+
+
+def unsound(found: Any) -> str:
+    """What is wrong with what a reader gave; empty where nothing is."""
+    if isinstance(found, ReadGroom):
+        strands, color = found.strands, found.groom.color
+        sound = [
+            strands.strand_count > 0,
+            np.isfinite(strands.points).all(),
+            np.isfinite(strands.radius).all() and (strands.radius > 0.0).all(),
+            strands.root_uv is None or np.isfinite(strands.root_uv).all(),
+            color is None or (np.isfinite(color).all() and (color >= 0.0).all()),
+        ]
+        return "" if all(sound) else f"a groom that is not sound: {sound}"
+    if isinstance(found, ReadBones):
+        weight = found.weights.weight
+        sums = weight.sum(axis=1, dtype=np.float64)
+        is_sound = (weight >= 0.0).all() and (np.abs(sums - 1.0) < 1.0e-5).all()
+        return "" if is_sound else "weights that are not sound"
+    return "" if isinstance(found, Preset) else f"a {type(found).__name__}"
+
+
+class _Hang(BaseException):
+    """Not to be caught by a reader."""
+
+
+@contextmanager
+def _interrupted_after(seconds: float) -> Iterator[None]:
+    def interrupt(*_: object) -> None:
+        raise _Hang(f"still reading after {seconds:g} s")
+
+    old = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, old)
