@@ -6,24 +6,19 @@ normal, and follows each from card to card until it meets the head or the open.
 
 from __future__ import annotations
 
-import os
 import time
-from pathlib import Path
 
 import numpy as np
-from extension_loader import REPOSITORY
+from _cards_groom import sintel_rig
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from hairloom.addon import pipeline
+from hairloom.addon.card_flow import card_build
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.occlusion import CardShade, vertex_occlusion
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.exchange.tressfx import read_tfx
-from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.host.mesh_files import read_mesh_file
 from hairloom.addon.shading.textures import TextureSettings, hair_textures
 from hairloom.addon.strands import Surface
 
@@ -63,14 +58,11 @@ def occlusion_figures() -> dict[str, float]:
 
 def sintel_cards() -> tuple[CardMesh, np.ndarray, Surface]:
     """Cards of Sintel's hair, the alpha of their texture, and her head."""
-    data = os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data")
-    folder = Path(data) / "sintel"
-    strands = read_tfx(folder / "SintelHairOriginal-sintel_hair.16points.tfx").strands
-    head = read_mesh_file(folder / "sintel.obj", need_uv=False)
-    rig = pipeline.prepare(strands, head, GuideSettings(), place="Sintel")
+    rig = sintel_rig()
+    assert rig.head is not None
     quick = CardOcclusionSettings(rays=1)
-    mesh = pipeline.card_build(rig, CARDS, AtlasSettings(source="made"), quick).finest
-    return mesh, hair_textures(TextureSettings(), mesh.atlas.columns).alpha, head
+    mesh = card_build(rig, CARDS, AtlasSettings(source="made"), quick).finest
+    return mesh, hair_textures(TextureSettings(), mesh.atlas.columns).alpha, rig.head
 
 
 def brute_force(

@@ -8,24 +8,18 @@ alike.
 
 from __future__ import annotations
 
-import os
 import time
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import gpu
 import numpy as np
-from extension_loader import REPOSITORY
+from _cards_groom import sintel_rig
 
-from hairloom.addon import pipeline
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.drawing_settings import CardDrawingSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.exchange.srgb import srgb_encoded
-from hairloom.addon.exchange.tressfx import read_tfx
-from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.host.card_builds import CardForm, built_cards
-from hairloom.addon.host.mesh_files import read_mesh_file
 from hairloom.addon.render.accumulation import Target
 from hairloom.addon.render.camera import Camera, frame_camera
 from hairloom.addon.render.card_pass import CardPass
@@ -117,15 +111,12 @@ _kept: list[tuple[CardSnapshot, MeshSnapshot]] = []
 
 def sintel_cards() -> tuple[CardSnapshot, MeshSnapshot]:
     if not _kept:
-        data = os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data")
-        folder = Path(data) / "sintel"
-        strands = read_tfx(folder / "SintelHairOriginal-sintel_hair.16points.tfx").strands
-        head = read_mesh_file(folder / "sintel.obj", need_uv=False)
-        rig = pipeline.prepare(strands, head, GuideSettings(), place="Sintel")
+        rig = sintel_rig()
+        assert rig.head is not None
         form = CardForm(cards=CARDS, atlas=AtlasSettings(source="made"))
         built = built_cards(rig, form, {})
         cards = built.drawn(built.rest, (CardDrawingSettings(), StrandSettings()))
-        _kept.append((cards, MeshSnapshot.of(head)))
+        _kept.append((cards, MeshSnapshot.of(rig.head)))
     return _kept[0]
 
 

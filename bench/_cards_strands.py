@@ -1,22 +1,22 @@
 """Cards beside the strands that they stand for: the sheet out/cards_sheet.png.
 
 Sintel's hair from eight sides at one metre, by one sun and the world's light, in front of a head
-that hides what is behind it: strands above, cards below. Both have the groom's own width, the looks
-that ship, and shadows of their own.
+that hides what is behind it: strands above, cards below, of two looks and two widths of strands.
+With deep shadows each has those of its own hair; without, what comes of ambient occlusion.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from _cards_groom import SETTINGS, sintel_rig
 from extension_loader import REPOSITORY
 
 from hairloom.addon import pipeline
-from hairloom.addon.cards.build import CardBuild
-from hairloom.addon.host.card_maps import CardMaps, made_maps
+from hairloom.addon.cards.steps import result_of
+from hairloom.addon.host.card_making import CardChoices, MadeCards, making_steps
+from hairloom.addon.host.card_maps import made_maps
 from hairloom.addon.host.images import contact_sheet, write_png
 from hairloom.addon.host.presets import named_preset
 from hairloom.addon.pipeline import Rig
@@ -24,61 +24,75 @@ from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.card_snapshot import CardSnapshot
 from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
+from hairloom.addon.shading.ambient import AmbientSettings
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.textures import TextureSettings
+from hairloom.addon.shading.volume.card_opacity import StrandArea, card_shade
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
 SHEET = REPOSITORY / "out" / "cards_sheet.png"
 VIEWS, DISTANCE, SIZE, SAMPLES = 8, 1.0, 256, 2
+#: some views are drawn larger as well, where strands are as wide as a good part of a pixel
+LARGE, LARGE_VIEWS = 1024, (0, 3)
 SUN, STRENGTH, WORLD = (0.4, 0.6, -0.8), 4.0, (0.3, 0.3, 0.3)
-LOOKS = ("brown", "blond")
-
-
-@dataclass(frozen=True)
-class Choices:
-    """What maps hang on."""
-
-    shading: ShadingSettings
-    texture: TextureSettings = field(default_factory=TextureSettings)
-    strands: StrandSettings = field(default_factory=StrandSettings)
-    pictures: Mapping[str, np.ndarray] = field(default_factory=dict)
+LOOKS, WIDTHS, SHADOWS = ("brown", "blond"), (1.0, 2.0), ("deep", "none")
 
 
 def strands_figures() -> dict[str, float]:
     """Write the sheet; how far cards are from strands, relative, at worst of the eight views.
 
-    coverage_difference: of the sum of alpha. color_difference_*: of the mean colour, at worst of
-    the three channels.
+    coverage_difference: of the sum of alpha, over both widths; coverage_difference_<size>: of the
+        larger pictures, with strands as wide as the file has them.
+    color_difference_<look>: of the mean colour of what is covered, at worst of the three channels
+        and of both widths, with shadows; color_difference_<look>_unshadowed: without.
     """
     rig = sintel_rig()
+    occlusion = pipeline.rest_occlusion(rig, AmbientSettings())
     found: dict[str, float] = {"coverage_difference": 0.0}
-    pictures = []
-    for name in LOOKS:
-        shading = _look(name)
-        build, maps = _cards(rig, shading)
-        rows = [
-            [_drawn(rig, shading, view, cards) for view in range(VIEWS)]
-            for cards in (None, CardSnapshot(build.finest, maps.textures, True))
-        ]
-        coverage, color = _differences(*rows)
-        found["coverage_difference"] = max(found["coverage_difference"], coverage)
-        found[f"color_difference_{name}"] = color
-        pictures += [*rows[0], *rows[1]]
+    pictures: list[np.ndarray] = []
+    for width in WIDTHS:
+        made = _made(rig, width)
+        for look in LOOKS:
+            strands = _strands(rig, look, width, occlusion)
+            cards = _as_cards(strands, _cards(rig, made, look, width))
+            for shadows in SHADOWS:
+                rows = [_drawn(rig, hair, shadows) for hair in (strands, cards)]
+                coverage, color = _differences(*rows)
+                found["coverage_difference"] = max(found["coverage_difference"], coverage)
+                name = f"color_difference_{look}{'_unshadowed' * (shadows == 'none')}"
+                found[name] = max(found.get(name, 0.0), color)
+                pictures += [*rows[0], *rows[1]] if shadows == SHADOWS[0] else []
+            if width == WIDTHS[0] and look == LOOKS[0]:
+                rows = [_drawn(rig, h, "none", LARGE_VIEWS, LARGE) for h in (strands, cards)]
+                found[f"coverage_difference_{LARGE}"] = _differences(*rows)[0]
     SHEET.parent.mkdir(exist_ok=True)
     write_png(SHEET, contact_sheet([_shown(each) for each in pictures], VIEWS))
     return found
 
 
-def _cards(rig: Rig, shading: ShadingSettings) -> tuple[CardBuild, CardMaps]:
-    made: list[CardMaps] = []
+def _choices(look: str, width: float) -> CardChoices:
+    return CardChoices(*SETTINGS, TextureSettings(), _look(look), StrandSettings(width_scale=width))
 
-    def alpha_of(build: CardBuild) -> np.ndarray:
-        made.append(made_maps(rig, build, Choices(shading)))
-        return made[-1].textures.alpha
 
-    build = pipeline.card_build(rig, *SETTINGS, alpha_of)
-    return build, made[-1]
+def _made(rig: Rig, width: float) -> MadeCards:
+    return result_of(making_steps(rig, _choices(LOOKS[0], width)))
+
+
+def _cards(rig: Rig, made: MadeCards, look: str, width: float) -> CardSnapshot:
+    """The cards in a look, which changes nothing but their maps."""
+    choices, build, grid = _choices(look, width), made.build, rig.strands.grid
+    maps, mesh = made_maps(rig, build, choices), build.finest
+    area = StrandArea.of(grid, rig.strands.radius.reshape(grid.shape[:2]))
+    shade = card_shade(mesh.positions, mesh.triangles, mesh.uv, maps.textures.alpha)
+    return CardSnapshot(
+        mesh,
+        maps.textures,
+        maps.has_tangent_map,
+        build.backs[0],
+        thickness=area.shade(choices.strands) / shade,
+        is_even=maps.is_even,
+    )
 
 
 def _look(name: str) -> ShadingSettings:
@@ -87,22 +101,33 @@ def _look(name: str) -> ShadingSettings:
     return shading
 
 
-def _drawn(rig: Rig, shading: ShadingSettings, view: int, cards: CardSnapshot | None) -> np.ndarray:
-    """One view of strands, or of cards in their place."""
+def _strands(rig: Rig, look: str, width: float, occlusion: np.ndarray) -> Snapshot:
     strands = rig.strands
-    snapshot = Snapshot(
+    assert rig.head is not None
+    return Snapshot(
         strands=strands.grid.astype(np.float32),
         radius=strands.radius.reshape(strands.strand_count, -1).astype(np.float32),
+        occlusion=occlusion,
         meshes=(replace(MeshSnapshot.of(rig.head), is_holdout=True),),
         lights=(Light.sun(SUN, (1.0, 1.0, 1.0), STRENGTH),),
         ambient=WORLD,
-        shading=shading,
-        volume=VolumeSettings(shadows="deep"),
+        shading=_look(look),
+        strand_settings=StrandSettings(width_scale=width),
     )
-    if cards is not None:
-        nothing = np.zeros((0, 2, 3), np.float32)
-        snapshot = replace(snapshot, strands=nothing, radius=nothing[..., 0], cards=cards)
-    return render_image(snapshot, _camera(rig, view), SIZE, SIZE, SAMPLES)
+
+
+def _as_cards(hair: Snapshot, cards: CardSnapshot) -> Snapshot:
+    none = np.zeros((0, 2, 3), np.float32)
+    return replace(hair, strands=none, radius=none[..., 0], occlusion=None, cards=cards)
+
+
+def _drawn(
+    rig: Rig, hair: Snapshot, shadows: str, views: tuple[int, ...] = (), size: int = SIZE
+) -> list[np.ndarray]:
+    """These views, or all."""
+    shaded = replace(hair, volume=VolumeSettings(shadows=shadows))
+    chosen = views or range(VIEWS)
+    return [render_image(shaded, _camera(rig, view), size, size, SAMPLES) for view in chosen]
 
 
 def _camera(rig: Rig, view: int) -> Camera:

@@ -4,10 +4,12 @@
 // is left out here, so that the depth test may come first. TANGENT_MAP 1: a map says which way strands
 // run, in place of the shift texture. NORMAL_MAP 1: a map bends the normal. SHADOWS of hair on hair, and SCATTERING from strand to strand, as strands have
 // them; where a light has no map, the occlusion stands in.
+#include "lib_card_texture.glsl"
 #if PRIME
 void main()
 {
-  if (texture(alpha_texture, card_uv).x < opaque_alpha) {
+  vec4 steps = sharpness * vec4(dFdx(card_uv), dFdy(card_uv));
+  if (card_texel(alpha_texture, card_uv, steps, atlas_tiles).x < opaque_alpha) {
     discard;
   }
   color = vec4(0.0);
@@ -25,20 +27,24 @@ void main()
   vec3 tangent = unit_or(card_tangent, vec3(0.0, 0.0, 1.0));
   vec3 to_eye = unit_or(view.eye.xyz - view.eye.w * card_point, normal);
   float along = card_along;
-  float alpha = texture(alpha_texture, card_uv).x;
+  vec4 steps = vec4(dFdx(card_uv), dFdy(card_uv));
+  float alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
+#  if EVEN
+  alpha = even_alpha(alpha, cross(dFdx(card_point), dFdy(card_point)), tangent, to_eye);
+#  endif
 #  if TANGENT_MAP
-  vec3 texel = texture(tangent_texture, card_uv).xyz;
+  vec3 texel = card_texel(tangent_texture, card_uv, steps, atlas_tiles).xyz;
   tangent = mapped_tangent(texel, tangent, normal, shading.shift_noise);
   float shift_noise = 0.5;
 #  else
-  float shift_noise = texture(shift_texture, card_uv).x;
+  float shift_noise = card_texel(shift_texture, card_uv, steps, vec2(0.0)).x;
 #  endif
 #  if NORMAL_MAP
-  normal = mapped_normal(texture(normal_texture, card_uv).xyz,
+  normal = mapped_normal(card_texel(normal_texture, card_uv, steps, atlas_tiles).xyz,
                          unit_or(card_tangent, vec3(0.0, 0.0, 1.0)),
                          normal);
 #  endif
-  float sparkle_noise = texture(noise_texture, card_uv).x;
+  float sparkle_noise = card_texel(noise_texture, card_uv, steps, vec2(0.0)).x;
   vec3 absorption = vec3(0.0);
 #  if MARSCHNER
   vec3 colored = strand_absorption(fibre, along, 0.5, 1.5, shading);
@@ -71,7 +77,7 @@ void main()
                                         level,
                                         way);
   }
-  radiance *= texture(base_texture, card_uv).xyz;
+  radiance *= card_texel(base_texture, card_uv, steps, atlas_tiles).xyz;
   float covered = is_opaque == 1 ? 1.0 : alpha;
 #  if CLIPPED
   if (alpha < alpha_range.x || alpha >= alpha_range.y) {

@@ -20,6 +20,16 @@ vec3 mapped_normal(vec3 texel, vec3 tangent, vec3 normal)
   return unit_or(way.x * side + way.y * tangent + way.z * normal, normal);
 }
 
+// What a card covers that is seen at a slant, if alpha is what it covers on the mean of all turns about
+// its strands. `across`: normal of its plane, of any length.
+float even_alpha(float alpha, vec3 across, vec3 tangent, vec3 to_eye)
+{
+  vec3 turned = to_eye - dot(to_eye, tangent) * tangent;
+  float size = length(across) * length(turned);
+  float facing = size > 0.0 ? abs(dot(across, turned)) / size : 1.0;
+  return 1.0 - pow(1.0 - alpha, {{mean_facing}} / max(facing, {{least_facing}}));
+}
+
 // Mean colour of the strands, of which some are grey: times the base texture it is the hair's.
 vec3 card_base(float along, ShadingSettings shading)
 {

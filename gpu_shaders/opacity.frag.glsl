@@ -6,12 +6,15 @@
 #include "lib_opacity.glsl"
 #ifdef CARDS
 #  include "lib_card_opacity.glsl"
+#  include "lib_card_texture.glsl"
 #endif
 
 void main()
 {
 #ifdef CARDS
-  float strand_weight = card_thickness * card_optical_depth(texture(alpha_texture, card_uv).x);
+  vec4 steps = vec4(dFdx(card_uv), dFdy(card_uv));
+  float alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
+  float strand_weight = card_thickness * card_optical_depth(alpha);
 #endif
   float behind = strand_depth;
 #if DEEP

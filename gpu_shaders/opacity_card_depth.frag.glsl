@@ -1,7 +1,10 @@
 // Opacity maps, fragment stage of cards: the depth of those that are not clear.
+#include "lib_card_texture.glsl"
+
 void main()
 {
-  if (texture(alpha_texture, card_uv).x < least_alpha) {
+  vec4 steps = vec4(dFdx(card_uv), dFdy(card_uv));
+  if (card_texel(alpha_texture, card_uv, steps, atlas_tiles).x < least_alpha) {
     discard;
   }
 }

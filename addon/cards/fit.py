@@ -26,6 +26,8 @@ _TURNS = 72
 _LEAST_WIDTH = 0.25
 #: How far a card reaches beyond the mean tip, in standard deviations of where its strands end.
 _TIP_REACH = 1.3
+#: And before the mean root: sqrt(3) holds evenly spread roots, so that no parting is bald.
+_ROOT_REACH = 1.7
 
 
 def cluster_of_strands(grid: Floats, group: Ints, settings: CardSettings) -> Ints:
@@ -82,6 +84,7 @@ def fit_strips(
     spread = mean.of(np.stack([ahead * ahead, aside * aside, ahead * aside], axis=-1))
     turn = _best_turn(spread, normal, side, outwards)
     thickness = mean.of(radius)
+    center[:, 0] -= _before_root(away[:, 0], tangent[:, 0], outwards, mean, cluster)
     center[:, -1] += tangent[:, -1] * _beyond_tip(away[:, -1], tangent[:, -1], mean, cluster)
     strips: list[tuple[CardFrames, Floats]] = []
     for further in (0.0, np.pi / 2.0)[: 1 + settings.crossed]:
@@ -102,6 +105,25 @@ def _beyond_tip(away: Floats, tangent: Floats, mean: _Mean, cluster: Ints) -> Fl
     """
     ahead = np.einsum("si,si->s", away, tangent[cluster])
     return _TIP_REACH * np.sqrt(mean.of(ahead * ahead))[:, None]
+
+
+def _before_root(
+    away: Floats, tangent: Floats, outwards: Floats, mean: _Mean, cluster: Ints
+) -> Floats:
+    """From where a card begins to the mean root, so that it holds its rearmost roots, (n, 3) [m].
+
+    It runs back along the head. Hair that stands upright has no rearmost roots.
+
+    Args:
+        away: (strand_count, 3) from the mean root to each strand's.
+        outwards: (n, 3) the mean normal of the head.
+    """
+    up = outwards / np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-12)
+    flat = tangent - up * np.einsum("ci,ci->c", tangent, up)[:, None]
+    lying = np.linalg.norm(flat, axis=1, keepdims=True)
+    ahead = np.einsum("si,si->s", away, (flat / np.maximum(lying, 1e-12))[cluster])
+    reach: Floats = flat * (_ROOT_REACH * np.sqrt(mean.of(ahead * ahead)))[:, None]
+    return reach
 
 
 def _stacked(strips: Sequence[tuple[CardFrames, Floats]]) -> Strips:

@@ -29,7 +29,9 @@ DIRECTIONS = ("normal", "tangent")
 LABELS = ("strand_id",)
 #: Fewer texels than these say nothing about a tile's coverage: the whole texture's is kept then.
 _LEAST_TILE_TEXELS = 16
-#: Below it there is no hair to weigh by, or no direction [1].
+#: What texels without hair weigh, so that where there is none at all the mean is that of all.
+_LEAST_WEIGHT = 1e-12
+#: Below it there is no direction [1].
 _NOTHING = 1e-6
 
 
@@ -40,7 +42,7 @@ def level_sizes(width: int, height: int) -> list[tuple[int, int]]:
 
 
 def mip_levels(
-    maps: Mapping[str, Floats], *, grid: AtlasGrid | None = None, threshold: float = 0.5
+    maps: Mapping[str, Floats], *, grid: AtlasGrid | None = None, threshold: float | None = 0.5
 ) -> Iterator[dict[str, Floats]]:
     """All levels of a set of maps, the maps themselves first.
 
@@ -48,7 +50,7 @@ def mip_levels(
         maps: name -> (height, width) or (height, width, channels) in [0, 1], all of one size;
             "alpha", where it is there, says where there is hair. See DIRECTIONS and LABELS.
         grid: the tiles that must not run into each other.
-        threshold: of the alpha test, in (0, 1).
+        threshold: of the alpha test, in (0, 1); None averages alpha as it stands, for blending.
 
     Yields:
         The same names with arrays of that level's size.
@@ -57,7 +59,7 @@ def mip_levels(
     grid = grid or AtlasGrid()
     alpha = maps.get("alpha")
     weight = np.ones((height, width), np.float32) if alpha is None else alpha
-    coverage = _coverage(weight, grid, threshold)
+    coverage = None if threshold is None else _coverage(weight, grid, threshold)
     level = {name: _as_averaged(name, values, weight) for name, values in maps.items()}
     yield dict(maps)
     for smaller in level_sizes(width, height)[1:]:
@@ -67,7 +69,7 @@ def mip_levels(
         weight = halving.mean(weight)
         level = averaged | kept
         made = {name: _as_shown(name, values, weight) for name, values in level.items()}
-        if alpha is not None:
+        if alpha is not None and coverage is not None and threshold is not None:
             made["alpha"] = _with_coverage(weight, coverage, grid, threshold)
         yield {name: made[name] for name in maps}
 
@@ -129,8 +131,9 @@ class _Taps:
         """Along axis 0, (new, ...)."""
         if np.array_equal(self.index.ravel(), np.arange(len(values))) and self.is_even:
             pairs = values.reshape(len(self.index), -1, *values.shape[1:])
-            return pairs.mean(axis=1, dtype=np.float32)
-        total: Floats = np.zeros((len(self.index), *values.shape[1:]), np.float32)
+            total = sum(pairs[:, each] for each in range(1, pairs.shape[1])) + pairs[:, 0]
+            return (total / np.float32(pairs.shape[1])).astype(np.float32, copy=False)
+        total = np.zeros((len(self.index), *values.shape[1:]), np.float32)
         for index, share in zip(self.index.T, self.share.T, strict=True):
             total += values[index] * share.reshape(-1, *(1,) * (values.ndim - 1))
         return total
@@ -175,22 +178,23 @@ def _tile_of(texels: int, tiles: int) -> Ints:
 
 
 def _as_averaged(name: str, values: Floats, weight: Floats) -> Floats:
-    """What can be summed up level by level: the value by its weight, and the value alone."""
+    """What can be summed up level by level: the value by its weight, which is never nothing."""
     if name == "alpha" or name in LABELS:
         return values
     plain = 2.0 * values - 1.0 if name in DIRECTIONS else values
     by_weight = weight if values.ndim == 2 else weight[..., None]
-    both: Floats = np.stack([plain * by_weight, plain], axis=-1).astype(np.float32)
-    return both
+    weighted: Floats = (plain * (by_weight + np.float32(_LEAST_WEIGHT))).astype(
+        np.float32, copy=False
+    )
+    return weighted
 
 
 def _as_shown(name: str, values: Floats, weight: Floats) -> Floats:
     """What a texture holds of such a sum: where there is no hair, the mean of all."""
     if name == "alpha" or name in LABELS:
         return values
-    by_weight = weight if values.ndim == 3 else weight[..., None]
-    has_hair = by_weight > _NOTHING
-    mean = np.where(has_hair, values[..., 0] / np.where(has_hair, by_weight, 1.0), values[..., 1])
+    by_weight = weight if values.ndim == 2 else weight[..., None]
+    mean = values / (by_weight + np.float32(_LEAST_WEIGHT))
     if name in DIRECTIONS:
         return np.asarray(0.5 * _unit(mean) + 0.5, np.float32)
     return np.clip(mean, 0.0, 1.0)

@@ -15,7 +15,7 @@ compute shader that makes texels of them. Reference: cards/bake.py. The textures
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,7 @@ from ..arrays import Floats
 from ..cards.atlas_maps import AtlasMaps
 from ..cards.bake import SAMPLES, Block, at_least_a_sample, blocks_of
 from ..cards.bake_strands import FlatStrands
+from ..cards.steps import result_of
 from .shader_program import ShaderProgram, ShaderRecipe, program
 from .textures import drawing_into, drawing_state, strand_rows, texture_from, texture_to_array
 
@@ -72,7 +73,12 @@ _TEXEL_RECIPE = ShaderRecipe(
 
 
 def baked_maps(flat: FlatStrands, size: int) -> AtlasMaps:
-    """The maps of an atlas, with zeros where no strand is: as cards.bake.sampled_maps.
+    """All steps of `baking` at once."""
+    return result_of(baking(flat, size))
+
+
+def baking(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMaps]:
+    """Bake the maps of an atlas, a block a step; zeros where no strand is, as sampled_maps.
 
     Args:
         size: of the atlas [pixels].
@@ -85,6 +91,7 @@ def baked_maps(flat: FlatStrands, size: int) -> AtlasMaps:
         for block, made in _blocks(_Bake.of(flat, size)):
             rows = slice(block.low, block.low + block.height)
             texels[:, rows, block.left : block.left + block.width] = made
+            yield
     place, base, tangent, normal = texels
     return AtlasMaps(
         alpha=base[..., 3].copy(),

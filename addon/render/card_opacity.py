@@ -20,6 +20,7 @@ from ..shading.settings import StrandSettings
 from ..shading.volume.light_frame import Ball, ball_around
 from ..shading.volume.map_size import START_TEXELS
 from ..shading.volume.settings import VolumeSettings
+from .card_textures import tiles_of
 from .opacity_maps import OpacityMaps
 from .opacity_pass import OpacityPass
 from .shader_program import ShaderRecipe, program
@@ -42,7 +43,7 @@ def card_opacity_recipe(slots: int, *, is_deep: bool) -> ShaderRecipe:
         blocks=_BLOCKS,
         textures=(("FLOAT_2D", "alpha_texture"), *starts),
         integers=("light_index", "first_texel", *(("map_index",) if is_deep else ())),
-        numbers=(("FLOAT", "card_thickness"),),
+        numbers=(("FLOAT", "card_thickness"), ("VEC2", "atlas_tiles")),
         inputs=_INPUTS,
         varyings=_VARYINGS,
         outputs=tuple(("VEC4", f"layers_{slot}") for slot in range(slots)),
@@ -58,7 +59,7 @@ _DEPTH_RECIPE = ShaderRecipe(
     blocks=_BLOCKS,
     textures=(("FLOAT_2D", "alpha_texture"),),
     integers=("light_index",),
-    numbers=(("FLOAT", "least_alpha"),),
+    numbers=(("FLOAT", "least_alpha"), ("VEC2", "atlas_tiles")),
     inputs=_INPUTS,
     varyings=_VARYINGS,
 )
@@ -81,7 +82,7 @@ class CardOpacity(OpacityPass):
         super().release()
         self._batch: Any = None
         self._alpha: Any = None
-        self._thickness = 1.0
+        self._thickness, self._tiles = 1.0, (1.0, 1.0)
         self._serial = 0
         self._extent: tuple[CardMesh | None, Ball] = (None, Ball(np.zeros(3), 1.0))
 
@@ -106,6 +107,7 @@ class CardOpacity(OpacityPass):
         if not is_same:
             self._batch, self._alpha, self._serial = batch, alpha, self._serial + 1
             self._thickness = thickness
+        self._tiles = tiles_of(mesh.atlas)
         if self._extent[0] is not mesh:
             self._extent = mesh, ball_around(mesh.positions)
         ball, lit_by = self._extent[1], kept_lights(lights)
@@ -138,7 +140,7 @@ class CardOpacity(OpacityPass):
                     blocks=blocks,
                     textures=textures,
                     integers={**integers, "first_texel": turn * slots},
-                    numbers={"card_thickness": self._thickness},
+                    numbers={"card_thickness": self._thickness, "atlas_tiles": self._tiles},
                 )
                 self._batch.draw(shader.shader)
 
@@ -166,7 +168,7 @@ class CardOpacity(OpacityPass):
                 blocks={"opacity": self._blocks["opacity"].buffer},
                 textures={"alpha_texture": self._alpha},
                 integers={"light_index": light},
-                numbers={"least_alpha": LEAST_ALPHA},
+                numbers={"least_alpha": LEAST_ALPHA, "atlas_tiles": self._tiles},
             )
             self._batch.draw(shader.shader)
         return depths

@@ -11,10 +11,12 @@ shaded. The author's simpler scheme has three passes, each with a test. Either d
 they stand, or sorted by card for the eye; exchange/sidecar.py lists the states, for engines too.
 Opaque meshes have to be drawn before.
 
-Limitations: what cards.sort says of the order. Textures have a single level, as Blender's GPU
-textures do: what is drawn small has to be drawn with several samples a pixel. At 240 pixels a head
-differs from one of 16 x 16 samples by 6 % with one sample, 2 % with 2 x 2 and 1 % with 3 x 3;
-smoother textures would make that 5, 2 and 1 %, because it is edges that need the samples.
+Textures have their mip maps in them, see card_textures.py. Seen at a slant, cards of a baked atlas
+cover as much as their strands do, see shading/card_look.py.
+
+Limitations: what cards.sort says of the order. Front faces that are nearly clear write depth, as
+the paper has it, and hide what is behind them but drawn later: an eighth of what thin hair covers.
+Baked cards are made so much denser (card_look.MEAN_FACING).
 """
 
 from __future__ import annotations
@@ -25,31 +27,27 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import gpu
-import numpy as np
 
-from ..arrays import Floats
 from ..cards.drawing_settings import CardDrawingSettings
 from ..exchange.sidecar import FOUR_PASSES, OPAQUE_ALPHA, THREE_PASSES, DrawPass
 from ..params.glsl import struct_values
 from ..shading.lights import kept_lights, kinds_needed, pack_lights
 from ..shading.marschner.look import pack_fibre
-from ..shading.textures import HairTextures
 from .camera import Camera
 from .card_batches import CardBatches
 from .card_opacity import CardOpacity
 from .card_recipe import PRIME_RECIPE, CardShading
 from .card_snapshot import CardSnapshot
+from .card_textures import CardTextures, tiles_of
 from .display import Display
 from .marschner_textures import MARSCHNER
 from .opacity_maps import OpacityMaps
 from .shader_program import program, released_with_shaders
 from .shader_source import output_index
 from .snapshot import Snapshot
-from .textures import UniformBlock, drawing_state, texture_from
+from .textures import UniformBlock, drawing_state
 from .view_block import view_values
 
-#: textures that repeat in u and v; the others end at their edges
-_REPEATED = ("shift", "noise")
 _BLOCKS = ("view", "lights", "shading", "fibre", "opacity")
 #: from this alpha on a card is what stands in a pixel, for depth and object masks
 _PRESENT_ALPHA = 0.5
@@ -84,11 +82,11 @@ class CardPass:
         cards = _drawn(snapshot)
         if cards is None or snapshot.volume.shadows == "none":
             return None
-        self._upload(cards.textures)
+        self._textures.upload(cards)
         return self._opacity.of(
             cards.mesh,
             self._batches.static(cards),
-            self._textures["alpha"],
+            self._textures.of("alpha"),
             snapshot.lights,
             snapshot.volume,
             snapshot.all_casters,
@@ -119,7 +117,7 @@ class CardPass:
         cards = _drawn(snapshot)
         if cards is None:
             return
-        self._upload(cards.textures)
+        self._textures.upload(cards)
         batches = self._batches.of(cards, camera.eye)
         shaded = self._shaded(snapshot, cards, camera, (width, height), opacity, display)
         shaded.integers["output_encoding"] = output_index(output)
@@ -129,7 +127,7 @@ class CardPass:
                 if each.color_write:
                     _draw_shaded(each, shaded, batch)
                 else:
-                    self._draw_depth(shaded.blocks["view"], batch, OPAQUE_ALPHA)
+                    self._draw_depth(shaded.blocks["view"], batch, OPAQUE_ALPHA, sharpness=1.0)
 
     def draw_depth(
         self,
@@ -148,18 +146,17 @@ class CardPass:
         cards = _drawn(snapshot)
         if cards is None:
             return
-        self._upload(cards.textures)
+        self._textures.upload(cards)
         view = self._blocks["view"].holding(view_values(camera, width, height))
         with _state_of(FOUR_PASSES[0]):
-            self._draw_depth(view, self._batches.static(cards), least_alpha)
+            self._draw_depth(view, self._batches.static(cards), least_alpha, sharpness=0.0)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
         self._blocks = {name: UniformBlock() for name in _BLOCKS}
         self._opacity.release()
         self._batches.release()
-        self._pictures: HairTextures | None = None
-        self._textures: dict[str, Any] = {}
+        self._textures = CardTextures()
 
     def _shaded(
         self,
@@ -175,8 +172,9 @@ class CardPass:
         shading = CardShading(
             model=look.model,
             has_tangent_map=cards.has_tangent_map,
-            has_normal_map="normal" in self._textures,
+            has_normal_map=cards.textures.normal is not None,
             has_display=display is not None,
+            is_even=cards.is_even,
             opacity=None if opacity is None else opacity.form,
             scatters=opacity is not None and is_marschner and snapshot.volume.scattering,
             light_kinds=kinds_needed(kept_lights(snapshot.lights)),
@@ -186,8 +184,8 @@ class CardPass:
             "lights": pack_lights(snapshot.lights, snapshot.ambient),
             "shading": struct_values(look),
         }
-        textures = {f"{name}_texture": self._textures[name] for name in shading.textures}
-        numbers: dict[str, Any] = {}
+        textures = {f"{name}_texture": self._textures.of(name) for name in shading.textures}
+        numbers: dict[str, Any] = {"atlas_tiles": tiles_of(cards.mesh.atlas)}
         if is_marschner:
             values["fibre"] = pack_fibre(look)
             textures |= MARSCHNER.of(look, snapshot.table_size)
@@ -205,22 +203,22 @@ class CardPass:
         blocks = {name: self._blocks[name].holding(values[name]) for name in values}
         return _Shaded(shading, blocks, textures, {}, numbers)
 
-    def _draw_depth(self, view: Any, batch: Any, least_alpha: float) -> None:
-        """Pixels of that alpha alone, by a shader that asks for nothing else."""
+    def _draw_depth(self, view: Any, batch: Any, least_alpha: float, *, sharpness: float) -> None:
+        """Pixels of that alpha alone, by a shader that asks for nothing else.
+
+        Args:
+            sharpness: 1 chooses mip maps as shading does; 0 asks the picture itself, of which small
+                pixels meet as many that are opaque as large ones.
+        """
         shader = program(PRIME_RECIPE)
-        textures = {"alpha_texture": self._textures["alpha"]}
-        numbers = {"opaque_alpha": least_alpha}
+        textures = {"alpha_texture": self._textures.of("alpha")}
+        numbers = {
+            "opaque_alpha": least_alpha,
+            "sharpness": sharpness,
+            "atlas_tiles": self._textures.tiles,
+        }
         shader.bind(blocks={"view": view}, textures=textures, numbers=numbers)
         batch.draw(shader.shader)
-
-    def _upload(self, pictures: HairTextures) -> None:
-        if self._pictures is not pictures:
-            self._textures = {
-                name: _texture(picture, is_repeated=name in _REPEATED)
-                for name, picture in vars(pictures).items()
-                if isinstance(picture, np.ndarray)
-            }
-            self._pictures = pictures
 
 
 def passes_of(drawing: CardDrawingSettings) -> tuple[DrawPass, ...]:
@@ -258,14 +256,3 @@ def _state_of(each: DrawPass) -> Iterator[None]:
         gpu.state.face_culling_set(each.cull.upper())
         gpu.state.color_mask_set(*(each.color_write,) * 4)
         yield
-
-
-def _texture(picture: Floats, *, is_repeated: bool) -> Any:
-    """One texture as RGBA or one channel, filtered linearly."""
-    if picture.ndim == 2:
-        texture = texture_from(picture[..., None], "R32F")
-    else:
-        opaque = np.ones((*picture.shape[:2], 1), np.float32)
-        texture = texture_from(np.concatenate([picture, opaque], axis=-1), "RGBA16F")
-    texture.extend_mode("REPEAT" if is_repeated else "EXTEND")
-    return texture

@@ -21,7 +21,7 @@ PRIME_RECIPE = ShaderRecipe(
     structs=("struct_view.glsl",),
     blocks=(("View", "view"),),
     textures=(("FLOAT_2D", "alpha_texture"),),
-    numbers=(("FLOAT", "opaque_alpha"),),
+    numbers=(("FLOAT", "opaque_alpha"), ("FLOAT", "sharpness"), ("VEC2", "atlas_tiles")),
     inputs=_INPUTS,
     varyings=(("smooth", "VEC2", "card_uv"),),
     outputs=(("VEC4", "color"),),
@@ -37,6 +37,7 @@ class CardShading:
     hidden may have to be shaded. With opacity maps hair shades cards; `scatters` adds light from
     strand to strand, in Marschner's model. With a display it looks up how the viewport shows a
     colour, see display.py. light_kinds: see kinds_needed.
+    is_even: see CardSnapshot.
     """
 
     model: str = "kajiya_kay"
@@ -44,6 +45,7 @@ class CardShading:
     has_normal_map: bool = False
     is_clipped: bool = False
     has_display: bool = False
+    is_even: bool = False
     opacity: OpacityForm | None = None
     scatters: bool = False
     light_kinds: int = 2
@@ -53,7 +55,9 @@ class CardShading:
         maps = "_tangent_map" * self.has_tangent_map + "_normal_map" * self.has_normal_map
         lit = f"_{self.opacity.slots}_{self.opacity.is_deep}" if self.opacity else ""
         lit += f"{'_scattering' * self.scatters}_{self.light_kinds}"
-        shown = "_clipped" * self.is_clipped + "_display" * self.has_display
+        shown = (
+            "_even" * self.is_even + "_clipped" * self.is_clipped + "_display" * self.has_display
+        )
         return f"card_{self.model}{maps}{lit}{shown}"
 
     @property
@@ -92,6 +96,7 @@ class CardShading:
             ),
             integers=("is_opaque", "output_encoding"),
             numbers=(
+                ("VEC2", "atlas_tiles"),
                 *((("VEC2", "alpha_range"),) if self.is_clipped else ()),
                 *((("FLOAT", "card_thickness"),) if self.opacity else ()),
                 *((("FLOAT", "scatter_density"), ("VEC3", "skin_color")) if self.scatters else ()),
@@ -110,6 +115,7 @@ class CardShading:
             defines=(
                 ("PRIME", 0),
                 ("CLIPPED", int(self.is_clipped)),
+                ("EVEN", int(self.is_even)),
                 ("TANGENT_MAP", int(self.has_tangent_map)),
                 ("NORMAL_MAP", int(self.has_normal_map)),
                 ("MARSCHNER", int(is_marschner)),

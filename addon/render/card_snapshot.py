@@ -17,6 +17,8 @@ class CardSnapshot:
     has_tangent_map: the tangent map takes the place of the shift texture.
     back_triangles: (n, 3) the triangles in the order in which their back faces are drawn; None is
         the order of the mesh. Neither counts where cards are sorted for each view.
+    is_even: alpha is what the strands cover on the mean of all turns of a card, as a baked atlas
+        has it; cards cover as much at a slant, see card_look.even_alpha.
     thickness: of the hair that alpha stands for in shadows, see shading/volume/card_opacity.py.
 
     Mesh and textures are uploaded again only when they are other objects than before; triangles
@@ -29,3 +31,4 @@ class CardSnapshot:
     back_triangles: Ints | None = None
     drawing: CardDrawingSettings = field(default_factory=CardDrawingSettings)
     thickness: float = 1.0
+    is_even: bool = False

@@ -21,6 +21,8 @@ from ..dynamics.contacts import SKIN
 from ..dynamics.wind import MODES
 from ..refine import detail
 from ..refine.settings import DetailSettings
+from ..shading.card_look import LEAST_FACING, MEAN_FACING
+from ..shading.card_texture import LEVELS, SLACK
 from ..shading.lights import LIGHT_CAPACITY, NEAREST_DISTANCE
 from ..shading.skin.diffusion import KERNEL_REACH, KERNEL_TAPS, SKIN_LIGHTS
 from ..shading.skin.layout import CLOSING
@@ -107,6 +109,10 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "skin_kernel_taps": str(KERNEL_TAPS),
         "skin_closing": repr(float(CLOSING)),
         "atlas_samples": str(SAMPLES),
+        "mean_facing": repr(MEAN_FACING),
+        "least_facing": repr(LEAST_FACING),
+        "card_texture_levels": str(LEVELS),
+        "card_texture_slack": str(SLACK),
         "sparse_mask": str(SPARSE_RANGE - 1),
         **{f"sparse_step_{axis}": str(s) for axis, s in zip("xyz", SPARSE_STEPS, strict=True)},
         "detail_nearest": repr(float(detail.NEAREST)),

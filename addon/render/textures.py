@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Floats
 from .shader_source import STRAND_ROWS
 
-_CHANNELS = {"R32F": 1, "RG32F": 2, "RGBA32F": 4, "RGBA16F": 4}
+_CHANNELS = {"R16F": 1, "R32F": 1, "RG32F": 2, "RGBA32F": 4, "RGBA16F": 4}
 
 
 def texture_from(pixels: Floats, texture_format: str) -> Any:

@@ -38,11 +38,11 @@ class TextureSettings(Settings):
     """What the strips of hair on a card texture look like."""
 
     section = "card_texture"
-    title = "Card texture"
+    title = "Card Texture"
 
     variant_width: int = integer(
         128,
-        label="Variant width",
+        label="Variant Width",
         description="Width of one strip of hair in pixels",
         soft=(32, 512),
         hard=(8, 4096),
@@ -72,7 +72,7 @@ class TextureSettings(Settings):
     )
     edge_width: float = number(
         0.3,
-        label="Edge width",
+        label="Edge Width",
         description="Part of the width, from each side, in which the strip dissolves into strands",
         unit="factor",
         soft=(0.05, 0.5),
@@ -80,7 +80,7 @@ class TextureSettings(Settings):
     )
     root_length: float = number(
         0.04,
-        label="Root length",
+        label="Root Length",
         description="Part of the length in which the strip gathers from strands at the root",
         unit="factor",
         soft=(0.0, 0.3),
@@ -88,7 +88,7 @@ class TextureSettings(Settings):
     )
     tip_length: float = number(
         0.6,
-        label="Tip length",
+        label="Tip Length",
         description="Part of the length, from the tip, in which the strip dissolves into strands",
         unit="factor",
         soft=(0.0, 1.0),

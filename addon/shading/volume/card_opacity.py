@@ -55,6 +55,10 @@ class StrandArea:
 _PLACES = (np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6.0).astype(np.float32)
 
 
+#: Texels that are one for a light, along each side: its map is about so much coarser than an atlas.
+_LIT_TEXELS = 4
+
+
 def card_shade(positions: Floats, triangles: Ints, uv: Floats, alpha: Floats) -> float:
     """What cards of thickness 1 would take of light from everywhere [m^2]: half of their area,
     as flat things, times tau.
@@ -65,10 +69,20 @@ def card_shade(positions: Floats, triangles: Ints, uv: Floats, alpha: Floats) ->
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     at = np.einsum("pk,tkj->ptj", _PLACES, uv[triangles])
+    alpha = _coarser(_coarser(alpha, 0), 1)
     size = np.array(alpha.shape)
     column, row = np.clip((at * size[::-1]).astype(np.int64), 0, size[::-1] - 1).transpose(2, 0, 1)
     tau = card_optical_depth(alpha[row, column]).mean(axis=0)
     return 0.5 * float((area * tau).sum(dtype=np.float64))
+
+
+def _coarser(alpha: Floats, axis: int) -> Floats:
+    """Means of so many texels along an axis, as mip maps have them."""
+    starts = np.arange(0, alpha.shape[axis], _LIT_TEXELS)
+    texels = np.diff(np.append(starts, alpha.shape[axis]))
+    sums = np.add.reduceat(alpha, starts, axis=axis, dtype=np.float32)
+    means: Floats = sums / (texels[:, None] if axis == 0 else texels)
+    return means
 
 
 def own_share(depth: Floats, bias: float, ends: Floats) -> Floats:

@@ -108,6 +108,17 @@ def test_a_card_reaches_to_where_most_of_its_strands_end() -> None:
     np.testing.assert_allclose(strips.frames.center[0, 0], 0.0, atol=1e-3)
 
 
+def test_a_card_reaches_back_to_its_rearmost_roots_along_the_head() -> None:
+    """Hair that rises at 45 degrees from roots spread over 4 cm along it; upright hair stays."""
+    for lean, begins in ((1.0, -0.02 * 1.7 / 3.0**0.5 * 0.5**0.5), (0.0, 0.0)):
+        grid = flat_bundle((0.2, 0.0, 0.0), 400)
+        grid[..., 1] -= np.linspace(-0.02, 0.02, 400, dtype=np.float32)[:, None] * lean
+        grid[..., 1] += lean * grid[..., 2]
+        strips = fitted(grid, (0.0, 0.0, -1.0))
+        np.testing.assert_allclose(strips.frames.center[0, 0, 1], -begins, atol=2e-4)
+        np.testing.assert_allclose(strips.frames.center[0, 0, [0, 2]], 0.0, atol=2e-4)
+
+
 def test_nineteen_of_twenty_places_of_a_groom_lie_on_their_card() -> None:
     """Wavy strands that hang from a head: across, each lies within the width of its card."""
     random = np.random.default_rng(4)

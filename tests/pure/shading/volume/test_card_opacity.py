@@ -73,3 +73,14 @@ def test_shade_of_cards_is_their_mean_shadow() -> None:
     tau = np.where(uv[triangles].mean(axis=1)[:, 1] < 0.5, -np.log(0.6), -np.log(0.2))
     expected = (np.abs(directions() @ area.T) * tau).sum(axis=1).mean()
     assert card_shade(positions, triangles, uv, alpha) == pytest.approx(expected, rel=0.02)
+
+
+def test_strands_thinner_than_what_lights_resolve_count_by_their_mean() -> None:
+    """Every fourth texel opaque, as thin strands are: a quarter is covered, also at the edges."""
+    alpha = np.zeros((18, 22), np.float32)
+    alpha[:, ::4] = 1.0
+    alpha[:, 20:] = 0.25
+    positions = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0]])
+    uv = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    shade = card_shade(positions, np.array([[0, 1, 2]]), uv, alpha)
+    assert shade == pytest.approx(0.5 * 3.0 * card_optical_depth(np.float32(0.25)), rel=1e-5)

@@ -1,0 +1,83 @@
+"""The textures of hair cards on the GPU, each with its mip maps in it: shading/card_texture.py."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..cards.atlas_grid import AtlasGrid
+from ..exchange.mip_maps import mip_levels
+from ..shading.card_texture import LEVELS, packed_levels
+from ..shading.textures import HairTextures
+from .card_snapshot import CardSnapshot
+from .textures import texture_from
+
+#: textures that repeat in u and v; the others end at their edges
+_REPEATED = ("shift", "noise")
+
+
+class CardTextures:
+    """Keeps the textures of the last cards; making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self._pictures: HairTextures | None = None
+        self._grid = AtlasGrid()
+        self._textures: dict[str, Any] = {}
+
+    @property
+    def tiles(self) -> tuple[float, float]:
+        """Columns and rows, as shaders take them."""
+        return tiles_of(self._grid)
+
+    def of(self, name: str) -> Any:
+        """The texture of that name, of HairTextures."""
+        return self._textures[name]
+
+    def upload(self, cards: CardSnapshot) -> None:
+        """Hold the textures of these cards; nothing goes up that is there."""
+        pictures, grid = cards.textures, cards.mesh.atlas
+        if self._pictures is pictures and self._grid == grid:
+            return
+        self._textures = {}
+        for name, levels in _levels(pictures, grid):
+            packed = packed_levels(levels, is_repeated=name in _REPEATED)
+            texture = texture_from(packed, "R16F" if packed.shape[-1] == 1 else "RGBA16F")
+            texture.extend_mode("EXTEND")
+            self._textures[name] = texture
+        self._pictures, self._grid = pictures, grid
+
+
+def tiles_of(grid: AtlasGrid) -> tuple[float, float]:
+    """Columns and rows, as shaders take them."""
+    return float(grid.columns), float(grid.rows)
+
+
+def _levels(pictures: HairTextures, grid: AtlasGrid) -> Iterator[tuple[str, list[Floats]]]:
+    """The levels of each texture, by how much hair there is.
+
+    Of mip_levels alone what is wanted: its maps are in [0, 1], while the base of an atlas may be
+    brighter, and what repeats knows no tiles.
+    """
+    for name, picture in vars(pictures).items():
+        if not isinstance(picture, np.ndarray):
+            continue
+        most = max(float(picture.max(initial=0.0)), 1.0)
+        kind = name if name in ("normal", "tangent") else "alpha" if name == "alpha" else "base"
+        maps: dict[str, Floats] = {kind: picture / np.float32(most)}
+        if name not in ("alpha", *_REPEATED) and pictures.alpha.shape == picture.shape[:2]:
+            maps["alpha"] = pictures.alpha
+        tiles = None if name in _REPEATED else grid
+        levels = islice(mip_levels(maps, grid=tiles, threshold=None), LEVELS)
+        yield name, [_texels(level[kind], most) for level in levels]
+
+
+def _texels(picture: Floats, most: float) -> Floats:
+    """As a texture holds them, (height, width, 1 or 4)."""
+    if picture.ndim == 2:
+        return picture[..., None] * np.float32(most)
+    opaque = np.ones((*picture.shape[:2], 1), np.float32)
+    return np.concatenate([picture * np.float32(most), opaque], axis=-1)
