@@ -1,4 +1,4 @@
-"""The flows of data through the pure rooms: a groom made ready, a frame of motion, a card build.
+"""The flows of data through the pure rooms: a groom made ready, a frame of motion.
 
 Each flow hands values from room to room and decides nothing itself. `host` calls them from the
 artist's buttons and from the command line alike.
@@ -6,19 +6,12 @@ artist's buttons and from the command line alike.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from .arrays import Floats, Ints
-from .cards.atlas_settings import AtlasSettings
-from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps
-from .cards.card_mesh import CardMesh
-from .cards.follow import CardBinding, bind_cards, card_lines, follow_guides
-from .cards.occlusion_settings import CardOcclusionSettings
-from .cards.settings import CardSettings
 from .dynamics.colliders import PosedCollider
 from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, start
@@ -280,62 +273,6 @@ def strand_ranks(rig: Rig) -> Floats:
     ranks = np.arange(count, dtype=np.float32) / np.float32(count)
     ranks[:guide_count] = even_ranks(rig.strands.roots[:guide_count]) * (guide_count / count)
     return ranks
-
-
-def card_build_steps(
-    rig: Rig,
-    settings: CardSettings,
-    atlas: AtlasSettings,
-    occlusion: CardOcclusionSettings,
-    alpha_of: AlphaOf = lambda _build: None,
-) -> Generator[str, None, CardBuild]:
-    """Cards at rest in all levels of detail, with occlusion, from inside to outside.
-
-    Args:
-        alpha_of: the alpha of the atlas, which is best baked here; see `cards.build`.
-
-    Yields what comes next, and returns the cards.
-
-    Raises:
-        HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
-    """
-    groom = CardGroom(rig.strands, rig.guides, root_normals(rig), rig.head)
-    return card_steps(groom, settings, atlas, occlusion, alpha_of)
-
-
-def card_build(
-    rig: Rig,
-    settings: CardSettings,
-    atlas: AtlasSettings,
-    occlusion: CardOcclusionSettings,
-    alpha_of: AlphaOf = lambda _build: None,
-) -> CardBuild:
-    """All steps of `card_build_steps` at once."""
-    steps = card_build_steps(rig, settings, atlas, occlusion, alpha_of)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            build: CardBuild = end.value
-            return build
-
-
-def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:
-    """Cards at rest, tied to the guides that they ride on from then on."""
-    used, lines = card_lines(mesh)
-    guides, guide_group = rig.strands.grid[rig.guides], rig.strands.group[rig.guides]
-    group = mesh.group[used]
-    if not np.isin(group, guide_group).all():  # cards that know of no groups
-        group, guide_group = np.zeros_like(group), np.zeros_like(guide_group)
-    weights = guide_weights(
-        lines[:, 0], group, guides[:, 0], guide_group, strand_grid=lines, guide_grid=guides
-    )
-    return bind_cards(mesh, guides, weights.guide, weights.weight)
-
-
-def cards_at(rig: Rig, cards: CardBinding, pose: Pose, guides_now: Floats) -> CardMesh:
-    """Cards riding on guides, world space; arguments as of `strands_at`."""
-    return follow_guides(cards, guides_now, root_turns(rig, pose))
 
 
 def root_turns(rig: Rig, pose: Pose) -> Floats:

@@ -16,6 +16,7 @@ import numpy as np
 from _volume_sintel import sintel
 
 from hairloom.addon import pipeline
+from hairloom.addon.card_flow import card_build
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
@@ -68,7 +69,7 @@ def order_figures() -> dict[str, float]:
     found = {"sort_ms": sort_milliseconds()}
     for way in ("clusters", "guides"):
         settings, made = CardSettings(way=way, levels=1), AtlasSettings(source="made")
-        mesh = as_built(pipeline.card_build(rig, settings, made, CardOcclusionSettings()).finest)
+        mesh = as_built(card_build(rig, settings, made, CardOcclusionSettings()).finest)
         begin = time.process_time()
         learnt = card_orders(mesh, sitter.head)
         seconds = time.process_time() - begin

@@ -48,8 +48,8 @@ class Shots:
 
     def built(self, way: str, levels: int = 1) -> tuple[Any, Any]:
         """Cards in this way, and their textures."""
-        settings, maps = self.settings, of_addon("host.card_maps")
-        choices = of_addon("host.card_files").CardChoices(
+        settings = self.settings
+        choices = of_addon("host.card_making").CardChoices(
             settings["cards"](way=way, card_count=CARDS, levels=levels),
             settings["atlas"](),
             settings["card_occlusion"](rays=64),
@@ -57,16 +57,9 @@ class Shots:
             self._shading,
             self._drawn,
         )
-        made: list[Any] = []
-
-        def alpha_of(build: Any) -> Any:
-            made.append(maps.made_maps(self.rig, build, choices))
-            return made[0].textures.alpha
-
-        build = self._pipeline.card_build(
-            self.rig, choices.cards, choices.atlas, choices.occlusion, alpha_of
-        )
-        return build, made[0].textures
+        steps = of_addon("host.card_making").making_steps(self.rig, choices)
+        made = of_addon("cards.steps").result_of(steps)
+        return made.build, made.maps.textures
 
     def cards(self, mesh: Any, textures: Any) -> Any:
         shown = of_addon("render.card_snapshot").CardSnapshot(mesh, textures)

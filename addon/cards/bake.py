@@ -29,7 +29,7 @@ SAMPLES = 4
 SPARSE_STEPS = (12664745, 9560333, 10368890)
 SPARSE_RANGE = 1 << 24
 #: Samples that are held at a time.
-_MOST_SAMPLES = 1 << 22
+_MOST_SAMPLES = 1 << 20
 #: Texels across that are made at a time, so that leaning samples fit a texture.
 _MOST_ACROSS = 2048
 _EDGES = np.array([[-1.0], [1.0]])

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -16,11 +17,18 @@ from .card_mesh import CardMesh
 from .fit import cluster_of_strands, fit_strips
 from .layers import card_layers
 from .levels import card_levels
-from .occlusion import CardShade, vertex_occlusion
+from .occlusion import CardShade, occlusion_steps
 from .occlusion_settings import CardOcclusionSettings
+from .order_check import wrong_share
 from .settings import CardSettings
-from .sort import card_of_vertex, sorted_both_ways
+from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, in_order, order_steps
+from .steps import retold
 from .strip import Strips, UncutCards, guide_strips, scattered_tiles
+
+#: Directions from which coarser levels are looked at to be sorted.
+_COARSER_VIEWS = 16
+#: Views in which it is counted how often the order is wrong.
+_CHECKED_VIEWS = 8
 
 
 @dataclass(frozen=True)
@@ -29,12 +37,14 @@ class CardGroom:
 
     strands: uniform, one at least.
     guides: (guide_count,) which of them are guides.
+    radius: (strand_count, cv_count) [m], as strands are drawn.
     root_normal: (strand_count, 3) unit normals of the head under the roots.
     head: in the space of the strands, or None.
     """
 
     strands: StrandSet
     guides: Ints
+    radius: Floats
     root_normal: Floats
     head: Surface | None
 
@@ -48,12 +58,15 @@ class CardBuild:
     backs: the triangles of each level once more, in the order in which back faces are drawn.
     errors: of each level [m], see `levels.CardLevel`: how far it is from the strands' own way.
     plan: what is to be baked into the atlas; None where its tiles are made by chance.
+    wrong_share: of the pixels of the finest level those that are drawn in a wrong order, see
+        `order_check.wrong_share`.
     """
 
     levels: tuple[CardMesh, ...]
     backs: tuple[Ints, ...]
     errors: tuple[float, ...]
     plan: AtlasPlan | None
+    wrong_share: float = 0.0
 
     @property
     def finest(self) -> CardMesh:
@@ -88,18 +101,53 @@ def card_steps(
     error = settings.error if settings.way == "clusters" else None
     levels = card_levels(cards, settings, error)
     meshes, errors = zip(*((level.mesh, level.error) for level in levels), strict=True)
-    build = CardBuild(meshes, tuple(mesh.triangles for mesh in meshes), errors, plan)
+    unsorted = tuple(mesh.triangles for mesh in meshes)
+    build = CardBuild(meshes, unsorted, errors, plan)
     yield "Atlas"
     alpha = alpha_of(build)
-    yield "Ambient occlusion"
     bodies = [] if groom.head is None else [groom.head]
     shades = [CardShade(build.finest, alpha)]
-    open_share = vertex_occlusion(build.finest, shades, bodies, occlusion)
-    yield "Order"
-    finest = build.finest.with_occlusion(open_share)
+    shading = occlusion_steps(build.finest, shades, bodies, occlusion)
+    finest = build.finest.with_occlusion((yield from _told("Ambient occlusion", shading)))
     shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))
-    meshes, backs = zip(*(sorted_both_ways(mesh, groom.head) for mesh in shaded), strict=True)
-    return replace(build, levels=meshes, backs=backs)
+    orders = yield from _orders(shaded, groom.head, settings)
+    yield "Check of the order"
+    first = orders[0]
+    wrong = wrong_share(
+        finest,
+        groom.head,
+        front=first.front,
+        back=first.back,
+        alpha=alpha,
+        view_count=_CHECKED_VIEWS,
+    )
+    pairs = list(zip(shaded, orders, strict=True))
+    return replace(
+        build,
+        levels=tuple(in_order(mesh, each.front) for mesh, each in pairs),
+        backs=tuple(mesh.triangles[each.back] for mesh, each in pairs),
+        wrong_share=wrong,
+    )
+
+
+def _orders(
+    levels: Sequence[CardMesh], head: Surface | None, settings: CardSettings
+) -> Generator[str, None, list[CardOrders]]:
+    """Of each level; coarser ones are looked at from fewer sides."""
+    by = cast("SortBy", settings.order_by)
+    orders = []
+    for number, mesh in enumerate(levels):
+        view_count = _COARSER_VIEWS if number else VIEW_COUNT
+        steps = order_steps(mesh, head, by, view_count=view_count)
+        name = f"Order of level {number}" if len(levels) > 1 else "Order"
+        orders.append((yield from _told(name, steps)))
+    return orders
+
+
+def _told[Result](name: str, steps: Generator[float, None, Result]) -> Generator[str, None, Result]:
+    """What is done, and how much of it."""
+    yield name
+    return (yield from retold(steps, lambda share: f"{name}, {100.0 * share:.0f} %"))
 
 
 def uncut_cards(
@@ -120,7 +168,8 @@ def uncut_cards(
     cards = _by_chance(strips, count[owner], strands.group[first][owner], settings)
     if atlas.source != "baked":
         return cards, None
-    plan = plan_atlas(strips.of(np.arange(len(first))), grid, radius, cluster, strands.group, atlas)
+    uncrossed = strips.of(np.arange(len(first)))
+    plan = plan_atlas(uncrossed, grid, groom.radius, cluster, strands.group, atlas)
     strips = _wider(cards.strips, plan.width_factor[owner])
     return replace(cards, strips=strips, tile=plan.tile[owner], atlas=plan.grid), plan
 

@@ -102,10 +102,11 @@ def _nearest(features: Floats, means: Floats) -> tuple[Ints, Floats]:
     """The nearest mean of each, (n,), and the squared distance [m^2]."""
     label = np.empty(len(features), np.int64)
     gap = np.empty(len(features), np.float32)
-    size = np.einsum("ij,ij->i", means, means)
+    size, turned = np.einsum("ij,ij->i", means, means), np.ascontiguousarray(-2.0 * means.T)
     for start in range(0, len(features), _CHUNK):
         part = features[start : start + _CHUNK]
-        table = size - 2.0 * (part @ means.T)
+        table = part @ turned
+        table += size
         nearest = table.argmin(axis=1)
         label[start : start + _CHUNK] = nearest
         gap[start : start + _CHUNK] = table[np.arange(len(part)), nearest]

@@ -12,7 +12,7 @@ class CardDrawingSettings(Settings):
     """How cards are shown, and in which passes and which order they are drawn."""
 
     section = "card_drawing"
-    title = "Card drawing"
+    title = "Card Drawing"
 
     shown_as: str = choice(
         "strands",

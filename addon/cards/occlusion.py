@@ -29,6 +29,7 @@ from .card_mesh import CardMesh
 from .occlusion_settings import CardOcclusionSettings
 from .parallel_rays import crossings, point_grid
 from .sort import card_of_vertex
+from .steps import result_of
 
 #: What is nearer than this is met by nobody: cards that cross at a vertex [m].
 _NEAREST = 1.0e-4
@@ -60,13 +61,7 @@ def vertex_occlusion(
         shades: cards of this groom, and of others by choice, all in one space.
         bodies: heads and whatever else lets no light through, in the same space.
     """
-    steps = occlusion_steps(mesh, shades, bodies, settings)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            openness: Floats = end.value
-            return openness
+    return result_of(occlusion_steps(mesh, shades, bodies, settings))
 
 
 def occlusion_steps(

@@ -13,7 +13,7 @@ class CardOcclusionSettings(Settings):
     """How cards and the body shade the vertices of cards from the light of all sides."""
 
     section: ClassVar[str] = "card_occlusion"
-    title: ClassVar[str] = "Card occlusion"
+    title: ClassVar[str] = "Card Occlusion"
 
     strength: float = number(
         1.0,

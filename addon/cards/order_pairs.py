@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +29,8 @@ OPACITY = 0.4
 LEAST_WEIGHT = 0.02
 #: Weights are whole numbers, so that their sums do not hang on the order of adding.
 _UNIT = 1000
+#: Views at work at the same time; numpy lets other threads run most of the time.
+_THREADS = min(4, os.cpu_count() or 1)
 
 
 @dataclass(frozen=True)
@@ -50,13 +54,20 @@ class Pairs:
 _NAMES = ("behind", "before", "weight", "facing")
 
 
-def seen_pairs(mesh: CardMesh, head: Surface | None, view_count: int, size: int) -> Pairs:
-    """What many parallel views around the head see, `size` pixels across."""
-    found = [
-        pairs_of(met)
-        for direction in view_directions(view_count)
-        for met in _both_ways(mesh, head, direction, size)
-    ]
+def pairs_by_view(
+    mesh: CardMesh, head: Surface | None, view_count: int, size: int
+) -> Iterator[Pairs]:
+    """What each of many parallel views around the head sees, `size` pixels across."""
+
+    def seen(direction: Floats) -> Pairs:
+        return all_pairs([pairs_of(met) for met in _both_ways(mesh, head, direction, size)])
+
+    with ThreadPoolExecutor(_THREADS) as threads:
+        yield from threads.map(seen, view_directions(view_count))
+
+
+def all_pairs(found: Sequence[Pairs]) -> Pairs:
+    """Those of some views together, one at least."""
     return Pairs(*(np.concatenate([getattr(one, name) for one in found]) for name in _NAMES))
 
 

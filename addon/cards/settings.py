@@ -12,7 +12,7 @@ class CardSettings(Settings):
     """How strands become strips of textured triangles."""
 
     section = "cards"
-    title = "Hair cards"
+    title = "Hair Cards"
 
     way: str = choice(
         "clusters",
@@ -107,7 +107,7 @@ class CardSettings(Settings):
     )
     tip_width: float = number(
         0.5,
-        label="Tip width",
+        label="Tip Width",
         description="Guides: width at the tip as a part of the width at the root",
         soft=(0.0, 1.0),
         hard=(0.0, 10.0),
@@ -133,6 +133,21 @@ class CardSettings(Settings):
         description="Different strips of hair side by side in the texture; each card uses one",
         soft=(1, 8),
         hard=(1, 64),
+    )
+    order_by: str = choice(
+        "pieces",
+        (
+            (
+                "pieces",
+                "Pieces",
+                "Pieces of cards that cross each other are sorted apart: fewest errors",
+            ),
+            ("cards", "Whole Cards", "All faces of a card stay together"),
+            ("distance", "Distance", "Whole cards by their distance from the head alone"),
+        ),
+        label="Order By",
+        description="What is sorted from the inside to the outside",
+        source="Scheuermann 2004",
     )
     seed: int = integer(
         0,

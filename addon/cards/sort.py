@@ -16,7 +16,7 @@ mesh of its own, such as a ponytail, see `card_orders`.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Generator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -27,8 +27,9 @@ from ..strands import Surface
 from ..strands.closest_point import closest_point
 from .card_mesh import OF_VERTICES, CardMesh
 from .order_groups import dangling_groups, sections
-from .order_pairs import Pairs, seen_pairs
+from .order_pairs import Pairs, all_pairs, pairs_by_view
 from .order_search import Wishes, least_broken, wishes
+from .steps import result_of
 
 #: Vertices of a card whose distance from the head is measured; more hardly change the order.
 SAMPLE_COUNT = 7
@@ -38,6 +39,8 @@ VIEW_COUNT, VIEW_SIZE = 48, 96
 MOST_PIECES = 30_000
 #: With more triangles than this the distance decides alone.
 MOST_TRIANGLES = 250_000
+#: Views looked at in a step, and how much of the time they take.
+_VIEWS_PER_STEP, _SHARE_OF_VIEWS = 8, 0.6
 
 #: What is sorted: pieces of cards or whole cards, by what is seen; whole cards by distance alone.
 type SortBy = Literal["pieces", "cards", "distance"]
@@ -54,30 +57,9 @@ class CardOrders:
     back: Ints
 
 
-def inside_out_order(
-    mesh: CardMesh,
-    head: Surface | None,
-    by: SortBy = "pieces",
-    apart: Collection[int] | None = None,
-    view_count: int = VIEW_COUNT,
-) -> CardMesh:
-    """The same cards in the order for front faces; see card_orders."""
-    return sorted_both_ways(mesh, head, by, apart, view_count)[0]
-
-
-def sorted_both_ways(
-    mesh: CardMesh,
-    head: Surface | None,
-    by: SortBy = "pieces",
-    apart: Collection[int] | None = None,
-    view_count: int = VIEW_COUNT,
-) -> tuple[CardMesh, Ints]:
-    """The same cards in the order for front faces, and their triangles, (triangle_count, 3), once
-    more in the order for back faces; see card_orders.
-    """
-    orders = card_orders(mesh, head, by, apart, view_count)
-    ordered = replace(mesh, triangles=mesh.triangles[orders.front], card=mesh.card[orders.front])
-    return ordered, mesh.triangles[orders.back]
+def in_order(mesh: CardMesh, order: Ints) -> CardMesh:
+    """The same cards with their triangles in an order, (triangle_count,)."""
+    return replace(mesh, triangles=mesh.triangles[order], card=mesh.card[order])
 
 
 def card_orders(
@@ -99,17 +81,35 @@ def card_orders(
             moved; None finds those that dangle.
         view_count: directions to look from. A third is enough for coarser levels of detail.
     """
+    return result_of(order_steps(mesh, head, by, apart, view_count))
+
+
+def order_steps(
+    mesh: CardMesh,
+    head: Surface | None,
+    by: SortBy = "pieces",
+    apart: Collection[int] | None = None,
+    view_count: int = VIEW_COUNT,
+) -> Generator[float, None, CardOrders]:
+    """As card_orders, some views a step; each gives the share that is done."""
     distance = card_distances(mesh, head)
     section = _section_of_cards(mesh, distance, apart)
     inside_out = np.lexsort((distance, section))
     outside_in = np.lexsort((-distance, section))
     if by == "distance" or len(mesh.triangles) > MOST_TRIANGLES:
         return CardOrders(_triangles_of(mesh, inside_out), _triangles_of(mesh, outside_in))
-    pairs = seen_pairs(mesh, head, view_count, VIEW_SIZE)
+    found = []
+    for seen in pairs_by_view(mesh, head, view_count, VIEW_SIZE):
+        found.append(seen)
+        if len(found) % _VIEWS_PER_STEP == 0:
+            yield _SHARE_OF_VIEWS * len(found) / view_count
+    pairs = all_pairs(found)
     own = section[mesh.card]
     pairs = pairs[own[pairs.behind] == own[pairs.before]]
     piece = pieces(mesh) if by == "pieces" else None
+    yield _SHARE_OF_VIEWS
     front = _learnt(mesh, pairs[pairs.facing == 1], inside_out, piece)
+    yield (1.0 + _SHARE_OF_VIEWS) / 2.0
     back = _learnt(mesh, pairs[pairs.facing == 0], outside_in, piece)
     # what was moved to an end of its own section may have passed others
     front, back = (order[np.argsort(own[order], kind="stable")] for order in (front, back))

@@ -95,15 +95,6 @@ def guide_strips(guides: Floats, root_normal: Floats, settings: CardSettings) ->
     return Strips(frames, np.broadcast_to(width, (len(guides), len(along))))
 
 
-def build_cards(guides: Floats, root_normal: Floats, settings: CardSettings) -> CardMesh:
-    """One card for each guide, as a mesh of one group and layer; see `guide_strips`."""
-    strips = guide_strips(guides, root_normal, settings)
-    atlas, none = AtlasGrid(columns=settings.atlas_columns), np.zeros(len(strips), np.int32)
-    tile = scattered_tiles(len(strips), atlas, settings.seed)
-    cards = UncutCards(strips, none + 1, none, none, tile, atlas)
-    return strip_mesh([(np.arange(len(strips)), strips)], cards, settings.column_count, settings)
-
-
 def strip_mesh(
     parts: Sequence[tuple[Ints, Strips]],
     cards: UncutCards,

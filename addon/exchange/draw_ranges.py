@@ -10,20 +10,26 @@ from ..arrays import Ints
 from ..cards.card_mesh import CardMesh
 
 
-def group_ranges(mesh: CardMesh) -> dict[str, list[int]]:
-    """Runs of triangles of one group and layer, in the order in which they are drawn.
+def group_ranges(mesh: CardMesh, *, by_layer: bool) -> dict[str, list[int]]:
+    """Runs of triangles of one group, or of one group and layer, in the order in which they are
+    drawn.
 
     Columns of a table: group and layer, the first index and how many there are.
     """
-    keys = np.stack([mesh.group[mesh.card], mesh.layer[mesh.card]], axis=1)
+    names = ("group", "layer") if by_layer else ("group",)
+    keys = np.stack([getattr(mesh, name)[mesh.card] for name in names], axis=1)
     runs = _runs(keys)
-    group, layer = keys[[start for start, _ in runs]].T.tolist()
-    return {"group": group, "layer": layer, **_indices(runs)}
+    columns = keys[[start for start, _ in runs]].T.tolist()
+    return {**dict(zip(names, columns, strict=True)), **_indices(runs)}
 
 
-def card_ranges(mesh: CardMesh) -> dict[str, list[int]]:
-    """Runs of triangles of one card, in the order in which they are drawn, as a table as above."""
+def card_ranges(mesh: CardMesh) -> dict[str, list[int]] | None:
+    """The triangles of each card, in the order in which they are drawn, as a table as above; None
+    where pieces of cards are sorted apart, so that a card is in many places.
+    """
     runs = _runs(mesh.card[:, None])
+    if len(runs) > mesh.card_count:
+        return None
     return {"card": mesh.card[[start for start, _ in runs]].tolist(), **_indices(runs)}
 
 

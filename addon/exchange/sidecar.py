@@ -165,14 +165,15 @@ def description(cards: CardFile) -> dict[str, Any]:
 
 def _level(cards: CardFile, number: int) -> dict[str, Any]:
     mesh, scale = cards.levels[number], cards.format.units_per_metre
+    whole = card_ranges(mesh)
     level: dict[str, Any] = {
         "node": cards.nodes[number],
         **_counts(mesh),
         "bounds": _bounds(cards.format, mesh),
         **({"error": cards.errors[number] * scale} if cards.errors else {}),
         "indices": len(mesh.triangles) * 3,
-        "ranges": group_ranges(mesh),
-        "cards_in_order": card_ranges(mesh),
+        "ranges": group_ranges(mesh, by_layer=whole is not None),
+        **({} if whole is None else {"cards_in_order": whole}),
     }
     if cards.indices is not None:
         buffer = cards.indices[1]

@@ -8,15 +8,17 @@ ATLAS = {
     "root": "the lower end of a tile",
 }
 DRAW_ORDER = {
-    "order": "cards from the inside to the outside of the hair; draw the indices as they stand",
+    "order": "pieces of cards from the inside to the outside of the hair; draw the indices as they "
+    "stand. Where a level has cards_in_order, all triangles of a card follow each other",
     "first": "all opaque meshes, the head included, before the first hair pass",
-    "valid_while": "the hair keeps its place on the head; sort hanging parts at run time, "
-    "triangles by the distance of their middles",
+    "valid_while": "the hair keeps its place on the head; hair that swings is to be sorted at run "
+    "time: triangles by the distance of their middles from the eye, the farthest first",
     "keep": "index order; optimisers that reorder triangles for vertex caches destroy it",
 }
 BACK_ORDER = (
-    "in the pass of transparent back faces draw the indices from buffer_back_first of the index "
-    "buffer; back faces lie on the far side of the hair, so theirs come from the outside inwards"
+    "by the second order of each level: in the pass of transparent back faces draw the indices "
+    "from buffer_back_first of the index buffer; back faces lie on the far side of the hair, so "
+    "theirs come from the outside inwards"
 )
 SHADING = {
     "model": "Scheuermann 2004; T from root to tip, N, L, V unit vectors, H = normalize(L + V)",

@@ -18,7 +18,9 @@ from ..arrays import Floats, Ints
 from ..cards.adopted import AdoptedCards, adopt_cards
 from ..cards.occlusion import CardShade, occlusion_steps
 from ..cards.occlusion_settings import CardOcclusionSettings
-from ..cards.sort import SortBy, card_orders
+from ..cards.settings import CardSettings
+from ..cards.sort import SortBy, order_steps
+from ..cards.steps import result_of, retold
 from ..cards.uv_ways import Way
 from ..errors import HairloomError
 from ..shading.textures import picture_as
@@ -29,6 +31,7 @@ from .surfaces import read_corner_uv, read_surface
 from .vertex_weights import weights_on
 
 __all__ = [
+    "ORDERS",
     "CardOcclusionSettings",
     "SortChoices",
     "SortedCards",
@@ -37,6 +40,8 @@ __all__ = [
     "sort_steps",
 ]
 
+#: What may be sorted: identifier, label, description.
+(ORDERS,) = (p.choices for p in CardSettings.parameters() if p.name == "order_by")
 #: Weight from which on a vertex belongs to a vertex group.
 _MEMBER = 0.5
 #: The group of cards that dangle.
@@ -103,12 +108,16 @@ def sort_steps(
     mesh = source.cards.mesh
     notes = list(source.notes)
     apart = [_DANGLING] if choices.dangling else None
-    order = card_orders(mesh, source.head, choices.by, apart).front
+    part_count = 1.0 if choices.occlusion is None else 2.0
+    ordering = order_steps(mesh, source.head, choices.by, apart)
+    orders = yield from retold(ordering, lambda share: share / part_count)
+    order = orders.front
     if choices.occlusion is not None:
         alpha, problems = _alpha_of(obj, choices.alpha)
         bodies = [] if source.head is None else [source.head]
         shades = [CardShade(mesh, alpha)]
-        openness = yield from occlusion_steps(mesh, shades, bodies, choices.occlusion)
+        shading = occlusion_steps(mesh, shades, bodies, choices.occlusion)
+        openness = yield from retold(shading, lambda share: (1.0 + share) / 2.0)
         corner = np.zeros(len(obj.data.loops), np.int32)
         corner[source.corner] = source.cards.corner
         problems += write_shares(obj.data, source.cards.vertex, corner, openness, mesh.along)
@@ -121,13 +130,7 @@ def sort_mesh(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, choices: SortChoices
 ) -> SortedCards:
     """All steps of `sort_steps` at once."""
-    steps = sort_steps(obj, depsgraph, choices)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            done: SortedCards = end.value
-            return done
+    return result_of(sort_steps(obj, depsgraph, choices))
 
 
 def read_cards(

@@ -8,21 +8,17 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .. import pipeline
-from ..arrays import Floats
-from ..cards.atlas_settings import AtlasSettings
 from ..cards.build import CardBuild
 from ..cards.card_mesh import CardMesh
-from ..cards.occlusion_settings import CardOcclusionSettings
-from ..cards.settings import CardSettings
+from ..cards.steps import result_of
 from ..exchange.card_formats import CardFormat, format_of
 from ..exchange.file_set import written_together
 from ..exchange.index_buffer import index_buffer
 from ..exchange.sidecar import SUFFIX, CardFile, sidecar_text
 from ..pipeline import Rig
-from ..shading.settings import ShadingSettings, StrandSettings
-from ..shading.textures import HairTextures, TextureSettings
+from ..shading.settings import ShadingSettings
 from .card_export import check_cards, check_exporter, write_card_mesh
+from .card_making import CardChoices, MadeCards, making_steps
 from .card_maps import CardMaps, made_maps
 from .card_material import material_of, write_tables
 from .card_scene import CardLook, level_names, without_loose
@@ -31,22 +27,6 @@ from .card_textures import TextureFiles, texture_channels, texture_roles, write_
 _MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
 
 type Stage = Callable[[str], AbstractContextManager[None]]
-
-
-@dataclass(frozen=True)
-class CardChoices:
-    """All that cards hang on.
-
-    pictures: what takes the place of generated textures, see `textures.picture_as`.
-    """
-
-    cards: CardSettings
-    atlas: AtlasSettings
-    occlusion: CardOcclusionSettings
-    texture: TextureSettings
-    shading: ShadingSettings
-    strands: StrandSettings
-    pictures: Mapping[str, Floats] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -73,15 +53,19 @@ class WrittenCards:
     notes: what the artist should know, each with its remedy.
     """
 
-    levels: tuple[CardMesh, ...]
-    textures: HairTextures
+    build: CardBuild
+    maps: CardMaps
     files: tuple[Path, ...]
     notes: tuple[str, ...]
 
     @property
+    def levels(self) -> tuple[CardMesh, ...]:
+        return self.build.levels
+
+    @property
     def mesh(self) -> CardMesh:
         """The finest level."""
-        return self.levels[0]
+        return self.build.finest
 
 
 def _untimed(_name: str) -> AbstractContextManager[None]:
@@ -108,37 +92,33 @@ def write_cards(
     output = output or CardOutput()
     path, file_format = format_of(path, output.format)
     check_exporter(file_format, str(path))
-    made: list[CardMaps] = []
 
-    def alpha_of(build: CardBuild) -> Floats:
+    def maps_of(build: CardBuild) -> CardMaps:
         with stage("card texture"):
-            made.append(made_maps(rig, build, choices))
-        return made[-1].textures.alpha
+            return made_maps(rig, build, choices)
 
     with stage("build cards"):
-        build = pipeline.card_build(rig, choices.cards, choices.atlas, choices.occlusion, alpha_of)
-    check_cards(build.levels, str(path))
-    (maps,) = made
+        made = result_of(making_steps(rig, choices, maps_of))
+    check_cards(made.build.levels, str(path))
     with written_together(path) as folder:
-        _write_all(folder / path.name, build, maps, choices, output, file_format, stage)
+        _write_all(folder / path.name, made, choices, output, file_format, stage)
         names = {file.name for file in folder.iterdir() if file.is_file()}
     beside = sorted(names - {path.name, path.stem + SUFFIX})
     files = (path.name, *beside, path.stem + SUFFIX)
     paths = tuple(path.with_name(name) for name in files)
-    return WrittenCards(build.levels, maps.textures, paths, build.notes)
+    return WrittenCards(made.build, made.maps, paths, made.build.notes)
 
 
 def _write_all(
     path: Path,
-    build: CardBuild,
-    maps: CardMaps,
+    made: MadeCards,
     choices: CardChoices,
     output: CardOutput,
     file_format: CardFormat,
     stage: Stage,
 ) -> None:
     """All files into the folder of `path`."""
-    name = output.name or path.stem
+    build, maps, name = made.build, made.maps, output.name or path.stem
     parts = map(without_loose, build.levels, build.backs)
     levels, backs = zip(*parts, strict=True)
     with stage("write textures"):
@@ -163,7 +143,7 @@ def _write_all(
         textures=roles,
         texture_files=texture_channels(written),
         base_gain=maps.base_gain,
-        highlights=choices.texture.highlights,
+        highlights=maps.highlights,
         material=material_of(choices.shading, tables),
         indices=indices,
         generator=tomllib.loads(_MANIFEST.read_text(encoding="utf-8"))["version"],

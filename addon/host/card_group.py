@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import IntProperty, PointerProperty
+from bpy.props import FloatProperty, IntProperty, PointerProperty
 
 
 def _is_hair(_group: object, obj: bpy.types.Object) -> bool:
@@ -25,6 +25,12 @@ class HAIRLOOM_PG_card_object(bpy.types.PropertyGroup):
         ),
         "card_count": IntProperty(
             name="Cards", description="How many cards this mesh holds", options={"HIDDEN"}
+        ),
+        "wrong_share": FloatProperty(
+            name="Wrong Order",
+            description="Share of the pixels that the finest level draws in a wrong order, from "
+            "all sides",
+            options={"HIDDEN"},
         ),
         "image": PointerProperty(
             type=bpy.types.Image,

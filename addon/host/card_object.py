@@ -14,22 +14,23 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from .. import pipeline
 from ..arrays import Floats, Ints
 from ..cards.build import CardBuild
 from ..cards.card_mesh import OF_CARDS, CardMesh
 from ..errors import HairloomError
-from .card_maps import CardMaps, made_maps
+from .card_builds import made_in_thread
+from .card_making import MadeCards, making_steps, order_line
 from .card_object_material import filled_image, new_material
 from .groom_files import card_choices, notes_of, rig_of
 from .objects import Handle, head_of, matrix_of
 from .source import read_source
+from .thread_work import ThreadWork
 
 
 class CardObjectJob:
-    """Making the cards of one groom, step by step: read when made, written in the last step.
+    """Making the cards of one groom: read at once, made in steps or in a thread, then written.
 
-    objects: those of the cards once all steps are done, finest first.
+    objects: those of the cards once they are written, finest first; order: how well it suits.
     notes: what the artist should know.
 
     Raises:
@@ -44,6 +45,7 @@ class CardObjectJob:
         self._choices, warnings = card_choices(hair)
         self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)
         self.objects: list[bpy.types.Object] = []
+        self.order = ""
         self.notes = (*source.warnings, *notes_of(hair, self._rig), *warnings)
         self.dropped = source.dropped
 
@@ -53,25 +55,32 @@ class CardObjectJob:
         Raises:
             HairloomError: no cards can be made, or the hair is gone.
         """
-        made: list[CardMaps] = []
-
-        def alpha_of(build: CardBuild) -> Floats:
-            made.append(made_maps(self._rig, build, self._choices))
-            return made[-1].textures.alpha
-
-        chosen = self._choices
-        build = yield from pipeline.card_build_steps(
-            self._rig, chosen.cards, chosen.atlas, chosen.occlusion, alpha_of
-        )
+        made = yield from making_steps(self._rig, self._choices)
         yield "Cards into the scene"
-        hair = self._hair.find()
+        self.write(made)
+
+    def making(self) -> ThreadWork[MadeCards]:
+        """Make the cards in a thread, which touches nothing of Blender's."""
+        rig, choices = self._rig, self._choices
+        return ThreadWork(lambda work: made_in_thread(work, rig, choices), "hairloom card objects")
+
+    def write(self, made: MadeCards) -> None:
+        """Put them into the scene.
+
+        Raises:
+            HairloomError: the hair is gone, or its cards cannot be changed any more.
+        """
+        hair, build = self._hair.find(), made.build
         if hair is None:
             raise HairloomError(
                 "this object is gone", place=self._hair.name, remedy="Choose other hair"
             )
+        for obj in card_objects(hair):
+            _check_editable(obj)
         self.notes += tuple(f"{hair.name}: {note}." for note in build.notes)
-        color = chosen.shading.base_color
-        self.objects = _write(hair, build, made[-1].textures.card, color, self._matrix)
+        color = self._choices.shading.base_color
+        self.objects = _write(hair, build, made.maps.textures.card, color, self._matrix)
+        self.order = order_line(build.wrong_share)
 
 
 def card_objects(hair: bpy.types.Object) -> list[bpy.types.Object]:
@@ -121,6 +130,7 @@ def _write(
             obj.data.materials.append(material)
         obj.hairloom.card_object.image = image
         obj.hairloom.card_object.card_count = cards.card_count
+        obj.hairloom.card_object.wrong_share = build.wrong_share
         _fill(obj.data, cards, matrix)
         objects.append(obj)
     return objects

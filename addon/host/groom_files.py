@@ -10,20 +10,17 @@ from typing import Any
 import bpy
 
 from .. import pipeline
-from ..cards.atlas_settings import AtlasSettings
-from ..cards.occlusion_settings import CardOcclusionSettings
-from ..cards.settings import CardSettings
 from ..exchange.tressfx import read_tfx, write_tfx
 from ..groom.children_settings import ChildrenSettings
 from ..groom.grow import grow, scalp_density
 from ..groom.roots import bind_roots
 from ..groom.settings import GrowSettings, GuideSettings
 from ..pipeline import Rig
-from ..shading.settings import ShadingSettings, StrandSettings
-from ..shading.textures import TextureSettings
 from ..strands import StrandSet
-from .card_files import CardChoices, CardOutput, write_cards
+from .card_files import CardOutput, write_cards
 from .card_images import chosen_pictures
+from .card_making import CardChoices, order_line
+from .choices import Choices
 from .curves import write_curves
 from .properties import settings_of
 from .source import Source, read_source
@@ -118,7 +115,7 @@ def export_cards(
     first, *beside = (file.name for file in written.files)
     result = (
         f"Wrote {written.mesh.card_count:,} cards in {len(written.levels)} levels of detail to "
-        f"{first}, with {len(beside)} files beside it"
+        f"{first}, with {len(beside)} files beside it. {order_line(written.build.wrong_share)}"
     )
     told = (*source.warnings, *notes_of(hair, rig), *written.notes, *warnings)
     return Outcome(result, source.dropped, told)
@@ -146,18 +143,8 @@ def export_tfx(
 
 def card_choices(hair: bpy.types.Object) -> tuple[CardChoices, tuple[str, ...]]:
     """What the groom's own settings say of its cards, and warnings of pictures that are no use."""
-    groom = hair.data.hairloom
-    pictures, warnings = chosen_pictures(groom.card_images)
-    choices = CardChoices(
-        settings_of(groom.cards, CardSettings),
-        settings_of(groom.atlas, AtlasSettings),
-        settings_of(groom.card_occlusion, CardOcclusionSettings),
-        settings_of(groom.card_texture, TextureSettings),
-        settings_of(groom.shading, ShadingSettings),
-        settings_of(groom.strands, StrandSettings),
-        pictures,
-    )
-    return choices, warnings
+    pictures, warnings = chosen_pictures(hair.data.hairloom.card_images)
+    return Choices.of(hair).card_form.choices(pictures), warnings
 
 
 def rig_of(hair: bpy.types.Object, source: Source) -> Rig:

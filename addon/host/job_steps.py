@@ -129,18 +129,23 @@ def open_studio(job: Job, rig: Rig, report: Report) -> Studio:
         skin=job.set(SkinSettings),
         shafts=job.set(ShaftSettings),
         card_drawing=job.set(CardDrawingSettings),
-        card_form=CardForm(
-            job.set(CardSettings),
-            job.set(AtlasSettings),
-            job.set(CardOcclusionSettings),
-            job.set(TextureSettings),
-            job.set(StrandSettings),
-            shading=job.set(ShadingSettings),
-        ),
+        card_form=card_form(job),
     )
     studio = Studio(rig, occlusion, head_occlusion, look)
     tell_notes(list(studio.warnings), report)
     return studio
+
+
+def card_form(job: Job) -> CardForm:
+    """What cards are built by."""
+    return CardForm(
+        job.set(CardSettings),
+        job.set(AtlasSettings),
+        job.set(CardOcclusionSettings),
+        job.set(TextureSettings),
+        job.set(StrandSettings),
+        shading=job.set(ShadingSettings),
+    )
 
 
 def finish(job: Job, report: Report, output: Path) -> None:

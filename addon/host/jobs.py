@@ -10,9 +10,6 @@ import numpy as np
 
 from .. import pipeline
 from ..arrays import Floats
-from ..cards.atlas_settings import AtlasSettings
-from ..cards.occlusion_settings import CardOcclusionSettings
-from ..cards.settings import CardSettings
 from ..dynamics.colliders import DistanceField
 from ..dynamics.settings import DynamicsSettings
 from ..errors import HairloomError
@@ -20,15 +17,14 @@ from ..exchange.card_formats import format_of
 from ..exchange.tressfx import write_tfx
 from ..pipeline import Pose, Rig
 from ..render.card_snapshot import CardSnapshot
-from ..shading.settings import ShadingSettings, StrandSettings
-from ..shading.textures import TextureSettings
 from ..shading.volume.settings import VolumeSettings
-from .card_files import CardChoices, CardOutput, WrittenCards, write_cards
+from .card_files import CardOutput, WrittenCards, write_cards
 from .card_images import named_pictures
+from .card_making import order_line
 from .card_textures import TextureFiles
 from .images import contact_sheet, write_png
 from .inputs import Inputs
-from .job_steps import Job, finish, moment_of, open_studio, read_rig, rest_of, tell_notes
+from .job_steps import Job, card_form, finish, moment_of, open_studio, read_rig, rest_of, tell_notes
 from .report import Progress, Report
 from .sheet import Sheet
 from .studio import Studio
@@ -265,22 +261,17 @@ def _write_cards(
 ) -> WrittenCards:
     print("building hair cards", flush=True)
     levels = getattr(job.options, "levels", None)
-    cards = job.set(CardSettings)
-    choices = CardChoices(
-        cards if levels is None else replace(cards, levels=levels),
-        job.set(AtlasSettings),
-        job.set(CardOcclusionSettings),
-        job.set(TextureSettings),
-        job.set(ShadingSettings),
-        job.set(StrandSettings),
-        pictures,
-    )
-    written = write_cards(path, rig, choices, output, report.stage)
+    form = card_form(job)
+    if levels is not None:
+        form = replace(form, cards=replace(form.cards, levels=levels))
+    written = write_cards(path, rig, form.choices(pictures), output, report.stage)
     report.facts.update(
         cards=written.mesh.card_count,
         card_triangles=len(written.mesh.triangles),
         card_levels=[len(level.triangles) for level in written.levels],
+        card_order_wrong=round(written.build.wrong_share, 4),
     )
+    print(order_line(written.build.wrong_share), flush=True)
     tell_notes(list(written.notes), report)
     for file in written.files:
         report.add_output(file)
@@ -291,8 +282,14 @@ def _write_card_still(
     job: Job, path: Path, studio: Studio, written: WrittenCards, report: Report
 ) -> None:
     """The cards where the strands are in the still."""
-    options, has_map = job.options, job.set(TextureSettings).highlights == "tangent"
-    shown = CardSnapshot(written.mesh, written.textures, has_map)
+    options, maps, build = job.options, written.maps, written.build
+    shown = CardSnapshot(
+        build.finest,
+        maps.textures,
+        maps.has_tangent_map,
+        build.backs[0],
+        is_even=maps.is_even,
+    )
     with report.stage("draw cards"):
         picture = studio.card_picture(shown, options.width, options.height, options.samples)
     write_png(path, picture)

@@ -23,8 +23,8 @@ from .shown import with_all_strands
 from .shown_cards import as_shown
 from .simulated import Simulated
 
-#: Cards that are being built are looked for this often [s].
-CARDS_TIME = 0.1
+#: Cards that are being built are looked for this often [s], or where they wait for this thread.
+CARDS_TIME, ASKING_TIME = 0.1, 0.01
 
 _sessions: dict[int, Simulated] = {}
 _notice = ""
@@ -94,6 +94,8 @@ def forget_all() -> None:
 
 def _forget(session: Simulated) -> None:
     _sessions.pop(session.uid, None)
+    if isinstance(session, Session):
+        session.cards.forget()
     timeline.forget(session.uid)
     overlay.drop(session.uid)
 
@@ -263,11 +265,12 @@ def _take_cards() -> float | None:
     """A timer of Blender's: cards that were built beside the window's work."""
     depsgraph = bpy.context.view_layer.depsgraph
     for session in sessions():
-        if session.cards.is_pending:
+        if session.cards.is_pending and session.cards.serve():
             attempt(session, depsgraph, Session.take_cards)
             redraw_panels()
-    is_pending = any(session.cards.is_pending for session in sessions())
-    return CARDS_TIME if is_pending else None
+    if any(session.cards.asks for session in sessions()):
+        return ASKING_TIME
+    return CARDS_TIME if any(session.cards.is_pending for session in sessions()) else None
 
 
 def _drawing(session: Session, hair: bpy.types.Object) -> Drawing:

@@ -2,33 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import bpy
 import numpy as np
 
-from .. import pipeline
 from ..arrays import Floats
 from ..errors import HairloomError
 from ..pipeline import Motion, Pose, Rig
-from ..render.hair_ball import HairBall
-from ..shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
-from ..shading.volume.shadow_lights import shadow_warnings
-from ..strands import Surface
+from ..render.snapshot import Snapshot
 from .baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays, used_vertices
 from .choices import Choices
-from .hiders import Hiders
-from .lights import (
-    light_warnings,
-    no_light_warnings,
-    read_ambient,
-    read_lights,
-    scene_lights_are_shown,
-)
+from .groom_picture import GroomPicture
 from .objects import Body
 from .obstacles import Obstacles
 from .reading import Reading
-from .shown import shapes_alike, snapshot_of, with_choices, with_tables
 from .shown_cards import ShownCards
 from .simulated import Arrays
 from .solvers import Solver, computed_on, form_of, solver_of
@@ -60,10 +46,7 @@ class Session:
         self.obstacles: Obstacles | None = None
         self.is_playing = False
         self.is_stale = False
-        self._is_drawn = is_drawn
-        self._light_warnings: tuple[str, ...] = ()
-        self._ball = HairBall()
-        self.cards = ShownCards()
+        self.picture = GroomPicture(is_drawn=is_drawn)
         self._take_rig(self._reading.rig(baked), depsgraph)
 
     @property
@@ -87,6 +70,15 @@ class Session:
         return self._reading.source
 
     @property
+    def snapshot(self) -> Snapshot:
+        """What is drawn."""
+        return self.picture.snapshot
+
+    @property
+    def cards(self) -> ShownCards:
+        return self.picture.cards
+
+    @property
     def choices(self) -> Choices:
         """What the artist has set, as far as it is taken over."""
         return self._reading.choices
@@ -98,17 +90,8 @@ class Session:
         doubled = () if hair is None else dynamics_warnings(hair)
         found = () if self.obstacles is None else self.obstacles.warnings
         notes = (f"{self.name}: {note}" for note in self.rig.notes)
-        dark = no_light_warnings(self.snapshot.lights, self.snapshot.ambient)
-        lights = (*self._light_warnings, *dark, *self._shadow_warnings())
         cards = (f"{self.name}: {note}" for note in self.cards.warnings)
-        return (*self.source.warnings, *notes, *cards, *doubled, *found, *lights)
-
-    def _shadow_warnings(self) -> tuple[str, ...]:
-        snapshot = self.snapshot
-        if snapshot.volume.shadows == "none" or not snapshot.strand_count:
-            return ()
-        lights = snapshot.lights if scene_lights_are_shown() else ()
-        return shadow_warnings(lights, self._ball.of(snapshot), snapshot.volume)
+        return (*self.source.warnings, *notes, *cards, *doubled, *found, *self.picture.warnings)
 
     @property
     def computed_on(self) -> str:
@@ -131,13 +114,7 @@ class Session:
         self.rig = rig
         self._used = used_vertices(rig)
         self.solver: Solver = solver_of(rig, self.choices.dynamics.form, motion)
-        occlusion, rank, self._hiders = None, None, None
-        if self._is_drawn:
-            occlusion = pipeline.rest_occlusion(rig, self.choices.ambient)
-            rank = pipeline.strand_ranks(rig)
-            self._hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
-        self.snapshot = with_choices(snapshot_of(rig, occlusion, rank), self.choices)
-        self._want_cards()
+        self.picture.take_rig(self.hair.found(), rig, self.choices)
         self.light(depsgraph)
         if motion is None:
             self.rest(depsgraph)
@@ -171,41 +148,24 @@ class Session:
         """
         before = self.choices
         self.is_stale |= not self._reading.take_choices().acts_at_once(before)
-        self.snapshot = with_choices(self.snapshot, self.choices)
-        if not shapes_alike(before.shading, self.choices.shading) and not bpy.app.background:
-            self.snapshot = with_tables(self.snapshot, PREVIEW_SIZE)
-        was, now = before, self.choices
-        is_other = (was.detail.culling, was.volume.shadows) != (
-            now.detail.culling,
-            now.volume.shadows,
-        )
-        if self._want_cards() or is_other:
+        if self.picture.take_choices(self.hair.found(), self.rig, before, self.choices):
             self._show()
         if self.choices.dynamics.form != before.dynamics.form:
             self._change_form(self.choices.dynamics.form)
 
-    def _want_cards(self) -> bool:
-        """Have cards built if they are to be shown; whether what is shown of them changes now."""
-        choices, before = self.choices, self.snapshot.cards
-        if not (self._is_drawn and choices.shows_cards):
-            self.cards.forget()
-            return before is not None
-        self.cards.want(self.hair.found(), self.rig, choices.card_form)
-        return True
-
     def take_cards(self) -> None:
-        """Show the cards that were built meanwhile, if there are any."""
-        if self.cards.collect(self.hair.found()):
-            self._show()
+        """Show the cards that were built meanwhile."""
+        self.cards.collect(self.hair.found())
+        self._show()
 
     @property
     def is_coarse(self) -> bool:
         """Whether a slider is being moved, so that it is shaded by tables that are quickly made."""
-        return self.snapshot.table_size < DEFAULT_SIZE
+        return self.picture.is_coarse
 
     def refine(self) -> None:
         """Shade by tables of full size again."""
-        self.snapshot = with_tables(self.snapshot, DEFAULT_SIZE)
+        self.picture.refine()
 
     def _change_form(self, form: str) -> None:
         """Go on where the hair is now, with another solver."""
@@ -215,12 +175,7 @@ class Session:
 
     def light(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Take over the scene's lights and world."""
-        self.snapshot = replace(
-            self.snapshot,
-            lights=read_lights(depsgraph, self.snapshot.center),
-            ambient=read_ambient(depsgraph.scene),
-        )
-        self._light_warnings = light_warnings(depsgraph)
+        self.picture.light(depsgraph)
 
     def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Hair in its style, carried by the head as it is posed now.
@@ -327,23 +282,7 @@ class Session:
         return self._reading.pose(self.rig, depsgraph)
 
     def _show(self) -> None:
-        hiders = None
-        if self._hiders is not None and self.choices.detail.culling == "hidden":
-            hiders = self._hiders.at(self.solver.pose)
-        solver, drawn = self.solver, self.choices.cards_drawn
-        self.snapshot = replace(
-            solver.shown(self.snapshot),
-            hiders=hiders,
-            casters=self._casters(),
-            cards=self.cards.now(self.rig, solver.pose, solver.guides, drawn),
-        )
-
-    def _casters(self) -> tuple[Surface, ...]:
-        """The head as it is posed, where its shadow is wanted."""
-        head, pose = self.rig.head, self.solver.pose
-        if head is None or pose.head_positions is None or self.choices.volume.shadows == "none":
-            return ()
-        return (Surface(pose.head_positions, head.triangles),)
+        self.picture.show(self.rig, self.solver, self.choices)
 
 
 def _same_guides(one: Rig, other: Rig) -> bool:

@@ -8,7 +8,7 @@ background, where nobody waits before a window, cards are built at once.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -18,8 +18,10 @@ from ..errors import HairloomError
 from ..pipeline import Pose, Rig
 from ..render.card_snapshot import CardSnapshot
 from ..render.snapshot import Snapshot
-from .card_builds import Build, BuiltCards, CardForm, CardsDrawn, told
+from .card_builds import BuiltCards, CardForm, CardsDrawn, building_cards, built_cards, told
 from .card_images import chosen_pictures
+from .card_making import order_line
+from .thread_work import ThreadWork
 
 
 def picture_names(group: Any) -> tuple[tuple[str, str], ...]:
@@ -51,6 +53,15 @@ def as_shown(snapshot: Snapshot) -> Snapshot:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Building:
+    """Cards on their way."""
+
+    rig: Rig
+    form: CardForm
+    work: ThreadWork[BuiltCards]
+
+
 class ShownCards:
     """The cards of one groom: those that are shown, and those that are being built.
 
@@ -60,7 +71,7 @@ class ShownCards:
     def __init__(self) -> None:
         self._built: BuiltCards | None = None
         self._wanted: tuple[Rig, CardForm] | None = None
-        self._build: Build | None = None
+        self._build: _Building | None = None
         self._shown: CardSnapshot | None = None
         self.warnings: tuple[str, ...] = ()
 
@@ -70,12 +81,25 @@ class ShownCards:
         return self._build is not None
 
     @property
+    def asks(self) -> bool:
+        """Whether what is on its way waits for `serve`."""
+        return self._build is not None and self._build.work.asks
+
+    @property
     def counts(self) -> tuple[int, int, int]:
         """Cards, triangles and vertices of what is shown."""
         if self._shown is None:
             return 0, 0, 0
         mesh = self._shown.mesh
         return mesh.card_count, len(mesh.triangles), len(mesh.positions)
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What is shown, for the panel."""
+        if self._built is None or self._shown is None:
+            return ("Cards are being built",) if self.is_pending else ()
+        cards, triangles, _ = self.counts
+        return f"{cards:,} cards, {triangles:,} triangles", order_line(self._built.wrong_share)
 
     def want(self, hair: bpy.types.Object, rig: Rig, form: CardForm) -> None:
         """Cards of this rig and form from now on; nothing is built twice."""
@@ -85,15 +109,17 @@ class ShownCards:
         if self._build is None:
             self._begin(hair)
 
-    def collect(self, hair: bpy.types.Object) -> bool:
-        """Take over what was built meanwhile; whether there is anything new."""
-        build = self._build
-        if build is None or not build.serve():
-            return False
-        self._take()
+    def serve(self) -> bool:
+        """Do a part of what only the main thread may; whether there is something to collect."""
+        return self._build is not None and self._build.work.serve()
+
+    def collect(self, hair: bpy.types.Object) -> None:
+        """Take over what was built meanwhile."""
+        build, self._build = self._build, None
+        assert build is not None
+        self._take(build.work.result)
         if not self._is_wanted(build.rig, build.form):
             self._begin(hair)
-        return True
 
     def now(
         self, rig: Rig, pose: Pose, guides: Callable[[], Floats], drawn: CardsDrawn
@@ -116,23 +142,22 @@ class ShownCards:
     def forget(self) -> None:
         """Strands are shown; cards that are on their way are not waited for."""
         if self._build is not None:
-            self._build.give_up()
+            self._build.work.give_up()
         self._built = self._wanted = self._build = self._shown = None
         self.warnings = ()
 
     def _begin(self, hair: bpy.types.Object) -> None:
         assert self._wanted is not None
         rig, form = self._wanted
-        is_awaited = self._is_awaited()
-        self._build = Build(rig, form, self._pictures(hair), is_awaited=is_awaited)
-        if is_awaited:
-            self._take()
+        pictures = self._pictures(hair)
+        if self._is_awaited():
+            self._take(lambda: built_cards(rig, form, pictures))
+        else:
+            self._build = _Building(rig, form, building_cards(rig, form, pictures))
 
-    def _take(self) -> None:
-        assert self._build is not None
-        build, self._build = self._build, None
+    def _take(self, result: Callable[[], BuiltCards]) -> None:
         try:
-            self._built = build.result()
+            self._built = result()
             self.warnings = self._built.notes
         except HairloomError as error:
             self._built, self._shown, self.warnings = None, None, (told(error),)

@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..errors import HairloomError
 from ..host.adopted_cards import (
+    ORDERS,
     CardOcclusionSettings,
     SortChoices,
     SortedCards,
@@ -21,11 +22,6 @@ from ..host.properties import settings_of
 from .reports import reporting, waiting
 from .selection import active_mesh
 
-_BY = (
-    ("pieces", "Pieces", "Pieces of cards that cross each other are sorted apart: fewest errors"),
-    ("cards", "Whole Cards", "All faces of a card stay together"),
-    ("distance", "Distance", "Whole cards by their distance from the head alone"),
-)
 _WAYS = (
     ("auto", "Automatic", "Found by which end of the UVs is nearer to the head"),
     ("down", "Down", "Roots are at the top of the texture"),
@@ -48,7 +44,7 @@ class HAIRLOOM_OT_sort_cards(bpy.types.Operator):
             name="Head",
             description="The mesh that the hair grows from, which shades it as well",
         ),
-        "by": EnumProperty(name="Sort", description="What is sorted", items=_BY),
+        "by": EnumProperty(name="Order By", description="What is sorted", items=ORDERS),
         "dangling": StringProperty(
             name="Dangling",
             description="Vertex group of cards that swing, such as a ponytail: drawn after all "
@@ -190,24 +186,6 @@ def draw_sort(self: Any, _context: bpy.types.Context) -> None:
     self.layout.operator("hairloom.sort_cards", icon="SORTSIZE")
 
 
-class HAIRLOOM_PT_sidebar_own_cards(bpy.types.Panel):
-    """Hair cards that were made by hand"""
-
-    bl_label = "Own Cards"
-    bl_parent_id = "HAIRLOOM_PT_sidebar"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Hairloom"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return active_mesh(context) is not None
-
-    def draw(self, context: bpy.types.Context) -> None:
-        draw_sort(self, context)
-
-
 def register() -> None:
     bpy.types.VIEW3D_MT_object.append(draw_sort)
 
@@ -216,4 +194,4 @@ def unregister() -> None:
     bpy.types.VIEW3D_MT_object.remove(draw_sort)
 
 
-CLASSES = (HAIRLOOM_OT_sort_cards, HAIRLOOM_PT_sidebar_own_cards)
+CLASSES = (HAIRLOOM_OT_sort_cards,)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
 import bpy
 
-from ..errors import HairloomError
+from ..host.card_making import order_line
 from ..host.card_object import CardObjectJob, card_objects
 from ..host.groom_files import Outcome
 from ..host.redraw import redraw_panels
@@ -15,15 +13,16 @@ from .selection import chosen_hair, needs_hair
 
 
 class _Running:
-    """The cards that are being made in the window.
-
-    step: what is done next. steps: the rest.
-    """
+    """The cards that are being made in the window."""
 
     def __init__(self, job: CardObjectJob, timer: bpy.types.Timer) -> None:
-        self.job, self.timer = job, timer
-        self.steps: Generator[str] = job.steps()
-        self.step, self.is_told = "", True
+        self.job, self.timer, self.work = job, timer, job.making()
+        self.told = ""
+
+    @property
+    def stage(self) -> str:
+        """What is done now."""
+        return self.work.stage or "Reading the hair"
 
 
 _running: _Running | None = None
@@ -77,33 +76,24 @@ class HAIRLOOM_OT_make_cards(bpy.types.Operator):
             return self._step(context)
         return {"RUNNING_MODAL"}
 
+    @reporting
     def _step(self, context: bpy.types.Context) -> set[str]:
         running = _running
         assert running is not None
-        running.is_told = not running.is_told
-        if running.is_told:  # the window has shown what is done now
-            try:
-                running.step = next(running.steps)
-            except StopIteration:
-                stop()
-                return self._finish(running.job)
-            except HairloomError as error:
-                stop()
-                self.report({"ERROR"}, str(error))
-                return {"CANCELLED"}
-            except BaseException:
-                stop()
-                raise
-        context.workspace.status_text_set(
-            f"Hairloom makes cards: {running.step or 'reading the hair'}. Esc: cancel"
-        )
-        redraw_panels()
+        if running.work.serve():
+            stop()
+            running.job.write(running.work.result())
+            return self._finish(running.job)
+        if running.told != running.stage:
+            running.told = running.stage
+            context.workspace.status_text_set(f"Hairloom makes cards: {running.told}. Esc: cancel")
+            redraw_panels()
         return {"RUNNING_MODAL"}
 
     def _finish(self, job: CardObjectJob) -> set[str]:
         finest, levels = job.objects[0], len(job.objects)
         detail = f"{levels} levels of detail" if levels > 1 else "one level of detail"
-        result = f"{finest.name}: {_counts(finest)}, {detail}"
+        result = f"{finest.name}: {_counts(finest)}, {detail}. {job.order}"
         tell(self, Outcome(result, job.dropped, job.notes))
         return {"FINISHED"}
 
@@ -112,13 +102,18 @@ class HAIRLOOM_OT_make_cards(bpy.types.Operator):
         stop()
 
 
+def is_making() -> bool:
+    """Whether cards are being made in the window."""
+    return _running is not None
+
+
 def stop() -> None:
     """End it, if cards are being made: leave no timer and no text."""
     global _running
     if _running is None:
         return
     running, _running = _running, None
-    running.steps.close()
+    running.work.give_up()
     bpy.context.window_manager.event_timer_remove(running.timer)
     if bpy.context.workspace is not None:
         bpy.context.workspace.status_text_set(None)
@@ -127,7 +122,7 @@ def stop() -> None:
 def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """The button, and what there is: a line a level of detail, and the texture."""
     if _running is not None:
-        layout.label(text=_running.step or "Reading the hair", icon="SORTTIME")
+        layout.label(text=_running.stage, icon="SORTTIME")
         return
     objects = card_objects(hair)
     text = "Make Cards Again" if objects else "Make Cards"
@@ -137,7 +132,10 @@ def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         row = column.row(align=True)
         row.label(text=f"{obj.name}: {_counts(obj)}")
         row.prop(obj, "hide_viewport", text="", emboss=False)
-    image = objects[0].hairloom.card_object.image if objects else None
+    if not objects:
+        return
+    column.label(text=order_line(objects[0].hairloom.card_object.wrong_share), icon="SORTSIZE")
+    image = objects[0].hairloom.card_object.image
     if image is not None:
         column.label(text=f"Texture {image.size[0]} x {image.size[1]}", icon="TEXTURE")
 

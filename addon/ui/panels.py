@@ -11,9 +11,11 @@ from ..host import live, timeline, view_transform
 from ..host.groom_files import dropped_phrase
 from ..host.session import Session
 from ..host.source import own_dynamics
+from .drawing import Draw
 from .messages import draw_lines, draw_message
-from .sections import SECTIONS, SUB_SECTIONS, Draw
-from .selection import chosen_hair
+from .operators_adopted import draw_sort
+from .sections import SECTIONS, SUB_SECTIONS
+from .selection import active_mesh, chosen_hair
 
 
 def _hair(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -141,6 +143,25 @@ def _sub_panel(
     return type(f"{parent.__name__}_{name}", (bpy.types.Panel,), namespace)
 
 
+class HAIRLOOM_PT_sidebar_mesh_cards(bpy.types.Panel):
+    """Hair cards that are meshes of your own"""
+
+    bl_label = "Mesh Cards"
+    bl_parent_id = "HAIRLOOM_PT_sidebar"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Hairloom"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        mesh = active_mesh(context)
+        return mesh is not None and mesh.hairloom.card_object.groom is None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_sort(self, context)
+
+
 def draw_import(self: Any, _context: bpy.types.Context) -> None:
     self.layout.operator("hairloom.import_tfx", text="Hairloom groom (.tfx)")
 
@@ -163,6 +184,7 @@ MENUS: tuple[tuple[str, Callable[[Any, bpy.types.Context], None]], ...] = (
 CLASSES: tuple[type[Any], ...] = (
     HAIRLOOM_PT_sidebar,
     *_sub_panels(HAIRLOOM_PT_sidebar),
+    HAIRLOOM_PT_sidebar_mesh_cards,
     HAIRLOOM_PT_data,
     *_sub_panels(HAIRLOOM_PT_data),
 )

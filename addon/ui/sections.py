@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
-
 import bpy
 
-from ..host.card_images import HAIRLOOM_PG_card_images
-from ..params import Parameter
+from .card_sections import CARD_SECTIONS, draw_cards
+from .drawing import Draw, draw_group, draw_named, draw_titled
 from .look import LOOK, draw_preset_row, is_idle, look_names
 from .operators_bake import draw_bake
-from .operators_cards import draw_made_cards
 from .operators_colliders import draw_colliders
 from .operators_show import draw_show
-
-type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
-
-#: places of a curve's five values
-_PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
 
 
 def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -37,14 +28,14 @@ def _look_section(label: str) -> Draw:
         for name in names:
             column = layout.column()
             column.active = not is_idle(name, group, hair.data.hairloom.volume)
-            _draw_named(column, group, (name,))
+            draw_named(column, group, (name,))
 
     return draw
 
 
 def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    _draw_group(layout, hair.data.hairloom.strands)
-    _draw_titled(layout, hair.data.hairloom.ambient)
+    draw_group(layout, hair.data.hairloom.strands)
+    draw_titled(layout, hair.data.hairloom.ambient)
 
 
 def draw_volume(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -60,7 +51,7 @@ def draw_volume(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         column.active = (parameter.name != "scattering" or scatters) and (
             parameter.name != "density" or (scatters and group.scattering)
         )
-        _draw_named(column, group, (parameter.name,))
+        draw_named(column, group, (parameter.name,))
     if group.shadows != "none":
         layout.operator("hairloom.show_slices")
     if group.shadows != "none":
@@ -72,7 +63,7 @@ def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     layout.prop(group, "soft_shadow")
     column = layout.column()
     column.active = group.soft_shadow
-    _draw_named(column, group, [p.name for p in group.settings.parameters()[1:]])
+    draw_named(column, group, [p.name for p in group.settings.parameters()[1:]])
     column.operator("hairloom.show_skin_shadow")
 
 
@@ -81,11 +72,11 @@ def draw_shafts(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     layout.prop(group, "use_shafts")
     column = layout.column()
     column.active = group.use_shafts
-    _draw_named(column, group, [p.name for p in group.settings.parameters()[1:]])
+    draw_named(column, group, [p.name for p in group.settings.parameters()[1:]])
 
 
 def draw_guides(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    _draw_group(layout, hair.data.hairloom.guides)
+    draw_group(layout, hair.data.hairloom.guides)
 
 
 def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -104,7 +95,7 @@ def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         if parameter.name != "way":
             column = layout.column()
             column.active = parameter.name not in idle
-            _draw_named(column, group, (parameter.name,))
+            draw_named(column, group, (parameter.name,))
 
 
 def draw_detail(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -115,7 +106,7 @@ def draw_detail(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     names = [p.name for p in group.settings.parameters() if p.name not in hidden]
     if not group.full_size:
         names.remove("least_share")
-    _draw_named(layout, group, names)
+    draw_named(layout, group, names)
 
 
 def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -124,101 +115,24 @@ def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     group = hair.hairloom.dynamics
     below = {name for names in DYNAMICS.values() for name in names}
     names = [p.name for p in group.settings.parameters() if p.name not in below]
-    _draw_named(layout, group, names)
+    draw_named(layout, group, names)
 
 
 def draw_collisions(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_colliders(layout, hair)
-    _draw_named(layout, hair.hairloom.dynamics, DYNAMICS["Collisions"])
+    draw_named(layout, hair.hairloom.dynamics, DYNAMICS["Collisions"])
 
 
 def _dynamics_section(label: str) -> Draw:
     def draw(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-        _draw_named(layout, hair.hairloom.dynamics, DYNAMICS[label])
+        draw_named(layout, hair.hairloom.dynamics, DYNAMICS[label])
 
     return draw
-
-
-def draw_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """What acts while strands are shown is only what shows cards."""
-    draw_made_cards(layout, hair)
-    group = hair.data.hairloom.card_drawing
-    layout.prop(group, "shown_as")
-    column = layout.column()
-    column.active = group.shown_as == "cards"
-    names = [p.name for p in group.settings.parameters() if p.name != "shown_as"]
-    if group.passes != "four":
-        names.remove("skip_clear")
-    _draw_named(column, group, names)
 
 
 def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     layout.operator("hairloom.export_cards", icon="EXPORT")
     layout.operator("hairloom.export_tfx", icon="EXPORT")
-
-
-def draw_strips(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """Only what acts on cards of this kind."""
-    group = hair.data.hairloom.cards
-    hidden = {name for way, names in CARDS.items() if way != group.way for name in names}
-    if _is_baked(hair):
-        hidden.add("atlas_columns")
-    _draw_named(
-        layout, group, [p.name for p in group.settings.parameters() if p.name not in hidden]
-    )
-
-
-def draw_card_texture(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """The atlas that is baked, or the texture that is made; what is made breaks up highlights in
-    both."""
-    groom = hair.data.hairloom
-    if groom.cards.way == "clusters":
-        layout.prop(groom.atlas, "source")
-    if _is_baked(hair):
-        _draw_named(layout, groom.atlas, [p.name for p in groom.atlas.settings.parameters()][1:])
-    _draw_titled(layout, groom.card_texture)
-    layout.label(text="Own Pictures")
-    pictures = hair.data.hairloom.card_images
-    for name in HAIRLOOM_PG_card_images.__annotations__:
-        label = pictures.bl_rna.properties[name].name
-        layout.template_ID(pictures, name, open="image.open", text=label)
-
-
-def _is_baked(hair: bpy.types.Object) -> bool:
-    groom = hair.data.hairloom
-    return bool(groom.cards.way == "clusters" and groom.atlas.source == "baked")
-
-
-def draw_card_occlusion(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    _draw_group(layout, hair.data.hairloom.card_occlusion)
-
-
-def _draw_titled(layout: bpy.types.UILayout, group: Any) -> None:
-    layout.label(text=group.settings.title)
-    _draw_group(layout, group)
-
-
-def _draw_group(layout: bpy.types.UILayout, group: Any) -> None:
-    _draw_named(layout, group, [parameter.name for parameter in group.settings.parameters()])
-
-
-def _draw_named(layout: bpy.types.UILayout, group: Any, names: Sequence[str]) -> None:
-    """The parameters of these names; a curve as one slider a place, from root to tip."""
-    column = layout.column()
-    for parameter in group.settings.parameters():
-        if parameter.name not in names:
-            continue
-        if parameter.kind == "curve":
-            _draw_curve(column, group, parameter)
-        else:
-            column.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
-
-
-def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter) -> None:
-    layout.label(text=parameter.label)
-    sliders = layout.column(align=True)
-    for index, place in enumerate(_PLACES):
-        sliders.prop(group, parameter.name, index=index, text=place, slider=True)
 
 
 #: a parameter of children -> those that do nothing while it is 0
@@ -234,11 +148,6 @@ DETAIL: dict[str, tuple[str, ...]] = {
 }
 #: form of shadows -> the parameters that act in it alone
 VOLUME: dict[str, tuple[str, ...]] = {"deep": ("layers", "layer_depth"), "slices": ("slices",)}
-#: what cards are made from -> the parameters that act on them alone
-CARDS: dict[str, tuple[str, ...]] = {
-    "guides": ("width_factor", "tip_width"),
-    "clusters": ("card_count", "error", "cover", "crossed", "fly_aways"),
-}
 #: section below Dynamics -> its parameters; all others stand in Dynamics itself
 DYNAMICS: dict[str, tuple[str, ...]] = {
     "Style": ("style_root", "style_tip", "style_along", "style_damping", "bend", "bend_along"),
@@ -274,9 +183,5 @@ SUB_SECTIONS: dict[str, tuple[tuple[str, str, Draw], ...]] = {
         ("collisions", "Collisions", draw_collisions),
         ("bake", "Bake", draw_bake),
     ),
-    "cards": (
-        ("card_strips", "Strips", draw_strips),
-        ("card_texture", "Texture", draw_card_texture),
-        ("card_occlusion", "Ambient Occlusion", draw_card_occlusion),
-    ),
+    "cards": CARD_SECTIONS,
 }

@@ -11,13 +11,19 @@ from ..host.objects import head_of
 def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The hair that buttons and panels are about, the active first.
 
-    That is the selected hair curves; else those on the selected meshes, as when the head is being
-    moved; else those that are previewed.
+    That is the selected hair curves; else those whose cards are selected; else those on the
+    selected meshes, as when the head is being moved; else those that are previewed.
     """
     candidates = [context.active_object, *context.selected_objects]
     selected = list(dict.fromkeys(obj for obj in candidates if obj is not None))
     hair = [obj for obj in selected if obj.type == "CURVES"]
-    return hair or _grown_on(selected, context) or _previewed()
+    return hair or _made_into(selected) or _grown_on(selected, context) or _previewed()
+
+
+def _made_into(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The hair of which these are the cards."""
+    hair = [obj.hairloom.card_object.groom for obj in objects if obj.type == "MESH"]
+    return list(dict.fromkeys(obj for obj in hair if obj is not None))
 
 
 def _grown_on(meshes: list[bpy.types.Object], context: bpy.types.Context) -> list[bpy.types.Object]:

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.cards.strip import build_cards
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.axes import from_z_up
 from hairloom.addon.exchange.card_formats import FBX, GLB, OBJ, USD, CardFormat, format_of
@@ -206,6 +206,8 @@ def test_the_users_blocks_keep_their_names(levels: list[CardMesh], tmp_path: Pat
 def test_nothing_is_left_in_the_scene(
     levels: list[CardMesh], tmp_path: Path, file_format: CardFormat
 ) -> None:
+    if file_format is USD and not bpy.app.build_options.usd:
+        pytest.skip("this Blender was built without USD")
     kinds = [p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
 
     def counts() -> dict[str, int]:

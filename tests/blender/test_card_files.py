@@ -7,7 +7,6 @@ import struct
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 
@@ -19,6 +18,7 @@ from hairloom.addon.shading.marschner.tables import marschner_tables, shape_of
 from hairloom.addon.shading.settings import ShadingSettings
 
 bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy module")
+jsonschema = pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
 
 from hairloom.addon.host import card_files, command_line  # noqa: E402
 from hairloom.addon.host.card_choices import suffix_of  # noqa: E402

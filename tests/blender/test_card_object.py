@@ -214,11 +214,12 @@ def test_the_panel_draws_what_there_is(hair):
     draw_made_cards(Layout(), hair)
     assert said[0] == "Make Cards Again"
     assert said[1].startswith("Hair Cards: 12 cards, 384 triangles")
+    assert said[-2].startswith("Order: ") and said[-2].endswith(" % of pixels wrong")
     assert said[-1] == "Texture 128 x 32"
 
 
 def test_the_panel_shows_only_what_acts_on_these_cards(hair):
-    from hairloom.addon.ui.sections import draw_card_texture, draw_strips
+    from hairloom.addon.ui.card_sections import draw_card_texture, draw_strips
 
     drawn: list[str] = []
 
@@ -245,6 +246,7 @@ def test_the_panel_shows_only_what_acts_on_these_cards(hair):
     assert "atlas_columns" in shown(draw_strips) and "padding" not in shown(draw_card_texture)
     groom.atlas.source = "baked"
     assert "atlas_columns" not in shown(draw_strips) and "padding" in shown(draw_card_texture)
+    assert "shift_cells" in drawn and "tip_length" not in drawn
     groom.cards.way = "guides"
     assert "width_factor" in shown(draw_strips) and "card_count" not in shown(draw_strips)
     assert not shown(draw_card_texture) & {"source", "padding"}

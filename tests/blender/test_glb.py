@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.cards.sort import inside_out_order
-from hairloom.addon.cards.strip import build_cards
+from hairloom.addon.cards.sort import card_orders, in_order
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.card_formats import GLB
 from hairloom.addon.exchange.file_set import written_together
@@ -107,7 +107,8 @@ def hair(count: int = 120, seed: int = 2) -> CardMesh:
 
 @pytest.fixture(scope="module")
 def sorted_hair() -> CardMesh:
-    return inside_out_order(hair(), None)
+    mesh = hair()
+    return in_order(mesh, card_orders(mesh, None).front)
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.cards.sort import inside_out_order
-from hairloom.addon.cards.strip import build_cards
+from hairloom.addon.cards.sort import card_orders, in_order
 from hairloom.addon.shading.textures import TextureSettings, hair_textures
 
 pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
@@ -56,7 +56,7 @@ def curtain() -> tuple[CardMesh, np.ndarray]:
     settings = CardSettings(width_factor=1.5)
     mesh = build_cards(guides.astype(np.float32), out.astype(np.float32), settings)
     texture = hair_textures(TextureSettings(variant_width=16, height=64), mesh.atlas.columns).card
-    return inside_out_order(mesh, None), texture
+    return in_order(mesh, card_orders(mesh, None).front), texture
 
 
 def node_program() -> str:

@@ -130,9 +130,7 @@ def by_hairloom(written: WrittenCards, look: ShadingSettings) -> np.ndarray:
     snapshot = Snapshot(
         np.zeros((0, 2, 3), np.float32),
         np.zeros((0, 2), np.float32),
-        cards=CardSnapshot(
-            written.mesh, written.maps.textures, written.maps.has_tangent_map
-        ),
+        cards=CardSnapshot(written.mesh, written.maps.textures, written.maps.has_tangent_map),
         lights=(Light.sun(tuple(-x for x in TO_SUN), (1.0, 1.0, 1.0), IRRADIANCE),),
         ambient=(0.0, 0.0, 0.0),
         shading=look,

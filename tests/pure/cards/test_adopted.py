@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from guide_cards import build_cards
 
 from hairloom.addon.cards.adopted import AdoptedCards, adopt_cards
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.cards.strip import build_cards
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.strands import Surface
 

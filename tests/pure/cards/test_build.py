@@ -8,13 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hairloom.addon import pipeline
+from hairloom.addon import card_flow, pipeline
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.build import CardBuild, CardGroom, uncut_cards, with_occlusion_of
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
+from hairloom.addon.cards.order_check import wrong_share
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.strands import StrandSet
 
 MADE = AtlasSettings(source="made")
@@ -40,7 +42,7 @@ def falling(count: int, *, groups: int = 2, cv_count: int = 12, seed: int = 0) -
 def built(strands: StrandSet, atlas: AtlasSettings = MADE, **changed: object) -> CardBuild:
     rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
     settings = CardSettings(**{"way": "clusters", "card_count": 30, **changed})  # type: ignore[arg-type]
-    return pipeline.card_build(rig, settings, atlas, FEW_RAYS)
+    return card_flow.card_build(rig, settings, atlas, FEW_RAYS)
 
 
 @pytest.mark.parametrize("way", ["clusters", "guides"])
@@ -99,7 +101,7 @@ def test_single_strands_are_the_outermost_layer() -> None:
 
 def _groom(strands: StrandSet) -> CardGroom:
     rig = pipeline.prepare(strands, None, GuideSettings(), place="hair")
-    return CardGroom(rig.strands, rig.guides, pipeline.root_normals(rig), None)
+    return card_flow.card_groom(rig)
 
 
 def test_a_vertex_that_is_in_both_levels_has_the_same_occlusion() -> None:
@@ -163,17 +165,58 @@ def test_alpha_is_asked_for_once_and_darkens_less_than_opaque_cards() -> None:
         asked.append(build)
         return np.zeros((8, 8), np.float32)
 
-    opaque = pipeline.card_build(rig, settings, MADE, FEW_RAYS)
-    seen_through = pipeline.card_build(rig, settings, MADE, FEW_RAYS, clear)
+    opaque = card_flow.card_build(rig, settings, MADE, FEW_RAYS)
+    seen_through = card_flow.card_build(rig, settings, MADE, FEW_RAYS, clear)
     assert len(asked) == 1
     np.testing.assert_allclose(seen_through.finest.occlusion, 1.0, atol=1e-5)
     assert opaque.finest.occlusion.mean() < 0.9
 
 
+def test_every_step_says_how_far_it_is() -> None:
+    rig = pipeline.prepare(falling(600), None, GuideSettings(), place="hair")
+    settings = CardSettings(way="clusters", card_count=30, levels=2)
+    steps = list(card_flow.card_build_steps(rig, settings, MADE, FEW_RAYS))
+    for name in ("Ambient occlusion", "Order of level 0", "Order of level 1"):
+        own = [step for step in steps if step.startswith(name)]
+        shares = [int(step.removeprefix(f"{name}, ").removesuffix(" %")) for step in own[1:]]
+        assert own[0] == name and len(shares) > 1
+        assert shares[0] > 0 and shares == sorted(shares) and shares[-1] <= 100
+
+
+@pytest.mark.parametrize("by", ["pieces", "cards", "distance"])
+def test_the_order_is_the_one_that_was_chosen_and_its_faults_are_told(by: str) -> None:
+    strands = falling(900)
+    build = built(strands, order_by=by, levels=1)
+    mesh = build.finest
+    runs = 1 + np.count_nonzero(np.diff(mesh.card))
+    assert (runs == mesh.card_count) == (by != "pieces")
+    index = {tuple(corners): n for n, corners in enumerate(mesh.triangles.tolist())}
+    back = np.array([index[tuple(corners)] for corners in build.backs[0].tolist()])
+    again = wrong_share(mesh, None, back=back, view_count=8)
+    assert 0.0 < build.wrong_share < 1.0
+    assert build.wrong_share == pytest.approx(again)
+
+
+def test_notes_go_by_how_wide_strands_are_drawn() -> None:
+    rig = pipeline.prepare(falling(900), None, GuideSettings(), place="hair")
+    settings = CardSettings(way="clusters", card_count=30)
+    atlas = AtlasSettings(size="512", columns=8, rows=2)
+
+    def notes(scale: float) -> str:
+        groom = card_flow.card_groom(rig, StrandSettings(width_scale=scale, tip_width=1.0))
+        plan = uncut_cards(groom, settings, atlas)[1]
+        assert plan is not None
+        return " ".join(plan.notes)
+
+    assert "fainter lines" in notes(0.5)
+    assert "fainter lines" not in notes(40.0)
+
+
 def test_half_a_million_strands_take_less_than_a_minute() -> None:
     strands = falling(500_000, cv_count=8)
     normal = np.tile(np.float32([0.0, 0.0, 1.0]), (500_000, 1))
-    groom = CardGroom(strands, np.arange(0, 500_000, 500), normal, None)
+    radius = strands.radius.reshape(500_000, -1)
+    groom = CardGroom(strands, np.arange(0, 500_000, 500), radius, normal, None)
     start = time.process_time()
     cards, _ = uncut_cards(groom, CardSettings(way="clusters"), replace(MADE))
     assert len(cards) >= 800

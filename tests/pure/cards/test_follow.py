@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from guide_cards import build_cards
 
-from hairloom.addon import pipeline
+from hairloom.addon import card_flow, pipeline
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.follow import (
@@ -19,7 +20,6 @@ from hairloom.addon.cards.follow import (
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import card_of_vertex
-from hairloom.addon.cards.strip import build_cards
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.pipeline import Pose
 from hairloom.addon.strands import StrandSet
@@ -204,13 +204,13 @@ def test_cards_of_a_rig_ride_as_its_strands_do() -> None:
     rig = pipeline.prepare(strands, None, GuideSettings(guide_count=24), place="hair")
     settings = CardSettings(way="clusters", card_count=10)
     made, occlusion = AtlasSettings(source="made"), CardOcclusionSettings(rays=16)
-    mesh = pipeline.card_build(rig, settings, made, occlusion).finest
-    binding = pipeline.bound_cards(rig, mesh)
+    mesh = card_flow.card_build(rig, settings, made, occlusion).finest
+    binding = card_flow.bound_cards(rig, mesh)
     pose = Pose(None, np.eye(4))
     guides = pipeline.carried(rig, pose, rig.guides)
     far = rig.strands.group[rig.guides] == 7
     guides[far, :, 1] += np.linspace(0.0, 0.05, guides.shape[1], dtype=np.float32)
-    moved = pipeline.cards_at(rig, binding, pose, guides)
+    moved = card_flow.cards_at(rig, binding, pose, guides)
     owner = card_of_vertex(mesh)
     step = np.linalg.norm(moved.positions - mesh.positions, axis=1)
     assert step[mesh.group[owner] == 3].max() < 1e-6

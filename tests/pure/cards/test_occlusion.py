@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import OF_VERTICES, CardMesh
 from hairloom.addon.cards.occlusion import CardShade, even_axes, vertex_occlusion
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.cards.strip import build_cards
 from hairloom.addon.strands import Surface
 
 RADIUS = 0.1

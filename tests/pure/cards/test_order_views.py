@@ -7,7 +7,13 @@ import pytest
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.order_groups import dangling_groups, sections
-from hairloom.addon.cards.order_pairs import LEAST_WEIGHT, OPACITY, pairs_of, seen_pairs
+from hairloom.addon.cards.order_pairs import (
+    LEAST_WEIGHT,
+    OPACITY,
+    all_pairs,
+    pairs_by_view,
+    pairs_of,
+)
 from hairloom.addon.cards.order_views import (
     Fragments,
     View,
@@ -159,7 +165,7 @@ def test_a_view_from_behind_is_the_view_from_the_front_turned_over() -> None:
             met = far_to_near(fragments(view, mesh.positions, mesh.triangles))
             pairs = pairs_of(met[met.near > nearest(view, head)[met.pixel]])
             expected += zip(pairs.behind, pairs.before, pairs.weight, pairs.facing, strict=True)
-    pairs = seen_pairs(mesh, head, 5, 32)
+    pairs = all_pairs(list(pairs_by_view(mesh, head, 5, 32)))
     found = list(zip(pairs.behind, pairs.before, pairs.weight, pairs.facing, strict=True))
     missed = sum(abs(found.count(pair) - expected.count(pair)) for pair in set(found + expected))
     assert len(expected) > 500

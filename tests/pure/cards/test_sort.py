@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh, joined
 from hairloom.addon.cards.order_check import wrong_share
-from hairloom.addon.cards.order_pairs import seen_pairs
+from hairloom.addon.cards.order_pairs import all_pairs, pairs_by_view
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import (
     MOST_PIECES,
@@ -21,13 +22,11 @@ from hairloom.addon.cards.sort import (
     card_of_vertex,
     card_orders,
     connected_components,
-    inside_out_order,
+    in_order,
     order_from,
     pieces,
     reordered,
-    sorted_both_ways,
 )
-from hairloom.addon.cards.strip import build_cards
 from hairloom.addon.strands import Surface
 
 
@@ -95,7 +94,7 @@ WAYS: tuple[SortBy, ...] = ("pieces", "cards", "distance")
 @pytest.mark.parametrize("head", [None, sphere()])
 def test_shells_are_drawn_from_the_inside_to_the_outside(head: Surface | None, by: SortBy) -> None:
     mesh, distance = shells()
-    ordered = inside_out_order(mesh, head, by)
+    ordered = in_order(mesh, card_orders(mesh, head, by).front)
     drawn = ordered.card[np.flatnonzero(np.diff(ordered.card, prepend=-1))]
     assert sorted(drawn) == list(range(mesh.card_count))
     np.testing.assert_array_equal(distance[drawn], np.sort(distance))
@@ -123,7 +122,8 @@ def test_everything_of_a_triangle_and_a_vertex_travels_with_it() -> None:
         corners = np.concatenate(values, axis=1)[one.triangles].reshape(len(one.triangles), -1)
         return np.unique(np.column_stack([one.card, corners]), axis=0)
 
-    ordered, back = sorted_both_ways(mesh, None)
+    orders = card_orders(mesh, None)
+    ordered, back = in_order(mesh, orders.front), mesh.triangles[orders.back]
     assert not np.array_equal(ordered.triangles, mesh.triangles)
     np.testing.assert_array_equal(table(ordered), table(mesh))
     np.testing.assert_array_equal(np.unique(back, axis=0), np.unique(mesh.triangles, axis=0))
@@ -361,7 +361,7 @@ def test_the_order_of_few_cards_is_the_best_of_all_orders() -> None:
     """Of all that six crossing cards could be drawn in, judged by the pairs that are seen."""
     mesh = crossing_cards(6)
     orders = card_orders(mesh, None, "cards", view_count=24)
-    pairs = seen_pairs(mesh, None, 24, VIEW_SIZE)
+    pairs = all_pairs(list(pairs_by_view(mesh, None, 24, VIEW_SIZE)))
     for facing, order in ((1, orders.front), (0, orders.back)):
         own = pairs[pairs.facing == facing]
         table = np.zeros((6, 6), np.int64)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.cards.strip import build_cards, mean_spacing
+from hairloom.addon.cards.strip import mean_spacing
 from hairloom.addon.errors import HairloomError
 
 

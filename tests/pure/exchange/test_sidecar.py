@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 
@@ -16,6 +15,8 @@ from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.exchange.card_formats import FBX, FORMATS, GLB, USD
 from hairloom.addon.exchange.index_buffer import index_buffer
 from hairloom.addon.exchange.sidecar import CardFile, description, sidecar_text
+
+jsonschema = pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
 
 SCHEMA = json.loads(
     (Path(__file__).parents[3] / "docs" / "sidecar.schema.json").read_text(encoding="utf-8")
@@ -101,6 +102,16 @@ def test_ranges_tell_groups_layers_and_cards_apart() -> None:
         "count": [6, 6, 6],
     }
     assert level["indices"] == 18
+
+
+def test_cards_are_listed_only_where_each_is_whole() -> None:
+    mesh = replace(triangles(6), card=np.array([0, 0, 1, 1, 0, 0]))
+    (level,) = read(card_file(levels=(mesh,)))["levels"]
+    assert "cards_in_order" not in level
+    assert level["ranges"] == {"group": [0], "first": [0], "count": [18]}
+    whole = replace(mesh, card=np.sort(mesh.card))
+    (level,) = read(card_file(levels=(whole,)))["levels"]
+    assert level["cards_in_order"] == {"card": [0, 1], "first": [0, 12], "count": [12, 6]}
 
 
 def test_levels_are_found_in_the_index_buffer() -> None:

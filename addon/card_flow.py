@@ -1,0 +1,81 @@
+"""The flow of data from a groom that was made ready to its cards, which move with it."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+
+from .arrays import Floats
+from .cards.atlas_settings import AtlasSettings
+from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps
+from .cards.card_mesh import CardMesh
+from .cards.follow import CardBinding, bind_cards, card_lines, follow_guides
+from .cards.occlusion_settings import CardOcclusionSettings
+from .cards.settings import CardSettings
+from .cards.steps import result_of
+from .groom.weights import guide_weights
+from .pipeline import Pose, Rig, root_normals, root_turns
+from .shading.drawn_strands import drawn_radius
+from .shading.settings import StrandSettings
+
+_AS_THEY_ARE = StrandSettings()
+
+
+def card_build_steps(
+    rig: Rig,
+    settings: CardSettings,
+    atlas: AtlasSettings,
+    occlusion: CardOcclusionSettings,
+    alpha_of: AlphaOf = lambda _build: None,
+    drawn: StrandSettings = _AS_THEY_ARE,
+) -> Generator[str, None, CardBuild]:
+    """Cards at rest in all levels of detail, with occlusion, from inside to outside.
+
+    Args:
+        alpha_of: the alpha of the atlas, which is best baked here; see `cards.build`.
+        drawn: how wide strands are drawn.
+
+    Yields what comes next, and returns the cards.
+
+    Raises:
+        HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
+    """
+    return card_steps(card_groom(rig, drawn), settings, atlas, occlusion, alpha_of)
+
+
+def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
+    """What cards are made from."""
+    strands = rig.strands
+    radius = drawn_radius(strands.radius.reshape(strands.strand_count, -1), drawn)
+    return CardGroom(strands, rig.guides, radius, root_normals(rig), rig.head)
+
+
+def card_build(
+    rig: Rig,
+    settings: CardSettings,
+    atlas: AtlasSettings,
+    occlusion: CardOcclusionSettings,
+    alpha_of: AlphaOf = lambda _build: None,
+    drawn: StrandSettings = _AS_THEY_ARE,
+) -> CardBuild:
+    """All steps of `card_build_steps` at once."""
+    return result_of(card_build_steps(rig, settings, atlas, occlusion, alpha_of, drawn))
+
+
+def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:
+    """Cards at rest, tied to the guides that they ride on from then on."""
+    used, lines = card_lines(mesh)
+    guides, guide_group = rig.strands.grid[rig.guides], rig.strands.group[rig.guides]
+    group = mesh.group[used]
+    if not np.isin(group, guide_group).all():  # cards that know of no groups
+        group, guide_group = np.zeros_like(group), np.zeros_like(guide_group)
+    weights = guide_weights(
+        lines[:, 0], group, guides[:, 0], guide_group, strand_grid=lines, guide_grid=guides
+    )
+    return bind_cards(mesh, guides, weights.guide, weights.weight)
+
+
+def cards_at(rig: Rig, cards: CardBinding, pose: Pose, guides_now: Floats) -> CardMesh:
+    """Cards riding on guides, world space; arguments as of `strands_at`."""
+    return follow_guides(cards, guides_now, root_turns(rig, pose))

@@ -1,0 +1,101 @@
+"""Work in a thread that asks the main thread for what only that one may do."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Generator
+from typing import Any
+
+import pytest
+
+pytest.importorskip("bpy", reason="what serves it runs inside Blender")
+
+from hairloom.addon.host.thread_work import GivenUpError, ThreadWork
+
+#: A thread that has something to do has done it by then [s].
+PATIENCE = 30.0
+
+
+def until(is_so: Any) -> None:
+    end = time.monotonic() + PATIENCE
+    while not is_so():
+        assert time.monotonic() < end, "the thread does not get on"
+        time.sleep(0.001)
+
+
+def counting(seen: list[Any], last: int) -> Generator[None, None, int]:
+    """Steps that note where they are done, and that they were closed."""
+    try:
+        for _ in range(last):
+            seen.append(threading.current_thread())
+            yield
+        return last
+    finally:
+        seen.append("closed")
+
+
+def test_what_is_asked_is_done_by_who_serves_and_a_part_at_a_time() -> None:
+    seen: list[Any] = []
+    work = ThreadWork(lambda work: 10 * work.asked(counting(seen, 3)), "test")
+    until(lambda: work.asks)
+    assert not seen, "it did it by itself"
+    for done in (1, 2, 3):
+        assert not work.serve(duration=0.0)
+        assert seen == [threading.main_thread()] * done
+    until(lambda: work.serve(duration=0.0))
+    assert work.result() == 30 and not work.asks
+    assert seen[-1] == "closed"
+
+
+def test_what_fails_is_raised_in_the_thread_and_told_by_the_result() -> None:
+    caught: list[Exception] = []
+
+    def refusing() -> Generator[None]:
+        yield
+        raise OSError("no more memory")
+
+    def try_it(work: ThreadWork[str]) -> str:
+        try:
+            work.asked(refusing())
+        except OSError as error:
+            caught.append(error)
+        work.tell("another try")
+        raise ValueError("in vain")
+
+    work = ThreadWork(try_it, "test")
+    until(work.serve)
+    assert [str(each) for each in caught] == ["no more memory"]
+    assert work.stage == "another try"
+    with pytest.raises(ValueError, match="in vain"):
+        work.result()
+
+
+def test_who_gives_up_closes_what_was_begun_and_ends_the_thread() -> None:
+    seen: list[Any] = []
+    work = ThreadWork(lambda work: work.asked(counting(seen, 1000)), "test")
+    until(lambda: work.asks)
+    work.serve(duration=0.0)
+    work.give_up()
+    assert seen[-1] == "closed", "what it holds is freed by the thread"
+    until(work.serve)
+    with pytest.raises(GivenUpError):
+        work.result()
+
+
+def test_work_that_was_given_up_asks_and_goes_on_no_more() -> None:
+    given_up, ended = threading.Event(), []
+
+    def go_on(work: ThreadWork[None]) -> None:
+        given_up.wait(PATIENCE)
+        for goes_on in (lambda: work.tell("next"), lambda: work.asked(counting([], 1))):
+            try:
+                goes_on()
+            except GivenUpError:
+                ended.append(True)
+
+    work = ThreadWork(go_on, "test")
+    work.give_up()
+    given_up.set()
+    until(work.serve)
+    assert ended == [True, True]

@@ -1,0 +1,401 @@
+"""Hair cards on screen: shown in place of strands while they are built beside the window, moved,
+rendered, made into objects, sorted, exported; and left in the middle of everything."""
+
+import json
+import sys
+import time
+from pathlib import Path
+
+import addon_utils
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import (
+    changed,
+    click,
+    look_from_front,
+    open_our_sidebar,
+    press,
+    region,
+    sidebar_button,
+    until,
+    viewport,
+    viewport_pixels,
+)
+
+STRANDS, CARDS = 400, 60
+FOLDER = Path(bpy.app.tempdir) / "cards"
+BLEND = str(FOLDER / "cards.blend")
+
+failures: list[str] = []
+
+
+def of_hairloom(module):
+    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
+
+
+def live():
+    return of_hairloom("host.live")
+
+
+def session():
+    (one,) = live().sessions()
+    return one
+
+
+def hair():
+    return bpy.data.objects["Hair"]
+
+
+def settings(section):
+    return getattr(hair().data.hairloom, section)
+
+
+def pixels(label):
+    return viewport_pixels(driver.screenshot(label))
+
+
+class Stillness:
+    """The longest time in which the window did nothing."""
+
+    def __init__(self):
+        self.longest, self.last = 0.0, time.perf_counter()
+        bpy.app.timers.register(self.tick, first_interval=0.0, persistent=True)
+
+    def tick(self):
+        now = time.perf_counter()
+        self.longest, self.last = max(self.longest, now - self.last), now
+        return 0.005
+
+    def since(self):
+        """It since the last call [s]."""
+        longest, self.longest = self.longest, 0.0
+        return longest
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    sys.excepthook = lambda kind, error, _: failures.append(f"{kind.__name__}: {error}")
+    driver.enable_extension()
+    yield from set_the_scene()
+    yield from cards_in_place_of_strands()
+    yield from a_slider_is_dragged()
+    yield from hair_plays_as_cards()
+    yield from a_look_is_chosen()
+    yield from strands_again_and_undo()
+    yield from rendered_as_cards()
+    yield from making_is_cancelled()
+    yield from cards_are_made()
+    yield from a_copy_is_sorted()
+    yield from they_are_exported()
+    yield from another_file_in_mid_build()
+    yield from disabled_in_mid_build()
+    assert failures == [], failures
+
+
+def set_the_scene():
+    FOLDER.mkdir()
+    bpy.data.batch_remove(bpy.data.objects)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    bpy.context.object.name = "Head"
+    bpy.ops.hairloom.grow(strand_count=STRANDS, length=0.12)
+    bpy.context.object.name = "Hair"
+    cards = settings("cards")
+    cards.way, cards.card_count, cards.levels = "clusters", CARDS, 2
+    settings("atlas").size = "512"
+    settings("strands").width_scale = 6.0  # few strands are seen all the same
+    overlays = viewport().spaces.active.overlay
+    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    look_from_front(0.9)
+    yield from open_our_sidebar()
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield 10
+
+
+def are_shown():
+    drawing = of_hairloom("host.overlay").drawing_of(session().uid)
+    return drawing.snapshot.cards is not None and not session().cards.is_pending
+
+
+def cards_in_place_of_strands():
+    """Strands stay until cards are there, and the window lives meanwhile."""
+    strands, watch = pixels("strands"), Stillness()
+    yield 3
+    watch.since()
+    settings("card_drawing").shown_as = "cards"
+    assert session().cards.is_pending and session().snapshot.strand_count == STRANDS
+    yield from until(are_shown, "no cards are shown", tries=300)
+    print(f"first cards: the window stood still for {watch.since():.2f} s", flush=True)
+    yield 5
+    cards = pixels("cards")
+    assert session().cards.counts[0] >= CARDS
+    assert changed(strands, cards) > 0.005, "cards look as strands to the pixel"
+    # both are hair of one colour over the same part of the view
+    empty = strands[2, 2]
+    cover = [np.abs(each - empty).max(axis=2) > 0.05 for each in (strands, cards)]
+    print(f"covered by strands, by cards: {cover[0].mean():.3f}, {cover[1].mean():.3f}")
+    assert 0.7 < cover[1].mean() / cover[0].mean() < 1.4
+
+
+def a_slider_is_dragged():
+    """The old cards stay until the last ones are there."""
+    watch, before = Stillness(), session().cards.counts
+    yield 1
+    watch.since()
+    for count in (70, 80, 90, 120):
+        settings("cards").card_count = count
+        assert session().snapshot.cards is not None, "nothing is shown meanwhile"
+        yield 1
+    yield from until(
+        lambda: are_shown() and session().cards.counts[0] >= 120, "the last cards do not come", 300
+    )
+    print(f"dragged to {session().cards.counts}: stood still for {watch.since():.2f} s", flush=True)
+    settings("cards").card_count = CARDS
+    yield from until(lambda: are_shown() and session().cards.counts == before, "not as before", 300)
+
+
+def hair_plays_as_cards():
+    at_rest = session().snapshot.cards.mesh
+    yield from click(*sidebar_button("hairloom.play"))
+    for x in (0.05, -0.05, 0.0):
+        bpy.data.objects["Head"].location.x = x
+        yield 4
+    moving = session().snapshot.cards.mesh
+    driver.screenshot("playing")
+    assert moving.triangles is at_rest.triangles, "they were built again"
+    assert np.abs(moving.positions - at_rest.positions).max() > 0.01
+    assert np.isfinite(moving.positions).all()
+    yield from click(*sidebar_button("hairloom.reset"))
+    yield from click(*sidebar_button("hairloom.play"))
+    yield 3
+    assert not live().is_playing()
+    np.testing.assert_allclose(
+        session().snapshot.cards.mesh.positions, at_rest.positions, atol=1e-4
+    )
+
+
+def a_look_is_chosen():
+    before, look = pixels("look-before"), settings("shading")
+    look.base_color = (0.9, 0.1, 0.05)
+    yield 5
+    red = pixels("look-red")
+    assert changed(before, red, 0.05) > 0.005
+    look.model = "marschner"
+    yield from until(are_shown, "cards of the other model do not come", 300)
+    yield 15
+    assert changed(red, pixels("look-marschner"), 0.05) > 0.003
+    look.model = "kajiya_kay"
+    yield from until(are_shown, "cards of the first model do not come", 300)
+
+
+def strands_again_and_undo():
+    drawing = settings("card_drawing")
+    bpy.ops.ed.undo_push(message="cards")
+    drawing.shown_as = "strands"
+    bpy.ops.ed.undo_push(message="strands")
+    yield 3
+    assert session().snapshot.cards is None and session().snapshot.strand_count == STRANDS
+    driver.screenshot("strands-again")
+    bpy.ops.ed.undo()
+    assert settings("card_drawing").shown_as == "cards"
+    yield from until(are_shown, "undo brings no cards back", 300)
+    bpy.ops.ed.redo()
+    yield from until(lambda: session().snapshot.cards is None, "redo brings no strands back")
+    bpy.ops.ed.undo()
+    yield from until(are_shown, "undo brings no cards back again", 300)
+
+
+def rendered_as_cards():
+    """Rendered mode and F12 of our engine."""
+    scene, shading = bpy.context.scene, viewport().spaces.active.shading
+    bpy.ops.object.light_add(type="SUN", rotation=(0.9, 0.3, 0.0))
+    hair().select_set(True)
+    bpy.context.view_layer.objects.active = hair()
+    engine, scene.render.engine = scene.render.engine, "HAIRLOOM"
+    scene.hairloom.picture.samples = scene.hairloom.picture.viewport_samples = 4
+    shading.type = "RENDERED"
+    yield 20
+    shown = pixels("rendered")
+    assert shown.std() > 0.05, "nothing is seen in Rendered mode"
+    camera = bpy.data.objects.new("Viewer", bpy.data.cameras.new("Viewer"))
+    bpy.context.collection.objects.link(camera)
+    camera.location, camera.rotation_euler = (0.0, -0.75, 0.0), (np.pi / 2.0, 0.0, 0.0)
+    camera.data.clip_start = 0.01
+    scene.camera, path = camera, FOLDER / "f12.png"
+    scene.render.resolution_x, scene.render.resolution_y = 200, 150
+    scene.render.filepath, scene.render.image_settings.file_format = str(path), "PNG"
+    bpy.context.preferences.view.render_display_type = "NONE"
+    bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
+    yield from until(
+        lambda: path.is_file() and not bpy.app.is_job_running("RENDER"),
+        "F12 writes no picture",
+        300,
+    )
+    image = bpy.data.images.load(str(path))
+    picture = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(picture)
+    bpy.data.images.remove(image)
+    assert picture.std() > 0.05, "nothing is seen in the picture"
+    shading.type, scene.render.engine = "SOLID", engine
+    yield 5
+
+
+def card_objects():
+    return of_hairloom("host.card_object").card_objects(hair())
+
+
+def is_making():
+    return of_hairloom("ui.operators_cards").is_making()
+
+
+def make_cards():
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        assert bpy.ops.hairloom.make_cards("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    assert is_making() and not bpy.ops.hairloom.make_cards.poll()
+
+
+def making_is_cancelled():
+    """Esc leaves nothing half made, at whatever stage."""
+    for ticks in (1, 6):
+        make_cards()
+        yield ticks
+        driver.screenshot(f"making-{ticks}")
+        yield from press("ESC")
+        yield from until(lambda: not is_making(), "Esc does not cancel")
+        assert card_objects() == [] and bpy.ops.hairloom.make_cards.poll()
+        assert not bpy.data.images.get("Hair Cards") and not bpy.data.meshes.get("Hair Cards")
+
+
+def cards_are_made():
+    """Again in place, where the artist's own modifier and material stay; undone and redone."""
+    watch = Stillness()
+    make_cards()
+    yield from until(lambda: not is_making(), "Make Cards does not end", 300)
+    print(f"Make Cards: the window stood still for {watch.since():.2f} s", flush=True)
+    finest, coarser = card_objects()
+    assert not finest.hide_viewport and coarser.hide_viewport
+    count = len(finest.data.polygons)
+    live().stop(session())
+    hair().hide_set(True)
+    yield 5
+    driver.screenshot("made")
+    finest.modifiers.new("Thick", "SOLIDIFY").thickness = 0.002
+    finest.data.materials[0] = bpy.data.materials.new("Own")
+    hair().hide_set(False)
+    hair().select_set(True)
+    bpy.context.view_layer.objects.active = hair()
+    settings("cards").card_count = 2 * CARDS
+    bpy.ops.ed.undo_push(message="before the cards are made again")
+    make_cards()
+    yield from until(lambda: not is_making(), "Make Cards does not end again", 300)
+    assert card_objects() == [finest, coarser]
+    assert len(finest.data.polygons) > 1.2 * count
+    assert [each.name for each in finest.modifiers] == ["Thick"]
+    assert [each.name for each in finest.data.materials] == ["Own"]
+    again = len(finest.data.polygons)
+    bpy.ops.ed.undo()
+    yield 3
+    assert len(card_objects()[0].data.polygons) == count
+    bpy.ops.ed.redo()
+    yield 3
+    assert len(card_objects()[0].data.polygons) == again
+    finest = card_objects()[0]
+    finest.hide_set(True)
+    yield 3
+    bpy.data.objects.remove(finest)
+    yield 3
+    make_cards()
+    yield from until(lambda: not is_making(), "a deleted object is not made anew", 300)
+    assert [each.hairloom.card_object.level for each in card_objects()] == [0, 1]
+
+
+def a_copy_is_sorted():
+    """Sort Hair Cards on a mesh whose faces somebody has mixed up."""
+    finest = card_objects()[0]
+    copy = finest.copy()
+    copy.data = finest.data.copy()
+    copy.name = "Copy"
+    bpy.context.collection.objects.link(copy)
+    count = len(copy.data.polygons)
+    for each in bpy.context.selected_objects:
+        each.select_set(False)
+    copy.select_set(True)
+    bpy.context.view_layer.objects.active = copy
+    yield 5
+    driver.screenshot("own-cards")
+    mode = bpy.ops.object.mode_set
+    mode(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.sort_elements(type="RANDOMIZE", elements={"FACE"}, seed=3)
+    mode(mode="OBJECT")
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        assert bpy.ops.hairloom.sort_cards(head="Head") == {"FINISHED"}
+    yield 2
+    assert len(copy.data.polygons) == count and len(finest.data.polygons) == count
+    driver.screenshot("sorted")
+    bpy.data.objects.remove(copy)
+    hair().select_set(True)
+    bpy.context.view_layer.objects.active = hair()
+    yield 3
+
+
+def they_are_exported():
+    """File > Export; a reader of JSON finds all levels, triangles and files."""
+    path = FOLDER / "hair.glb"
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        assert bpy.ops.hairloom.export_cards(filepath=str(path)) == {"FINISHED"}
+    raw = path.read_bytes()
+    length = int.from_bytes(raw[12:16], "little")
+    gltf = json.loads(raw[20 : 20 + length])
+    sidecar = json.loads((FOLDER / "hair.hairloom.json").read_text(encoding="utf-8"))
+    assert len(gltf["meshes"]) == len(sidecar["levels"]) == 2
+    for mesh in gltf["meshes"]:
+        (primitive,) = mesh["primitives"]
+        assert {"TEXCOORD_0", "TEXCOORD_1", "TANGENT"} <= set(primitive["attributes"])
+    counts = {gltf["accessors"][m["primitives"][0]["indices"]]["count"] for m in gltf["meshes"]}
+    assert counts == {3 * len(each.data.polygons) for each in card_objects()}
+    for file in sidecar["texture_files"]:
+        assert (FOLDER / file).is_file(), file
+    yield 1
+
+
+def is_building():
+    return any(each.cards.is_pending for each in live().sessions())
+
+
+def another_file_in_mid_build():
+    """What is half done ends with its file; the next one is as good as any."""
+    hair().select_set(True)
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield from until(is_building, "no cards are built")
+    make_cards()
+    yield 2
+    bpy.ops.wm.save_as_mainfile(filepath=BLEND)
+    bpy.ops.wm.open_mainfile(filepath=BLEND)
+    yield 10
+    assert not is_making() and live().sessions() == () and live().notice() == ""
+    assert settings("card_drawing").shown_as == "cards" and len(card_objects()) == 2
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield from until(are_shown, "no cards are shown in the file that was loaded", 300)
+    driver.screenshot("reloaded")
+
+
+def disabled_in_mid_build():
+    settings("cards").card_count = CARDS + 7
+    assert is_building()
+    make_cards()
+    yield 2
+    addon_utils.disable(driver.EXTENSION, default_set=True)
+    yield 10
+    assert not hasattr(bpy.types.Curves, "hairloom")
+    driver.enable_extension()
+    yield 5
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield from until(are_shown, "no cards are shown after all", 300)
+    addon_utils.disable(driver.EXTENSION, default_set=True)
+    yield 5
+
+
+driver.play(steps())
