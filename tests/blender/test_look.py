@@ -8,8 +8,7 @@ from typing import Any
 import bpy
 import pytest
 
-from hairloom.addon.host import live, overlay, reactions
-from hairloom.addon.host import session as session_module
+from hairloom.addon.host import groom_picture, live, overlay, reactions
 from hairloom.addon.shading.kajiya_kay_settings import KajiyaKaySettings
 from hairloom.addon.shading.marschner.settings import MarschnerSettings
 from hairloom.addon.shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
@@ -36,7 +35,7 @@ def window(monkeypatch: pytest.MonkeyPatch) -> None:
     class Blender:
         app = App
 
-    monkeypatch.setattr(session_module, "bpy", Blender)
+    monkeypatch.setattr(groom_picture, "bpy", Blender)
 
 
 def table_size(session: Any) -> int:
