@@ -75,6 +75,8 @@ def glb_parts(path: Path) -> tuple[dict[str, Any], bytes]:
 def test_every_format_comes_with_a_sidecar_that_follows_the_schema(
     tmp_path: Path, suffix: str
 ) -> None:
+    if suffix == ".usda" and not bpy.app.build_options.usd:
+        pytest.skip("this Blender was built without USD")
     assert cards(tmp_path / f"hair{suffix}", "--levels", "2") == 0
     content = sidecar_of(tmp_path / f"hair{suffix}")
     assert [level["node"] for level in content["levels"]] == ["hair_LOD0", "hair_LOD1"]
