@@ -81,21 +81,21 @@ def has_drawn():
 
 
 def hair_shades_the_head():
-    """Ours in place of Blender's; without a light none; and as before when it comes back."""
+    """By a light that throws shadows, and as before when it does so again."""
     shaded = pixels("on_body")
     sun = bpy.data.objects["Sun"].data
     sun.use_shadow = False
-    yield 10
-    # Blender throws no shadow of its own strands that this could take away
-    assert changed(shaded, pixels("no_blender_shadow"), 0.05) < 5e-3
-    volume().on_body = False
     yield from until(
         lambda: changed(shaded, pixels("bare"), 0.05) > 0.004, "hair does not shade the head"
     )
     yield 10
     bare = pixels("bare")
     assert np.quantile((shaded - bare).max(axis=2), 0.995) < 0.05, "it only darkens"
-    volume().on_body = True
+    # with neither shadows of the light nor On Body it is the same: Blender's strands throw none
+    volume().on_body = False
+    yield 10
+    assert changed(bare, pixels("no_shadow_at_all"), 0.05) < 5e-3
+    volume().on_body = sun.use_shadow = True
     yield from until(
         lambda: changed(shaded, pixels("on_body_again"), 0.05) < 5e-3, "it does not come back"
     )
