@@ -18,7 +18,7 @@ from .field import Settings
 
 PRESET_VERSION = 1
 #: A preset has some thousand bytes; JSON may take twenty times its size in memory.
-LARGEST_PRESET = 1_000_000
+LARGEST_PRESET = 1 << 16
 
 #: version n -> the step that makes it version n + 1; one entry for each version that ever shipped
 MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
