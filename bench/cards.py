@@ -1,7 +1,7 @@
 """Hair cards of Sintel: how long they take, order, occlusion, passes, and cards beside strands.
 
-See `_cards_atlas`, `_cards_order`, `_cards_occlusion`, `_cards_passes` and `_cards_strands` for
-what is compared with what.
+See `_cards_build`, `_cards_atlas`, `_cards_order`, `_cards_occlusion`, `_cards_passes` and
+`_cards_strands` for what is compared with what.
 
 make bench NAME=cards           some minutes; writes out/cards_sheet.png
 """
@@ -16,6 +16,7 @@ import bpy
 import gpu
 import numpy as np
 from _cards_atlas import atlas_figures
+from _cards_build import build_figures
 from _cards_occlusion import occlusion_figures
 from _cards_order import order_figures
 from _cards_passes import passes_figures
@@ -25,6 +26,7 @@ from _cards_strands import strands_figures
 def main() -> None:
     gpu.init()
     found: dict[str, Any] = {
+        **build_figures(),
         **atlas_figures(),
         **order_figures(),
         **occlusion_figures(),
