@@ -26,15 +26,6 @@ SUFFIXES = (".usd", ".usdc", ".usda")
 _PATIENCE, _BYTES_A_SECOND = 20.0, 4.0e6
 
 
-def has_usd() -> bool:
-    """Whether the functions here can work in this Python."""
-    try:
-        from pxr import UsdGeom  # noqa: F401
-    except ImportError:
-        return False
-    return True
-
-
 def usd_library(place: Path) -> ModuleType:
     """The package `pxr`, with the modules that grooms need.
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import gpu
-import numpy as np
-
 from ..arrays import Floats
+from .mesh_batch import triangle_batch
 from .mesh_pictures import pictures_of
 from .snapshot import Caster, MeshSnapshot, surface_of
 
@@ -31,14 +29,4 @@ def caster_batch(caster: Caster) -> Any:
             "position": surface.corners.reshape(-1, 3),
             "picture_place": surface.corner_uv.reshape(-1, 2),
         }
-    layout = gpu.types.GPUVertFormat()
-    for name, array in values.items():
-        layout.attr_add(id=name, comp_type="F32", len=array.shape[1], fetch_mode="FLOAT")
-    vertices = gpu.types.GPUVertBuf(layout, len(values["position"]))
-    for name, array in values.items():
-        vertices.attr_fill(name, np.ascontiguousarray(array, np.float32))
-    if has_corners:
-        return gpu.types.GPUBatch(type="TRIS", buf=vertices)
-    triangles = np.ascontiguousarray(surface.triangles, np.int32)
-    indices = gpu.types.GPUIndexBuf(type="TRIS", seq=triangles)
-    return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
+    return triangle_batch(values, None if has_corners else surface.triangles)

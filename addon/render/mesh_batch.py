@@ -7,7 +7,7 @@ from typing import Any
 import gpu
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..shading.skin.layout import SkinLayout
 from .mesh_pictures import pictures_of
 from .snapshot import MeshSnapshot
@@ -36,6 +36,15 @@ def mesh_batch(mesh: MeshSnapshot, skin: SkinLayout | None = None) -> Any:
         values["skin_place"] = _skin_places(mesh, skin)
     if pictures_of(mesh) is not None and surface.corner_uv is not None:
         values["picture_place"] = surface.corner_uv.reshape(-1, 2)
+    return triangle_batch(values, None if has_corners else surface.triangles)
+
+
+def triangle_batch(values: dict[str, Floats], triangles: Ints | None) -> Any:
+    """Vertex attributes by name, (vertex_count, length) each, and the triangles between them.
+
+    Args:
+        triangles: (triangle_count, 3); None where three vertices each are a triangle.
+    """
     layout = gpu.types.GPUVertFormat()
     for name, array in values.items():
         layout.attr_add(id=name, comp_type="F32", len=array.shape[1], fetch_mode="FLOAT")
@@ -43,10 +52,10 @@ def mesh_batch(mesh: MeshSnapshot, skin: SkinLayout | None = None) -> Any:
     for name, array in values.items():
         # attr_fill checks neither dtype nor order
         vertices.attr_fill(name, np.ascontiguousarray(array, np.float32))
-    if has_corners:
+    if triangles is None:
         return gpu.types.GPUBatch(type="TRIS", buf=vertices)
-    triangles = np.ascontiguousarray(surface.triangles, np.int32)
-    indices = gpu.types.GPUIndexBuf(type="TRIS", seq=triangles)
+    corners = np.ascontiguousarray(triangles, np.int32)
+    indices = gpu.types.GPUIndexBuf(type="TRIS", seq=corners)
     return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
 
 
