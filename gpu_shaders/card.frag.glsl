@@ -28,10 +28,13 @@ void main()
   vec3 to_eye = unit_or(view.eye.xyz - view.eye.w * card_point, normal);
   float along = card_along;
   vec4 steps = vec4(dFdx(card_uv), dFdy(card_uv));
-  float alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
+  float texture_alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
+  float alpha = texture_alpha;
+  vec3 across = cross(dFdx(card_point), dFdy(card_point));
 #  if EVEN
-  alpha = even_alpha(alpha, cross(dFdx(card_point), dFdy(card_point)), tangent, to_eye);
+  alpha = even_alpha(alpha, across, tangent, to_eye);
 #  endif
+  vec3 card_way = tangent, card_front = normal;
 #  if TANGENT_MAP
   vec3 texel = card_texel(tangent_texture, card_uv, steps, atlas_tiles).xyz;
   tangent = mapped_tangent(texel, tangent, normal, shading.shift_noise);
@@ -41,25 +44,27 @@ void main()
 #  endif
 #  if NORMAL_MAP
   normal = mapped_normal(card_texel(normal_texture, card_uv, steps, atlas_tiles).xyz,
-                         unit_or(card_tangent, vec3(0.0, 0.0, 1.0)),
+                         card_way,
                          normal);
 #  endif
+  vec3 base = card_texel(base_texture, card_uv, steps, atlas_tiles).xyz;
   float sparkle_noise = card_texel(noise_texture, card_uv, steps, vec2(0.0)).x;
   vec3 absorption = vec3(0.0);
 #  if MARSCHNER
   vec3 colored = strand_absorption(fibre, along, 0.5, 1.5, shading);
   vec3 grey = strand_absorption(fibre, along, 0.5, -0.5, shading);
-  absorption = mix(colored, grey, shading.grey_share);
+  absorption = own_absorption(mix(colored, grey, shading.grey_share), base, fibre.root.w);
   vec3 hair = strand_color(fibre, absorption);
 #  else
-  vec3 hair = card_base(along, shading);
+  vec3 hair = card_base(along, shading) * base;
 #  endif
 
   vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz * card_occlusion;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, card_point, to_light, irradiance);
-    vec3 way = way_of_light_to_card(index, card_point, alpha);
+    vec3 way = way_of_light_to_card(
+        index, card_point, texture_alpha, to_light, across, card_way, card_front);
     irradiance *= way.x < 0.0 ? card_occlusion : way.z;
     float level = 0.0;
 #  if MARSCHNER
@@ -77,7 +82,6 @@ void main()
                                         level,
                                         way);
   }
-  radiance *= card_texel(base_texture, card_uv, steps, atlas_tiles).xyz;
   float covered = is_opaque == 1 ? 1.0 : alpha;
 #  if CLIPPED
   if (alpha < alpha_range.x || alpha >= alpha_range.y) {

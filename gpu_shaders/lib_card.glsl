@@ -1,6 +1,7 @@
 // What a card makes of the models of strands: a card stands for many of them.
 //
 // Twin of addon/shading/card_look.py: same names, same order. Holds no resources.
+#include "lib_card_opacity.glsl"
 #include "lib_kajiya_kay.glsl"
 
 // The way of a strand by a texel of a tangent map.
@@ -24,9 +25,7 @@ vec3 mapped_normal(vec3 texel, vec3 tangent, vec3 normal)
 // its strands. `across`: normal of its plane, of any length.
 float even_alpha(float alpha, vec3 across, vec3 tangent, vec3 to_eye)
 {
-  vec3 turned = to_eye - dot(to_eye, tangent) * tangent;
-  float size = length(across) * length(turned);
-  float facing = size > 0.0 ? abs(dot(across, turned)) / size : 1.0;
+  float facing = turned_facing(across, tangent, to_eye);
   return 1.0 - pow(1.0 - alpha, {{mean_facing}} / max(facing, {{least_facing}}));
 }
 
@@ -36,4 +35,13 @@ vec3 card_base(float along, ShadingSettings shading)
   vec3 colored = strand_base(along, 0.5, 1.5, shading);
   vec3 grey = strand_base(along, 0.5, -0.5, shading);
   return mix(colored, grey, shading.grey_share);
+}
+
+// The absorption of strands whose colour is `base` times that of the card's mean. `color_factor`: by
+// which a root of absorption is minus the logarithm of a colour.
+vec3 own_absorption(vec3 absorption, vec3 base, float color_factor)
+{
+  vec3 root = sqrt(max(absorption, 0.0)) - log(max(base, {{darkest}})) / color_factor;
+  root = max(root, 0.0);
+  return root * root;
 }

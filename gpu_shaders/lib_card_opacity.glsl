@@ -7,3 +7,28 @@ float card_optical_depth(float alpha)
 {
   return -log(1.0 - min(alpha, {{most_alpha}}));
 }
+
+// |cos| of the turn about its strands by which a card faces a way. `across`: normal of its plane, of any
+// length.
+float turned_facing(vec3 across, vec3 tangent, vec3 way)
+{
+  vec3 turned = way - dot(way, tangent) * tangent;
+  float size = length(across) * length(turned);
+  return size > 0.0 ? abs(dot(across, turned)) / size : 1.0;
+}
+
+// Factor of the tau that light from a way meets in an even card.
+float even_depth(vec3 across, vec3 tangent, vec3 way)
+{
+  return {{mean_turn}} / max(turned_facing(across, tangent, way), {{least_facing}});
+}
+
+// How much hair lies before and beyond the strand of an even card that is seen; `way`: before and beyond
+// its plane by the map.
+vec2 among_strands(vec2 way, float scale, float tau, float share, float front)
+{
+  float few = max(tau, {{least_tau}});
+  float others = scale * (few / (1.0 - exp(-few)) - 1.0);
+  vec2 rest = max(way - scale * tau * vec2(share, 1.0 - share), 0.0);
+  return rest + others * vec2(1.0 - front, front);
+}

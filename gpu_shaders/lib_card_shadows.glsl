@@ -1,6 +1,6 @@
 // What is in the way of a light to a card: all but the card itself, which is in the maps as well.
 //
-// Twin of own_share in addon/shading/volume/card_opacity.py. Reads what lib_shadows.glsl reads.
+// Twin of own_share and among_strands in addon/shading/volume/card_opacity.py. Reads what lib_shadows.glsl reads.
 #include "lib_shadows.glsl"
 #include "lib_card_opacity.glsl"
 
@@ -32,15 +32,22 @@ float own_share(int light, vec3 point)
 }
 #endif
 
-// As way_of_light, for a place of a card that covers alpha.
-vec3 way_of_light_to_card(int index, vec3 point, float alpha)
+// As way_of_light, for a place of a card whose texture covers alpha. `across`: normal of its plane, of any
+// length. EVEN: for the foremost of its strands.
+vec3 way_of_light_to_card(
+    int index, vec3 point, float alpha, vec3 to_light, vec3 across, vec3 tangent, vec3 normal)
 {
   vec3 way = way_of_light(index, point);
 #if SHADOWS
-  if (way.x > 0.0) {
-    float own = opacity.extinction * own_share(index, point) * card_thickness *
-                card_optical_depth(alpha);
-    way.x = max(way.x - own, 0.0);
+  if (way.x >= 0.0) {
+    float share = own_share(index, point), tau = card_optical_depth(alpha);
+    float scale = opacity.extinction * card_thickness;
+#  if EVEN
+    scale *= even_depth(across, tangent, to_light);
+    way.xy = among_strands(way.xy, scale, tau, share, 0.5 + 0.5 * dot(normal, to_light));
+#  else
+    way.x = max(way.x - scale * share * tau, 0.0);
+#  endif
   }
 #endif
   return way;

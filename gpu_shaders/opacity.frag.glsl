@@ -2,7 +2,7 @@
 //
 // TARGETS: textures of four layers each that are drawn into. DEEP: layers lie between the first
 // and the last hair that the light meets. CARDS: cards are drawn, not strands; they count as what their alpha stands
-// for.
+// for; EVEN: from whichever side the light comes.
 #include "lib_opacity.glsl"
 #ifdef CARDS
 #  include "lib_card_opacity.glsl"
@@ -15,6 +15,10 @@ void main()
   vec4 steps = vec4(dFdx(card_uv), dFdy(card_uv));
   float alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
   float strand_weight = card_thickness * card_optical_depth(alpha);
+#  if EVEN
+  vec3 across = cross(dFdx(card_point), dFdy(card_point));
+  strand_weight *= even_depth(across, normalize(card_tangent), normalize(light_way));
+#  endif
 #endif
   float behind = strand_depth;
 #if DEEP

@@ -7,6 +7,12 @@ void main()
   float w = dot(opacity.map_w[light_index], at);
   float depth = clamp(dot(opacity.map_depth[light_index], at), 0.0, 1.0);
   card_uv = uv;
+  card_point = position;
+  card_tangent = tangent;
+  // along it the place in the map stays the same
+  vec2 here = vec2(dot(opacity.map_x[light_index], at), dot(opacity.map_y[light_index], at)) / w;
+  light_way = cross(opacity.map_x[light_index].xyz - here.x * opacity.map_w[light_index].xyz,
+                    opacity.map_y[light_index].xyz - here.y * opacity.map_w[light_index].xyz);
   strand_depth = depth;
   gl_Position = vec4(dot(opacity.map_x[light_index], at), dot(opacity.map_y[light_index], at),
                      (2.0 * depth - 1.0) * w, w);

@@ -28,15 +28,21 @@ from .snapshot import Caster
 from .textures import drawing_into, drawing_state
 
 _BLOCKS = (("Opacity", "opacity"),)
-_INPUTS = (("VEC3", "position"), ("VEC2", "uv"))
-_VARYINGS = (("smooth", "VEC2", "card_uv"), ("smooth", "FLOAT", "strand_depth"))
+_INPUTS = (("VEC3", "position"), ("VEC2", "uv"), ("VEC3", "tangent"))
+_VARYINGS = (
+    ("smooth", "VEC2", "card_uv"),
+    ("smooth", "FLOAT", "strand_depth"),
+    ("smooth", "VEC3", "card_point"),
+    ("smooth", "VEC3", "card_tangent"),
+    ("smooth", "VEC3", "light_way"),
+)
 
 
-def card_opacity_recipe(slots: int, *, is_deep: bool) -> ShaderRecipe:
-    """The program that draws cards into so many slots."""
+def card_opacity_recipe(slots: int, *, is_deep: bool, is_even: bool) -> ShaderRecipe:
+    """The program that draws cards into so many slots; is_even: see CardSnapshot."""
     starts = (("UINT_2D", "opacity_starts"),) if is_deep else ()
     return ShaderRecipe(
-        name=f"opacity_cards_{slots}_{'deep' if is_deep else 'slices'}",
+        name=f"opacity_cards_{slots}_{'deep' if is_deep else 'slices'}{'_even' * is_even}",
         vertex="opacity_card.vert.glsl",
         fragment="opacity.frag.glsl",
         structs=("struct_opacity.glsl",),
@@ -47,7 +53,12 @@ def card_opacity_recipe(slots: int, *, is_deep: bool) -> ShaderRecipe:
         inputs=_INPUTS,
         varyings=_VARYINGS,
         outputs=tuple(("VEC4", f"layers_{slot}") for slot in range(slots)),
-        defines=(("TARGETS", slots), ("DEEP", int(is_deep)), ("CARDS", 1)),
+        defines=(
+            ("TARGETS", slots),
+            ("DEEP", int(is_deep)),
+            ("CARDS", 1),
+            ("EVEN", int(is_even)),
+        ),
     )
 
 
@@ -82,7 +93,7 @@ class CardOpacity(OpacityPass):
         super().release()
         self._batch: Any = None
         self._alpha: Any = None
-        self._thickness, self._tiles = 1.0, (1.0, 1.0)
+        self._thickness, self._is_even, self._tiles = 1.0, False, (1.0, 1.0)
         self._serial = 0
         self._extent: tuple[CardMesh | None, Ball] = (None, Ball(np.zeros(3), 1.0))
 
@@ -95,18 +106,20 @@ class CardOpacity(OpacityPass):
         settings: VolumeSettings,
         casters: tuple[Caster, ...] = (),
         thickness: float = 1.0,
+        is_even: bool = False,
     ) -> OpacityMaps:
         """The maps of these cards.
 
         Args:
             batch: the mesh on the GPU. alpha: its texture; another object whenever it is another.
             lights, casters: as in OpacityPass.maps.
-            thickness: see CardSnapshot.
+            thickness, is_even: see CardSnapshot.
         """
-        is_same = self._batch is batch and self._alpha is alpha and self._thickness == thickness
+        counted = self._thickness, self._is_even
+        is_same = self._batch is batch and self._alpha is alpha and counted == (thickness, is_even)
         if not is_same:
             self._batch, self._alpha, self._serial = batch, alpha, self._serial + 1
-            self._thickness = thickness
+            self._thickness, self._is_even = thickness, is_even
         self._tiles = tiles_of(mesh.atlas)
         if self._extent[0] is not mesh:
             self._extent = mesh, ball_around(mesh.positions)
@@ -125,7 +138,8 @@ class CardOpacity(OpacityPass):
             textures["opacity_starts"] = maps.starts
             integers["map_index"] = number
         slots, passes = len(maps.slots), maps.passes
-        shader = program(card_opacity_recipe(slots, is_deep=maps.starts is not None))
+        is_deep = maps.starts is not None
+        shader = program(card_opacity_recipe(slots, is_deep=is_deep, is_even=self._is_even))
         for turn in range(passes):
             layer = number * passes + turn
             target = gpu.types.GPUFrameBuffer(

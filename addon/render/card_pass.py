@@ -82,7 +82,7 @@ class CardPass:
         cards = _drawn(snapshot)
         if cards is None or snapshot.volume.shadows == "none":
             return None
-        self._textures.upload(cards)
+        self._take_textures(cards)
         return self._opacity.of(
             cards.mesh,
             self._batches.static(cards),
@@ -91,6 +91,7 @@ class CardPass:
             snapshot.volume,
             snapshot.all_casters,
             cards.thickness,
+            is_even=cards.is_even,
         )
 
     def draw(
@@ -117,7 +118,7 @@ class CardPass:
         cards = _drawn(snapshot)
         if cards is None:
             return
-        self._textures.upload(cards)
+        self._take_textures(cards)
         batches = self._batches.of(cards, camera.eye)
         shaded = self._shaded(snapshot, cards, camera, (width, height), opacity, display)
         shaded.integers["output_encoding"] = output_index(output)
@@ -146,7 +147,7 @@ class CardPass:
         cards = _drawn(snapshot)
         if cards is None:
             return
-        self._textures.upload(cards)
+        self._take_textures(cards)
         view = self._blocks["view"].holding(view_values(camera, width, height))
         with _state_of(FOUR_PASSES[0]):
             self._draw_depth(view, self._batches.static(cards), least_alpha, sharpness=0.0)
@@ -156,7 +157,11 @@ class CardPass:
         self._blocks = {name: UniformBlock() for name in _BLOCKS}
         self._opacity.release()
         self._batches.release()
-        self._textures = CardTextures()
+        self._own_textures = self._textures = CardTextures()
+
+    def _take_textures(self, cards: CardSnapshot) -> None:
+        self._textures = cards.device or self._own_textures
+        self._textures.upload(cards)
 
     def _shaded(
         self,

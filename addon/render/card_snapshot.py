@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from ..arrays import Ints
 from ..cards.card_mesh import CardMesh
@@ -20,6 +21,7 @@ class CardSnapshot:
     is_even: alpha is what the strands cover on the mean of all turns of a card, as a baked atlas
         has it; cards cover as much at a slant, see card_look.even_alpha.
     thickness: of the hair that alpha stands for in shadows, see shading/volume/card_opacity.py.
+    device: the card_textures.CardTextures that all who draw these cards share; None: each its own.
 
     Mesh and textures are uploaded again only when they are other objects than before; triangles
     that are the same array stay on the GPU while cards move.
@@ -32,3 +34,4 @@ class CardSnapshot:
     drawing: CardDrawingSettings = field(default_factory=CardDrawingSettings)
     thickness: float = 1.0
     is_even: bool = False
+    device: Any = None

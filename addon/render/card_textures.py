@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterable, Iterator
 from itertools import islice
 from typing import Any
 
@@ -14,6 +14,7 @@ from ..exchange.mip_maps import mip_levels
 from ..shading.card_texture import LEVELS, packed_levels
 from ..shading.textures import HairTextures
 from .card_snapshot import CardSnapshot
+from .shader_program import released_with_shaders
 from .textures import texture_from
 
 #: textures that repeat in u and v; the others end at their edges
@@ -27,6 +28,7 @@ class CardTextures:
         self._pictures: HairTextures | None = None
         self._grid = AtlasGrid()
         self._textures: dict[str, Any] = {}
+        released_with_shaders(self)
 
     @property
     def tiles(self) -> tuple[float, float]:
@@ -40,15 +42,32 @@ class CardTextures:
     def upload(self, cards: CardSnapshot) -> None:
         """Hold the textures of these cards; nothing goes up that is there."""
         pictures, grid = cards.textures, cards.mesh.atlas
-        if self._pictures is pictures and self._grid == grid:
-            return
-        self._textures = {}
-        for name, levels in _levels(pictures, grid):
-            packed = packed_levels(levels, is_repeated=name in _REPEATED)
-            texture = texture_from(packed, "R16F" if packed.shape[-1] == 1 else "RGBA16F")
+        if self._pictures is not pictures or self._grid != grid:
+            for _ in self.uploading(pictures, grid, packed_textures(pictures, grid)):
+                pass
+
+    def uploading(
+        self, pictures: HairTextures, grid: AtlasGrid, packed: Iterable[tuple[str, Floats]]
+    ) -> Generator[None]:
+        """The same in steps, a texture each; packed: see `packed_textures`."""
+        self.release()
+        textures: dict[str, Any] = {}
+        for name, texels in packed:
+            texture = texture_from(texels, "R16F" if texels.shape[-1] == 1 else "RGBA16F")
             texture.extend_mode("EXTEND")
-            self._textures[name] = texture
-        self._pictures, self._grid = pictures, grid
+            textures[name] = texture
+            yield
+        self._pictures, self._grid, self._textures = pictures, grid, textures
+
+    def release(self) -> None:
+        """Let go of them; the next draw uploads again."""
+        self._pictures, self._textures = None, {}
+
+
+def packed_textures(pictures: HairTextures, grid: AtlasGrid) -> Iterator[tuple[str, Floats]]:
+    """Name and texels of each texture, see shading/card_texture.py; any thread may ask for them."""
+    for name, levels in _levels(pictures, grid):
+        yield name, packed_levels(levels, is_repeated=name in _REPEATED)
 
 
 def tiles_of(grid: AtlasGrid) -> tuple[float, float]:

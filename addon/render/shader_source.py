@@ -21,12 +21,12 @@ from ..dynamics.contacts import SKIN
 from ..dynamics.wind import MODES
 from ..refine import detail
 from ..refine.settings import DetailSettings
-from ..shading.card_look import LEAST_FACING, MEAN_FACING
+from ..shading.card_look import DARKEST, MEAN_FACING
 from ..shading.card_texture import LEVELS, SLACK
 from ..shading.lights import LIGHT_CAPACITY, NEAREST_DISTANCE
 from ..shading.skin.diffusion import KERNEL_REACH, KERNEL_TAPS, SKIN_LIGHTS
 from ..shading.skin.layout import CLOSING
-from ..shading.volume.card_opacity import MOST_ALPHA
+from ..shading.volume.card_opacity import LEAST_FACING, LEAST_TAU, MEAN_TURN, MOST_ALPHA
 from ..shading.volume.dual import HALF_WAY, UNKNOWN_BEYOND
 from ..shading.volume.map_size import START_TEXELS
 from ..shading.volume.mesh_frames import MESH_FRAME_CAPACITY
@@ -110,7 +110,10 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "skin_closing": repr(float(CLOSING)),
         "atlas_samples": str(SAMPLES),
         "mean_facing": repr(MEAN_FACING),
+        "darkest": repr(DARKEST),
         "least_facing": repr(LEAST_FACING),
+        "mean_turn": repr(MEAN_TURN),
+        "least_tau": repr(LEAST_TAU),
         "card_texture_levels": str(LEVELS),
         "card_texture_slack": str(SLACK),
         "sparse_mask": str(SPARSE_RANGE - 1),

@@ -10,14 +10,18 @@ import numpy as np
 
 from ..arrays import Floats
 from .kajiya_kay import strand_base
+from .marschner.pigment import COLOR_FACTOR
 from .settings import ShadingSettings
+from .volume.card_opacity import LEAST_FACING, MEAN_TURN, turned_facing
 
 #: How dense a card is that faces the eye, in what it is on the mean of all turns: 2 / pi, the mean
 #: of |cos|; and a quarter more, for what is lost behind cards that are nearly clear and still write
 #: depth (measured, Sintel).
-MEAN_FACING = 1.25 * 2.0 / np.pi
-#: where a card is nearly on edge, it counts as this far turned to the eye
-LEAST_FACING = 0.1
+MEAN_FACING = 1.25 * MEAN_TURN
+#: both, by the names that sidecars have for them
+EVEN_ALPHA = {"mean_facing": MEAN_FACING, "least_facing": LEAST_FACING}
+#: Darkest texel of a base texture of which an absorption is made.
+DARKEST = 1.0e-3
 
 
 def mapped_tangent(texel: Floats, tangent: Floats, normal: Floats, shift_noise: float) -> Floats:
@@ -61,10 +65,7 @@ def even_alpha(alpha: Floats, across: Floats, tangent: Floats, to_eye: Floats) -
         across: (..., 3) normal of its plane, of any length.
         tangent, to_eye: (..., 3) unit vectors.
     """
-    turned = to_eye - np.sum(to_eye * tangent, axis=-1, keepdims=True) * tangent
-    size = np.linalg.norm(across, axis=-1) * np.linalg.norm(turned, axis=-1)
-    facing = np.abs(np.sum(across * turned, axis=-1)) / np.maximum(size, 1.0e-30)
-    facing = np.where(size > 0.0, facing, 1.0)
+    facing = turned_facing(across, tangent, to_eye)
     even: Floats = 1.0 - (1.0 - alpha) ** (MEAN_FACING / np.maximum(facing, LEAST_FACING))
     return even
 
@@ -78,3 +79,18 @@ def card_base(along: Floats, shading: ShadingSettings) -> Floats:
     colored = strand_base(along, even, even + 1.0, shading)
     grey = strand_base(along, even, even - 1.0, shading)
     return colored + (grey - colored) * shading.grey_share
+
+
+def own_absorption(absorption: Floats, base: Floats) -> Floats:
+    """The absorption of strands whose colour is `base` times that of the card's mean, (..., 3).
+
+    So the base texture colours what passes through a fibre, and no light that it reflects. The
+    inverse of marschner.look.strand_color; nothing is brighter than white.
+
+    Args:
+        absorption: (..., 3) mean of the card, per radius.
+        base: (..., 3) texel of the base texture.
+    """
+    root = np.sqrt(np.maximum(absorption, 0.0)) - np.log(np.maximum(base, DARKEST)) / COLOR_FACTOR
+    own: Floats = np.maximum(root, 0.0) ** 2
+    return own

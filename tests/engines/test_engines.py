@@ -46,9 +46,10 @@ TO_SUN = tuple(np.array([0.5, -0.7, 0.5]) / np.linalg.norm([0.5, -0.7, 0.5]))
 IRRADIANCE = 4.0
 NEAR, FAR = 0.05, 5.0
 
-#: A card seen edge-on is drawn with mip maps there and without them here.
-MOST_MEAN = 1.5 / 255.0
-MOST_DIFFERENT = 0.08
+MOST_MEAN = 1.0 / 255.0
+#: Share of pixels that differ by more than 8 / 255, at most: mip maps are not made alike, and sharp
+#: highlights show it. Baked cards that did not grow denser at a slant would be at 0.022.
+MOST_DIFFERENT = {"kajiya_kay": 0.03, "marschner": 0.005, "baked": 0.015}
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,12 @@ def by_hairloom(written: WrittenCards, look: ShadingSettings) -> np.ndarray:
     snapshot = Snapshot(
         np.zeros((0, 2, 3), np.float32),
         np.zeros((0, 2), np.float32),
-        cards=CardSnapshot(written.mesh, written.maps.textures, written.maps.has_tangent_map),
+        cards=CardSnapshot(
+            written.mesh,
+            written.maps.textures,
+            written.maps.has_tangent_map,
+            is_even=written.maps.is_even,
+        ),
         lights=(Light.sun(tuple(-x for x in TO_SUN), (1.0, 1.0, 1.0), IRRADIANCE),),
         ambient=(0.0, 0.0, 0.0),
         shading=look,
@@ -157,7 +163,7 @@ def check(asset: Asset, drawn: Path) -> None:
     difference = np.abs(theirs - ours)
     assert (ours.max(axis=-1) > 0.1).mean() > 0.1  # there is hair in it
     assert difference.mean() < MOST_MEAN
-    assert (difference.max(axis=-1) > 8.0 / 255.0).mean() < MOST_DIFFERENT
+    assert (difference.max(axis=-1) > 8.0 / 255.0).mean() < MOST_DIFFERENT[asset.folder.name]
 
 
 def read_encoded(linear: np.ndarray) -> np.ndarray:

@@ -136,6 +136,37 @@ def test_thin_cards_take_less_of_the_light(frame: Any, form: str) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("turn", [0.0, 1.1])
+def test_even_cards_shade_as_much_from_all_sides_of_their_strands(
+    frame: Any, form: str, turn: float
+) -> None:
+    """A card turned about its strands before a wall of hair, of which nothing is in its own way."""
+    wall = card(1.0, 0.0, 2.0, (1.0, 1.0))
+    wall["normal"] = -wall["normal"]
+    turned = card(0.0, 1.0, 0.0, (0.0, 0.0))
+    x = turned["positions"][:, 0] - 0.5
+    turned["positions"] = turned["positions"] * [0.0, 0.0, 1.0]
+    turned["positions"][:, 0] = 0.5 + x * np.cos(turn)
+    turned["positions"][:, 1] = 0.7 + x * np.sin(turn)
+    found = []
+    for cards in ((turned, wall), (wall,)):
+        snapshot = snapshot_of(
+            mesh_of(*cards),
+            textures_of([0.6, 1.0]),
+            volume=of_form(form),
+            lights=(SUN,),
+            ambient=(0.0, 0.0, 0.0),
+            shading=PLAIN,
+        )
+        even = dataclasses.replace(snapshot.cards, is_even=True)
+        shown = dataclasses.replace(snapshot, cards=even)
+        found.append(frame.render_image(shown, behind(frame), SIZE, SIZE, 1)[16, 14:18, 0])
+    left = 0.4 ** (2.0 / np.pi / np.cos(turn))
+    assert found[1].min() > 0.01
+    assert found[0] / found[1] == pytest.approx(left, rel=0.03)
+
+
+@pytest.mark.parametrize("form", FORMS)
 def test_cards_shade_the_skin_and_a_mesh_shades_cards(frame: Any, form: str) -> None:
     def wall(y: float, low: float, high: float) -> Any:
         corners = np.array([[low, y, -1], [high, y, -1], [high, y, 2], [low, y, 2]], np.float32)

@@ -6,12 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from mip_chains import mip_chain
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
-from hairloom.addon.exchange.mip_maps import mip_chain
 from hairloom.addon.shading.card_look import even_alpha
 from hairloom.addon.shading.card_texture import LEVELS, card_texel, packed_levels, wanted_level
 from hairloom.addon.shading.settings import ShadingSettings
+from hairloom.addon.shading.volume.card_opacity import (
+    among_strands,
+    card_optical_depth,
+    even_depth,
+)
 
 SHAPE = (40, 96)
 
@@ -60,3 +65,8 @@ def test_level_and_slant(compute: Callable[..., np.ndarray]) -> None:
     level = wanted_level(steps[..., :2], steps[..., 2:], (96, 40))
     assert np.abs(found[..., 1] - level).max() < 1e-3
     assert (level > 1.0).mean() > 0.2
+    tau, parts = card_optical_depth(alpha), np.minimum(steps[..., 2:], 1.0)
+    scale = even_depth(normals, tangents, eyes)
+    among = among_strands(steps[..., 0], steps[..., 1], scale, tau, parts[..., 0], parts[..., 1])
+    assert found[..., 2:] == pytest.approx(np.stack(among, axis=-1), rel=1e-3, abs=1e-3)
+    assert np.ptp(among[0]) > 1.0

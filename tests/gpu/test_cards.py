@@ -169,8 +169,10 @@ def test_a_pixel_has_the_colour_of_the_reference(
     assert np.ptp(expected[..., 0]) > 0.02, "the light must vary"
 
 
-def test_marschner_shades_cards_as_strands(frame: Any, front: Any) -> None:
-    """A card without texture has the colours of the reference of a strand in its place."""
+@pytest.mark.parametrize("color_noise", [0.5, 0.05, 0.9])
+def test_marschner_shades_cards_as_strands(frame: Any, front: Any, color_noise: float) -> None:
+    """A card has the colours of the reference of a strand in its place; its base texture says how
+    that strand's colour differs from the mean."""
     from hairloom.addon.shading.marschner.look import (
         fibre_of,
         marschner_light,
@@ -179,11 +181,18 @@ def test_marschner_shades_cards_as_strands(frame: Any, front: Any) -> None:
     )
     from hairloom.addon.shading.marschner.tables import marschner_tables, shape_of
 
-    look = dataclasses.replace(LOOK, model="marschner", grey_share=0.0)
+    look = dataclasses.replace(
+        LOOK, model="marschner", grey_share=0.0, tip_tint=0.0, color_variation=0.6
+    )
+    half = np.array(0.5)
+    own, mean = (
+        strand_color(strand_absorption(look, half, np.array(noise), half + 1.0))
+        for noise in (color_noise, 0.5)
+    )
     tilt = 0.3
     snapshot = snapshot_of(
         mesh_of(card((0.0, 0.0), (1.0, 1.0), 0.0, tilt=tilt)),
-        constant(noise=0.3, shift=0.7),
+        constant(own / mean, noise=0.3, shift=0.7),
         lights=LIGHTS,
         ambient=AMBIENT,
         shading=look,
@@ -195,8 +204,8 @@ def test_marschner_shades_cards_as_strands(frame: Any, front: Any) -> None:
         point = np.array([u, 0.0, z])
         normal = np.array([0.0, -np.cos(tilt), np.sin(tilt)])
         tangent = np.array([0.0, -np.sin(tilt), -np.cos(tilt)])
-        along, half = np.array(1.0 - z), np.array(0.5)
-        absorption = strand_absorption(look, along, half, half + 1.0)
+        along = np.array(1.0 - z)
+        absorption = strand_absorption(look, along, np.array(color_noise), half + 1.0)
         radiance = np.array(AMBIENT) * strand_color(absorption)
         for lamp in LIGHTS:
             radiance = radiance + light_irradiance(lamp, point) * marschner_light(

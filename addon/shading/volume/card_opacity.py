@@ -4,7 +4,13 @@ Strands that cover a place at random, tau times over, leave exp(-tau) of it open
 whose texture covers alpha of a place leaves 1 - alpha open, so it stands for -log(1 - alpha)
 strands, one behind the other. That is more than a groom has, because cards are opaque where they
 stand for few strands too, so cards of a groom count by a thickness at which all of them together
-throw as much shadow as its strands. Twin of gpu_shaders/lib_card_opacity.glsl and
+throw as much shadow as its strands.
+
+Cards of baked strands, "even" ones, count as strands do from whichever side: turned about its
+strands a card grows narrower, they do not. And the strand that is seen is the foremost one of its
+card, so that light from the front meets the others behind it, and light from behind before it.
+
+Twin of gpu_shaders/lib_card_opacity.glsl and
 lib_card_shadows.glsl.
 """
 
@@ -19,11 +25,56 @@ from ..settings import StrandSettings
 
 #: a card lets at least as much light through as this leaves: four strands are as good as a wall
 MOST_ALPHA = 0.98
+#: mean of |cos| over all turns of a card about its strands
+MEAN_TURN = 2.0 / np.pi
+#: where a card is nearly on edge, it counts as this far turned to the eye, or to the light
+LEAST_FACING = 0.1
+#: fewer strands than that are as good as none [1]
+LEAST_TAU = 1.0e-3
 
 
 def card_optical_depth(alpha: Floats) -> Floats:
     """tau that light meets in a card of thickness 1, (...)."""
     return -np.log1p(-np.minimum(alpha, MOST_ALPHA))
+
+
+def turned_facing(across: Floats, tangent: Floats, way: Floats) -> Floats:
+    """|cos| of the turn about its strands by which a card faces a way, (...).
+
+    Args:
+        across: (..., 3) normal of its plane, of any length.
+        tangent, way: (..., 3) unit vectors.
+    """
+    turned = way - np.sum(way * tangent, axis=-1, keepdims=True) * tangent
+    size = np.linalg.norm(across, axis=-1) * np.linalg.norm(turned, axis=-1)
+    facing = np.abs(np.sum(across * turned, axis=-1)) / np.maximum(size, 1.0e-30)
+    return np.where(size > 0.0, facing, 1.0)
+
+
+def even_depth(across: Floats, tangent: Floats, way: Floats) -> Floats:
+    """Factor of the tau that light from a way meets in an even card, (...): its mean over all
+    turns of the card, times |cos|, is that of a flat card; arguments of `turned_facing`."""
+    factor: Floats = MEAN_TURN / np.maximum(turned_facing(across, tangent, way), LEAST_FACING)
+    return factor
+
+
+def among_strands(
+    before: Floats, beyond: Floats, scale: Floats, tau: Floats, share: Floats, front: Floats
+) -> tuple[Floats, Floats]:
+    """How much hair lies before and beyond the strand of an even card that is seen, (...) each.
+
+    Where tau strands lie at random and one at least, it has tau / (1 - exp(-tau)) - 1 behind it.
+
+    Args:
+        before, beyond: the plane of the card by the map, the card itself in them.
+        scale: what one strand of the card counts there. tau: of the card.
+        share: see own_share. front: share of its other strands that the light meets later.
+    """
+    few = np.maximum(tau, LEAST_TAU)
+    others = scale * (few / -np.expm1(-few) - 1.0)
+    met = np.maximum(before - scale * tau * share, 0.0) + others * (1.0 - front)
+    left = np.maximum(beyond - scale * tau * (1.0 - share), 0.0) + others * front
+    return met, left
 
 
 @dataclass(frozen=True)

@@ -77,6 +77,7 @@ function materialOf(pass, sidecar, formulas, uniforms) {
       LEAST_ALPHA: leastAlpha(pass, sidecar).toFixed(6),
       NORMAL_MAP: sidecar.textures.normal ? 1 : 0,
       TANGENT_MAP: sidecar.textures.highlights_by === 'tangent' ? 1 : 0,
+      EVEN_ALPHA: sidecar.textures.even_alpha ? 1 : 0,
     },
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT.replace('#include <hair_shading>', formulas),
@@ -99,7 +100,9 @@ function leastAlpha(pass, sidecar) {
 
 async function uniformsOf(sidecar, address) {
   const { model, values, fibre, tables } = sidecar.material;
+  const even = sidecar.textures.even_alpha;
   const uniforms = {
+    even_facing: { value: new THREE.Vector2(even?.mean_facing, even?.least_facing) },
     model: { value: model === 'marschner' ? 1 : 0 },
     base_gain: { value: sidecar.textures.base?.gain ?? 1.0 }, // 8 bits hold no more than 1
   };
@@ -185,6 +188,7 @@ uniform float tip_tint, tint_start, tint_end, grey_share, shift_noise, sparkle, 
 uniform float primary_strength, primary_exponent, primary_shift;
 uniform float secondary_strength, secondary_exponent, secondary_shift;
 uniform float scattered, volume_shade, base_gain;
+uniform vec2 even_facing;
 uniform vec4 fibre_root, fibre_tip, fibre_strengths;
 uniform sampler2D base_texture, alpha_texture, shift_texture, noise_texture, tangent_texture;
 uniform sampler2D normal_texture;
@@ -214,6 +218,7 @@ HairPlace place() {
   here.normal = normal;
   here.tangent = tangent;
   here.along = occlusion_and_along.y;
+  here.base = base_gain * texture(base_texture, card_uv).xyz;
   here.shift = 0.5;
   here.sparkle = dot(texture(noise_texture, card_uv), noise_mask);
 #if TANGENT_MAP
@@ -229,13 +234,19 @@ HairPlace place() {
 
 void main() {
   float alpha = dot(texture(alpha_texture, card_uv), alpha_mask);
+#if EVEN_ALPHA && !IS_PRIME
+  vec3 to_eye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-card_point);
+  vec3 across = cross(dFdx(card_point), dFdy(card_point));
+  vec3 along = hair_unit(card_tangent, vec3(0.0, 0.0, 1.0));
+  alpha = hair_even_alpha(alpha, across, along, to_eye, even_facing);
+#endif
   if (alpha < LEAST_ALPHA) discard;
 #if IS_PRIME
   color = vec4(0.0);
 #else
   HairMaterial hair = material();
   HairPlace here = place();
-  vec3 radiance = hair_color(hair, here.along) * ambient * ambientLightColor / HAIR_PI;
+  vec3 radiance = hair_color(hair, here.along, here.base) * ambient * ambientLightColor / HAIR_PI;
 #if NUM_DIR_LIGHTS > 0
   for (int i = 0; i < NUM_DIR_LIGHTS; i++) {
     radiance += directionalLights[i].color *
@@ -250,7 +261,7 @@ void main() {
                 hair_light(hair, longitudinal, azimuthal, paths, here, normalize(away));
   }
 #endif
-  radiance *= occlusion_and_along.x * base_gain * texture(base_texture, card_uv).xyz;
+  radiance *= occlusion_and_along.x;
   float covered = IS_OPAQUE == 1 ? 1.0 : alpha;
   color = linearToOutputTexel(vec4(radiance, 1.0));
   color = vec4(color.xyz * covered, covered);

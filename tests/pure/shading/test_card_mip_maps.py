@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mip_chains import mip_chain
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
-from hairloom.addon.exchange.mip_maps import mip_chain
-from hairloom.addon.shading.card_look import LEAST_FACING, MEAN_FACING, even_alpha
+from hairloom.addon.shading.card_look import MEAN_FACING, even_alpha
 from hairloom.addon.shading.card_texture import (
     LEVELS,
     card_texel,
@@ -16,6 +16,7 @@ from hairloom.addon.shading.card_texture import (
     picture_size,
     wanted_level,
 )
+from hairloom.addon.shading.volume.card_opacity import LEAST_FACING
 
 GRID = AtlasGrid(4, 2)
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon.shading.card_look import card_base
+from hairloom.addon.shading.card_look import DARKEST, card_base, own_absorption
 from hairloom.addon.shading.drawn_strands import drawn_radius, strand_variation
 from hairloom.addon.shading.kajiya_kay import GREY_COLOR
+from hairloom.addon.shading.marschner.look import strand_absorption
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.strand_noise import strand_noise
 
 BROWN = (0.4, 0.25, 0.15)
 
@@ -46,3 +48,28 @@ def test_grey_on_black_hair_stays_within_bounds() -> None:
     factor = strand_variation(np.arange(1000), 3, shading)
     assert np.isfinite(factor).all()
     assert 0.0 <= factor.min() <= factor.max() == 4.0
+
+
+def test_a_base_texture_gives_strands_their_own_absorption() -> None:
+    """That of the strand itself, from the mean of the card and how the strand's colour differs."""
+    shading = ShadingSettings(
+        model="marschner", base_color=BROWN, tip_tint=0.8, color_variation=0.5, grey_share=0.2
+    )
+    seeds, along = np.arange(200), np.linspace(0.0, 1.0, 6)[None, :]
+    noises = [strand_noise(seeds, channel, np.zeros(1))[:, None] for channel in (2, 3)]
+    own = strand_absorption(shading, along, *noises)
+    half = np.full_like(along, 0.5)
+    colored, grey = (strand_absorption(shading, along, half, half + s) for s in (1.0, -1.0))
+    mean = colored + (grey - colored) * shading.grey_share
+    base = strand_variation(seeds, 6, shading)
+    is_bounded = base < 4.0
+    assert is_bounded.mean() > 0.75
+    found = own_absorption(np.broadcast_to(mean, own.shape), base)
+    np.testing.assert_allclose(found[is_bounded], own[is_bounded], rtol=1e-4)
+
+
+def test_absorption_of_black_and_of_more_than_white_stays_within_bounds() -> None:
+    black = own_absorption(np.full(3, 0.5), np.zeros(3))
+    assert np.isfinite(black).all()
+    np.testing.assert_array_equal(black, own_absorption(np.full(3, 0.5), np.full(3, DARKEST)))
+    np.testing.assert_array_equal(own_absorption(np.full(3, 0.01), np.full(3, 4.0)), 0.0)

@@ -7,10 +7,13 @@ import pytest
 
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.shading.volume.card_opacity import (
+    LEAST_FACING,
     MOST_ALPHA,
     StrandArea,
+    among_strands,
     card_optical_depth,
     card_shade,
+    even_depth,
     own_share,
 )
 from hairloom.addon.shading.volume.opacity import adds_to, layer_ends, layer_weights
@@ -84,3 +87,30 @@ def test_strands_thinner_than_what_lights_resolve_count_by_their_mean() -> None:
     uv = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     shade = card_shade(positions, np.array([[0, 1, 2]]), uv, alpha)
     assert shade == pytest.approx(0.5 * 3.0 * card_optical_depth(np.float32(0.25)), rel=1e-5)
+
+
+def test_even_cards_count_the_same_from_all_sides_of_their_strands() -> None:
+    """Turned to a light a card is as wide as |cos| shows it; on the mean of all turns it counts as
+    a flat one does."""
+    turns = np.linspace(0.0, 2.0 * np.pi, 3000, endpoint=False)
+    across = 3.0 * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=-1)
+    tangent, way = np.array([0.0, 0.0, 1.0]), np.array([0.8, 0.0, 0.6])
+    width = np.abs(np.cos(turns))
+    counted = even_depth(across, tangent, way) * width
+    assert counted[width > LEAST_FACING] == pytest.approx(2.0 / np.pi)
+    assert counted.mean() == pytest.approx(width.mean(), rel=0.04)
+    assert even_depth(across[:1], tangent, tangent) == pytest.approx(2.0 / np.pi)
+
+
+@pytest.mark.parametrize("tau", [0.05, 0.7, 3.0])
+def test_other_strands_of_an_even_card_are_behind_the_one_that_is_seen(tau: float) -> None:
+    """Against strands thrown at random; light comes from the front, from behind, from aside."""
+    count = np.random.default_rng(0).poisson(tau, 400_000)
+    others = (count[count > 0] - 1.0).mean()
+    for front in (1.0, 0.0, 0.5):
+        before, beyond = among_strands(
+            2.0 + 0.8 * 0.3 * tau, 5.0 + 0.8 * 0.7 * tau, 0.8, tau, 0.3, front
+        )
+        assert before == pytest.approx(2.0 + 0.8 * others * (1.0 - front), abs=0.01)
+        assert beyond == pytest.approx(5.0 + 0.8 * others * front, abs=0.01)
+    assert among_strands(0.0, 0.0, 1.0, 0.0, 0.5, 0.5) == pytest.approx((0.0, 0.0), abs=1e-3)
