@@ -1,4 +1,4 @@
-"""Sound files of every format that Hairloom parses itself, and ways to damage them.
+"""Sound files of every format of strands, and presets, and ways to damage them.
 
 Every file comes from a seed and a number, so that `mutated(FORMAT, SEED, number)` makes it again.
 """
@@ -7,14 +7,17 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 from extension_loader import REPOSITORY
 
-from hairloom.addon.exchange.groom import Groom
+from hairloom.addon.exchange.groom import Groom, GroomMotion
+from hairloom.addon.exchange.groom_alembic import write_groom_alembic
+from hairloom.addon.exchange.groom_presets import PRESETS
+from hairloom.addon.exchange.groom_usd import write_usd
 from hairloom.addon.exchange.hair_file import HEADER, write_hair_file
 from hairloom.addon.exchange.tfxbone import strongest_bones, write_tfxbone
 from hairloom.addon.exchange.tressfx import write_tfx
@@ -58,9 +61,9 @@ def originals(kind: str) -> tuple[tuple[bytes, ...], tuple[bytes, ...]]:
         return tuple(file.read_bytes() for file in sorted(REPOSITORY.glob("presets/*/*.json"))), ()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"sound.{kind}"
-        makers = {"tfx": _tfx_files, "tfxbone": _bone_files, "hair": _hair_files}[kind]
-        small = tuple(makers(path, 5))
-        return small, tuple(makers(path, 6000))
+        makers = MAKERS[kind]
+        large = () if kind in OF_LIBRARIES else tuple(makers(path, 6000))
+        return tuple(makers(path, 5)), large
 
 
 def sample(strand_count: int, seed: int = 0, *, point_count: int = 0) -> Groom:
@@ -126,6 +129,39 @@ def _hair_files(path: Path, strand_count: int) -> Iterator[bytes]:
     header["arrays"] |= 8
     clear = np.zeros(points, "<f4").tobytes()
     yield header.tobytes() + content[HEADER.itemsize : cut] + clear + content[cut:]
+
+
+def _alembic_files(path: Path, strand_count: int) -> Iterator[bytes]:
+    for preset in PRESETS.values():
+        write_groom_alembic(path, sample(strand_count), preset)
+        yield path.read_bytes()
+    groom = sample(strand_count)
+    write_groom_alembic(path, groom, motion=_motion(groom))
+    yield path.read_bytes()
+
+
+def _usd_files(path: Path, strand_count: int) -> Iterator[bytes]:
+    groom = sample(strand_count)
+    for motion in (None, _motion(groom)):
+        write_usd(path, groom, motion=motion)
+        yield path.read_bytes()
+
+
+def _motion(groom: Groom) -> GroomMotion:
+    """Two frames."""
+    return GroomMotion([groom.strands.points, groom.strands.points + np.float32(0.01)], 24.0)
+
+
+MAKERS: dict[str, Callable[[Path, int], Iterator[bytes]]] = {
+    "tfx": _tfx_files,
+    "tfxbone": _bone_files,
+    "hair": _hair_files,
+    "abc": _alembic_files,
+    "usdc": _usd_files,
+    "usda": _usd_files,
+}
+#: what libraries parse, not we
+OF_LIBRARIES = ("abc", "usdc", "usda")
 
 
 def _flip_bits(content: bytearray, random: np.random.Generator) -> bytearray:

@@ -1,13 +1,13 @@
-"""Kills a process while it writes a file, many times: the old file or the new one must be there.
+"""Kills a process while it writes, many times: the old files or the new ones must be there.
 
-python tools/in_package.py kill_writes FORMAT TRIALS [SEED]    a JSON line: trials, failures, amid
+python tools/in_package.py kill_writes FORMAT TRIALS [SEED]    a JSON line, see `killed`
 
 A child writes two versions in turn, as fast as it can, and is killed by SIGKILL at a random moment.
-`amid` counts the kills that left a half-written file beside the target: those that came in time.
 """
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import signal
@@ -20,13 +20,18 @@ import numpy as np
 from damaged_files import sample
 
 from hairloom.addon.exchange.atomic import write_text_atomic
+from hairloom.addon.exchange.file_set import written_together
+from hairloom.addon.exchange.groom_alembic import is_finished, write_groom_alembic
+from hairloom.addon.exchange.groom_usd import write_usd
 from hairloom.addon.exchange.hair_file import write_hair_file
 from hairloom.addon.exchange.tfxbone import strongest_bones, write_tfxbone
 from hairloom.addon.exchange.tressfx import write_tfx
 
 STRANDS = 3000
-#: the child is killed within this time from its first write on [s]
-LONGEST = 0.03
+#: the child is killed within the time of so many writes from its first one on
+WRITES = 4.0
+#: what is exported as a set, beside the file that is asked for
+OTHERS = ("hair_base.png", "hair_normal.png", "hair.json")
 
 
 def _write_bones(path: Path, version: int) -> None:
@@ -36,6 +41,12 @@ def _write_bones(path: Path, version: int) -> None:
 
 def _write_text(path: Path, version: int) -> None:
     write_text_atomic(path, json.dumps({"values": [version] * 100_000}))
+
+
+def _write_set(path: Path, version: int) -> None:
+    with written_together(path) as folder:
+        for name in (path.name, *OTHERS):
+            (folder / name).write_bytes(bytes([version]) * 500_000)
 
 
 def _write_plainly(path: Path, version: int) -> None:
@@ -49,38 +60,81 @@ WRITERS: dict[str, Callable[[Path, int], object]] = {
     "tfxbone": _write_bones,
     "hair": lambda path, version: write_hair_file(path, GROOMS[version], uv=True),
     "preset": _write_text,
+    "abc": lambda path, version: write_groom_alembic(path, GROOMS[version]),
+    "usdc": lambda path, version: write_usd(path, GROOMS[version]),
+    "glb": _write_set,
     "plain": _write_plainly,
 }
+#: imported once, not in every child
+LIBRARIES = {"abc": ("imath", "alembic3d"), "usdc": ("pxr.Usd", "pxr.UsdGeom", "pxr.Vt")}
 
 
 def main(arguments: list[str]) -> int:
     kind, trials, seed = arguments[0], int(arguments[1]), int((arguments[2:] or ["0"])[0])
+    for library in LIBRARIES.get(kind, ()):
+        importlib.import_module(library)
     with tempfile.TemporaryDirectory() as folder:
-        print(json.dumps(killed(WRITERS[kind], Path(folder), trials, seed)))
+        print(json.dumps(killed(WRITERS[kind], Path(folder) / f"hair.{kind}", trials, seed)))
     return 0
 
 
 def killed(
-    write: Callable[[Path, int], object], folder: Path, trials: int, seed: int
+    write: Callable[[Path, int], object], target: Path, trials: int, seed: int
 ) -> dict[str, int]:
-    """Kill a writer so many times and look at what it left."""
+    """Kill a writer so many times and look at what it left.
+
+    Returns:
+        trials; failures: a file that is neither the old one nor the new one; amid: kills that left
+        something half-written beside the target, those that came in time; mixed: sets with old and
+        new files; leftovers: what still lies beside the target after one write more.
+    """
     random = np.random.default_rng(seed)
-    target = folder / "target.file"
-    versions = []
-    for version in range(2):
-        write(target, version)
-        versions.append(target.read_bytes())
-    failures = amid = 0
+    folder, versions, seconds = target.parent, [], 0.0
+    for version in (0, 1):
+        begun = time.perf_counter()
+        _write_apart(write, target, version)
+        seconds = max(seconds, time.perf_counter() - begun)
+        versions.append(_content(folder))
+    found = {"trials": trials, "failures": 0, "amid": 0, "mixed": 0, "leftovers": 0}
+    known: set[str] = set()
     for _ in range(trials):
-        _kill_one(write, target, float(random.uniform(0.0, LONGEST)))
-        failures += target.read_bytes() not in versions
-        beside = [file for file in folder.iterdir() if file != target]
-        amid += bool(beside)
-        for file in beside:
-            file.unlink()
-        if target.read_bytes() not in versions:
-            write(target, 0)
-    return {"trials": trials, "failures": failures, "amid": amid}
+        _kill_one(write, target, float(random.uniform(0.0, WRITES * seconds)))
+        content = _content(folder)
+        is_whole = all(content.get(n) in [v[n] for v in versions] for n in versions[0])
+        found["failures"] += not is_whole
+        found["mixed"] += is_whole and content not in versions
+        beside = set(os.listdir(folder)) - set(content)
+        found["amid"] += bool(beside - known)
+        known = beside
+        if not is_whole:
+            _write_apart(write, target, 0)
+    _write_apart(write, target, 0)
+    found["leftovers"] = len(set(os.listdir(folder)) - set(versions[0]))
+    return found
+
+
+def _content(folder: Path) -> dict[str, bytes]:
+    """What lies there, without hidden files; Alembic files, which have a date, by their size."""
+    files = [path for path in folder.iterdir() if not path.name.startswith(".")]
+    return {
+        path.name: repr((path.stat().st_size, is_finished(path))).encode()
+        if path.suffix == ".abc"
+        else path.read_bytes()
+        for path in files
+    }
+
+
+def _write_apart(write: Callable[[Path, int], object], target: Path, version: int) -> None:
+    """In a child too: libraries have threads, which would not come along into the next one."""
+    child = os.fork()
+    if child == 0:
+        try:
+            write(target, version)
+            os._exit(0)
+        finally:
+            os._exit(1)
+    _, status = os.waitpid(child, 0)
+    assert status == 0, "the writer failed"
 
 
 def _kill_one(write: Callable[[Path, int], object], target: Path, delay: float) -> None:

@@ -25,7 +25,7 @@ type Arrays = dict[str, NDArray[Any]]
 MEMORY = 4 << 30
 #: Objects below each other; a damaged file may have them in a circle.
 DEEPEST = 64
-#: Exit code after an error that the library has told of on stderr.
+#: Exit code after an error that is told on stderr, as `apart` expects it.
 TOLD = 3
 
 _VECTORS = {2: "IV2fArrayProperty", 3: "IV3fArrayProperty"}
@@ -69,11 +69,16 @@ def _walk(thing: Any, matrix: NDArray[np.float64], found: Arrays, depth: int) ->
 
 
 def _read_geometry(schema: Any, prefix: str, found: Arrays) -> None:
+    from alembic3d import Abc
+
     for header in schema.propertyheaders:
         name = header.getName()
         ours = {"P": "points", "nVertices": "counts", "width": "widths"}.get(name)
         if ours is not None:
             found[prefix + ours] = _values(schema, header)
+            if ours == "points":
+                samples = Abc.IArrayProperty(schema, name).getNumSamples()
+                found[prefix + "samples"] = np.array(samples)
         elif name == ".arbGeomParams":
             _read_attributes(schema, header, prefix, found)
 
@@ -117,12 +122,15 @@ def _values(parent: Any, header: Any) -> NDArray[Any]:
 
 def _limit_memory(path: str) -> None:
     """A file whose counts lie must not take all memory; only where the system sees to it: Windows
-    has no such limit, macOS refuses it."""
+    has no such limit, macOS refuses it. Blender itself, where it is this process, has much."""
     try:
         import resource
     except ImportError:
         return
     size = MEMORY + 10 * os.path.getsize(path)
+    if sys.platform.startswith("linux"):
+        with open("/proc/self/statm", encoding="ascii") as pages:
+            size += int(pages.read().split()[0]) * resource.getpagesize()
     with contextlib.suppress(ValueError, OSError):
         resource.setrlimit(resource.RLIMIT_AS, (size, size))
 
@@ -140,4 +148,6 @@ def _main(path: str, result: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(_main(*sys.argv[-2:]))
+    code = _main(*sys.argv[-2:])
+    sys.stderr.flush()
+    os._exit(code)  # at once: the library's own end may fail on what it has read

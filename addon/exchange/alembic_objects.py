@@ -97,7 +97,7 @@ def joined(found: Arrays, path: Path) -> Joined:
     counts = np.concatenate([each.counts for each in objects])
     widths = [_widths(each) for each in objects]
     group, names = _groups(objects)
-    result = Joined(
+    return Joined(
         points=np.concatenate([each.points for each in objects]),
         offsets=np.concatenate([[0], np.cumsum(counts)]),
         widths=_side_by_side(widths, [len(each.points) for each in objects], np.nan),
@@ -110,10 +110,14 @@ def joined(found: Arrays, path: Path) -> Joined:
         ),
         uniform=_guides(objects),
         group_names=names,
-        notes=(),
+        notes=_notes(objects),  # after all others, which add to them
     )
-    notes = tuple(note for each in objects for note in each.notes)
-    return result if not notes else Joined(**{**vars(result), "notes": notes})
+
+
+def _notes(objects: list[_Object]) -> tuple[str, ...]:
+    together = f"its {len(objects):,} curves objects became one groom"
+    told = tuple(note for each in objects for note in each.notes)
+    return (together, *told) if len(objects) > 1 else told
 
 
 def _numbers(found: Arrays) -> list[int]:
@@ -131,7 +135,9 @@ def _object(found: Arrays, number: int, path: Path) -> _Object:
     counts = counts.astype(np.int64)
     if len(counts) and (counts.min() < 0 or counts.sum() != len(points)):
         raise _lying(path, name, f"its curves want {counts.sum()} points and it has {len(points)}")
-    return _Object(name, _placed(points, own["matrix"]), counts, own)
+    moves = int(own["samples"]) > 1
+    notes = [f"{name}: its motion was left out"] if moves else []
+    return _Object(name, _placed(points, own["matrix"]), counts, own, notes)
 
 
 def _placed(points: Floats, matrix: Floats) -> Floats:

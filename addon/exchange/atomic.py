@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import HairloomError
+from .leftovers import remove_leftovers, temporary_beside
 
 
 @contextmanager
@@ -18,13 +18,14 @@ def atomic_write(path: Path) -> Iterator[Path]:
     """A path beside `path` to write to; it takes the place of `path` when the block ends well.
 
     The temporary path has the same suffix, so that exporters accept it. Missing folders are made.
-    When the block fails or is interrupted, what was at `path` before stays as it was.
+    When the block fails or is interrupted, what was at `path` before stays as it was. What a killed
+    process left in the folder is removed.
 
     Raises:
         HairloomError: nothing can be written there, or the block wrote no file.
     """
     target = Path(os.path.realpath(path))  # through a link, as plain writing would go
-    temporary = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
+    temporary = temporary_beside(target)
     try:
         _check_writable(target, temporary)
     except OSError as error:
@@ -64,6 +65,7 @@ def _check_writable(target: Path, temporary: Path) -> None:
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, "a folder has this name")
     target.parent.mkdir(parents=True, exist_ok=True)
+    remove_leftovers(target.parent)
     temporary.touch(exist_ok=False)
     temporary.unlink()
 

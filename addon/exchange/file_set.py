@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from .atomic import flush_to_disk, unwritable
+from .leftovers import remove_leftovers, temporary_beside
 
 
 @contextmanager
@@ -18,15 +18,16 @@ def written_together(path: Path) -> Iterator[Path]:
 
     They keep their names, so that they may name each other. Missing folders are made. When the
     block fails or is interrupted, or when one of the files cannot be put into its place, all that
-    was there before stays as it was.
+    was there before stays as it was. What a killed process left in the folder is removed.
 
     Raises:
         HairloomError: nothing can be written there, or the block wrote no file of `path`'s name.
     """
     folder = path.parent
-    staging = folder / f".{secrets.token_hex(6)}"
+    staging = temporary_beside(path, suffix="")
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        remove_leftovers(folder)
         staging.mkdir()
     except OSError as error:
         raise unwritable(path, error.strerror or str(error)) from error

@@ -7,10 +7,9 @@ Several curves objects become one groom; where none of them has group IDs, each 
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,10 @@ from ..arrays import Floats
 from ..errors import HairloomError
 from ..strands.clean import clean
 from . import alembic_curves
-from .alembic_curves import TOLD, Arrays
+from .alembic_curves import Arrays
 from .alembic_library import alembic_library
 from .alembic_objects import Joined, joined
+from .apart import run_apart
 from .file_space import FileSpace
 from .groom import Groom
 from .groom_alembic import is_finished
@@ -30,14 +30,14 @@ from .read_groom import ReadGroom, finite, kept_points
 
 #: Hair wider than this in the file's units is in centimetres, not in metres.
 WIDEST_IN_METRES = 5.0
-#: Seconds for any file, and bytes that a slow disk gives in another one.
-_PATIENCE, _BYTES_A_SECOND = 60.0, 4.0e6
 
 
 def read_groom_alembic(
     path: Path,
     *,
     space: FileSpace | None = None,
+    up: str | None = None,
+    factor: float = 1.0,
     with_guides: bool = True,
     python: Sequence[str] | None = None,
 ) -> ReadGroom:
@@ -47,9 +47,10 @@ def read_groom_alembic(
         space: the file's unit and axes. None: what our own files say of themselves; of others, Y
             up, in metres where Blender wrote them or they are smaller than WIDEST_IN_METRES, else
             in centimetres.
+        up: "Y" or "Z" in place of what that says.
+        factor: what lengths are multiplied by beside that.
         with_guides: whether strands that are marked as guides are kept.
-        python: how to start a Python: a command to which a script and its arguments are added.
-            None: this one, where it is a program of its own.
+        python: the command that starts another Python, see `run_apart`.
 
     Raises:
         HairloomError: no such file, no Alembic, one without curves, a damaged one, no alembic3d,
@@ -58,14 +59,19 @@ def read_groom_alembic(
     _check(path)
     found = _read_apart(path, python)
     curves = joined(found, path)
-    space = space or _told_space(found) or _guessed_space(found, curves)
+    notes, space = list(curves.notes), space or _told_space(found)
+    if space is None:
+        space = _guessed_space(curves)
+        unit = "metres" if space.per_metre == 1.0 else "centimetres"
+        notes.append(f"it names no unit and no axes: read in {unit}, {up or space.up} up")
+    space = replace(space, up=up or space.up, per_metre=space.per_metre / factor)
     groom = _groom(curves, space, path)
     if not with_guides:
         groom = groom.without_guides()
     if not groom.strands.strand_count:
         raise _error(path, "it holds nothing but guides", "Read it with its guides")
     version = f"{_number(found, 'major')}.{_number(found, 'minor')}"
-    return ReadGroom(groom, float(version), curves.notes)
+    return ReadGroom(groom, float(version), tuple(f"{path.name}: {note}." for note in notes))
 
 
 def _check(path: Path) -> None:
@@ -92,43 +98,18 @@ def _check(path: Path) -> None:
 def _read_apart(path: Path, python: Sequence[str] | None) -> Arrays:
     """The file's curves, read by another process."""
     alembic_library(str(path))  # for its message, should it be missing
-    command = [*(python or _this_python(path)), alembic_curves.__file__]
-    patience = _PATIENCE + path.stat().st_size / _BYTES_A_SECOND
+    script = Path(alembic_curves.__file__)
     with tempfile.TemporaryDirectory(prefix="hairloom-") as folder:
         result = Path(folder) / "curves.npz"
-        try:
-            done = subprocess.run(
-                [*command, str(path), str(result)],
-                capture_output=True,
-                env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-                timeout=patience,
-            )
-        except subprocess.TimeoutExpired as error:
-            raise _broken(path, f"it could not be read within {patience:.0f} s") from error
-        except OSError as error:
-            remedy = "Use USD instead"
-            raise _error(path, f"no Python can be started to read it ({error})", remedy) from error
-        if done.returncode == TOLD:
-            lines = done.stderr.decode(errors="replace").strip().splitlines()
-            raise _broken(path, f"Alembic says: {lines[-1].rstrip('.')}")
-        if done.returncode:
-            raise _broken(path, f"Alembic's library failed on it, code {done.returncode}")
+        run_apart(script, path, [result], library="Alembic", python=python)
         with np.load(result, allow_pickle=False) as arrays:
             return dict(arrays)
 
 
-def _this_python(path: Path) -> list[str]:
-    if not Path(sys.executable).stem.lower().startswith("python"):
-        raise _error(
-            path,
-            f"no Python is known that could read it apart from Blender ({sys.executable})",
-            "Use USD instead",
-        )
-    return [sys.executable, "-s", "-P"]
-
-
 def _told_space(found: Arrays) -> FileSpace | None:
-    """What our own files say of themselves."""
+    """What our own files say of themselves, or what Blender's always are."""
+    if "blender" in str(found.get("application", "")).lower():
+        return FileSpace("Y", 1.0)
     text = str(found.get("groom_properties", ""))
     told = dict(each.split("=", 1) for each in text.split(";") if "=" in each)
     try:
@@ -139,11 +120,10 @@ def _told_space(found: Arrays) -> FileSpace | None:
     return space if space.up in ("Y", "Z") and 1e-6 < per_metre < 1e6 else None
 
 
-def _guessed_space(found: Arrays, curves: Joined) -> FileSpace:
+def _guessed_space(curves: Joined) -> FileSpace:
     points = curves.points[np.isfinite(curves.points).all(axis=1)]
     extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
-    is_metres = "blender" in str(found.get("application", "")).lower()
-    return FileSpace("Y", 1.0 if is_metres or extent < WIDEST_IN_METRES else 100.0)
+    return FileSpace("Y", 1.0 if extent < WIDEST_IN_METRES else 100.0)
 
 
 def _groom(curves: Joined, space: FileSpace, path: Path) -> Groom:
@@ -188,10 +168,6 @@ def _number(found: Arrays, which: str) -> int:
     return (
         int(value.flat[0]) if value is not None and value.size and value.dtype.kind in "iu" else 0
     )
-
-
-def _broken(path: Path, problem: str) -> HairloomError:
-    return _error(path, problem, "It is damaged or made otherwise: copy or export it again")
 
 
 def _error(path: Path, problem: str, remedy: str) -> HairloomError:

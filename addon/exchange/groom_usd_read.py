@@ -8,7 +8,7 @@ point instancers are not, and of other geometry only its number is told.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -29,13 +29,22 @@ from .usd_library import damage_told, opened_stage, usd_library
 MOST_POINTS = 1 << 28
 
 
-def read_usd(path: Path, *, up: str | None = None, scale: float | None = None) -> ReadGroom:
+def read_usd(
+    path: Path,
+    *,
+    up: str | None = None,
+    scale: float | None = None,
+    factor: float = 1.0,
+    python: Sequence[str] | None = None,
+) -> ReadGroom:
     """Read all hair of a file as one groom.
 
     Args:
         path: .usd, .usdc or .usda.
         up: "Y" or "Z" in place of what the file says.
         scale: metres in one unit, in place of what the file says.
+        factor: what lengths are multiplied by beside that.
+        python: the command that starts another Python, see `run_apart`.
 
     Returns:
         The groom: groups as the file has them, or one for each prim; the version of Epic's
@@ -45,9 +54,9 @@ def read_usd(path: Path, *, up: str | None = None, scale: float | None = None) -
         HairloomError: no OpenUSD, a file that cannot be read, or one without a usable strand.
     """
     usd = usd_library(path)
-    stage = opened_stage(path)
+    stage = opened_stage(path, python)
     with damage_told(path):
-        reading = _Reading(usd, stage, path, up, scale)
+        reading = _Reading(usd, stage, path, up, scale, factor)
         pieces = list(reading.pieces())
         if not pieces:
             raise reading.nothing_found()
@@ -60,7 +69,13 @@ class _Reading:
     """A walk over a stage, and what there is to say of it."""
 
     def __init__(
-        self, usd: ModuleType, stage: Any, path: Path, up: str | None, scale: float | None
+        self,
+        usd: ModuleType,
+        stage: Any,
+        path: Path,
+        up: str | None,
+        scale: float | None,
+        factor: float,
     ) -> None:
         self.notes: list[str] = []
         self._usd, self._stage, self._path = usd, stage, path
@@ -74,7 +89,7 @@ class _Reading:
             unit = 1.0
         axes = to_z_up(np.eye(3), up or str(geometry.GetStageUpAxis(stage))).T
         self._to_blender = np.eye(4)
-        self._to_blender[:3, :3] = axes * unit
+        self._to_blender[:3, :3] = axes * (unit * factor)
 
     def pieces(self) -> Iterator[Curves]:
         """The curves of each prim that has usable ones."""
@@ -162,6 +177,8 @@ def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Gr
             place=str(path),
             remedy="Export the groom again",
         )
+    if len(pieces) > 1:
+        notes.append(f"its {len(pieces):,} prims of curves became one groom")
     color = _of_all("colours", [piece.color for piece in pieces], notes)
     return Groom(
         cleaned.strands,

@@ -79,6 +79,8 @@ def curves_of(usd: ModuleType, prim: Any, matrix: Floats) -> Curves:
     radius, notes = _radius(values, curves, mean_scale(matrix))
     if values.on_curves.vertex is not None:
         notes += (f"its {basis} curves became points on the curves",)
+    if curves.GetPointsAttr().GetNumTimeSamples() > 1:
+        notes += ("its motion was left out",)
     wrong = values.on_curves.wrong_count
     if wrong:
         notes += (f"{wrong:,} curves have a number of points that {basis} curves cannot have",)

@@ -6,24 +6,21 @@ their place, in one process with Blender's own. Some Linux distributions build B
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from ..errors import HairloomError
+from .apart import damaged, refusal, run_apart
 from .usd_crate import CRATE, check_crate
-from .usd_probe import REFUSED, told
+from .usd_probe import told
 
 #: either of both, binary (crate), text
 SUFFIXES = (".usd", ".usdc", ".usda")
-
-#: Seconds for any file, and bytes that a slow disk gives in another one.
-_PATIENCE, _BYTES_A_SECOND = 20.0, 4.0e6
+#: reads all of a binary file first, in another process: damaged ones make the library crash
+PROBE = Path(__file__).with_name("usd_probe.py")
 
 
 def usd_library(place: Path) -> ModuleType:
@@ -44,8 +41,10 @@ def usd_library(place: Path) -> ModuleType:
     return pxr
 
 
-def opened_stage(path: Path) -> Any:
+def opened_stage(path: Path, python: Sequence[str] | None = None) -> Any:
     """The stage of a file, with all its payloads.
+
+    python: the command that starts another Python, see `run_apart`.
 
     Raises:
         HairloomError: no OpenUSD, no such file, or none that can be read as USD.
@@ -73,47 +72,11 @@ def opened_stage(path: Path) -> Any:
             "Choose a .usd, .usdc or .usda file, or export the groom again",
         )
     if beginning == CRATE:
-        _probe(path)
+        # One thread: each further one reserves memory of its own, which would count.
+        one_thread = {"PXR_WORK_THREAD_LIMIT": "1"}
+        run_apart(PROBE, path, library="USD", python=python, settings=one_thread)
     with damage_told(path):
         return usd.Usd.Stage.Open(str(path))
-
-
-def _probe(path: Path) -> None:
-    """Let another process read a binary file first, where there is a Python to do so.
-
-    Raises:
-        HairloomError: that process failed, or took too long.
-    """
-    if not Path(sys.executable).stem.lower().startswith("python"):
-        return
-    patience = _PATIENCE + path.stat().st_size / _BYTES_A_SECOND
-    script = Path(__file__).with_name("usd_probe.py")
-    # One thread: each further one reserves memory of its own, which would count.
-    settings = {
-        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
-        "PXR_WORK_THREAD_LIMIT": "1",
-    }
-    try:
-        done = subprocess.run(
-            [sys.executable, "-s", "-P", str(script), str(path)],
-            capture_output=True,
-            env=os.environ | settings,
-            timeout=patience,
-            check=False,
-        )
-    except subprocess.TimeoutExpired as error:
-        raise _damaged(path, f"it takes more than {patience:.0f} s") from error
-    except OSError as error:
-        raise _unusable(
-            path,
-            f"no Python can be started to read it ({error})",
-            "Export it as text, .usda, or use another format",
-        ) from error
-    if done.returncode == REFUSED:
-        lines = done.stderr.decode(errors="replace").strip().splitlines()
-        raise _damaged(path, lines[-1] if lines else "no reason given")
-    if done.returncode:
-        raise _damaged(path, f"it failed with code {done.returncode}")
 
 
 @contextmanager
@@ -128,15 +91,7 @@ def damage_told(path: Path) -> Iterator[None]:
         yield
     # Beside its own error the library lets C++ exceptions through, as whatever Python has for them.
     except (usd.Tf.ErrorException, RuntimeError, ValueError, MemoryError) as error:
-        raise _damaged(path, told(error)) from error
-
-
-def _damaged(path: Path, why: str) -> HairloomError:
-    return _unusable(
-        path,
-        f"USD's library cannot read it ({why})",
-        "The file is cut short or damaged: copy or export it again",
-    )
+        raise damaged(path, refusal("USD", told(error))) from error
 
 
 def _unusable(path: Path, problem: str, remedy: str) -> HairloomError:

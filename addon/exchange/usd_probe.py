@@ -1,7 +1,7 @@
 """Reads all of a USD file in a process of its own: a script, run with the file's path.
 
-It ends with 0 when the library could read everything; with REFUSED and a line on stderr when it
-could not. Whatever else a damaged file makes the library do, it does not do to Blender.
+It ends with 0 when the library could read everything; with TOLD and a line on stderr when it could
+not. Whatever else a damaged file makes the library do, it does not do to Blender.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ import os
 import sys
 from pathlib import Path
 
-REFUSED = 3
+#: as `apart` expects it
+TOLD = 3
 
 #: Memory that a file may take beside its own size, and as a multiple of it.
 _BESIDE, _MOST_TIMES = 1 << 30, 30
@@ -29,7 +30,7 @@ def main(path: Path) -> int:
                     attribute.Get(first)
     except (Tf.ErrorException, RuntimeError, ValueError, MemoryError) as error:
         print(ascii(told(error)), file=sys.stderr)
-        return REFUSED
+        return TOLD
     return 0
 
 
@@ -56,6 +57,6 @@ def limit_memory(more: int) -> None:
 
 
 if __name__ == "__main__":
-    code = main(Path(sys.argv[1]))
+    code = main(Path(sys.argv[-1]))
     sys.stderr.flush()
     os._exit(code)  # at once: the library's own end may fail on what it has read

@@ -15,7 +15,6 @@ import json
 import math
 import os
 import re
-import zipfile
 from collections import OrderedDict
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -24,11 +23,14 @@ from typing import Any, Self
 import numpy as np
 
 from ..errors import HairloomError
+from ..exchange.array_file import read_arrays
 from .simulated import Arrays
 
 VERSION = 1
 FACTS, CONSTANTS = "cache.json", "constants.npz"
 _OURS = re.compile(r"cache\.json|constants\.npz|frame_-?\d{5,7}\.npz")
+#: A frame has some hundred bytes there; JSON may take twenty times its size in memory.
+_LARGEST_FACTS = 1 << 25
 #: Frames kept in memory: the one that is shown, and its neighbours for motion blur.
 _KEPT = 3
 
@@ -135,11 +137,8 @@ class Cache:
             self.facts = Facts(
                 **{name: content[name] for name in names}, moments=tuple(content["moments"])
             )
-            if len(self.facts.moments) != self.facts.frame_count:
-                raise ValueError("frames are missing")
-            if not (math.isfinite(self.facts.frame_rate) and self.facts.frame_rate > 0.0):
-                raise ValueError("the frame rate is no positive number")
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            _check(self.facts)
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise _damaged(folder / FACTS, str(error)) from error
         self._frames: OrderedDict[int, Arrays] = OrderedDict()
         self._constants: Arrays | None = None
@@ -235,10 +234,12 @@ def _frame_name(frame: int) -> str:
 
 def _read_facts(path: Path) -> dict[str, Any]:
     try:
+        if path.stat().st_size > _LARGEST_FACTS:
+            raise ValueError(f"it has more than {_LARGEST_FACTS:,} bytes")
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise HairloomError("there is no bake", place=str(path.parent), remedy="Bake") from error
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise _damaged(path, str(error)) from error
     version = content.get("version") if isinstance(content, dict) else None
     if not isinstance(version, int):
@@ -252,6 +253,19 @@ def _read_facts(path: Path) -> dict[str, Any]:
     return content
 
 
+def _check(facts: Facts) -> None:
+    """Raise ValueError or TypeError for what no bake says of itself."""
+    if not (isinstance(facts.first, int) and isinstance(facts.last, int)):
+        raise TypeError("its frames are no whole numbers")
+    texts = (facts.owner, facts.form, facts.fingerprint, facts.hairloom, *facts.moments)
+    if not all(isinstance(text, str) for text in texts):
+        raise TypeError("names and hashes are no texts")
+    if len(facts.moments) != facts.frame_count:
+        raise ValueError("frames are missing")
+    if not (math.isfinite(facts.frame_rate) and facts.frame_rate > 0.0):
+        raise ValueError("the frame rate is no positive number")
+
+
 def _read_arrays(path: Path) -> Arrays:
     """All arrays of a file.
 
@@ -259,13 +273,8 @@ def _read_arrays(path: Path) -> Arrays:
         HairloomError: it is gone or damaged, or claims more than it holds.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            claimed = sum(member.file_size for member in archive.infolist())
-            if claimed > path.stat().st_size:  # we store, and do not compress
-                raise ValueError("it claims to be larger than it is")
-        with np.load(path, allow_pickle=False) as data:
-            return {name: data[name] for name in data.files}
-    except (OSError, ValueError, KeyError, EOFError, MemoryError, zipfile.BadZipFile) as error:
+        return read_arrays(path)
+    except (OSError, ValueError) as error:
         raise _damaged(path, str(error)) from error
 
 

@@ -32,6 +32,6 @@ def _value(text: str) -> Any:
     for content in (text, f"[{text}]"):
         try:
             return json.loads(content)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
     return text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ from ..dynamics.measure import deepest_penetration, max_stretch
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.way import bow
 from ..errors import HairloomError
+from ..exchange.array_file import read_arrays
 from ..exchange.atomic import atomic_write
 from ..pipeline import Pose, Rig
 from .fingerprints import frame_rate
@@ -164,13 +164,15 @@ def read_take(path: Path, rig: Rig) -> Take:
         HairloomError: not a take, or one of another groom.
     """
     try:
-        with np.load(path, allow_pickle=False) as data:
-            take = Take(data["guides"], data["heads"], float(data["frame_rate"]))
+        data = read_arrays(path)
+        guides, heads = (np.asarray(data[name], np.float32) for name in ("guides", "heads"))
+        take = Take(guides, heads, float(data["frame_rate"]))
+        _check(take)
     except FileNotFoundError as error:
         raise HairloomError(
             "there is no such file", place=str(path), remedy="Check the path"
         ) from error
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+    except (OSError, KeyError, TypeError, ValueError) as error:
         raise HairloomError(
             "this file is no take, or it is damaged",
             place=str(path),
@@ -191,6 +193,16 @@ def read_take(path: Path, rig: Rig) -> Take:
             remedy="Give the groom, head and guide settings that it was simulated with",
         )
     return take
+
+
+def _check(take: Take) -> None:
+    """Raise ValueError for what no take holds."""
+    if not (np.isfinite(take.guides).all() and np.isfinite(take.heads).all()):
+        raise ValueError("positions that are not finite")
+    if take.guides.ndim != 4 or len(take.heads) != take.frame_count or not take.frame_count:
+        raise ValueError("frames are missing")
+    if not (np.isfinite(take.frame_rate) and take.frame_rate > 0.0):
+        raise ValueError("the frame rate is no positive number")
 
 
 def _head_of(pose: Pose) -> Floats:

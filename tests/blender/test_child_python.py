@@ -1,0 +1,90 @@
+"""Another Python beside this Blender: it has the same packages, or Blender itself stands in."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
+
+from hairloom.addon.exchange.apart import run_apart, same_packages, this_python  # noqa: E402
+from hairloom.addon.host import child_python  # noqa: E402
+
+SCRIPT = "import os, sys, numpy\nopen(sys.argv[-1], 'w').write(numpy.__file__)\nos._exit({code})\n"
+
+
+@pytest.fixture
+def afresh():
+    """The command is looked for once a session."""
+    child_python.python_command.cache_clear()
+    yield child_python.python_command
+    child_python.python_command.cache_clear()
+
+
+def numpy_of(command, folder):
+    """Where a command's Python has its numpy; it runs a script as a reader does."""
+    script, path, result = folder / "script.py", folder / "groom.abc", folder / "result"
+    script.write_text(SCRIPT.format(code=0))
+    path.write_bytes(b"any")
+    run_apart(script, path, [result], library="Any", python=command)
+    return result.read_text()
+
+
+def test_it_has_the_packages_of_this_one(afresh, tmp_path):
+    import numpy
+
+    assert numpy_of(afresh(), tmp_path) == numpy.__file__
+
+
+def test_packages_that_this_one_has_load_there(afresh):
+    command = afresh()
+    for package, module in child_python._PACKAGES.items():
+        if child_python.importlib.util.find_spec(package):
+            environment = os.environ | same_packages()
+            subprocess.run([*command, "-c", f"import {module}"], env=environment, check=True)
+
+
+def test_only_files_of_libraries_need_it(afresh):
+    assert child_python.python_for(Path("a.tfx")) is None
+    assert child_python.python_for(Path("a.hair")) is None
+    assert child_python.python_for(Path("a.ABC")) == child_python.python_for(Path("a.usda"))
+    assert child_python.python_for(Path("a.abc")) == afresh()
+
+
+@pytest.mark.skipif(not bpy.app.binary_path, reason="here Blender is a module, not a program")
+def test_blender_itself_runs_a_script(tmp_path):
+    import numpy
+
+    assert numpy_of(child_python.blender_command(), tmp_path) == numpy.__file__
+
+
+def test_a_python_without_the_packages_is_passed_over(afresh, monkeypatch, tmp_path):
+    """Where no Python has them it is Blender, and where that is a module it is nothing."""
+    lacking = tmp_path / "python-lacking"
+    lacking.write_text("#!/bin/sh\nexit 1\n")
+    lacking.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(lacking))
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert afresh() == child_python.blender_command()
+
+
+def test_a_program_that_is_no_python_is_not_taken(monkeypatch, tmp_path):
+    monkeypatch.setattr(sys, "executable", "/opt/blender/blender")
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert list(child_python._programs()) == []
+    with pytest.raises(Exception, match=r"no Python can be started .*opt/blender"):
+        this_python(tmp_path)
+
+
+def test_the_python_of_the_folder_of_modules_is_found(monkeypatch, tmp_path):
+    """Where Blender does not name it: as official builds have it."""
+    program = tmp_path / "bin" / f"python{sys.version_info[0]}.{sys.version_info[1]}"
+    program.parent.mkdir()
+    program.touch()
+    monkeypatch.setattr(sys, "executable", "/opt/blender/blender")
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    assert next(child_python._programs()) == str(program)

@@ -1,0 +1,131 @@
+"""What Hairloom keeps beside scenes, bakes and takes, read when it holds anything at all."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.host import cache
+from hairloom.addon.host.cache import Cache, CacheWriter, Facts
+from hairloom.addon.host.overrides import overrides
+from hairloom.addon.host.take import Take, read_take, write_take
+
+
+@pytest.fixture
+def bake(tmp_path):
+    """The folder of a bake of two frames."""
+    folder = tmp_path / "bake"
+    writer = CacheWriter(folder)
+    writer.add_constants({"offsets": np.arange(3)})
+    for frame in (1, 2):
+        writer.add(frame, {"points": np.full((2, 3), frame, np.float32)}, "hair=00")
+    writer.finish(Facts("Hair", 1, 2, 24.0, "numpy", "hair=00", "0.1.0"))
+    return folder
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"frame_rate": 10**400},
+        {"frame_rate": "24"},
+        {"frame_rate": float("nan")},
+        {"first": 1.5, "last": 2.5},
+        {"first": None},
+        {"last": 10**30},
+        {"owner": ["Hair"]},
+        {"moments": [1, 2]},
+        {"moments": "ab"[:1]},
+        {"layout": {"points": 3}},
+        {"layout": []},
+        {"version": "1"},
+    ],
+)
+def test_facts_that_cannot_be_are_told(bake, change):
+    facts = json.loads((bake / "cache.json").read_text())
+    Cache(bake)
+    (bake / "cache.json").write_text(json.dumps(facts | change))
+    with pytest.raises(HairloomError, match="Bake again"):
+        Cache(bake)
+
+
+def test_facts_in_which_lists_never_end_are_told(bake):
+    (bake / "cache.json").write_text('{"version": ' + "[" * 200_000)
+    with pytest.raises(HairloomError, match=r"damaged .*Bake again"):
+        Cache(bake)
+
+
+def test_facts_of_any_size_are_refused_before_they_are_read(bake, monkeypatch):
+    monkeypatch.setattr(cache, "_LARGEST_FACTS", 100)
+    with pytest.raises(HairloomError, match="more than 100 bytes"):
+        Cache(bake)
+
+
+def test_bytes_by_chance_in_a_bake_are_told_or_read(bake):
+    random = np.random.default_rng(2)
+    whole = {path: path.read_bytes() for path in bake.iterdir()}
+    told = 0
+    for _ in range(300):
+        path = list(whole)[int(random.integers(len(whole)))]
+        content = bytearray(whole[path])
+        for place in random.integers(len(content), size=3):
+            content[place] = int(random.integers(256))
+        path.write_bytes(content)
+        try:
+            read = Cache(bake)
+            read.constants()
+            for frame in (1, 2):
+                assert read.frame(frame)["points"].shape == (2, 3)
+        except HairloomError as error:
+            told += 1
+            assert error.remedy and str(bake) in error.place
+        path.write_bytes(whole[path])
+    assert 150 < told < 300
+
+
+def rig():
+    head = SimpleNamespace(positions=np.zeros((4, 3)))
+    strands = SimpleNamespace(grid=np.zeros((5, 8)))
+    return SimpleNamespace(head=head, guides=range(5), strands=strands)
+
+
+def take(**changes):
+    whole = {"guides": np.zeros((2, 5, 8, 3)), "heads": np.zeros((2, 4, 3)), "frame_rate": 24.0}
+    return Take(**(whole | changes))
+
+
+def test_a_take_is_read(tmp_path):
+    write_take(tmp_path / "a.npz", take())
+    assert read_take(tmp_path / "a.npz", rig()).frame_count == 2
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"guides": np.full((2, 5, 8, 3), np.nan)},
+        {"guides": np.full((2, 5, 8, 3), "x")},
+        {"guides": np.zeros(())},
+        {"guides": np.zeros((0, 5, 8, 3)), "heads": np.zeros((0, 4, 3))},
+        {"heads": np.zeros((3, 4, 3))},
+        {"heads": np.full((2, 4, 3), np.inf)},
+        {"frame_rate": np.array([1.0, 2.0])},
+        {"frame_rate": 0.0},
+        {"frame_rate": np.nan},
+    ],
+)
+def test_what_no_take_holds_is_told(tmp_path, change):
+    write_take(tmp_path / "a.npz", take(**change))
+    with pytest.raises(HairloomError, match=r"no take, or it is damaged.*hairloom simulate"):
+        read_take(tmp_path / "a.npz", rig())
+
+
+def test_a_take_of_another_groom_is_told(tmp_path):
+    write_take(tmp_path / "a.npz", take(guides=np.zeros((2, 6, 8, 3))))
+    with pytest.raises(HairloomError, match="of another groom"):
+        read_take(tmp_path / "a.npz", rig())
+
+
+@pytest.mark.parametrize("text", ["[" * 200_000, "9" * 5000, '{"a":' * 50_000])
+def test_a_value_of_the_command_line_that_json_refuses_is_a_text(text):
+    assert overrides([f"guides.guide_count={text}"], "guides") == {"guide_count": text}

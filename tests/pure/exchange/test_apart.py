@@ -1,0 +1,71 @@
+"""A script that reads a file in another process: however it ends, it is a message."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange import apart
+from hairloom.addon.exchange.apart import run_apart
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "groom.abc"
+    file.write_bytes(b"content")
+    return file
+
+
+def run(path: Path, script: str, **options: object) -> None:
+    file = path.with_name("script.py")
+    file.write_text(script)
+    run_apart(file, path, [path.with_name("result")], library="Alembic", **options)  # type: ignore
+
+
+def test_a_script_has_the_file_the_result_and_all_packages(path: Path) -> None:
+    run(
+        path,
+        "import os, sys, numpy\n"
+        "open(sys.argv[-1], 'w').write(open(sys.argv[-2]).read() + os.environ['MORE'])\n",
+        settings={"MORE": " and more"},
+    )
+    assert path.with_name("result").read_text() == "content and more"
+
+
+@pytest.mark.parametrize(
+    ("script", "message"),
+    [
+        ("import sys; print('it is broken.', file=sys.stderr); sys.exit(3)", "says: it is broken"),
+        ("import sys; sys.exit(3)", "says: no reason"),
+        ("import sys; sys.exit(7)", "failed on it, code 7"),
+        (f"import os; os.kill(os.getpid(), {int(signal.SIGSEGV)})", "failed on it, code -11"),
+        ("raise SystemError", "failed on it, code 1"),
+    ],
+)
+def test_every_bad_end_is_a_message(path: Path, script: str, message: str) -> None:
+    with pytest.raises(HairloomError, match=f"Alembic's library .*{message}") as caught:
+        run(path, script)
+    assert caught.value.place == str(path) and "export it again" in caught.value.remedy
+
+
+def test_a_script_without_an_end_is_ended(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(apart, "_PATIENCE", 1.0)
+    number = path.with_name("number")
+    script = f"import os\nopen({str(number)!r}, 'w').write(str(os.getpid()))\nwhile True: pass"
+    with pytest.raises(HairloomError, match="could not read it within 1 s"):
+        run(path, script)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(number.read_text()), 0)
+
+
+def test_where_no_python_is_known_that_is_said(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(HairloomError, match=r"no Python can be started .*Use another format"):
+        run(path, "", python=[str(path.with_name("none"))])
+    monkeypatch.setattr(sys, "executable", "/opt/blender/blender")
+    with pytest.raises(HairloomError, match=r"no Python can be started .*/opt/blender/blender"):
+        run(path, "")

@@ -1,0 +1,82 @@
+"""What killed writers left beside a file goes with the next write; what others write stays."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hairloom.addon.exchange import leftovers
+from hairloom.addon.exchange.atomic import write_bytes_atomic
+from hairloom.addon.exchange.file_set import written_together
+from hairloom.addon.exchange.leftovers import remove_leftovers, temporary_beside
+
+
+@pytest.fixture
+def ended() -> int:
+    """The number of a process that has ended."""
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    return process.pid
+
+
+def left_by(process: int, path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str | None) -> Path:
+    with monkeypatch.context() as patched:
+        patched.setattr(leftovers.os, "getpid", lambda: process)
+        return temporary_beside(path, suffix)
+
+
+def write_set(path: Path) -> None:
+    with written_together(path) as folder:
+        (folder / path.name).write_bytes(b"new")
+
+
+@pytest.mark.parametrize("write", [lambda path: write_bytes_atomic(path, b"new"), write_set])
+def test_the_next_write_removes_what_the_dead_left(
+    write, tmp_path: Path, ended: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "cards.v2.glb"
+    file = left_by(ended, path, monkeypatch, None)
+    file.write_bytes(b"half")
+    folder = left_by(ended, path, monkeypatch, "")
+    (folder / "old").mkdir(parents=True)
+    (folder / "old" / "cards.png").write_bytes(b"half")
+    assert (file.suffix, folder.suffix[:4]) == (".glb", ".hl-")
+    write(path)
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
+    assert path.read_bytes() == b"new"
+
+
+def test_what_others_write_or_own_stays(
+    tmp_path: Path, ended: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "groom.abc"
+    ours = temporary_beside(path)
+    another = left_by(os.getppid(), path, monkeypatch, None)
+    monkeypatch.setattr(leftovers, "_here", lambda: "0" * 8)
+    elsewhere = left_by(ended, path, monkeypatch, None)
+    monkeypatch.undo()
+    foreign = [tmp_path / name for name in (".groom.abc", ".hl-1-2-3", f".a.hl-{ended}", "b.hl-1")]
+    kept = [ours, another, elsewhere, *foreign]
+    for each in kept:
+        each.write_bytes(b"kept")
+    write_bytes_atomic(path, b"new")
+    assert sorted(tmp_path.iterdir()) == sorted([path, *kept])
+
+
+def test_where_no_process_can_be_asked_for_a_day_must_pass(
+    tmp_path: Path, ended: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = left_by(ended, tmp_path / "groom.abc", monkeypatch, None)
+    left.write_bytes(b"half")
+    monkeypatch.setattr(leftovers.os, "name", "nt")
+    monkeypatch.setattr(leftovers.os, "kill", lambda *_: pytest.fail("that would end it"))
+    remove_leftovers(tmp_path)
+    assert left.exists()
+    a_day_ago = left.stat().st_mtime - 86_500
+    os.utime(left, (a_day_ago, a_day_ago))
+    remove_leftovers(tmp_path)
+    assert not left.exists()
