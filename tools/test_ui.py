@@ -126,8 +126,11 @@ def run_tests(backend: str, tally: Tally) -> None:
     arguments += ["--python", "tests/run_in_blender.py", "--", f"--junitxml={report}"]
     if backend != BACKENDS[0]:
         arguments += ["tests/gpu", "tests/blender"]
-    kept = {"HAIRLOOM_PICTURES": str(OUTPUT)}
+    resources = OUTPUT / f"resources-tests-{backend}"
+    shutil.copytree(INSTALLED, resources)  # for the packages that the zip brings along
+    kept = {"HAIRLOOM_PICTURES": str(OUTPUT), "BLENDER_USER_RESOURCES": str(resources)}
     code = run_blender("background", arguments, log, TESTS_LIMIT_S, kept)
+    shutil.rmtree(resources)
     if not report.is_file():
         announce("tests", backend, False, f"exit code {code} and no report", log)
         tally.add(0, 1)

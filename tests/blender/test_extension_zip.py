@@ -1,5 +1,7 @@
 """The extension as artists get it: its manifest, its zip, and what Blender does with them."""
 
+import hashlib
+import importlib.util
 import json
 import os
 import re
@@ -7,6 +9,7 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 
 import bpy
@@ -88,11 +91,53 @@ def test_blender_accepts_the_repository_and_the_zip(built):
     extension_tool("validate", built)
 
 
-def test_the_zip_brings_the_wheels_of_the_table_and_no_others(names, wheels, manifest):
+def test_the_zip_brings_the_wheels_of_the_table_and_no_others(built, names, wheels, manifest):
+    import fetch_wheels
+
     assert manifest["wheels"] == [f"./wheels/{name}" for name in wheels]
     assert sorted(n for n in names if n.endswith(".whl")) == [f"wheels/{name}" for name in wheels]
-    systems = {name.split("-")[-1].split("_")[0] for name in wheels}
-    assert systems == {"any.whl", "macosx", "manylinux", "win"}
+    with zipfile.ZipFile(built) as archive:
+        sums = {n: hashlib.sha256(archive.read(f"wheels/{n}")).hexdigest() for n in wheels}
+        assert tomllib.loads(archive.read("blender_manifest.toml").decode()) == manifest
+    assert sums == fetch_wheels.wanted()
+
+
+#: Blender's names for the systems and the Pythons that it is built with there: official builds,
+#: and those of Linux distributions
+BUILDS = [
+    ("linux-x64", (3, 13)),
+    ("windows-x64", (3, 13)),
+    ("macos-arm64", (3, 13)),
+    ("linux-x64", (3, 14)),
+]
+
+
+@pytest.fixture(scope="module")
+def packager():
+    """Blender's own code that decides which wheels fit."""
+    loader = SourceFileLoader("blender_ext", str(EXTENSION_TOOL))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    sys.modules[loader.name] = module
+    loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(("system", "python"), BUILDS)
+def test_every_build_of_blender_gets_one_wheel_of_each_package(packager, wheels, system, python):
+    def suits(name):
+        tags = name.removesuffix(".whl").split("-")[-3:]
+        versions = packager.python_versions_from_wheel_python_tag(tags[0])
+        stable = packager.python_versions_from_wheel_abi_tag(tags[1], stable_only=True)
+        return python in versions or (python[0],) in versions | stable
+
+    here = packager.paths_filter_wheels_by_platform(wheels, system)
+    packages = sorted(name.split("-")[0] for name in here if suits(name))
+    assert packages == ["alembic3d", "archspec", "etcpak"]
+
+
+def test_blender_takes_the_zip_with_these_pythons_and_no_others(packager, wheels):
+    """A wheel for one Python alone has it refuse the whole zip with every other."""
+    assert packager.python_versions_from_wheels(wheels) == {python for _, python in BUILDS}
 
 
 def test_a_wheel_that_cannot_be_had_is_named(tmp_path):
@@ -174,13 +219,40 @@ bpy.ops.hairloom.preview()
 live = sys.modules[NAME + ".addon.host.live"]
 registration = sys.modules[NAME + ".addon.registration"]
 dds = importlib.import_module(NAME + ".addon.exchange.dds")
+
+def module(name):
+    return importlib.import_module(NAME + ".addon." + name)
+
+groom, alembic = module("exchange.groom"), module("exchange.groom_alembic")
+reader, child = module("exchange.groom_alembic_read"), module("host.child_python")
+path = pathlib.Path({resources!r}) / "a.abc"
+alembic.write_groom_alembic(path, groom.Groom(live.sessions()[0].rig.strands))
+
+def strands_read(command):
+    return reader.read_groom_alembic(path, python=command).strands.strand_count
+
+def crashes(command):
+    crash = path.with_name("crash.py")
+    crash.write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    try:
+        module("exchange.apart").run_apart(crash, path, library="Alembic", python=command)
+    except module("errors").HairloomError as error:
+        return str(error)
+
+commands = [each for each in (child.python_command(), child.blender_command()) if each]
+import alembic3d, numpy
 print(json.dumps(dict(
+    alembic=alembic3d.__file__,
+    numpy=numpy.__file__,
+    read=[strands_read(command) for command in commands],
+    crashes=[crashes(command) for command in commands],
     enabled=enabled,
     after=sorted(after),
     strands=live.sessions()[0].rig.strands.strand_count,
     root=registration.ROOT_PACKAGE,
     has_compressor=dds.has_compressor(),
     installed=[p.parent.name for p in pathlib.Path({resources!r}).rglob("_etcpak_none*")],
+    packages=sorted(p.name for p in pathlib.Path({resources!r}).rglob("site-packages/*.dist-info")),
 )), flush=True)
 """
 
@@ -197,5 +269,12 @@ def test_it_installs_from_the_zip_and_goes_on_and_off_ten_times(built, tmp_path)
     assert answer["root"] == "bl_ext.user_default.hairloom"
     assert answer["installed"] == ["etcpak"], "the wheel of this platform, and only that"
     assert answer["has_compressor"]
+    packages = ("alembic3d", "archspec", "etcpak")
+    assert [each.split("-")[0] for each in answer["packages"]] == list(packages)
+    if bpy.app.binary_path:  # the module finds that of our own requirements first
+        assert Path(answer["alembic"]).is_relative_to(resources)
+    assert not Path(answer["numpy"]).is_relative_to(resources), "Blender's own numpy stays"
+    assert answer["read"] and set(answer["read"]) == {50}
+    assert all("library failed on it" in message for message in answer["crashes"])
     assert "Policy" not in output
     assert not re.search(r"Traceback[\s\S]*hairloom", output), output
