@@ -16,6 +16,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from _exchange_memory import megabytes_beside
 from extension_loader import REPOSITORY, load_package
 
 load_package()
@@ -33,7 +34,7 @@ GUIDES = 50
 
 def alembic_figures() -> dict[str, float]:
     """Seconds, the least of some rounds, megabytes of the file, and of memory beside what was
-    there before the first round: for reading, the groom itself is among them."""
+    there before; for reading, the groom itself is among them, and the other process is not."""
     figures = {}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "groom.abc"
@@ -76,19 +77,21 @@ def full_groom() -> Groom:
 
 
 def _act(act: str, preset: str, path: Path) -> dict[str, float]:
-    """One act some times over; the memory is that of the first."""
+    """One act some times over; the memory is that of the first time."""
     groom = full_groom() if act == "write" else None
-    timings, processor, memory = [], [], 0.0
-    for _ in range(ROUNDS):
-        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        started, processed = time.perf_counter(), _processor_seconds()
+
+    def work() -> None:
         if groom is None:
             read_groom_alembic(path)
         else:
             write_groom_alembic(path, groom, PRESETS[preset])
+
+    timings, processor, memory = [], [], megabytes_beside(work)
+    for _ in range(ROUNDS):
+        started, processed = time.perf_counter(), _processor_seconds()
+        work()
         timings.append(time.perf_counter() - started)
         processor.append(_processor_seconds() - processed)
-        memory = memory or (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1e3
     return {"seconds": min(timings), "processor_seconds": min(processor), "memory": memory}
 
 

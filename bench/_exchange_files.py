@@ -1,4 +1,4 @@
-"""TressFX, .tfxbone and .hair files, and presets: how fast they are, and what damage and death do.
+"""How fast TressFX and .hair files are, and what damage and death do to files of all formats.
 
 Fuzzing and killing run in children: one that crashes ends the benchmark with its last words.
 """
@@ -25,19 +25,15 @@ from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
 from hairloom.addon.strands import StrandSet
 
 STRANDS, POINTS, ROUNDS = 100_000, 16, 7
-FUZZED, KILLS = 10_000, 100
-FUZZED_FORMATS = ("tfx", "tfxbone", "hair", "preset")
+#: damaged files of a format that we parse, and of one that a library parses in another process
+FUZZED, FUZZED_APART, KILLS = 10_000, 1_000, 100
+OUR_FORMATS, LIBRARIES_FORMATS = ("tfx", "tfxbone", "hair", "preset"), ("abc", "usdc", "usda")
+KILLED_FORMATS = ("tfx", "tfxbone", "hair", "preset", "abc", "usdc", "glb")
 
 
-def files_figures(fuzzed: int = FUZZED, kills: int = KILLS) -> dict[str, float]:
+def file_timings() -> dict[str, float]:
     """<format>_write_seconds and <format>_read_seconds of STRANDS x POINTS with UVs and thickness,
-    medians of some rounds, and the processor's time of the same; fuzz_files and fuzz_failures,
-    slowest_seconds and memory_times, the most of all of them; kill_trials, kill_failures and
-    kill_amid, of the kills those that left a half-written file beside the target."""
-    return {**timings(), **fuzz_figures(fuzzed), **kill_figures(kills)}
-
-
-def timings() -> dict[str, float]:
+    medians of some rounds, and the processor's time of the same."""
     groom = Groom(_strands())
     found: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -58,30 +54,38 @@ def timings() -> dict[str, float]:
     return found
 
 
-def fuzz_figures(count: int) -> dict[str, float]:
-    """10,000 damaged files of each format by default."""
+def fuzz_figures(ours: int = FUZZED, libraries: int = FUZZED_APART) -> dict[str, float]:
+    """How many damaged files were read, refused, or neither (failures); the slowest, and the most
+    memory as a multiple of the file, of those that we parse; and of those that libraries parse how
+    many ended all right."""
+    counts = dict.fromkeys(OUR_FORMATS, ours) | dict.fromkeys(LIBRARIES_FORMATS, libraries)
     with ThreadPoolExecutor(2) as pool:
-        found = list(pool.map(lambda kind: _child("fuzz_files", kind, count), FUZZED_FORMATS))
-    failures = [failure for each in found for failure in each["failures"]]
+        found = dict(zip(counts, pool.map(_fuzzed, counts, counts.values()), strict=True))
+    failures = [failure for each in found.values() for failure in each["failures"]]
     for failure in failures[:20]:
         print(failure)
+    parsed = [found[kind] for kind in OUR_FORMATS]
     return {
-        "fuzz_files": float(sum(each["files"] for each in found)),
-        "fuzz_read": float(sum(each["read"] for each in found)),
-        "fuzz_refused": float(sum(each["refused"] for each in found)),
+        "fuzz_files": float(sum(each["files"] for each in found.values())),
         "fuzz_failures": float(len(failures)),
-        "fuzz_slowest_seconds": max(each["slowest"] for each in found),
-        "fuzz_memory_times": max(each["memory_times"] for each in found),
+        "fuzz_read": float(sum(each["read"] for each in found.values())),
+        "fuzz_refused": float(sum(each["refused"] for each in found.values())),
+        "fuzz_slowest_seconds": max(each["slowest"] for each in parsed),
+        "fuzz_memory_times": max(each["memory_times"] for each in parsed),
+        **{f"fuzz_{kind}_read": float(found[kind]["read"]) for kind in found},
     }
 
 
-def kill_figures(trials: int) -> dict[str, float]:
-    found = [_child("kill_writes", kind, trials) for kind in FUZZED_FORMATS]
-    return {
-        "kill_trials": float(sum(each["trials"] for each in found)),
-        "kill_failures": float(sum(each["failures"] for each in found)),
-        "kill_amid": float(sum(each["amid"] for each in found)),
-    }
+def _fuzzed(kind: str, count: int) -> dict[str, Any]:
+    return _child("fuzz_files", kind, count)
+
+
+def kill_figures(trials: int = KILLS) -> dict[str, float]:
+    """Kills, files that were neither old nor new, kills that left something half-written, sets of
+    old and new files, and what still lay there after one write more."""
+    found = [_child("kill_writes", kind, trials) for kind in KILLED_FORMATS]
+    names = ("trials", "failures", "amid", "mixed", "leftovers")
+    return {f"kill_{name}": float(sum(each[name] for each in found)) for name in names}
 
 
 def _child(tool: str, kind: str, count: int) -> dict[str, Any]:

@@ -1,0 +1,94 @@
+"""Sintel's cards on a head that shakes for two seconds, as joints and as motion textures.
+
+It needs Blender, or Blender as a module, for the simulation of a take.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+from extension_loader import load_package
+
+load_package()
+
+from _cards_groom import SETTINGS, sintel_rig  # noqa: E402
+
+from hairloom.addon.card_flow import card_build  # noqa: E402
+from hairloom.addon.cards.steps import result_of  # noqa: E402
+from hairloom.addon.cards.vertex_animation import motion_values  # noqa: E402
+from hairloom.addon.dynamics.colliders import DistanceField  # noqa: E402
+from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
+from hairloom.addon.exchange.card_formats import GLB  # noqa: E402
+from hairloom.addon.host.card_motion import (  # noqa: E402
+    GuideMotion,
+    MotionChoices,
+    TextureMotion,
+    joint_motion_steps,
+    moved_cards,
+)
+from hairloom.addon.host.images import read_texture  # noqa: E402
+from hairloom.addon.host.take import TakeDrive, shaken_poses, simulate  # noqa: E402
+from hairloom.addon.pipeline import Rig  # noqa: E402
+
+SECONDS, RATE = 2.0, 60.0
+
+
+def motion_figures() -> dict[str, float]:
+    """Errors in percent of the hair's mean length and in mm, what the skeleton has, and seconds."""
+    rig = sintel_rig()
+    motion = _shaken(rig)
+    levels = card_build(rig, *SETTINGS).levels
+    begin = time.perf_counter()
+    moved = result_of(moved_cards(motion, levels, space="head", with_directions=True))
+    ridden = time.perf_counter()
+    joints = result_of(joint_motion_steps(moved.tracks, MotionChoices("joints")))
+    fitted = time.perf_counter()
+    length, told = moved.tracks.hair_length, joints.facts
+    figures = {
+        "joint_error_percent": 100.0 * joints.share,
+        "joint_error_percent_99": 100.0 * joints.error.most / length,
+        "joint_error_percent_worst": 100.0 * joints.error.worst / length,
+        "chains": told["chains"],
+        "joints": told["joints_in_chain"],
+        "keys": told["keys"],
+        "motion_ride_seconds": ridden - begin,
+        "joint_seconds": fitted - ridden,
+    }
+    texture = TextureMotion.of(moved, MotionChoices("texture"), GLB, "bench")
+    with tempfile.TemporaryDirectory() as folder:
+        files = texture.write(Path(folder) / "cards.glb")
+        figures["vat_seconds"] = time.perf_counter() - fitted
+        paths = [Path(folder) / name for name in files.values()]
+        figures["vat_megabytes"] = sum(path.stat().st_size for path in paths) / 1e6
+        stored = read_texture(Path(folder) / files["position"], is_color=False)
+    found = motion_values(stored, texture.layout)
+    pairs = zip(moved.tracks.moved, levels, strict=True)
+    offsets = np.concatenate([now - mesh.positions[:, None] for now, mesh in pairs])
+    miss = np.linalg.norm(found - GLB.placed(offsets), axis=-1)
+    figures["vat_error_mm"] = 1000.0 * float(miss.max())
+    return figures
+
+
+def _shaken(rig: Rig) -> GuideMotion:
+    assert rig.head is not None
+    settings = DynamicsSettings()
+    collider = DistanceField.from_surface(rig.head, settings, place="Sintel")
+    drive = TakeDrive(shaken_poses(rig, round(SECONDS * RATE) + 1, RATE), RATE)
+    take, _ = simulate(
+        rig, collider, drive, settings, lambda _stage: nullcontext(), lambda _frame: None
+    )
+    return GuideMotion(
+        rig,
+        range(take.frame_count),
+        RATE,
+        lambda frame: (take.pose(frame), take.guides[frame]),
+    )
+
+
+if __name__ == "__main__":
+    for name, value in motion_figures().items():
+        print(f"{name:28} {value:,.4g}")
