@@ -95,8 +95,10 @@ class CardFile:
     textures: role -> {"file", "channels"} of those that lie beside it; texture_files: file -> what
         its channels hold. highlights: which of them breaks up the highlights, "shift" or "tangent".
     base_gain: what the base texture is to be multiplied by.
+    even_alpha: mean_facing and least_facing where alpha is that of baked strands, else empty.
     material: model, values, units, fibre and tables, see host/card_material.py.
     indices: the index buffer and its file, or None.
+    motion: what moves, see exchange/sidecar_motion.py; empty: nothing.
     generator: version of Hairloom.
     """
 
@@ -110,8 +112,10 @@ class CardFile:
     texture_files: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     base_gain: float = 1.0
     highlights: str = "shift"
+    even_alpha: Mapping[str, float] = field(default_factory=dict)
     material: Mapping[str, Any] = field(default_factory=dict)
     indices: tuple[str, IndexBuffer] | None = None
+    motion: Mapping[str, Any] = field(default_factory=dict)
     generator: str = ""
 
 
@@ -152,6 +156,8 @@ def description(cards: CardFile) -> dict[str, Any]:
         "shading": texts.SHADING,
         "engines": texts.ENGINES,
     }
+    if cards.motion:
+        content["motion"] = dict(cards.motion)
     if cards.indices is not None:
         file, buffer = cards.indices
         content["index_buffer"] = {
@@ -210,4 +216,5 @@ def _textures(cards: CardFile) -> dict[str, Any]:
         space, meaning = texts.ROLES[role]
         gain = {"gain": cards.base_gain} if role == "base" else {}
         roles[role] = {**where, "color_space": space, **gain, "meaning": meaning}
-    return {**texts.TEXTURES, "highlights_by": cards.highlights, **roles}
+    even = {"even_alpha": {**cards.even_alpha, "is": texts.EVEN_ALPHA}} if cards.even_alpha else {}
+    return {**texts.TEXTURES, "highlights_by": cards.highlights, **even, **roles}

@@ -41,9 +41,19 @@ TEXTURES = {
     "place": "the lowest row of a picture is v = 0, counted from below: the root",
     "shift_and_noise": "where they are textures of their own they repeat in u and v",
 }
+EVEN_ALPHA = (
+    "alpha is what strands cover on the mean of all turns of a card about its tangent. Seen at a "
+    "slant, when its shading is drawn, it covers 1 - (1 - alpha)^(mean_facing / max(f, "
+    "least_facing)); f is |dot(n, e)| of the normal n of its plane and the way e to the eye made "
+    "perpendicular to the tangent, a unit vector"
+)
 #: role of a texture -> its color space in files of integers, and what it says
 ROLES = {
-    "base": ("sRGB", "times gain it is what the hair's colour is multiplied by"),
+    "base": (
+        "sRGB",
+        "times gain it is what the hair's colour is multiplied by; with Marschner by an absorption "
+        "of (root(absorption) - log(base) / factor)^2",
+    ),
     "alpha": ("linear", "straight coverage; 0 at both sides of a tile, opaque in its middle"),
     "shift": ("linear", "moves both highlights: shift + shift_noise (value - 0.5)"),
     "noise": ("linear", "breaks up the second highlight: times mix(1, value, sparkle)"),

@@ -5,10 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ..cards.joints import JointChoices
 from ..exchange.card_formats import FBX, FORMATS, GLB, OBJ, USD
 from ..exchange.names import plain_name
 from .card_files import CardOutput
+from .card_motion import MotionChoices
 from .card_textures import TextureFiles
+from .job_options import add_frames_option
 
 FORMAT_ITEMS = (
     (GLB.name, "glTF (.glb)", "Metres, Y up; for three.js, Godot and most others"),
@@ -30,6 +33,27 @@ TEXTURE_ITEMS = (
     ("dds", "DDS", "Compressed for GPUs (BC4, BC5, BC7), with all mip maps"),
     ("dds_plain", "DDS, Plain", "Not compressed, with all mip maps"),
 )
+MOTION_ITEMS = (
+    ("none", "None", "The cards at rest"),
+    (
+        "joints",
+        "Joints",
+        "GLB: chains of joints that cards are skinned to, with keys; every engine plays them",
+    ),
+    (
+        "texture",
+        "Vertex Textures",
+        "GLB, FBX, USD: where each vertex is in each frame, for a vertex shader; exact",
+    ),
+)
+SPACE_ITEMS = (
+    ("head", "With the Head", "Without the head's own motion: attach the hair to the head"),
+    ("world", "World", "With the head's own motion"),
+)
+DEPTH_ITEMS = (
+    ("half", "Half", "16 bits: within a two thousandth of how far a vertex moves"),
+    ("float", "Float", "32 bits"),
+)
 SUFFIXES = tuple(suffix for each in FORMATS for suffix in each.suffixes)
 
 
@@ -49,7 +73,14 @@ def card_output(values: Any, path: Path, hair_name: str) -> CardOutput:
         portable=not values.attributes,
         index_buffer=values.index_buffer,
         textures=TextureFiles(values.packing, values.textures),
+        motion=motion_choices(values),
     )
+
+
+def motion_choices(values: Any) -> MotionChoices:
+    """Of an operator with these properties, or of options."""
+    joints = JointChoices(values.chains, values.joints, values.joint_error / 100.0)
+    return MotionChoices(values.motion, values.motion_space, values.motion_depth, joints)
 
 
 def file_stem(hair_name: str) -> str:
@@ -96,4 +127,47 @@ def add_card_options(job: Any) -> None:
         action="store_false",
         dest="portable",
         help="ambient occlusion as the attribute _AO too, which some engines refuse",
+    )
+    _add_motion_options(job)
+
+
+def _add_motion_options(job: Any) -> None:
+    job.add_argument(
+        "--motion",
+        choices=[name for name, *_ in MOTION_ITEMS],
+        default="none",
+        help="of --take, or of the bake of the object --groom, as joints with keys (GLB) or as "
+        "vertex animation textures",
+    )
+    job.add_argument("--take", help="a take written by 'simulate'")
+    add_frames_option(job, "of the motion; a take's count from 0 (default: all)")
+    job.add_argument(
+        "--motion-space",
+        choices=[name for name, *_ in SPACE_ITEMS],
+        default="head",
+        help="head: without the head's own motion, to be attached to it (default)",
+    )
+    job.add_argument(
+        "--motion-depth",
+        choices=[name for name, *_ in DEPTH_ITEMS],
+        default="half",
+        help="of vertex animation textures",
+    )
+    defaults = JointChoices()
+    job.add_argument(
+        "--chains", type=int, default=defaults.chains, metavar="N", help="of joints, at most"
+    )
+    job.add_argument(
+        "--joints",
+        type=int,
+        default=defaults.joints,
+        metavar="N",
+        help="in a chain, at most, 2 to 16; as few as stay under the error",
+    )
+    job.add_argument(
+        "--joint-error",
+        type=float,
+        default=100.0 * defaults.error,
+        metavar="PERCENT",
+        help="root mean square distance from the simulation, of the mean length of the hair",
     )

@@ -15,6 +15,7 @@ from typing import Any
 
 import bpy
 
+from ..arrays import Floats
 from ..cards.card_mesh import CardMesh
 from ..errors import HairloomError
 from ..exchange.card_formats import FBX, GLB, OBJ, USD, CardFormat
@@ -29,6 +30,7 @@ def write_card_mesh(
     *,
     name: str,
     portable: bool = True,
+    texels: Sequence[Floats] = (),
 ) -> None:
     """Write each level as one object whose order of triangles is that of `triangles`.
 
@@ -37,13 +39,15 @@ def write_card_mesh(
             `exchange.file_set.written_together`.
         name: of the hair in the file.
         portable: without custom attributes, which some engines refuse.
+        texels: of each level, (vertex_count, 2) for a third UV map, see `card_scene`.
 
     Raises:
         HairloomError: no cards, or Blender's exporter is missing or fails.
     """
     check_cards(levels, str(path))
     check_exporter(file_format, str(path))
-    with card_scene(levels, name, look, file_format, portable=portable) as scene, shown(scene):
+    scene_of_cards = card_scene(levels, name, look, file_format, portable=portable, texels=texels)
+    with scene_of_cards as scene, shown(scene):
         try:
             with redirect_stdout(StringIO()):  # running commentary; errors go to stderr
                 _EXPORTERS[file_format.name](path, portable)

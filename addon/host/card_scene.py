@@ -71,11 +71,15 @@ def card_scene(
     file_format: CardFormat,
     *,
     portable: bool,
+    texels: Sequence[Floats] = (),
 ) -> Iterator[bpy.types.Scene]:
     """A scene with one object a level, below an empty where there are several.
 
     It vanishes afterwards with every data-block made in the meantime. Blocks of the user that have
     the names of ours are called otherwise for the time.
+
+    Args:
+        texels: of each level, (vertex_count, 2): a third UV map, its second component from the top.
     """
     names = level_names(name, len(levels))
     before = _data_blocks()
@@ -84,8 +88,10 @@ def card_scene(
             scene = bpy.data.scenes.new(plain_name(name))
             material = _new_material(look, plain_name(name), file_format)
             parent = _new_parent(scene, plain_name(name)) if len(levels) > 1 else None
-            for level, level_name in zip(levels, names, strict=True):
+            for number, (level, level_name) in enumerate(zip(levels, names, strict=True)):
                 mesh = _new_mesh(level, level_name, file_format, portable)
+                if len(texels):
+                    _add_texels(mesh, level, texels[number], file_format)
                 mesh.materials.append(material)
                 obj = bpy.data.objects.new(level_name, mesh)
                 obj.parent = parent
@@ -168,6 +174,14 @@ def _new_mesh(
         _add_attribute(mesh, "tangents", "FLOAT_VECTOR", "vector", _unit(side))
     _add_attribute(mesh, "custom_normal", "FLOAT_VECTOR", "vector", cards.normal)
     return mesh
+
+
+def _add_texels(
+    mesh: bpy.types.Mesh, cards: CardMesh, texels: Floats, file_format: CardFormat
+) -> None:
+    """Blender, and all files but glTF's, count v from the bottom."""
+    name = "st2" if file_format == USD else "Motion"
+    _add_uv_layer(mesh, name, (texels * [1.0, -1.0] + [0.0, 1.0])[cards.triangles.ravel()])
 
 
 def _add_uv_layer(mesh: bpy.types.Mesh, name: str, uv: Floats) -> None:

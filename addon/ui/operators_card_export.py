@@ -2,34 +2,42 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..errors import HairloomError
-from ..host import groom_files
 from ..host.card_choices import (
+    DEPTH_ITEMS,
     FORMAT_ITEMS,
+    MOTION_ITEMS,
     PACKING_ITEMS,
+    SPACE_ITEMS,
     SUFFIXES,
     TEXTURE_ITEMS,
     card_output,
     file_stem,
     suffix_of,
 )
-from .reports import reporting, tell, waiting
+from ..host.card_files import FileSteps
+from ..host.card_out import CardExport
+from ..host.groom_files import Outcome
+from .long_work import LongWork, Progress, Steps, threaded
+from .reports import tell
 from .selection import chosen_hair, needs_hair
 
 
-class HAIRLOOM_OT_export_cards(bpy.types.Operator, ExportHelper):
+class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     """Write hair as textured cards, sorted from inside to outside, for engines"""
 
     bl_idname = "hairloom.export_cards"
     bl_label = "Export Hair Cards"
     bl_options = {"PRESET"}
+    unharmed = "nothing was written"
 
     filter_glob: StringProperty(
         default=";".join(f"*{suffix}" for suffix in SUFFIXES), options={"HIDDEN"}
@@ -74,6 +82,47 @@ class HAIRLOOM_OT_export_cards(bpy.types.Operator, ExportHelper):
         "their own vertices",
         default=False,
     )
+    motion: EnumProperty(
+        name="Motion",
+        description="How the motion of the hair's bake is written",
+        items=MOTION_ITEMS,
+    )
+    own_frames: BoolProperty(
+        name="Other Frames", description="Write a part of the bake", default=False
+    )
+    first_frame: IntProperty(name="First", description="First frame that is written", default=1)
+    last_frame: IntProperty(name="Last", description="Last frame that is written", default=250)
+    motion_space: EnumProperty(
+        name="Space", description="What the motion is measured against", items=SPACE_ITEMS
+    )
+    chains: IntProperty(
+        name="Chains",
+        description="How many chains of joints there are at most; cards that move alike share one",
+        default=64,
+        min=1,
+        max=2048,
+        soft_max=256,
+    )
+    joints: IntProperty(
+        name="Joints",
+        description="How many joints a chain has at most; as few as stay under the error",
+        default=16,
+        min=2,
+        max=16,
+    )
+    joint_error: FloatProperty(
+        name="Error",
+        description="Root mean square distance of cards from the simulation, of the mean length of "
+        "the hair",
+        default=1.0,
+        min=0.01,
+        max=100.0,
+        soft_max=10.0,
+        subtype="PERCENTAGE",
+    )
+    motion_depth: EnumProperty(
+        name="Depth", description="Numbers in the textures", items=DEPTH_ITEMS
+    )
 
     @property
     def filename_ext(self) -> str:
@@ -83,7 +132,7 @@ class HAIRLOOM_OT_export_cards(bpy.types.Operator, ExportHelper):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         # a collection's exporter has its own hair, and no selection
-        return bool(bpy.data.hair_curves) or needs_hair(cls, context)
+        return cls.is_free() and (bool(bpy.data.hair_curves) or needs_hair(cls, context))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         hair = chosen_hair(context)
@@ -92,17 +141,39 @@ class HAIRLOOM_OT_export_cards(bpy.types.Operator, ExportHelper):
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
         return super().invoke(context, event)
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        depsgraph, hair = context.evaluated_depsgraph_get(), self._hair(context)
-        levels = self.levels if self.own_levels else None
-        for each in hair:
-            path = self._path(each, is_alone=len(hair) == 1)
-            output = card_output(self, path, each.name)
-            with waiting(context):
-                outcome = groom_files.export_cards(each, depsgraph, path, output, levels=levels)
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        hair = self._hair(context)
+        plans = [self._plan(context, each, is_alone=len(hair) == 1) for each in hair]
+        outcomes = []
+        for plan in plans:
+            made = yield from threaded(plan.making())
+            outcomes.append((yield from _shown(plan.writing(made))))
+        for outcome in outcomes:
             tell(self, outcome)
-        return {"FINISHED"}
+
+    def _plan(
+        self, context: bpy.types.Context, hair: bpy.types.Object, *, is_alone: bool
+    ) -> CardExport:
+        path, depsgraph = self._path(hair, is_alone=is_alone), context.evaluated_depsgraph_get()
+        return CardExport.of(
+            hair,
+            depsgraph,
+            path,
+            card_output(self, path, hair.name),
+            levels=self.levels if self.own_levels else None,
+            frames=self._frames(hair),
+        )
+
+    def _frames(self, hair: bpy.types.Object) -> range | None:
+        if not self.own_frames or self.motion == "none":
+            return None
+        if self.last_frame < self.first_frame:
+            raise HairloomError(
+                f"the last frame, {self.last_frame}, comes before the first, {self.first_frame}",
+                place=hair.name,
+                remedy="Correct the frame range",
+            )
+        return range(self.first_frame, self.last_frame + 1)
 
     def _hair(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         if not self.collection:
@@ -128,8 +199,32 @@ class HAIRLOOM_OT_export_cards(bpy.types.Operator, ExportHelper):
         count = levels.row()
         count.active = self.own_levels
         count.prop(self, "levels", text="")
-        for name in ("packing", "textures", "attributes", "index_buffer"):
+        for name in ("packing", "textures", "attributes", "index_buffer", "motion"):
             layout.prop(self, name)
+        if self.motion != "none":
+            self._draw_motion(layout)
+
+    def _draw_motion(self, layout: bpy.types.UILayout) -> None:
+        frames = layout.row(heading="Frames")
+        frames.prop(self, "own_frames", text="")
+        ends = frames.row(align=True)
+        ends.active = self.own_frames
+        ends.prop(self, "first_frame", text="")
+        ends.prop(self, "last_frame", text="")
+        of_joints = ("chains", "joints", "joint_error")
+        for name in ("motion_space", *(of_joints if self.motion == "joints" else ["motion_depth"])):
+            layout.prop(self, name)
+
+
+def _shown(writing: FileSteps[Outcome]) -> Steps[Outcome]:
+    with closing(writing):
+        while True:
+            try:
+                text, share = next(writing)
+            except StopIteration as end:
+                outcome: Outcome = end.value
+                return outcome
+            yield Progress(text, share)
 
 
 class HAIRLOOM_FH_cards(bpy.types.FileHandler):

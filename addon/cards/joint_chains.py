@@ -1,0 +1,96 @@
+"""Cards that move alike share a chain of joints: which ones, and with which other chain.
+
+Alike is meant of how far places along the cards go from rest, frame by frame, and a little of where
+they lie: k-means (Lloyd 1982) from the cards that are farthest from each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+
+#: How much cards that lie apart are told apart, beside how they move.
+_PLACE = 0.75
+_ROUNDS = 20
+_SMALLEST = 1.0e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Chains:
+    """The chain that each card rides on, and another one that it may share; (n,) each."""
+
+    own: Ints
+    other: Ints
+    count: int
+
+
+def card_chains(places: Floats, moved: Floats, most: int) -> Chains:
+    """Put cards into `most` chains or fewer.
+
+    Args:
+        places: (n, row_count, 3) of each card at rest [m].
+        moved: (n, row_count, frame_count, 3) the same in motion.
+    """
+    ways = (moved - places[:, :, None]).reshape(len(places), -1)
+    middle = places - places.mean(axis=(0, 1))
+    size = np.sqrt((middle * middle).mean())
+    share = _PLACE * np.sqrt((ways * ways).mean()) / max(float(size), _SMALLEST)
+    vectors = np.concatenate([ways, middle.reshape(len(places), -1) * share], axis=1)
+    own, centres = _k_means(vectors, min(most, len(places)))
+    used, own = np.unique(own, return_inverse=True)
+    return Chains(own, _partners(vectors, own, centres[used]), len(used))
+
+
+def _k_means(vectors: Floats, count: int) -> tuple[Ints, Floats]:
+    """The nearest of `count` centres of each vector, and the centres."""
+    centres = _far_apart(vectors, count)
+    nearest = np.full(len(vectors), -1)
+    for _ in range(_ROUNDS):
+        before, nearest = nearest, _squares(vectors, centres).argmin(axis=1)
+        if np.array_equal(before, nearest):
+            break
+        members = np.bincount(nearest, minlength=count)
+        sums = np.zeros_like(centres)
+        np.add.at(sums, nearest, vectors)
+        has_some = members > 0
+        centres[has_some] = sums[has_some] / members[has_some, None]
+    return nearest, centres
+
+
+def _far_apart(vectors: Floats, count: int) -> Floats:
+    """Each time the vector that is farthest from all chosen ones, beginning at the mean."""
+    first = int(_squares(vectors, vectors.mean(axis=0)[None])[:, 0].argmin())
+    chosen, distance = [first], np.full(len(vectors), np.inf)
+    while len(chosen) < count:
+        distance = np.minimum(distance, _squares(vectors, vectors[chosen[-1:]])[:, 0])
+        chosen.append(int(distance.argmax()))
+    return vectors[chosen].copy()
+
+
+def _partners(vectors: Floats, own: Ints, centres: Floats) -> Ints:
+    """With which other centre, mixed with its own, each vector is best reached; its own alone."""
+    count = len(centres)
+    if count < 2:
+        return own
+    grid = centres @ centres.T
+    square = np.diag(grid)
+    between = np.maximum(square[own][:, None] - 2.0 * grid[own] + square, _SMALLEST)
+    to_centres = vectors @ centres.T
+    from_own = to_centres[np.arange(len(own)), own]
+    # (v - a) (b - a) for all b, a being its own centre
+    toward = to_centres - from_own[:, None] - grid[own] + square[own][:, None]
+    share = np.clip(toward / between, 0.0, 0.5)
+    gain = 2.0 * share * toward - share * share * between
+    gain[np.arange(len(own)), own] = -1.0
+    return gain.argmax(axis=1)
+
+
+def _squares(vectors: Floats, centres: Floats) -> Floats:
+    """Squared distances, (n, k)."""
+    product = vectors @ centres.T
+    lengths = (vectors * vectors).sum(axis=1)[:, None] + (centres * centres).sum(axis=1)
+    squares: Floats = np.maximum(lengths - 2.0 * product, 0.0)
+    return squares

@@ -1,0 +1,164 @@
+"""Keys of joints: turns as quaternions and ways beside their parents, and only keys that count.
+
+A chain's joints share their keys. Between two of them engines turn evenly (slerp, Shoemake 1985)
+and move straight; a key is left out where that comes near enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .joints import JointRig
+
+#: Quaternions nearer to each other than this (their dot product) are mixed straight.
+_NEAR = 1.0 - 1.0e-9
+
+
+@dataclass(frozen=True, eq=False)
+class ChainKeys:
+    """Keys of a chain.
+
+    frame: (key_count,) counted from 0.
+    rotation: (joints, key_count, 4) unit quaternions x, y, z, w; translation: (joints, key_count,
+        3) [m]; of each joint in the space of the one before, of the first in that of the rig.
+    """
+
+    frame: Ints
+    rotation: Floats
+    translation: Floats
+
+
+def chain_keys(rig: JointRig, near: float) -> Generator[float, None, tuple[ChainKeys, ...]]:
+    """The keys of all chains; yields the share of them that is done.
+
+    Args:
+        near: how far a joint, and what hangs on it, may be from its way between two keys [m].
+    """
+    keys = []
+    for chain in range(rig.chains):
+        keys.append(keys_of(rig.turn[chain], rig.place[chain], rig.reach[chain], near))
+        yield (chain + 1) / rig.chains
+    return tuple(keys)
+
+
+def keys_of(turn: Floats, place: Floats, reach: Floats, near: float) -> ChainKeys:
+    """The keys of one chain.
+
+    Args:
+        turn, place: (joints, frame_count, 3, 3) and (joints, frame_count, 3) [m].
+        reach: (joints,) [m]: how far from a joint its turns matter.
+    """
+    frame_count = turn.shape[1]
+    rotation, translation = _beside_parents(turn, place)
+    kept = np.unique([0, frame_count - 1])
+    while len(kept) < frame_count:
+        keys = ChainKeys(kept, rotation[:, kept], translation[:, kept])
+        turned, placed = between_keys(keys, frame_count)
+        miss = np.linalg.norm(placed - place, axis=-1)
+        angle = np.linalg.norm(turned - turn, axis=(-2, -1)) / np.sqrt(2.0)
+        off = (miss + angle * reach[:, None]).max(axis=0)
+        if off.max() <= near:
+            break
+        # the worst frame of each stretch between two keys
+        stretch = np.searchsorted(kept, np.arange(frame_count), side="right")
+        order = np.lexsort((-off, stretch))
+        first = np.unique(stretch[order], return_index=True)[1]
+        worst = order[first]
+        kept = np.union1d(kept, worst[off[worst] > near])
+    return _shortest(ChainKeys(kept, rotation[:, kept], translation[:, kept]))
+
+
+def between_keys(keys: ChainKeys, frame_count: int) -> tuple[Floats, Floats]:
+    """Where the keys put the joints in every frame: turns (joints, frame_count, 3, 3) and places
+    (joints, frame_count, 3), as `keys_of` takes them.
+    """
+    frames = np.clip(np.arange(frame_count), keys.frame[0], keys.frame[-1])
+    after = np.searchsorted(keys.frame, frames).clip(1 if len(keys.frame) > 1 else 0)
+    before = np.maximum(after - 1, 0)
+    length = np.maximum(keys.frame[after] - keys.frame[before], 1)
+    share = ((frames - keys.frame[before]) / length)[:, None]
+    one, other = keys.translation[:, before], keys.translation[:, after]
+    place = one + (other - one) * share
+    turn = matrices(slerp(keys.rotation[:, before], keys.rotation[:, after], share))
+    for joint in range(1, len(turn)):
+        place[joint] = np.einsum("fab,fb->fa", turn[joint - 1], place[joint]) + place[joint - 1]
+        turn[joint] = turn[joint - 1] @ turn[joint]
+    return turn, place
+
+
+def quaternions(turn: Floats) -> Floats:
+    """Turns (..., 3, 3) as unit quaternions x, y, z, w (..., 4), by the largest of the four
+    (Shepperd 1978).
+    """
+    trace = np.trace(turn, axis1=-2, axis2=-1)
+    diagonal = np.diagonal(turn, axis1=-2, axis2=-1)
+    # four times the outer product of the quaternion with itself
+    outer = np.empty((*turn.shape[:-2], 4, 4))
+    for axis in range(3):
+        outer[..., axis, axis] = 1.0 - trace + 2.0 * diagonal[..., axis]
+        one, two = (axis + 1) % 3, (axis + 2) % 3
+        outer[..., one, two] = outer[..., two, one] = turn[..., one, two] + turn[..., two, one]
+        outer[..., axis, 3] = outer[..., 3, axis] = turn[..., two, one] - turn[..., one, two]
+    outer[..., 3, 3] = 1.0 + trace
+    largest = np.diagonal(outer, axis1=-2, axis2=-1).argmax(axis=-1)
+    row = np.take_along_axis(outer, largest[..., None, None], axis=-2)[..., 0, :]
+    unit: Floats = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    return unit
+
+
+def matrices(quaternion: Floats) -> Floats:
+    """Unit quaternions x, y, z, w (..., 4) as turns (..., 3, 3)."""
+    x, y, z, w = np.moveaxis(quaternion, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def slerp(one: Floats, other: Floats, share: Floats) -> Floats:
+    """Evenly from one unit quaternion to the other, the shorter way round, (..., 4)."""
+    cosine = (one * other).sum(axis=-1, keepdims=True)
+    other = np.where(cosine < 0.0, -other, other)
+    cosine = np.minimum(np.abs(cosine), 1.0)
+    angle = np.arccos(np.minimum(cosine, _NEAR))
+    is_near = cosine > _NEAR
+    sine = np.sin(angle)
+    first = np.where(is_near, 1.0 - share, np.sin((1.0 - share) * angle) / sine)
+    second = np.where(is_near, share, np.sin(share * angle) / sine)
+    mixed = one * first + other * second
+    unit: Floats = mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
+    return unit
+
+
+def beside_parent(parent: Floats, own: Floats) -> Floats:
+    """Rigid matrices (..., 4, 4) in the space of others."""
+    result: Floats = np.linalg.inv(parent) @ own
+    return result
+
+
+def _beside_parents(turn: Floats, place: Floats) -> tuple[Floats, Floats]:
+    """Quaternions that go the shorter way from frame to frame, and ways, in parents' spaces."""
+    turned, moved = turn.copy(), place.copy()
+    back = turn[:-1].swapaxes(-1, -2)
+    turned[1:] = back @ turn[1:]
+    moved[1:] = np.einsum("jfab,jfb->jfa", back, place[1:] - place[:-1])
+    rotation = quaternions(turned)
+    flips = np.sign((rotation[:, 1:] * rotation[:, :-1]).sum(axis=-1))
+    flips[flips == 0.0] = 1.0
+    rotation[:, 1:] *= np.cumprod(flips, axis=1)[..., None]
+    return rotation, moved
+
+
+def _shortest(keys: ChainKeys) -> ChainKeys:
+    """One key for what stays where it is."""
+    if len(keys.frame) == 2 and all(
+        np.array_equal(each[:, 0], each[:, 1]) for each in (keys.rotation, keys.translation)
+    ):
+        return ChainKeys(keys.frame[:1], keys.rotation[:, :1], keys.translation[:, :1])
+    return keys

@@ -1,0 +1,171 @@
+"""Rigid joints and their weights from moving points: the two halves of skinning decomposition.
+
+Le and Deng, "Smooth Skinning Decomposition with Rigid Bones", 2012: with the weights fixed each
+joint has its best rigid motion in closed form, with the motion fixed each point its best weights.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+
+#: How many joints move one vertex, as engines have it.
+INFLUENCES = 4
+#: How much a fit keeps to the turn before it, as a share of what the points say: points in a line
+#: say nothing of the turn about it.
+_KEEP = 1.0e-4
+#: The same for weights.
+_KEEP_WEIGHTS = 1.0e-4
+#: Lengths [m] and weights below this are none.
+_SMALLEST = 1.0e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """joint, weight: (n, INFLUENCES) for each point; weights are not negative, of sum 1."""
+
+    joint: Ints
+    weight: Floats
+
+
+def rigid_fits(
+    points: Floats, targets: Floats, weight: Floats, before: Floats
+) -> tuple[Floats, Floats]:
+    """The rigid motion that brings weighted points nearest to targets, in each frame.
+
+    Kabsch 1976. Where points say nothing of a turn it is the one before.
+
+    Args:
+        points: (n, 3). targets: (n, frame_count, 3). weight: (n,).
+        before: (frame_count, 3, 3) turns.
+
+    Returns:
+        Turns (frame_count, 3, 3) and ways (frame_count, 3): target = turn point + way.
+    """
+    total = max(float(weight.sum()), _SMALLEST)
+    middle, goal = weight @ points / total, np.tensordot(weight, targets, 1) / total
+    arms = points - middle
+    spread = np.tensordot(arms * weight[:, None], targets, (0, 0)).transpose(1, 2, 0)
+    size = float((weight * (arms * arms).sum(axis=1)).sum())
+    left, _, right = np.linalg.svd(spread + (size * _KEEP + _SMALLEST**2) * before)
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    turn = left @ right
+    return turn, goal - turn @ middle
+
+
+def placed(points: Floats, turn: Floats, way: Floats) -> Floats:
+    """Points (n, 3) in each frame of a rigid motion, (n, frame_count, 3)."""
+    flat = points @ turn.reshape(-1, 3).T + way.reshape(-1)
+    return flat.reshape(len(points), -1, 3)
+
+
+def skinned(points: Floats, skin: Skin, turn: Floats, way: Floats) -> Floats:
+    """Points (n, 3) moved by their joints, (n, frame_count, 3): linear blend skinning.
+
+    Args:
+        turn, way: (joint_count, frame_count, 3, 3) and (joint_count, frame_count, 3).
+    """
+    result = np.zeros((len(points), *way.shape[1:]), way.dtype)
+    for joint in range(len(turn)):
+        for column in range(INFLUENCES):
+            own = np.flatnonzero((skin.joint[:, column] == joint) & (skin.weight[:, column] > 0.0))
+            if len(own):
+                share = skin.weight[own, column, None, None]
+                result[own] += share * placed(points[own], turn[joint], way[joint])
+    return result
+
+
+def first_joints(points: Floats, targets: Floats, skin: Skin, count: int) -> tuple[Floats, Floats]:
+    """`turn` and `way` of each joint as if what hangs on it hung on it alone."""
+    still = np.tile(np.eye(3), (targets.shape[1], 1, 1))
+    turn, way = np.tile(still, (count, 1, 1, 1)), np.zeros((count, *targets.shape[1:]))
+    for joint in range(count):
+        share = np.where(skin.joint == joint, skin.weight, 0.0).sum(axis=1)
+        own = np.flatnonzero(share > 0.0)
+        if len(own):
+            turn[joint], way[joint] = rigid_fits(points[own], targets[own], share[own], still)
+    return turn, way
+
+
+def move_joints(
+    points: Floats, targets: Floats, skin: Skin, turn: Floats, way: Floats, rounds: int
+) -> None:
+    """Better `turn` and `way`, in place: joint by joint against what the others leave (eq. 8).
+
+    Args:
+        targets: (n, frame_count, 3).
+        turn, way: as of `skinned`.
+    """
+    left = targets - skinned(points, skin, turn, way)
+    count = len(turn)
+    members = [np.flatnonzero((skin.joint == joint).any(axis=1)) for joint in range(count)]
+    for _ in range(rounds):
+        for joint, own in enumerate(members):
+            share = np.where(skin.joint[own] == joint, skin.weight[own], 0.0).sum(axis=1)
+            own, share = own[share > 0.0], share[share > 0.0]
+            if not len(own):
+                continue
+            before = placed(points[own], turn[joint], way[joint])
+            goal = before + left[own] / np.maximum(share, 1.0e-3)[:, None, None]
+            fit = rigid_fits(points[own], goal, share * share, turn[joint])
+            after = placed(points[own], *fit)
+            left[own] += share[:, None, None] * (before - after)
+            turn[joint], way[joint] = fit
+
+
+def best_weights(points: Floats, targets: Floats, first: Skin, turn: Floats, way: Floats) -> Skin:
+    """The weights of the same joints that bring points nearest to targets (eq. 5).
+
+    Every set of joints that may remain is tried, so that the best weights that are not negative
+    are found, and not those where a search ends.
+
+    Args:
+        targets: (n, frame_count, 3).
+        first: what weights keep to where the motion says nothing of them.
+    """
+    shown = np.stack(
+        [
+            _of_joints(points, first.joint[:, column], turn, way) - targets
+            for column in range(INFLUENCES)
+        ],
+        axis=1,
+    ).reshape(len(points), INFLUENCES, -1)
+    gram = shown @ shown.transpose(0, 2, 1)  # of the misses: weights of sum 1 mix these, too
+    scale = np.trace(gram, axis1=1, axis2=2) * _KEEP_WEIGHTS + _SMALLEST**2
+    gram = gram + scale[:, None, None] * np.eye(INFLUENCES)
+    pull = scale[:, None] * first.weight
+    best, weight = np.full(len(points), np.inf), first.weight.astype(np.float64)
+    for size in range(1, INFLUENCES + 1):
+        for chosen in combinations(range(INFLUENCES), size):
+            found = _of_sum_one(gram[:, chosen][:, :, chosen], pull[:, chosen])
+            trial = np.zeros((len(points), INFLUENCES))
+            trial[:, chosen] = found
+            cost = np.einsum("ni,nij,nj->n", trial, gram, trial) - 2.0 * (trial * pull).sum(axis=1)
+            is_better = (found >= 0.0).all(axis=1) & (cost < best)
+            best[is_better], weight[is_better] = cost[is_better], trial[is_better]
+    return Skin(first.joint, weight)
+
+
+def _of_joints(points: Floats, joint: Ints, turn: Floats, way: Floats) -> Floats:
+    """Each point moved by a joint of its own, (n, frame_count, 3)."""
+    result = np.empty((len(points), *way.shape[1:]))
+    order = np.argsort(joint, kind="stable")
+    ends = np.searchsorted(joint[order], np.arange(len(turn) + 1))
+    for number, (begin, end) in enumerate(pairwise(ends)):
+        own = order[begin:end]
+        if len(own):
+            result[own] = placed(points[own], turn[number], way[number])
+    return result
+
+
+def _of_sum_one(gram: Floats, pull: Floats) -> Floats:
+    """w with the least w G w / 2 - p w among those of sum 1, (n, k), with Lagrange's multiplier."""
+    count, size = pull.shape
+    both = np.stack([np.ones((count, size)), pull], axis=2)
+    ones, free = np.moveaxis(np.linalg.solve(gram, both), 2, 0)
+    over = (free.sum(axis=1) - 1.0) / ones.sum(axis=1)
+    return free - over[:, None] * ones

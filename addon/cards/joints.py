@@ -1,0 +1,285 @@
+"""Chains of joints that move cards as their guides do: for engines that know skinned meshes.
+
+Cards that move alike share a chain (`joint_chains`), a vertex hangs on two neighbouring joints of
+its own chain and two of another one, and joints and weights are fitted to the motion in turns
+(`joint_solve`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .card_mesh import CardMesh
+from .follow import card_lines
+from .joint_chains import Chains, card_chains
+from .joint_rest import reach_of, rest_joints
+from .joint_solve import INFLUENCES, Skin, best_weights, first_joints, move_joints, skinned
+from .sort import card_of_vertex
+
+#: Numbers of joints that are tried, the fewest first.
+_COUNTS = (2, 3, 4, 6, 8, 12, 16)
+#: Joints go on being added while each step takes at least this share of the error away.
+_WORTH = 0.03
+#: Share of the error that the joints may take; the rest is for the keys that are left out.
+FIT_SHARE = 0.9
+#: Frames from which weights are learnt, and vertices from which joints are.
+_LEARNT_FRAMES = 24
+_LEARNT_VERTICES = 12_000
+_TURNS = 3
+#: Frames that are solved, and vertices that are placed, at once.
+_FRAMES_AT_ONCE = 64
+_VERTICES_AT_ONCE = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class CardTracks:
+    """Cards in motion, in the space that they have at rest, which the head carries.
+
+    levels: at rest [m], the finest first.
+    moved: (vertex_count, frame_count, 3) float32 [m] of each level.
+    carrier: (frame_count, 4, 4) rigid, from that space to the world.
+    hair_length: mean length of the guides [m], of which errors are shares.
+    root: (3,) middle of the roots at rest [m].
+    first: number of the first frame. frame_rate: [1/s].
+    """
+
+    levels: tuple[CardMesh, ...]
+    moved: tuple[Floats, ...]
+    carrier: Floats
+    hair_length: float
+    root: Floats
+    first: int
+    frame_rate: float
+
+    @property
+    def frame_count(self) -> int:
+        return len(self.carrier)
+
+
+@dataclass(frozen=True)
+class JointChoices:
+    """chains: at most. joints: at most, in a chain, 2 to 16. error: share of the hair's length."""
+
+    chains: int = 64
+    joints: int = 16
+    error: float = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class JointRig:
+    """Joints and what hangs on them, in the space of `CardTracks`; chain after chain.
+
+    chains, joints: how many chains, and joints in each.
+    rest: (chains, joints, 4, 4) rigid [m]; the y axis is along the chain.
+    turn, place: (chains, joints, frame_count, 3, 3) and (..., 3) [m], of the joints themselves.
+    reach: (chains, joints) how far what hangs on it lies from it [m].
+    skins: of each level; a joint's number is chain * joints + number in the chain.
+    """
+
+    chains: int
+    joints: int
+    rest: Floats
+    turn: Floats
+    place: Floats
+    reach: Floats
+    skins: tuple[Skin, ...]
+
+
+@dataclass(frozen=True)
+class FitError:
+    """Distances of skinned vertices from simulated ones [m], over all levels and frames:
+    root mean square, 99 % of them are below, and the worst.
+    """
+
+    mean_square_root: float
+    most: float
+    worst: float
+
+
+def joint_steps(tracks: CardTracks, choices: JointChoices) -> Generator[float, None, JointRig]:
+    """The fewest joints that stay under the error; where none do, the nearest ones.
+
+    Yields the share that is done.
+    """
+    learnt = _Learnt.of(tracks, choices.chains)
+    yield 0.1
+    allowed = FIT_SHARE * choices.error * tracks.hair_length
+    best, least = None, np.inf
+    for count in (each for each in _COUNTS if each <= choices.joints):
+        fit, error = learnt.fitted(count)
+        if error > least * (1.0 - _WORTH):
+            break
+        best, least = (count, *fit), error
+        if error <= allowed:
+            break
+        yield 0.1 + 0.4 * count / _COUNTS[-1]
+    assert best is not None, "two joints are always tried"
+    yield 0.5
+    return (yield from _on_all(tracks, learnt, *best))
+
+
+def keyed_error(tracks: CardTracks, rig: JointRig, turn: Floats, place: Floats) -> FitError:
+    """How far the cards are from the simulation when the joints are there.
+
+    Args:
+        turn, place: as those of the rig, which they may differ from by left out keys.
+    """
+    moves = joint_moves(rig.rest, turn, place)
+    distances = []
+    for mesh, moved, skin in zip(tracks.levels, tracks.moved, rig.skins, strict=True):
+        for begin in range(0, len(moved), _VERTICES_AT_ONCE):
+            part = slice(begin, begin + _VERTICES_AT_ONCE)
+            points = mesh.positions[part].astype(np.float64)
+            own = Skin(skin.joint[part], skin.weight[part])
+            miss = skinned(points, own, *moves) - moved[part]
+            distances.append(np.sqrt((miss * miss).sum(axis=-1)).astype(np.float32).ravel())
+    every = np.concatenate(distances)
+    rms = float(np.sqrt(np.mean(np.square(every, dtype=np.float64))))
+    return FitError(rms, float(np.quantile(every, 0.99)), float(every.max()))
+
+
+def joint_moves(rest: Floats, turn: Floats, place: Floats) -> tuple[Floats, Floats]:
+    """What joints do to points at rest: turns (n, frame_count, 3, 3) and ways (n, frame_count, 3)
+    such that a point goes to turn point + way.
+    """
+    shape = turn.shape[2:]
+    moves = (turn @ rest[:, :, None, :3, :3].swapaxes(-1, -2)).reshape(-1, *shape)
+    ways = place.reshape(-1, shape[0], 3) - np.einsum(
+        "jfab,jb->jfa", moves, rest.reshape(-1, 4, 4)[:, :3, 3]
+    )
+    return moves, ways
+
+
+@dataclass(frozen=True, eq=False)
+class _Learnt:
+    """What joints are learnt from: some vertices of the finest level in some frames."""
+
+    lines: Floats
+    chains: Chains
+    points: Floats
+    moved: Floats
+    card: Ints
+    along: Floats
+    picked: Ints
+    frames: Ints
+
+    @classmethod
+    def of(cls, tracks: CardTracks, most: int) -> _Learnt:
+        mesh, moved = tracks.levels[0], tracks.moved[0]
+        few = min(tracks.frame_count, _LEARNT_FRAMES)
+        frames = np.linspace(0, tracks.frame_count - 1, few).round().astype(int)
+        _, lines = card_lines(mesh)
+        ways = [card_lines(replace(mesh, positions=moved[:, frame]))[1] for frame in frames]
+        lines = lines.astype(np.float64)
+        chains = card_chains(lines, np.stack(ways, axis=2).astype(np.float64), most)
+        count = min(len(mesh.positions), _LEARNT_VERTICES)
+        picked = np.sort(np.random.default_rng(0).permutation(len(mesh.positions))[:count])
+        return cls(
+            lines,
+            chains,
+            mesh.positions[picked].astype(np.float64),
+            moved[picked][:, frames].astype(np.float64),
+            _card_places(mesh, mesh)[picked],
+            mesh.along[picked],
+            picked,
+            frames,
+        )
+
+    def first_skin(self, card: Ints, along: Floats, joints: int) -> Skin:
+        """Each vertex between two joints of its own chain, with none of the other chain's."""
+        at = np.clip(along.astype(np.float64), 0.0, 1.0) * (joints - 1)
+        before = np.minimum(at.astype(np.int64), joints - 2)
+        own = self.chains.own[card] * joints + before
+        other = self.chains.other[card] * joints + before
+        share = at - before
+        weight = np.zeros((len(card), INFLUENCES))
+        weight[:, 0], weight[:, 1] = 1.0 - share, share
+        return Skin(np.stack([own, own + 1, other, other + 1], axis=1), weight)
+
+    def fitted(self, joints: int) -> tuple[tuple[Skin, Floats, Floats], float]:
+        """The skin of the learnt vertices, the joints' motion, and the error [m]."""
+        skin = self.first_skin(self.card, self.along, joints)
+        count = self.chains.count * joints
+        turn, way = first_joints(self.points, self.moved, skin, count)
+        for _ in range(_TURNS):
+            move_joints(self.points, self.moved, skin, turn, way, 2)
+            skin = best_weights(self.points, self.moved, skin, turn, way)
+        move_joints(self.points, self.moved, skin, turn, way, 1)
+        miss = skinned(self.points, skin, turn, way) - self.moved
+        return (skin, turn, way), float(np.sqrt((miss * miss).sum(axis=-1).mean()))
+
+
+def _on_all(
+    tracks: CardTracks, learnt: _Learnt, joints: int, skin: Skin, turn: Floats, way: Floats
+) -> Generator[float, None, JointRig]:
+    """The learnt joints in all frames, and with all vertices."""
+    chains, frame_count = learnt.chains.count, tracks.frame_count
+    turns = np.empty((chains * joints, frame_count, 3, 3))
+    ways = np.empty((chains * joints, frame_count, 3))
+    for begin in range(0, frame_count, _FRAMES_AT_ONCE):
+        part = slice(begin, begin + _FRAMES_AT_ONCE)
+        moved = tracks.moved[0][learnt.picked, part].astype(np.float64)
+        block = first_joints(learnt.points, moved, skin, chains * joints)
+        move_joints(learnt.points, moved, skin, *block, rounds=3)
+        turns[:, part], ways[:, part] = block
+        yield 0.5 + 0.3 * min(begin + _FRAMES_AT_ONCE, frame_count) / frame_count
+    skins = []
+    for mesh, now in zip(tracks.levels, tracks.moved, strict=True):
+        skins.append(_skin_of(mesh, now, tracks.levels[0], learnt, joints, turn, way))
+        yield 0.8 + 0.1 * len(skins) / len(tracks.levels)
+    rest = rest_joints(learnt.lines, learnt.chains, joints)
+    flat: Floats = rest.reshape(-1, 4, 4)
+    place = np.einsum("jfab,jb->jfa", turns, flat[:, :3, 3])
+    shape = (chains, joints, frame_count)
+    return JointRig(
+        chains,
+        joints,
+        rest,
+        (turns @ flat[:, None, :3, :3]).reshape(*shape, 3, 3),
+        (place + ways).reshape(*shape, 3),
+        reach_of(tracks.levels[0].positions, skins[0], rest),
+        tuple(skins),
+    )
+
+
+def _skin_of(
+    mesh: CardMesh,
+    moved: Floats,
+    finest: CardMesh,
+    learnt: _Learnt,
+    joints: int,
+    turn: Floats,
+    way: Floats,
+) -> Skin:
+    """The weights of all vertices of a level, heaviest first."""
+    card = _card_places(mesh, finest)
+    parts = []
+    for begin in range(0, len(moved), _VERTICES_AT_ONCE):
+        part = slice(begin, begin + _VERTICES_AT_ONCE)
+        first = learnt.first_skin(card[part], mesh.along[part], joints)
+        points = mesh.positions[part].astype(np.float64)
+        ways = moved[part][:, learnt.frames].astype(np.float64)
+        parts.append(best_weights(points, ways, first, turn, way))
+    joint = np.concatenate([each.joint for each in parts])
+    weight = np.concatenate([each.weight for each in parts])
+    order = np.argsort(-weight, axis=1, kind="stable")
+    return Skin(np.take_along_axis(joint, order, 1), np.take_along_axis(weight, order, 1))
+
+
+def _card_places(mesh: CardMesh, finest: CardMesh) -> Ints:
+    """Of each vertex, the place of its card among those of the finest level."""
+    return np.searchsorted(np.unique(finest.card), card_of_vertex(mesh))
+
+
+def joint_names(rig: JointRig) -> Sequence[str]:
+    """Such as chain_03_joint_02, chain after chain."""
+    width = max(2, len(str(rig.chains - 1)))
+    return [
+        f"chain_{chain:0{width}}_joint_{joint:02}"
+        for chain in range(rig.chains)
+        for joint in range(rig.joints)
+    ]

@@ -1,0 +1,83 @@
+"""Vertices in motion as a texture: a texel for each vertex and frame.
+
+Frame 0 has the upper rows, frame 1 those below it, and so on; within a frame vertices go along the
+rows, the first one at the left of the uppermost row. Vertices of all levels follow each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import HairloomError
+
+#: Widths that are tried [texels]: the first that holds everything in a height that is no larger.
+_WIDTHS = (1024, 2048, 4096, 8192)
+
+
+@dataclass(frozen=True)
+class MotionLayout:
+    """Where things are in the texture.
+
+    width: [texels]. rows: for each frame.
+    """
+
+    vertex_count: int
+    frame_count: int
+    width: int
+    rows: int
+
+    @property
+    def height(self) -> int:
+        return self.rows * self.frame_count
+
+    @property
+    def frame_step(self) -> float:
+        """How far the next frame is, as a share of the height, downwards."""
+        return self.rows / self.height
+
+
+def motion_layout(vertex_count: int, frame_count: int, place: str) -> MotionLayout:
+    """A layout that wastes little.
+
+    Raises:
+        HairloomError: it does not fit into a texture that engines can hold.
+    """
+    for most in _WIDTHS:
+        rows = -(-vertex_count // most)
+        if rows * frame_count <= most:
+            return MotionLayout(vertex_count, frame_count, -(-vertex_count // rows), rows)
+    raise HairloomError(
+        f"{vertex_count:,} vertices in {frame_count:,} frames do not fit into a texture of "
+        f"{_WIDTHS[-1]} x {_WIDTHS[-1]} texels",
+        place=place,
+        remedy="Write fewer frames, levels of detail or cards, or joints",
+    )
+
+
+def vertex_texels(layout: MotionLayout) -> Floats:
+    """The texture coordinate of each vertex in frame 0, (vertex_count, 2) in 0 to 1; the second
+    one from the top of the picture.
+    """
+    number = np.arange(layout.vertex_count)
+    column, row = number % layout.width, number // layout.width
+    return np.stack([(column + 0.5) / layout.width, (row + 0.5) / layout.height], axis=1)
+
+
+def motion_texture(values: Floats, layout: MotionLayout) -> Floats:
+    """The texture, (height, width, 3) with row 0 at the bottom; 0 where no vertex is.
+
+    Args:
+        values: (vertex_count, frame_count, 3).
+    """
+    texels = np.zeros((layout.frame_count, layout.rows * layout.width, 3), np.float32)
+    texels[:, : layout.vertex_count] = values.transpose(1, 0, 2)
+    return texels.reshape(layout.height, layout.width, 3)[::-1]
+
+
+def motion_values(texture: Floats, layout: MotionLayout) -> Floats:
+    """What `motion_texture` was made from, (vertex_count, frame_count, 3)."""
+    texels = texture[::-1].reshape(layout.frame_count, -1, 3)
+    return texels[:, : layout.vertex_count].transpose(1, 0, 2)

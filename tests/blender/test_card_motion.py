@@ -1,0 +1,404 @@
+"""Cards in motion: what files hold, played by readers of our own making and by others'."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_glb import Glb
+from test_glb_engines import validated
+
+bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
+
+from hairloom.addon import pipeline  # noqa: E402
+from hairloom.addon.card_flow import bound_cards, cards_at  # noqa: E402
+from hairloom.addon.cards.joints import JointChoices  # noqa: E402
+from hairloom.addon.cards.settings import CardSettings  # noqa: E402
+from hairloom.addon.errors import HairloomError  # noqa: E402
+from hairloom.addon.exchange.card_formats import FBX, GLB, USD  # noqa: E402
+from hairloom.addon.groom.settings import GrowSettings, GuideSettings  # noqa: E402
+from hairloom.addon.host import command_line  # noqa: E402
+from hairloom.addon.host.bake import Bake  # noqa: E402
+from hairloom.addon.host.card_builds import CardForm  # noqa: E402
+from hairloom.addon.host.card_files import CardOutput, WrittenCards, write_cards  # noqa: E402
+from hairloom.addon.host.card_motion import GuideMotion, MotionChoices  # noqa: E402
+from hairloom.addon.host.inputs import Sources, read_inputs  # noqa: E402
+from hairloom.addon.host.take import shaken_poses  # noqa: E402
+from hairloom.addon.pipeline import Pose, Rig  # noqa: E402
+from hairloom.addon.shading.textures import TextureSettings  # noqa: E402
+
+FRAMES, RATE = 31, 30.0
+PANDA_MOTION = Path(__file__).parent / "panda_motion.py"
+FORM = CardForm(
+    cards=CardSettings(way="guides", levels=2),
+    texture=TextureSettings(variant_width=32, height=64),
+)
+
+
+@pytest.fixture(scope="module")
+def motion() -> GuideMotion:
+    """Hair grown here on a head that shakes; the guides lag behind, each as a wave of its own."""
+    grown = read_inputs(Sources(), GrowSettings(strand_count=400, length=0.12))
+    rig = pipeline.prepare(grown.strands, grown.head, GuideSettings(guide_count=60), place="x")
+    poses = shaken_poses(rig, FRAMES, RATE)
+    carried = [pipeline.carried(rig, pose, rig.guides) for pose in poses]
+    along = np.linspace(0.0, 1.0, carried[0].shape[1])[:, None] ** 2
+
+    def moment(frame: int) -> tuple[Pose, np.ndarray]:
+        before = carried[max(frame - 3, 0)]
+        phase = np.arange(len(rig.guides))[:, None, None] * 0.1 + frame * 0.3
+        wave = 0.006 * np.sin(phase) * along * min(frame / 5.0, 1.0)
+        return poses[frame], (carried[frame] * (1 - along) + before * along + wave).astype("f4")
+
+    return GuideMotion(rig, range(FRAMES), RATE, moment)
+
+
+def write(path: Path, motion: GuideMotion, **choices: Any) -> WrittenCards:
+    output = CardOutput(motion=MotionChoices(**choices))
+    return write_cards(path, motion.rig, FORM.choices({}), output, motion=motion)
+
+
+def simulated(motion: GuideMotion, written: WrittenCards, frame: int) -> list[np.ndarray]:
+    """The corners of all triangles of each level in the world, (triangle_count, 3, 3)."""
+    rig: Rig = motion.rig
+    corners = []
+    for level in written.levels:
+        mesh = cards_at(rig, bound_cards(rig, level), *motion.moment(frame))
+        corners.append(mesh.positions[mesh.triangles])
+    return corners
+
+
+def head_matrix(motion: GuideMotion, frame: int) -> np.ndarray:
+    """How the head has moved, which turns as one piece."""
+    return motion.moment(frame)[0].matrix
+
+
+@pytest.fixture(scope="module")
+def joints(
+    motion: GuideMotion, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, WrittenCards]:
+    path = tmp_path_factory.mktemp("joints") / "hair.glb"
+    return path, write(path, motion, kind="joints", joints=JointChoices(40, 16, 0.01))
+
+
+class Player:
+    """Plays a skinned GLB by the specification, section 3.7.3 and appendix C, vertex by vertex."""
+
+    def __init__(self, path: Path) -> None:
+        self.file = Glb(path)
+        self.file._WIDTH = {**Glb._WIDTH, "MAT4": 16}
+        self.file._DTYPE = {**Glb._DTYPE, 5121: "u1"}
+        self.json = self.file.json
+
+    def corners(self, seconds: float) -> list[np.ndarray]:
+        """The corners of all triangles of each skinned node, by name, in Blender's axes."""
+        world = self._worlds(seconds)
+        (skin,) = self.json["skins"]
+        inverse = self.file.accessor(skin["inverseBindMatrices"]).reshape(-1, 4, 4)
+        moves = np.stack([world[n] for n in skin["joints"]]) @ inverse.swapaxes(1, 2)
+        nodes = [node for node in self.json["nodes"] if "skin" in node]
+        found = []
+        for node in sorted(nodes, key=lambda each: each["name"]):
+            (primitive,) = self.json["meshes"][node["mesh"]]["primitives"]
+            names = ("POSITION", "JOINTS_0", "WEIGHTS_0")
+            points, joint, weight = (
+                self.file.accessor(primitive["attributes"][name]) for name in names
+            )
+            mixed = np.einsum("nk,nkab->nab", weight, moves[joint])
+            placed = np.einsum("nab,nb->na", mixed[:, :3, :3], points) + mixed[:, :3, 3]
+            index = self.file.accessor(primitive["indices"]).reshape(-1, 3)
+            x, y, z = np.moveaxis(placed, -1, 0)
+            found.append(np.stack([x, -z, y], axis=-1)[index])
+        return found
+
+    def _worlds(self, seconds: float) -> dict[int, np.ndarray]:
+        local = {n: dict(node) for n, node in enumerate(self.json["nodes"])}
+        (animation,) = self.json["animations"]
+        for channel in animation["channels"]:
+            sampler = animation["samplers"][channel["sampler"]]
+            value = self._value(sampler, channel["target"]["path"], seconds)
+            local[channel["target"]["node"]][channel["target"]["path"]] = value
+        world: dict[int, np.ndarray] = {}
+
+        def walk(number: int, parent: np.ndarray) -> None:
+            node, matrix = local[number], np.eye(4)
+            x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+            # q p q* written out for the three axes
+            matrix[:3, 0] = [
+                w * w + x * x - y * y - z * z,
+                2 * (x * y + w * z),
+                2 * (x * z - w * y),
+            ]
+            matrix[:3, 1] = [
+                2 * (x * y - w * z),
+                w * w - x * x + y * y - z * z,
+                2 * (y * z + w * x),
+            ]
+            matrix[:3, 2] = [
+                2 * (x * z + w * y),
+                2 * (y * z - w * x),
+                w * w - x * x - y * y + z * z,
+            ]
+            matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+            world[number] = parent @ matrix
+            for child in node.get("children", ()):
+                walk(child, world[number])
+
+        for root in self.json["scenes"][0]["nodes"]:
+            walk(root, np.eye(4))
+        return world
+
+    def _value(self, sampler: dict[str, Any], path: str, seconds: float) -> np.ndarray:
+        times = self.file.accessor(sampler["input"])[:, 0].astype(np.float64)
+        values = self.file.accessor(sampler["output"]).astype(np.float64)
+        after = int(np.searchsorted(times, seconds).clip(1, max(len(times) - 1, 1)))
+        if len(times) == 1:
+            return values[0]
+        one, two = values[after - 1], values[after]
+        share = np.clip((seconds - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)
+        if path == "translation":
+            return one + (two - one) * share
+        cosine = abs(one @ two)
+        angle = np.arccos(min(cosine, 1.0))
+        two = two * np.sign(one @ two)
+        if angle < 1e-6:
+            return one
+        mixed = np.sin((1.0 - share) * angle) * one + np.sin(share * angle) * two
+        return mixed / np.sin(angle)
+
+
+def off(found: list[np.ndarray], expected: list[np.ndarray]) -> np.ndarray:
+    return np.concatenate(
+        [np.linalg.norm(a - b, axis=-1).ravel() for a, b in zip(found, expected, strict=True)]
+    )
+
+
+def test_skinned_cards_are_the_simulated_ones(
+    motion: GuideMotion, joints: tuple[Path, WrittenCards]
+) -> None:
+    """Index by index in all levels, with the head's motion put back; and they do move."""
+    path, written = joints
+    player, told = Player(path), written.motion
+    assert told["joints_in_chain"] <= 16
+    wrong, moved = [], []
+    for frame in range(FRAMES):
+        back = head_matrix(motion, frame)
+        played = [each @ back[:3, :3].T + back[:3, 3] for each in player.corners(frame / RATE)]
+        wrong.append(off(played, simulated(motion, written, frame)))
+        moved.append(off(player.corners(frame / RATE), player.corners(0.0)))
+    assert off(player.corners(0.0), simulated(motion, written, 0)).max() < 1e-3
+    rms = np.sqrt(np.mean(np.square(wrong)))
+    length = told["error"]["hair_length"]
+    assert 0.1 < length < 0.13
+    assert rms < 0.01 * length
+    assert rms == pytest.approx(told["error"]["root_mean_square"], rel=0.2)  # corners count twice
+    assert np.sqrt(np.mean(np.square(moved))) > 5.0 * rms
+
+
+def test_the_head_is_in_the_root_joint_where_it_is_asked_for(
+    motion: GuideMotion, tmp_path: Path
+) -> None:
+    path = tmp_path / "hair.glb"
+    written = write(path, motion, kind="joints", space="world", joints=JointChoices(40, 16, 0.01))
+    player = Player(path)
+    wrong = [off(player.corners(f / RATE), simulated(motion, written, f)) for f in range(FRAMES)]
+    assert np.sqrt(np.mean(np.square(wrong))) < 0.01 * written.motion["error"]["hair_length"]
+
+
+def test_khronos_validator_finds_no_fault(joints: tuple[Path, WrittenCards]) -> None:
+    report = validated(joints[0])
+    assert report["issues"]["numErrors"] == 0, report
+    # the meshes lie below a node that stays where it is, as in Blender's own files
+    warning = 1
+    grave = [each for each in report["issues"]["messages"] if each["severity"] <= warning]
+    codes = {message["code"] for message in grave}
+    assert codes <= {"NODE_SKINNED_MESH_NON_ROOT"}, report
+    assert report["info"]["animationCount"] == 1
+
+
+def test_weights_are_four_of_sum_one_and_levels_share_the_joints(
+    joints: tuple[Path, WrittenCards],
+) -> None:
+    player = Player(joints[0])
+    assert len(player.json["skins"]) == 1
+    meshes = [node for node in player.json["nodes"] if "mesh" in node]
+    assert [node["skin"] for node in meshes] == [0, 0]
+    for node in meshes:
+        (primitive,) = player.json["meshes"][node["mesh"]]["primitives"]
+        weight = player.file.accessor(primitive["attributes"]["WEIGHTS_0"])
+        assert weight.shape[1] == 4
+        np.testing.assert_allclose(weight.sum(axis=1), 1.0, atol=1e-6)
+    names = [player.json["nodes"][n]["name"] for n in player.json["skins"][0]["joints"]]
+    assert names[:3] == ["hair_root", "chain_00_joint_00", "chain_00_joint_01"]
+    assert len(set(names)) == len(names)
+
+
+def test_panda3d_plays_the_same(
+    motion: GuideMotion, joints: tuple[Path, WrittenCards], tmp_path: Path
+) -> None:
+    """Its own skinning and its own clock."""
+    for module in ("panda3d", "gltf"):
+        if importlib.util.find_spec(module) is None:
+            pytest.skip(f"{module} is missing: `make setup` installs it")
+    path, written = joints
+    output = tmp_path / "bounds.json"
+    frames = [4, 12, 20, 28]  # its reader shows frame 1 for frame 0
+    command = [sys.executable, str(PANDA_MOTION), str(path), str(output), str(RATE)]
+    command += [str(frame) for frame in frames]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0, result.stderr
+    bounds = np.array(json.loads(output.read_text()))
+    for frame, (low, high) in zip(frames, bounds, strict=True):
+        played = np.concatenate(
+            [each.reshape(-1, 3) for each in Player(path).corners(frame / RATE)]
+        )
+        np.testing.assert_allclose(low, played.min(axis=0), atol=1e-3)
+        np.testing.assert_allclose(high, played.max(axis=0), atol=1e-3)
+    assert np.abs(bounds[1:] - bounds[0]).max() > 0.003
+    assert written.motion["frames"]["count"] == FRAMES
+
+
+@pytest.mark.parametrize("depth", ["half", "float"])
+def test_a_motion_texture_holds_the_simulated_cards(
+    motion: GuideMotion, tmp_path: Path, depth: str
+) -> None:
+    """From the GLB's texels, the sidecar and the EXR alone, as a vertex shader reads them."""
+    library = pytest.importorskip("OpenImageIO")
+    path = tmp_path / "hair.glb"
+    written = write(path, motion, kind="texture", space="world", depth=depth)
+    told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
+    pictures = {}
+    for name, texture in told["textures"].items():
+        image = library.ImageBuf(str(tmp_path / texture["file"]))
+        assert str(image.spec().format) == depth
+        pictures[name] = image.get_pixels(library.FLOAT)[..., :3]
+        assert pictures[name].shape[:2] == (told["height"], told["width"])
+    file = Glb(path)
+    worst = 0.0
+    for level, mesh in enumerate(file.json["meshes"]):
+        (primitive,) = mesh["primitives"]
+        index = file.accessor(primitive["indices"]).reshape(-1)
+        rest = file.accessor(primitive["attributes"]["POSITION"])[index]
+        texel = file.accessor(primitive["attributes"]["TEXCOORD_2"])[index].astype(np.float64)
+        for frame in (0, 7, FRAMES - 1):
+            v = texel[:, 1] + frame * told["frame_step"]
+            row, column = (
+                (v * told["height"]).astype(int),
+                (texel[:, 0] * told["width"]).astype(int),
+            )
+            moved = rest + pictures["position"][row, column]
+            mesh_now = cards_at(
+                motion.rig,
+                bound_cards(motion.rig, written.levels[level]),
+                *motion.moment(frame),
+            )
+            corners = mesh_now.triangles.reshape(-1)
+            miss = np.abs(moved - GLB.placed(mesh_now.positions[corners]))
+            worst = max(worst, float(miss.max()))
+            for name in ("normal", "tangent"):
+                expected = GLB.placed(getattr(mesh_now, name)[corners])
+                np.testing.assert_allclose(pictures[name][row, column], expected, atol=6e-4)
+    # a half holds 11 bits of how far a vertex goes, here less than 12.5 cm
+    assert worst < (0.125 * 2.0**-11 + 1e-6 if depth == "half" else 1e-6)
+
+
+@pytest.mark.parametrize("file_format", [FBX, USD])
+def test_texels_are_in_other_formats_too(
+    motion: GuideMotion, tmp_path: Path, file_format: Any
+) -> None:
+    path = tmp_path / f"hair{file_format.suffixes[0]}"
+    try:
+        written = write(path, motion, kind="texture")
+    except HairloomError as error:
+        pytest.skip(str(error))
+    assert written.motion["frame_step"] < 0.0
+    assert written.motion["texel"] in ("LayerElementUV 2", "primvars:st2")
+    assert (tmp_path / "hair_motion_position.exr").is_file()
+
+
+def test_what_cannot_be_is_told_before_the_work(motion: GuideMotion, tmp_path: Path) -> None:
+    with pytest.raises(HairloomError, match="joints are written to GLB"):
+        write(tmp_path / "hair.fbx", motion, kind="joints")
+    with pytest.raises(HairloomError, match="one frame"):
+        write(tmp_path / "hair.glb", replace(motion, frames=range(1)), kind="joints")
+    with pytest.raises(HairloomError, match="OBJ"):
+        write(tmp_path / "hair.obj", motion, kind="texture")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_line_writes_a_take(tmp_path: Path, capfd: Any) -> None:
+    few = ["--set", "grow.strand_count=60", "--set", "guides.guide_count=12"]
+    few += ["--set", "grow.length=0.06"]
+    take = str(tmp_path / "take.npz")
+    assert command_line.run(["simulate", *few, "--seconds", "0.2", "--output", take]) == 0
+    small = ["--set", "cards.way=guides", "--levels", "1", "--set", "card_occlusion.rays=8"]
+    arguments = ["cards", *few, *small, "--output", str(tmp_path / "hair.glb")]
+    moving = ["--motion", "joints", "--chains", "4"]
+    assert command_line.run([*arguments, *moving]) == 1
+    assert "--take" in capfd.readouterr().err
+    assert command_line.run([*arguments, "--take", take]) == 1
+    assert "--motion" in capfd.readouterr().err
+    assert command_line.run([*arguments, *moving, "--take", take, "--frames", "2", "99"]) == 1
+    assert "from 0 to 12" in capfd.readouterr().err
+    assert command_line.run([*arguments, *moving, "--take", take, "--frames", "2", "9"]) == 0
+    told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
+    assert told["frames"] == {"first": 2, "count": 8, "rate": 60.0}
+    assert told["chains"] <= 4
+
+
+def test_the_sidecar_follows_the_schema(
+    motion: GuideMotion, joints: tuple[Path, WrittenCards], tmp_path: Path
+) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads((Path(__file__).parents[2] / "docs/sidecar.schema.json").read_text("utf-8"))
+    write(tmp_path / "hair.glb", motion, kind="texture")
+    for folder in (joints[0].parent, tmp_path):
+        content = json.loads((folder / "hair.hairloom.json").read_text("utf-8"))
+        jsonschema.Draft202012Validator(schema).validate(content)
+        assert "motion" in content
+        content["motion"].pop("kind")
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.Draft202012Validator(schema).validate(content)
+
+
+@pytest.mark.usefixtures("extension")
+def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
+    """Its frames, or some of them; without a bake it says so, and nothing is written."""
+    bpy.ops.object.select_all(action="DESELECT")
+    sphere.select_set(True)
+    bpy.context.view_layer.objects.active = sphere
+    bpy.ops.hairloom.grow(strand_count=60, length=0.05)
+    hair, scene = bpy.context.object, bpy.context.scene
+    hair.data.hairloom.guides.guide_count = 8
+    hair.data.hairloom.card_occlusion.rays = 8
+    hair.data.hairloom.cards.way = "guides"
+    scene.frame_start, scene.frame_end = 3, 9
+    for frame in (3, 6, 9):
+        sphere.location.x = 0.03 * (frame % 2)
+        sphere.keyframe_insert("location", frame=frame)
+    path = tmp_path / "out" / "hair.glb"
+    options = {"filepath": str(path), "motion": "joints", "chains": 4}
+    with pytest.raises(RuntimeError, match="it has no bake"):
+        bpy.ops.hairloom.export_cards(**options)
+    assert not path.parent.exists()
+    scene.frame_set(3)
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.collider_resolution = 8
+    list(Bake.of([hair], scene).steps())
+    for chosen, first, count in (
+        ({}, 3, 7),
+        ({"own_frames": True, "first_frame": 4, "last_frame": 6}, 4, 3),
+    ):
+        assert bpy.ops.hairloom.export_cards(**options, **chosen) == {"FINISHED"}
+        told = json.loads((path.parent / "hair.hairloom.json").read_text("utf-8"))["motion"]
+        assert (told["frames"]["first"], told["frames"]["count"]) == (first, count)
+    with pytest.raises(RuntimeError, match="holds frames 3 to 9"):
+        bpy.ops.hairloom.export_cards(**options, own_frames=True, first_frame=4, last_frame=20)
