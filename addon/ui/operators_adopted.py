@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from typing import Any
 
 import bpy
@@ -14,12 +13,12 @@ from ..host.adopted_cards import (
     CardOcclusionSettings,
     SortChoices,
     SortedCards,
-    alpha_image,
     sort_steps,
 )
+from ..host.card_alpha import alpha_image
 from ..host.groups import operator_properties
 from ..host.properties import settings_of
-from .reports import reporting, waiting
+from .long_work import LongWork, Steps, shared
 from .selection import active_mesh
 
 _WAYS = (
@@ -31,9 +30,9 @@ _WAYS = (
 )
 
 
-class HAIRLOOM_OT_sort_cards(bpy.types.Operator):
+class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
     """Put the faces of the active mesh of hair cards into the order in which engines have to draw
-    them, from the inside to the outside, and store ambient occlusion"""
+    them, from the inside to the outside, and store ambient occlusion. Esc cancels"""
 
     bl_idname = "hairloom.sort_cards"
     bl_label = "Sort Hair Cards"
@@ -68,8 +67,8 @@ class HAIRLOOM_OT_sort_cards(bpy.types.Operator):
     }
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _can_sort(cls, context)
+    def poll(cls: Any, context: bpy.types.Context) -> bool:
+        return cls.is_free() and _can_sort(cls, context)
 
     def invoke(self: Any, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         obj = active_mesh(context)
@@ -97,8 +96,7 @@ class HAIRLOOM_OT_sort_cards(bpy.types.Operator):
         for parameter in CardOcclusionSettings.parameters():
             column.prop(self, parameter.name)
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def steps(self: Any, context: bpy.types.Context) -> Steps[None]:
         obj = active_mesh(context)
         assert obj is not None
         choices = SortChoices(
@@ -110,9 +108,7 @@ class HAIRLOOM_OT_sort_cards(bpy.types.Operator):
             alpha=_named_image(self.alpha),
         )
         steps = sort_steps(obj, context.evaluated_depsgraph_get(), choices)
-        with waiting(context):
-            self._tell(obj, _counted(steps, context.window_manager))
-        return {"FINISHED"}
+        self._tell(obj, (yield from shared(steps)))
 
     def _tell(self, obj: bpy.types.Object, done: SortedCards) -> None:
         for note in done.notes:
@@ -120,21 +116,6 @@ class HAIRLOOM_OT_sort_cards(bpy.types.Operator):
         moved = f"{done.moved} of {done.face_count} faces moved"
         count = "1 card" if done.card_count == 1 else f"{done.card_count} cards"
         self.report({"INFO"}, f"Sorted {count}; {moved}")
-
-
-def _counted(
-    steps: Generator[float, None, SortedCards], manager: bpy.types.WindowManager
-) -> SortedCards:
-    """The result of all steps, while the mouse pointer shows how far they are."""
-    manager.progress_begin(0, 100)
-    try:
-        while True:
-            manager.progress_update(100.0 * next(steps))
-    except StopIteration as end:
-        done: SortedCards = end.value
-        return done
-    finally:
-        manager.progress_end()
 
 
 def _can_sort(operator: type[Any], context: bpy.types.Context) -> bool:

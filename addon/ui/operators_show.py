@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Generator
 from pathlib import Path
 
 import bpy
@@ -13,41 +11,25 @@ from bpy_extras.io_utils import ExportHelper
 from ..errors import HairloomError
 from ..host.fingerprints import frame_rate
 from ..host.images import write_png
-from ..host.redraw import redraw_panels
 from ..host.sheet import Sheet
 from ..host.showing import ShownGroom, file_name, shown_groom
 from ..host.turntable import FRAMES, LIGHTS, SIDES, Turntable, TurntableSettings
+from .long_work import LongWork, Steps, counted, draw_progress
 from .reports import reporting, waiting
 from .selection import chosen_hair, needs_hair
-
-#: Work this long [s] between two looks at the keyboard.
-_SPELL = 0.1
 
 _SAMPLES = IntProperty(
     name="Samples", description="Sub-pixels along each side of a pixel", default=3, min=1, max=4
 )
 
 
-class _Running:
-    """The turntable that is being drawn in the window.
-
-    done: pictures so far.
-    """
-
-    def __init__(self, table: Turntable, steps: Generator[int], timer: bpy.types.Timer) -> None:
-        self.table, self.steps, self.timer = table, steps, timer
-        self.done = 0
-
-
-_running: _Running | None = None
-
-
-class HAIRLOOM_OT_turntable(bpy.types.Operator):
+class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
     """Turn the active hair once before a camera: pictures, and a video of them. Esc cancels"""
 
     bl_idname = "hairloom.turntable"
     bl_label = "Turntable"
     bl_options = {"REGISTER", "PRESET"}
+    unharmed = "nothing was written"
 
     directory: StringProperty(
         name="Folder",
@@ -90,30 +72,26 @@ class HAIRLOOM_OT_turntable(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if _running is not None:
-            cls.poll_message_set("A turntable is being drawn already; Esc cancels it")
-            return False
-        return needs_hair(cls, context)
+        return cls.is_free() and needs_hair(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if self.directory:
+            return self.execute(context)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """In the window a bit at a time; without one, for scripts, all at once."""
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
         if not self.directory:
             raise HairloomError(
                 "there is no folder for the pictures", place="Turntable", remedy="Choose one"
             )
-        with waiting(context):
-            table = self._table(context)
-        if bpy.app.background:
-            for _ in table.steps():
-                pass
-            return self._finish(table)
-        self._start(context, table)
-        return {"RUNNING_MODAL"}
+        table = self._table(context)
+        count = table.settings.frames
+        yield from counted(table.steps(), count, "pictures")
+        for note in table.notes:
+            self.report({"WARNING"}, note)
+        video = " and a video" if table.has_video else ""
+        self.report({"INFO"}, f"Wrote {count:,} pictures{video} to {table.folder}")
 
     def _table(self, context: bpy.types.Context) -> Turntable:
         shown = _shown(self, context)
@@ -130,60 +108,6 @@ class HAIRLOOM_OT_turntable(bpy.types.Operator):
         name = file_name(chosen_hair(context)[0].name)
         folder = Path(bpy.path.abspath(self.directory))
         return Turntable(shown.studio, shown.pose, shown.points, chosen, folder, name)
-
-    def _start(self, context: bpy.types.Context, table: Turntable) -> None:
-        global _running
-        manager = context.window_manager
-        timer = manager.event_timer_add(0.01, window=context.window)
-        _running = _Running(table, table.steps(), timer)
-        manager.progress_begin(0, table.settings.frames)
-        manager.modal_handler_add(self)
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if _running is None:
-            return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
-            stop()
-            self.report({"INFO"}, "The turntable was cancelled; nothing was written")
-            return {"CANCELLED"}
-        if event.type == "TIMER":
-            return self._spell(context)
-        return {"RUNNING_MODAL"}
-
-    def _spell(self, context: bpy.types.Context) -> set[str]:
-        running, end = _running, time.perf_counter() + _SPELL
-        assert running is not None
-        try:
-            while time.perf_counter() < end:
-                running.done = next(running.steps)
-        except StopIteration:
-            stop()
-            return self._finish(running.table)
-        except HairloomError as error:
-            stop()
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        except BaseException:
-            stop()
-            raise
-        context.window_manager.progress_update(running.done)
-        context.workspace.status_text_set(
-            f"Hairloom draws: {running.done:,} of {running.table.settings.frames:,} pictures. "
-            "Esc: cancel"
-        )
-        redraw_panels()
-        return {"RUNNING_MODAL"}
-
-    def _finish(self, table: Turntable) -> set[str]:
-        for note in table.notes:
-            self.report({"WARNING"}, note)
-        video = " and a video" if table.has_video else ""
-        self.report({"INFO"}, f"Wrote {table.settings.frames:,} pictures{video} to {table.folder}")
-        return {"FINISHED"}
-
-    def cancel(self, _context: bpy.types.Context) -> None:
-        """Blender ends the operator: a file is loaded or its window closed."""
-        stop()
 
 
 class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
@@ -250,25 +174,8 @@ def _shown(operator: bpy.types.Operator, context: bpy.types.Context) -> ShownGro
     return shown
 
 
-def stop() -> None:
-    """End the turntable, if one goes on: leave no timer, no text and nothing half written."""
-    global _running
-    if _running is None:
-        return
-    running, _running = _running, None
-    running.steps.close()
-    manager = bpy.context.window_manager
-    manager.event_timer_remove(running.timer)
-    manager.progress_end()
-    if bpy.context.workspace is not None:
-        bpy.context.workspace.status_text_set(None)
-
-
 def draw_show(layout: bpy.types.UILayout, _hair: bpy.types.Object) -> None:
-    if _running is not None:
-        total = _running.table.settings.frames
-        text = f"{_running.done:,} of {total:,} pictures"
-        layout.progress(factor=_running.done / total, text=text)
+    if draw_progress(layout, HAIRLOOM_OT_turntable):
         return
     layout.operator("hairloom.turntable", icon="RENDER_ANIMATION")
     layout.operator("hairloom.contact_sheet", icon="IMAGE_DATA")

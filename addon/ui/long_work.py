@@ -1,0 +1,229 @@
+"""Operators whose work is long: in steps, with progress, and cancelled by Esc.
+
+An artist's click runs the steps in spells on a timer, so that the window lives. Scripts, the
+background and Adjust Last Operation take the same steps all at once.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from contextlib import closing
+from typing import Any, NamedTuple
+
+import bpy
+
+from ..host.redraw import redraw_panels
+from ..host.thread_work import ThreadWork
+from .reports import reporting, waiting
+
+#: Work this long [s] between two looks at the keyboard.
+_SPELL = 0.1
+#: Time between two spells [s], and between two looks at a thread where there is no window.
+_PAUSE = 0.01
+
+
+class Progress(NamedTuple):
+    """How far work is.
+
+    share: of all, 0 to 1; None where nobody knows.
+    waits: there is nothing to do just now, since a thread works.
+    """
+
+    text: str
+    share: float | None = None
+    waits: bool = False
+
+
+type Steps[Result] = Generator[Progress, None, Result]
+
+
+class LongWork:
+    """Base of an operator, before bpy.types.Operator.
+
+    `steps` is the work and what is told of it. An operator's poll begins with `is_free`.
+
+    unharmed: what the artist is told after Esc.
+    """
+
+    unharmed = "nothing has changed"
+
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        """All of the work, up to its reports.
+
+        The first step comes at once and may raise what is wrong with the input; closing the steps
+        leaves nothing half done.
+
+        Raises:
+            HairloomError: it cannot be done, which becomes a report.
+        """
+        raise NotImplementedError
+
+    @classmethod
+    def is_free(cls: Any) -> bool:
+        """For `poll`: whether no other long work goes on; says which on the greyed-out button."""
+        if _running is None:
+            return True
+        cls.poll_message_set(f"{_running.label} goes on; Esc cancels it")
+        return False
+
+    @reporting
+    def execute(self: Any, context: bpy.types.Context) -> set[str]:
+        global _running
+        steps = self.steps(context)
+        # a repeated operator is not Blender's to keep, so it cannot stay in the window
+        how = self.options
+        is_repeated = how.is_repeat or how.is_repeat_last
+        if bpy.app.background or not how.is_invoke or is_repeated:
+            with waiting(context):
+                _at_once(steps)
+            return {"FINISHED"}
+        with waiting(context):
+            try:
+                first = next(steps)
+            except StopIteration:
+                return {"FINISHED"}
+        _running = _Running(self, steps, context.window)
+        _running.tell(first)
+        return {"RUNNING_MODAL"}
+
+    def modal(self: Any, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Everything else waits: what is edited meanwhile would be in half of the work."""
+        if _running is None:
+            return {"CANCELLED"}
+        if event.type == "ESC" and event.value == "PRESS":
+            stop()
+            self.report({"INFO"}, f"{self.bl_label} was cancelled; {self.unharmed}")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        result = {"CANCELLED"}
+        try:
+            result = self._spell(context)
+        finally:
+            if result != {"RUNNING_MODAL"}:
+                stop()
+        return result
+
+    @reporting
+    def _spell(self, _context: bpy.types.Context) -> set[str]:
+        running, end = _running, time.perf_counter() + _SPELL
+        assert running is not None
+        try:
+            step = next(running.steps)
+            while not step.waits and time.perf_counter() < end:
+                step = next(running.steps)
+        except StopIteration:
+            return {"FINISHED"}
+        running.tell(step)
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, _context: bpy.types.Context) -> None:
+        """Blender ends the operator: a file is loaded or its window closed."""
+        stop()
+
+
+class _Running:
+    """The work that goes on in the window; Blender does not tell an operator that it is disabled.
+
+    progress: the last that was told.
+    """
+
+    def __init__(self, operator: Any, steps: Steps[None], window: bpy.types.Window) -> None:
+        self.operator, self.label, self.steps = type(operator), operator.bl_label, steps
+        self.progress, self._has_cursor = Progress(""), False
+        manager = bpy.context.window_manager
+        self._timer = manager.event_timer_add(_PAUSE, window=window)
+        manager.modal_handler_add(operator)
+
+    def tell(self, progress: Progress) -> None:
+        """In the status bar, at the mouse pointer and in panels."""
+        if progress == self.progress:
+            return
+        self.progress = progress
+        manager = bpy.context.window_manager
+        if progress.share is not None:
+            if not self._has_cursor:
+                manager.progress_begin(0.0, 1.0)
+                self._has_cursor = True
+            manager.progress_update(progress.share)
+        workspace = bpy.context.workspace
+        workspace.status_text_set(f"{self.label}: {progress.text}. Esc: cancel")
+        redraw_panels()
+
+    def end(self) -> None:
+        """Leave no timer and no text."""
+        manager = bpy.context.window_manager  # another than before, when a file is loaded
+        manager.event_timer_remove(self._timer)
+        if self._has_cursor:
+            manager.progress_end()
+        if bpy.context.workspace is not None:
+            bpy.context.workspace.status_text_set(None)
+        redraw_panels()
+
+
+_running: _Running | None = None
+
+
+def running() -> str:
+    """The label of the work that goes on in the window; "" when there is none."""
+    return "" if _running is None else _running.label
+
+
+def draw_progress(layout: bpy.types.UILayout, operator: type[LongWork]) -> bool:
+    """In a panel, in the place of the button: how far this work is. False: it does not go on."""
+    if _running is None or _running.operator is not operator:
+        return False
+    text, share, _ = _running.progress
+    if share is None:
+        layout.label(text=text, icon="SORTTIME")
+    else:
+        layout.progress(factor=share, text=text)
+    return True
+
+
+def counted(steps: Generator[int], total: int, things: str) -> Steps[None]:
+    """Work that tells how many things are done; things: what they are, such as "frames"."""
+    with closing(steps):
+        for done in steps:
+            yield Progress(f"{done:,} of {total:,} {things}", done / total)
+
+
+def shared[Result](steps: Generator[float, None, Result]) -> Steps[Result]:
+    """Work that tells the share that is done."""
+    with closing(steps):
+        while True:
+            try:
+                share = next(steps)
+            except StopIteration as end:
+                result: Result = end.value
+                return result
+            yield Progress(f"{share:.0%}", share)
+
+
+def threaded[Result](work: ThreadWork[Result]) -> Steps[Result]:
+    """Work in a thread, which tells what it does; closing it gives the work up."""
+    try:
+        while not work.serve():
+            yield Progress(work.stage, waits=not work.asks)
+        return work.result()
+    finally:
+        work.give_up()
+
+
+def stop() -> None:
+    """End the work, if some goes on: leave no timer, no text and nothing half written."""
+    global _running
+    if _running is None:
+        return
+    ended, _running = _running, None
+    try:
+        ended.steps.close()
+    finally:
+        ended.end()
+
+
+def _at_once(steps: Steps[None]) -> None:
+    for step in steps:
+        if step.waits:
+            time.sleep(_PAUSE)

@@ -1,0 +1,121 @@
+"""Operators whose work is long, where there is no window: all at once, by the same steps."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Generator
+from typing import Any
+
+import bpy
+import pytest
+
+from hairloom.addon.cards.steps import result_of
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.host.thread_work import GivenUpError, ThreadWork
+from hairloom.addon.ui.long_work import LongWork, Progress, Steps, counted, shared, threaded
+
+seen: list[Any] = []
+
+
+class HAIRLOOM_OT_test_work(LongWork, bpy.types.Operator):
+    bl_idname = "hairloom.test_work"
+    bl_label = "Test Work"
+
+    count: bpy.props.IntProperty(default=3)
+
+    @classmethod
+    def poll(cls, _context: Any) -> bool:
+        return cls.is_free()
+
+    def steps(self: Any, _context: Any) -> Steps[None]:
+        if self.count > 5:
+            raise HairloomError("too many", place="test", remedy="Take fewer")
+        yield from counted(counting(self.count), self.count, "things")
+        seen.append("done")
+        self.report({"INFO"}, "All is done")
+
+
+def counting(count: int) -> Generator[int]:
+    try:
+        for done in range(1, count + 1):
+            seen.append(done)
+            yield done
+    finally:
+        seen.append("closed")
+
+
+@pytest.fixture(autouse=True)
+def registered() -> Generator[None]:
+    seen.clear()
+    bpy.utils.register_class(HAIRLOOM_OT_test_work)
+    yield
+    bpy.utils.unregister_class(HAIRLOOM_OT_test_work)
+
+
+@pytest.mark.parametrize("how", ["EXEC_DEFAULT", "INVOKE_DEFAULT"])
+def test_without_a_window_all_steps_come_at_once(how: str) -> None:
+    assert bpy.ops.hairloom.test_work(how) == {"FINISHED"}
+    assert seen == [1, 2, 3, "closed", "done"]
+
+
+def test_bad_input_is_an_error_of_the_operator() -> None:
+    with pytest.raises(RuntimeError, match="too many"):
+        bpy.ops.hairloom.test_work(count=6)
+    assert seen == []
+
+
+def test_what_is_told_is_how_many_of_how_many() -> None:
+    told = list(counted(counting(2), 2000, "frames"))
+    assert told == [Progress("1 of 2,000 frames", 0.0005), Progress("2 of 2,000 frames", 0.001)]
+
+
+def test_closing_what_is_told_closes_the_work() -> None:
+    steps = counted(counting(3), 3, "frames")
+    next(steps)
+    steps.close()
+    assert seen == [1, "closed"]
+
+
+def test_shares_are_told_and_the_result_is_kept() -> None:
+    def work() -> Generator[float, None, str]:
+        yield 0.25
+        return "sorted"
+
+    assert list(shared(work())) == [Progress("25%", 0.25)]
+    assert result_of(shared(work())) == "sorted"
+
+
+def test_a_thread_is_waited_for_and_its_stages_are_told() -> None:
+    may_end = threading.Event()
+
+    def work(thread: ThreadWork[str]) -> str:
+        thread.tell("Sorting")
+        assert may_end.wait(30.0)
+        return "sorted"
+
+    steps = threaded(ThreadWork(work, "test"))
+    while next(steps).text != "Sorting":
+        pass
+    assert next(steps) == Progress("Sorting", waits=True)
+    may_end.set()
+    assert result_of(steps) == "sorted"
+
+
+def test_closing_gives_the_thread_up() -> None:
+    begun, may_go_on = threading.Event(), threading.Event()
+
+    def work(thread: ThreadWork[None]) -> None:
+        begun.set()
+        assert may_go_on.wait(30.0)
+        thread.tell("More")
+
+    thread = ThreadWork(work, "test")
+    steps = threaded(thread)
+    assert begun.wait(30.0)
+    next(steps)
+    steps.close()
+    may_go_on.set()
+    while not thread.serve():
+        pass
+    with pytest.raises(GivenUpError):
+        thread.result()

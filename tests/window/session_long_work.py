@@ -1,0 +1,167 @@
+"""Long work in the window: begun from a dialog and from the file browser, one at a time, cancelled
+by Esc, undone, repeated with other settings, and left by loading and by disabling."""
+
+import sys
+from pathlib import Path
+
+import addon_utils
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import look_from_front, open_our_sidebar, press, region, until, viewport
+
+FOLDER = Path(bpy.app.tempdir) / "long"
+SMALL = {"size": 64, "samples": 1}
+#: rays that take long, and such that do not
+MANY, FEW = 4096, 64
+
+failures: list[str] = []
+
+
+def running():
+    return sys.modules[f"{driver.EXTENSION}.addon.ui.long_work"].running()
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    sys.excepthook = lambda kind, error, _: failures.append(f"{kind.__name__}: {error}")
+    driver.enable_extension()
+    yield from set_the_scene()
+    yield from from_a_dialog()
+    yield from from_the_file_browser()
+    yield from another_file_in_mid_work()
+    yield from disabled_in_mid_work()
+    assert failures == [], failures
+
+
+def set_the_scene():
+    FOLDER.mkdir()
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    bpy.data.batch_remove(bpy.data.objects)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    bpy.context.object.name = "Head"
+    assert bpy.ops.hairloom.grow(strand_count=300, length=0.12) == {"FINISHED"}
+    hair = bpy.context.object
+    hair.name = "Hair"
+    groom = hair.data.hairloom
+    groom.cards.way, groom.cards.card_count, groom.cards.levels = "clusters", 300, 1
+    groom.atlas.source = "made"
+    assert bpy.ops.hairloom.make_cards() == {"FINISHED"}, "a script does not get all at once"
+    look_from_front(0.9)
+    yield from open_our_sidebar()
+    cards = bpy.data.objects["Hair Cards"]
+    cards.data = mixed_up(cards.data)
+    choose(cards)
+    bpy.ops.ed.undo_push(message="mixed up")
+
+
+def mixed_up(mesh):
+    """The same cards, their faces in an order that is wrong."""
+    bpy.context.view_layer.objects.active = bpy.data.objects["Hair Cards"]
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.sort_elements(type="RANDOMIZE", elements={"FACE"}, seed=3)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return mesh
+
+
+def choose(obj):
+    for each in bpy.context.selected_objects:
+        each.select_set(False)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+
+
+def order():
+    mesh = bpy.data.objects["Hair Cards"].data
+    found = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", found)
+    return found
+
+
+def sort_by_dialog(rays):
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        asked = bpy.ops.hairloom.sort_cards("INVOKE_DEFAULT", head="Head", rays=rays)
+    assert asked == {"RUNNING_MODAL"}
+    yield 3
+    yield from press("RET")
+    yield from until(lambda: running() == "Sort Hair Cards", "the dialog starts nothing")
+
+
+def from_a_dialog():
+    """Esc leaves the mesh as it was; the second time it comes to its end."""
+    before = order()
+    yield from sort_by_dialog(MANY)
+    driver.screenshot("sorting")
+    for operator in (bpy.ops.hairloom.sort_cards, bpy.ops.hairloom.turntable):
+        assert not operator.poll(), "another long work may begin"
+    yield from press("ESC")
+    yield from until(lambda: not running(), "Esc does not cancel")
+    assert np.array_equal(order(), before)
+    yield from sort_by_dialog(FEW)
+    yield from until(lambda: not running(), "sorting does not end", 300)
+    after = order()
+    assert not np.array_equal(after, before)
+    repeated_at_once(bpy.ops.ed.undo_redo)
+    assert np.array_equal(order(), after), "Adjust Last Operation gives another order"
+    bpy.ops.ed.undo()
+    assert np.array_equal(order(), before), "undo does not bring the order back"
+    bpy.ops.ed.redo()
+    assert np.array_equal(order(), after)
+    yield 2
+
+
+def repeated_at_once(repeat):
+    """Blender frees an operator that is repeated when it likes: it must not stay in the window."""
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        repeat("EXEC_DEFAULT", True)  # with an undo step, as a click has it
+    assert not running()
+
+
+def turntable(frames):
+    choose(bpy.data.objects["Hair"])
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        bpy.ops.hairloom.turntable("INVOKE_DEFAULT", frames=frames, **SMALL)
+    yield 5
+    (browser,) = [area for area in bpy.context.window.screen.areas if area.type == "FILE_BROWSER"]
+    browser.spaces.active.params.directory = bytes(str(FOLDER), "utf-8")
+    main = next(each for each in browser.regions if each.type == "WINDOW")
+    with bpy.context.temp_override(area=browser, region=main):
+        bpy.ops.file.execute("INVOKE_DEFAULT")
+    yield from until(lambda: running() == "Turntable", "the file browser starts nothing")
+
+
+def from_the_file_browser():
+    yield from turntable(2000)
+    yield 5
+    driver.screenshot("turning")
+    yield from press("ESC")
+    yield from until(lambda: not running(), "Esc does not cancel the turntable")
+    assert list(FOLDER.iterdir()) == []
+    yield from turntable(3)
+    yield from until(lambda: not running(), "the turntable does not end", 300)
+    assert len(list(FOLDER.glob("Hair_000*.png"))) == 3
+    yield 3
+
+
+def another_file_in_mid_work():
+    path = str(Path(bpy.app.tempdir) / "long.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    yield from turntable(2000)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    yield 5
+    assert not running() and list(FOLDER.glob(".turntable*")) == []
+    assert bpy.ops.hairloom.turntable.poll()
+
+
+def disabled_in_mid_work():
+    yield from turntable(2000)
+    addon_utils.disable(driver.EXTENSION, default_set=True)
+    assert list(FOLDER.glob(".turntable*")) == []
+    yield 5
+    driver.screenshot("disabled")
+
+
+driver.play(steps())
