@@ -13,9 +13,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from _volume_sintel import sintel
+from _cards_groom import sintel_rig
 
-from hairloom.addon import pipeline
 from hairloom.addon.card_flow import card_build
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.card_mesh import CardMesh
@@ -30,9 +29,8 @@ from hairloom.addon.cards.sort import (
     order_from,
     reordered,
 )
-from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.shading.textures import TextureSettings, hair_textures
-from hairloom.addon.strands import StrandSet, Surface
+from hairloom.addon.strands import Surface
 
 VIEW_COUNT, SIZE = 200, 128
 #: for the cards along guides
@@ -57,30 +55,24 @@ def order_figures() -> dict[str, float]:
     sort_ms: 100,000 triangles: pieces found and all moved by given distances, the median.
     order_seconds: to learn the orders of 800 cards; order_from_ms: to sort them for an eye.
     """
-    sitter = sintel()
-    count = len(sitter.strands) * sitter.strands.shape[1]
-    strands = StrandSet(
-        points=sitter.strands.reshape(-1, 3),
-        offsets=np.arange(0, count + 1, sitter.strands.shape[1]),
-        radius=np.full(count, 1.0e-4, np.float32),
-        group=np.zeros(len(sitter.strands), np.int32),
-    )
-    rig = pipeline.prepare(strands, sitter.head, GuideSettings(), place="Sintel")
+    rig = sintel_rig()
+    head = rig.head
+    assert head is not None
     found = {"sort_ms": sort_milliseconds()}
     for way in ("clusters", "guides"):
         settings, made = CardSettings(way=way, levels=1), AtlasSettings(source="made")
         mesh = as_built(card_build(rig, settings, made, CardOcclusionSettings()).finest)
         begin = time.process_time()
-        learnt = card_orders(mesh, sitter.head)
+        learnt = card_orders(mesh, head)
         seconds = time.process_time() - begin
         unsorted = np.arange(len(mesh.triangles))
         orders: dict[str, OrderOf] = {"unsorted": always(unsorted), "sorted": both(learnt)}
         if way == "clusters":
             found["order_seconds"] = seconds
             found["order_from_ms"] = eye_milliseconds(mesh)
-            orders |= others(mesh, sitter.head, learnt)
+            orders |= others(mesh, head, learnt)
         view_count = VIEW_COUNT if way == "clusters" else FEWER_VIEWS
-        shares = wrong_shares(mesh, sitter.head, orders, view_count)
+        shares = wrong_shares(mesh, head, orders, view_count)
         if way == "clusters":
             found |= {f"order_wrong_{name}": share for name, share in shares.items()}
         else:

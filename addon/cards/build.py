@@ -89,8 +89,12 @@ def card_steps(
     atlas: AtlasSettings,
     occlusion: CardOcclusionSettings,
     alpha_of: AlphaOf,
+    others: Sequence[CardShade] = (),
 ) -> Generator[str, None, CardBuild]:
     """Build the cards; each step names what comes next, and the result is returned.
+
+    Args:
+        others: cards of other grooms, which shade these, world space.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
@@ -106,7 +110,7 @@ def card_steps(
     yield "Atlas"
     alpha = alpha_of(build)
     bodies = [] if groom.head is None else [groom.head]
-    shades = [CardShade(build.finest, alpha)]
+    shades = [CardShade(build.finest, alpha), *others]
     shading = occlusion_steps(build.finest, shades, bodies, occlusion)
     finest = build.finest.with_occlusion((yield from _told("Ambient occlusion", shading)))
     shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))

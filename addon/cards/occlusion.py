@@ -47,6 +47,26 @@ class CardShade:
     mesh: CardMesh
     alpha: Floats | None = None
 
+    @classmethod
+    def of_surface(cls, surface: Surface, alpha: Floats | None) -> CardShade:
+        """A mesh that shades and is not shaded: nothing is known of its cards. It is opaque
+        without UVs."""
+        corners = surface.triangles.ravel()
+        count = len(corners)
+        uv = surface.corner_uv
+        nothing, unknown = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
+        mesh = CardMesh(
+            positions=surface.positions[corners],
+            triangles=np.arange(count).reshape(-1, 3),
+            uv=nothing[:, :2] if uv is None else uv.reshape(-1, 2),
+            normal=nothing,
+            tangent=nothing,
+            occlusion=unknown,
+            card=np.zeros(count // 3, np.int32),
+            along=unknown,
+        )
+        return cls(mesh, None if uv is None else alpha)
+
 
 def vertex_occlusion(
     mesh: CardMesh,

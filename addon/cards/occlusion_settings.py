@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..params import Settings, integer, number
+from ..params import Settings, integer, number, toggle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,4 +46,10 @@ class CardOcclusionSettings(Settings):
         unit="length",
         soft=(0.0, 0.1),
         hard=(0.0, 1_000.0),
+    )
+    others: bool = toggle(
+        False,
+        label="Other Cards",
+        description="Hair cards of other grooms shade as well: all meshes in sight that Make Cards "
+        "or Sort Hair Cards has written",
     )

@@ -23,10 +23,10 @@ from ..cards.sort import SortBy, order_steps
 from ..cards.steps import result_of, retold
 from ..cards.uv_ways import Way
 from ..errors import HairloomError
-from ..shading.textures import picture_as
 from ..strands import Surface
 from .adopted_writing import face_order, reorder_faces, write_shares
-from .images import read_image
+from .card_alpha import alpha_of
+from .other_cards import other_cards
 from .surfaces import read_corner_uv, read_surface
 from .vertex_weights import weights_on
 
@@ -35,7 +35,6 @@ __all__ = [
     "CardOcclusionSettings",
     "SortChoices",
     "SortedCards",
-    "alpha_image",
     "sort_mesh",
     "sort_steps",
 ]
@@ -113,9 +112,11 @@ def sort_steps(
     orders = yield from retold(ordering, lambda share: share / part_count)
     order = orders.front
     if choices.occlusion is not None:
-        alpha, problems = _alpha_of(obj, choices.alpha)
+        alpha, problems = alpha_of(obj, choices.alpha)
         bodies = [] if source.head is None else [source.head]
-        shades = [CardShade(mesh, alpha)]
+        others, doubts = other_cards(choices.occlusion, obj, depsgraph)
+        problems += doubts
+        shades = [CardShade(mesh, alpha), *others]
         shading = occlusion_steps(mesh, shades, bodies, choices.occlusion)
         openness = yield from retold(shading, lambda share: (1.0 + share) / 2.0)
         corner = np.zeros(len(obj.data.loops), np.int32)
@@ -225,30 +226,3 @@ def _shared(mesh: bpy.types.Mesh) -> list[str]:
     if mesh.users < 2:
         return []
     return [f"{mesh.users} objects share the mesh '{mesh.name}' and have been sorted together"]
-
-
-def _alpha_of(
-    obj: bpy.types.Object, chosen: bpy.types.Image | None
-) -> tuple[Floats | None, list[str]]:
-    """Where cards are clear, (height, width), and why not; None for opaque cards."""
-    image = chosen or alpha_image(obj)
-    if image is None:
-        return None, ["No material has a picture for its alpha, so cards counted as opaque"]
-    place = f"Image '{image.name}'"
-    try:
-        picture = read_image(image, is_color=False, place=place)
-        return picture_as("alpha", picture, place=place), []
-    except HairloomError as error:
-        return None, [f"{error} Until then cards counted as opaque"]
-
-
-def alpha_image(obj: bpy.types.Object) -> bpy.types.Image | None:
-    """The picture that is linked to the alpha of a Principled BSDF of the object's materials."""
-    for slot in obj.material_slots:
-        tree = None if slot.material is None else slot.material.node_tree
-        for node in tree.nodes if tree is not None else ():
-            if node.type == "BSDF_PRINCIPLED":
-                for link in node.inputs["Alpha"].links:
-                    if link.from_node.type == "TEX_IMAGE" and link.from_node.image is not None:
-                        return link.from_node.image
-    return None

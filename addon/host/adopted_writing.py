@@ -9,6 +9,8 @@ import numpy as np
 from ..arrays import Floats, Ints
 
 OCCLUSION_LAYER = "Occlusion"
+#: attributes of cards: how open each vertex is, and how far from the root
+SHARES = ("occlusion", "along")
 
 
 def face_order(polygon: Ints) -> Ints:
@@ -49,7 +51,7 @@ def write_shares(
         corner: (loop_count,) the value of each corner of a face.
         openness, along: (n,).
     """
-    for name, values in (("occlusion", openness), ("along", along)):
+    for name, values in zip(SHARES, (openness, along), strict=True):
         _set_attribute(mesh, name, _at_source(values, vertex, len(mesh.vertices)))
     layer = mesh.uv_layers.get(OCCLUSION_LAYER)
     if layer is None:

@@ -24,12 +24,12 @@ type AtlasDraw = Callable[[FlatStrands, int], AtlasMaps]
 
 def drawn_maps(flat: FlatStrands, size: int) -> AtlasMaps:
     """Here and now; the main thread's."""
-    return baked_maps(flat, size) if _has_gpu() else sampled_maps(flat, size)
+    return baked_maps(flat, size) if has_gpu() else sampled_maps(flat, size)
 
 
 def drawing_maps(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMaps]:
     """The same in steps."""
-    if not _has_gpu():
+    if not has_gpu():
         return sampled_maps(flat, size)
     return (yield from baking(flat, size))
 
@@ -55,7 +55,7 @@ def baked_atlas(
     return dilated(draw(flat, plan.size), plan.grid)
 
 
-def _has_gpu() -> bool:
+def has_gpu() -> bool:
     """Blender in the background has none until it is asked for, and on some machines none then."""
     try:
         ensure_gpu()

@@ -6,7 +6,7 @@ build waits there until it is served.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,16 +17,18 @@ from ..cards.atlas_settings import AtlasSettings
 from ..cards.bake_strands import FlatStrands
 from ..cards.drawing_settings import CardDrawingSettings
 from ..cards.follow import CardBinding
+from ..cards.occlusion import CardShade
 from ..cards.occlusion_settings import CardOcclusionSettings
 from ..cards.settings import CardSettings
 from ..cards.steps import result_of, retold
 from ..errors import HairloomError
 from ..pipeline import Pose, Rig
 from ..render.card_snapshot import CardSnapshot
+from ..render.card_textures import CardTextures, packed_textures
 from ..shading.settings import ShadingSettings, StrandSettings
 from ..shading.textures import TextureSettings
 from ..shading.volume.card_opacity import StrandArea, card_shade
-from .card_atlas import drawing_maps
+from .card_atlas import drawing_maps, has_gpu
 from .card_making import CardChoices, MadeCards, making_steps
 from .card_maps import made_maps
 from .thread_work import ThreadWork
@@ -57,8 +59,10 @@ class CardForm:
         look = self.shading
         object.__setattr__(self, "variation", (look.model, look.color_variation, look.grey_share))
 
-    def choices(self, pictures: Mapping[str, Floats]) -> CardChoices:
-        """The same with the pictures themselves."""
+    def choices(
+        self, pictures: Mapping[str, Floats], others: tuple[CardShade, ...] = ()
+    ) -> CardChoices:
+        """The same with the pictures themselves, and with the cards of other grooms."""
         return CardChoices(
             self.cards,
             self.atlas,
@@ -67,6 +71,7 @@ class CardForm:
             self.shading,
             self.strands,
             pictures,
+            others,
         )
 
 
@@ -99,25 +104,54 @@ class BuiltCards:
         return replace(cards, drawing=drawing, thickness=thickness)
 
 
-def built_cards(rig: Rig, form: CardForm, pictures: Mapping[str, Floats]) -> BuiltCards:
+def built_cards(
+    rig: Rig,
+    form: CardForm,
+    pictures: Mapping[str, Floats],
+    others: tuple[CardShade, ...] = (),
+) -> BuiltCards:
     """Build the cards of a rig with their textures, here and now.
 
     Raises:
         HairloomError: no cards can be made.
     """
-    return _bound(rig, form, result_of(making_steps(rig, form.choices(pictures))))
+    return _bound(rig, form, result_of(making_steps(rig, form.choices(pictures, others))))
 
 
 def building_cards(
-    rig: Rig, form: CardForm, pictures: Mapping[str, Floats]
+    rig: Rig,
+    form: CardForm,
+    pictures: Mapping[str, Floats],
+    others: tuple[CardShade, ...] = (),
 ) -> ThreadWork[BuiltCards]:
     """Build them in a thread."""
-    choices = form.choices(pictures)
+    choices = form.choices(pictures, others)
 
     def build(work: ThreadWork[BuiltCards]) -> BuiltCards:
-        return _bound(rig, form, made_in_thread(work, rig, choices))
+        built = _bound(rig, form, made_in_thread(work, rig, choices))
+        work.tell("Textures")
+        device = _uploaded(work, built.rest)
+        return replace(built, rest=replace(built.rest, device=device))
 
     return ThreadWork(build, "hairloom cards")
+
+
+def _uploaded(work: ThreadWork[Any], cards: CardSnapshot) -> CardTextures | None:
+    """In the thread: their textures on the GPU, so that no draw waits for them; None without one.
+
+    Raises:
+        GivenUpError: nobody waits for them.
+    """
+    packed = list(packed_textures(cards.textures, cards.mesh.atlas))
+
+    def uploading() -> Generator[None, None, CardTextures | None]:
+        if not has_gpu():
+            return None
+        device = CardTextures()
+        yield from device.uploading(cards.textures, cards.mesh.atlas, packed)
+        return device
+
+    return work.asked(uploading())
 
 
 def made_in_thread(work: ThreadWork[Any], rig: Rig, choices: CardChoices) -> MadeCards:

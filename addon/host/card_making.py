@@ -9,6 +9,7 @@ from ..arrays import Floats
 from ..card_flow import card_build_steps
 from ..cards.atlas_settings import AtlasSettings
 from ..cards.build import CardBuild
+from ..cards.occlusion import CardShade
 from ..cards.occlusion_settings import CardOcclusionSettings
 from ..cards.settings import CardSettings
 from ..pipeline import Rig
@@ -22,6 +23,7 @@ class CardChoices:
     """All that cards hang on.
 
     pictures: what takes the place of generated textures, see `textures.picture_as`.
+    others: cards of other grooms, which shade these, world space.
     """
 
     cards: CardSettings
@@ -31,6 +33,7 @@ class CardChoices:
     shading: ShadingSettings
     strands: StrandSettings
     pictures: Mapping[str, Floats] = field(default_factory=dict)
+    others: tuple[CardShade, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,13 @@ def making_steps(
         return made[-1].textures.alpha
 
     build = yield from card_build_steps(
-        rig, choices.cards, choices.atlas, choices.occlusion, alpha_of, choices.strands
+        rig,
+        choices.cards,
+        choices.atlas,
+        choices.occlusion,
+        alpha_of,
+        choices.strands,
+        choices.others,
     )
     return MadeCards(build, made[-1])
 

@@ -7,7 +7,7 @@ stay there.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import bpy
@@ -19,7 +19,7 @@ from ..cards.build import CardBuild
 from ..cards.card_mesh import OF_CARDS, CardMesh
 from ..errors import HairloomError
 from .card_builds import made_in_thread
-from .card_making import MadeCards, making_steps, order_line
+from .card_making import MadeCards, order_line
 from .card_object_material import filled_image, new_material
 from .groom_files import card_choices, notes_of, rig_of
 from .objects import Handle, head_of, matrix_of
@@ -28,7 +28,7 @@ from .thread_work import ThreadWork
 
 
 class CardObjectJob:
-    """Making the cards of one groom: read at once, made in steps or in a thread, then written.
+    """Making the cards of one groom: read at once, made in a thread, then written.
 
     objects: those of the cards once they are written, finest first; order: how well it suits.
     notes: what the artist should know.
@@ -48,16 +48,6 @@ class CardObjectJob:
         self.order = ""
         self.notes = (*source.warnings, *notes_of(hair, self._rig), *warnings)
         self.dropped = source.dropped
-
-    def steps(self) -> Generator[str]:
-        """Do it; each step names what comes next.
-
-        Raises:
-            HairloomError: no cards can be made, or the hair is gone.
-        """
-        made = yield from making_steps(self._rig, self._choices)
-        yield "Cards into the scene"
-        self.write(made)
 
     def making(self) -> ThreadWork[MadeCards]:
         """Make the cards in a thread, which touches nothing of Blender's."""

@@ -21,6 +21,7 @@ from ..render.snapshot import Snapshot
 from .card_builds import BuiltCards, CardForm, CardsDrawn, building_cards, built_cards, told
 from .card_images import chosen_pictures
 from .card_making import order_line
+from .other_cards import other_cards
 from .thread_work import ThreadWork
 
 
@@ -150,10 +151,11 @@ class ShownCards:
         assert self._wanted is not None
         rig, form = self._wanted
         pictures = self._pictures(hair)
+        others, _ = other_cards(form.occlusion, hair, bpy.context.view_layer.depsgraph)
         if self._is_awaited():
-            self._take(lambda: built_cards(rig, form, pictures))
+            self._take(lambda: built_cards(rig, form, pictures, others))
         else:
-            self._build = _Building(rig, form, building_cards(rig, form, pictures))
+            self._build = _Building(rig, form, building_cards(rig, form, pictures, others))
 
     def _take(self, result: Callable[[], BuiltCards]) -> None:
         try:

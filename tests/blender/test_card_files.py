@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -155,6 +159,59 @@ def test_a_failure_in_the_middle_leaves_the_old_files(
 
     monkeypatch.setattr(card_files, "sidecar_text", full)
     assert cards(tmp_path / f"hair{suffix}", "--set", "grow.length=0.3", "--levels", "2") == 1
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="folders have no owners here")
+def test_a_folder_that_may_not_be_written_to_keeps_its_files(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        assert cards(folder / "hair.glb", "--levels", "1") == 0
+        before = {path.name: path.read_bytes() for path in folder.iterdir()}
+        folder.chmod(0o555)
+        try:
+            with nobody():
+                assert cards(folder / "hair.glb", "--set", "grow.length=0.3") == 1
+        finally:
+            folder.chmod(0o755)
+        assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    assert "Permission denied" in capfd.readouterr().err
+
+
+@contextmanager
+def nobody() -> Iterator[None]:
+    """Without the rights of root, whom no folder refuses."""
+    is_root = os.geteuid() == 0
+    if is_root:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        if is_root:
+            os.seteuid(0)
+
+
+@pytest.mark.parametrize("refused", [1, 3])
+def test_a_file_that_cannot_be_replaced_leaves_all_old_files(
+    tmp_path: Path, refused: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where another program holds one of them open."""
+    assert cards(tmp_path / "hair.glb", "--levels", "1") == 0
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    really, moves = os.replace, []
+
+    def replace(source: Path, target: Path) -> None:
+        if Path(target).parent == tmp_path and Path(source).parent.parent == tmp_path:
+            moves.append(target)
+            if len(moves) == refused:
+                raise PermissionError(13, "Permission denied")
+        really(source, target)
+
+    monkeypatch.setattr(os, "replace", replace)
+    assert cards(tmp_path / "hair.glb", "--set", "grow.length=0.3", "--levels", "1") == 1
+    assert len(moves) == refused
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 

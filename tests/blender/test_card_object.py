@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from hairloom.addon.cards.steps import result_of
 from hairloom.addon.host.card_object import CardObjectJob, card_objects
+from hairloom.addon.ui.long_work import threaded
 
 
 @pytest.fixture
@@ -166,12 +168,10 @@ def test_it_can_be_undone_and_the_groom_is_remembered_in_the_file(hair, tmp_path
 
 def test_hair_that_was_removed_meanwhile_changes_nothing(hair):
     job = CardObjectJob(hair, bpy.context.evaluated_depsgraph_get())
-    steps = job.steps()
-    next(steps)
+    work = job.making()
     bpy.data.objects.remove(hair)
     with pytest.raises(Exception, match="gone"):
-        for _ in steps:
-            pass
+        job.write(result_of(threaded(work)))
     assert not any(obj.hairloom.card_object.groom for obj in bpy.data.objects)
 
 

@@ -3,9 +3,9 @@
 import bpy
 import numpy as np
 import pytest
+from mip_chains import mip_chain
 
 from hairloom.addon.exchange.dds import has_compressor, write_dds
-from hairloom.addon.exchange.mip_maps import mip_chain
 from hairloom.addon.host.images import read_image
 
 COMPRESSED = pytest.param(

@@ -225,6 +225,16 @@ def test_other_grooms_and_bodies_shade_as_well_and_only_within_the_reach() -> No
         assert vertex_occlusion(mesh, shades, bodies, far).max() < 0.02
 
 
+def test_a_mesh_of_other_cards_shades_as_the_cards_themselves() -> None:
+    first, other = hanging(40), hanging(40, seed=2)
+    alpha = np.random.default_rng(2).random((16, 16)).astype(np.float32)
+    mesh = Surface(other.positions, other.triangles, other.uv[other.triangles])
+    shades = CardShade(other, alpha), CardShade.of_surface(mesh, alpha)
+    found = [vertex_occlusion(first, [CardShade(first), each], [], plain()) for each in shades]
+    np.testing.assert_allclose(found[0], found[1], atol=1e-5)
+    assert found[0].mean() < vertex_occlusion(first, [CardShade(first)], [], plain()).mean() - 0.02
+
+
 def test_strength_mixes_in_and_the_same_input_gives_the_same_bits() -> None:
     mesh = hanging(40)
     full = vertex_occlusion(mesh, [CardShade(mesh)], [ball()], CardOcclusionSettings(rays=32))

@@ -1,0 +1,108 @@
+"""Cards of other grooms shade those that are made, written or sorted, by choice."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
+from hairloom.addon.host.adopted_cards import SortChoices, sort_mesh
+from hairloom.addon.host.card_object import card_objects
+from hairloom.addon.host.groom_files import card_choices
+from hairloom.addon.host.other_cards import other_cards
+
+
+@pytest.fixture
+def hair(new_hair, sphere):
+    """A hedgehog on a sphere, with cards, and a larger copy of them that is nobody's."""
+    made = new_hair(sphere)
+    groom = made.data.hairloom
+    groom.cards.way, groom.cards.card_count, groom.cards.levels = "clusters", 12, 2
+    groom.atlas.source, groom.card_occlusion.rays = "made", 64
+    groom.card_texture.height = groom.card_texture.variant_width = 32
+    bpy.context.view_layer.update()
+    press()
+    return made
+
+
+@pytest.fixture
+def other(hair):
+    first = card_objects(hair)[0]
+    copy = first.copy()
+    copy.data = first.data.copy()
+    copy.name = "Other"
+    copy.hairloom.card_object.groom = None
+    copy.rotation_euler.z += 0.3
+    bpy.context.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    return copy
+
+
+def press():
+    assert bpy.ops.hairloom.make_cards() == {"FINISHED"}
+    bpy.context.view_layer.update()
+
+
+def openness(obj):
+    values = np.empty(len(obj.data.vertices), np.float32)
+    obj.data.attributes["occlusion"].data.foreach_get("value", values)
+    return values
+
+
+def test_they_shade_what_is_made_and_only_while_they_are_seen(hair, other):
+    alone = openness(card_objects(hair)[0])
+    hair.data.hairloom.card_occlusion.others = True
+    press()
+    both = openness(card_objects(hair)[0])
+    assert both.mean() < alone.mean() - 0.02
+    other.hide_set(True)
+    press()
+    np.testing.assert_array_equal(openness(card_objects(hair)[0]), alone)
+
+
+def test_what_is_written_has_the_same_shade(hair, other):
+    settings = hair.data.hairloom.card_occlusion
+    assert card_choices(hair)[0].others == ()
+    settings.others = True
+    (shade,) = card_choices(hair)[0].others
+    mesh = other.data
+    assert len(shade.mesh.triangles) == len(mesh.polygons)
+    assert shade.alpha.shape[0] > 1 and 0.0 < shade.alpha.mean() < 1.0
+    middle = np.array([tuple(other.matrix_world @ each.center) for each in mesh.polygons])
+    found = shade.mesh.positions[shade.mesh.triangles].mean(axis=1)
+    np.testing.assert_allclose(found, middle, atol=1e-6)
+
+
+def test_own_cards_and_coarser_levels_and_other_meshes_are_left_out(hair, sphere):
+    on = CardOcclusionSettings(others=True)
+    for obj in card_objects(hair):
+        obj.hide_set(False)
+        obj.hide_viewport = False
+    assert other_cards(on, hair) == ((), [])
+    (shade,), _ = other_cards(on, sphere)
+    assert len(shade.mesh.triangles) == len(card_objects(hair)[0].data.polygons)
+
+
+def test_they_shade_what_is_sorted(hair, other, evaluated):
+    def sorted_by(others):
+        choices = SortChoices(occlusion=CardOcclusionSettings(rays=64, others=others))
+        sort_mesh(other, evaluated(), choices)
+        return openness(other).mean()
+
+    assert sorted_by(True) < sorted_by(False) - 0.02
+
+
+def test_without_uvs_or_a_picture_they_are_opaque_and_without_faces_nothing(hair, other):
+    on = CardOcclusionSettings(others=True)
+    other.data.materials[0] = None
+    (shade,), notes = other_cards(on, hair)
+    assert shade.alpha is None and "Other: No material" in notes[0]
+    for layer in list(other.data.uv_layers):
+        other.data.uv_layers.remove(layer)
+    bpy.context.view_layer.update()
+    (shade,), _ = other_cards(on, hair)
+    assert shade.alpha is None
+    other.data.clear_geometry()
+    bpy.context.view_layer.update()
+    assert other_cards(on, hair) == ((), [])
