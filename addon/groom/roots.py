@@ -10,13 +10,8 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
 from ..strands.closest_point import ClosestPointSearch
+from .root_fit import IMPLAUSIBLE_DISTANCE, fitting_factor
 
-#: Median distance of the roots, as a part of the surface's diagonal, beyond which the groom
-#: cannot belong to it; grooms that fit lie within 1 %.
-IMPLAUSIBLE_DISTANCE = 0.15
-#: Factors between the units that grooms come in: powers of ten, inch and foot, to and from metres.
-_UNIT_FACTORS = (*(10.0**n for n in range(-4, 5)), 0.0254, 0.3048, 1 / 0.0254, 1 / 0.3048)
-_SAMPLED_ROOTS = 500
 #: Sine of a triangle's first angle below which rounding in float64 decides about its normal.
 _FLAT = 1.0e-9
 
@@ -128,7 +123,7 @@ def _check_scale(
     if np.median(distance) <= IMPLAUSIBLE_DISTANCE * surface_size:
         return
     roots_size = float(np.linalg.norm(np.ptp(roots, axis=0)))
-    factor = _fitting_factor(roots, roots_size, search)
+    factor = fitting_factor(roots, search)
     if factor is None:
         raise HairloomError(
             f"its roots lie {np.median(distance):.3g} m from the head (median); they span"
@@ -143,19 +138,6 @@ def _check_scale(
         place=place,
         remedy=f"Scale the groom by {factor:.4g} (pass --groom-scale {factor:.4g})",
     )
-
-
-def _fitting_factor(roots: Floats, roots_size: float, search: ClosestPointSearch) -> float | None:
-    """The factor between units that brings the roots onto the surface, if one does.
-
-    Distances are judged by the size of the scaled roots: roots that shrink to a point somewhere
-    inside of the head are near to it, but do not fit.
-    """
-    sample = roots[:: -(-len(roots) // _SAMPLED_ROOTS)].astype(np.float64)
-    distance = {f: float(np.median(search.closest(sample * f).distance)) for f in _UNIT_FACTORS}
-    best = min(_UNIT_FACTORS, key=lambda factor: distance[factor] / factor)
-    fits = distance[best] <= IMPLAUSIBLE_DISTANCE * best * roots_size
-    return best if fits and best != 1.0 else None
 
 
 def _unit(

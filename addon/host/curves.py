@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet
 from ..strands.affine import mean_scale, moved
@@ -39,16 +39,16 @@ def read_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleane
     evaluated = obj.evaluated_get(depsgraph)
     curves = evaluated.data
     matrix = np.array(evaluated.matrix_world)
-    radius = _attribute(curves, "radius", "POINT")
+    radius = read_attribute(curves, "radius", "POINT")
     group = next(
-        filter(_is_there, (_attribute(curves, n, "CURVE") for n in GROUP_ATTRIBUTES)), None
+        filter(_is_there, (read_attribute(curves, n, "CURVE") for n in GROUP_ATTRIBUTES)), None
     )
     return clean(
         moved(_positions(curves), matrix),
-        _offsets(curves),
+        curve_offsets(curves),
         radius=None if radius is None else radius * np.float32(mean_scale(matrix)),
         group=group,
-        root_uv=_attribute(curves, "surface_uv_coordinate", "CURVE"),
+        root_uv=read_attribute(curves, "surface_uv_coordinate", "CURVE", 2),
     )
 
 
@@ -67,11 +67,11 @@ def write_curves(
     if strands.strand_count:
         curves.add_curves(strands.point_counts.tolist())
         curves.position_data.foreach_set("vector", strands.points.ravel())
-    _set_attribute(curves, "radius", "FLOAT", "POINT", strands.radius)
+    set_attribute(curves, "radius", "FLOAT", "POINT", strands.radius)
     if strands.group.any():
-        _set_attribute(curves, GROUP_ATTRIBUTES[0], "INT", "CURVE", strands.group)
+        set_attribute(curves, GROUP_ATTRIBUTES[0], "INT", "CURVE", strands.group)
     if strands.root_uv is not None:
-        _set_attribute(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", strands.root_uv)
+        set_attribute(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", strands.root_uv)
     obj = bpy.data.objects.new(name, curves)
     collection.objects.link(obj)
     if surface is not None:
@@ -96,7 +96,7 @@ def _positions(curves: bpy.types.Curves) -> Floats:
     return points
 
 
-def _offsets(curves: bpy.types.Curves) -> Ints:
+def curve_offsets(curves: bpy.types.Curves) -> Ints:
     """(curve_count + 1,) int32; [0] where there are no curves."""
     offsets = np.zeros(len(curves.curves) + 1, np.int32)
     if len(curves.curves):  # without curves the array has length 1 and yet holds nothing
@@ -106,30 +106,42 @@ def _offsets(curves: bpy.types.Curves) -> Ints:
 
 #: data type of an attribute -> (name of the value, width, dtype)
 _LAYOUTS: dict[str, tuple[str, int, Any]] = {
+    "BOOLEAN": ("value", 1, np.bool_),
     "FLOAT": ("value", 1, np.float32),
     "FLOAT2": ("vector", 2, np.float32),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
     "INT": ("value", 1, np.int32),
     "INT8": ("value", 1, np.int32),
 }
 
 
-def _attribute(curves: bpy.types.Curves, name: str, domain: str) -> Any:
-    """The values of an attribute, (count,) or (count, 2); None where it is absent or another's."""
+def read_attribute(curves: bpy.types.Curves, name: str, domain: str, width: int = 1) -> Any:
+    """The values of an attribute, (count,) or (count, width); None where it is absent, of another
+    domain or of another width. Colours are scene-linear."""
     attribute = curves.attributes.get(name)
     if attribute is None or attribute.domain != domain or attribute.data_type not in _LAYOUTS:
         return None
-    value, width, dtype = _LAYOUTS[attribute.data_type]
+    value, own_width, dtype = _LAYOUTS[attribute.data_type]
+    if own_width != width:
+        return None
     values = np.empty(len(attribute.data) * width, dtype)
     attribute.data.foreach_get(value, values)
     return values if width == 1 else values.reshape(-1, width)
 
 
-def _set_attribute(
-    curves: bpy.types.Curves, name: str, data_type: str, domain: str, values: Floats | Ints
+def set_attribute(
+    curves: bpy.types.Curves,
+    name: str,
+    data_type: str,
+    domain: str,
+    values: Floats | Ints | Bools,
 ) -> None:
+    """Give the curves an attribute of whole values, (count,) or (count, width)."""
     attribute = curves.attributes.new(name, data_type, domain)
     if len(values):
-        attribute.data.foreach_set(_LAYOUTS[data_type][0], values.ravel())
+        attribute.data.foreach_set(_LAYOUTS[data_type][0], np.ascontiguousarray(values).ravel())
 
 
 def _is_there(values: Any) -> bool:

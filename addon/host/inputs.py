@@ -9,11 +9,14 @@ import bpy
 
 from ..arrays import Floats
 from ..errors import HairloomError
-from ..exchange.tressfx import read_tfx
+from ..exchange.groom import Groom
+from ..exchange.strand_formats import SUFFIXES
+from ..exchange.strand_reading import read_strands
 from ..groom.grow import grow, scalp_density
 from ..groom.settings import GrowSettings
 from ..strands import StrandSet, Surface
 from .built_in_head import built_in_head
+from .child_python import python_for
 from .curves import read_curves
 from .mesh_files import read_mesh_file
 from .objects import head_of
@@ -29,6 +32,7 @@ class Sources:
 
     groom None: one is grown on the head. head None: the one that hair curves name as their
     surface; the built-in one where a groom is grown. collider None: the head itself.
+    groom_scale, groom_up: of a groom's file, see `strand_reading.read_strands`.
     need_head: whether a groom without a head is refused.
     need_uv: whether a head without UVs is refused.
     density_group, length_group: vertex groups or attributes of a head in the open scene, by name,
@@ -40,7 +44,7 @@ class Sources:
     head: str | None = None
     collider: str | None = None
     groom_scale: float = 1.0
-    groom_up: str = "Y"
+    groom_up: str | None = None
     need_head: bool = True
     need_uv: bool = True
     density_group: str = ""
@@ -52,11 +56,15 @@ class Sources:
 class Inputs:
     """What was found, in world space at rest.
 
+    groom: all that a groom's file says of the strands, or None.
+    notes: what of that file was left out or changed.
     density: (vertex_count,) how densely children grow on the head, or None.
     """
 
     strands: StrandSet
     dropped: dict[str, int]
+    groom: Groom | None
+    notes: tuple[str, ...]
     groom_name: str
     head: Surface | None
     head_object: str | None
@@ -72,10 +80,10 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     """
     head_name = sources.head or _surface_name(sources.groom)
     if sources.groom is not None:
-        strands, dropped = _read_groom(sources.groom, sources)
+        strands, dropped, groom, notes = _read_groom(sources.groom, sources)
         head = _read_head(head_name, sources)
     else:
-        head, dropped = _read_head(head_name, sources), {}
+        head, dropped, groom, notes = _read_head(head_name, sources), {}, None, ()
         assert head is not None, "the built-in one is always there"
         density = _weights(sources.density_group, head_name)
         if density is None and grow_settings.way == "combed":
@@ -88,7 +96,7 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     name = sources.groom or BUILT_IN
     children = _weights(sources.children_density, head_name)
     found = head_object and head_object.name
-    return Inputs(strands, dropped, name, head, found, collider, children)
+    return Inputs(strands, dropped, groom, notes, name, head, found, collider, children)
 
 
 def _read_head(name: str | None, sources: Sources) -> Surface | None:
@@ -127,15 +135,20 @@ def _surface_name(groom: str | None) -> str | None:
     return None if surface is None else surface.name
 
 
-def _read_groom(source: str, sources: Sources) -> tuple[StrandSet, dict[str, int]]:
+def _read_groom(
+    source: str, sources: Sources
+) -> tuple[StrandSet, dict[str, int], Groom | None, tuple[str, ...]]:
     groom_object = bpy.data.objects.get(source)
     if groom_object is not None:
         read = read_curves(groom_object, bpy.context.evaluated_depsgraph_get())
-        return read.strands, read.dropped
-    if source.lower().endswith(".tfx"):
-        file = read_tfx(Path(source), up=sources.groom_up, scale=sources.groom_scale)
-        return file.strands, file.dropped
-    raise _unknown(source, "hair curves", "a .tfx file")
+        return read.strands, read.dropped, None, ()
+    if source.lower().endswith(SUFFIXES):
+        path = Path(source)
+        file = read_strands(
+            path, up=sources.groom_up, scale=sources.groom_scale, python=python_for(path)
+        )
+        return file.strands, file.dropped, file.groom, file.notes
+    raise _unknown(source, "hair curves", "a groom's file such as hair.abc")
 
 
 def _read_mesh(source: str, *, need_uv: bool) -> Surface:

@@ -1,4 +1,4 @@
-"""Meshes from files, through Blender's own importers, without leaving anything in the scene."""
+"""Meshes from files, through Blender's own importers, to read them or to have them in the scene."""
 
 from __future__ import annotations
 
@@ -29,12 +29,40 @@ _PURGED = ("objects", "meshes", "materials", "images", "collections", "cameras",
 
 
 def read_mesh_file(path: Path, *, need_uv: bool) -> Surface:
-    """All meshes of a file as one Surface, in metres, Blender's Z up.
+    """All meshes of a file as one Surface, in metres, Blender's Z up; the scene stays as it is.
 
     Raises:
         HairloomError: no such file, a format that Blender does not read, no faces, or no UVs
             where they are needed.
     """
+    before = _data_blocks()
+    try:
+        meshes = _imported(path)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        parts = [read_surface(mesh, depsgraph, need_uv=need_uv, place=str(path)) for mesh in meshes]
+    finally:
+        bpy.data.batch_remove(_data_blocks() - before)
+    return merged(parts)
+
+
+def import_mesh_file(path: Path) -> bpy.types.Object:
+    """The one mesh of a file, in the open scene.
+
+    Raises:
+        HairloomError: no such file, a format that Blender does not read, or not one mesh.
+    """
+    meshes = _imported(path)
+    if len(meshes) == 1:
+        return meshes[0]
+    raise HairloomError(
+        f"it holds {len(meshes)} meshes, and hair grows on one",
+        place=str(path),
+        remedy="Join them, or open a scene with them and name one",
+    )
+
+
+def _imported(path: Path) -> list[bpy.types.Object]:
+    """The file's mesh objects, new in the scene, by name; one or more."""
     importer = _IMPORTERS.get(path.suffix.lower())
     if importer is None:
         raise HairloomError(
@@ -46,21 +74,13 @@ def read_mesh_file(path: Path, *, need_uv: bool) -> Surface:
         raise HairloomError("there is no such file", place=str(path), remedy="Check the path")
     before = _data_blocks()
     try:
-        try:
-            importer(str(path))
-        except RuntimeError as error:
-            raise _unreadable(path, str(error).strip()) from error
-        meshes = [block for block in _data_blocks() - before if _is_mesh_object(block)]
-        if not meshes:
-            raise _unreadable(path, "it holds no mesh")
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        parts = [
-            read_surface(mesh, depsgraph, need_uv=need_uv, place=str(path))
-            for mesh in sorted(meshes, key=lambda block: block.name)
-        ]
-    finally:
-        bpy.data.batch_remove(_data_blocks() - before)
-    return merged(parts)
+        importer(str(path))
+    except RuntimeError as error:
+        raise _unreadable(path, str(error).strip()) from error
+    meshes = [block for block in _data_blocks() - before if _is_mesh_object(block)]
+    if not meshes:
+        raise _unreadable(path, "it holds no mesh")
+    return sorted(meshes, key=lambda block: str(block.name))
 
 
 def merged(parts: list[Surface]) -> Surface:

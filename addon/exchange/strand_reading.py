@@ -1,0 +1,103 @@
+"""One way in for all files of strands, whichever format their suffix names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import HairloomError
+from .groom import Groom
+from .groom_alembic_read import read_groom_alembic
+from .groom_usd_read import read_usd
+from .hair_file import read_hair_file
+from .read_groom import ReadGroom
+from .strand_formats import ALEMBIC, TRESSFX, USD, strand_format
+from .tressfx import read_tfx
+
+#: what of a file that holds strands and guides is wanted
+PARTS = ("strands", "guides", "both")
+#: of formats that do not say it
+_TRESSFX_UP, _HAIR_UP = "Y", "Z"
+
+
+def read_strands(
+    path: Path,
+    *,
+    up: str | None = None,
+    scale: float = 1.0,
+    parts: str = "strands",
+    python: Sequence[str] | None = None,
+) -> ReadGroom:
+    """Read a groom in Blender's space.
+
+    Args:
+        path: .abc, .usdc, .usd, .usda, .tfx or .hair.
+        up: the file's up axis, "Y" or "Z". None: as a USD file and our Alembic files say; of others
+            Z in a .hair file, else Y.
+        scale: what lengths are multiplied by, beside what the file says of its unit; a .tfx or
+            .hair file says nothing and is taken to be in metres.
+        parts: one of PARTS. A file that holds guides alone gives those for "strands", too.
+        python: the command that starts another Python, see `apart.run_apart`.
+
+    Returns:
+        What the file's reader gives, with notes on what was left out. Closest guides are kept
+        where strands and guides are.
+
+    Raises:
+        HairloomError: another suffix, no guides where they are wanted, or whatever keeps the file
+            from being read.
+    """
+    if parts not in PARTS:
+        raise HairloomError(
+            f"'{parts}' is no part", place="parts", remedy="Use " + ", ".join(PARTS)
+        )
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise HairloomError(
+            f"{scale} cannot be used", place="scale", remedy="Use a number above zero"
+        )
+    read = _read(path, up, scale, python)
+    groom, note = _parts(read.groom, parts, path)
+    return replace(read, groom=groom, notes=(*read.notes, *note))
+
+
+def _read(path: Path, up: str | None, scale: float, python: Sequence[str] | None) -> ReadGroom:
+    known = strand_format(path)
+    if known is ALEMBIC:
+        return read_groom_alembic(path, up=up, factor=scale, python=python)
+    if known is USD:
+        return read_usd(path, up=up, factor=scale, python=python)
+    if known is TRESSFX:
+        return read_tfx(path, up=up or _TRESSFX_UP, scale=scale)
+    return read_hair_file(path, up=up or _HAIR_UP, scale=scale)
+
+
+def _parts(groom: Groom, parts: str, path: Path) -> tuple[Groom, tuple[str, ...]]:
+    """What is wanted of a groom, and what there is to say of the rest."""
+    is_guide = groom.is_guide
+    guides = 0 if is_guide is None else int(is_guide.sum())
+    others = groom.strands.strand_count - guides
+    if parts == "both":
+        return groom, ()
+    if parts == "guides":
+        if not guides:
+            raise HairloomError(
+                "none of its strands is marked as a guide",
+                place=str(path),
+                remedy="Import its strands instead",
+            )
+        note = f"{path.name}: {others:,} strands were left out." if others else ""
+        return _untied(groom.guides()), tuple(filter(None, [note]))
+    if not guides:
+        return _untied(groom), ()
+    if not others:
+        return _untied(groom), (f"{path.name}: it holds nothing but guides: {guides:,} of them.",)
+    note = f"{path.name}: {guides:,} guides were left out."
+    return _untied(replace(groom.without_guides(), is_guide=None)), (note,)
+
+
+def _untied(groom: Groom) -> Groom:
+    """Without the closest guides, which are no longer there."""
+    return replace(groom, closest_guides=None, guide_weights=None)

@@ -1,0 +1,145 @@
+"""Strands of files in: File > Import, and files that are dropped into the viewport."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    StringProperty,
+)
+from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
+
+from ..errors import HairloomError
+from ..host.groom_in import FILE_KINDS, Ground, StrandImport, import_strands, read_ground
+from .reports import reporting, tell, waiting
+from .selection import active_mesh, make_active
+
+SUFFIXES = tuple(suffix for _, suffixes in FILE_KINDS for suffix in suffixes)
+UP_AXES = (
+    ("FILE", "From File", "As the file says; where it does not: Z in .hair files, else Y"),
+    ("Y", "Y Up", "The file's Y axis points up, as in most engines"),
+    ("Z", "Z Up", "The file's Z axis points up, as in Blender"),
+)
+GUIDES = (
+    ("LEAVE", "Leave Out", "Only the strands that are seen; of a file with guides alone, those"),
+    ("APART", "Own Object", "Guides are hair curves of their own beside the strands"),
+    ("AMONG", "With Strands", "Guides are among the strands, marked by the attribute groom_guide"),
+)
+
+
+def _filter(suffixes: Iterable[str]) -> str:
+    return ";".join(f"*{suffix}" for suffix in suffixes)
+
+
+class HAIRLOOM_OT_import_strands(bpy.types.Operator, ImportHelper):
+    """Import grooms as hair curves, onto the active mesh if one is selected"""
+
+    bl_idname = "hairloom.import_strands"
+    bl_label = "Import Hair Strands"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    filter_glob: StringProperty(default=_filter(SUFFIXES), options={"HIDDEN", "SKIP_SAVE"})
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
+    )
+    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    up: EnumProperty(name="Up", description="What points up in the file", items=UP_AXES)
+    scale: FloatProperty(
+        name="Scale",
+        description="What lengths are multiplied by, beside what the file says of its unit: 0.01 "
+        "for a TressFX groom in centimetres",
+        default=1.0,
+        min=1.0e-6,
+        max=1.0e6,
+        soft_min=0.001,
+        soft_max=100.0,
+        precision=4,
+    )
+    guides: EnumProperty(
+        name="Guides", description="What becomes of guides in Alembic and USD files", items=GUIDES
+    )
+    onto_mesh: BoolProperty(
+        name="Onto Active Mesh",
+        description="Bind the roots to the mesh that is active, so that the hair moves with it",
+        default=True,
+    )
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        imported: list[bpy.types.Object] = []
+        head = active_mesh(context) if self.onto_mesh else None
+        with waiting(context):
+            ground = head and read_ground(head, context.evaluated_depsgraph_get())
+            for path in self._paths():
+                imported += self._imported(context, path, ground)
+        if not imported:
+            return {"CANCELLED"}
+        make_active(context, imported[::-1])
+        return {"FINISHED"}
+
+    def _imported(
+        self, context: bpy.types.Context, path: Path, ground: Ground | None
+    ) -> list[bpy.types.Object]:
+        """The new objects; none where the file cannot be used, so that the others still come in."""
+        choices = StrandImport(
+            up=None if self.up == "FILE" else self.up,
+            scale=self.scale,
+            guides=self.guides.lower(),
+        )
+        try:
+            hair, outcome = import_strands(path, ground, context.collection, choices)
+        except HairloomError as error:
+            self.report({"ERROR"}, str(error))
+            return []
+        tell(self, outcome)
+        return hair
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        return self.invoke_popup(context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "up")
+        layout.prop(self, "scale")
+        layout.prop(self, "guides")
+        mesh = active_mesh(context)
+        row = layout.row(heading="" if mesh is None else mesh.name)
+        row.enabled = mesh is not None
+        row.prop(self, "onto_mesh")
+
+    def _paths(self) -> list[Path]:
+        """Several files chosen or dropped, else the one of `filepath`."""
+        named = [Path(self.directory) / file.name for file in self.files if file.name]
+        return named or [Path(self.filepath)]
+
+
+class HAIRLOOM_FH_strands(bpy.types.FileHandler):
+    """Files dropped into the viewport or the outliner"""
+
+    bl_idname = "HAIRLOOM_FH_strands"
+    bl_label = "Hairloom Hair Strands"
+    bl_import_operator = "hairloom.import_strands"
+    bl_file_extensions = ";".join(SUFFIXES)
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return poll_file_object_drop(context)
+
+
+def draw_imports(layout: bpy.types.UILayout) -> None:
+    """The entries of File > Import, one a format."""
+    for title, suffixes in FILE_KINDS:
+        text = f"Hairloom {title} ({'/'.join(suffixes)})"
+        entry = layout.operator("hairloom.import_strands", text=text)
+        entry.filter_glob = _filter(suffixes)
+
+
+CLASSES = (HAIRLOOM_OT_import_strands, HAIRLOOM_FH_strands)

@@ -1,0 +1,201 @@
+"""The verb `import`, and grooms of all formats for the other verbs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.exchange.groom import Groom
+from hairloom.addon.exchange.groom_alembic import write_groom_alembic
+from hairloom.addon.exchange.groom_usd import write_usd
+from hairloom.addon.exchange.hair_file import write_hair_file
+from hairloom.addon.exchange.tressfx import write_tfx
+from hairloom.addon.groom.settings import GrowSettings
+from hairloom.addon.host import command_line
+from hairloom.addon.host.inputs import Sources, read_inputs
+from hairloom.addon.strands import StrandSet
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+#: a box of 20 x 20 x 20 cm on the ground, as .obj has it with Y up
+HEAD_OBJ = """
+v -0.1 0 -0.1
+v 0.1 0 -0.1
+v 0.1 0 0.1
+v -0.1 0 0.1
+v -0.1 0.2 -0.1
+v 0.1 0.2 -0.1
+v 0.1 0.2 0.1
+v -0.1 0.2 0.1
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+f 1/1 2/2 3/3 4/4
+f 8/1 7/2 6/3 5/4
+f 1/1 5/2 6/3 2/4
+f 2/1 6/2 7/3 3/4
+f 3/1 7/2 8/3 4/4
+f 4/1 8/2 5/3 1/4
+"""
+WRITERS: dict[str, Callable[[Path, Groom], Any]] = {
+    ".abc": write_groom_alembic,
+    ".usdc": write_usd,
+    ".tfx": write_tfx,
+    ".hair": write_hair_file,
+}
+
+
+def hairdo() -> Groom:
+    """Straight hair on the top of the box; every fifth strand is a guide."""
+    random = np.random.default_rng(5)
+    root = random.uniform(-0.09, 0.09, (50, 1, 3)) * [1.0, 1.0, 0.0] + [0.0, 0.0, 0.2]
+    points = root + np.linspace(0.0, 0.1, 8)[:, None] * [0.3, 0.1, 1.0]
+    strands = StrandSet(
+        points.reshape(-1, 3), np.arange(51) * 8, np.full(400, 4e-5), np.arange(50) % 2
+    )
+    return Groom(strands, is_guide=np.arange(50) % 5 == 0, group_names={0: "left", 1: "right"})
+
+
+@pytest.fixture
+def head(tmp_path: Path) -> Path:
+    path = tmp_path / "head.obj"
+    path.write_text(HEAD_OBJ)
+    return path
+
+
+def grooms_of(scene: Path) -> dict[str, Any]:
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    return {each.name: each for each in bpy.data.objects if each.type == "CURVES"}
+
+
+def test_files_of_all_formats_come_into_a_scene_on_a_head_from_a_file(
+    tmp_path: Path, head: Path
+) -> None:
+    files = [tmp_path / f"from_{suffix[1:]}{suffix}" for suffix in WRITERS]
+    for file in files:
+        WRITERS[file.suffix](file, hairdo())
+    scene, report = tmp_path / "made" / "scene.blend", tmp_path / "report.json"
+    arguments = ["import", *map(str, files), "--head", str(head), "--output", str(scene)]
+    arguments += ["--set", "shading.melanin=0.25", "--report", str(report)]
+
+    assert command_line.run(arguments) == 0
+
+    told = json.loads(report.read_text())
+    assert told["head"] == "head" and told["status"] == "done" and told["dropped"] == {}
+    assert [each["file"] for each in told["objects"]] == [file.name for file in files]
+    assert [each["strands"] for each in told["objects"]] == [40] * 4
+    assert any("10 guides were left out" in note for note in told["notes"])
+    assert told["outputs"] == ["scene.blend"] and "import" in told["stages_ms"]
+    grooms = grooms_of(scene)
+    assert sorted(grooms) == ["from_abc", "from_hair", "from_tfx", "from_usdc"]
+    expected = hairdo().without_guides().strands.points
+    for hair in grooms.values():
+        assert hair.data.surface == hair.parent == bpy.data.objects["head"]
+        assert hair.data.hairloom.shading.melanin == 0.25
+        points = np.empty((320, 3), np.float32)
+        hair.data.position_data.foreach_get("vector", points.ravel())
+        np.testing.assert_allclose(points, expected, atol=1e-6)
+
+
+def test_guides_can_be_apart_on_a_head_of_the_scene(tmp_path: Path, sphere: Any) -> None:
+    sphere.scale = (1.5, 1.5, 1.0)
+    sphere.location.z = 0.1
+    write_usd(tmp_path / "hair.usdc", hairdo())
+    scene = tmp_path / "scene.blend"
+    arguments = ["import", str(tmp_path / "hair.usdc"), "--head", "Head", "--guides", "apart"]
+    assert command_line.run([*arguments, "--output", str(scene)]) == 0
+    counts = {name: len(hair.data.curves) for name, hair in grooms_of(scene).items()}
+    assert counts == {"hair": 40, "hair Guides": 10}
+
+
+@pytest.mark.parametrize(
+    ("head", "problem"),
+    [
+        ("Nobody", "Nobody: this does not name a mesh"),
+        ("Camera", "Camera: this does not name a mesh"),
+        ("none.obj", "none.obj: there is no such file"),
+        ("two.obj", "it holds 2 meshes"),
+    ],
+)
+def test_a_head_that_is_none_is_named(
+    tmp_path: Path, head: str, problem: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bpy.context.collection.objects.link(
+        bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    )
+    triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n"
+    (tmp_path / "two.obj").write_text(f"o one\n{triangle}o two\n{triangle}")
+    write_usd(tmp_path / "hair.usdc", hairdo())
+    name = str(tmp_path / head) if "." in head else head
+    output = tmp_path / "scene.blend"
+    arguments = ["import", str(tmp_path / "hair.usdc"), "--head", name, "--output", str(output)]
+    assert command_line.run(arguments) == 1
+    assert problem in capfd.readouterr().err
+    assert not output.exists()
+
+
+def test_one_bad_file_keeps_the_scene_from_being_written(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    write_usd(tmp_path / "hair.usdc", hairdo())
+    (tmp_path / "bad.abc").write_bytes(b"no hair in here")
+    report, output = tmp_path / "report.json", tmp_path / "scene.blend"
+    files = [str(tmp_path / name) for name in ("hair.usdc", "bad.abc")]
+    arguments = ["import", *files, "--output", str(output), "--report", str(report)]
+    assert command_line.run(arguments) == 1
+    message = capfd.readouterr().err
+    assert "bad.abc: this is no Alembic file" in message and "Traceback" not in message
+    assert not output.exists() and json.loads(report.read_text())["status"] == "failed"
+
+
+def test_strict_refuses_what_would_be_dropped(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "hair.tfx"
+    write_tfx(path, hairdo())
+    content = bytearray(path.read_bytes())
+    content[160:164] = np.float32(np.nan).tobytes()  # the first point of the first strand
+    path.write_bytes(content)
+    output = tmp_path / "scene.blend"
+    arguments = ["import", str(path), "--output", str(output)]
+    assert command_line.run([*arguments, "--strict"]) == 1
+    assert "1 (a point that is not finite)" in capfd.readouterr().err
+    assert not output.exists()
+    assert command_line.run(arguments) == 0
+    assert len(grooms_of(output)["hair"].data.curves) == 39
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_other_verbs_take_grooms_of_all_formats(tmp_path: Path, head: Path, suffix: str) -> None:
+    path = tmp_path / f"hair{suffix}"
+    WRITERS[suffix](path, hairdo())
+    inputs = read_inputs(Sources(groom=str(path), head=str(head)), GrowSettings())
+    expected = hairdo().without_guides().strands.points
+    np.testing.assert_allclose(inputs.strands.points, expected, atol=1e-6)
+    assert inputs.dropped == {}
+    told = any("10 guides were left out" in note for note in inputs.notes)
+    assert told == (suffix in (".abc", ".usdc"))
+
+
+def test_axes_and_scale_of_a_groom_are_passed_on(tmp_path: Path, head: Path) -> None:
+    """A .tfx has Y up; read as if it had Z up, its numbers stay as they are."""
+    write_tfx(tmp_path / "hair.tfx", hairdo())
+    sources = Sources(str(tmp_path / "hair.tfx"), str(head), groom_up="Z", groom_scale=2.0)
+    x, y, z = hairdo().without_guides().strands.points.T
+    points = read_inputs(sources, GrowSettings()).strands.points
+    np.testing.assert_allclose(points, np.stack([x, z, -y], axis=1) * 2.0, atol=1e-6)
+
+
+def test_a_name_that_is_neither_an_object_nor_a_file_is_told(
+    tmp_path: Path, head: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["render", "--groom", "Hair.017", "--head", str(head)]
+    assert command_line.run([*arguments, "--output", str(tmp_path / "a.png")]) == 1
+    assert "Hair.017: this names neither a hair curves object" in capfd.readouterr().err

@@ -1,0 +1,199 @@
+"""The one way in for files of strands: suffixes, axes, scales, and guides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.groom import Groom, GroomMotion
+from hairloom.addon.exchange.groom_alembic import write_groom_alembic
+from hairloom.addon.exchange.groom_presets import BLENDER, UNITY, UNREAL
+from hairloom.addon.exchange.groom_usd import write_usd
+from hairloom.addon.exchange.hair_file import write_hair_file
+from hairloom.addon.exchange.strand_formats import SUFFIXES
+from hairloom.addon.exchange.strand_reading import read_strands
+from hairloom.addon.exchange.tressfx import write_tfx
+from hairloom.addon.strands import StrandSet
+
+pytest.importorskip("alembic3d", reason="it is missing: `make setup` installs it")
+pytest.importorskip("pxr", reason="usd-core is missing: `make setup` installs it")
+from pxr import Usd, UsdGeom
+
+
+def groom(guides: tuple[int, ...] = (1, 3)) -> Groom:
+    """Five strands of four points, all of one thickness, some of them guides."""
+    random = np.random.default_rng(4)
+    is_guide = np.isin(np.arange(5), guides)
+    strands = StrandSet(
+        random.uniform(-0.3, 0.3, (20, 3)), np.arange(6) * 4, np.full(20, 4e-5), np.zeros(5)
+    )
+    return Groom(
+        strands,
+        strand_id=np.arange(5) + 10,
+        is_guide=is_guide,
+        closest_guides=np.tile([11, 13, 11], (5, 1)),
+        guide_weights=np.tile([0.5, 0.25, 0.25], (5, 1)),
+    )
+
+
+def write(path: Path, hair: Groom) -> None:
+    if path.suffix == ".abc":
+        write_groom_alembic(path, hair, BLENDER)
+    elif path.suffix == ".tfx":
+        write_tfx(path, hair, parts="both")
+    elif path.suffix == ".hair":
+        write_hair_file(path, hair, parts="both")
+    else:
+        write_usd(path, hair)
+
+
+@pytest.mark.parametrize("suffix", [*SUFFIXES, ".ABC"])
+def test_what_was_written_in_any_format_is_read_by_its_suffix(tmp_path: Path, suffix: str) -> None:
+    write(tmp_path / f"hair{suffix.lower()}", groom())
+    path = (tmp_path / f"hair{suffix.lower()}").rename(tmp_path / f"hair{suffix}")
+    read = read_strands(path, parts="both")
+    np.testing.assert_array_equal(read.strands.points, groom().strands.points)
+    np.testing.assert_allclose(read.strands.radius, 4e-5, rtol=1e-6)
+    assert read.source == path and read.dropped == {}
+    if suffix in (".abc", ".usdc"):
+        for name in ("strand_id", "is_guide", "closest_guides", "guide_weights"):
+            np.testing.assert_array_equal(getattr(read.groom, name), getattr(groom(), name))
+
+
+@pytest.mark.parametrize("suffix", [".abc", ".usdc", ".tfx", ".hair"])
+@pytest.mark.parametrize("scale", [1.0, 0.01, 2.54])
+@pytest.mark.parametrize("up", ["Y", "Z"])
+def test_axes_and_scale_of_every_format_can_be_told(
+    tmp_path: Path, suffix: str, scale: float, up: str
+) -> None:
+    """All but .usdc and .hair are written with Y up; read with Z up, their numbers stay as they
+    are."""
+    path, hair = tmp_path / f"hair{suffix}", groom().strands.points
+    write(path, groom())
+    read = read_strands(path, up=up, scale=scale, parts="both").strands
+    x, y, z = hair.T
+    expected = hair
+    if suffix in (".abc", ".tfx") and up == "Z":
+        expected = np.stack([x, z, -y], axis=1)
+    if suffix in (".usdc", ".hair") and up == "Y":
+        expected = np.stack([x, -z, y], axis=1)
+    np.testing.assert_allclose(read.points, expected * scale, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(read.radius, 4e-5 * scale, rtol=1e-5)
+
+
+@pytest.mark.parametrize("preset", [UNREAL, UNITY, BLENDER], ids=lambda preset: preset.name)
+def test_our_alembic_files_say_their_own_space(tmp_path: Path, preset: Any) -> None:
+    write_groom_alembic(tmp_path / "a.abc", groom(), replace(preset, parts="both", is_split=False))
+    read = read_strands(tmp_path / "a.abc", parts="both")
+    np.testing.assert_allclose(read.strands.points, groom().strands.points, atol=1e-7)
+    assert read.notes == ()
+
+
+@pytest.mark.parametrize("suffix", [".abc", ".usda"])
+def test_strands_come_without_their_guides_and_guides_without_strands(
+    tmp_path: Path, suffix: str
+) -> None:
+    path, hair = tmp_path / f"hair{suffix}", groom()
+    write(path, hair)
+    read = read_strands(path)
+    np.testing.assert_array_equal(read.groom.strand_id, [10, 12, 14])
+    assert read.groom.is_guide is None and read.groom.closest_guides is None
+    assert any("2 guides were left out" in note for note in read.notes)
+    read = read_strands(path, parts="guides")
+    np.testing.assert_array_equal(read.groom.strand_id, [11, 13])
+    np.testing.assert_array_equal(read.strands.points, hair.guides().strands.points)
+    assert any("3 strands were left out" in note for note in read.notes)
+
+
+def test_a_file_of_guides_alone_gives_those(tmp_path: Path) -> None:
+    write(tmp_path / "hair.abc", groom(guides=(0, 1, 2, 3, 4)))
+    read = read_strands(tmp_path / "hair.abc")
+    assert read.strands.strand_count == 5 and read.groom.is_guide.all()
+    assert any("nothing but guides" in note for note in read.notes)
+
+
+def test_several_grooms_in_a_file_become_one_and_that_is_told(tmp_path: Path) -> None:
+    stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    for name in ("front", "back"):
+        curves = UsdGeom.BasisCurves.Define(stage, f"/{name}")
+        curves.CreateTypeAttr("linear")
+        curves.CreatePointsAttr([(0, 0, 0), (0, 0.1, 0)])
+        curves.CreateCurveVertexCountsAttr([2])
+    stage.Save()
+    read = read_strands(tmp_path / "two.usda")
+    assert dict(read.groom.group_names) == {0: "front", 1: "back"}
+    assert "two.usda: its 2 prims of curves became one groom." in read.notes
+    write_groom_alembic(
+        tmp_path / "two.abc", groom_of_groups(), replace(BLENDER, is_split=True, parts="both")
+    )
+    read = read_strands(tmp_path / "two.abc")
+    assert read.strands.group.tolist() == [0, 0, 1, 1, 1]
+    assert "two.abc: its 2 curves objects became one groom." in read.notes
+
+
+@pytest.mark.parametrize("suffix", [".abc", ".usdc"])
+def test_of_motion_the_first_frame_is_read_and_that_is_told(tmp_path: Path, suffix: str) -> None:
+    hair = groom()
+    rest = hair.strands.points
+    motion = GroomMotion([rest, rest + 1.0, rest + 2.0], rate=24.0)
+    if suffix == ".abc":
+        write_groom_alembic(tmp_path / "hair.abc", hair, BLENDER, motion=motion)
+    else:
+        write_usd(tmp_path / "hair.usdc", hair, motion=motion)
+    read = read_strands(tmp_path / f"hair{suffix}", parts="both")
+    np.testing.assert_array_equal(read.strands.points, rest)
+    assert any("its motion was left out" in note for note in read.notes)
+
+
+def groom_of_groups() -> Groom:
+    strands = replace(groom().strands, group=np.array([0, 0, 1, 1, 1], np.int32))
+    return Groom(strands, group_names={0: "front", 1: "back"})
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("hair", b"x", "it has no suffix"),
+        ("hair.obj", b"x", "'.obj' is no suffix of files of strands"),
+        ("hair.abc", b"HAIR" + bytes(200), "this is no Alembic file"),
+        ("hair.tfx", b"#usda 1.0\n" + bytes(200), "no TressFX 3 or 4 file"),
+        ("hair.usdc", b"Ogawa\xff" + bytes(200), "USD"),
+        ("hair.hair", b"PXR-USDC" + bytes(200), "no .hair file"),
+        ("hair.usd", b"", "empty"),
+        ("hair.abc", b"", "empty"),
+    ],
+)
+def test_files_that_are_none_of_theirs_are_named(
+    tmp_path: Path, name: str, content: bytes, problem: str
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(HairloomError) as raised:
+        read_strands(path)
+    assert problem in raised.value.problem
+    assert raised.value.place == str(path) and raised.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("wishes", "place"),
+    [({"parts": "cards"}, "parts"), ({"scale": 0.0}, "scale"), ({"scale": np.nan}, "scale")],
+)
+def test_wishes_that_make_no_sense_are_refused(
+    tmp_path: Path, wishes: dict[str, Any], place: str
+) -> None:
+    write(tmp_path / "hair.tfx", groom())
+    with pytest.raises(HairloomError) as raised:
+        read_strands(tmp_path / "hair.tfx", **wishes)
+    assert raised.value.place == place
+
+
+def test_guides_of_a_file_without_any_are_refused(tmp_path: Path) -> None:
+    write(tmp_path / "hair.tfx", groom())
+    with pytest.raises(HairloomError, match="none of its strands is marked as a guide"):
+        read_strands(tmp_path / "hair.tfx", parts="guides")

@@ -1,0 +1,117 @@
+"""Grooms of files in the window: the file browser of a menu entry, the popup of dropped files, undo
+and redo."""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import look_from_front, press, until, viewport
+
+FOLDER = Path(bpy.app.tempdir) / "grooms"
+
+
+def of_hairloom(module):
+    return __import__(f"{driver.EXTENSION}.addon.{module}", fromlist=["_"])
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    set_the_scene()
+    yield from the_menu_opens_a_browser_for_its_format()
+    yield from dropped_files_come_in_after_the_popup()
+    yield from undo_and_redo()
+
+
+def set_the_scene():
+    for obj in list(bpy.data.objects):
+        if obj.type == "MESH":
+            bpy.data.objects.remove(obj)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    bpy.context.object.name = "Head"
+    look_from_front(0.9)
+    FOLDER.mkdir()
+    outward = np.random.default_rng(1).normal(size=(500, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    points = outward[:, None] * np.linspace(0.1, 0.2, 8)[:, None]
+    strands = of_hairloom("strands").StrandSet(
+        points.reshape(-1, 3), np.arange(501) * 8, np.full(4000, 1e-4), np.arange(500) % 3
+    )
+    groom = of_hairloom("exchange.groom").Groom(strands)
+    of_hairloom("exchange.tressfx").write_tfx(FOLDER / "first.tfx", groom)
+    of_hairloom("exchange.hair_file").write_hair_file(FOLDER / "second.hair", groom)
+    with in_the_view():
+        bpy.ops.ed.undo_push(message="the scene")  # what a script changes is no step by itself
+
+
+def in_the_view():
+    area = viewport()
+    region = next(each for each in area.regions if each.type == "WINDOW")
+    return bpy.context.temp_override(window=bpy.context.window, area=area, region=region)
+
+
+def grooms():
+    return {each.name: each for each in bpy.data.objects if each.type == "CURVES"}
+
+
+def browsers():
+    """The areas of all windows that show files."""
+    areas = (area for w in bpy.context.window_manager.windows for area in w.screen.areas)
+    return [area for area in areas if area.type == "FILE_BROWSER"]
+
+
+def the_menu_opens_a_browser_for_its_format():
+    with in_the_view():
+        bpy.ops.hairloom.import_strands("INVOKE_DEFAULT", filter_glob="*.hair")
+    yield from until(lambda: bool(browsers()), "no file browser has come")
+    yield 10
+    (browser,) = browsers()
+    assert browser.spaces.active.params.filter_glob == "*.hair"
+    driver.screenshot("browser")
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1], area=browser):
+        bpy.ops.file.cancel()
+    yield from until(lambda: not browsers(), "the file browser stays")
+    assert grooms() == {}
+
+
+def dropped_files_come_in_after_the_popup():
+    """What Blender does when files are dropped: it calls the operator with their names."""
+    handler = bpy.types.HAIRLOOM_FH_strands
+    with in_the_view():
+        assert handler.poll_drop(bpy.context)
+        bpy.ops.hairloom.import_strands(
+            "INVOKE_DEFAULT",
+            True,
+            filepath=str(FOLDER / "first.tfx"),
+            directory=str(FOLDER),
+            files=[{"name": "first.tfx"}, {"name": "second.hair"}],
+        )
+    yield 10
+    assert grooms() == {}, "it does not ask before"
+    driver.screenshot("popup")
+    yield from press("RET")
+    yield from until(lambda: len(grooms()) == 2, "the files do not come in")
+    head = bpy.data.objects["Head"]
+    assert all(each.data.surface == head for each in grooms().values())
+    assert bpy.context.view_layer.objects.active == grooms()["first"]
+    yield 10
+    driver.screenshot("imported")
+
+
+def undo_and_redo():
+    with in_the_view():
+        bpy.ops.ed.undo()
+    yield 5
+    assert grooms() == {}
+    assert [each.name for each in bpy.data.objects if each.type == "MESH"] == ["Head"]
+    with in_the_view():
+        bpy.ops.ed.redo()
+    yield 5
+    assert sorted(grooms()) == ["first", "second"]
+
+
+driver.play(steps())
