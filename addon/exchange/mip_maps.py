@@ -74,33 +74,6 @@ def mip_levels(
         yield {name: made[name] for name in maps}
 
 
-def mip_chain(
-    image: Floats,
-    *,
-    alpha: Floats | None = None,
-    is_direction: bool = False,
-    grid: AtlasGrid | None = None,
-) -> list[Floats]:
-    """All levels of one image, itself first; see `mip_levels`.
-
-    Args:
-        image: (height, width) or (height, width, channels) in [0, 1].
-        alpha: (height, width), how much each texel counts.
-        is_direction: it holds unit vectors as 0.5 d + 0.5.
-    """
-    name = DIRECTIONS[0] if is_direction else "base"
-    maps = {name: image} | ({} if alpha is None else {"alpha": alpha})
-    return [level[name] for level in mip_levels(maps, grid=grid)]
-
-
-def alpha_chain(
-    alpha: Floats, *, threshold: float = 0.5, grid: AtlasGrid | None = None
-) -> list[Floats]:
-    """All levels of an alpha (height, width) with its coverage kept, itself first."""
-    levels = mip_levels({"alpha": alpha}, grid=grid, threshold=threshold)
-    return [level["alpha"] for level in levels]
-
-
 @dataclass(frozen=True)
 class _Taps:
     """Along one axis: what each texel of the smaller level is made of.

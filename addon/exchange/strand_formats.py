@@ -28,6 +28,7 @@ USD = StrandFormat("usd", "USD", (".usdc", ".usd", ".usda"), has_motion=True)
 TRESSFX = StrandFormat("tressfx", "TressFX", (".tfx",), has_motion=False)
 HAIR = StrandFormat("hair", "Cem Yuksel's .hair", (".hair",), has_motion=False)
 STRAND_FORMATS = (ALEMBIC, USD, TRESSFX, HAIR)
+SUFFIXES = tuple(suffix for each in STRAND_FORMATS for suffix in each.suffixes)
 
 
 def strand_format(path: Path) -> StrandFormat:
@@ -40,9 +41,8 @@ def strand_format(path: Path) -> StrandFormat:
     for each in STRAND_FORMATS:
         if suffix in each.suffixes:
             return each
-    known = ", ".join(suffix for each in STRAND_FORMATS for suffix in each.suffixes)
     raise HairloomError(
         f"'{path.suffix}' is no suffix of files of strands" if path.suffix else "it has no suffix",
         place=str(path),
-        remedy=f"Choose one of {known}",
+        remedy="Choose one of " + ", ".join(SUFFIXES),
     )

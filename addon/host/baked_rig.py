@@ -79,6 +79,8 @@ def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
         "hair_rest": rests.hair,
         "notes": np.array(rig.notes, np.str_),
     }
+    if strands.root_uv is not None:
+        arrays["root_uv"] = strands.root_uv
     if rig.head is not None and rests.head is not None:
         assert strands.root_triangle is not None and strands.root_barycentric is not None
         arrays |= {
@@ -120,6 +122,7 @@ def _rig_of(arrays: Arrays) -> BakedRig:
         offsets=np.arange(count + 1, dtype=np.int32) * cv_count,
         radius=arrays["radius"],
         group=arrays["group"],
+        root_uv=arrays.get("root_uv"),
         root_triangle=arrays.get("root_triangle"),
         root_barycentric=arrays.get("root_barycentric"),
     )

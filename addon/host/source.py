@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
 from ..strands.clean import Cleaned
@@ -25,12 +25,14 @@ class Source:
     """Hair and head as Blender shows them, in world space.
 
     dropped: reason -> number of curves that cannot be used.
+    kept: (strand_count,) indices of the curves that became strands.
     density: (vertex_count,) how densely children grow on the head, or None.
     head_warning, density_warning: what the artist should know, with its remedy; or empty.
     """
 
     strands: StrandSet
     dropped: dict[str, int]
+    kept: Ints
     head: Surface | None
     density: Floats | None = None
     head_warning: str = ""
@@ -50,7 +52,9 @@ def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sourc
     read = usable_curves(hair, depsgraph)
     head, head_warning = _read_head(hair, depsgraph)
     density, density_warning = read_density(hair, head, depsgraph)
-    return Source(read.strands, read.dropped, head, density, head_warning, density_warning)
+    return Source(
+        read.strands, read.dropped, read.kept, head, density, head_warning, density_warning
+    )
 
 
 def read_density(

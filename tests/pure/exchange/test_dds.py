@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mip_chains import mip_chain
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange import dds
 from hairloom.addon.exchange.dds import has_compressor, write_dds
-from hairloom.addon.exchange.mip_maps import level_sizes, mip_chain
+from hairloom.addon.exchange.mip_maps import level_sizes
 from hairloom.addon.exchange.srgb import srgb_decoded
 
 oiio = pytest.importorskip("OpenImageIO", reason="DDS files are read through it")

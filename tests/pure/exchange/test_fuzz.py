@@ -1,10 +1,11 @@
-"""Damaged files of all formats we parse ourselves, and writers killed in their work.
+"""Damaged files of all formats that are read, and writers killed in their work.
 
 `bench/_exchange_files.py` does the same with 10,000 files and 100 kills of each format.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import subprocess
@@ -14,21 +15,33 @@ from typing import Any
 
 import damaged_files
 import fuzz_files
-import kill_writes
 import pytest
 from extension_loader import REPOSITORY
 
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.apart import same_packages
+
+
+def with_library(kind: str, package: str) -> Any:
+    has_it = importlib.util.find_spec(package) is not None
+    return pytest.param(kind, marks=pytest.mark.skipif(not has_it, reason=f"no {package} here"))
+
 
 FORMATS = ("tfx", "tfxbone", "hair", "preset")
-FILES, KILLS = 300, 12
+#: what libraries parse, in another process that takes its time
+APART = tuple(
+    with_library(kind, package)
+    for kind, package in (("abc", "alembic3d"), ("usdc", "pxr"), ("usda", "pxr"))
+)
+WRITTEN = (*FORMATS, "glb", *APART[:2])
+FILES, FILES_APART, KILLS = 300, 12, 12
 
 
 def report(tool: str, *arguments: str) -> dict[str, Any]:
     """What a tool says in a process of its own, which may crash."""
     in_package = str(REPOSITORY / "tools" / "in_package.py")
     command = [sys.executable, in_package, tool, *arguments]
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    environment = {**os.environ, **same_packages(), "OPENBLAS_NUM_THREADS": "1"}
     run = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=120)
     assert run.returncode == 0, run.stderr
     return json.loads(run.stdout.splitlines()[-1])
@@ -41,10 +54,18 @@ def test_no_damage_ends_in_anything_but_a_groom_or_a_message(kind: str) -> None:
     assert min(found["read"], found["refused"]) > FILES // 20, found
 
 
-@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("kind", APART)
+def test_damage_to_what_libraries_parse_is_told_too(kind: str) -> None:
+    found = report("fuzz_files", kind, str(FILES_APART))
+    assert found["failures"] == []
+    assert found["read"] + found["refused"] == FILES_APART
+
+
+@pytest.mark.parametrize("kind", WRITTEN)
 def test_a_killed_writer_leaves_the_old_file_or_the_new_one(kind: str) -> None:
+    """And what it leaves beside goes with the next write."""
     found = report("kill_writes", kind, str(KILLS))
-    assert (found["trials"], found["failures"]) == (KILLS, 0)
+    assert (found["trials"], found["failures"], found["leftovers"]) == (KILLS, 0, 0)
 
 
 def test_killing_a_plain_writer_is_seen() -> None:
@@ -89,14 +110,13 @@ def test_damage_is_the_same_for_the_same_number() -> None:
     assert len({damaged_files.mutated("hair", 3, number) for number in range(50)}) > 45
 
 
-@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("kind", (*FORMATS, *APART))
 def test_the_files_to_be_damaged_are_sound(kind: str, tmp_path: Path) -> None:
     small, large = damaged_files.originals(kind)
     path = tmp_path / f"sound.{kind}"
     for content in (*small, *large):
         path.write_bytes(content)
         assert fuzz_files.unsound(fuzz_files.READERS[kind](path)) == ""
-    assert set(kill_writes.WRITERS) == {*FORMATS, "plain"}
 
 
 def test_a_large_preset_is_refused_before_it_is_read(tmp_path: Path) -> None:

@@ -6,9 +6,10 @@ import itertools
 
 import numpy as np
 import pytest
+from mip_chains import alpha_chain, mip_chain
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
-from hairloom.addon.exchange.mip_maps import alpha_chain, level_sizes, mip_chain, mip_levels
+from hairloom.addon.exchange.mip_maps import level_sizes, mip_levels
 
 THRESHOLD = 0.5
 

@@ -1,0 +1,109 @@
+"""Several grooms as one, each with groups of its own: what engines import as one asset."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..strands import StrandSet
+from .groom import Groom
+from .tfxbone import BoneWeights
+
+
+def joined_grooms(grooms: Sequence[Groom], name: str) -> tuple[Groom, tuple[str, ...]]:
+    """All strands one after the other, their groups numbered anew, and named after their groom.
+
+    Returns:
+        the groom, and what is lost because not all of them have it.
+    """
+    if len(grooms) == 1:
+        return grooms[0], ()
+    groups, names = _groups(grooms)
+    values: dict[str, Any] = {
+        "color": _all_or_none([groom.color for groom in grooms]),
+        "is_guide": _guides(grooms),
+        **_numbered(grooms),
+    }
+    strands = [groom.strands for groom in grooms]
+    root_uv = _all_or_none([each.root_uv for each in strands])
+    starts = np.cumsum([0, *(each.point_count for each in strands[:-1])])
+    ends = [each.offsets[1:] + start for each, start in zip(strands, starts, strict=True)]
+    together = StrandSet(
+        np.concatenate([each.points for each in strands]),
+        np.concatenate([[0], *ends]),
+        np.concatenate([each.radius for each in strands]),
+        groups,
+        root_uv,
+    )
+    without = [groom.name for groom in grooms if groom.strands.root_uv is None]
+    notes: tuple[str, ...] = ()
+    if root_uv is None and len(without) < len(grooms):
+        notes = (
+            f"{', '.join(without)}: no root UVs, so the file has none at all. Give this hair a "
+            "surface with UVs, or write it to a file of its own.",
+        )
+    return Groom(together, name, group_names=names, **values), notes
+
+
+def joined_bones(bones: Sequence[BoneWeights]) -> BoneWeights:
+    """Of all strands one after the other; bones of the same name are one."""
+    names = tuple(dict.fromkeys(name for each in bones for name in each.names))
+    places = {name: place for place, name in enumerate(names)}
+    carried = [np.array([places[name] for name in each.names])[each.bone] for each in bones]
+    weight = np.concatenate([each.weight for each in bones])
+    bone = np.where(weight == 0.0, 0, np.concatenate(carried))
+    return BoneWeights(names, bone, weight)
+
+
+def _groups(grooms: Sequence[Groom]) -> tuple[Any, dict[int, str]]:
+    """New numbers of groups, one array for all strands, and their names."""
+    numbers, names, taken = [], {}, 0
+    for groom in grooms:
+        old, place = np.unique(groom.strands.group, return_inverse=True)
+        numbers.append(place + taken)
+        for index, group in enumerate(old.tolist()):
+            own = groom.group_names.get(group, "" if len(old) == 1 else str(group))
+            names[taken + index] = f"{groom.name} {own}".strip()
+        taken += len(old)
+    return np.concatenate(numbers), names
+
+
+def _numbered(grooms: Sequence[Groom]) -> dict[str, Any]:
+    """New IDs of all strands, and the same guides by them; nothing where no groom has IDs."""
+    if all(groom.strand_id is None for groom in grooms):
+        return {}
+    ids, closest, taken = [], [], 0
+    for groom in grooms:
+        count = groom.strands.strand_count
+        old = np.arange(count) if groom.strand_id is None else groom.strand_id
+        known, place = np.unique(old, return_inverse=True)
+        ids.append(place + taken)
+        if groom.closest_guides is not None:
+            closest.append(np.searchsorted(known, groom.closest_guides) + taken)
+        taken += count
+    if len(closest) < len(grooms):
+        return {"strand_id": np.concatenate(ids)}
+    weights = _all_or_none([groom.guide_weights for groom in grooms])
+    return {
+        "strand_id": np.concatenate(ids),
+        "closest_guides": np.concatenate(closest),
+        "guide_weights": weights,
+    }
+
+
+def _guides(grooms: Sequence[Groom]) -> Any:
+    """Marks of guides where some grooms have them; None where none has."""
+    if all(groom.is_guide is None for groom in grooms):
+        return None
+    return np.concatenate(
+        [
+            np.zeros(g.strands.strand_count, bool) if g.is_guide is None else g.is_guide
+            for g in grooms
+        ]
+    )
+
+
+def _all_or_none(parts: list[Any]) -> Any:
+    return None if any(part is None for part in parts) else np.concatenate(parts)

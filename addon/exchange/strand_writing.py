@@ -1,0 +1,197 @@
+"""Strands to a file of any of the formats, by its suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import HairloomError
+from .file_set import written_together
+from .groom import Groom, GroomMotion, points_of
+from .groom_alembic import write_groom_alembic
+from .groom_presets import chosen_parts
+from .groom_usd import write_usd
+from .group_files import group_files
+from .hair_file import write_hair_file
+from .strand_formats import ALEMBIC, HAIR, TRESSFX, USD, strand_format
+from .strand_output import StrandOutput, layout_of, metres_per_unit
+from .tfxbone import BoneWeights, write_tfxbone
+from .tressfx import STRANDS_AT_ONCE, write_tfx
+
+
+@dataclass(frozen=True)
+class WrittenStrands:
+    """What was written.
+
+    files: all of them, that of the given path first where there is one.
+    notes: what the files cannot say of the groom.
+    """
+
+    files: tuple[Path, ...]
+    notes: tuple[str, ...]
+
+
+def write_strands(
+    path: Path,
+    groom: Groom,
+    output: StrandOutput | None = None,
+    motion: GroomMotion | None = None,
+) -> WrittenStrands:
+    """Write a groom; all its files are there complete, or what was there before stays.
+
+    Args:
+        motion: of the groom's points; for Alembic and USD.
+
+    Raises:
+        HairloomError: a suffix, engine or unit that cannot be, motion for a format without,
+            nothing to write, a library that is missing, or nothing can be written there.
+    """
+    kind, output = strand_format(path), output or StrandOutput()
+    if motion is not None and not kind.has_motion:
+        raise HairloomError(
+            f"{kind.title} holds no motion",
+            place=str(path),
+            remedy="Write one frame, or choose Alembic (.abc) or USD (.usdc)",
+        )
+    return _WRITERS[kind.name](path, groom, output, motion)
+
+
+def _write_alembic(
+    path: Path, groom: Groom, output: StrandOutput, motion: GroomMotion | None
+) -> WrittenStrands:
+    preset = layout_of(ALEMBIC, output)
+    write_groom_alembic(path, groom, preset, motion=motion)
+    long = int((chosen_parts(groom, preset.parts).strands.point_counts > preset.most_points).sum())
+    notes: tuple[str, ...] = ()
+    if long:
+        notes = (f"{path.name}: {long:,} strands were resampled to {preset.most_points} points.",)
+    return WrittenStrands((path,), notes)
+
+
+def _write_usd(
+    path: Path, groom: Groom, output: StrandOutput, motion: GroomMotion | None
+) -> WrittenStrands:
+    layout = layout_of(USD, output)
+    chosen = _chosen(groom, layout.parts)
+    if motion is not None and len(chosen) < groom.strands.strand_count:
+        points = points_of(groom.strands, chosen)
+        motion = replace(motion, positions=_only(motion, points))
+    write_usd(
+        path,
+        _part(groom, chosen, layout.parts),
+        up=layout.space.up,
+        scale=metres_per_unit(USD, output),
+        by_group=layout.is_split,
+        is_linear=layout.basis == "linear",
+        motion=motion,
+    )
+    return WrittenStrands((path,), ())
+
+
+def _write_tressfx(
+    path: Path, groom: Groom, output: StrandOutput, _motion: GroomMotion | None
+) -> WrittenStrands:
+    layout, scale = layout_of(TRESSFX, output), metres_per_unit(TRESSFX, output)
+
+    def write(file: Path, part: Groom, bones: BoneWeights | None) -> tuple[str, ...]:
+        notes = write_tfx(
+            file,
+            part,
+            up=layout.space.up,
+            scale=scale,
+            vertex_count=output.vertex_count,
+            parts="both",  # they are chosen already
+            held_count=output.held_count,
+            multiple_of_64=output.fills_groups,
+            vertex_uv=output.point_uv,
+        )
+        if bones is not None:
+            count = part.strands.strand_count
+            filled = count + (-count % STRANDS_AT_ONCE if output.fills_groups else 0)
+            write_tfxbone(file.with_suffix(".tfxbone"), bones, filled)
+        return notes
+
+    return _write_files(path, groom, output, layout.parts, write)
+
+
+def _write_hair(
+    path: Path, groom: Groom, output: StrandOutput, _motion: GroomMotion | None
+) -> WrittenStrands:
+    layout, scale = layout_of(HAIR, output), metres_per_unit(HAIR, output)
+
+    def write(file: Path, part: Groom, _bones: BoneWeights | None) -> tuple[str, ...]:
+        return write_hair_file(
+            file, part, up=layout.space.up, scale=scale, parts="both", uv=output.point_uv
+        )
+
+    return _write_files(path, groom, output, layout.parts, write)
+
+
+_WRITERS: dict[str, Callable[[Path, Groom, StrandOutput, GroomMotion | None], WrittenStrands]] = {
+    ALEMBIC.name: _write_alembic,
+    USD.name: _write_usd,
+    TRESSFX.name: _write_tressfx,
+    HAIR.name: _write_hair,
+}
+
+
+def _write_files(
+    path: Path,
+    groom: Groom,
+    output: StrandOutput,
+    parts: str,
+    write: Callable[[Path, Groom, BoneWeights | None], tuple[str, ...]],
+) -> WrittenStrands:
+    """One file, or one for each group, with what lies beside them."""
+    chosen = _chosen(groom, parts)
+    groom = _part(groom, chosen, parts)
+    bones = None if output.bones is None else output.bones.take(chosen)
+    files: dict[Path, Ints] = {path: np.arange(len(chosen))}
+    if output.by_group:
+        files = _strands_of_files(path, groom)
+    notes: list[str] = []
+    with written_together(next(iter(files))) as folder:
+        for file, strands in files.items():
+            own = None if bones is None else bones.take(strands)
+            notes += write(folder / file.name, groom.take(strands), own)
+        written = sorted(
+            (path.with_name(file.name) for file in folder.iterdir()),
+            key=lambda file: (file not in files, file.name),
+        )
+    return WrittenStrands(tuple(written), tuple(notes))
+
+
+def _strands_of_files(path: Path, groom: Groom) -> dict[Path, Ints]:
+    """The file of each group, and the indices of its strands."""
+    count = groom.strands.strand_count
+    numbered = replace(groom, strand_id=np.arange(count), closest_guides=None, guide_weights=None)
+    return {file: _numbers(part) for file, part in group_files(path, numbered).items()}
+
+
+def _chosen(groom: Groom, parts: str) -> Ints:
+    """Indices of the strands that these parts are."""
+    count = groom.strands.strand_count
+    numbered = replace(groom, strand_id=np.arange(count), closest_guides=None, guide_weights=None)
+    return _numbers(chosen_parts(numbered, parts))
+
+
+def _numbers(groom: Groom) -> Ints:
+    assert groom.strand_id is not None
+    return groom.strand_id
+
+
+def _part(groom: Groom, chosen: Ints, parts: str) -> Groom:
+    """The chosen strands; closest guides go where they are not all in the file."""
+    if len(chosen) < groom.strands.strand_count:
+        groom = groom.take(chosen)
+    if parts != "both" and groom.closest_guides is not None:
+        return replace(groom, closest_guides=None, guide_weights=None)
+    return groom
+
+
+def _only(motion: GroomMotion, points: Ints) -> Iterator[Floats]:
+    return (frame[points] for frame in motion.positions)

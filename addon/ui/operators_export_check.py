@@ -1,0 +1,136 @@
+"""Check for Export: what an engine will see of the hair, in a dialog or beside a file's options."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import EnumProperty
+
+from ..host.bake import bakeable
+from ..host.export_check import ExportCheck
+from ..host.groom_files import Outcome
+from ..host.strand_choices import ALEMBIC_ENGINES, FORMATS, USD_ENGINES, strand_output
+from .messages import draw_lines
+from .reports import tell, waiting
+from .selection import chosen_hair, needs_hair
+
+#: of the file browser or dialog that is open
+_check: ExportCheck | None = None
+
+
+def begin(hair: list[bpy.types.Object]) -> None:
+    """A file browser or dialog opens for this hair."""
+    global _check
+    _check = ExportCheck.of(hair)
+
+
+def end() -> None:
+    """It is closed: let go of the hair that was read."""
+    global _check
+    _check = None
+
+
+def count() -> int:
+    """Of how many hairs it is; 0 where none is open."""
+    return 0 if _check is None else len(_check.hair)
+
+
+def refresh(context: bpy.types.Context, kind: str, output: Any) -> bool:
+    """Check for a format, by its name, and what is asked of it; whether anything may be new."""
+    if _check is None:
+        return False
+    with waiting(context):
+        return _check.refresh(context.evaluated_depsgraph_get(), FORMATS[kind], output)
+
+
+def draw_motion(layout: bpy.types.UILayout, context: bpy.types.Context, *, use_bake: bool) -> None:
+    """What moves the hair over frames; nothing where no browser is open."""
+    if _check is not None:
+        column = layout.column(align=True)
+        for line in _check.motion_lines(use_bake=use_bake):
+            draw_lines(column, context, line)
+
+
+def writable(objects: Any) -> list[bpy.types.Object]:
+    """Hair, but no copy that shows a bake in renders."""
+    return [obj for obj in objects if obj.type == "CURVES" and bakeable(obj)]
+
+
+def draw(layout: bpy.types.UILayout, context: bpy.types.Context, panel: str) -> None:
+    """What the engine will see, below the options; nothing where no browser is open."""
+    if _check is None:
+        return
+    header, body = layout.panel(panel)
+    trouble = "INFO" if _check.lines else "ERROR"
+    icon = trouble if _check.warnings else "CHECKMARK"
+    header.label(text="What the Engine Will See", icon=icon)
+    if body is None:
+        return
+    column = body.column(align=True)
+    for line in _check.lines:
+        draw_lines(column, context, line)
+    for warning in _check.warnings:
+        draw_lines(column, context, warning, trouble)
+
+
+class HAIRLOOM_OT_check_export(bpy.types.Operator):
+    """Say what an engine will see of the hair, and write nothing"""
+
+    bl_idname = "hairloom.check_export"
+    bl_label = "Check for Export"
+
+    engine: EnumProperty(
+        name="For",
+        description="Which engine, and by which file",
+        items=(
+            *(
+                (f"alembic {name}", f"{label}, Alembic", about)
+                for name, label, about in ALEMBIC_ENGINES
+            ),
+            *((f"usd {name}", f"{label}, USD", about) for name, label, about in USD_ENGINES),
+            ("tressfx", "TressFX", "Metres, Y up"),
+            ("hair", "Cem Yuksel's .hair", "Metres, Z up"),
+        ),
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return needs_hair(cls, context)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        begin(writable(chosen_hair(context)))
+        self.check(context)
+        return context.window_manager.invoke_props_dialog(self, width=440)
+
+    def check(self, context: bpy.types.Context) -> bool:
+        """Blender calls it when the engine has changed."""
+        kind, _, engine = self.engine.partition(" ")
+        return refresh(context, kind, strand_output(_Engine(engine)))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.prop(self, "engine")
+        draw(self.layout, context, "HAIRLOOM_check_export")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if _check is None:
+            begin(writable(chosen_hair(context)))
+            self.check(context)
+        assert _check is not None
+        tell(self, Outcome("; ".join(_check.lines), {}, tuple(_check.warnings)))
+        end()
+        return {"FINISHED"}
+
+    def cancel(self, _context: bpy.types.Context) -> None:
+        end()
+
+
+class _Engine:
+    """All as usual but the engine."""
+
+    def __init__(self, engine: str) -> None:
+        self.engine = engine
+
+
+CLASSES = (HAIRLOOM_OT_check_export,)

@@ -1,0 +1,192 @@
+"""What the operators that write strands share: options, and motion in steps."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import Any, ClassVar
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ..errors import HairloomError
+from ..host.groom_files import Outcome
+from ..host.strand_choices import FORMATS, FRAMES, SEVERAL, file_of, strand_output
+from ..host.strand_export import StrandExport
+from . import operators_export_check as export_check
+from .long_work import LongWork, Progress, Steps
+from .operators_export_check import writable
+from .reports import tell
+from .selection import chosen_hair, needs_hair
+
+
+class StrandExportOperator(LongWork, ExportHelper):
+    """What all formats share. Motion is written in steps, which Esc cancels."""
+
+    bl_options: ClassVar[set[str]] = {"PRESET"}
+    unharmed = "the file is as it was before"
+    #: name of the format
+    kind: ClassVar[str]
+
+    collection: StringProperty(
+        name="Source Collection",
+        description="Write the hair of this collection in place of what is selected",
+        default="",
+        options={"HIDDEN"},
+    )
+    several: EnumProperty(
+        name="Several Hairs", description="Where more than one hair is chosen", items=SEVERAL
+    )
+
+    @property
+    def filename_ext(self) -> str:
+        """What Blender puts behind a name; one of the format's own stays."""
+        suffix, known = Path(self.filepath).suffix.lower(), FORMATS[self.kind].suffixes
+        return suffix if suffix in known else known[0]
+
+    @classmethod
+    def poll(cls: Any, context: bpy.types.Context) -> bool:
+        if not cls.is_free():
+            return False
+        # a collection's exporter has its own hair, and no selection
+        return bool(bpy.data.hair_curves) or needs_hair(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        hair = writable(chosen_hair(context))
+        if hair and not self.filepath:
+            folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
+            name = file_of(folder / hair[0].name, hair[0].name, is_alone=True).name
+            self.properties.filepath = str(folder / (name + self.filename_ext))
+        export_check.begin(hair)
+        self._refresh(context)
+        return super().invoke(context, event)
+
+    def check(self, context: bpy.types.Context) -> bool:
+        """Blender calls it when an option has changed."""
+        changed = super().check(context)
+        return self._refresh(context) or changed
+
+    def _refresh(self, context: bpy.types.Context) -> bool:
+        return export_check.refresh(context, self.kind, strand_output(self))
+
+    def steps(self: Any, context: bpy.types.Context) -> Steps[None]:
+        export_check.end()
+        for path, plan in self._plans(context):
+            if plan.frames is None:
+                tell(self, plan.write(path))
+            else:
+                tell(self, (yield from _in_motion(path, plan)))
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        export_check.end()
+        super().cancel(context)
+
+    def _plans(self, context: bpy.types.Context) -> list[tuple[Path, StrandExport]]:
+        """What is written where: one file of all hair, or a file of each."""
+        hair, path = self._hair(context), Path(bpy.path.abspath(self.filepath))
+        parts = [hair] if self.several == "one" else [[each] for each in hair]
+        depsgraph = context.evaluated_depsgraph_get()
+        return [
+            (
+                file_of(path, part[0].name, is_alone=len(parts) == 1),
+                StrandExport.of(
+                    part,
+                    depsgraph,
+                    FORMATS[self.kind],
+                    strand_output(self),
+                    frames=self._frames(context.scene),
+                    use_bake=getattr(self, "use_bake", True),
+                    with_bones=getattr(self, "bones", True),
+                ),
+            )
+            for part in parts
+        ]
+
+    def _frames(self: Any, scene: bpy.types.Scene) -> range | None:
+        frames = getattr(self, "frames", "still")
+        if frames == "still":
+            return None
+        own = frames == "own"
+        first, last = (self.first, self.last) if own else (scene.frame_start, scene.frame_end)
+        if last < first:
+            raise HairloomError(
+                f"the last frame, {last}, comes before the first, {first}",
+                place="Frames",
+                remedy="Correct the frame range",
+            )
+        return range(first, last + 1)
+
+    def _hair(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        if not self.collection:
+            return writable(chosen_hair(context)) or _refuse(
+                "Nothing selected", "Select hair curves"
+            )
+        own = context.scene.collection
+        collection = bpy.data.collections.get(
+            self.collection, own if self.collection == own.name else None
+        )
+        objects = () if collection is None else collection.all_objects
+        return writable(objects) or _refuse(
+            f"Collection '{self.collection}'", "Link hair curves to it, or choose another one"
+        )
+
+    def draw(self: Any, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        for label, names in self.sections:
+            header, body = layout.panel(f"{self.bl_idname}_{label}")
+            header.label(text=label)
+            if body is not None:
+                for name in names:
+                    self._draw_option(body, name)
+                if "frames" in names and self.frames != "still" and not self.collection:
+                    export_check.draw_motion(body, context, use_bake=self.use_bake)
+        if not self.collection:
+            export_check.draw(layout, context, f"{self.bl_idname}_check")
+
+    def _draw_option(self: Any, layout: bpy.types.UILayout, name: str) -> None:
+        """An option, unless it says nothing just now."""
+        if name in ("first", "last") and self.frames != "own":
+            return
+        if name == "use_bake" and self.frames == "still":
+            return
+        if name == "several" and export_check.count() == 1:
+            return
+        if name in ("up", "scale") and not getattr(self, "own_space", True):
+            return
+        layout.prop(self, name)
+
+
+class MovingExport:
+    """Formats that hold motion."""
+
+    frames: EnumProperty(name="Frames", description="Which frames are written", items=FRAMES)
+    first: IntProperty(name="First", description="First frame", default=1)
+    last: IntProperty(name="Last", description="Last frame", default=250)
+    use_bake: BoolProperty(
+        name="Use Bake",
+        description="Write the motion that Hairloom has baked, of hair that has a bake; off: as "
+        "Blender's own animation and modifiers move the hair",
+        default=True,
+    )
+
+
+def _in_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:
+    """Frames are read here, in the main thread, and written in another one."""
+    total = plan.frame_count
+    yield Progress(f"0 of {total:,} frames", 0.0)
+    with closing(plan.positions()) as positions:
+        work = plan.writing(path, positions)
+        try:
+            while not work.serve():
+                text = f"{plan.done:,} of {total:,} frames"
+                yield Progress(text, plan.done / total, waits=not work.asks)
+            return work.result()
+        finally:
+            work.give_up()
+
+
+def _refuse(place: str, remedy: str) -> Any:
+    raise HairloomError("there is no hair to write", place=place, remedy=remedy)

@@ -1,0 +1,213 @@
+"""Strands to files of all four formats by one call, and what is said of them before."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.groom import Groom, GroomMotion
+from hairloom.addon.exchange.groom_alembic_read import read_groom_alembic
+from hairloom.addon.exchange.groom_usd_read import read_usd
+from hairloom.addon.exchange.guide_copies import with_guide_copies
+from hairloom.addon.exchange.hair_file import read_hair_file
+from hairloom.addon.exchange.joined_grooms import joined_bones, joined_grooms
+from hairloom.addon.exchange.strand_check import check_lines, check_strands
+from hairloom.addon.exchange.strand_formats import ALEMBIC, HAIR, TRESSFX, USD
+from hairloom.addon.exchange.strand_output import StrandOutput
+from hairloom.addon.exchange.strand_writing import write_strands
+from hairloom.addon.exchange.tfxbone import read_tfxbone, strongest_bones
+from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.strands import StrandSet
+
+COUNT, POINTS = 10, 5
+GUIDES = np.array([2, 7])
+
+
+def groom(name: str = "hair", seed: int = 1, *, has_uv: bool = True) -> Groom:
+    """Ten strands of five points in two groups, 1 and 4; no guides."""
+    random = np.random.default_rng(seed)
+    strands = StrandSet(
+        random.uniform(-0.1, 0.1, (COUNT * POINTS, 3)),
+        np.arange(COUNT + 1) * POINTS,
+        np.full(COUNT * POINTS, 4e-5),
+        np.where(np.arange(COUNT) < 6, 1, 4),
+        random.random((COUNT, 2)) if has_uv else None,
+    )
+    return Groom(strands, name, group_names={1: "crown"})
+
+
+def guided(**options: object) -> Groom:
+    """The same with copies of two guides behind, and what rides on them."""
+    random = np.random.default_rng(5)
+    weight = random.dirichlet((1.0, 1.0, 1.0), COUNT)
+    guide = random.integers(0, 2, (COUNT, 3))
+    return with_guide_copies(replace(groom(), **options), GUIDES, guide, weight)
+
+
+def test_copies_of_guides_lie_behind_and_ride_on_themselves() -> None:
+    hair, plain = guided(), groom().strands
+    np.testing.assert_array_equal(hair.strands.points[: COUNT * POINTS], plain.points)
+    np.testing.assert_array_equal(hair.strands.grid[COUNT:], plain.grid[GUIDES])
+    assert hair.is_guide is not None and hair.strand_id is not None
+    assert np.flatnonzero(hair.is_guide).tolist() == [COUNT, COUNT + 1]
+    assert hair.closest_guides is not None and hair.guide_weights is not None
+    assert hair.closest_guides[COUNT:, 0].tolist() == hair.strand_id[COUNT:].tolist()
+    assert hair.guide_weights[COUNT:].tolist() == [[1.0, 0.0, 0.0]] * 2
+    assert set(hair.closest_guides.ravel()) <= set(hair.strand_id[COUNT:])
+
+
+def test_ids_that_leave_no_room_for_guides_are_numbered_anew() -> None:
+    ids = np.arange(COUNT) + np.iinfo(np.int32).max - COUNT + 1
+    assert guided(strand_id=ids).strand_id.tolist() == list(range(COUNT + 2))
+    kept = guided(strand_id=np.arange(COUNT) * 7).strand_id
+    assert kept.tolist() == [*range(0, 70, 7), 64, 65]
+
+
+@pytest.mark.parametrize("suffix", [".abc", ".usdc", ".usda", ".usd", ".tfx", ".hair"])
+def test_the_suffix_says_the_format(suffix: str, tmp_path: Path) -> None:
+    pytest.importorskip("alembic3d")
+    pytest.importorskip("pxr")
+    path = tmp_path / f"hair{suffix}"
+    written = write_strands(path, guided(), StrandOutput(parts="strands"))
+    assert written.files == (path,) and list(tmp_path.iterdir()) == [path]
+    readers = {".abc": read_groom_alembic, ".tfx": read_tfx, ".hair": read_hair_file}
+    read = readers.get(suffix, read_usd)(path)
+    strands = read.strands
+    assert strands.strand_count == COUNT
+    if suffix != ".tfx":  # eight points there
+        np.testing.assert_allclose(strands.points, groom().strands.points, atol=1e-6)
+
+
+def test_a_suffix_or_engine_that_is_not_known_is_named(tmp_path: Path) -> None:
+    for name, output, message in (
+        ("hair.obj", StrandOutput(), r"'\.obj' is no suffix.*\.abc"),
+        ("hair.abc", StrandOutput(engine="maya"), "no layout for 'maya'.*unreal, unity, blender"),
+        ("hair.tfx", StrandOutput(engine="unreal"), "no layout for 'unreal'.*up axis"),
+        ("hair.usda", StrandOutput(scale=0.0), "unit of 0.0 m"),
+        ("hair.hair", StrandOutput(scale=float("nan")), "unit of nan m"),
+    ):
+        with pytest.raises(HairloomError, match=message):
+            write_strands(tmp_path / name, groom(), output)
+    motion = GroomMotion([groom().strands.points], 24.0)
+    with pytest.raises(HairloomError, match=r"\.hair holds no motion"):
+        write_strands(tmp_path / "hair.hair", groom(), motion=motion)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_usd_has_the_parts_that_the_engine_wants_in_motion_too(tmp_path: Path) -> None:
+    usd = pytest.importorskip("pxr.Usd")
+    hair = guided()
+    frames = [hair.strands.points + np.float32(step) for step in (0.0, 0.5)]
+    for engine, parts, count in (
+        ("unreal", "", 12),
+        ("houdini", "", 10),
+        ("houdini", "guides", 2),
+        ("houdini", "both", 12),
+    ):
+        path = tmp_path / f"{engine}{parts}.usdc"  # the library remembers files by name
+        output = StrandOutput(engine=engine, parts=parts)
+        write_strands(path, hair, output, GroomMotion(iter(frames), 24.0, 5))
+        stage = usd.Stage.Open(str(path))
+        (prim,) = (each for each in stage.Traverse() if each.GetTypeName() == "BasisCurves")
+        points = [np.array(prim.GetAttribute("points").Get(time)) for time in (5, 6)]
+        assert len(points[0]) == count * POINTS
+        step = [50.0, 50.0, 50.0] if engine == "unreal" else [0.5, 0.5, -0.5]
+        np.testing.assert_allclose(points[1] - points[0], [step] * len(points[0]), rtol=1e-5)
+        has_closest = prim.HasAttribute("primvars:groom_closest_guides")
+        assert has_closest == (count == 12)
+
+
+def test_groups_go_into_files_with_the_bones_of_their_strands(tmp_path: Path) -> None:
+    bones = strongest_bones(("a", "b", "c"), np.random.default_rng(2).random((COUNT + 2, 3)))
+    output = StrandOutput(by_group=True, bones=bones)
+    written = write_strands(tmp_path / "hair.tfx", guided(), output)
+    names = ["hair_crown.tfx", "hair_group4.tfx", "hair_crown.tfxbone", "hair_group4.tfxbone"]
+    assert [path.name for path in written.files] == names
+    for name, own in (("crown", slice(0, 6)), ("group4", slice(6, 10))):
+        read = read_tfx(tmp_path / f"hair_{name}.tfx").strands
+        np.testing.assert_allclose(read.roots, groom().strands.roots[own], atol=1e-6)
+        held = read_tfxbone(tmp_path / f"hair_{name}.tfxbone").weights
+        np.testing.assert_array_equal(held.bone, bones.bone[own])
+        np.testing.assert_allclose(held.weight, bones.weight[own], atol=1e-6)
+
+
+def test_bones_of_the_last_strand_fill_up_to_64(tmp_path: Path) -> None:
+    bones = strongest_bones(("a", "b"), np.eye(2)[np.arange(COUNT) % 2])
+    write_strands(tmp_path / "hair.tfx", groom(), StrandOutput(bones=bones, fills_groups=True))
+    assert read_tfx(tmp_path / "hair.tfx").strands.strand_count == 64
+    held = read_tfxbone(tmp_path / "hair.tfxbone").weights
+    assert held.strand_count == 64 and (held.bone[COUNT:, 0] == 1).all()
+
+
+def test_a_file_that_fails_takes_the_others_with_it(tmp_path: Path) -> None:
+    (tmp_path / "hair_crown.tfx").write_bytes(b"old")
+    (tmp_path / "hair_group4.tfx").mkdir()
+    with pytest.raises(HairloomError, match="a folder has this name"):
+        write_strands(tmp_path / "hair.tfx", groom(), StrandOutput(by_group=True))
+    assert (tmp_path / "hair_crown.tfx").read_bytes() == b"old"
+
+
+def test_what_is_cut_is_told(tmp_path: Path) -> None:
+    pytest.importorskip("alembic3d")
+    points = np.linspace([0, 0, 0], [0, 0, 0.1], 300)
+    long = Groom(StrandSet(points, [0, 300], np.full(300, 4e-5), [0]))
+    written = write_strands(tmp_path / "a.abc", long)
+    assert "resampled to 255 points" in written.notes[0]
+    assert "resampled to 64" in write_strands(tmp_path / "a.tfx", long).notes[0]
+
+
+def test_joined_grooms_keep_their_groups_guides_and_ids_apart() -> None:
+    one, other = guided(), replace(guided(), name="brows", group_names={})
+    both, notes = joined_grooms([one, other], "all")
+    assert notes == () and both.strands.strand_count == 24
+    assert dict(both.group_names) == {0: "hair crown", 1: "hair 4", 2: "brows 1", 3: "brows 4"}
+    assert np.unique(both.strands.group).tolist() == [0, 1, 2, 3]
+    assert both.strand_id is not None and len(set(both.strand_id.tolist())) == 24
+    assert both.closest_guides is not None and both.is_guide is not None
+    for part, own in ((one, slice(0, 12)), (other, slice(12, 24))):
+        assert part.closest_guides is not None and part.strand_id is not None
+        place = {number: index for index, number in enumerate(part.strand_id.tolist())}
+        expected = [[place[g] for g in row] for row in part.closest_guides.tolist()]
+        ids = both.strand_id[own]
+        np.testing.assert_array_equal(both.closest_guides[own], ids[expected])
+        np.testing.assert_array_equal(both.strands.grid[own], part.strands.grid)
+
+
+def test_joined_grooms_lose_what_one_of_them_lacks_and_say_so() -> None:
+    bald, painted = groom("bald", has_uv=False), replace(guided(), color=np.ones((60, 3)))
+    both, notes = joined_grooms([painted, bald], "all")
+    assert both.strands.root_uv is None and both.color is None and both.closest_guides is None
+    assert both.is_guide is not None and both.is_guide.sum() == 2
+    assert "bald: no root UVs" in notes[0]
+    assert joined_grooms([bald], "all") == (bald, ())
+
+
+def test_joined_bones_are_one_by_name() -> None:
+    one = strongest_bones(("spine", "head"), np.array([[0.0, 1.0], [0.5, 0.5]]))
+    other = strongest_bones(("head", "jaw"), np.array([[1.0, 0.0], [0.0, 1.0]]))
+    both = joined_bones([one, other])
+    assert both.names == ("spine", "head", "jaw")
+    assert [both.names[i] for i in both.bone[:, 0]] == ["head", "spine", "head", "jaw"]
+    np.testing.assert_allclose(both.weight.sum(axis=1), 1.0)
+
+
+def test_the_check_counts_in_the_files_own_unit() -> None:
+    place = np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 4.0]])
+    hair = Groom(StrandSet(place, [0, 2], np.full(2, 4e-5), [3]), group_names={3: "fringe"})
+    facts = check_strands(hair, USD, StrandOutput(engine="maya"))
+    assert (facts["unit"], facts["up"], facts["is_mirrored"]) == ("cm", "Y", False)
+    np.testing.assert_allclose(facts["lowest"], (100.0, 300.0, -200.0))
+    np.testing.assert_allclose(facts["highest"], (100.0, 400.0, -200.0))
+    np.testing.assert_allclose(facts["width"], (8e-3, 8e-3), rtol=1e-6)
+    lines = check_lines(facts)
+    assert lines[0] == "1 strands, 0 guides, 2 points" and "Groups: fringe (1)" in lines
+    assert "Width: 0.008 cm" in lines and "Length: 100 cm" in lines
+    unreal = check_strands(hair, ALEMBIC, StrandOutput())
+    assert unreal["is_mirrored"] and any("left-handed" in line for line in check_lines(unreal))
+    assert check_strands(hair, HAIR, StrandOutput(scale=0.001))["unit"] == "mm"
+    inch = check_strands(hair, TRESSFX, StrandOutput(scale=0.0254))
+    assert inch["unit"] == "1/39.3701 m" and inch["points_per_curve"] == (2, 2)

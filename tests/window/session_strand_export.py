@@ -1,0 +1,132 @@
+"""Strands out in the window: options and check in the file browser, motion in steps, Esc."""
+
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import look_from_front, open_our_sidebar, press, region, until, viewport
+
+FOLDER = Path(bpy.app.tempdir) / "strands"
+
+failures: list[str] = []
+
+
+def of_hairloom(module):
+    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
+
+
+def running():
+    return of_hairloom("ui.long_work").running()
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    sys.excepthook = lambda kind, error, _: failures.append(f"{kind.__name__}: {error}")
+    driver.enable_extension()
+    yield from set_the_scene()
+    yield from the_check_stands_beside_the_options()
+    yield from motion_comes_in_steps()
+    yield from escape_leaves_the_old_file()
+    yield from the_check_alone()
+    assert failures == [], failures
+
+
+def set_the_scene():
+    FOLDER.mkdir()
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    bpy.data.batch_remove(bpy.data.objects)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    bpy.context.object.name = "Head"
+    assert bpy.ops.hairloom.grow(strand_count=3000, length=0.12) == {"FINISHED"}
+    hair = bpy.context.object
+    hair.name = "Hair"
+    head = bpy.data.objects["Head"]
+    for frame, x in ((1, 0.0), (400, 1.0)):
+        head.location.x = x
+        head.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+    look_from_front(0.9)
+    yield from open_our_sidebar()
+
+
+def browser():
+    return next(
+        (
+            a
+            for w in bpy.context.window_manager.windows
+            for a in w.screen.areas
+            if a.type == "FILE_BROWSER"
+        ),
+        None,
+    )
+
+
+def export(**options):
+    """Open the file browser for a groom Alembic."""
+    path = str(FOLDER / "hair.abc")
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        asked = bpy.ops.hairloom.export_alembic("INVOKE_DEFAULT", filepath=path, **options)
+    assert asked == {"RUNNING_MODAL"}
+    yield from until(lambda: browser() is not None, "no file browser opens")
+    yield 8
+
+
+def confirm():
+    with bpy.context.temp_override(
+        area=browser(), region=next(r for r in browser().regions if r.type == "WINDOW")
+    ):
+        bpy.ops.file.execute("INVOKE_DEFAULT")
+    yield from until(lambda: browser() is None, "the file browser stays")
+
+
+def the_check_stands_beside_the_options():
+    yield from export()
+    check = of_hairloom("ui.operators_export_check")
+    assert check.count() == 1 and "guides" in check._check.lines[0], check._check
+    driver.screenshot("options")
+    yield from confirm()
+    yield from until((FOLDER / "hair.abc").exists, "nothing is written")
+    assert check.count() == 0 and not running()
+
+
+def motion_comes_in_steps():
+    (FOLDER / "hair.abc").unlink()
+    yield from export(frames="own", first=1, last=60)
+    yield from confirm()
+    yield from until(lambda: bool(running()), "the export does not begin")
+    yield 3
+    driver.screenshot("writing")
+    yield from until(lambda: not running(), "the export does not end", 300)
+    assert (FOLDER / "hair.abc").exists()
+    assert bpy.context.scene.frame_current == 1
+
+
+def escape_leaves_the_old_file():
+    (FOLDER / "hair.abc").write_bytes(b"old")
+    yield from export(frames="own", first=1, last=4000)
+    yield from confirm()
+    yield from until(lambda: bool(running()), "the export does not begin")
+    yield 5
+    yield from press("ESC")
+    yield from until(lambda: not running(), "Esc does not cancel the export")
+    yield from until(
+        lambda: [p.name for p in FOLDER.iterdir()] == ["hair.abc"], "a half-written file is left"
+    )
+    assert (FOLDER / "hair.abc").read_bytes() == b"old"
+    assert bpy.context.scene.frame_current == 1
+
+
+def the_check_alone():
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        bpy.ops.hairloom.check_export("INVOKE_DEFAULT")
+    yield 5
+    driver.screenshot("check")
+    yield from press("ESC")
+    yield 3
+    assert of_hairloom("ui.operators_export_check").count() == 0
+
+
+driver.play(steps())
