@@ -33,13 +33,14 @@ from .take import read_take
 
 @dataclass(frozen=True)
 class Job:
-    """One call of a verb: what to work on, how, and where the result goes."""
+    """One call of a verb: what to work on, how, where the result goes, and what is told of it."""
 
     verb: str
     sources: Sources
     settings: dict[str, Settings]
     output: Path
     options: argparse.Namespace
+    report: Report
 
     def set[S: Settings](self, kind: type[S]) -> S:
         """This job's values of one parameter set."""
@@ -48,12 +49,14 @@ class Job:
         return values
 
 
-def read_rig(job: Job, report: Report) -> tuple[Rig, Inputs]:
+def read_rig(job: Job) -> tuple[Rig, Inputs]:
     """Read what the job names and make it ready to move."""
+    report = job.report
     print("reading", job.sources.groom or "(a groom grown here)", flush=True)
     with report.stage("read inputs"):
         inputs = read_inputs(job.sources, job.set(GrowSettings))
     _tell_drops(job, inputs)
+    tell_notes(list(inputs.notes), report)
     with report.stage("bind roots, choose guides"):
         rig = pipeline.prepare(
             inputs.strands,
@@ -117,8 +120,9 @@ def moment_of(job: Job, rig: Rig) -> tuple[Pose, Floats]:
     return pose, pipeline.strands_at(rig, pose, take.guides[job.options.frame])
 
 
-def open_studio(job: Job, rig: Rig, report: Report) -> Studio:
-    with report.stage("ambient occlusion"):
+def open_studio(job: Job, rig: Rig) -> Studio:
+    """What draws this job's hair in its look."""
+    with job.report.stage("ambient occlusion"):
         occlusion = pipeline.rest_occlusion(rig, job.set(AmbientSettings))
         head_occlusion = pipeline.head_occlusion(rig, job.set(AmbientSettings))
     look = Look(
@@ -132,7 +136,7 @@ def open_studio(job: Job, rig: Rig, report: Report) -> Studio:
         card_form=card_form(job),
     )
     studio = Studio(rig, occlusion, head_occlusion, look)
-    tell_notes(list(studio.warnings), report)
+    tell_notes(list(studio.warnings), job.report)
     return studio
 
 
@@ -148,10 +152,8 @@ def card_form(job: Job) -> CardForm:
     )
 
 
-def finish(job: Job, report: Report, output: Path) -> None:
-    """Name the result, and write the report where one was asked for."""
-    if not report.facts["outputs"]:
-        report.add_output(output)
-    if job.options.report:
-        report.write(Path(job.options.report))
+def finish(job: Job, output: Path) -> None:
+    """Name the result."""
+    if not job.report.facts["outputs"]:
+        job.report.add_output(output)
     print(f"Wrote {output}")

@@ -1,0 +1,66 @@
+"""Ctrl-C, and what a farm sends to end a task, end a job in order: nothing is left half-written."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+#: SIGBREAK is Windows' own: what a farm sends there.
+_NAMES = ("SIGINT", "SIGTERM", "SIGBREAK")
+
+_asked: list[int] = []
+
+
+class Interrupted(KeyboardInterrupt):
+    """The job has to end now. args[0]: the signal's number."""
+
+    @property
+    def number(self) -> int:
+        return int(self.args[0])
+
+    @property
+    def name(self) -> str:
+        return signal.Signals(self.number).name
+
+    @property
+    def exit_code(self) -> int:
+        """128 and the signal's number, as shells have it: 130 for Ctrl-C."""
+        return 128 + self.number
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Signals raise Interrupted inside; Blender itself would only note them, or die at once.
+
+    Does nothing in a thread, where signals never arrive.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    _asked.clear()
+    numbers = [getattr(signal, name) for name in _NAMES if hasattr(signal, name)]
+    before = {number: signal.signal(number, _stop) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            # None: set by C code, which Python cannot set again
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+
+def stop_if_asked() -> None:
+    """For long work between its steps: Blender swallows what is raised inside its own handlers.
+
+    Raises:
+        Interrupted: a signal has come.
+    """
+    if _asked:
+        raise Interrupted(_asked[0])
+
+
+def _stop(number: int, _frame: FrameType | None) -> None:
+    _asked.append(number)
+    raise Interrupted(number)

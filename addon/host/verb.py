@@ -1,0 +1,77 @@
+"""What a verb of the command line is: its flow, its options and what it writes."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from .job_options import (
+    add_farm_options,
+    add_hair_options,
+    add_output_option,
+    add_save_option,
+    add_scene_option,
+    add_settings_options,
+)
+from .job_steps import Job
+
+SCENE_OUTPUT = "scene to write (.blend)"
+
+
+def no_options(_: argparse.ArgumentParser) -> None:
+    """For a verb that has none of its own."""
+
+
+@dataclass(frozen=True)
+class Verb:
+    """One verb; it stands at the end of the file with its flow.
+
+    flow: does the work; the first line of its docstring is the help.
+    add_options: adds what only this verb has.
+    output: what --output is; "" for a verb without one.
+    default_output: where it writes without --output.
+    needs_output: whether --output must be given.
+    takes_hair: whether it works on hair that --groom, --head and --collider name.
+    needs_head: whether it refuses hair without a head.
+    takes_settings: whether it has --set and --preset.
+    opens_scene: whether it has --scene.
+    saves_scene: whether it changes the scene, which is saved as --output or, with --save, over its
+        own file.
+    operators: names of the artist's buttons whose work it does.
+    """
+
+    name: str
+    flow: Callable[[Job], None]
+    add_options: Callable[[argparse.ArgumentParser], None] = no_options
+    output: str = ""
+    default_output: Path | None = None
+    needs_output: bool = True
+    takes_hair: bool = True
+    needs_head: bool = False
+    takes_settings: bool = True
+    opens_scene: bool = True
+    saves_scene: bool = False
+    operators: tuple[str, ...] = ()
+
+    @property
+    def about(self) -> str:
+        return (self.flow.__doc__ or "").strip().splitlines()[0]
+
+    def add_all_options(self, parser: argparse.ArgumentParser) -> None:
+        """What it works on, what it writes, how, and what farms need; its own in their midst."""
+        if self.opens_scene:
+            add_scene_option(parser)
+        output, is_needed = self.output, self.needs_output and self.default_output is None
+        if self.saves_scene:
+            add_save_option(parser)
+            output, is_needed = SCENE_OUTPUT, False
+        if output:
+            add_output_option(parser, output, self.default_output, needed=is_needed)
+        if self.takes_hair:
+            add_hair_options(parser)
+        self.add_options(parser)
+        if self.takes_settings:
+            add_settings_options(parser)
+        add_farm_options(parser, can_skip=bool(output))

@@ -1,0 +1,292 @@
+"""Verbs that change a scene: each does what its button does, and saves it, or leaves all alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.host import command_line, presets
+from hairloom.addon.host.adopted_cards import SortChoices, sort_mesh
+from hairloom.addon.host.adopted_writing import reorder_faces
+from hairloom.addon.host.fin_modifier import fin_modifier
+from hairloom.addon.host.spheres import fitted_collections
+
+FEW = ["--set", "grow.way=normals", "--set", "grow.strand_count=40", "--set", "grow.length=0.05"]
+
+
+@pytest.fixture
+def scene(sphere: Any, new_hair: Callable[..., Any], tmp_path: Path) -> Path:
+    """A saved file with hair on a head, and another one open."""
+    new_hair(sphere)
+    group = sphere.vertex_groups.new(name="Top")
+    group.add([v.index for v in sphere.data.vertices if v.co.z > 0.05], 1.0, "REPLACE")
+    path = tmp_path / "wig.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return path
+
+
+def run(scene: Path, verb: str, *arguments: str) -> dict[str, Any]:
+    """Change the scene into another file, which is open then; gives the report."""
+    report, output = scene.with_name("report.json"), scene.with_name("out.blend")
+    saving = ["--output", str(output), "--report", str(report)]
+    before = scene.read_bytes()
+    assert command_line.run([verb, "--scene", str(scene), *arguments, *saving]) == 0
+    assert scene.read_bytes() == before, "the scene itself has changed"
+    bpy.ops.wm.open_mainfile(filepath=str(output))
+    facts: dict[str, Any] = json.loads(report.read_text())
+    assert facts["status"] == "done" and facts["outputs"] == ["out.blend"]
+    return facts
+
+
+def test_hair_grows_on_a_mesh(scene: Path) -> None:
+    look = ["--preset", "looks/blond", "--set", "shading.primary_strength=3"]
+    facts = run(scene, "grow", "--head", "Head", "--name", "Fringe", *FEW, *look)
+    hair = bpy.data.objects["Fringe"]
+    assert facts["strands"] == len(hair.data.curves) == 40 and facts["object"] == "Fringe"
+    assert hair.data.surface == bpy.data.objects["Head"]
+    blond = presets.named_preset("looks/blond").settings.as_dict()
+    assert list(hair.data.hairloom.shading.base_color) == pytest.approx(blond["base_color"])
+    assert hair.data.hairloom.shading.primary_strength == 3.0
+
+
+def test_hair_grows_where_a_group_says(scene: Path) -> None:
+    run(scene, "grow", "--head", "Head", "--name", "Tuft", "--density-group", "Top", *FEW)
+    curves = bpy.data.objects["Tuft"].data
+    points = np.empty(len(curves.points) * 3, np.float32)
+    curves.position_data.foreach_get("vector", points)
+    roots = points.reshape(len(curves.curves), -1, 3)[:, 0]
+    assert roots[:, 2].min() > 0.02
+
+
+def test_settings_go_onto_the_hair_that_is_named(scene: Path) -> None:
+    run(
+        scene,
+        "settings",
+        "--object",
+        "Hair",
+        "--preset",
+        "dynamics/soft",
+        "--set",
+        "cards.levels=2",
+    )
+    hair = bpy.data.objects["Hair"]
+    soft = presets.named_preset("dynamics/soft").settings.as_dict()
+    assert hair.hairloom.dynamics.damping == pytest.approx(soft["damping"])
+    assert hair.data.hairloom.cards.levels == 2
+
+
+def test_the_look_of_a_material_is_taken_over(scene: Path) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    material = bpy.data.materials.new("Red")
+    material.node_tree.nodes.clear()
+    node = material.node_tree.nodes.new("ShaderNodeBsdfHairPrincipled")
+    output = material.node_tree.nodes.new("ShaderNodeOutputMaterial")
+    material.node_tree.links.new(node.outputs[0], output.inputs["Surface"])
+    node.inputs["IOR"].default_value = 1.3
+    bpy.data.objects["Hair"].data.materials.append(material)
+    bpy.ops.wm.save_mainfile()
+    run(scene, "settings", "--look-from-material")
+    assert bpy.data.objects["Hair"].data.hairloom.shading.index_of_refraction == pytest.approx(1.3)
+
+
+def test_presets_are_listed_kept_and_deleted(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(presets, "own_folder", lambda: tmp_path / "own")
+    report = tmp_path / "report.json"
+
+    def listed(*arguments: str) -> list[str]:
+        assert command_line.run(["presets", *arguments, "--report", str(report)]) == 0
+        return [one["name"] for one in json.loads(report.read_text())["presets"]]
+
+    assert "looks/blond" in listed() and "own/mine" not in listed()
+    assert "own/mine" in listed("--scene", str(scene), "--keep", "Mine")
+    assert "own/mine" in capsys.readouterr().out
+    assert "own/mine" not in listed("--delete", "own/mine")
+    assert command_line.run(["presets", "--delete", "looks/blond"]) == 1
+
+
+def test_a_mesh_becomes_a_fin_and_a_mesh_again(scene: Path) -> None:
+    stiff = ["--set", "fin.damping=5"]
+    run(scene, "fins", "--object", "Head", "--pin-group", "Top", *stiff)
+    head = bpy.data.objects["Head"]
+    assert fin_modifier(head) is not None and head.hairloom.fin.pin_group == "Top"
+    assert head.hairloom.fin.damping == 5.0
+    run(
+        scene.with_name("out.blend").rename(scene.with_name("fin.blend")),
+        "fins",
+        "--object",
+        "Head",
+        "--remove",
+    )
+    assert fin_modifier(bpy.data.objects["Head"]) is None
+
+
+def test_spheres_are_fitted_and_removed(scene: Path) -> None:
+    facts = run(scene, "spheres", "--object", "Head", "--set", "sphere_fit.sphere_count=6")
+    head, hair = bpy.data.objects["Head"], bpy.data.objects["Hair"]
+    (collection,) = fitted_collections(head)
+    assert len(collection.objects) == facts["spheres"][0]["count"] == 6
+    assert hair.hairloom.collider_collection == collection
+    assert head.hairloom.collider_shape == "none"
+    other = scene.with_name("out.blend").rename(scene.with_name("fitted.blend"))
+    facts = run(other, "spheres", "--object", "Head", "--remove")
+    assert facts["spheres"] == [{"object": "Head", "removed": 6}]
+    assert not fitted_collections(bpy.data.objects["Head"])
+
+
+def test_cards_are_made_as_objects_and_sorted(scene: Path, gpu_context: object) -> None:
+    small = ["--set", "cards.way=clusters", "--set", "atlas.size=512", "--set", "cards.levels=1"]
+    facts = run(scene, "make-cards", *small)
+    (made,) = facts["made"]
+    cards = bpy.data.objects[made["object"]]
+    assert len(cards.data.polygons) == made["triangles"] > 0
+    name, count = cards.name, made["triangles"]
+    reorder_faces(cards.data, np.arange(count)[::-1])
+    shuffled = scene.with_name("shuffled.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=str(shuffled))
+    facts = run(shuffled, "sort-cards", "--object", name, "--head", "Head", "--no-occlusion")
+    (done,) = facts["sorted"]
+    assert done["cards"] == made["cards"] and done["moved"] > count / 2
+    order = vertices_of(name)
+    bpy.ops.wm.open_mainfile(filepath=str(shuffled))
+    assert vertices_of(name) != order
+    choices = SortChoices(head=bpy.data.objects["Head"], occlusion=None)
+    sort_mesh(bpy.data.objects[name], bpy.context.evaluated_depsgraph_get(), choices)
+    assert vertices_of(name) == order, "the button gives another order"
+
+
+def vertices_of(name: str) -> list[tuple[int, ...]]:
+    return [tuple(polygon.vertices) for polygon in bpy.data.objects[name].data.polygons]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["settings"], "--output"),
+        (["settings", "--save", "--output", "x.blend"], "twice"),
+        (["settings", "--output", "x.png"], ".blend"),
+        (["settings", "--object", "Nobody", "--output", "x.blend"], "Nobody"),
+        (["settings", "--set", "shading.nothing=1", "--output", "x.blend"], "nothing"),
+        (["grow", "--head", "Hair", "--output", "x.blend"], "Hair"),
+        (["fins", "--object", "Head", "--pin-group", "None", "--output", "x.blend"], "None"),
+        (["fins", "--object", "Head", "--remove", "--output", "x.blend"], "no fin"),
+        (["spheres", "--object", "Hair", "--output", "x.blend"], "Hair"),
+        (["make-cards", "--object", "Head", "--output", "x.blend"], "Head"),
+        (["sort-cards", "--object", "Head", "--alpha", "No", "--output", "x.blend"], "No"),
+        (["sort-cards", "--object", "Head", "--head", "No", "--output", "x.blend"], "No"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_bad_input_saves_nothing(
+    arguments: list[str],
+    message: str,
+    scene: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    there = sorted(tmp_path.iterdir())
+    placed = [str(tmp_path / word) if word.startswith("x.") else word for word in arguments]
+    assert command_line.run([placed[0], "--scene", str(scene), *placed[1:]]) == 1
+    told = [line for line in capfd.readouterr().err.splitlines() if line.startswith("hairloom:")]
+    assert len(told) == 1 and message in told[0]
+    assert sorted(tmp_path.iterdir()) == there
+
+
+def test_a_scene_that_moves_keeps_its_bakes(scene: Path, tmp_path: Path) -> None:
+    """The folder of a bake is named as seen from the new place."""
+    other = tmp_path / "shots" / "seven" / "wig.blend"
+    quick = ["--set", "dynamics.form=numpy", "--set", "dynamics.collider_resolution=8"]
+    bake = ["bake", "--scene", str(scene), "--frames", "1", "3", *quick]
+    folder = tmp_path / "baked"
+    assert command_line.run([*bake, "--output", str(folder), "--save-as", str(other)]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(other))
+    hair = bpy.data.objects["Hair"]
+    assert hair.hairloom.bake.folder == "//../../baked"
+    assert bpy.data.objects["Hair Baked"].data.hairloom.baked_in == "//../../baked"
+    assert command_line.run(["bake", "--scene", str(other), "--delete", "--save"]) == 0
+    assert not folder.exists() and "Hair Baked" not in bpy.data.objects
+
+
+def test_hair_is_made_ready(scene: Path) -> None:
+    """Loose hair on a bare head gets a surface, UVs, roots on it and its scale into the curves."""
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
+    hair.data.surface = hair.parent = None
+    hair.scale = (1.0, 1.0, 1.2)
+    head.data.uv_layers.remove(head.data.uv_layers[0])
+    bpy.ops.wm.save_mainfile()
+    facts = run(scene, "mend", "--surface", "--unwrap", "--snap-roots", "--apply-scale")
+    assert len(facts["mended"]) == 4
+    hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
+    assert hair.data.surface == head and len(head.data.uv_layers) == 1
+    assert list(hair.scale) == pytest.approx([1.0, 1.0, 1.0])
+    points = np.empty(len(hair.data.points) * 3, np.float32)
+    hair.data.position_data.foreach_get("vector", points)
+    roots = points.reshape(len(hair.data.curves), -1, 3)[:, 0]
+    # the ball has flat faces, and its scaled hair began up to 2 cm above it
+    np.testing.assert_allclose(np.linalg.norm(roots, axis=1), 0.1, atol=2e-3)
+
+
+def test_a_button_that_would_be_grey_is_an_error(
+    scene: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["--scene", str(scene), "--unwrap", "--output", str(tmp_path / "x.blend")]
+    assert command_line.run(["mend", *arguments]) == 1
+    assert "hairloom: Hair: The surface has UVs already. " in capfd.readouterr().err
+
+
+def test_particle_hair_becomes_curves(scene: Path) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    head = bpy.data.objects["Head"]
+    bpy.context.view_layer.objects.active = head
+    bpy.ops.object.particle_system_add()
+    settings = head.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length = "HAIR", 30, 0.05
+    bpy.ops.wm.save_mainfile()
+    run(scene, "mend", "--convert-particles", "Head", "--preset", "looks/blond")
+    (made,) = [o for o in bpy.data.objects if o.type == "CURVES" and o.name != "Hair"]
+    assert len(made.data.curves) == 30 and made.data.surface == bpy.data.objects["Head"]
+
+
+def test_a_sample_scene_is_shown_when_its_file_is_opened(extension: None, tmp_path: Path) -> None:
+    path = tmp_path / "sample.blend"
+    assert command_line.run(["sample", "--output", str(path)]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    assert bpy.context.scene.name == "Hairloom Sample" and bpy.context.scene.camera
+    assert any(obj.type == "CURVES" for obj in bpy.context.scene.objects)
+
+
+def test_the_self_test_tells_what_this_machine_can_do(
+    extension: None, tmp_path: Path, gpu_context: object
+) -> None:
+    report = tmp_path / "report.json"
+    assert command_line.run(["self-test", "--report", str(report)]) == 0
+    outcomes = [check["outcome"] for check in json.loads(report.read_text())["checks"]]
+    assert "passed" in outcomes and "failed" not in outcomes
+
+
+def test_hair_of_a_scene_is_taken_with_its_own_settings(scene: Path, tmp_path: Path) -> None:
+    """What the artist has set goes into files; --set goes over it."""
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    groom = bpy.data.objects["Hair"].data.hairloom
+    groom.children.way, groom.children.strand_count = "single", 300
+    bpy.ops.wm.save_mainfile()
+
+    def exported(*more: str) -> int:
+        report = tmp_path / "report.json"
+        arguments = ["export", "--scene", str(scene), *more, "--report", str(report)]
+        assert command_line.run([*arguments, "--output", str(tmp_path / "out.tfx")]) == 0
+        return int(json.loads(report.read_text())["preflight"]["strands"])
+
+    assert exported("--groom", "Hair") == exported("--object", "Hair") == exported()
+    assert exported() == pytest.approx(300, rel=0.3)
+    fewer = exported("--groom", "Hair", "--set", "children.way=none")
+    assert fewer == exported("--object", "Hair", "--set", "children.way=none") < exported()

@@ -1,0 +1,192 @@
+"""What a farm hangs on: reports of failures, progress lines, interrupted and repeated tasks."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+
+from hairloom.addon.host import command_line, interruption
+from hairloom.addon.host.cache import Cache
+
+REPOSITORY = Path(__file__).parents[2]
+QUICK = ["--set", "dynamics.form=numpy", "--set", "dynamics.collider_resolution=8"]
+
+
+@pytest.fixture
+def scene(sphere: Any, new_hair: Callable[..., Any], tmp_path: Path) -> Path:
+    """A saved file with hair on a head, and another one open."""
+    new_hair(sphere)
+    path = tmp_path / "wig.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return path
+
+
+@pytest.fixture
+def task(scene: Path, tmp_path: Path) -> Callable[..., dict[str, Any]]:
+    """Bakes the scene as a farm's task does; gives the report."""
+
+    def run(*more: str, code: int = 0) -> dict[str, Any]:
+        report = tmp_path / "report.json"
+        arguments = ["bake", "--scene", str(scene), "--frames", "1", "3", *QUICK]
+        arguments += ["--output", str(tmp_path / "bake"), "--skip-existing"]
+        assert command_line.run([*arguments, "--report", str(report), *more]) == code
+        facts: dict[str, Any] = json.loads(report.read_text())
+        return facts
+
+    return run
+
+
+def test_a_task_that_is_done_is_not_done_again(
+    task: Callable[..., dict[str, Any]], tmp_path: Path
+) -> None:
+    assert task()["status"] == "done"
+    made = {file: file.stat().st_mtime_ns for file in (tmp_path / "bake").rglob("*")}
+    assert task()["status"] == "skipped"
+    assert {file: file.stat().st_mtime_ns for file in (tmp_path / "bake").rglob("*")} == made
+    assert task("--progress", "openjd")["status"] == "skipped", "progress is no part of the result"
+
+
+@pytest.mark.parametrize(
+    "change", ["scene", "cut output", "no output", "option", "no stamp", "stamp"]
+)
+def test_a_task_is_done_again_when_anything_has_changed(
+    change: str, task: Callable[..., dict[str, Any]], scene: Path, tmp_path: Path
+) -> None:
+    task()
+    bake, stamp, more = tmp_path / "bake", tmp_path / "bake.done.json", list[str]()
+    frame = max(bake.glob("*"), key=lambda file: file.stat().st_size)
+    size = frame.stat().st_size
+    if change == "scene":
+        bpy.ops.wm.open_mainfile(filepath=str(scene))
+        bpy.data.objects["Hair"].hairloom.dynamics.damping = 7.0
+        bpy.ops.wm.save_mainfile()
+    elif change == "cut output":
+        frame.write_bytes(frame.read_bytes()[:-9])
+    elif change == "no output":
+        frame.unlink()
+    elif change == "option":
+        more = ["--set", "dynamics.damping=3"]
+    elif change == "no stamp":
+        stamp.unlink()
+    else:
+        stamp.write_text(stamp.read_text()[:-40])
+    assert task(*more)["status"] == "done"
+    assert frame.stat().st_size == size and Cache(bake).facts.last == 3
+    assert task(*more)["status"] == "skipped"
+
+
+def test_a_linked_library_is_an_input(
+    task: Callable[..., dict[str, Any]], scene: Path, tmp_path: Path
+) -> None:
+    library = tmp_path / "props.blend"
+    bpy.data.objects.new("Prop", None).use_fake_user = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(library))
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    with bpy.data.libraries.load(str(library), link=True) as (_, into):
+        into.objects = ["Prop"]
+    bpy.context.collection.objects.link(bpy.data.objects["Prop"])
+    bpy.ops.wm.save_mainfile()
+    task()
+    assert task()["status"] == "skipped"
+    bpy.ops.wm.open_mainfile(filepath=str(library))
+    bpy.data.objects.new("Another", None).use_fake_user = True
+    bpy.ops.wm.save_mainfile()
+    assert task()["status"] == "done"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [(["bake", "--skip-existing"], "--output"), (["bake", "--output", "x", "--save"], "--save-as")],
+)
+def test_what_cannot_be_skipped_is_said(
+    arguments: list[str], message: str, extension: None, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert command_line.run([*arguments, "--skip-existing"]) == 1
+    assert message in capfd.readouterr().err
+
+
+def test_a_failed_task_says_why_in_its_report(
+    task: Callable[..., dict[str, Any]], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    facts = task("--object", "Nobody", "--progress", "openjd", code=1)
+    assert facts["status"] == "failed" and facts["verb"] == "bake"
+    assert facts["error"]["place"] == "Nobody"
+    assert set(facts["error"]) == {"problem", "place", "remedy"} and all(facts["error"].values())
+    told = capfd.readouterr()
+    assert f"openjd_fail: Nobody: {facts['error']['problem']}" in told.out
+    assert facts["error"]["problem"] in told.err
+    assert not (tmp_path / "bake").exists() and not (tmp_path / "bake.done.json").exists()
+
+
+def test_a_report_that_cannot_be_written_fails_the_task(extension: None, tmp_path: Path) -> None:
+    assert command_line.run(["presets", "--report", str(tmp_path)]) == 1
+
+
+def test_a_fault_of_ours_is_in_the_report_too(
+    task: Callable[..., dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Never the report of the run before."""
+    task()
+    monkeypatch.setattr(command_line, "check_numbers", lambda _options: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        task()
+    facts = json.loads((tmp_path / "report.json").read_text())
+    assert facts["status"] == "failed" and "ZeroDivisionError" in facts["error"]["problem"]
+
+
+def test_a_farm_reads_status_and_progress(
+    task: Callable[..., dict[str, Any]], capfd: pytest.CaptureFixture[str]
+) -> None:
+    task("--progress", "openjd")
+    lines = capfd.readouterr().out.splitlines()
+    shares = [float(line.split(": ")[1]) for line in lines if line.startswith("openjd_progress: ")]
+    assert shares == sorted(shares) and shares[-1] == 100.0 and len(shares) == 3
+    states = [line.split(": ")[1] for line in lines if line.startswith("openjd_status: ")]
+    assert states == ["open scene", "bake frame"]
+    assert not any(re.match(r"baking: ", line) for line in lines)
+
+
+@pytest.mark.skipif(not bpy.app.module, reason="tools/headless.py needs Blender as a module")
+def test_an_interrupted_task_leaves_nothing(scene: Path, tmp_path: Path) -> None:
+    """As a farm does it: a process that is sent SIGTERM, here as well by Ctrl-C's SIGINT."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        report, bake = tmp_path / f"{number}.json", tmp_path / f"bake{number}"
+        command = [sys.executable, "tools/headless.py", "bake", "--scene", str(scene), *QUICK]
+        command += ["--frames", "1", "5000", "--output", str(bake), "--report", str(report)]
+        log = tmp_path / "log"
+        with open(log, "w") as file:
+            process = subprocess.Popen(
+                command, cwd=REPOSITORY, stdout=file, stderr=file, env=os.environ
+            )
+            end = time.monotonic() + 60.0
+            while "baking: 0/5000" not in log.read_text() and "baking: 1" not in log.read_text():
+                assert time.monotonic() < end and process.poll() is None, log.read_text()
+                time.sleep(0.05)
+            process.send_signal(number)
+            assert process.wait(60.0) == 128 + number, log.read_text()
+        assert json.loads(report.read_text())["status"] == "interrupted"
+        left = [file for file in tmp_path.iterdir() if file.name.startswith((bake.name, "."))]
+        assert left == [], "something half-written remains"
+
+
+def test_signals_are_as_before_afterwards() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(interruption.Interrupted) as caught, interruption.interruptible():
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(1.0)
+    assert caught.value.exit_code == 130
+    assert signal.getsignal(signal.SIGINT) is before
+    with interruption.interruptible():
+        interruption.stop_if_asked()  # the one before is forgotten

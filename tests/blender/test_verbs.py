@@ -1,0 +1,93 @@
+"""Verbs and buttons: what an artist can do in the window, a farm can do without one."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("bpy", reason="the buttons are Blender's operators")
+
+import bpy
+
+from hairloom.addon import registration
+from hairloom.addon.host.command_line import VERBS, parser, run
+from hairloom.addon.host.verb_docs import page
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+#: buttons that act on a view or a session alone, and leave nothing behind
+WINDOW_ONLY = {
+    "preview",
+    "play",
+    "pause",
+    "reset",
+    "fin_preview",
+    "fin_reset",
+    "choose_preset",
+    "show_settings",
+}
+
+
+def operators() -> set[str]:
+    names = [
+        each.bl_idname for each in registration.CLASSES if issubclass(each, bpy.types.Operator)
+    ]
+    return {name.removeprefix("hairloom.") for name in names}
+
+
+def test_every_button_has_a_verb_or_needs_a_window() -> None:
+    done = [name for verb in VERBS for name in verb.operators]
+    assert len(done) == len(set(done)), "two verbs do the work of one button"
+    assert operators() - WINDOW_ONLY - set(done) == set(), "buttons without a verb"
+    assert set(done) | WINDOW_ONLY <= operators(), "verbs of buttons that are not there"
+    assert not WINDOW_ONLY & set(done)
+
+
+def options_of(verb: str) -> list[argparse.Action]:
+    (verbs,) = (a for a in parser()._actions if isinstance(a, argparse._SubParsersAction))
+    actions: list[argparse.Action] = verbs.choices[verb]._actions
+    return actions
+
+
+@pytest.mark.parametrize("verb", [verb.name for verb in VERBS])
+def test_the_help_of_a_verb_is_whole(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([verb, "--help"]) == 0
+    text = capsys.readouterr().out
+    for action in options_of(verb):
+        assert action.help, f"{action.dest} has no help"
+        for name in action.option_strings:
+            assert name in text
+    (about,) = (each.about for each in VERBS if each.name == verb)
+    assert about.endswith(".") and " ".join(text.split()).count(about) == 1
+
+
+@pytest.mark.parametrize("verb", [verb.name for verb in VERBS])
+def test_every_verb_reports(verb: str) -> None:
+    names = {name for action in options_of(verb) for name in action.option_strings}
+    assert {"--report", "--progress", "--help", "--scene"} <= names
+    assert ("--skip-existing" in names) == ("--output" in names)
+
+
+def test_the_page_of_verbs_is_current() -> None:
+    assert (DOCS / "verbs.md").read_text(encoding="utf-8") == page(VERBS), "run make docs"
+
+
+def test_every_option_is_on_the_page_of_verbs() -> None:
+    text = page(VERBS)
+    for verb in VERBS:
+        assert f"## `{verb.name}`" in text
+        for action in options_of(verb.name):
+            for name in set(action.option_strings) - {"-h", "--help"}:
+                assert f"`{name}" in text, f"{verb.name} {name}"
+
+
+def test_the_guide_names_every_verb_and_no_option_that_is_not_there() -> None:
+    text = (DOCS / "command-line.md").read_text(encoding="utf-8")
+    for verb in VERBS:
+        assert f"| `{verb.name}` |" in text
+    known = {n for verb in VERBS for action in options_of(verb.name) for n in action.option_strings}
+    blenders_own = {"--command", "--help"}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", text)) <= known | blenders_own
