@@ -21,6 +21,7 @@ from ..parameters import ALL_SETTINGS
 from ..params import Settings
 from ..params.preset import Preset, preset_as_dict, read_any_preset
 from . import previews
+from .properties import settings_of
 
 PRESET_FOLDER = Path(__file__).resolve().parents[2] / "presets"
 #: what the names of the artist's own presets begin with
@@ -28,6 +29,8 @@ OWN = "own/"
 #: no preset is nearly as long [bytes]
 _LONGEST = 1_000_000
 _LONGEST_TITLE = 40
+#: section of a preset -> those that it keeps as well: cards are little without their atlas
+_TOGETHER = {"cards": ("atlas", "card_texture")}
 #: the package that Blender knows, two above this one
 _EXTENSION = __package__.rpartition(".addon")[0]
 
@@ -81,6 +84,11 @@ def own(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
     return tuple(sorted(entries, key=lambda entry: entry.title.lower())), tuple(warnings)
 
 
+def names(section: str) -> list[str]:
+    """All presets of one section, as `named_preset` knows them: those that ship come first."""
+    return [entry.name for entry in (*shipped(section), *own(section)[0])]
+
+
 def own_folder() -> Path:
     """Where the artist's own presets lie; it may not be there yet."""
     try:
@@ -89,8 +97,21 @@ def own_folder() -> Path:
         return Path(bpy.utils.user_resource("CONFIG", path="hairloom")) / "presets"
 
 
-def save_own(title: str, settings: Settings) -> Path:
+def kept_settings(hair: bpy.types.Object, section: str) -> tuple[Settings, ...]:
+    """What a preset of this section keeps of a groom: that section, then those that go with it."""
+    owners, found = (hair.data.hairloom, hair.hairloom), []
+    for name in (section, *_TOGETHER.get(section, ())):
+        owner = next(each for each in owners if hasattr(each, name))
+        found.append(settings_of(getattr(owner, name), ALL_SETTINGS[name]))
+    return tuple(found)
+
+
+def save_own(title: str, settings: Settings, *also: Settings) -> Path:
     """Keep settings as a preset of this title; one that has the same title is replaced.
+
+    Args:
+        settings: of the section under which it is found.
+        also: of others that go with it.
 
     Raises:
         HairloomError: the title is empty, or the file cannot be written.
@@ -100,7 +121,7 @@ def save_own(title: str, settings: Settings) -> Path:
     if not title:
         raise HairloomError("a preset needs a name", place="Save Preset", remedy="Type one")
     path = _file_for(stem or "preset", title, settings.section)
-    data = preset_as_dict(Preset(title, "saved by the artist", settings))
+    data = preset_as_dict(Preset(title, "saved by the artist", settings, also))
     write_text_atomic(path, json.dumps(data, indent=2) + "\n")
     return path
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
-from ..host.presets import apply, delete_own, named_preset, own, save_own, shipped
+from ..host.presets import apply, delete_own, kept_settings, named_preset, save_own
 from ..host.principled import has_principled_hair, look_from_material
 from ..host.properties import settings_of
+from .preset_chooser import KIND
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 
@@ -37,11 +38,12 @@ class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_save_preset(bpy.types.Operator):
-    """Keep the look of the selected hair as a preset of your own, in all files"""
+    """Keep these settings of the selected hair as a preset of your own, in all files"""
 
     bl_idname = "hairloom.save_preset"
-    bl_label = "Save Look as Preset"
+    bl_label = "Save as Preset"
 
+    section: KIND
     title: StringProperty(
         name="Name", description="A preset of yours that has this name is replaced", maxlen=40
     )
@@ -56,10 +58,12 @@ class HAIRLOOM_OT_save_preset(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        group = chosen_hair(context)[0].data.hairloom.shading
-        path = save_own(self.title, settings_of(group, group.settings))
+        path = save_own(self.title, *kept_settings(chosen_hair(context)[0], self.section))
         self.report({"INFO"}, f"Saved to {path}")
         return {"FINISHED"}
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.prop(self, "title")
 
 
 class HAIRLOOM_OT_delete_preset(bpy.types.Operator):
@@ -108,33 +112,9 @@ class HAIRLOOM_OT_look_from_material(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class HAIRLOOM_MT_dynamics(bpy.types.Menu):
-    """Ways to move that come with Hairloom"""
-
-    bl_idname = "HAIRLOOM_MT_dynamics"
-    bl_label = "Presets"
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        for entry in (*shipped("dynamics"), *own("dynamics")[0]):
-            self.layout.operator("hairloom.apply_preset", text=entry.title).name = entry.name
-
-
-class HAIRLOOM_MT_shadows(bpy.types.Menu):
-    """Shadows from fast to fine"""
-
-    bl_idname = "HAIRLOOM_MT_shadows"
-    bl_label = "Presets"
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        for entry in (*shipped("volume"), *own("volume")[0]):
-            self.layout.operator("hairloom.apply_preset", text=entry.title).name = entry.name
-
-
 CLASSES = (
     HAIRLOOM_OT_apply_preset,
     HAIRLOOM_OT_save_preset,
     HAIRLOOM_OT_delete_preset,
     HAIRLOOM_OT_look_from_material,
-    HAIRLOOM_MT_dynamics,
-    HAIRLOOM_MT_shadows,
 )

@@ -14,7 +14,7 @@ pytest.importorskip("bpy", reason="presets are applied inside Blender")
 import bpy
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import command_line, presets
+from hairloom.addon.host import command_line, job_options, presets
 from hairloom.addon.host.properties import settings_of
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import PRESET_VERSION
@@ -65,7 +65,7 @@ def test_the_command_line_takes_presets_and_single_values_over_them(tmp_path: Pa
         ["cards", "--output", "x.glb", "--preset", "looks/blond"]
         + ["--set", "shading.primary_strength=3"]
     )
-    shading = command_line._settings(options)["shading"].as_dict()
+    shading = job_options.chosen_settings(options)["shading"].as_dict()
     assert shading["primary_strength"] == 3.0
     blond = presets.named_preset("looks/blond").settings.as_dict()
     assert shading["base_color"] == blond["base_color"]
@@ -100,6 +100,35 @@ def test_a_look_is_saved_listed_applied_and_deleted(
     assert shading.model == "marschner" and shading.width_r == pytest.approx(0.123)
     assert bpy.ops.hairloom.delete_preset(name=entry.name) == {"FINISHED"}
     assert list(own_folder.iterdir()) == [] and titles() == []
+
+
+def test_presets_of_all_kinds_are_saved_and_cards_bring_their_atlas(
+    hair: bpy.types.Object, own_folder: Path
+) -> None:
+    groom = hair.data.hairloom
+    groom.cards.card_count, groom.atlas.size, hair.hairloom.dynamics.drag = 77, "512", 0.5
+    for section in ("cards", "dynamics", "volume"):
+        assert bpy.ops.hairloom.save_preset(title="Mine", section=section) == {"FINISHED"}
+        ((entry,), _) = presets.own(section)
+        assert entry.title == "Mine"
+    assert presets.own("shading") == ((), ())
+    groom.cards.card_count, groom.atlas.size, hair.hairloom.dynamics.drag = 100, "1024", 0.0
+    for section in ("cards", "dynamics"):
+        bpy.ops.hairloom.apply_preset(name=presets.own(section)[0][0].name)
+    assert (groom.cards.card_count, groom.atlas.size) == (77, "512")
+    assert hair.hairloom.dynamics.drag == 0.5
+
+
+@pytest.mark.parametrize("section", ["shading", "dynamics", "volume", "cards"])
+def test_every_preset_that_ships_goes_onto_a_groom_and_has_a_picture(
+    hair: bpy.types.Object, section: str
+) -> None:
+    entries = presets.shipped(section)
+    assert len(entries) >= 3
+    for entry in entries:
+        assert bpy.ops.hairloom.apply_preset(name=entry.name) == {"FINISHED"}
+        picture = entry.path.with_suffix(".png")
+        assert picture.is_file() and picture.stat().st_size < 60_000, "run make pictures"
 
 
 def test_the_same_title_replaces_and_another_never_does(
@@ -200,4 +229,4 @@ def test_the_look_under_water_brings_its_shafts_of_light_with_it(hair: bpy.types
     options = command_line.parser().parse_args(
         ["render", "--output", "x.png", "--preset", "looks/under_water"]
     )
-    assert command_line._settings(options)["shafts"] == wanted[0]
+    assert job_options.chosen_settings(options)["shafts"] == wanted[0]

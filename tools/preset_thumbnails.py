@@ -1,0 +1,100 @@
+"""Draws a thumbnail beside each preset that is not a look: dynamics, shadows and cards.
+
+python tools/preset_thumbnails.py FOLDER
+
+FOLDER gets presets.png, all of them on one sheet. Those of looks: tools/preset_pictures.py.
+"""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import bpy  # noqa: F401  it must come before gpu, which lives inside it
+import gpu
+import numpy as np
+from extension_loader import REPOSITORY, load_package
+from preset_pictures import NO_BACKDROP, THUMBNAIL, coarse, of_addon
+
+PRESETS, SAMPLES = REPOSITORY / "presets", 2
+#: all hair is blond here: it shows shadows best
+LOOK, STRANDS, THICKER = "looks/blond", 5000, 1.8
+#: the head turns by so much [rad] and stops; what is drawn is so many frames after it began
+TURN, TURNING, FRAMES, DURATION = np.radians(70.0), 8, 13, 1.0 / 24.0
+#: enough for a picture of this size
+ATLAS = "1024"
+GRAVITY = np.array([0.0, 0.0, -9.81])
+
+
+def wig() -> Any:
+    """Shoulder-long hair on the built-in head, made ready to move."""
+    settings, pipeline = of_addon("parameters").ALL_SETTINGS, of_addon("pipeline")
+    grown = settings["grow"](strand_count=STRANDS)
+    head = of_addon("host.built_in_head").built_in_head()
+    grow = of_addon("groom.grow")
+    strands = grow.grow(head, grown, grow.scalp_density(head))
+    return pipeline.prepare(strands, head, settings["guides"](), place="the built-in groom")
+
+
+def turned(rig: Any, angle: float) -> Any:
+    """The head turned about the upright axis."""
+    matrix = np.eye(4)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    matrix[:2, :2] = ((cosine, -sine), (sine, cosine))
+    positions = rig.head.positions @ matrix[:3, :3].T
+    return of_addon("pipeline").Pose(positions.astype(np.float32), matrix)
+
+
+def moved(rig: Any, dynamics: Any) -> tuple[Any, Any]:
+    """Pose and strands after the head has turned to the front, and a moment more."""
+    pipeline = of_addon("pipeline")
+    angles = [-TURN * (1.0 - min(frame / TURNING, 1.0)) for frame in range(FRAMES)]
+    motion = pipeline.begin(rig, turned(rig, angles[0]))
+    for angle in angles[1:]:
+        pose = turned(rig, angle)
+        motion = pipeline.advance(rig, motion, pose, (), dynamics, GRAVITY, DURATION)
+    return motion.pose, pipeline.strands_now(rig, motion)
+
+
+def main(folder: Path) -> None:
+    gpu.init()
+    load_package().register()
+    presets, pipeline = of_addon("host.presets"), of_addon("pipeline")
+    settings, studio_of = of_addon("parameters").ALL_SETTINGS, of_addon("host.studio")
+    images, form_of = of_addon("host.images"), of_addon("host.card_builds").CardForm
+    rig, ambient = wig(), settings["ambient"]()
+    shading = presets.named_preset(LOOK).settings
+    plain = studio_of.Look(
+        shading=shading,
+        strands=settings["strands"](width_scale=THICKER),
+        detail=settings["detail"](full_size=0.0),
+    )
+    occlusion = pipeline.rest_occlusion(rig, ambient), pipeline.head_occlusion(rig, ambient)
+    studio = studio_of.Studio(rig, *occlusion, plain)
+
+    def look_and_motion(preset: Any) -> tuple[Any, tuple[Any, Any]]:
+        at_rest = rig.rest_pose, rig.strands.grid
+        chosen = {one.section: one for one in preset.all}
+        if "dynamics" in chosen:
+            return plain, moved(rig, chosen["dynamics"])
+        if "volume" in chosen:
+            return replace(plain, volume=chosen["volume"]), at_rest
+        atlas = replace(chosen["atlas"], size=ATLAS)
+        form = form_of(cards=chosen["cards"], atlas=atlas, shading=shading)
+        shown = settings["card_drawing"](shown_as="cards")
+        return replace(plain, card_form=form, card_drawing=shown), at_rest
+
+    sheet = []
+    for section in ("dynamics", "volume", "cards"):
+        for entry in presets.shipped(section):
+            studio.look, (pose, points) = look_and_motion(presets.named_preset(entry.name))
+            size = THUMBNAIL, THUMBNAIL, SAMPLES
+            picture = studio.picture(pose, points, *size, background=NO_BACKDROP)
+            images.write_png(entry.path.with_suffix(".png"), coarse(picture))
+            sheet.append(picture)
+            print(f"Drew {entry.name}", flush=True)
+    images.write_png(folder / "presets.png", images.contact_sheet(sheet, 5))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
