@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from .cards.atlas_settings import AtlasSettings
 from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps
 from .cards.card_mesh import CardMesh
 from .cards.follow import CardBinding, bind_cards, card_lines, follow_guides
+from .cards.occlusion import CardShade
 from .cards.occlusion_settings import CardOcclusionSettings
 from .cards.settings import CardSettings
 from .cards.steps import result_of
@@ -29,19 +30,21 @@ def card_build_steps(
     occlusion: CardOcclusionSettings,
     alpha_of: AlphaOf = lambda _build: None,
     drawn: StrandSettings = _AS_THEY_ARE,
+    others: Sequence[CardShade] = (),
 ) -> Generator[str, None, CardBuild]:
     """Cards at rest in all levels of detail, with occlusion, from inside to outside.
 
     Args:
         alpha_of: the alpha of the atlas, which is best baked here; see `cards.build`.
         drawn: how wide strands are drawn.
+        others: cards of other grooms, which shade these, world space.
 
     Yields what comes next, and returns the cards.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
     """
-    return card_steps(card_groom(rig, drawn), settings, atlas, occlusion, alpha_of)
+    return card_steps(card_groom(rig, drawn), settings, atlas, occlusion, alpha_of, others)
 
 
 def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:

@@ -14,19 +14,28 @@ from .host import engine, engine_group, groups, handlers, previews, reactions
 from .host.command_line import run
 from .ui import (
     engine_panels,
-    look,
+    long_work,
     operators_adopted,
     operators_bake,
     operators_card_export,
     operators_cards,
     operators_colliders,
+    operators_export_check,
     operators_files,
     operators_fins,
+    operators_mend,
     operators_presets,
     operators_preview,
+    operators_self_test,
     operators_show,
     operators_slices,
+    operators_start,
+    operators_strand_export,
+    operators_strand_import,
     panels,
+    preferences,
+    preset_chooser,
+    translations,
 )
 
 #: the package that Blender knows, above this one; it is called otherwise in every repository
@@ -41,12 +50,19 @@ CLASSES: tuple[type[Any], ...] = (
     *operators_bake.CLASSES,
     *operators_colliders.CLASSES,
     *operators_files.CLASSES,
+    *operators_strand_import.CLASSES,
+    *operators_strand_export.CLASSES,
+    *operators_export_check.CLASSES,
     *operators_card_export.CLASSES,
     *operators_cards.CLASSES,
     *operators_presets.CLASSES,
     *operators_show.CLASSES,
     *operators_slices.CLASSES,
-    *look.CLASSES,
+    *preset_chooser.CLASSES,
+    *operators_mend.CLASSES,
+    *operators_self_test.CLASSES,
+    *preferences.CLASSES,
+    *operators_start.CLASSES,
     *panels.CLASSES,
     *operators_fins.CLASSES,
     *operators_adopted.CLASSES,
@@ -75,9 +91,7 @@ def register() -> None:
 def unregister() -> None:
     """The exact mirror image, after the previews have ended."""
     operators_preview.stop_ticking()
-    operators_bake.stop()
-    operators_cards.stop()
-    operators_show.stop()
+    long_work.stop()
     reactions.clear()
     engine.unregister()
     for _, undo in reversed(_steps()):
@@ -93,6 +107,7 @@ def _steps() -> tuple[Step, ...]:
         (engine_panels.register, engine_panels.unregister),
         (previews.register, previews.unregister),
         (panels.register, panels.unregister),
+        (translations.register, translations.unregister),
         (operators_adopted.register, operators_adopted.unregister),
         (handlers.register, handlers.unregister),
         (_register_command, _unregister_command),

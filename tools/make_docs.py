@@ -1,14 +1,15 @@
-"""Makes the parts of docs/ that come from the code: the parameter tables, and the pictures.
+"""Makes what comes from the code: parameter tables, verbs, the texts to translate, the pictures.
 
 python tools/make_docs.py [--check | --pictures]
 
 --check fails when docs/parameters.md is not what the code would write; --pictures also runs the
 demo, copies its pictures into docs/images, and draws those of docs/refinement.md,
-docs/shading.md and docs/engine.md with the thumbnails of the looks.
+docs/shading.md and docs/engine.md with the thumbnails of the presets.
 """
 
 import argparse
 import importlib
+import json
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,8 @@ from pathlib import Path
 from extension_loader import PACKAGE, REPOSITORY, load_package
 
 PARAMETERS = REPOSITORY / "docs" / "parameters.md"
+VERBS = REPOSITORY / "docs" / "verbs.md"
+TEXTS = REPOSITORY / "translations" / "template.json"
 IMAGES = REPOSITORY / "docs" / "images"
 HEADING = """# Parameters
 
@@ -37,6 +40,21 @@ def parameter_tables() -> str:
     )
 
 
+def verb_tables() -> str:
+    """docs/verbs.md, whole; it takes a Blender to know."""
+    load_package()
+    command_line = importlib.import_module(f"{PACKAGE}.addon.host.command_line")
+    return str(importlib.import_module(f"{PACKAGE}.addon.host.verb_docs").page(command_line.VERBS))
+
+
+def texts_to_translate() -> str:
+    """translations/template.json, whole; it takes a Blender to know."""
+    load_package().register()
+    translations = importlib.import_module(f"{PACKAGE}.addon.ui.translations")
+    classes = importlib.import_module(f"{PACKAGE}.addon.registration").CLASSES
+    return json.dumps(translations.texts(classes), indent=1, ensure_ascii=False) + "\n"
+
+
 def make_pictures() -> None:
     """Run the demo on the built-in head, in air and under water, and keep its pictures."""
     IMAGES.mkdir(exist_ok=True)
@@ -48,8 +66,8 @@ def make_pictures() -> None:
         preset = ["--preset", "dynamics/under_water"]
         subprocess.run([*headless, "demo", *preset, "--output", folder], check=True)
         shutil.copyfile(Path(folder) / "motion.png", IMAGES / "under_water.png")
-    tools = ("refinement", "preset", "shading", "volume", "engine")
-    for name in (f"{each}_pictures" for each in tools):
+    tools = ("refinement", "preset", "shading", "volume", "engine", "quick_start")
+    for name in (*(f"{each}_pictures" for each in tools), "preset_thumbnails"):
         tool = [sys.executable, str(REPOSITORY / "tools" / f"{name}.py")]
         subprocess.run([*tool, str(IMAGES)], check=True)
 
@@ -66,6 +84,8 @@ def main() -> int:
             print("docs/parameters.md is out of date: run make docs", file=sys.stderr)
         return 0 if current else 1
     PARAMETERS.write_text(text, encoding="utf-8")
+    VERBS.write_text(verb_tables(), encoding="utf-8")
+    TEXTS.write_text(texts_to_translate(), encoding="utf-8")
     if chosen.pictures:
         make_pictures()
     return 0

@@ -25,6 +25,7 @@ from .card_builds import BuiltCards, CardForm, built_cards
 from .card_images import chosen_pictures
 from .choices import Choices
 from .objects import head_of
+from .other_cards import other_cards
 from .reading import Reading
 from .shown import snapshot_of, with_all_strands, with_choices
 from .shown_cards import as_shown
@@ -39,12 +40,15 @@ class _Kept:
     snapshot: Snapshot
     _cards: list[BuiltCards] = field(default_factory=list)
 
-    def cards(self, owner: bpy.types.Object, form: CardForm) -> BuiltCards:
+    def cards(
+        self, owner: bpy.types.Object, form: CardForm, depsgraph: bpy.types.Depsgraph
+    ) -> BuiltCards:
         """Its cards; those of the last form are kept, to the last colour."""
         kept = [each for each in self._cards if each.form == form]
         if not kept or kept[0].form.shading != form.shading:
             pictures, _ = chosen_pictures(owner.data.hairloom.card_images)
-            self._cards[:] = [built_cards(self.rig, form, pictures)]
+            others, _ = other_cards(form.occlusion, owner, depsgraph)
+            self._cards[:] = [built_cards(self.rig, form, pictures, others)]
         return self._cards[0]
 
 
@@ -84,7 +88,7 @@ def read_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Snapsh
         strands, pose = kept.snapshot.strands, kept.rig.rest_pose
     snapshot = replace(kept.snapshot, strands=strands)
     if choices.shows_cards:
-        built = kept.cards(owner, choices.card_form)
+        built = kept.cards(owner, choices.card_form, depsgraph)
         cards = built.at(pose, strands[kept.rig.guides], choices.cards_drawn)
         snapshot = as_shown(replace(snapshot, cards=cards))
     return with_all_strands(with_choices(snapshot, choices))

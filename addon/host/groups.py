@@ -84,11 +84,42 @@ def operator_properties(section: str) -> dict[str, Any]:
     return property_annotations(ALL_SETTINGS[section])
 
 
+def _switch(section: str, parameter: str, values: tuple[str, str], name: str, text: str) -> Any:
+    """A checkbox for a choice of which one value means off, as headers of panels have it.
+
+    Args:
+        values: of the choice when off, and what it becomes when turned on.
+    """
+
+    def get(groom: Any) -> bool:
+        return bool(getattr(getattr(groom, section), parameter) != values[0])
+
+    def turn(groom: Any, on: bool) -> None:
+        if on != get(groom):
+            setattr(getattr(groom, section), parameter, values[on])
+
+    return BoolProperty(name=name, description=text, get=get, set=turn)
+
+
+_SWITCHES = {
+    "use_children": _switch(
+        "children", "way", ("none", "multi"), "Children", "Grow more hair between the guides"
+    ),
+    "use_shadows": _switch(
+        "volume", "shadows", ("none", "deep"), "Shadows", "Let hair shade itself and what is near"
+    ),
+    "use_cards": _switch(
+        "card_drawing", "shown_as", ("strands", "cards"), "Show Cards", "Show cards, not strands"
+    ),
+}
+
+
 class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
     """Everything about one groom that goes with its curves."""
 
     __annotations__ = {
         **_pointers(GROOM_SECTIONS),
+        **_SWITCHES,
         "card_images": PointerProperty(
             type=HAIRLOOM_PG_card_images,
             name="Card Pictures",

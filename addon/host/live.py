@@ -14,10 +14,10 @@ import bpy
 
 from ..errors import HairloomError
 from . import overlay, playback, timeline
-from .objects import is_solid, spaces_without
+from .objects import is_elsewhere, is_solid, spaces_without
 from .originals import refresh_views, show_originals
 from .overlay import Drawing
-from .redraw import redraw_panels
+from .redraw import redraw_panels, refresh_panels
 from .session import Session
 from .shown import with_all_strands
 from .shown_cards import as_shown
@@ -229,6 +229,10 @@ def attempt[S: Simulated](
     A defect of ours ends it as well, told in full but once, not at every event from now on.
     """
     global _notice
+    if is_elsewhere(session.uid, session.name, depsgraph.scene):
+        session.is_stale = True  # until its scene is shown again, in which it is evaluated
+        overlay.hide(session.uid)
+        return
     try:
         action(session)
         if _sessions.get(session.uid) is session:  # not begun anew
@@ -248,6 +252,7 @@ def _publish(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     if session.cards.is_pending:
         _await_cards()
     overlay.show(session.uid, _drawing(session, hair))
+    refresh_panels()
     is_replaced = hair.mode == "OBJECT" and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original
     volume = session.choices.volume

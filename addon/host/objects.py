@@ -100,3 +100,15 @@ def spaces_without(obj: bpy.types.Object) -> frozenset[int]:
         for space in area.spaces
         if space.type == "VIEW_3D" and not obj.visible_in_viewport_get(space)
     )
+
+
+def is_elsewhere(uid: int, name: str, scene: bpy.types.Scene) -> bool:
+    """Whether an object is in another scene alone; one that is gone is nowhere."""
+    named = scene.objects.get(name)
+    if named is not None and named.session_uid == uid:
+        return False
+    here, everywhere = (
+        any(obj.session_uid == uid for obj in objects)
+        for objects in (scene.objects, bpy.data.objects)
+    )
+    return everywhere and not here

@@ -17,12 +17,14 @@ import numpy as np
 from ..render.body_shadow import BodyShadow
 from ..render.camera import Camera
 from ..render.card_pass import CardPass
+from ..render.display import Display
 from ..render.scene_pass import ONE_AT_A_TIME
 from ..render.snapshot import Snapshot
-from ..render.strand_pass import StrandPass
+from ..render.strand_pass import Statistics, StrandPass
 from ..shading.lights import Light, three_point_lights
 from . import view_transform
 from .lights import uses_scene_light
+from .measures import forget, frame_line, measured
 from .overlay_text import card_counts_line, counts_line, write_lines
 from .redraw import redraw_panels, redraw_views
 from .shown import with_all_strands
@@ -71,12 +73,20 @@ def show(uid: int, drawing: Drawing) -> None:
     redraw_views()
 
 
+def hide(uid: int) -> None:
+    """Not to be seen until it is shown again."""
+    drawing = _drawings.get(uid)
+    if drawing is not None and drawing.is_visible:
+        show(uid, replace(drawing, is_visible=False))
+
+
 def drop(uid: int) -> None:
     """No longer draw this groom; with the last one the draw handlers go."""
     _drawings.pop(uid, None)
     _passes.pop(uid, None)
     _card_passes.pop(uid, None)
     _shadows.pop(uid, None)
+    forget(uid)
     if not _drawings:
         _remove_handlers()
     redraw_views()
@@ -114,35 +124,43 @@ def _draw_strands(context: Any) -> None:
     camera = Camera(np.array(view.view_matrix), np.array(view.window_matrix))
     address, studio = space.as_pointer(), three_point_lights(camera.view)
     display = view_transform.display_of(space.shading, context.scene)
-    _, _, width, height = gpu.state.viewport_get()
     for uid, drawing in shown_in(space):
         snapshot = drawing.snapshot
         if is_seen_through(space.shading) or address in drawing.bare_in:
             snapshot = with_all_strands(snapshot)
-        strand_pass = _passes.setdefault(uid, StrandPass())
-        card_pass = _card_passes.setdefault(uid, CardPass())
         snapshot = lit(snapshot, space.shading, studio)
+        shades_body = _shades_body(snapshot, space) and address not in drawing.bare_in
         # colours that stand for numbers are no light
         shown_by = display if snapshot.debug_view == "none" else None
-        with ONE_AT_A_TIME:
-            maps = None
-            if snapshot.cards is not None:
-                maps = card_pass.opacity(snapshot)
-            if _shades_body(snapshot, space) and address not in drawing.bare_in:
-                maps = maps or strand_pass.opacity(snapshot)
-                if maps is not None:
-                    shadow = _shadows.setdefault(uid, BodyShadow())
-                    shadow.draw(snapshot, maps, camera, width, height, display=display)
-            strand_pass.draw(snapshot, camera, width, height, output="viewport", display=shown_by)
-            card_pass.draw(
-                snapshot,
-                camera,
-                width,
-                height,
-                opacity=maps,
-                output="viewport",
-                display=shown_by,
-            )
+        with ONE_AT_A_TIME, measured(uid, "drawing"):
+            _draw_groom(uid, snapshot, camera, shown_by, shades_body=shades_body)
+
+
+def _draw_groom(
+    uid: int, snapshot: Snapshot, camera: Camera, display: Display | None, *, shades_body: bool
+) -> None:
+    """Into the view that is being drawn."""
+    _, _, width, height = gpu.state.viewport_get()
+    strand_pass = _passes.setdefault(uid, StrandPass())
+    card_pass = _card_passes.setdefault(uid, CardPass())
+    maps = None
+    if snapshot.cards is not None:
+        maps = card_pass.opacity(snapshot)
+    if shades_body:
+        maps = maps or strand_pass.opacity(snapshot)
+        if maps is not None:
+            shadow = _shadows.setdefault(uid, BodyShadow())
+            shadow.draw(snapshot, maps, camera, width, height, display=display)
+    strand_pass.draw(snapshot, camera, width, height, output="viewport", display=display)
+    card_pass.draw(
+        snapshot,
+        camera,
+        width,
+        height,
+        opacity=maps,
+        output="viewport",
+        display=display,
+    )
 
 
 def _draw_counts(context: Any) -> None:
@@ -150,18 +168,24 @@ def _draw_counts(context: Any) -> None:
     if not context.space_data.overlay.show_overlays:
         return
     lines = [
-        card_counts_line(drawing.counts_of, drawing.guide_count, drawing.card_counts)
-        if drawing.card_counts
-        else counts_line(
-            drawing.counts_of,
-            drawing.guide_count,
-            drawing.snapshot.strand_count,
-            strand_pass.statistics,
-        )
+        "   ".join(filter(None, (_counts_of(drawing, strand_pass), frame_line(uid))))
         for uid, drawing in shown_in(context.space_data)
         if drawing.counts_of and (strand_pass := _passes.get(uid)) is not None
     ]
     write_lines(context, lines)
+
+
+def _counts_of(drawing: Drawing, strand_pass: StrandPass) -> str:
+    if drawing.card_counts:
+        return card_counts_line(drawing.counts_of, drawing.guide_count, drawing.card_counts)
+    strand_count, drawn_now = drawing.snapshot.strand_count, strand_pass.statistics
+    return counts_line(drawing.counts_of, drawing.guide_count, strand_count, drawn_now)
+
+
+def statistics_of(uid: int) -> Statistics:
+    """What was drawn of a groom in the last view; nothing before the first."""
+    strand_pass = _passes.get(uid)
+    return Statistics() if strand_pass is None else strand_pass.statistics
 
 
 def drawn() -> frozenset[int]:

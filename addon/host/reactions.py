@@ -59,6 +59,8 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
         if is_edited(session, edited) or is_weighted_anew(session, edited):
             session.is_stale = True
             _read_again_soon()
+        elif session.is_stale and not bpy.app.timers.is_registered(_read_again):
+            _read_again_soon()  # its scene is shown again
         follows = not live.is_free(session) and is_among(session, moved)
         update = partial(_update, depsgraph=depsgraph, follows=follows, is_lit_anew=is_lit_anew)
         live.attempt(session, depsgraph, update)
@@ -116,7 +118,13 @@ def _refine() -> None:
 
 
 def undone() -> None:
-    """Anything may be different after undo and redo: look again, once Blender has settled."""
+    """Anything may be different after undo and redo: look again, once Blender has settled.
+
+    Hair whose making was undone is simply gone; nobody needs to be told.
+    """
+    for groom in live.sessions():
+        if groom.hair.handle.find() is None:
+            live.stop(groom)
     for session in live.simulated():
         session.is_stale = True
     if live.simulated():

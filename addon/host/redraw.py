@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import time
+
 import bpy
+
+#: Panels that tell times and counts are drawn again this often [s] while hair moves.
+_PAUSE = 0.5
+
+_last = 0.0
 
 
 def redraw_views() -> None:
@@ -13,6 +20,15 @@ def redraw_views() -> None:
 def redraw_panels() -> None:
     """Ask all places that have a panel of ours to draw themselves again."""
     _redraw({("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")})
+
+
+def refresh_panels() -> None:
+    """As `redraw_panels`, but not at every frame."""
+    global _last
+    now = time.monotonic()
+    if now - _last >= _PAUSE:
+        _last = now
+        redraw_panels()
 
 
 def _redraw(places: set[tuple[str, str]]) -> None:

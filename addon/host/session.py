@@ -12,6 +12,7 @@ from ..render.snapshot import Snapshot
 from .baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays, used_vertices
 from .choices import Choices
 from .groom_picture import GroomPicture
+from .measures import measured
 from .objects import Body
 from .obstacles import Obstacles
 from .reading import Reading
@@ -232,16 +233,17 @@ class Session:
         Raises:
             HairloomError: as `rest`.
         """
-        pose = self._pose(depsgraph)
-        self.solver.advance(
-            pose,
-            () if self.obstacles is None else self.obstacles.move(depsgraph, duration),
-            self.choices.dynamics,
-            gravity_of(depsgraph.scene),
-            duration,
-            scene_wind(depsgraph),
-        )
-        self._show()
+        with measured(self.uid, "simulation"):
+            pose = self._pose(depsgraph)
+            self.solver.advance(
+                pose,
+                () if self.obstacles is None else self.obstacles.move(depsgraph, duration),
+                self.choices.dynamics,
+                gravity_of(depsgraph.scene),
+                duration,
+                scene_wind(depsgraph),
+            )
+            self._show()
 
     def constants(self) -> Arrays:
         """See `baked_rig.rig_arrays`."""

@@ -8,9 +8,11 @@ from ..host import live
 from ..host.card_images import HAIRLOOM_PG_card_images
 from .drawing import Draw, draw_group, draw_named
 from .operators_cards import draw_made_cards
+from .preset_chooser import draw_preset_row
 
 
 def draw_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    draw_preset_row(layout, hair, "cards")
     layout.prop(hair.data.hairloom.card_drawing, "shown_as")
     session = live.session_of(hair)
     for line in () if session is None else session.cards.lines:

@@ -117,7 +117,6 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         layout.operator("hairloom.fin_add", icon="MOD_CLOTH")
         return
     fin, session = obj.hairloom.fin, live.simulated_of(obj)
-    layout.prop(fin, "enabled")
     row = layout.row(align=True)
     text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
     row.operator("hairloom.fin_preview", text=text, icon=icon, depress=session is not None)
@@ -134,6 +133,12 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         column.prop(fin, parameter.name, slider=parameter.kind in {"number", "integer"})
 
 
+def draw_switch(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
+    """Whether the fin moves, in the header of its panel."""
+    if fin_modifier(obj) is not None:
+        layout.prop(obj.hairloom.fin, "enabled", text="")
+
+
 class HAIRLOOM_PT_fin(bpy.types.Panel):
     """A mesh that moves as cloth"""
 
@@ -146,6 +151,9 @@ class HAIRLOOM_PT_fin(bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return context.object is not None and context.object.type == "MESH"
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        draw_switch(self.layout, context.object)
 
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
@@ -166,6 +174,9 @@ class HAIRLOOM_PT_sidebar_fin(bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return active_mesh(context) is not None
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        draw_switch(self.layout, context.object)
 
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True

@@ -57,6 +57,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
     bl_label = "Play"
 
     _pace: Pace
+    _ticks: bpy.types.Timer
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -85,12 +86,14 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
                 self.report({"WARNING"}, warning)
         if not live.is_playing():
             return {"CANCELLED"}
-        start_ticking(context)
+        self._ticks = start_ticking(context)
         self._pace = Pace(time.perf_counter())
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if self._ticks is not _timer:
+            return {"FINISHED"}  # another Play has taken over
         if not live.is_playing():
             stop_ticking()
             return {"FINISHED"}
@@ -177,11 +180,12 @@ class HAIRLOOM_OT_reset(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def start_ticking(context: bpy.types.Context) -> None:
+def start_ticking(context: bpy.types.Context) -> bpy.types.Timer:
     global _timer
     stop_ticking()
     _timer = context.window_manager.event_timer_add(1.0 / TICKS_PER_SECOND, window=context.window)
     context.workspace.status_text_set(STATUS)
+    return _timer
 
 
 def stop_ticking() -> None:

@@ -1,21 +1,22 @@
-"""Panels: session and settings in the sidebar, the same settings in Properties > Data."""
+"""Panels: what is done to hair in the sidebar, all of its settings in Properties > Data."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from typing import Any
 
 import bpy
 
-from ..host import live, timeline, view_transform
-from ..host.groom_files import dropped_phrase
-from ..host.session import Session
-from ..host.source import own_dynamics
+from ..host import live
+from ..host.particle_hair import hair_systems
+from ..host.starting import is_untouched
 from .drawing import Draw
-from .messages import draw_lines, draw_message
 from .operators_adopted import draw_sort
-from .sections import SECTIONS, SUB_SECTIONS
+from .operators_strand_export import draw_strand_exports
+from .operators_strand_import import draw_imports
+from .sections import SECTIONS, SESSION_SECTIONS, SUB_SECTIONS, SWITCHES
 from .selection import active_mesh, chosen_hair
+from .state import draw_notice, draw_state, draw_troubles
 
 
 def _hair(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -42,43 +43,44 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     if hair is not None:
         layout.prop(hair.hairloom.bake, "follows")
     if session is not None:
-        _draw_state(layout, context, session)
-    if live.notice():
-        draw_message(layout, context, live.notice(), "ERROR")
+        draw_state(layout, context, session)
+    draw_notice(layout, context)
     if hair is None:
-        layout.operator("hairloom.grow", icon="OUTLINER_OB_CURVES")
-        layout.operator("hairloom.import_tfx", icon="IMPORT")
+        draw_start(layout, context)
         return
+    if session is None and is_untouched(hair):
+        layout.operator("hairloom.use_groom", icon="OUTLINER_OB_CURVES")
+    draw_troubles(layout, context, hair, session)
     row = layout.row(align=True)
     row.prop(hair.hairloom, "debug_view")
     row.prop(hair.hairloom, "show_counts", text="", icon="INFO")
     layout.prop(hair.hairloom, "hide_original")
-    if own_dynamics(hair):
-        layout.operator("hairloom.mute_hair_dynamics", icon="MUTE_IPO_ON")
 
 
-def _draw_state(layout: bpy.types.UILayout, context: bpy.types.Context, session: Session) -> None:
-    rig = session.rig
-    layout.label(text=f"{rig.strands.strand_count:,} strands, {len(rig.guides):,} guides")
-    draw_lines(layout.column(align=True), context, _moved_by(session))
-    if session.source.dropped:
-        draw_message(layout, context, dropped_phrase(session.source.dropped).capitalize(), "INFO")
-    troubles = filter(None, (timeline.trouble(session.uid), view_transform.trouble()))
-    for warning in dict.fromkeys((*session.warnings, *troubles)):
-        draw_message(layout, context, warning, "ERROR")
+def draw_start(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """How to get some hair."""
+    column = layout.column(align=True)
+    column.scale_y = 1.3
+    column.operator("hairloom.add_groom", text="Add Hair", icon="OUTLINER_OB_CURVES")
+    mesh = active_mesh(context)
+    if mesh is not None and hair_systems(mesh):
+        column.operator("hairloom.convert_particles", icon="PARTICLES")
+    column.operator("hairloom.sample_scene", text="Sample Scene", icon="SCENE_DATA")
+    column.menu("HAIRLOOM_MT_import", text="Import", icon="IMPORT")
 
 
-def _moved_by(session: Session) -> str:
-    """What moves the hair at the moment, such as "Simulated on the GPU (OpenGL, llvmpipe)"."""
-    baked = timeline.baked(session.uid)
-    if baked is not None and baked.is_shown:
-        return "Shown from the bake" + (", which is out of date" if baked.changed else "")
-    computed = "Simulated" if session.is_playing else "To be simulated"
-    return f"{computed} on the {session.computed_on}"
+class HAIRLOOM_MT_import(bpy.types.Menu):
+    """Grooms from files"""
+
+    bl_idname = "HAIRLOOM_MT_import"
+    bl_label = "Import Hair"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        draw_imports(self.layout)
 
 
 class HAIRLOOM_PT_sidebar(bpy.types.Panel):
-    """Preview, Play and the settings of the selected hair"""
+    """Preview, Play and what is done to the selected hair"""
 
     bl_label = "Hairloom"
     bl_space_type = "VIEW_3D"
@@ -87,6 +89,8 @@ class HAIRLOOM_PT_sidebar(bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_preview(self.layout, context)
+        if _hair(context) is not None:
+            self.layout.operator("hairloom.show_settings", icon="PROPERTIES")
 
 
 class HAIRLOOM_PT_data(bpy.types.Panel):
@@ -96,7 +100,6 @@ class HAIRLOOM_PT_data(bpy.types.Panel):
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "data"
-    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -106,12 +109,17 @@ class HAIRLOOM_PT_data(bpy.types.Panel):
         draw_preview(self.layout, context)
 
 
-def _sub_panels(parent: type[bpy.types.Panel]) -> Iterable[type[Any]]:
+def _sub_panels(
+    parent: type[bpy.types.Panel], *, only: Container[str] | None = None
+) -> Iterable[type[Any]]:
     for name, label, draw_section in SECTIONS:
+        if only is not None and name not in only:
+            continue
         section = _sub_panel(parent, name, label, draw_section)
         yield section
         for below in SUB_SECTIONS.get(name, ()):
-            yield _sub_panel(section, *below)
+            if only is None or below[0] in only:
+                yield _sub_panel(section, *below)
 
 
 def _sub_panel(
@@ -122,10 +130,16 @@ def _sub_panel(
     def poll(cls: type[Any], context: bpy.types.Context) -> bool:
         return _hair(context) is not None
 
+    is_in_properties = parent.bl_space_type == "PROPERTIES"
+
     def draw(self: Any, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
-        self.layout.use_property_decorate = False
+        self.layout.use_property_decorate = is_in_properties
         draw_section(self.layout, _hair(context))
+
+    def draw_header(self: Any, context: bpy.types.Context) -> None:
+        owner, switch = SWITCHES[name]
+        self.layout.prop(owner(_hair(context)), switch, text="")
 
     namespace = {
         "__doc__": f"{label} of the selected hair",
@@ -137,6 +151,8 @@ def _sub_panel(
         "poll": classmethod(poll),
         "draw": draw,
     }
+    if name in SWITCHES:
+        namespace["draw_header"] = draw_header
     for place in ("bl_category", "bl_context"):
         if hasattr(parent, place):
             namespace[place] = getattr(parent, place)
@@ -163,16 +179,17 @@ class HAIRLOOM_PT_sidebar_mesh_cards(bpy.types.Panel):
 
 
 def draw_import(self: Any, _context: bpy.types.Context) -> None:
-    self.layout.operator("hairloom.import_tfx", text="Hairloom groom (.tfx)")
+    draw_imports(self.layout)
 
 
 def draw_exports(self: Any, _context: bpy.types.Context) -> None:
     self.layout.operator("hairloom.export_cards", text="Hair cards (.glb/.fbx/.usd/.obj)")
-    self.layout.operator("hairloom.export_tfx", text="TressFX (.tfx)")
+    draw_strand_exports(self.layout)
 
 
 def draw_add(self: Any, _context: bpy.types.Context) -> None:
-    self.layout.operator("hairloom.grow", text="Hairloom Hair", icon="OUTLINER_OB_CURVES")
+    self.layout.operator("hairloom.add_groom", icon="OUTLINER_OB_CURVES")
+    self.layout.operator("hairloom.sample_scene", icon="SCENE_DATA")
 
 
 MENUS: tuple[tuple[str, Callable[[Any, bpy.types.Context], None]], ...] = (
@@ -182,8 +199,9 @@ MENUS: tuple[tuple[str, Callable[[Any, bpy.types.Context], None]], ...] = (
 )
 
 CLASSES: tuple[type[Any], ...] = (
+    HAIRLOOM_MT_import,
     HAIRLOOM_PT_sidebar,
-    *_sub_panels(HAIRLOOM_PT_sidebar),
+    *_sub_panels(HAIRLOOM_PT_sidebar, only=SESSION_SECTIONS),
     HAIRLOOM_PT_sidebar_mesh_cards,
     HAIRLOOM_PT_data,
     *_sub_panels(HAIRLOOM_PT_data),

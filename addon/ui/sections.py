@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import bpy
 
 from .card_sections import CARD_SECTIONS, draw_cards
 from .drawing import Draw, draw_group, draw_named, draw_titled
-from .look import LOOK, draw_preset_row, is_idle, look_names
+from .look import LOOK, is_idle, look_names
 from .operators_bake import draw_bake
 from .operators_colliders import draw_colliders
 from .operators_show import draw_show
+from .preset_chooser import draw_preset_row
 
 
 def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -40,7 +44,7 @@ def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 def draw_volume(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Only what acts in this form; scattering only where the model has it."""
-    layout.menu("HAIRLOOM_MT_shadows")
+    draw_preset_row(layout, hair, "volume")
     group = hair.data.hairloom.volume
     hidden = {name for form, names in VOLUME.items() if form != group.shadows for name in names}
     for parameter in group.settings.parameters():
@@ -54,22 +58,19 @@ def draw_volume(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         draw_named(column, group, (parameter.name,))
     if group.shadows != "none":
         layout.operator("hairloom.show_slices")
-    if group.shadows != "none":
-        draw_skin(layout, hair)
 
 
 def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Where hair throws no shadow there is none on skin."""
     group = hair.data.hairloom.skin
-    layout.prop(group, "soft_shadow")
     column = layout.column()
-    column.active = group.soft_shadow
+    column.active = group.soft_shadow and hair.data.hairloom.volume.shadows != "none"
     draw_named(column, group, [p.name for p in group.settings.parameters()[1:]])
     column.operator("hairloom.show_skin_shadow")
 
 
 def draw_shafts(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     group = hair.data.hairloom.shafts
-    layout.prop(group, "use_shafts")
     column = layout.column()
     column.active = group.use_shafts
     draw_named(column, group, [p.name for p in group.settings.parameters()[1:]])
@@ -111,7 +112,7 @@ def draw_detail(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """What the sections below leave out."""
-    layout.menu("HAIRLOOM_MT_dynamics")
+    draw_preset_row(layout, hair, "dynamics")
     group = hair.hairloom.dynamics
     below = {name for names in DYNAMICS.values() for name in names}
     names = [p.name for p in group.settings.parameters() if p.name not in below]
@@ -132,7 +133,8 @@ def _dynamics_section(label: str) -> Draw:
 
 def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     layout.operator("hairloom.export_cards", icon="EXPORT")
-    layout.operator("hairloom.export_tfx", icon="EXPORT")
+    layout.menu("HAIRLOOM_MT_export_strands", icon="EXPORT")
+    layout.operator("hairloom.check_export", icon="CHECKMARK")
 
 
 #: a parameter of children -> those that do nothing while it is 0
@@ -171,11 +173,28 @@ SECTIONS: tuple[tuple[str, str, Draw], ...] = (
     ("cards", "Cards", draw_cards),
     ("export", "Export", draw_export),
 )
+#: those that the sidebar has too: what is done to the hair, not what it is
+SESSION_SECTIONS = frozenset({"look", "dynamics", "bake", "show", "cards", "export"})
+
+
+def _groom(hair: bpy.types.Object) -> Any:
+    return hair.data.hairloom
+
+
+#: section that is on or off -> what holds the property of the checkbox in its header, its name
+SWITCHES: dict[str, tuple[Callable[[bpy.types.Object], Any], str]] = {
+    "shadows": (_groom, "use_shadows"),
+    "skin": (lambda hair: hair.data.hairloom.skin, "soft_shadow"),
+    "shafts": (lambda hair: hair.data.hairloom.shafts, "use_shafts"),
+    "children": (_groom, "use_children"),
+    "cards": (_groom, "use_cards"),
+}
 #: section -> those below it
 SUB_SECTIONS: dict[str, tuple[tuple[str, str, Draw], ...]] = {
     "look": tuple(
         (f"look_{label.split()[0].lower()}", label, _look_section(label)) for label in LOOK if label
     ),
+    "shadows": (("skin", "Soft Shadow on Skin", draw_skin),),
     "dynamics": (
         ("style", "Style", _dynamics_section("Style")),
         ("medium", "Medium & Wind", _dynamics_section("Medium & Wind")),

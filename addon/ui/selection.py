@@ -49,3 +49,12 @@ def needs_hair(operator: type[bpy.types.Operator], context: bpy.types.Context) -
         return True
     operator.poll_message_set("Select hair curves first (Add > Curve > Empty Hair, or import some)")
     return False
+
+
+def make_active(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
+    """Select these alone; the last is active."""
+    for selected in context.selected_objects:
+        selected.select_set(False)
+    for obj in objects:
+        obj.select_set(True)
+        context.view_layer.objects.active = obj

@@ -9,10 +9,13 @@ import pytest
 
 from hairloom.addon import pipeline
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.strand_formats import TRESSFX
+from hairloom.addon.exchange.strand_output import StrandOutput
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.host import command_line, live, overlay, playback, reactions, timeline
 from hairloom.addon.host.bake import Bake
-from hairloom.addon.host.groom_files import export_cards, export_tfx
+from hairloom.addon.host.card_out import export_cards
+from hairloom.addon.host.strand_export import StrandExport
 
 LAST = 6
 
@@ -289,8 +292,8 @@ def test_cards_are_one_a_guide_and_tressfx_holds_all(hair, evaluated, tmp_path):
     hair.data.hairloom.cards.way = "guides"
     cards = export_cards(hair, evaluated(), tmp_path / "cards.glb")
     assert "Wrote 60 cards" in cards.result
-    outcome = export_tfx(hair, evaluated(), tmp_path / "hair.tfx", up="Z", scale=1.0)
-    assert "260 strands" in outcome.result
+    plan = StrandExport.of([hair], evaluated(), TRESSFX, StrandOutput(up="Z"))
+    assert "260 strands" in plan.write(tmp_path / "hair.tfx").result
     written = read_tfx(tmp_path / "hair.tfx", up="Z", scale=1.0).strands
     session = live.start(hair, evaluated())
     np.testing.assert_allclose(written.points, session.rig.strands.points, atol=1e-6)

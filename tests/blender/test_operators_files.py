@@ -1,7 +1,5 @@
 """The artist's buttons for files: they do it, or say what is wrong, where, and what to do."""
 
-from pathlib import Path
-
 import bpy
 import numpy as np
 import pytest
@@ -161,60 +159,10 @@ def test_growing_needs_a_mesh(told):
         bpy.ops.hairloom.grow()
 
 
-def test_a_file_comes_in_onto_the_selected_head(sphere, groom_file, told):
-    assert bpy.ops.hairloom.import_tfx(filepath=str(groom_file)) == {"FINISHED"}
-    hair = bpy.context.object
-    assert hair.name == "groom" and hair.data.surface == sphere and hair.parent == sphere
-    assert "groom.tfx: 40 strands" in told()
-    uv = np.empty(80, np.float32)
-    hair.data.attributes["surface_uv_coordinate"].data.foreach_get("vector", uv)
-    assert uv.min() >= 0.0 and uv.max() <= 1.0 and np.ptp(uv) > 0.5
-
-
-def test_a_file_comes_in_alone_without_a_head(groom_file):
-    bpy.ops.hairloom.import_tfx(filepath=str(groom_file))
-    hair = bpy.context.object
-    assert hair.data.surface is None and hair.parent is None
-    expected = read_tfx(groom_file).strands
-    assert len(hair.data.points) == expected.point_count
-
-
-def test_several_files_come_in_together_and_bad_ones_are_reported(groom_file, tmp_path, told):
-    (tmp_path / "garbage.tfx").write_bytes(b"no hair in here")
-    with pytest.raises(RuntimeError, match=r"garbage\.tfx"):
-        bpy.ops.hairloom.import_tfx(
-            filepath=str(groom_file),
-            directory=str(tmp_path),
-            files=[{"name": "garbage.tfx"}, {"name": "groom.tfx"}],
-        )
-    assert [obj.name for obj in bpy.data.objects if obj.type == "CURVES"] == ["groom"]
-
-
-@pytest.mark.parametrize("damage", ["truncated", "garbage", "empty", "missing", "of another scale"])
-def test_a_file_that_cannot_be_used_is_named_and_leaves_nothing(damage, sphere, groom_file, told):
-    options, content = {}, groom_file.read_bytes()
-    if damage == "truncated":
-        groom_file.write_bytes(content[: len(content) // 2])
-    elif damage == "garbage":
-        groom_file.write_bytes(b"x" * 500)
-    elif damage == "empty":
-        groom_file.write_bytes(b"")
-    elif damage == "missing":
-        groom_file.unlink()
-    else:
-        options["scale"] = 100.0
-    with pytest.raises(RuntimeError, match=r"groom\.tfx") as raised:
-        bpy.ops.hairloom.import_tfx(filepath=str(groom_file), **options)
-    assert "Traceback" not in str(raised.value)
-    told()
-    assert [obj.name for obj in bpy.data.objects] == ["Head"]
-    assert len(bpy.data.hair_curves) == 0
-
-
 def test_a_head_without_uvs_is_a_warning_with_the_remedy(sphere, groom_file, told):
     sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
     sphere.data.update()
-    assert bpy.ops.hairloom.import_tfx(filepath=str(groom_file)) == {"FINISHED"}
+    assert bpy.ops.hairloom.import_strands(filepath=str(groom_file)) == {"FINISHED"}
     assert "Unwrap" in told()
     out = groom_file.with_name("out.tfx")
     assert bpy.ops.hairloom.export_tfx(filepath=str(out)) == {"FINISHED"}
@@ -222,7 +170,7 @@ def test_a_head_without_uvs_is_a_warning_with_the_remedy(sphere, groom_file, tol
 
 
 def test_strands_leave_as_they_came(sphere, groom_file, told):
-    bpy.ops.hairloom.import_tfx(filepath=str(groom_file))
+    bpy.ops.hairloom.import_strands(filepath=str(groom_file))
     out = groom_file.with_name("out.tfx")
     assert bpy.ops.hairloom.export_tfx(filepath=str(out)) == {"FINISHED"}
     assert "40 strands" in told()
@@ -231,7 +179,7 @@ def test_strands_leave_as_they_came(sphere, groom_file, told):
 
 
 def test_axes_and_scale_are_undone_by_their_own_inverse(groom_file):
-    bpy.ops.hairloom.import_tfx(filepath=str(groom_file), up="Z", scale=0.01)
+    bpy.ops.hairloom.import_strands(filepath=str(groom_file), up="Z", scale=0.01)
     out = groom_file.with_name("out.tfx")
     bpy.ops.hairloom.export_tfx(filepath=str(out), up="Z", scale=0.01)
     before, after = read_tfx(groom_file).strands, read_tfx(out).strands
@@ -274,19 +222,3 @@ def test_a_place_that_cannot_be_written_to_is_named(operator, name, sphere, tmp_
         getattr(bpy.ops.hairloom, operator)(filepath=str(path))
     told()
     assert [path.name for path in tmp_path.iterdir()] == ["no folder"]
-
-
-def test_the_ponytail_of_four_files_comes_in_at_once(shared_data, told):
-    folder = Path(shared_data) / "tressfx_ponytail"
-    files = [{"name": path.name} for path in sorted(folder.glob("*.tfx"))]
-    assert bpy.ops.hairloom.import_tfx(
-        filepath=str(folder / files[0]["name"]), directory=str(folder), files=files
-    ) == {"FINISHED"}
-    assert len([obj for obj in bpy.data.objects if obj.type == "CURVES"]) == len(files) == 4
-    assert len(bpy.context.selected_objects) == 4
-
-
-def test_the_file_menus_and_dropping_know_our_formats():
-    handler = bpy.types.HAIRLOOM_FH_tfx
-    assert handler.bl_file_extensions == ".tfx"
-    assert handler.bl_import_operator == "hairloom.import_tfx"

@@ -8,7 +8,7 @@ import bpy
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import command_line
+from hairloom.addon.host import command_line, job_options
 from hairloom.addon.host.principled import _values, has_principled_hair, look_from_material
 from hairloom.addon.shading.marschner.principled import PrincipledHair
 
@@ -136,7 +136,7 @@ def test_a_node_that_is_muted_or_not_linked_does_not_count(hair: Any) -> None:
 def settings_by(*arguments: str) -> Any:
     parser = command_line.parser()
     options = parser.parse_args(["render", "--output", "x.png", *arguments])
-    return command_line._settings(options)["shading"]
+    return job_options.chosen_settings(options)["shading"]
 
 
 def test_the_command_line_starts_from_the_material_and_single_values_go_over_it(

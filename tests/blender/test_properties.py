@@ -168,35 +168,6 @@ def test_a_file_from_before_shadows_shows_the_default_and_keeps_what_was_set(new
     assert "found Bare none True" in done.stdout
 
 
-def test_everything_that_the_artist_can_set_has_a_description(extension):
-    """Properties of groups and operators; Blender's own (name, filepath...) are its own matter."""
-    own_to_blender = set(bpy.types.PropertyGroup.bl_rna.properties.keys()) | {
-        "check_existing",
-        "directory",
-        "filepath",
-        "files",
-        "filter_glob",
-    }
-    undescribed = [
-        f"{name}.{shown.identifier}"
-        for name in dir(bpy.types)
-        if name.startswith("HAIRLOOM_PG_")
-        for shown in getattr(bpy.types, name).bl_rna.properties
-        if shown.identifier not in own_to_blender and not shown.description
-    ]
-    operators = [getattr(bpy.ops.hairloom, name) for name in dir(bpy.ops.hairloom)]
-    for operator in operators:
-        rna = operator.get_rna_type()
-        assert rna.description, rna.identifier
-        undescribed += [
-            f"{rna.identifier}.{shown.identifier}"
-            for shown in rna.properties
-            if shown.identifier not in own_to_blender and not shown.description
-        ]
-    assert operators
-    assert undescribed == []
-
-
 def test_settings_out_of_range_in_a_script_are_clamped_by_blender(group_of):
     group = group_of("detail")
     group.subdivisions = 10**6

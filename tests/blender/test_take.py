@@ -20,7 +20,7 @@ def scene(new_hair, sphere):
 
 
 def simulated(path, *extra):
-    arguments = ["simulate", "--groom", "Hair", "--scene", *SMALL, *extra, "--output", str(path)]
+    arguments = ["simulate", "--groom", "Hair", "--animated", *SMALL, *extra, "--output", str(path)]
     assert command_line.run(arguments) == 0
     with np.load(path) as data:
         return data["guides"]

@@ -247,7 +247,7 @@ def card_objects():
 
 
 def is_making():
-    return of_hairloom("ui.operators_cards").is_making()
+    return of_hairloom("ui.long_work").running() == "Make Cards"
 
 
 def make_cards():

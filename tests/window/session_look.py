@@ -253,7 +253,7 @@ def own_presets():
     bpy.context.window.cursor_warp(view.x + view.width // 3, view.y + view.height // 2)
     yield 3
     with bpy.context.temp_override(area=view, region=region("WINDOW")):
-        bpy.ops.hairloom.choose_look("INVOKE_DEFAULT")
+        bpy.ops.hairloom.choose_preset("INVOKE_DEFAULT")
     yield 10
     driver.screenshot("presets")
     yield from press("ESC")

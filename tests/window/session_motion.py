@@ -124,7 +124,7 @@ def run_bake():
 
 
 def is_baking():
-    return of_hairloom("ui.operators_bake")._running is not None
+    return of_hairloom("ui.long_work").running() == "Bake"
 
 
 def bake_in_the_window():

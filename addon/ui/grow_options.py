@@ -1,0 +1,72 @@
+"""What growing hair asks for, shared by the operators that grow some."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import bpy
+from bpy.props import StringProperty
+
+from ..host.groups import operator_properties
+from ..host.objects import head_of
+from ..host.vertex_weights import weight_names
+from .selection import active_mesh, chosen_hair
+
+#: settings that say nothing about hair that stands straight along the normals, and the other way
+_COMBED_ONLY: tuple[str, ...] = (
+    "lift",
+    "comb_back",
+    "comb_share",
+    "droop",
+    "clump",
+    "clump_size",
+    "wave",
+    "wave_length",
+    "frizz",
+    "clearance",
+    "volume",
+)
+_NORMALS_ONLY: tuple[str, ...] = ("per_vertex", "threshold")
+
+
+def _weight_names(_operator: Any, context: bpy.types.Context, typed: str) -> list[str]:
+    # while the operator is adjusted the hair that it has grown is active
+    chosen = chosen_hair(context)
+    mesh = active_mesh(context) or (head_of(chosen[0]) if chosen else None)
+    names = [] if mesh is None else weight_names(mesh)
+    return [name for name in names if typed.lower() in name.lower()]
+
+
+#: for the `__annotations__` of an operator
+GROW_PROPERTIES: dict[str, Any] = {
+    **operator_properties("grow"),
+    "density_group": StringProperty(
+        name="Density",
+        description="Vertex group or float attribute on points that says how densely hair "
+        "grows; empty: on the scalp if combed, else everywhere",
+        search=_weight_names,
+        search_options={"SUGGESTION"},
+    ),
+    "length_group": StringProperty(
+        name="Length Factor",
+        description="Vertex group or float attribute on points that the length is multiplied "
+        "by; empty: all as long as said",
+        search=_weight_names,
+        search_options={"SUGGESTION"},
+    ),
+}
+
+
+def draw_grow(
+    layout: bpy.types.UILayout, operator: Any, names: Iterable[str] = GROW_PROPERTIES
+) -> None:
+    """Only what acts in the way that is chosen."""
+    hidden = _NORMALS_ONLY if operator.way == "combed" else _COMBED_ONLY
+    if operator.way == "normals" and operator.per_vertex:
+        hidden += ("strand_count",)
+    elif operator.way == "normals":
+        hidden += ("threshold",)
+    for name in names:
+        if name not in hidden:
+            layout.prop(operator, name)

@@ -1,0 +1,184 @@
+"""The buttons beside warnings: each mends what is wrong with the active hair."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import bpy
+
+from ..errors import HairloomError
+from ..host.objects import head_of
+from ..host.troubles import is_unevenly_scaled, set_surface, surface_for
+from .reports import reporting, waiting
+from .selection import chosen_hair, needs_hair
+
+#: for Smart UV Project: the steepest turn within an island [rad], the room between islands
+_STEEPEST, _ROOM = 1.15, 0.02
+
+
+class HAIRLOOM_OT_set_surface(bpy.types.Operator):
+    """Let the active hair grow from the selected mesh; else from the mesh that is closest to it"""
+
+    bl_idname = "hairloom.set_surface"
+    bl_label = "Set Surface"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _can_mend(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        hair, depsgraph = chosen_hair(context)[0], context.evaluated_depsgraph_get()
+        selected = [obj for obj in context.selected_objects if obj.type == "MESH"]
+        visible = [obj for obj in context.view_layer.objects if obj.visible_get()]
+        mesh = surface_for(hair, selected or visible, depsgraph)
+        set_surface(hair, mesh)
+        self.report({"INFO"}, f"{hair.name} grows from {mesh.name} now")
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_snap_roots(bpy.types.Operator):
+    """Move each strand of the active hair so that its root lies on the surface"""
+
+    bl_idname = "hairloom.snap_roots"
+    bl_label = "Snap Roots to Surface"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (_can_mend(cls, context) and _needs_surface(cls, context)):
+            return False
+        if _surface_of(context).data.uv_layers.active is not None:
+            return True
+        cls.poll_message_set("The surface has no UVs: press Unwrap first")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        hair = chosen_hair(context)[0]
+        set_surface(hair, _surface_of(context))
+        with waiting(context), _alone(context, hair):
+            bpy.ops.curves.snap_curves_to_surface(attach_mode="NEAREST")
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
+    """Give the surface of the active hair UVs that do not overlap, by Smart UV Project"""
+
+    bl_idname = "hairloom.unwrap_surface"
+    bl_label = "Unwrap Surface"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (_can_mend(cls, context) and _needs_surface(cls, context)):
+            return False
+        head = _surface_of(context)
+        if head.data.uv_layers.active is not None:
+            cls.poll_message_set("The surface has UVs already")
+        elif not head.data.is_editable or not head.visible_get():
+            cls.poll_message_set("The surface is hidden, or linked from another file")
+        else:
+            return True
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        hair, head = chosen_hair(context)[0], _surface_of(context)
+        with waiting(context), _alone(context, head):
+            bpy.ops.object.mode_set(mode="EDIT")
+            try:
+                bpy.ops.mesh.select_all(action="SELECT")
+                bpy.ops.uv.smart_project(angle_limit=_STEEPEST, island_margin=_ROOM)
+            finally:
+                bpy.ops.object.mode_set(mode="OBJECT")
+        set_surface(hair, head)
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_apply_scale(bpy.types.Operator):
+    """Put the scale of the active hair's object into its curves; nothing moves"""
+
+    bl_idname = "hairloom.apply_scale"
+    bl_label = "Apply Scale"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not _can_mend(cls, context):
+            return False
+        hair = chosen_hair(context)[0]
+        if hair.data.users > 1:
+            cls.poll_message_set("Several objects share these curves: make them single first")
+        elif not is_unevenly_scaled(hair):
+            cls.poll_message_set("It is scaled evenly")
+        else:
+            return True
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        hair = chosen_hair(context)[0]
+        with _alone(context, hair):
+            bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
+        if is_unevenly_scaled(hair):
+            raise HairloomError(
+                "its parent is scaled unevenly too",
+                place=hair.name,
+                remedy="Apply the scale of the parent (Ctrl A); until then only widths are a mean",
+            )
+        return {"FINISHED"}
+
+
+@contextmanager
+def _alone(context: bpy.types.Context, obj: bpy.types.Object) -> Iterator[None]:
+    """Only this object is selected and active, for Blender's operators; then all is as before."""
+    selected, active = context.selected_objects, context.view_layer.objects.active
+    for other in selected:
+        other.select_set(False)
+    obj.select_set(True)
+    context.view_layer.objects.active = obj
+    try:
+        yield
+    finally:
+        obj.select_set(False)
+        for other in selected:
+            other.select_set(True)
+        context.view_layer.objects.active = active
+
+
+def _can_mend(operator: type[Any], context: bpy.types.Context) -> bool:
+    if not needs_hair(operator, context):
+        return False
+    hair = chosen_hair(context)[0]
+    if context.mode != "OBJECT":
+        operator.poll_message_set("Go back to Object Mode first")
+    elif not hair.is_editable or not hair.data.is_editable:
+        operator.poll_message_set("It is linked from another file: make it local first")
+    else:
+        return True
+    return False
+
+
+def _surface_of(context: bpy.types.Context) -> bpy.types.Object:
+    head = head_of(chosen_hair(context)[0])
+    assert head is not None, "poll has looked"
+    return head
+
+
+def _needs_surface(operator: type[Any], context: bpy.types.Context) -> bool:
+    if head_of(chosen_hair(context)[0]) is not None:
+        return True
+    operator.poll_message_set("The hair has no surface: press Set Surface first")
+    return False
+
+
+CLASSES: tuple[type[Any], ...] = (
+    HAIRLOOM_OT_set_surface,
+    HAIRLOOM_OT_snap_roots,
+    HAIRLOOM_OT_unwrap_surface,
+    HAIRLOOM_OT_apply_scale,
+)

@@ -1,0 +1,50 @@
+"""The self-test's buttons in the Preferences."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..host import self_test
+from .reports import waiting
+
+
+class HAIRLOOM_OT_self_test(bpy.types.Operator):
+    """Try out on this machine what Hairloom stands on: shaders, simulation, drawing and files.
+    Takes a few seconds and changes nothing"""
+
+    bl_idname = "hairloom.self_test"
+    bl_label = "Self-Test"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        with waiting(context):
+            checks = self_test.run()
+        failed = [check for check in checks if check.outcome == "failed"]
+        for check in failed:
+            self.report({"WARNING"}, f"{check.name}: {check.text}")
+        if not failed:
+            self.report({"INFO"}, f"All {len(checks)} checks are done; none failed")
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_copy_report(bpy.types.Operator):
+    """Copy what the self-test found, and what this machine is, as text"""
+
+    bl_idname = "hairloom.copy_report"
+    bl_label = "Copy Report"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        if self_test.last_report():
+            return True
+        cls.poll_message_set("Press Self-Test first")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        context.window_manager.clipboard = self_test.report_text()
+        self.report({"INFO"}, "The report is copied")
+        return {"FINISHED"}
+
+
+CLASSES: tuple[type[Any], ...] = (HAIRLOOM_OT_self_test, HAIRLOOM_OT_copy_report)

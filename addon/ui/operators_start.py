@@ -1,0 +1,253 @@
+"""The first five minutes: a groom on a mesh, on hair of Blender's, or in a sample scene; it moves
+and shines at once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty
+
+from ..host import live
+from ..host.particle_hair import convert_particle_hair, hair_systems
+from ..host.sample_scene import add_sample_scene
+from ..host.starting import new_groom, take_over
+from .grow_options import GROW_PROPERTIES, draw_grow
+from .operators_preview import start_preview
+from .preferences import NEW_GROOM, chosen_presets, preferences
+from .reports import reporting, waiting
+from .selection import active_mesh, chosen_hair, make_active, needs_hair
+
+_NO_MESH = "Select the mesh to grow hair on, or add a sample: Add > Curve > Hairloom Sample Scene"
+
+
+class HAIRLOOM_OT_add_groom(bpy.types.Operator):
+    """Grow a groom on the active mesh, with a look, and let it move"""
+
+    bl_idname = "hairloom.add_groom"
+    bl_label = "Hairloom Groom"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = {
+        **NEW_GROOM,
+        "fits": BoolProperty(
+            name="Fit to Mesh",
+            description="Hair as long for this mesh as it would be on a head, if its size is none "
+            "of a head or body",
+            default=True,
+        ),
+        **GROW_PROPERTIES,
+    }
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _in_object_mode(cls, context) and _has_mesh(cls, context)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        _take_preferences(self, context)
+        return self.execute(context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        depsgraph = context.evaluated_depsgraph_get()
+        with waiting(context):
+            hair = new_groom(
+                active_mesh(context),
+                depsgraph,
+                context.collection,
+                self,
+                presets=chosen_presets(self),
+                fits=self.fits,
+                density_group=self.density_group,
+                length_group=self.length_group,
+            )
+            _begin(self, context, [hair], plays=self.plays)
+        return {"FINISHED"}
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        draw_grow(self.layout, self, self.__annotations__)
+
+
+class HAIRLOOM_OT_sample_scene(bpy.types.Operator):
+    """Add a scene with a head that turns, long hair, lights and a camera, and play it. Your own
+    scenes stay as they are"""
+
+    bl_idname = "hairloom.sample_scene"
+    bl_label = "Hairloom Sample Scene"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = dict(NEW_GROOM)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _in_object_mode(cls, context)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        _take_preferences(self, context)
+        return self.execute(context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        with waiting(context):
+            scene, hair = add_sample_scene(chosen_presets(self))
+            if context.window is not None:
+                context.window.scene = scene
+            with context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+                _begin(self, context, [hair], plays=False)
+                hair.select_set(False)  # active, but without an outline
+        if not bpy.app.background:
+            _look_through_the_camera(context)
+            if self.plays and not context.screen.is_animation_playing:
+                bpy.ops.screen.animation_play()
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_use_groom(bpy.types.Operator):
+    """Preview the selected hair with Hairloom: Blender's own Hair Dynamics is turned off, hair
+    without curves is grown, and a look is given to what has none"""
+
+    bl_idname = "hairloom.use_groom"
+    bl_label = "Use Hairloom"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not _in_object_mode(cls, context):
+            return False
+        if any(live.session_of(hair) is None for hair in chosen_hair(context)):
+            return True
+        cls.poll_message_set("Select hair curves that Hairloom does not preview yet")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        chosen, taken = preferences(context), []
+        with waiting(context):
+            for hair in chosen_hair(context):
+                name, depsgraph = hair.name, context.evaluated_depsgraph_get()
+                ready, done = take_over(hair, depsgraph, chosen_presets(chosen))
+                for one in done:
+                    self.report({"INFO"}, f"{name}: {one}")
+                taken.append(ready)
+            _begin(self, context, taken, plays=chosen.plays)
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
+    """Make hair curves of the particle hair of the active mesh, bound to it, and preview them. The
+    particles are hidden, not deleted"""
+
+    bl_idname = "hairloom.convert_particles"
+    bl_label = "Convert Particle Hair"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (_in_object_mode(cls, context) and _has_mesh(cls, context)):
+            return False
+        if hair_systems(active_mesh(context)):
+            return True
+        cls.poll_message_set("The active mesh has no particle hair")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        chosen, mesh = preferences(context), active_mesh(context)
+        assert mesh is not None, "poll has looked"
+        with waiting(context):
+            made = convert_particle_hair(context, mesh)
+            for hair in made:
+                take_over(hair, context.evaluated_depsgraph_get(), chosen_presets(chosen))
+            _begin(self, context, made, plays=chosen.plays)
+        self.report({"INFO"}, f"{mesh.name}: its particle hair is hidden, curves took its place")
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_show_settings(bpy.types.Operator):
+    """Make the hair active and show all of its settings, in Properties > Data"""
+
+    bl_idname = "hairloom.show_settings"
+    bl_label = "All Settings"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return needs_hair(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        make_active(context, chosen_hair(context)[:1])
+        for area in () if context.screen is None else context.screen.areas:
+            if area.type == "PROPERTIES":
+                _show_data(area.spaces.active)
+        return {"FINISHED"}
+
+
+def _show_data(editor: bpy.types.SpaceProperties) -> None:
+    try:
+        editor.context = "DATA"
+    except TypeError:  # it has no such tab, as while it is pinned to something else
+        editor.context = "OBJECT"
+
+
+def _begin(
+    operator: bpy.types.Operator,
+    context: bpy.types.Context,
+    grooms: list[bpy.types.Object],
+    *,
+    plays: bool,
+) -> None:
+    """Select, preview and, in a window, play."""
+    chosen = preferences(context)
+    for hair in grooms:
+        hair.hairloom.bake.follows = chosen.follows
+        hair.hairloom.show_counts = chosen.show_counts
+        if chosen.form != "automatic":
+            hair.hairloom.dynamics.form = chosen.form
+    make_active(context, grooms)
+    start_preview(operator, context, grooms)
+    if not plays or bpy.app.background:
+        return
+    if live.is_playing():
+        depsgraph = context.evaluated_depsgraph_get()
+        for session in filter(None, map(live.session_of, grooms)):
+            session.play(depsgraph)
+    else:
+        bpy.ops.hairloom.play("INVOKE_DEFAULT")
+
+
+def _look_through_the_camera(context: bpy.types.Context) -> None:
+    for area in context.screen.areas:
+        if area.type == "VIEW_3D":
+            area.spaces.active.region_3d.view_perspective = "CAMERA"
+
+
+def _take_preferences(operator: Any, context: bpy.types.Context) -> None:
+    chosen = preferences(context)
+    for name in NEW_GROOM:
+        if not operator.properties.is_property_set(name):
+            setattr(operator, name, getattr(chosen, name))
+
+
+def _in_object_mode(operator: type[Any], context: bpy.types.Context) -> bool:
+    if context.mode == "OBJECT":
+        return True
+    operator.poll_message_set("Go back to Object Mode first")
+    return False
+
+
+def _has_mesh(operator: type[Any], context: bpy.types.Context) -> bool:
+    if active_mesh(context) is not None:
+        return True
+    operator.poll_message_set(_NO_MESH)
+    return False
+
+
+CLASSES: tuple[type[Any], ...] = (
+    HAIRLOOM_OT_add_groom,
+    HAIRLOOM_OT_sample_scene,
+    HAIRLOOM_OT_use_groom,
+    HAIRLOOM_OT_convert_particles,
+    HAIRLOOM_OT_show_settings,
+)

@@ -1,0 +1,134 @@
+"""The add-on's page in Blender's Preferences: defaults, the GPU, and a self-test."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+
+from ..host.gpu_context import gpu_in_use
+from ..host.groups import operator_properties
+from ..host.presets import names
+from ..host.self_test import last_report
+from ..host.solvers import compute_problem
+from .messages import draw_message
+
+#: the package that Blender knows, above this one
+ROOT_PACKAGE = __package__.rpartition(".addon")[0]
+LOOK, DYNAMICS = "looks/brown", "dynamics/breeze"
+
+
+def _looks(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+    return [name for name in names("shading") if typed.lower() in name.lower()]
+
+
+def _ways(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+    return [name for name in names("dynamics") if typed.lower() in name.lower()]
+
+
+#: what a new groom has; for the `__annotations__` of the page, and of operators that make one
+NEW_GROOM: dict[str, Any] = {
+    "look": StringProperty(
+        name="Look",
+        description="Preset of the look that a new groom has; empty: the plain defaults",
+        default=LOOK,
+        search=_looks,
+        search_options={"SUGGESTION"},
+    ),
+    "motion": StringProperty(
+        name="Dynamics",
+        description="Preset of the way in which a new groom moves; empty: the plain defaults",
+        default=DYNAMICS,
+        search=_ways,
+        search_options={"SUGGESTION"},
+    ),
+    "plays": BoolProperty(
+        name="Play at Once",
+        description="Let a new groom move as soon as it is there; off: it is previewed at rest",
+        default=True,
+    ),
+}
+_FORM = operator_properties("dynamics")["form"]
+
+
+class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
+    """What new grooms begin with, and whether all works on this machine"""
+
+    bl_idname = ROOT_PACKAGE
+
+    __annotations__ = {
+        **NEW_GROOM,
+        "form": _FORM,
+        "follows": BoolProperty(
+            name="Simulate on Playback",
+            description="Simulate new grooms while Blender plays its animation; off: only by Play",
+            default=True,
+        ),
+        "show_counts": BoolProperty(
+            name="Counts in the Viewport",
+            description="Write counts and times of new grooms into the viewport",
+            default=False,
+        ),
+    }
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        header, body = layout.panel("hairloom_new_grooms")
+        header.label(text="New Grooms")
+        if body:
+            for name in self.__annotations__:
+                body.prop(self, name)
+        header, body = layout.panel("hairloom_this_machine")
+        header.label(text="This Machine")
+        if body:
+            draw_machine(body, context)
+
+
+def draw_machine(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """The GPU, and what the last self-test found."""
+    used = gpu_in_use()
+    for name, value in used.items():
+        layout.label(text=f"{name.capitalize()}: {value or 'none'}")
+    problem = compute_problem()
+    text = f"Simulates on the CPU: {problem}" if problem else "Simulates on the GPU"
+    layout.label(text=text, icon="INFO" if problem else "CHECKMARK")
+    row = layout.row(align=True)
+    row.operator("hairloom.self_test", icon="CHECKMARK")
+    row.operator("hairloom.copy_report", text="", icon="COPYDOWN")
+    for check in last_report():
+        icon = {"passed": "CHECKMARK", "absent": "INFO", "failed": "ERROR"}[check.outcome]
+        if check.outcome == "failed":
+            draw_message(layout, context, f"{check.name}: {check.text}", icon)
+        else:
+            layout.label(text=f"{check.name}: {check.text}", icon=icon)
+
+
+def preferences(context: bpy.types.Context) -> Any:
+    """The artist's preferences; the defaults where Hairloom is not installed as an extension."""
+    entry = context.preferences.addons.get(ROOT_PACKAGE)
+    if entry is not None and entry.preferences is not None:
+        return entry.preferences
+    return SimpleNamespace(
+        look=LOOK,
+        motion=DYNAMICS,
+        plays=True,
+        form="automatic",
+        follows=True,
+        show_counts=False,
+    )
+
+
+def chosen_presets(chosen: Any) -> tuple[str, ...]:
+    """The presets of a new groom, by name.
+
+    Args:
+        chosen: preferences, or an operator with NEW_GROOM.
+    """
+    return tuple(name for name in (chosen.look, chosen.motion) if name)
+
+
+CLASSES: tuple[type[Any], ...] = (HAIRLOOM_AP_preferences,)

@@ -1,0 +1,172 @@
+"""The first five minutes: grooms on a mesh, on empty hair, of particles; a sample scene."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.groom.settings import GrowSettings
+from hairloom.addon.host import live, overlay, particle_hair, reactions, starting
+from hairloom.addon.host.curves import read_curves
+from hairloom.addon.host.presets import named_preset
+from hairloom.addon.host.source import own_dynamics
+from hairloom.addon.ui.preferences import DYNAMICS, LOOK, preferences
+
+pytestmark = pytest.mark.usefixtures("extension")
+FEW = {"strand_count": 150, "length": 0.1}
+
+
+def make_active(obj):
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    return obj
+
+
+def test_a_groom_is_grown_dressed_previewed_and_active(sphere):
+    assert bpy.ops.hairloom.add_groom(**FEW) == {"FINISHED"}
+    hair = bpy.context.object
+    assert hair.type == "CURVES" and hair.data.surface == sphere and len(hair.data.curves) == 150
+    look, motion = (named_preset(name).settings for name in (LOOK, DYNAMICS))
+    assert hair.data.hairloom.shading.base_color[:] == pytest.approx(look.base_color)
+    assert hair.hairloom.dynamics.wind_speed == pytest.approx(motion.wind_speed)
+    assert motion.wind_speed > 0.0, "nothing moves in still air"
+    (session,) = live.sessions()
+    assert session.rig.strands.strand_count == 150 and session.warnings == ()
+
+
+def test_the_presets_of_a_new_groom_can_be_others_or_none(sphere):
+    bpy.ops.hairloom.add_groom(look="looks/blond", motion="", **FEW)
+    hair = bpy.context.object
+    blond = named_preset("looks/blond").settings
+    assert hair.data.hairloom.shading.base_color[:] == pytest.approx(blond.base_color)
+    assert hair.hairloom.dynamics.wind_speed == 0.0
+    make_active(sphere)
+    with pytest.raises(RuntimeError, match="no such preset"):
+        bpy.ops.hairloom.add_groom(look="looks/plaid", **FEW)
+
+
+@pytest.mark.parametrize(
+    ("size", "factor"),
+    [((2.0, 2.0, 2.0), 2.0 / 0.19), ((1.7, 0.3, 1.8), 1.0), ((0.16, 0.2, 0.24), 1.0)],
+    ids=["cube", "body", "head"],
+)
+def test_only_meshes_that_are_no_head_or_body_change_the_lengths(size, factor):
+    bpy.ops.mesh.primitive_cube_add(size=1.0)
+    bpy.context.object.scale = size
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    found = starting.fitting_factor(bpy.context.object, depsgraph)
+    assert found == pytest.approx(factor)
+    fitted = starting.fitted(GrowSettings(), found)
+    assert fitted.length == pytest.approx(GrowSettings().length * factor)
+    assert fitted.radius == pytest.approx(GrowSettings().radius * factor)
+    assert fitted.strand_count == GrowSettings().strand_count
+
+
+def test_undo_takes_the_groom_and_its_preview_away(sphere):
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.hairloom.add_groom("EXEC_DEFAULT", True, **FEW)
+    assert len(live.sessions()) == 1
+    bpy.ops.ed.undo()
+    assert [obj.type for obj in bpy.data.objects] == ["MESH"]
+    assert live.sessions() == () and live.notice() == ""
+
+
+def test_the_sample_scene_is_a_scene_of_its_own_that_moves():
+    bpy.ops.mesh.primitive_cube_add()
+    before = bpy.context.scene
+    assert bpy.ops.hairloom.sample_scene() == {"FINISHED"}
+    scene = bpy.context.scene
+    assert scene != before and [obj.name for obj in before.objects] == ["Cube"]
+    assert scene.render.engine == "HAIRLOOM" and scene.camera is not None
+    assert sum(obj.type == "LIGHT" for obj in scene.objects) == 3
+    (session,) = live.sessions()
+    assert session.warnings == () and session.head is not None
+    first = session.strands
+    for frame in range(1, 10):
+        scene.frame_set(frame)
+    assert np.abs(session.strands - first).max() > 0.01
+    head = scene.objects["Head"]
+    scene.frame_set(1)
+    at_start = head.rotation_euler.copy()
+    scene.frame_set(scene.frame_end + 1)
+    assert head.rotation_euler[:] == pytest.approx(at_start[:], abs=1e-4), "it jumps as it repeats"
+
+
+def test_the_camera_of_the_sample_sees_all_of_its_hair():
+    from bpy_extras.object_utils import world_to_camera_view
+    from mathutils import Vector
+
+    bpy.ops.hairloom.sample_scene()
+    scene, (session,) = bpy.context.scene, live.sessions()
+    places = session.strands.reshape(-1, 3)[::97]
+    seen = np.array([world_to_camera_view(scene, scene.camera, Vector(p)) for p in places])
+    assert (seen[:, :2] > 0.0).all() and (seen[:, :2] < 1.0).all() and (seen[:, 2] > 0.0).all()
+    assert np.ptp(seen[:, 1]) > 0.4, "hair is small in the picture"
+
+
+def test_empty_hair_of_blenders_gets_hair_a_look_and_a_preview(sphere):
+    bpy.ops.object.curves_empty_hair_add()
+    empty = bpy.context.object
+    name = empty.name
+    assert len(empty.data.curves) == 0 and own_dynamics(empty)
+    assert bpy.ops.hairloom.use_groom() == {"FINISHED"}
+    hair = bpy.data.objects[name]
+    assert len(hair.data.curves) > 1000 and hair.data.surface == sphere
+    assert not own_dynamics(hair) and len(live.sessions()) == 1
+    blond = named_preset(preferences(bpy.context).look).settings
+    assert hair.data.hairloom.shading.base_color[:] == pytest.approx(blond.base_color)
+    assert len(bpy.data.hair_curves) == 1, "the empty curves are left"
+
+
+def test_hair_that_has_a_look_keeps_it(new_hair, sphere):
+    hair = new_hair(sphere)
+    hair.data.hairloom.shading.base_color = (0.1, 0.2, 0.3)
+    bpy.ops.hairloom.use_groom()
+    assert hair.data.hairloom.shading.base_color[:] == pytest.approx((0.1, 0.2, 0.3))
+    with pytest.raises(RuntimeError, match="does not preview yet"):
+        bpy.ops.hairloom.use_groom()
+
+
+def test_hair_without_curves_and_surface_says_what_to_do():
+    curves = bpy.data.hair_curves.new("Empty")
+    bpy.context.collection.objects.link(bpy.data.objects.new("Empty", curves))
+    make_active(bpy.data.objects["Empty"])
+    with pytest.raises(RuntimeError, match="Sculpt Mode"):
+        bpy.ops.hairloom.use_groom()
+
+
+def test_particle_hair_becomes_curves_on_its_mesh(sphere):
+    sphere.location = (0.5, 0.0, 0.0)
+    modifier = sphere.modifiers.new("Fur", "PARTICLE_SYSTEM")
+    settings = modifier.particle_system.settings
+    settings.type, settings.count, settings.hair_length = "HAIR", 80, 0.05
+    assert bpy.ops.hairloom.convert_particles() == {"FINISHED"}
+    hair = bpy.context.object
+    assert hair.type == "CURVES" and hair.data.surface == sphere and hair.parent == sphere
+    assert not modifier.show_viewport and not modifier.show_render
+    strands = read_curves(hair, bpy.context.evaluated_depsgraph_get()).strands
+    assert strands.strand_count == 80 and strands.root_uv is not None
+    away = np.linalg.norm(strands.roots - np.array(sphere.location), axis=1)
+    assert away == pytest.approx(np.full(80, 0.1), rel=0.05)
+    assert [obj.type for obj in bpy.data.objects].count("CURVES") == 1
+    assert particle_hair.hair_systems(sphere)
+
+
+def test_hair_of_a_scene_that_is_not_shown_waits_for_it():
+    """Its head is not evaluated there: no vertex count fits, which is nobody's fault."""
+    own = bpy.context.scene
+    bpy.ops.hairloom.sample_scene()
+    sample, (session,) = bpy.context.scene, live.sessions()
+    assert overlay.drawing_of(session.uid).is_visible
+    bpy.context.window.scene = own
+    bpy.ops.mesh.primitive_cube_add()
+    own.frame_set(3)
+    bpy.context.view_layer.update()
+    assert live.sessions() == (session,) and live.notice() == ""
+    assert not overlay.drawing_of(session.uid).is_visible
+    bpy.context.window.scene = sample
+    sample.frame_set(2)
+    reactions.catch_up(bpy.context.evaluated_depsgraph_get())
+    assert live.sessions() == (session,) and not session.is_stale
+    assert overlay.drawing_of(session.uid).is_visible

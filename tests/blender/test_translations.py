@@ -1,0 +1,56 @@
+"""Texts to translate: all of them are in the template, and a language file reaches Blender."""
+
+import json
+
+import bpy
+import pytest
+
+import hairloom
+from hairloom.addon import registration
+from hairloom.addon.ui import translations
+
+TEXTS_OF_ALL_KINDS = (
+    "Play at Once",
+    "Levels of Detail",
+    "Light Shafts",
+    "Colour and shine of the strands",
+)
+
+
+def test_the_template_is_current(extension):
+    path = translations.FOLDER / f"{translations.TEMPLATE}.json"
+    found = json.loads(path.read_text(encoding="utf-8"))
+    assert found == translations.texts(registration.CLASSES), "run make docs"
+
+
+def test_texts_of_every_kind_are_found(extension):
+    found = translations.texts(registration.CLASSES)
+    for text in TEXTS_OF_ALL_KINDS:
+        assert text in found["*"], text
+    assert "Make Cards" in found["Operator"] and "" not in found["*"]
+    assert "Bl Label" not in found["*"], "Blender translates its own"
+
+
+def test_a_language_reaches_blender_and_goes_again(empty_scene, monkeypatch, tmp_path):
+    template = {
+        "*": {"Play at Once": "Gleich abspielen", "Look": ""},
+        "Operator": {"Make Cards": "x"},
+    }
+    (tmp_path / "de_DE.json").write_text(json.dumps(template))
+    (tmp_path / "template.json").write_text("{}")
+    monkeypatch.setattr(translations, "FOLDER", tmp_path)
+    assert translations.tables() == {
+        "de_DE": {("*", "Play at Once"): "Gleich abspielen", ("Operator", "Make Cards"): "x"}
+    }
+    view, language = bpy.context.preferences.view, bpy.context.preferences.view.language
+    hairloom.register()
+    try:
+        try:
+            view.language = "de_DE"
+        except TypeError:
+            pytest.skip("this Blender is built without languages")
+        assert bpy.app.translations.pgettext("Play at Once") == "Gleich abspielen"
+    finally:
+        hairloom.unregister()
+    assert bpy.app.translations.pgettext("Play at Once") == "Play at Once"
+    view.language = language

@@ -1,0 +1,140 @@
+"""Warnings where the artist looks, each with a button that mends."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.host import live, troubles
+from hairloom.addon.host.curves import read_curves
+
+
+def told(hair):
+    return [each.operator for each in troubles.troubles_of(hair, live.session_of(hair))]
+
+
+def mend(hair):
+    """Press the one button there is."""
+    (trouble,) = troubles.troubles_of(hair, live.session_of(hair))
+    group, name = trouble.operator.split(".")
+    assert getattr(getattr(bpy.ops, group), name)() == {"FINISHED"}
+
+
+def read(hair):
+    return read_curves(hair, bpy.context.evaluated_depsgraph_get()).strands
+
+
+def preview(hair):
+    live.stop_all()
+    return live.start(hair, bpy.context.evaluated_depsgraph_get())
+
+
+def test_good_hair_has_none(new_hair, sphere):
+    hair = new_hair(sphere)
+    assert told(hair) == []
+    preview(hair)
+    assert told(hair) == []
+
+
+def test_a_surface_is_set_and_the_hair_stays_where_it_is(new_hair, sphere):
+    bpy.ops.mesh.primitive_cube_add(size=0.1, location=(3.0, 0.0, 0.0))
+    hair = new_hair()
+    hair.location = (0.0, 0.0, 0.01)
+    bpy.context.view_layer.update()
+    before = read(hair).points
+    (trouble,) = troubles.troubles_of(hair, preview(hair))
+    assert trouble.instead_of.startswith("Hair: it has no surface")
+    mend(hair)
+    bpy.context.view_layer.update()
+    assert hair.data.surface == sphere and hair.parent == sphere, "the cube is far away"
+    assert hair.data.surface_uv_map == "UVMap"
+    assert read(hair).points == pytest.approx(before, abs=1e-6)
+    assert told(hair) == []
+
+
+def test_of_many_curves_some_are_asked(new_hair, sphere):
+    from hairloom.addon.host import curves
+
+    hair = new_hair()
+    hair.data.add_curves([3] * 500)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    assert troubles.surface_for(hair, [sphere], depsgraph) == sphere
+    assert curves.read_curves(hair, depsgraph).strands.strand_count == 60, "the rest has no length"
+
+
+def test_a_selected_mesh_is_taken_before_a_closer_one(new_hair, sphere):
+    bpy.ops.mesh.primitive_cube_add(size=0.1, location=(3.0, 0.0, 0.0))
+    cube = bpy.context.object
+    hair = new_hair()
+    cube.select_set(True)
+    mend(hair)
+    assert hair.data.surface == cube
+
+
+def test_without_any_mesh_the_button_says_what_to_do(new_hair):
+    new_hair()
+    with pytest.raises(RuntimeError, match="no mesh that it could grow from"):
+        bpy.ops.hairloom.set_surface()
+
+
+def test_roots_in_the_air_are_counted_and_snapped(new_hair, sphere):
+    hair = new_hair(sphere)
+    points = np.empty((len(hair.data.position_data), 3), np.float32)
+    hair.data.position_data.foreach_get("vector", points.ravel())
+    points[: 20 * 8] *= 1.4  # twenty strands begin 4 cm above the sphere
+    hair.data.position_data.foreach_set("vector", points.ravel())
+    preview(hair)
+    (trouble,) = troubles.troubles_of(hair, live.session_of(hair))
+    assert trouble.text.startswith("20 roots are not on Head")
+    mend(hair)
+    roots = np.linalg.norm(read(hair).roots, axis=1)
+    assert roots == pytest.approx(np.full(60, 0.1), rel=0.02)
+    preview(hair)
+    assert told(hair) == []
+
+
+def test_a_surface_without_uvs_is_unwrapped_without_overlap(new_hair, sphere):
+    sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
+    hair = new_hair(sphere)
+    assert told(hair) == ["hairloom.unwrap_surface"]
+    with pytest.raises(RuntimeError, match="no UVs: press Unwrap"):
+        bpy.ops.hairloom.snap_roots()
+    mend(hair)
+    assert told(hair) == [] and bpy.context.mode == "OBJECT" and bpy.context.object == hair
+    corners = np.empty((len(sphere.data.loops), 2), np.float32)
+    sphere.data.uv_layers.active.uv.foreach_get("vector", corners.ravel())
+    assert np.ptp(corners, axis=0).min() > 0.5 and (corners >= 0.0).all() and (corners <= 1.0).all()
+
+
+def test_an_uneven_scale_goes_into_the_curves(new_hair, sphere):
+    hair = new_hair(sphere)
+    hair.scale = (1.0, 1.0, 1.5)
+    bpy.context.view_layer.update()
+    before = read(hair).points
+    assert told(hair) == ["hairloom.apply_scale"]
+    mend(hair)
+    bpy.context.view_layer.update()
+    assert hair.scale[:] == (1.0, 1.0, 1.0)
+    assert read(hair).points == pytest.approx(before, abs=1e-6)
+
+
+def test_a_scale_of_shared_curves_or_of_a_parent_is_refused_with_a_reason(new_hair, sphere):
+    hair = new_hair(sphere)
+    hair.scale = (1.0, 1.0, 1.5)
+    other = bpy.data.objects.new("Other", hair.data)
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="share these curves"):
+        bpy.ops.hairloom.apply_scale()
+    bpy.data.objects.remove(other)
+    hair.scale, sphere.scale = (1.0, 1.0, 1.0), (1.0, 1.0, 2.0)
+    bpy.context.view_layer.update()
+    assert told(hair) == ["hairloom.apply_scale"]
+    with pytest.raises(RuntimeError, match="its parent is scaled unevenly"):
+        bpy.ops.hairloom.apply_scale()
+
+
+def test_blenders_dynamics_are_muted(sphere, extension):
+    bpy.ops.object.curves_empty_hair_add()
+    hair = bpy.context.object
+    assert told(hair) == ["hairloom.mute_hair_dynamics"]
+    mend(hair)
+    assert told(hair) == []

@@ -1,0 +1,208 @@
+"""The first five minutes: nothing selected, the sample scene, hair on a mesh that plays at once,
+undo, presets with pictures, warnings that mend, export, the page in the Preferences with its test.
+"""
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import (
+    changed,
+    look_from_front,
+    open_our_sidebar,
+    press,
+    region,
+    until,
+    viewport,
+    viewport_pixels,
+)
+
+
+def of_hairloom(module):
+    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
+
+
+def live():
+    return of_hairloom("host.live")
+
+
+def pixels(label):
+    return viewport_pixels(driver.screenshot(label))
+
+
+def in_view():
+    return bpy.context.temp_override(area=viewport(), region=region("WINDOW"))
+
+
+def invoke(name, **settings):
+    """As a menu does, in the 3D view."""
+    with in_view():
+        result = getattr(bpy.ops.hairloom, name)("INVOKE_DEFAULT", True, **settings)
+    assert result & {"FINISHED", "RUNNING_MODAL"}, f"{name}: {result}"
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    yield from nothing_selected()
+    yield from the_sample_scene_plays()
+    yield from hair_on_a_mesh_of_ones_own()
+    yield from undo_takes_it_away()
+    yield from presets_have_pictures()
+    yield from a_warning_mends()
+    yield from to_the_engine()
+    yield from the_page_in_the_preferences()
+    assert of_hairloom("host.overlay").failure() == "" and live().notice() == ""
+
+
+def nothing_selected():
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    yield from open_our_sidebar()
+    driver.screenshot("start")
+    assert not bpy.ops.hairloom.add_groom.poll()
+    with in_view():
+        bpy.ops.wm.call_menu(name="VIEW3D_MT_curve_add")
+    yield 5
+    driver.screenshot("add-menu")
+    yield from press("ESC")
+
+
+def the_sample_scene_plays():
+    """One click: hair that moves and shines, in a scene of its own."""
+    own = bpy.context.window.scene
+    invoke("sample_scene")
+    scene = bpy.context.window.scene
+    assert scene != own and len(live().sessions()) == 1
+    yield from until(lambda: bpy.context.screen.is_animation_playing, "nothing plays")
+    yield from until(lambda: scene.frame_current > 5, "the playhead stands")
+    one = pixels("sample")
+    frame = scene.frame_current
+    yield from until(lambda: abs(scene.frame_current - frame) > 8, "the playhead stands")
+    other = pixels("sample-later")
+    assert changed(one, other) > 0.02, "nothing has moved"
+    with in_view():
+        bpy.ops.screen.animation_cancel(restore_frame=False)
+    yield 3
+    bpy.context.window.scene = own
+    live().stop_all()
+    yield 5
+
+
+def hair_on_a_mesh_of_ones_own():
+    """Add > Curve > Hairloom Groom on a selected mesh: it is grown, shines and swings at once."""
+    for obj in list(bpy.context.scene.objects):
+        if obj.type == "MESH":
+            bpy.data.objects.remove(obj)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    bpy.context.object.name = "Ball"
+    overlays = viewport().spaces.active.overlay
+    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    look_from_front(0.9)
+    yield 10
+    bare = pixels("bare")
+    bpy.ops.ed.undo_push(message="a head")
+    invoke("add_groom", strand_count=1500)
+    yield from until(lambda: live().is_playing(), "it does not play")
+    (session,) = live().sessions()
+    at_first = session.strands
+    yield 20
+    assert np.abs(session.strands - at_first).max() > 1.0e-3, "nothing moves"
+    assert changed(bare, pixels("own-mesh")) > 0.02, "no hair is seen"
+    line = of_hairloom("host.measures").frame_line(session.uid)
+    assert "simulation" in line and "drawing" in line, line
+
+
+def undo_takes_it_away():
+    with in_view():
+        bpy.ops.ed.undo()
+    yield from until(lambda: not live().sessions(), "the preview outlives its hair")
+    assert not live().is_playing() and live().notice() == ""
+    yield 5
+    with in_view():
+        bpy.ops.ed.redo()
+    yield 5
+    assert bpy.context.scene.objects.get("Ball Hair") is not None
+    hair = bpy.context.scene.objects["Ball Hair"]
+    bpy.context.view_layer.objects.active = hair
+    hair.select_set(True)
+    assert bpy.ops.hairloom.preview() == {"FINISHED"}
+    yield 5
+
+
+def presets_have_pictures():
+    presets = of_hairloom("host.presets")
+    bpy.context.window.cursor_warp(viewport().x + 300, viewport().y + viewport().height // 2)
+    for section in ("shading", "dynamics", "volume", "cards"):
+        entries = presets.shipped(section)
+        assert entries and all(entry.icon for entry in entries), section
+        invoke("choose_preset", section=section)
+        yield 8
+        driver.screenshot(f"presets-{section}")
+        yield from press("ESC")
+        yield 2
+    before = pixels("brown")
+    bpy.ops.hairloom.apply_preset("EXEC_DEFAULT", True, name="looks/blond")
+    yield 8
+    assert changed(before, pixels("blond")) > 0.01, "the look is the same"
+
+
+def a_warning_mends():
+    hair, head = bpy.data.objects["Ball Hair"], bpy.data.objects["Ball"]
+    live().stop_all()
+    hair.data.surface, hair.parent = None, None
+    hair.scale.x = 1.4
+    assert bpy.ops.hairloom.preview() == {"FINISHED"}
+    properties = next(a for a in bpy.context.screen.areas if a.type == "PROPERTIES")
+    bpy.ops.hairloom.show_settings()
+    yield 25  # panels slide to their places
+    driver.screenshot("warnings")
+    assert properties.spaces.active.context == "DATA"
+    assert bpy.ops.hairloom.set_surface() == {"FINISHED"} and hair.data.surface == head
+    assert bpy.ops.hairloom.apply_scale() == {"FINISHED"}
+    yield from until(
+        lambda: live().sessions() and live().sessions()[0].head is not None, "it has no head yet"
+    )
+    troubles = of_hairloom("host.troubles").troubles_of(hair, live().sessions()[0])
+    driver.screenshot("mended")
+    assert [trouble.operator for trouble in troubles] in ([], ["hairloom.snap_roots"])
+
+
+def to_the_engine():
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "cards.glb")
+        bpy.ops.hairloom.apply_preset(name="cards/crowd")
+        assert bpy.ops.hairloom.export_cards(filepath=path) & {"FINISHED", "RUNNING_MODAL"}
+        yield from until(lambda: os.path.isfile(path), "no cards were written", tries=300)
+    yield 3
+
+
+def the_page_in_the_preferences():
+    area = viewport()
+    area.type = "PREFERENCES"
+    bpy.context.preferences.active_section = "ADDONS"
+    bpy.context.window_manager.addon_search = "hairloom"
+    bpy.ops.preferences.addon_expand(module=driver.EXTENSION)
+    yield 5
+    assert bpy.ops.hairloom.self_test() == {"FINISHED"}
+    checks = of_hairloom("host.self_test").last_report()
+    failed = [check for check in checks if check.outcome == "failed"]
+    assert not failed and sum(check.outcome == "passed" for check in checks) >= 5, checks
+    bpy.ops.hairloom.copy_report()
+    assert "Drawing, Marschner" in bpy.context.window_manager.clipboard
+    yield 5
+    driver.screenshot("preferences")
+    page = of_hairloom("ui.preferences").preferences(bpy.context)
+    assert page.bl_rna.identifier.startswith("HAIRLOOM"), "it is the defaults, not the page"
+    page.look = "looks/red"
+    area.type = "VIEW_3D"
+    yield 3
+
+
+driver.play(steps())
