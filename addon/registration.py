@@ -10,8 +10,11 @@ from typing import Any
 
 import bpy
 
-from .host import engine, engine_group, groups, handlers, previews, reactions
-from .host.command_line import run
+from .host import handlers
+from .host.preview import reactions
+from .host.render_engine import engine
+from .host.settings import engine_group, groups, previews
+from .host.verbs.command_line import run
 from .ui import (
     engine_panels,
     long_work,

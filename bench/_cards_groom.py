@@ -13,7 +13,7 @@ from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.host.mesh_files import read_mesh_file
+from hairloom.addon.host.scene.mesh_files import read_mesh_file
 from hairloom.addon.pipeline import Rig
 
 #: 800 cards of clusters, an atlas of 2048 baked from the strands, 256 rays a vertex

@@ -21,9 +21,9 @@ from extension_loader import REPOSITORY, load_package
 
 load_package()
 
+from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic  # noqa: E402
+from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic  # noqa: E402
 from hairloom.addon.exchange.groom import Groom  # noqa: E402
-from hairloom.addon.exchange.groom_alembic import write_groom_alembic  # noqa: E402
-from hairloom.addon.exchange.groom_alembic_read import read_groom_alembic  # noqa: E402
 from hairloom.addon.exchange.groom_presets import PRESETS  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 

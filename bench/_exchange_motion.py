@@ -22,16 +22,16 @@ from hairloom.addon.cards.steps import result_of  # noqa: E402
 from hairloom.addon.cards.vertex_animation import motion_values  # noqa: E402
 from hairloom.addon.dynamics.colliders import DistanceField  # noqa: E402
 from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
-from hairloom.addon.exchange.card_formats import GLB  # noqa: E402
-from hairloom.addon.host.card_motion import (  # noqa: E402
+from hairloom.addon.exchange.cards.card_formats import GLB  # noqa: E402
+from hairloom.addon.host.bakes.take import TakeDrive, shaken_poses, simulate  # noqa: E402
+from hairloom.addon.host.cards.card_motion import (  # noqa: E402
     GuideMotion,
     MotionChoices,
     TextureMotion,
     joint_motion_steps,
     moved_cards,
 )
-from hairloom.addon.host.images import read_texture  # noqa: E402
-from hairloom.addon.host.take import TakeDrive, shaken_poses, simulate  # noqa: E402
+from hairloom.addon.host.pictures.images import read_texture  # noqa: E402
 from hairloom.addon.pipeline import Rig  # noqa: E402
 
 SECONDS, RATE = 2.0, 60.0

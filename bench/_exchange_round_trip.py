@@ -12,14 +12,14 @@ from damaged_files import sample
 from extension_loader import REPOSITORY
 
 from hairloom.addon.arrays import Floats
+from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
+from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic
 from hairloom.addon.exchange.groom import Groom
-from hairloom.addon.exchange.groom_alembic import write_groom_alembic
-from hairloom.addon.exchange.groom_alembic_read import read_groom_alembic
 from hairloom.addon.exchange.groom_presets import PRESETS
-from hairloom.addon.exchange.groom_usd import write_usd
-from hairloom.addon.exchange.groom_usd_read import read_usd
 from hairloom.addon.exchange.hair_file import read_hair_file, write_hair_file
 from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
+from hairloom.addon.exchange.usd.groom_usd import write_usd
+from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 
 DATA = Path(os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data"))
 #: version 4, and version 3 with followers

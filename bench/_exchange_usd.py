@@ -17,8 +17,8 @@ from _exchange_memory import megabytes_beside
 from pxr import Usd, UsdGeom, Vt
 
 from hairloom.addon.exchange.groom import Groom
-from hairloom.addon.exchange.groom_usd import write_usd
-from hairloom.addon.exchange.groom_usd_read import read_usd
+from hairloom.addon.exchange.usd.groom_usd import write_usd
+from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 from hairloom.addon.strands import StrandSet
 
 STRANDS, POINTS, ROUNDS = 100_000, 16, 5

@@ -25,9 +25,9 @@ from hairloom.addon import pipeline
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
-from hairloom.addon.host.built_in_head import built_in_head
-from hairloom.addon.host.compute_solver import ComputeSolver
-from hairloom.addon.host.take import GRAVITY, shaken_poses
+from hairloom.addon.host.bakes.take import GRAVITY, shaken_poses
+from hairloom.addon.host.preview.compute_solver import ComputeSolver
+from hairloom.addon.host.scene.built_in_head import built_in_head
 from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.render.strand_pass import StrandPass

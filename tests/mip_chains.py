@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.cards.atlas_grid import AtlasGrid
-from hairloom.addon.exchange.mip_maps import DIRECTIONS, mip_levels
+from hairloom.addon.exchange.textures.mip_maps import DIRECTIONS, mip_levels
 
 
 def mip_chain(

@@ -27,8 +27,8 @@ class Shots:
 
     def __init__(self) -> None:
         settings = of_addon("parameters").ALL_SETTINGS
-        head = of_addon("host.built_in_head").built_in_head()
-        grow, studio = of_addon("groom.grow"), of_addon("host.studio")
+        head = of_addon("host.scene.built_in_head").built_in_head()
+        grow, studio = of_addon("groom.grow"), of_addon("host.pictures.studio")
         grown = settings["grow"](strand_count=STRANDS, clump=0.4)
         strands = grow.grow(head, grown, grow.scalp_density(head))
         self.settings, self._pipeline = settings, of_addon("pipeline")
@@ -49,7 +49,7 @@ class Shots:
     def built(self, way: str, levels: int = 1) -> tuple[Any, Any]:
         """Cards in this way, and their textures."""
         settings = self.settings
-        choices = of_addon("host.card_making").CardChoices(
+        choices = of_addon("host.cards.card_making").CardChoices(
             settings["cards"](way=way, card_count=CARDS, levels=levels),
             settings["atlas"](),
             settings["card_occlusion"](rays=64),
@@ -57,7 +57,7 @@ class Shots:
             self._shading,
             self._drawn,
         )
-        steps = of_addon("host.card_making").making_steps(self.rig, choices)
+        steps = of_addon("host.cards.card_making").making_steps(self.rig, choices)
         made = of_addon("cards.steps").result_of(steps)
         return made.build, made.maps.textures
 
@@ -75,7 +75,7 @@ def of_layer(mesh: Any, layer: int) -> Any:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    images, shots = of_addon("host.images"), Shots()
+    images, shots = of_addon("host.pictures.images"), Shots()
 
     def sheet(name: str, pictures: list[Any]) -> None:
         images.write_png(folder / name, images.contact_sheet(pictures, len(pictures)))

@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 from extension_loader import REPOSITORY
 
+from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom import Groom, GroomMotion
-from hairloom.addon.exchange.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom_presets import PRESETS
-from hairloom.addon.exchange.groom_usd import write_usd
 from hairloom.addon.exchange.hair_file import HEADER, write_hair_file
 from hairloom.addon.exchange.tfxbone import strongest_bones, write_tfxbone
 from hairloom.addon.exchange.tressfx import write_tfx
 from hairloom.addon.exchange.tressfx_layout import HEADER_3, HEADER_4
+from hairloom.addon.exchange.usd.groom_usd import write_usd
 from hairloom.addon.strands import StrandSet
 
 #: counts and offsets that hurt

@@ -25,12 +25,12 @@ import numpy as np
 from damaged_files import OF_LIBRARIES, mutated
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.groom_alembic_read import read_groom_alembic
-from hairloom.addon.exchange.groom_usd_read import read_usd
+from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.read_groom import ReadGroom
 from hairloom.addon.exchange.tfxbone import ReadBones, read_tfxbone
 from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import Preset, read_any_preset
 

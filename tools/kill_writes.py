@@ -19,13 +19,13 @@ from pathlib import Path
 import numpy as np
 from damaged_files import sample
 
-from hairloom.addon.exchange.atomic import write_text_atomic
-from hairloom.addon.exchange.file_set import written_together
-from hairloom.addon.exchange.groom_alembic import is_finished, write_groom_alembic
-from hairloom.addon.exchange.groom_usd import write_usd
+from hairloom.addon.exchange.alembic.groom_alembic import is_finished, write_groom_alembic
+from hairloom.addon.exchange.files.atomic import write_text_atomic
+from hairloom.addon.exchange.files.file_set import written_together
 from hairloom.addon.exchange.hair_file import write_hair_file
 from hairloom.addon.exchange.tfxbone import strongest_bones, write_tfxbone
 from hairloom.addon.exchange.tressfx import write_tfx
+from hairloom.addon.exchange.usd.groom_usd import write_usd
 
 STRANDS = 3000
 #: the child is killed within the time of so many writes from its first one on

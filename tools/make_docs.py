@@ -43,8 +43,10 @@ def parameter_tables() -> str:
 def verb_tables() -> str:
     """docs/verbs.md, whole; it takes a Blender to know."""
     load_package()
-    command_line = importlib.import_module(f"{PACKAGE}.addon.host.command_line")
-    return str(importlib.import_module(f"{PACKAGE}.addon.host.verb_docs").page(command_line.VERBS))
+    command_line = importlib.import_module(f"{PACKAGE}.addon.host.verbs.command_line")
+    return str(
+        importlib.import_module(f"{PACKAGE}.addon.host.verbs.verb_docs").page(command_line.VERBS)
+    )
 
 
 def texts_to_translate() -> str:

@@ -40,10 +40,10 @@ def main(folder: Path) -> None:
             image = bpy.data.images.load(scene.render.filepath)
             pixels = np.empty((SIDE, SIDE, 4), np.float32)
             image.pixels.foreach_get(pixels.ravel())
-            pictures.append(of_addon("exchange.srgb").srgb_decoded(pixels))
+            pictures.append(of_addon("exchange.textures.srgb").srgb_decoded(pixels))
             bpy.data.images.remove(image)
             print(f"Drew frame {frame}", flush=True)
-    images = of_addon("host.images")
+    images = of_addon("host.pictures.images")
     images.write_png(folder / "sample.png", images.contact_sheet(pictures, len(FRAMES)))
 
 

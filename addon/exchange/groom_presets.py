@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .file_space import FileSpace
+from .files.file_space import FileSpace
 from .groom import Groom
 
 #: Thinner than any hair [m]. A width of 0 makes Unity drop all widths.

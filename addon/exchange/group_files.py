@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .file_set import written_together
+from .files.file_set import written_together
+from .files.names import plain_name
 from .groom import Groom
-from .names import plain_name
 
 
 def write_groups(

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import StrandSet
 from ..strands.clean import Cleaned, clean
-from .binary_file import BinaryFile
+from .files.binary_file import BinaryFile
 from .groom import Groom
 
 #: Thicker than any hair [m]: such a thickness is a coefficient or in another unit.

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from ..errors import HairloomError
-from .file_space import FileSpace
+from .files.file_space import FileSpace
 from .groom_presets import PRESETS, GroomPreset
-from .groom_usd import USD_SPACES
 from .hair_file import MOST_SEGMENTS
 from .strand_formats import ALEMBIC, HAIR, TRESSFX, USD, StrandFormat
 from .tfxbone import BoneWeights
 from .tressfx_layout import VERTEX_COUNTS
+from .usd.groom_usd import USD_SPACES
 
 #: format -> the engines that it knows, the usual one first
 ENGINES: Mapping[str, tuple[str, ...]] = MappingProxyType(

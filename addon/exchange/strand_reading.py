@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import HairloomError
+from .alembic.groom_alembic_read import read_groom_alembic
 from .groom import Groom
-from .groom_alembic_read import read_groom_alembic
-from .groom_usd_read import read_usd
 from .hair_file import read_hair_file
 from .read_groom import ReadGroom
 from .strand_formats import ALEMBIC, TRESSFX, USD, strand_format
 from .tressfx import read_tfx
+from .usd.groom_usd_read import read_usd
 
 #: what of a file that holds strands and guides is wanted
 PARTS = ("strands", "guides", "both")

@@ -10,17 +10,17 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
-from .file_set import written_together
+from .alembic.groom_alembic import write_groom_alembic
+from .files.file_set import written_together
 from .groom import Groom, GroomMotion, points_of
-from .groom_alembic import write_groom_alembic
 from .groom_presets import chosen_parts
-from .groom_usd import write_usd
 from .group_files import group_files
 from .hair_file import write_hair_file
 from .strand_formats import ALEMBIC, HAIR, TRESSFX, USD, strand_format
 from .strand_output import StrandOutput, layout_of, metres_per_unit
 from .tfxbone import BoneWeights, write_tfxbone
 from .tressfx import STRANDS_AT_ONCE, write_tfx
+from .usd.groom_usd import write_usd
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet
-from .binary_file import BinaryFile, write_blocks
+from .files.binary_file import BinaryFile, write_blocks
 
 #: Bones of one strand.
 INFLUENCES = 4

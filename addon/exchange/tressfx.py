@@ -23,8 +23,8 @@ from ..arrays import Bools, Floats
 from ..errors import HairloomError
 from ..strands import StrandSet
 from ..strands.resample import arc_length_positions, resample
-from .axes import from_z_up, to_z_up
-from .binary_file import write_blocks
+from .files.axes import from_z_up, to_z_up
+from .files.binary_file import write_blocks
 from .groom import Groom
 from .groom_presets import chosen_parts
 from .read_groom import ReadGroom, finite, kept_points, plausible, usable

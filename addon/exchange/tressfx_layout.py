@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import Bools, Floats
-from .binary_file import BinaryFile
+from .files.binary_file import BinaryFile
 
 #: What TressFX's own loader accepts.
 VERTEX_COUNTS = (4, 8, 16, 32, 64)

@@ -8,7 +8,8 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from . import live, playback, reactions
+from .bakes import playback
+from .preview import live, reactions
 
 _is_reacting = False
 

@@ -17,9 +17,9 @@ import bpy
 import numpy as np
 
 from ..errors import HairloomError
-from ..exchange.atomic import write_text_atomic
+from ..exchange.files.atomic import write_text_atomic
 from .gpu_context import gpu_in_use
-from .interruption import stop_if_asked
+from .verbs.interruption import stop_if_asked
 
 _MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
 #: What progress lines are written for: a reader, or whatever runs an Open Job Description.

@@ -8,8 +8,8 @@ import numpy as np
 from mathutils import Vector
 
 from ..groom.settings import GrowSettings
-from .built_in_head import HEAD_HEIGHT
-from .overlay import ENGINE
+from .preview.overlay import ENGINE
+from .scene.built_in_head import HEAD_HEIGHT
 from .starting import new_groom
 
 NAME = "Hairloom Sample"

@@ -26,10 +26,10 @@ from ..shading.settings import ShadingSettings
 from ..shading.volume.settings import VolumeSettings
 from ..strands import StrandSet
 from .gpu_context import ensure_gpu
-from .images import write_png
+from .pictures.images import write_png
+from .preview.shown import snapshot_of
+from .preview.solvers import compute_problem
 from .report import environment
-from .shown import snapshot_of
-from .solvers import compute_problem
 
 type Outcome = Literal["passed", "absent", "failed"]
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from ..errors import HairloomError
 from ..groom.settings import GrowSettings
-from .curves import read_curves
-from .groom_files import grow_on
-from .objects import head_of
-from .presets import apply, named_preset
-from .properties import settings_of
-from .source import mute_own_dynamics
-from .surfaces import read_positions
+from .scene.curves import read_curves
+from .scene.objects import head_of
+from .scene.source import mute_own_dynamics
+from .scene.surfaces import read_positions
+from .settings.presets import apply, named_preset
+from .settings.properties import settings_of
+from .strands.groom_files import grow_on
 
 #: Least extent [m] of a head of human size; lengths are declared for that.
 _HEAD_SIZE = 0.19

@@ -14,7 +14,7 @@ import gpu
 import numpy as np
 
 from ..cards.card_mesh import CardMesh
-from ..exchange.sidecar import LEAST_ALPHA
+from ..exchange.cards.sidecar import LEAST_ALPHA
 from ..shading.lights import Light, kept_lights
 from ..shading.settings import StrandSettings
 from ..shading.volume.light_frame import Ball, ball_around

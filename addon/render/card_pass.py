@@ -8,8 +8,8 @@
 
 The first alone tests alpha, so that in the others hidden pixels are left out before they are
 shaded. The author's simpler scheme has three passes, each with a test. Either draws triangles as
-they stand, or sorted by card for the eye; exchange/sidecar.py lists the states, for engines too.
-Opaque meshes have to be drawn before.
+they stand, or sorted by card for the eye; exchange/cards/sidecar.py lists the states, for engines
+too. Opaque meshes have to be drawn before.
 
 Textures have their mip maps in them, see card_textures.py. Seen at a slant, cards of a baked atlas
 cover as much as their strands do, see shading/card_look.py.
@@ -29,7 +29,7 @@ from typing import Any
 import gpu
 
 from ..cards.drawing_settings import CardDrawingSettings
-from ..exchange.sidecar import FOUR_PASSES, OPAQUE_ALPHA, THREE_PASSES, DrawPass
+from ..exchange.cards.sidecar import FOUR_PASSES, OPAQUE_ALPHA, THREE_PASSES, DrawPass
 from ..params.glsl import struct_values
 from ..shading.lights import kept_lights, kinds_needed, pack_lights
 from ..shading.marschner.look import pack_fibre

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..cards.atlas_grid import AtlasGrid
-from ..exchange.mip_maps import mip_levels
+from ..exchange.textures.mip_maps import mip_levels
 from ..shading.card_texture import LEVELS, packed_levels
 from ..shading.textures import HairTextures
 from .card_snapshot import CardSnapshot

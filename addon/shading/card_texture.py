@@ -10,7 +10,7 @@
 Which level a pixel wants is for how far the place in the texture moves from pixel to pixel, as
 Williams 1983 has it ("Pyramidal parametrics"), and it is mixed of the two that are nearest. Alpha
 is averaged as it stands, because it is blended; all else by how much hair there is, see
-exchange/mip_maps.py. Twin of gpu_shaders/lib_card_texture.glsl.
+exchange/textures/mip_maps.py. Twin of gpu_shaders/lib_card_texture.glsl.
 """
 
 from __future__ import annotations

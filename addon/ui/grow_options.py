@@ -8,9 +8,9 @@ from typing import Any
 import bpy
 from bpy.props import StringProperty
 
-from ..host.groups import operator_properties
-from ..host.objects import head_of
-from ..host.vertex_weights import weight_names
+from ..host.scene.objects import head_of
+from ..host.scene.vertex_weights import weight_names
+from ..host.settings.groups import operator_properties
 from .selection import active_mesh, chosen_hair
 
 #: settings that say nothing about hair that stands straight along the normals, and the other way

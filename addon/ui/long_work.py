@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import bpy
 
-from ..host.redraw import redraw_panels
+from ..host.preview.redraw import redraw_panels
 from ..host.thread_work import ThreadWork
 from .reports import reporting, waiting
 

@@ -8,16 +8,16 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..errors import HairloomError
-from ..host.adopted_cards import (
+from ..host.cards.adopted_cards import (
     ORDERS,
     CardOcclusionSettings,
     SortChoices,
     SortedCards,
     sort_steps,
 )
-from ..host.card_alpha import alpha_image
-from ..host.groups import operator_properties
-from ..host.properties import settings_of
+from ..host.cards.card_alpha import alpha_image
+from ..host.settings.groups import operator_properties
+from ..host.settings.properties import settings_of
 from .long_work import LongWork, Steps, shared
 from .selection import active_mesh
 

@@ -7,9 +7,10 @@ from typing import ClassVar
 import bpy
 
 from ..errors import HairloomError
-from ..host import live, playback, timeline
-from ..host.bake import Bake, bakeable, free, show_in_renders
-from ..host.fin_modifier import fin_modifier
+from ..host.bakes import playback
+from ..host.bakes.bake import Bake, bakeable, free, show_in_renders
+from ..host.cloth.fin_modifier import fin_modifier
+from ..host.preview import live, timeline
 from . import long_work
 from .long_work import LongWork, Steps, counted, draw_progress
 from .reports import reporting

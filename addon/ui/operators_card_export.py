@@ -11,7 +11,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from bpy_extras.io_utils import ExportHelper
 
 from ..errors import HairloomError
-from ..host.card_choices import (
+from ..host.cards.card_choices import (
     DEPTH_ITEMS,
     FORMAT_ITEMS,
     MOTION_ITEMS,
@@ -23,9 +23,9 @@ from ..host.card_choices import (
     file_stem,
     suffix_of,
 )
-from ..host.card_files import FileSteps
-from ..host.card_out import CardExport
-from ..host.groom_files import Outcome
+from ..host.cards.card_files import FileSteps
+from ..host.cards.card_out import CardExport
+from ..host.strands.groom_files import Outcome
 from .long_work import LongWork, Progress, Steps, threaded
 from .reports import tell
 from .selection import chosen_hair, needs_hair

@@ -5,11 +5,11 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty
 
-from ..host import spheres
-from ..host.groups import operator_properties
-from ..host.objects import head_of
-from ..host.properties import settings_of
-from ..host.spheres import FittedSpheres, SphereFitSettings
+from ..host.colliders import spheres
+from ..host.colliders.spheres import FittedSpheres, SphereFitSettings
+from ..host.scene.objects import head_of
+from ..host.settings.groups import operator_properties
+from ..host.settings.properties import settings_of
 from .reports import reporting, waiting
 from .selection import active_mesh, chosen_hair
 

@@ -6,8 +6,9 @@ from typing import Any
 
 import bpy
 
-from ..host import fins, live
-from ..host.fin_modifier import add_modifier, clear, fin_modifier, is_shown, remove_modifier
+from ..host.cloth import fins
+from ..host.cloth.fin_modifier import add_modifier, clear, fin_modifier, is_shown, remove_modifier
+from ..host.preview import live
 from .messages import draw_message
 from .reports import reporting, waiting
 from .selection import active_mesh

@@ -9,8 +9,8 @@ from typing import Any
 import bpy
 
 from ..errors import HairloomError
-from ..host.objects import head_of
-from ..host.troubles import is_unevenly_scaled, set_surface, surface_for
+from ..host.preview.troubles import is_unevenly_scaled, set_surface, surface_for
+from ..host.scene.objects import head_of
 from .reports import reporting, waiting
 from .selection import chosen_hair, needs_hair
 

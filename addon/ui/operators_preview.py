@@ -11,11 +11,12 @@ import time
 
 import bpy
 
-from ..host import fins, live
-from ..host.fingerprints import frame_rate
-from ..host.groom_files import Outcome
-from ..host.pace import Pace
-from ..host.source import mute_own_dynamics, own_dynamics
+from ..host.cloth import fins
+from ..host.preview import live
+from ..host.preview.fingerprints import frame_rate
+from ..host.preview.pace import Pace
+from ..host.scene.source import mute_own_dynamics, own_dynamics
+from ..host.strands.groom_files import Outcome
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
 

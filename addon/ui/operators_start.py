@@ -9,10 +9,10 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty
 
-from ..host import live
-from ..host.particle_hair import convert_particle_hair, hair_systems
+from ..host.preview import live
 from ..host.sample_scene import add_sample_scene
 from ..host.starting import new_groom, take_over
+from ..host.strands.particle_hair import convert_particle_hair, hair_systems
 from .grow_options import GROW_PROPERTIES, draw_grow
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences

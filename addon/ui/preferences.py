@@ -9,10 +9,10 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..host.gpu_context import gpu_in_use
-from ..host.groups import operator_properties
-from ..host.presets import names
+from ..host.preview.solvers import compute_problem
 from ..host.self_test import last_report
-from ..host.solvers import compute_problem
+from ..host.settings.groups import operator_properties
+from ..host.settings.presets import names
 from .messages import draw_message
 
 #: the package that Blender knows, above this one

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 
 from ..errors import HairloomError
-from ..host.groom_files import Outcome, dropped_phrase
+from ..host.strands.groom_files import Outcome, dropped_phrase
 
 
 def reporting(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..host import live
-from ..host.objects import head_of
+from ..host.preview import live
+from ..host.scene.objects import head_of
 
 
 def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ..host import live, measures, timeline, view_transform
-from ..host.groom_files import dropped_phrase
-from ..host.overlay import statistics_of
-from ..host.session import Session
-from ..host.troubles import Trouble, troubles_of
+from ..host.preview import live, measures, timeline, view_transform
+from ..host.preview.overlay import statistics_of
+from ..host.preview.session import Session
+from ..host.preview.troubles import Trouble, troubles_of
+from ..host.strands.groom_files import dropped_phrase
 from .messages import draw_lines, draw_message
 
 _MEGABYTE = 1 << 20

@@ -11,9 +11,9 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..errors import HairloomError
-from ..host.groom_files import Outcome
-from ..host.strand_choices import FORMATS, FRAMES, SEVERAL, file_of, strand_output
-from ..host.strand_export import StrandExport
+from ..host.strands.groom_files import Outcome
+from ..host.strands.strand_choices import FORMATS, FRAMES, SEVERAL, file_of, strand_output
+from ..host.strands.strand_export import StrandExport
 from . import operators_export_check as export_check
 from .long_work import LongWork, Progress, Steps
 from .operators_export_check import writable

@@ -10,7 +10,7 @@ import pytest
 
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.adopted_cards import SortChoices, read_cards, sort_mesh
+from hairloom.addon.host.cards.adopted_cards import SortChoices, read_cards, sort_mesh
 
 QUICK = CardOcclusionSettings(rays=16)
 

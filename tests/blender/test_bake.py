@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import live, playback, reactions, timeline
-from hairloom.addon.host.bake import Bake, free
-from hairloom.addon.host.cache import Cache
+from hairloom.addon.host.bakes import playback
+from hairloom.addon.host.bakes.bake import Bake, free
+from hairloom.addon.host.bakes.cache import Cache
+from hairloom.addon.host.preview import live, reactions, timeline
 
 LAST = 8
 

@@ -6,8 +6,9 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host import command_line, playback
-from hairloom.addon.host.cache import Cache
+from hairloom.addon.host.bakes import playback
+from hairloom.addon.host.bakes.cache import Cache
+from hairloom.addon.host.verbs import command_line
 
 LAST = 5
 

@@ -17,15 +17,15 @@ from guide_cards import build_cards
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.axes import from_z_up
-from hairloom.addon.exchange.card_formats import FBX, GLB, OBJ, USD, CardFormat, format_of
-from hairloom.addon.exchange.file_set import written_together
+from hairloom.addon.exchange.cards.card_formats import FBX, GLB, OBJ, USD, CardFormat, format_of
+from hairloom.addon.exchange.files.axes import from_z_up
+from hairloom.addon.exchange.files.file_set import written_together
 
 bpy = pytest.importorskip("bpy", reason="Blender's exporters need Blender or the bpy module")
 
-from hairloom.addon.host import card_export  # noqa: E402
-from hairloom.addon.host.card_export import check_exporter, write_card_mesh  # noqa: E402
-from hairloom.addon.host.card_scene import CardLook  # noqa: E402
+from hairloom.addon.host.cards import card_export  # noqa: E402
+from hairloom.addon.host.cards.card_export import check_exporter, write_card_mesh  # noqa: E402
+from hairloom.addon.host.cards.card_scene import CardLook  # noqa: E402
 
 MESH_VIEW = Path(__file__).parent / "mesh_view.py"
 NAME, NODE = "Haar/Ä.001", "Haar_Ä_001"

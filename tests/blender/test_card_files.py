@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hairloom.addon.exchange.card_formats import FORMATS
-from hairloom.addon.exchange.card_textures import FORMATS as TEXTURE_FORMATS
-from hairloom.addon.exchange.texture_packing import PRESETS
+from hairloom.addon.exchange.cards.card_formats import FORMATS
+from hairloom.addon.exchange.textures.card_textures import FORMATS as TEXTURE_FORMATS
+from hairloom.addon.exchange.textures.texture_packing import PRESETS
 from hairloom.addon.shading.marschner.look import fibre_of
 from hairloom.addon.shading.marschner.tables import marschner_tables, shape_of
 from hairloom.addon.shading.settings import ShadingSettings
@@ -24,9 +24,10 @@ from hairloom.addon.shading.settings import ShadingSettings
 bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy module")
 jsonschema = pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
 
-from hairloom.addon.host import card_files, command_line  # noqa: E402
-from hairloom.addon.host.card_choices import suffix_of  # noqa: E402
-from hairloom.addon.host.card_material import TABLE_SIZE  # noqa: E402
+from hairloom.addon.host.cards import card_files  # noqa: E402
+from hairloom.addon.host.cards.card_choices import suffix_of  # noqa: E402
+from hairloom.addon.host.cards.card_material import TABLE_SIZE  # noqa: E402
+from hairloom.addon.host.verbs import command_line  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("extension")
 

@@ -13,8 +13,9 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="Blender's images need Blender or the bpy module")
 
 from hairloom.addon.errors import HairloomError  # noqa: E402
-from hairloom.addon.host import command_line, images  # noqa: E402
-from hairloom.addon.host.card_images import chosen_pictures, named_pictures  # noqa: E402
+from hairloom.addon.host.cards.card_images import chosen_pictures, named_pictures  # noqa: E402
+from hairloom.addon.host.pictures import images  # noqa: E402
+from hairloom.addon.host.verbs import command_line  # noqa: E402
 from hairloom.addon.shading.textures import TEXTURES  # noqa: E402
 
 SHAPE = (6, 8)
@@ -27,7 +28,7 @@ def values(channels: int, seed: int = 3) -> np.ndarray:
 @pytest.fixture
 def write(tmp_path: Path) -> Any:
     """Writes a picture into a file and gives its path."""
-    files = pytest.importorskip("hairloom.addon.exchange.texture_files")
+    files = pytest.importorskip("hairloom.addon.exchange.textures.texture_files")
     pytest.importorskip("OpenImageIO")
 
     def written(name: str, pixels: np.ndarray, **more: Any) -> Path:

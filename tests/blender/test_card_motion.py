@@ -22,15 +22,15 @@ from hairloom.addon.card_flow import bound_cards, cards_at  # noqa: E402
 from hairloom.addon.cards.joints import JointChoices  # noqa: E402
 from hairloom.addon.cards.settings import CardSettings  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
-from hairloom.addon.exchange.card_formats import FBX, GLB, USD  # noqa: E402
+from hairloom.addon.exchange.cards.card_formats import FBX, GLB, USD  # noqa: E402
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings  # noqa: E402
-from hairloom.addon.host import command_line  # noqa: E402
-from hairloom.addon.host.bake import Bake  # noqa: E402
-from hairloom.addon.host.card_builds import CardForm  # noqa: E402
-from hairloom.addon.host.card_files import CardOutput, WrittenCards, write_cards  # noqa: E402
-from hairloom.addon.host.card_motion import GuideMotion, MotionChoices  # noqa: E402
-from hairloom.addon.host.inputs import Sources, read_inputs  # noqa: E402
-from hairloom.addon.host.take import shaken_poses  # noqa: E402
+from hairloom.addon.host.bakes.bake import Bake  # noqa: E402
+from hairloom.addon.host.bakes.take import shaken_poses  # noqa: E402
+from hairloom.addon.host.cards.card_builds import CardForm  # noqa: E402
+from hairloom.addon.host.cards.card_files import CardOutput, WrittenCards, write_cards  # noqa: E402
+from hairloom.addon.host.cards.card_motion import GuideMotion, MotionChoices  # noqa: E402
+from hairloom.addon.host.verbs import command_line  # noqa: E402
+from hairloom.addon.host.verbs.inputs import Sources, read_inputs  # noqa: E402
 from hairloom.addon.pipeline import Pose, Rig  # noqa: E402
 from hairloom.addon.shading.textures import TextureSettings  # noqa: E402
 

@@ -9,7 +9,7 @@ import pytest
 from mathutils import Matrix
 
 from hairloom.addon.cards.steps import result_of
-from hairloom.addon.host.card_object import CardObjectJob, card_objects
+from hairloom.addon.host.cards.card_object import CardObjectJob, card_objects
 from hairloom.addon.ui.long_work import threaded
 
 

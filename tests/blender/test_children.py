@@ -12,10 +12,12 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.strand_formats import TRESSFX
 from hairloom.addon.exchange.strand_output import StrandOutput
 from hairloom.addon.exchange.tressfx import read_tfx
-from hairloom.addon.host import command_line, live, overlay, playback, reactions, timeline
-from hairloom.addon.host.bake import Bake
-from hairloom.addon.host.card_out import export_cards
-from hairloom.addon.host.strand_export import StrandExport
+from hairloom.addon.host.bakes import playback
+from hairloom.addon.host.bakes.bake import Bake
+from hairloom.addon.host.cards.card_out import export_cards
+from hairloom.addon.host.preview import live, overlay, reactions, timeline
+from hairloom.addon.host.strands.strand_export import StrandExport
+from hairloom.addon.host.verbs import command_line
 
 LAST = 6
 

@@ -15,9 +15,9 @@ pytest.importorskip("bpy", reason="the command line runs inside Blender")
 import bpy
 
 from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
-from hairloom.addon.host import command_line
-from hairloom.addon.host.curves import write_curves
-from hairloom.addon.host.take import scene_drive
+from hairloom.addon.host.bakes.take import scene_drive
+from hairloom.addon.host.scene.curves import write_curves
+from hairloom.addon.host.verbs import command_line
 from hairloom.addon.strands import StrandSet
 
 HEAD_OBJ = """

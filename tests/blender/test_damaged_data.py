@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import cache
-from hairloom.addon.host.cache import Cache, CacheWriter, Facts
-from hairloom.addon.host.overrides import overrides
-from hairloom.addon.host.take import Take, read_take, write_take
+from hairloom.addon.host.bakes import cache
+from hairloom.addon.host.bakes.cache import Cache, CacheWriter, Facts
+from hairloom.addon.host.bakes.take import Take, read_take, write_take
+from hairloom.addon.host.verbs.overrides import overrides
 
 
 @pytest.fixture

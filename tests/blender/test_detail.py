@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hairloom.addon.host import live, overlay
-from hairloom.addon.host.hiders import Hiders
-from hairloom.addon.host.overlay_text import counts_line, free_corner
+from hairloom.addon.host.preview import live, overlay
+from hairloom.addon.host.preview.hiders import Hiders
+from hairloom.addon.host.preview.overlay_text import counts_line, free_corner
 from hairloom.addon.pipeline import Pose
 from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.strand_pass import Statistics, StrandPass

@@ -77,7 +77,7 @@ def test_previewed_hair_is_seen_as_its_object_is(
     stage: Any, new_hair: Callable[..., Any], sphere: Any
 ) -> None:
     """The reader leaves it out and says how it takes part, whatever a preview wrote to the copy."""
-    from hairloom.addon.host.engine_scene import SceneReader
+    from hairloom.addon.host.render_engine.engine_scene import SceneReader
 
     hair, reader = new_hair(sphere), SceneReader()
     hair.is_holdout = True
@@ -145,7 +145,8 @@ def test_hair_is_rendered_as_it_was_baked(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
     """Frames and moments between them, although the curves themselves are hidden then."""
-    from hairloom.addon.host import engine_hair, playback
+    from hairloom.addon.host.bakes import playback
+    from hairloom.addon.host.render_engine import engine_hair
 
     hair = new_hair(sphere)
     stage.frame_start, stage.frame_end = 1, 4
@@ -176,7 +177,7 @@ def test_hair_is_rendered_as_it_was_baked(
 def test_animated_settings_are_those_of_the_frame(
     stage: Any, new_hair: Callable[..., Any], sphere: Any
 ) -> None:
-    from hairloom.addon.host import engine_hair
+    from hairloom.addon.host.render_engine import engine_hair
 
     hair = new_hair(sphere)
     strands = hair.data.hairloom.strands

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from hairloom.addon.exchange.groom import Groom
-from hairloom.addon.exchange.groom_usd import write_usd
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.tressfx import read_tfx
-from hairloom.addon.host import command_line, playback
-from hairloom.addon.host.bake import Bake
+from hairloom.addon.exchange.usd.groom_usd import write_usd
+from hairloom.addon.host.bakes import playback
+from hairloom.addon.host.bakes.bake import Bake
+from hairloom.addon.host.verbs import command_line
 from hairloom.addon.strands import StrandSet
 
 SMALL = ["--set", "guides.guide_count=12", "--set", "guides.cv_count=8"]

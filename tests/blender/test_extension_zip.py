@@ -216,15 +216,15 @@ for _ in range(10):
 bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
 bpy.ops.hairloom.grow(strand_count=50, length=0.1)
 bpy.ops.hairloom.preview()
-live = sys.modules[NAME + ".addon.host.live"]
+live = sys.modules[NAME + ".addon.host.preview.live"]
 registration = sys.modules[NAME + ".addon.registration"]
-dds = importlib.import_module(NAME + ".addon.exchange.dds")
+dds = importlib.import_module(NAME + ".addon.exchange.textures.dds")
 
 def module(name):
     return importlib.import_module(NAME + ".addon." + name)
 
-groom, alembic = module("exchange.groom"), module("exchange.groom_alembic")
-reader, child = module("exchange.groom_alembic_read"), module("host.child_python")
+groom, alembic = module("exchange.groom"), module("exchange.alembic.groom_alembic")
+reader, child = module("exchange.alembic.groom_alembic_read"), module("host.strands.child_python")
 path = pathlib.Path({resources!r}) / "a.abc"
 alembic.write_groom_alembic(path, groom.Groom(live.sessions()[0].rig.strands))
 
@@ -235,7 +235,7 @@ def crashes(command):
     crash = path.with_name("crash.py")
     crash.write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
     try:
-        module("exchange.apart").run_apart(crash, path, library="Alembic", python=command)
+        module("exchange.files.apart").run_apart(crash, path, library="Alembic", python=command)
     except module("errors").HairloomError as error:
         return str(error)
 

@@ -99,7 +99,7 @@ def _content(file: Path) -> dict[str, Any]:
 
 def test_the_template_is_valid_and_names_verbs_and_options_that_there_are() -> None:
     assert openjd("check", str(TEMPLATE)).returncode == 0
-    from hairloom.addon.host.command_line import parser
+    from hairloom.addon.host.verbs.command_line import parser
 
     for step in yaml.safe_load(TEMPLATE.read_text())["steps"]:
         arguments = step["script"]["actions"]["onRun"]["args"]

@@ -6,9 +6,10 @@ import pytest
 from mathutils import Matrix
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import fins, live, reactions
-from hairloom.addon.host.bake import Bake
-from hairloom.addon.host.fin_modifier import INDEX, POSITION, fin_modifier, is_shown
+from hairloom.addon.host.bakes.bake import Bake
+from hairloom.addon.host.cloth import fins
+from hairloom.addon.host.cloth.fin_modifier import INDEX, POSITION, fin_modifier, is_shown
+from hairloom.addon.host.preview import live, reactions
 
 FRAME = 1.0 / 60.0
 

@@ -16,15 +16,15 @@ from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import card_orders, in_order
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.card_formats import GLB
-from hairloom.addon.exchange.file_set import written_together
+from hairloom.addon.exchange.cards.card_formats import GLB
+from hairloom.addon.exchange.files.file_set import written_together
 from hairloom.addon.shading.textures import TextureSettings, hair_textures
 
 bpy = pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 
-from hairloom.addon.host import card_export  # noqa: E402
-from hairloom.addon.host.card_export import write_card_mesh  # noqa: E402
-from hairloom.addon.host.card_scene import ROUGHNESS, CardLook  # noqa: E402
+from hairloom.addon.host.cards import card_export  # noqa: E402
+from hairloom.addon.host.cards.card_export import write_card_mesh  # noqa: E402
+from hairloom.addon.host.cards.card_scene import ROUGHNESS, CardLook  # noqa: E402
 
 TEXTURE = TextureSettings(variant_width=32, height=128)
 

@@ -12,8 +12,8 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 pytest.importorskip("pxr", reason="this Python has no OpenUSD")
 
 from hairloom.addon.exchange.groom import Groom  # noqa: E402
-from hairloom.addon.exchange.groom_usd import write_usd  # noqa: E402
-from hairloom.addon.exchange.groom_usd_read import read_usd  # noqa: E402
+from hairloom.addon.exchange.usd.groom_usd import write_usd  # noqa: E402
+from hairloom.addon.exchange.usd.groom_usd_read import read_usd  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
 if not hasattr(bpy.ops.wm, "usd_export") or not bpy.app.build_options.usd:

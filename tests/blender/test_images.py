@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange import texture_files
-from hairloom.addon.exchange.srgb import srgb_encoded
-from hairloom.addon.host import images
+from hairloom.addon.exchange.textures import texture_files
+from hairloom.addon.exchange.textures.srgb import srgb_encoded
+from hairloom.addon.host.pictures import images
 
 
 @pytest.fixture(autouse=True)

@@ -5,7 +5,8 @@ import pytest
 
 import hairloom
 from hairloom.addon import registration
-from hairloom.addon.host import groups, live, overlay, reactions
+from hairloom.addon.host.preview import live, overlay, reactions
+from hairloom.addon.host.settings import groups
 
 
 @pytest.fixture

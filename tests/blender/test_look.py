@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import pytest
 
-from hairloom.addon.host import groom_picture, live, overlay, reactions
+from hairloom.addon.host.preview import groom_picture, live, overlay, reactions
 from hairloom.addon.shading.kajiya_kay_settings import KajiyaKaySettings
 from hairloom.addon.shading.marschner.settings import MarschnerSettings
 from hairloom.addon.shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from hairloom.addon.host import live, measures
+from hairloom.addon.host.preview import live, measures
 
 
 @pytest.fixture(autouse=True)

@@ -16,10 +16,10 @@ from hairloom.addon.dynamics.colliders import (
 )
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.objects import Body
-from hairloom.addon.host.obstacles import Obstacles
-from hairloom.addon.host.surfaces import read_surface
-from hairloom.addon.host.wind import scene_wind
+from hairloom.addon.host.colliders.obstacles import Obstacles
+from hairloom.addon.host.scene.objects import Body
+from hairloom.addon.host.scene.surfaces import read_surface
+from hairloom.addon.host.scene.wind import scene_wind
 from hairloom.addon.strands import Surface
 
 FRAME = 1.0 / 60.0

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
-from hairloom.addon.host.adopted_cards import SortChoices, sort_mesh
-from hairloom.addon.host.card_object import card_objects
-from hairloom.addon.host.groom_files import card_choices
-from hairloom.addon.host.other_cards import other_cards
+from hairloom.addon.host.cards.adopted_cards import SortChoices, sort_mesh
+from hairloom.addon.host.cards.card_object import card_objects
+from hairloom.addon.host.cards.other_cards import other_cards
+from hairloom.addon.host.strands.groom_files import card_choices
 
 
 @pytest.fixture

@@ -8,9 +8,10 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host import live, playback
-from hairloom.addon.host.bake import Bake, bakeable, simulated_for
-from hairloom.addon.host.fin_modifier import POSITION, add_modifier
+from hairloom.addon.host.bakes import playback
+from hairloom.addon.host.bakes.bake import Bake, bakeable, simulated_for
+from hairloom.addon.host.cloth.fin_modifier import POSITION, add_modifier
+from hairloom.addon.host.preview import live
 
 LAST = 6
 SIZE = 64

@@ -8,8 +8,8 @@ import bpy
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import command_line, job_options
-from hairloom.addon.host.principled import _values, has_principled_hair, look_from_material
+from hairloom.addon.host.scene.principled import _values, has_principled_hair, look_from_material
+from hairloom.addon.host.verbs import command_line, job_options
 from hairloom.addon.shading.marschner.principled import PrincipledHair
 
 

@@ -10,8 +10,9 @@ import pytest
 
 from hairloom import register, unregister
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import groups, reactions
-from hairloom.addon.host.properties import property_group, settings_of
+from hairloom.addon.host.preview import reactions
+from hairloom.addon.host.settings import groups
+from hairloom.addon.host.settings.properties import property_group, settings_of
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.curve import PLACES
 

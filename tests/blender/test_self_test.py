@@ -4,7 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host import self_test, solvers
+from hairloom.addon.host import self_test
+from hairloom.addon.host.preview import solvers
 
 pytestmark = pytest.mark.usefixtures("extension")
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hairloom.addon.host import live, overlay, reactions
+from hairloom.addon.host.preview import live, overlay, reactions
 from hairloom.addon.strands import StrandSet
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import live, overlay, reactions
+from hairloom.addon.host.preview import live, overlay, reactions
 
 
 @pytest.fixture

@@ -7,8 +7,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from hairloom.addon.host import live, overlay, reactions  # noqa: E402
-from hairloom.addon.host.engine_hair import read_groom  # noqa: E402
+from hairloom.addon.host.preview import live, overlay, reactions  # noqa: E402
+from hairloom.addon.host.render_engine.engine_hair import read_groom  # noqa: E402
 
 
 @pytest.fixture

@@ -13,10 +13,11 @@ pytest.importorskip("bpy", reason="runs inside Blender")
 import bpy
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import command_line, live
-from hairloom.addon.host.session import Session
-from hairloom.addon.host.skin_picture import IMAGE as SKIN_IMAGE
-from hairloom.addon.host.slices import IMAGE, shown_image, shown_slices
+from hairloom.addon.host.pictures.skin_picture import IMAGE as SKIN_IMAGE
+from hairloom.addon.host.pictures.slices import IMAGE, shown_image, shown_slices
+from hairloom.addon.host.preview import live
+from hairloom.addon.host.preview.session import Session
+from hairloom.addon.host.verbs import command_line
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
 pytestmark = pytest.mark.usefixtures("gpu_context")

@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 
 from hairloom.addon.groom.settings import GrowSettings
-from hairloom.addon.host import live, overlay, particle_hair, reactions, starting
-from hairloom.addon.host.curves import read_curves
-from hairloom.addon.host.presets import named_preset
-from hairloom.addon.host.source import own_dynamics
+from hairloom.addon.host import starting
+from hairloom.addon.host.preview import live, overlay, reactions
+from hairloom.addon.host.scene.curves import read_curves
+from hairloom.addon.host.scene.source import own_dynamics
+from hairloom.addon.host.settings.presets import named_preset
+from hairloom.addon.host.strands import particle_hair
 from hairloom.addon.ui.preferences import DYNAMICS, LOOK, preferences
 
 pytestmark = pytest.mark.usefixtures("extension")

@@ -18,13 +18,13 @@ from hairloom.addon.exchange.strand_formats import ALEMBIC, TRESSFX, USD
 from hairloom.addon.exchange.strand_output import StrandOutput
 from hairloom.addon.exchange.tfxbone import read_tfxbone
 from hairloom.addon.exchange.tressfx import read_tfx
-from hairloom.addon.host import playback
-from hairloom.addon.host.bake import Bake
-from hairloom.addon.host.curves import write_curves
-from hairloom.addon.host.export_check import ExportCheck
-from hairloom.addon.host.groom_attributes import store_groom
-from hairloom.addon.host.groom_out import Wishes, still_hair
-from hairloom.addon.host.strand_export import StrandExport
+from hairloom.addon.host.bakes import playback
+from hairloom.addon.host.bakes.bake import Bake
+from hairloom.addon.host.scene.curves import write_curves
+from hairloom.addon.host.strands.export_check import ExportCheck
+from hairloom.addon.host.strands.groom_attributes import store_groom
+from hairloom.addon.host.strands.groom_out import Wishes, still_hair
+from hairloom.addon.host.strands.strand_export import StrandExport
 from hairloom.addon.strands import StrandSet
 
 pytest.importorskip("alembic3d", reason="it is missing: `make setup` installs it")

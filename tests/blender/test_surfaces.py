@@ -6,7 +6,7 @@ import pytest
 from mathutils import Euler, Matrix
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.surfaces import read_positions, read_surface
+from hairloom.addon.host.scene.surfaces import read_positions, read_surface
 
 
 def volume(surface):

@@ -16,8 +16,8 @@ from typing import Any
 import bpy
 import pytest
 
-from hairloom.addon.host import command_line, interruption
-from hairloom.addon.host.cache import Cache
+from hairloom.addon.host.bakes.cache import Cache
+from hairloom.addon.host.verbs import command_line, interruption
 
 REPOSITORY = Path(__file__).parents[2]
 QUICK = ["--set", "dynamics.form=numpy", "--set", "dynamics.collider_resolution=8"]

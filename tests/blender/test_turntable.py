@@ -15,14 +15,15 @@ pytest.importorskip("bpy", reason="turntables are drawn inside Blender")
 import bpy
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host import command_line, video
-from hairloom.addon.host import turntable as turntable_module
-from hairloom.addon.host.images import read_texture
-from hairloom.addon.host.labels import labelled
-from hairloom.addon.host.presets import shipped
-from hairloom.addon.host.sheet import COLUMNS, VIEWS, Sheet
-from hairloom.addon.host.showing import file_name, shown_groom
-from hairloom.addon.host.turntable import Turntable, TurntableSettings
+from hairloom.addon.host.pictures import turntable as turntable_module
+from hairloom.addon.host.pictures import video
+from hairloom.addon.host.pictures.images import read_texture
+from hairloom.addon.host.pictures.labels import labelled
+from hairloom.addon.host.pictures.sheet import COLUMNS, VIEWS, Sheet
+from hairloom.addon.host.pictures.turntable import Turntable, TurntableSettings
+from hairloom.addon.host.preview.showing import file_name, shown_groom
+from hairloom.addon.host.settings.presets import shipped
+from hairloom.addon.host.verbs import command_line
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from hair_ball import ball_mesh, combed_strands
 
-from hairloom.addon.exchange.srgb import srgb_encoded
+from hairloom.addon.exchange.textures.srgb import srgb_encoded
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings

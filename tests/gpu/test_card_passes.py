@@ -340,7 +340,7 @@ def test_what_the_viewport_is_given(frame: Any) -> None:
     """Straight colours as its handlers have to write them, then times alpha."""
     import gpu
 
-    from hairloom.addon.exchange.srgb import srgb_encoded
+    from hairloom.addon.exchange.textures.srgb import srgb_encoded
     from hairloom.addon.render.card_pass import CardPass
 
     dim = {"lights": (Light.sun((0.2, 0.7, -0.4), (1.0, 0.9, 0.8), 0.4),)}

@@ -39,7 +39,7 @@ def steps():
     yield from set_the_scene()
     yield from hair_shades_the_head()
     yield from layers_are_shown()
-    assert of_hairloom("host.overlay").failure() == ""
+    assert of_hairloom("host.preview.overlay").failure() == ""
 
 
 def set_the_scene():
@@ -76,7 +76,7 @@ def set_the_scene():
 
 
 def has_drawn():
-    passes = of_hairloom("host.overlay")._passes
+    passes = of_hairloom("host.preview.overlay")._passes
     return any(each.statistics.strands > 0 for each in passes.values())
 
 

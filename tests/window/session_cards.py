@@ -37,7 +37,7 @@ def of_hairloom(module):
 
 
 def live():
-    return of_hairloom("host.live")
+    return of_hairloom("host.preview.live")
 
 
 def session():
@@ -115,7 +115,7 @@ def set_the_scene():
 
 
 def are_shown():
-    drawing = of_hairloom("host.overlay").drawing_of(session().uid)
+    drawing = of_hairloom("host.preview.overlay").drawing_of(session().uid)
     return drawing.snapshot.cards is not None and not session().cards.is_pending
 
 
@@ -243,7 +243,7 @@ def rendered_as_cards():
 
 
 def card_objects():
-    return of_hairloom("host.card_object").card_objects(hair())
+    return of_hairloom("host.cards.card_object").card_objects(hair())
 
 
 def is_making():

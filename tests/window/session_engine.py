@@ -33,7 +33,7 @@ def of_hairloom(module):
 
 def view():
     """What draws the viewport; the newest, where Blender has not let go of an older one yet."""
-    kind = of_hairloom("host.engine").HAIRLOOM_RE_engine
+    kind = of_hairloom("host.render_engine.engine").HAIRLOOM_RE_engine
     engines = [each for each in gc.get_objects() if type(each) is kind]
     return engines[-1].view if engines else None
 
@@ -62,7 +62,7 @@ def steps():
     yield from a_region_alone_is_drawn()
     yield from it_begins_anew_at_a_change()
     yield from hair_plays_in_it()
-    assert of_hairloom("host.overlay").failure() == ""
+    assert of_hairloom("host.preview.overlay").failure() == ""
 
 
 def set_the_scene():
@@ -173,7 +173,7 @@ def it_begins_anew_at_a_change():
 
 def hair_plays_in_it():
     yield from click(*sidebar_button("hairloom.preview"))
-    overlay = of_hairloom("host.overlay")
+    overlay = of_hairloom("host.preview.overlay")
     yield from until(lambda: bool(overlay.drawn()), "the preview does not start")
     yield from settled()
     at_rest = pixels("previewed")

@@ -78,7 +78,7 @@ def nothing_selected():
     yield from click(*sidebar_button("hairloom.preview"))
     yield 3
     driver.screenshot("nothing-selected")
-    assert of_hairloom("host.live").sessions() == ()
+    assert of_hairloom("host.preview.live").sessions() == ()
 
 
 def set_the_scene():
@@ -103,7 +103,7 @@ def every_panel_draws():
     yield 10
     driver.screenshot("all-panels")
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
-    fin_modifier = of_hairloom("host.fin_modifier")
+    fin_modifier = of_hairloom("host.cloth.fin_modifier")
     fin_modifier.add_modifier(head)
     for obj, tab in ((head, "PHYSICS"), (hair, "DATA")):  # a mesh has panels of its own
         bpy.context.active_object.select_set(False)
@@ -119,7 +119,7 @@ def every_panel_draws():
         each.__name__ for each in of_hairloom("registration").CLASSES if "_PT_" in each.__name__
     } - drawn
     assert not missing, f"never drawn: {missing}"
-    (session,) = of_hairloom("host.live").sessions()
+    (session,) = of_hairloom("host.preview.live").sessions()
     assert session.source.dropped == {"fewer than two points": 3}
 
 
@@ -163,7 +163,7 @@ def hiding_and_local_view():
 
 def blenders_own_animation():
     """Space bar: hair that is not to be simulated goes with the head, drawn at every frame."""
-    live, head = of_hairloom("host.live"), bpy.data.objects["Head"]
+    live, head = of_hairloom("host.preview.live"), bpy.data.objects["Head"]
     bpy.data.objects["Hair"].hairloom.bake.follows = False
     for frame, x in ((1, 0.0), (40, 0.2)):
         head.location.x = x
@@ -184,7 +184,7 @@ def blenders_own_animation():
 
 def hair_without_a_surface():
     """A warning in the panel, no more."""
-    live = of_hairloom("host.live")
+    live = of_hairloom("host.preview.live")
     hair = bpy.data.objects["Hair"]
     live.stop_all()
     hair.data.surface, hair.parent = None, None
@@ -199,7 +199,7 @@ def hair_without_a_surface():
 
 
 def a_failing_shader_is_told_once():
-    overlay = of_hairloom("host.overlay")
+    overlay = of_hairloom("host.preview.overlay")
     strand_pass = of_hairloom("render.strand_pass").StrandPass
     draw, calls = strand_pass.draw, []
 
@@ -215,12 +215,12 @@ def a_failing_shader_is_told_once():
     assert len(calls) == 1, f"it was tried {len(calls)} times"
     hair = bpy.data.objects["Hair"].evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert hair.display_type == "TEXTURED", "neither our strands nor Blender's are to be seen"
-    assert "this GPU refuses" in of_hairloom("host.live").notice()
+    assert "this GPU refuses" in of_hairloom("host.preview.live").notice()
     strand_pass.draw = draw
     for _ in range(2):  # off and on again
         yield from click(*sidebar_button("hairloom.preview"))
         yield 5
-    assert overlay.failure() == "" and of_hairloom("host.live").notice() == ""
+    assert overlay.failure() == "" and of_hairloom("host.preview.live").notice() == ""
     driver.screenshot("drawn-again")
 
 

@@ -29,11 +29,11 @@ FILE = str(Path(bpy.app.tempdir) / "first_light.blend")
 
 
 def live():
-    return sys.modules[f"{driver.EXTENSION}.addon.host.live"]
+    return sys.modules[f"{driver.EXTENSION}.addon.host.preview.live"]
 
 
 def overlay():
-    return sys.modules[f"{driver.EXTENSION}.addon.host.overlay"]
+    return sys.modules[f"{driver.EXTENSION}.addon.host.preview.overlay"]
 
 
 def pixels(label):

@@ -29,7 +29,7 @@ def of_hairloom(module):
 
 
 def live():
-    return of_hairloom("host.live")
+    return of_hairloom("host.preview.live")
 
 
 def pixels(label):
@@ -58,7 +58,7 @@ def steps():
     yield from a_warning_mends()
     yield from to_the_engine()
     yield from the_page_in_the_preferences()
-    assert of_hairloom("host.overlay").failure() == "" and live().notice() == ""
+    assert of_hairloom("host.preview.overlay").failure() == "" and live().notice() == ""
 
 
 def nothing_selected():
@@ -115,7 +115,7 @@ def hair_on_a_mesh_of_ones_own():
     yield 20
     assert np.abs(session.strands - at_first).max() > 1.0e-3, "nothing moves"
     assert changed(bare, pixels("own-mesh")) > 0.02, "no hair is seen"
-    line = of_hairloom("host.measures").frame_line(session.uid)
+    line = of_hairloom("host.preview.measures").frame_line(session.uid)
     assert "simulation" in line and "drawing" in line, line
 
 
@@ -137,7 +137,7 @@ def undo_takes_it_away():
 
 
 def presets_have_pictures():
-    presets = of_hairloom("host.presets")
+    presets = of_hairloom("host.settings.presets")
     bpy.context.window.cursor_warp(viewport().x + 300, viewport().y + viewport().height // 2)
     for section in ("shading", "dynamics", "volume", "cards"):
         entries = presets.shipped(section)
@@ -169,7 +169,7 @@ def a_warning_mends():
     yield from until(
         lambda: live().sessions() and live().sessions()[0].head is not None, "it has no head yet"
     )
-    troubles = of_hairloom("host.troubles").troubles_of(hair, live().sessions()[0])
+    troubles = of_hairloom("host.preview.troubles").troubles_of(hair, live().sessions()[0])
     driver.screenshot("mended")
     assert [trouble.operator for trouble in troubles] in ([], ["hairloom.snap_roots"])
 

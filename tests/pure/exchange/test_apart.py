@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange import apart
-from hairloom.addon.exchange.apart import run_apart
+from hairloom.addon.exchange.files import apart
+from hairloom.addon.exchange.files.apart import run_apart
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hairloom.addon.exchange.array_file import read_arrays
+from hairloom.addon.exchange.files.array_file import read_arrays
 
 ARRAYS = {
     "guides": np.arange(24, dtype=np.float32).reshape(2, 4, 3),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.atomic import atomic_write, write_bytes_atomic, write_text_atomic
+from hairloom.addon.exchange.files.atomic import atomic_write, write_bytes_atomic, write_text_atomic
 
 
 def names(folder: Path) -> list[str]:

@@ -13,12 +13,12 @@ import pytest
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange import texture_files
-from hairloom.addon.exchange.card_textures import FORMATS, write_card_textures
-from hairloom.addon.exchange.dds import has_compressor
-from hairloom.addon.exchange.mip_maps import level_sizes
-from hairloom.addon.exchange.texture_files import read_texture
-from hairloom.addon.exchange.texture_packing import MEANINGS, PRESETS, packed
+from hairloom.addon.exchange.textures import texture_files
+from hairloom.addon.exchange.textures.card_textures import FORMATS, write_card_textures
+from hairloom.addon.exchange.textures.dds import has_compressor
+from hairloom.addon.exchange.textures.mip_maps import level_sizes
+from hairloom.addon.exchange.textures.texture_files import read_texture
+from hairloom.addon.exchange.textures.texture_packing import MEANINGS, PRESETS, packed
 
 oiio = pytest.importorskip("OpenImageIO", reason="textures are read and written through it")
 needs_compressor = pytest.mark.skipif(not has_compressor(), reason="there is no etcpak")
@@ -202,7 +202,7 @@ def test_a_writer_that_fails_midway_leaves_the_old_file(
     def dies(*_arguments: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("hairloom.addon.exchange.atomic.os.replace", dies)
+    monkeypatch.setattr("hairloom.addon.exchange.files.atomic.os.replace", dies)
     for file_format in ("png", "exr", "dds_plain"):
         with pytest.raises(HairloomError, match="No space left"):
             write_card_textures(tmp_path / "a", maps, "hairloom", file_format=file_format)

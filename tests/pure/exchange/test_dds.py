@@ -11,10 +11,10 @@ import pytest
 from mip_chains import mip_chain
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange import dds
-from hairloom.addon.exchange.dds import has_compressor, write_dds
-from hairloom.addon.exchange.mip_maps import level_sizes
-from hairloom.addon.exchange.srgb import srgb_decoded
+from hairloom.addon.exchange.textures import dds
+from hairloom.addon.exchange.textures.dds import has_compressor, write_dds
+from hairloom.addon.exchange.textures.mip_maps import level_sizes
+from hairloom.addon.exchange.textures.srgb import srgb_decoded
 
 oiio = pytest.importorskip("OpenImageIO", reason="DDS files are read through it")
 needs_compressor = pytest.mark.skipif(not has_compressor(), reason="there is no etcpak")

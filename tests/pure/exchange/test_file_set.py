@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange import file_set
-from hairloom.addon.exchange.file_set import written_together
+from hairloom.addon.exchange.files import file_set
+from hairloom.addon.exchange.files.file_set import written_together
 
 FILES = ("hair.glb", "hair_base.png", "hair.json")
 

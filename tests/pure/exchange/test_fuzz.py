@@ -19,7 +19,7 @@ import pytest
 from extension_loader import REPOSITORY
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.apart import same_packages
+from hairloom.addon.exchange.files.apart import same_packages
 
 
 def with_library(kind: str, package: str) -> Any:

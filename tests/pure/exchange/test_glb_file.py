@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.glb_file import GlbFile
+from hairloom.addon.exchange.cards.glb_file import GlbFile
 
 
 def written(content: dict[str, object], binary: bytes) -> bytes:

@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.apart import same_packages, this_python
-from hairloom.addon.exchange.file_space import FileSpace
+from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
+from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic
+from hairloom.addon.exchange.files.apart import same_packages, this_python
+from hairloom.addon.exchange.files.file_space import FileSpace
 from hairloom.addon.exchange.groom import Groom, GroomMotion
-from hairloom.addon.exchange.groom_alembic import write_groom_alembic
-from hairloom.addon.exchange.groom_alembic_read import read_groom_alembic
 from hairloom.addon.exchange.groom_presets import BLENDER, LEAST_WIDTH, UNITY, UNREAL, preflight
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.strand_set import DEFAULT_RADIUS
@@ -443,7 +443,7 @@ def test_a_full_disk_is_told(tmp_path: Path) -> None:
 
 def test_the_reader_of_curves_is_a_program_of_its_own(tmp_path: Path) -> None:
     """It must run where the package, and with it Blender, is not."""
-    from hairloom.addon.exchange import alembic_curves
+    from hairloom.addon.exchange.alembic import alembic_curves
 
     write_groom_alembic(tmp_path / "a.abc", groom())
     command = [*this_python(tmp_path), alembic_curves.__file__, tmp_path / "a.abc", tmp_path / "r"]

@@ -14,8 +14,8 @@ import pytest
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.groom import Groom, GroomMotion
-from hairloom.addon.exchange.groom_usd import USD_SPACES, write_usd
-from hairloom.addon.exchange.groom_usd_read import read_usd
+from hairloom.addon.exchange.usd.groom_usd import USD_SPACES, write_usd
+from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 from hairloom.addon.strands import StrandSet
 
 pytest.importorskip("pxr", reason="usd-core is missing: `make setup` installs it")
@@ -211,7 +211,7 @@ def test_long_motion_goes_to_the_file_as_it_comes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Saved after each frame, the file holds what a file saved once does."""
-    monkeypatch.setattr("hairloom.addon.exchange.groom_usd._WAITING", 0)
+    monkeypatch.setattr("hairloom.addon.exchange.usd.groom_usd._WAITING", 0)
     groom, path, sizes = full_groom(), tmp_path / "a.usdc", []
 
     def frames() -> Iterator[np.ndarray]:
@@ -499,7 +499,7 @@ sys.path.insert(0, sys.argv[1])
 from extension_loader import load_package
 load_package()
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.groom_usd_read import read_usd
+from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 for path in sorted(Path(sys.argv[2]).iterdir()):
     try:
         print(path.name, read_usd(path).strands.strand_count, flush=True)

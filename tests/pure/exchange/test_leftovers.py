@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from hairloom.addon.exchange import leftovers
-from hairloom.addon.exchange.atomic import write_bytes_atomic
-from hairloom.addon.exchange.file_set import written_together
-from hairloom.addon.exchange.leftovers import remove_leftovers, temporary_beside
+from hairloom.addon.exchange.files import leftovers
+from hairloom.addon.exchange.files.atomic import write_bytes_atomic
+from hairloom.addon.exchange.files.file_set import written_together
+from hairloom.addon.exchange.files.leftovers import remove_leftovers, temporary_beside
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 from mip_chains import alpha_chain, mip_chain
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
-from hairloom.addon.exchange.mip_maps import level_sizes, mip_levels
+from hairloom.addon.exchange.textures.mip_maps import level_sizes, mip_levels
 
 THRESHOLD = 0.5
 

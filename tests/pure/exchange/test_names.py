@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hairloom.addon.exchange.names import plain_name
+from hairloom.addon.exchange.files.names import plain_name
 
 
 @pytest.mark.parametrize(

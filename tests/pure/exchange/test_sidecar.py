@@ -12,9 +12,9 @@ import pytest
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.exchange.card_formats import FBX, FORMATS, GLB, USD
-from hairloom.addon.exchange.index_buffer import index_buffer
-from hairloom.addon.exchange.sidecar import CardFile, description, sidecar_text
+from hairloom.addon.exchange.cards.card_formats import FBX, FORMATS, GLB, USD
+from hairloom.addon.exchange.cards.index_buffer import index_buffer
+from hairloom.addon.exchange.cards.sidecar import CardFile, description, sidecar_text
 
 jsonschema = pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
 

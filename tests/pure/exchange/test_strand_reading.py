@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom import Groom, GroomMotion
-from hairloom.addon.exchange.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom_presets import BLENDER, UNITY, UNREAL
-from hairloom.addon.exchange.groom_usd import write_usd
 from hairloom.addon.exchange.hair_file import write_hair_file
 from hairloom.addon.exchange.strand_formats import SUFFIXES
 from hairloom.addon.exchange.strand_reading import read_strands
 from hairloom.addon.exchange.tressfx import write_tfx
+from hairloom.addon.exchange.usd.groom_usd import write_usd
 from hairloom.addon.strands import StrandSet
 
 pytest.importorskip("alembic3d", reason="it is missing: `make setup` installs it")

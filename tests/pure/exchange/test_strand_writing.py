@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic
 from hairloom.addon.exchange.groom import Groom, GroomMotion
-from hairloom.addon.exchange.groom_alembic_read import read_groom_alembic
-from hairloom.addon.exchange.groom_usd_read import read_usd
 from hairloom.addon.exchange.guide_copies import with_guide_copies
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.joined_grooms import joined_bones, joined_grooms
@@ -21,6 +20,7 @@ from hairloom.addon.exchange.strand_output import StrandOutput
 from hairloom.addon.exchange.strand_writing import write_strands
 from hairloom.addon.exchange.tfxbone import read_tfxbone, strongest_bones
 from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 from hairloom.addon.strands import StrandSet
 
 COUNT, POINTS = 10, 5

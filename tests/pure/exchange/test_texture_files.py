@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange import texture_files
-from hairloom.addon.exchange.srgb import srgb_decoded, srgb_encoded
-from hairloom.addon.exchange.texture_files import DEPTHS, read_texture, write_texture
+from hairloom.addon.exchange.textures import texture_files
+from hairloom.addon.exchange.textures.srgb import srgb_decoded, srgb_encoded
+from hairloom.addon.exchange.textures.texture_files import DEPTHS, read_texture, write_texture
 
 oiio = pytest.importorskip("OpenImageIO", reason="textures are read and written through it")
 

@@ -10,7 +10,7 @@ import pytest
 
 from hairloom.addon.cards.atlas_maps import MAPS
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.texture_packing import MEANINGS, PRESETS, layouts, packed
+from hairloom.addon.exchange.textures.texture_packing import MEANINGS, PRESETS, layouts, packed
 
 THREE = ("base", "normal", "tangent")
 

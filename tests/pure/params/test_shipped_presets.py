@@ -65,8 +65,11 @@ def test_what_a_preset_brings_along_is_checked(tmp_path: Path, also: object) -> 
 
 def test_only_the_look_under_water_has_shafts_of_light() -> None:
     presets = {path: read_any_preset(path, ALL_SETTINGS) for path in PRESETS}
-    with_shafts = {path.stem for path, preset in presets.items() if preset.also}
-    assert with_shafts == {"under_water"}
-    (shafts,) = presets[FOLDER / "looks" / "under_water.json"].also
-    assert isinstance(shafts, ShaftSettings) and shafts.use_shafts
+    shafts = {
+        path.stem: settings
+        for path, preset in presets.items()
+        for settings in preset.also
+        if isinstance(settings, ShaftSettings)
+    }
+    assert set(shafts) == {"under_water"} and shafts["under_water"].use_shafts
     assert not ShaftSettings().use_shafts

@@ -1,0 +1,73 @@
+"""PyAlembic, as the package `alembic3d` brings it, and its arrays to and from numpy's."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
+
+#: numpy dtype, width of an item -> the array of Imath that is made from a buffer
+_FROM_BUFFER = {
+    ("float32", 1): "FloatArrayFromBuffer",
+    ("float32", 2): "V2fArrayFromBuffer",
+    ("float32", 3): "V3fArrayFromBuffer",
+    ("int32", 1): "IntArrayFromBuffer",
+    ("int32", 3): "V3iArrayFromBuffer",
+}
+#: the same -> what Alembic calls the type of such a geometry parameter
+_PARAMETER = {
+    ("float32", 1): "Float",
+    ("float32", 2): "V2f",
+    ("float32", 3): "V3f",
+    ("int32", 1): "Int32",
+    ("int32", 3): "V3i",
+}
+
+
+def alembic_library(place: str) -> Any:
+    """Its modules as `abc`, `geom`, `core` and `imath`.
+
+    Raises:
+        HairloomError: it cannot be loaded in this Python.
+    """
+    try:
+        import imath
+        from alembic3d import Abc, AbcCoreAbstract, AbcGeom
+    except ImportError as error:
+        raise HairloomError(
+            f"the package alembic3d, which reads and writes Alembic, cannot be loaded ({error})",
+            place=place,
+            remedy="Use USD instead, or install the extension again for this platform",
+        ) from error
+    return SimpleNamespace(abc=Abc, geom=AbcGeom, core=AbcCoreAbstract, imath=imath)
+
+
+def array_of(library: Any, values: Floats | Ints) -> Any:
+    """A copy of (n,) or (n, width) float32 or int32 as Imath has it."""
+    return getattr(library.imath, _FROM_BUFFER[_kind(values)])(np.ascontiguousarray(values))
+
+
+def sample_of(library: Any, values: Floats | Ints, scope: str) -> Any:
+    """Values of a geometry parameter; `scope` is "Constant", "Uniform" or "Vertex"."""
+    make = getattr(library.geom, f"O{_PARAMETER[_kind(values)]}GeomParamSample")
+    return make(array_of(library, values), scope_of(library, scope))
+
+
+def write_parameter(
+    library: Any, parent: Any, name: str, values: Floats | Ints, scope: str
+) -> None:
+    """A geometry parameter with one sample; vectors have the interpretation "vector"."""
+    make = getattr(library.geom, f"O{_PARAMETER[_kind(values)]}GeomParam")
+    make(parent, name, False, scope_of(library, scope), 1).set(sample_of(library, values, scope))
+
+
+def scope_of(library: Any, scope: str) -> Any:
+    return getattr(library.geom.GeometryScope, f"k{scope}Scope")
+
+
+def _kind(values: Floats | Ints) -> tuple[str, int]:
+    return values.dtype.name, values.shape[1] if values.ndim == 2 else 1

@@ -1,0 +1,228 @@
+"""An Alembic file's curves objects as one: points in the world, attributes side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
+from .alembic_curves import Arrays
+
+type _Values = NDArray[Any]
+
+_INT32 = np.iinfo(np.int32)
+
+
+@dataclass(frozen=True)
+class Joined:
+    """Curves as a file has them, in its unit and axes, not yet cleaned.
+
+    points: (point_count, 3) float32.
+    offsets: (curve_count + 1,).
+    widths: (point_count,), or None.
+    group: (curve_count,) int32.
+    root_uv: (curve_count, 2), or None.
+    color: (point_count, 3), or None.
+    uniform: strand_id, is_guide, closest_guides, guide_weights of each curve, or None.
+    group_names: group -> name.
+    notes: what could not be used.
+    """
+
+    points: Floats
+    offsets: Ints
+    widths: Floats | None
+    group: Ints
+    root_uv: Floats | None
+    color: Floats | None
+    uniform: Arrays
+    group_names: dict[int, str]
+    notes: tuple[str, ...]
+
+
+@dataclass
+class _Object:
+    """One curves object, and what of it could not be used."""
+
+    name: str
+    points: Floats
+    counts: Ints
+    arrays: Arrays
+    notes: list[str] = field(default_factory=list)
+
+    def of_curves(self, name: str, width: int = 1) -> _Values | None:
+        """An attribute's value for each curve, from as many, or from one for all."""
+        return self._spread(name, width, {len(self.counts): None, 1: len(self.counts)})
+
+    def of_points(self, name: str, width: int = 1) -> _Values | None:
+        """An attribute's value for each point, from as many, or from one a curve or for all."""
+        curves, points = len(self.counts), len(self.points)
+        return self._spread(name, width, {points: None, curves: self.counts, 1: points})
+
+    def _spread(
+        self, name: str, width: int, repeats: dict[int, Ints | int | None]
+    ) -> _Values | None:
+        values = self.arrays.get(name)
+        if values is None or not values.size:
+            return None
+        if values.dtype.kind not in "biuf" or values.size % width:
+            self.notes.append(f"{self.name}: {name} is of another type")
+            return None
+        values = values.reshape(-1, width) if width > 1 else values.ravel()
+        if len(values) not in repeats:
+            self.notes.append(f"{self.name}: {name} has {len(values)} values")
+            return None
+        times = repeats[len(values)]
+        return values if times is None else np.repeat(values, times, axis=0)
+
+
+def joined(found: Arrays, path: Path) -> Joined:
+    """All curves objects that `alembic_curves` has found.
+
+    Raises:
+        HairloomError: there are none, or one's counts do not fit its points.
+    """
+    objects = [_object(found, number, path) for number in _numbers(found)]
+    objects = [each for each in objects if len(each.counts)]
+    if not objects:
+        raise HairloomError(
+            "there are no curves in it",
+            place=str(path),
+            remedy="Export hair curves, not meshes or empties",
+        )
+    counts = np.concatenate([each.counts for each in objects])
+    widths = [_widths(each) for each in objects]
+    group, names = _groups(objects)
+    return Joined(
+        points=np.concatenate([each.points for each in objects]),
+        offsets=np.concatenate([[0], np.cumsum(counts)]),
+        widths=_side_by_side(widths, [len(each.points) for each in objects], np.nan),
+        group=group,
+        root_uv=_uniform(objects, "groom_root_uv", 2, 0.0),
+        color=_side_by_side(
+            [each.of_points("groom_color", 3) for each in objects],
+            [len(each.points) for each in objects],
+            0.0,
+        ),
+        uniform=_guides(objects),
+        group_names=names,
+        notes=_notes(objects),  # after all others, which add to them
+    )
+
+
+def _notes(objects: list[_Object]) -> tuple[str, ...]:
+    together = f"its {len(objects):,} curves objects became one groom"
+    told = tuple(note for each in objects for note in each.notes)
+    return (together, *told) if len(objects) > 1 else told
+
+
+def _numbers(found: Arrays) -> list[int]:
+    """Of objects that have points and counts."""
+    every = [n for n in range(len(found)) if f"{n}/name" in found]
+    return [n for n in every if f"{n}/points" in found and f"{n}/counts" in found]
+
+
+def _object(found: Arrays, number: int, path: Path) -> _Object:
+    prefix = f"{number}/"
+    own = {n.removeprefix(prefix): v for n, v in found.items() if n.startswith(prefix)}
+    name, points, counts = str(own["name"]), own["points"], own["counts"]
+    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f" or counts.ndim != 1:
+        raise _lying(path, name, "its points are no positions")
+    counts = counts.astype(np.int64)
+    if len(counts) and (counts.min() < 0 or counts.sum() != len(points)):
+        raise _lying(path, name, f"its curves want {counts.sum()} points and it has {len(points)}")
+    moves = int(own["samples"]) > 1
+    notes = [f"{name}: its motion was left out"] if moves else []
+    return _Object(name, _placed(points, own["matrix"]), counts, own, notes)
+
+
+def _placed(points: Floats, matrix: Floats) -> Floats:
+    """Points in the world; untouched, to the bit, where the object is not moved."""
+    if np.array_equal(matrix, np.eye(4)):
+        return points.astype(np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):
+        moved = points.astype(np.float64) @ matrix[:3, :3] + matrix[3, :3]
+        return moved.astype(np.float32)
+
+
+def _widths(each: _Object) -> _Values | None:
+    """Of a strand at each point, as engines take them: the attribute before the curves' own."""
+    widths = each.of_points("groom_width")
+    return each.of_points("widths") if widths is None else widths
+
+
+def _groups(objects: list[_Object]) -> tuple[Ints, dict[int, str]]:
+    """Group of each curve, and names; the objects are the groups where the file has no IDs."""
+    has_ids = any("groom_group_id" in each.arrays for each in objects)
+    ids, names = list[Ints](), dict[int, str]()
+    for number, each in enumerate(objects):
+        own = _whole(each.of_curves("groom_group_id")) if has_ids else None
+        if own is None:
+            own = np.full(len(each.counts), 0 if has_ids else number, np.int32)
+        ids.append(own)
+        texts = each.arrays.get("groom_group_name")
+        if texts is not None and texts.dtype.kind == "U" and texts.size in (1, len(own)):
+            groups, first = np.unique(own, return_index=True)
+            chosen = np.broadcast_to(texts.ravel(), len(own))[first].tolist()
+            names.update(zip(groups.tolist(), chosen, strict=True))
+        elif not has_ids and len(objects) > 1:
+            names[number] = each.name
+    return np.concatenate(ids), names
+
+
+def _guides(objects: list[_Object]) -> Arrays:
+    """What tells guides from strands, and ties them; closest guides only where there are IDs."""
+    ids = [_whole(each.of_curves("groom_id")) for each in objects]
+    sizes = [len(each.counts) for each in objects]
+    known = None if any(each is None for each in ids) else _side_by_side(ids, sizes, 0)
+    guide = _uniform(objects, "groom_guide", 1, 0)
+    closest = _side_by_side(
+        [_whole(o.of_curves("groom_closest_guides", 3)) for o in objects], sizes, 0
+    )
+    weights = _uniform(objects, "groom_guide_weights", 3, 0.0)
+    found: Arrays = {}
+    if known is not None:
+        found["strand_id"] = known
+    if guide is not None:
+        found["is_guide"] = guide != 0
+    if known is not None and closest is not None and weights is not None:
+        found["closest_guides"] = closest
+        found["guide_weights"] = np.nan_to_num(weights, posinf=0.0, neginf=0.0)
+    return found
+
+
+def _whole(values: _Values | None) -> Ints | None:
+    """As int32; what does not fit becomes 0."""
+    if values is None:
+        return None
+    fits = np.isfinite(values) & (values >= _INT32.min) & (values <= _INT32.max)
+    return np.where(fits, values, 0).astype(np.int32)
+
+
+def _uniform(objects: list[_Object], name: str, width: int, missing: float) -> _Values | None:
+    """An attribute of all curves, `missing` for objects without it; None if no object has it."""
+    values = [each.of_curves(name, width) for each in objects]
+    return _side_by_side(values, [len(each.counts) for each in objects], missing)
+
+
+def _side_by_side(parts: list[_Values | None], sizes: list[int], missing: float) -> _Values | None:
+    there = next((part for part in parts if part is not None), None)
+    if there is None:
+        return None
+    filled = [
+        np.full((size, *there.shape[1:]), missing, there.dtype) if part is None else part
+        for part, size in zip(parts, sizes, strict=True)
+    ]
+    return np.concatenate(filled)
+
+
+def _lying(path: Path, name: str, problem: str) -> HairloomError:
+    return HairloomError(
+        f"the curves '{name}' are broken: {problem}",
+        place=str(path),
+        remedy="The file is damaged: copy or export it again",
+    )

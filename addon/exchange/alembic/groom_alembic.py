@@ -1,0 +1,266 @@
+"""Grooms as Alembic files for engines, after Epic's "Alembic for Grooms Specification" 1.5.
+
+One IXform carries the version and what wrote the file; below it lie ICurves with the attributes
+groom_guide, groom_group_id, groom_group_name, groom_id, groom_root_uv, groom_width, groom_color,
+groom_closest_guides and groom_guide_weights. Vectors have the interpretation "vector": Unreal's
+importer refuses others. Widths are the curves' own as well, where Unity and Blender look for them;
+Alembic stores the same numbers once.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
+from ..files.atomic import atomic_write, unwritable
+from ..files.disk_room import check_room
+from ..files.names import plain_name
+from ..groom import Groom, GroomMotion, points_of
+from ..groom_presets import LEAST_WIDTH, UNREAL, GroomPreset, chosen_parts
+from ..point_cap import PointCap, point_cap
+from .alembic_library import alembic_library, array_of, sample_of, scope_of, write_parameter
+
+VERSION = (1, 5)
+TOOL = "Hairloom"
+#: A frame rate that nobody has; files and times would be broken by it.
+_MOST_RATE = 1.0e4
+#: No fewer bytes than a point, and a strand, have with all attributes; and all headers together.
+_POINT_BYTES, _STRAND_BYTES, _HEADER_BYTES = 40, 64, 1 << 18
+
+
+def write_groom_alembic(
+    path: Path, groom: Groom, preset: GroomPreset = UNREAL, *, motion: GroomMotion | None = None
+) -> None:
+    """Write a groom, still or moving; the file is there complete or not at all.
+
+    Strands without an ID get their number as one. Widths are at least LEAST_WIDTH.
+
+    Args:
+        preset: the engine's units, axes, and what it takes; `replace` it for other wishes.
+        motion: positions over time; widths and attributes stay the groom's.
+
+    Raises:
+        HairloomError: no alembic3d, nothing to write, frames that do not fit the groom or are not
+            finite, or nothing can be written there.
+    """
+    library = alembic_library(str(path))
+    parts = _parts(groom, preset)
+    if not parts:
+        what = "guides" if preset.parts == "guides" else "strands"
+        raise HairloomError(
+            f"there are no {what} to write", place=str(path), remedy=f"Choose hair that has {what}"
+        )
+    with atomic_write(path) as temporary:
+        try:
+            _write(library, temporary, groom, parts, preset, motion)
+        except BaseException as error:
+            # Its frames would hold the archive open, and Windows deletes no open file
+            traceback.clear_frames(error.__traceback__)
+            if not isinstance(error, RuntimeError):
+                raise
+            raise unwritable(path, str(error).strip() or "no reason given") from error
+        if not is_finished(temporary):
+            raise unwritable(path, "the disk may be full")
+
+
+def is_finished(path: Path) -> bool:
+    """Whether whoever wrote an Alembic file came to its end: its sixth byte says so."""
+    with path.open("rb") as file:
+        return file.read(6) == b"Ogawa\xff"
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One curves object: its strands, and how to get its points from the groom's."""
+
+    name: str
+    groom: Groom
+    points: Ints | None
+    cap: PointCap | None
+
+    @property
+    def point_counts(self) -> Ints:
+        return self.groom.strands.point_counts if self.cap is None else np.diff(self.cap.offsets)
+
+    def of_points(self, values: Floats) -> Floats:
+        """Values at the groom's points at the points of this object."""
+        return self.capped(values if self.points is None else values[self.points])
+
+    def capped(self, values: Floats) -> Floats:
+        """Values at the points of this object's strands at those that are written."""
+        return values if self.cap is None else self.cap.apply(values)
+
+
+def _parts(groom: Groom, preset: GroomPreset) -> list[_Part]:
+    parts = []
+    for name, chosen in _chosen(groom, preset):
+        if chosen is not None and not len(chosen):
+            continue
+        own = groom if chosen is None else groom.take(chosen)
+        points = None if chosen is None else points_of(groom.strands, chosen)
+        parts.append(_Part(name, own, points, point_cap(own.strands, preset.most_points)))
+    return [part for part in parts if part.groom.strands.strand_count]
+
+
+def _chosen(groom: Groom, preset: GroomPreset) -> Iterator[tuple[str, Ints | None]]:
+    """Name and strands of each curves object; None are all of them, in their order."""
+    count = groom.strands.strand_count
+    numbered = replace(groom, strand_id=np.arange(count), closest_guides=None, guide_weights=None)
+    wanted = chosen_parts(numbered, preset.parts).strand_id
+    assert wanted is not None
+    if not preset.is_split:
+        yield plain_name(groom.name), None if len(wanted) == count else wanted
+        return
+    group = groom.strands.group[wanted]
+    taken: set[str] = set()
+    for number in np.unique(group).tolist():
+        name = plain_name(groom.group_names.get(number, f"{groom.name}_{number}"))
+        name = name if name not in taken else f"{name}_{number}"
+        taken.add(name)
+        yield name, wanted[group == number]
+
+
+def _write(
+    library: Any,
+    path: Path,
+    groom: Groom,
+    parts: list[_Part],
+    preset: GroomPreset,
+    motion: GroomMotion | None,
+) -> None:
+    """The file is closed, and so finished, when the last of the local objects goes.
+
+    Alembic's library ends the process where the disk is full, so that is looked at before.
+    """
+    points = sum(int(part.point_counts.sum()) for part in parts)
+    strands = sum(part.groom.strands.strand_count for part in parts)
+    check_room(path, points * _POINT_BYTES + strands * _STRAND_BYTES + _HEADER_BYTES)
+    archive, time = _archive(library, path, groom, motion)
+    top = library.geom.OXform(archive.getTop(), f"{plain_name(groom.name)}_groom")
+    _write_version(library, top.getSchema().getUserProperties(), groom, preset)
+    schemas = []
+    for part in parts:
+        curves = library.geom.OCurves(top, part.name, library.abc.Argument(time))
+        schemas.append(curves.getSchema())
+    frames = iter([groom.strands.points] if motion is None else motion.positions)
+    first = _checked(next(frames, None), groom, preset)
+    for part, schema in zip(parts, schemas, strict=True):
+        schema.set(_first_sample(library, part, preset, part.of_points(first)))
+        _write_attributes(library, schema.getArbGeomParams(), part, preset)
+    for frame in frames:
+        moved = _checked(frame, groom, preset)
+        check_room(path, points * _POINT_BYTES + _HEADER_BYTES)
+        for part, schema in zip(parts, schemas, strict=True):
+            schema.set(_sample(library, preset, part.of_points(moved)))
+
+
+def _archive(library: Any, path: Path, groom: Groom, motion: GroomMotion | None) -> tuple[Any, int]:
+    """A new archive, and the number of its time sampling."""
+    if motion is None:
+        return library.abc.CreateArchiveWithInfo(str(path), TOOL, groom.name), 0
+    if not 0.0 < motion.rate <= _MOST_RATE:
+        raise HairloomError(
+            f"{motion.rate} frames a second cannot be written",
+            place="frame rate",
+            remedy="Choose a rate above 0",
+        )
+    archive = library.abc.CreateArchiveWithInfo(str(path), float(motion.rate), TOOL, groom.name)
+    step = 1.0 / motion.rate
+    sampling = library.core.TimeSampling(step, motion.first_frame * step)
+    return archive, archive.addTimeSampling(sampling)
+
+
+def _checked(frame: Floats | None, groom: Groom, preset: GroomPreset) -> Floats:
+    """A frame's points in the file's space."""
+    expected = (groom.strands.point_count, 3)
+    if frame is None or frame.shape != expected or not np.isfinite(frame).all():
+        found = "none" if frame is None else f"{frame.shape}"
+        raise HairloomError(
+            f"a frame does not have finite points of shape {expected} (found {found})",
+            place=groom.name,
+            remedy="Bake the motion again",
+        )
+    return preset.space.to_file(frame)
+
+
+def _write_version(library: Any, properties: Any, groom: Groom, preset: GroomPreset) -> None:
+    abc, space = library.abc, preset.space
+    abc.OInt16Property(properties, "groom_version_major").setValue(VERSION[0])
+    abc.OInt16Property(properties, "groom_version_minor").setValue(VERSION[1])
+    abc.OStringProperty(properties, "groom_tool").setValue(TOOL)
+    about = f"up={space.up};per_metre={space.per_metre!r};mirrored={int(space.is_mirrored)}"
+    abc.OStringProperty(properties, "groom_properties").setValue(about)
+
+
+def _sample(library: Any, preset: GroomPreset, points: Floats) -> Any:
+    """Points, and the kind of curve, which each sample repeats. What is not given must stay unset:
+    Unreal takes empty knots for broken ones."""
+    geom, is_cubic = library.geom, preset.basis == "cubic"
+    sample = geom.OCurvesSchemaSample()
+    sample.setPositions(array_of(library, points))
+    sample.setType(geom.CurveType.kCubic if is_cubic else geom.CurveType.kLinear)
+    sample.setBasis(geom.BasisType.kCatmullromBasis if is_cubic else geom.BasisType.kNoBasis)
+    sample.setWrap(geom.CurvePeriodicity.kNonPeriodic)
+    return sample
+
+
+def _first_sample(library: Any, part: _Part, preset: GroomPreset, points: Floats) -> Any:
+    """What the later ones repeat, too: counts, widths and UVs."""
+    sample = _sample(library, preset, points)
+    sample.setCurvesNumVertices(array_of(library, part.point_counts.astype(np.int32)))
+    sample.setWidths(sample_of(library, _widths(part, preset), "Vertex"))
+    uv = part.groom.strands.root_uv
+    if preset.has_curve_uv and uv is not None:
+        sample.setUVs(sample_of(library, np.repeat(uv, part.point_counts, axis=0), "Vertex"))
+    return sample
+
+
+def _write_attributes(library: Any, parent: Any, part: _Part, preset: GroomPreset) -> None:
+    groom, count = part.groom, part.groom.strands.strand_count
+    number = np.arange(count) if groom.strand_id is None else groom.strand_id
+    uniform: dict[str, Floats | Ints | None] = {
+        "groom_group_id": groom.strands.group,
+        "groom_id": number.astype(np.int32),
+        "groom_root_uv": groom.strands.root_uv,
+    }
+    if groom.is_guide is not None:
+        uniform["groom_guide"] = groom.is_guide.astype(np.int32)
+    if preset.parts == "both":
+        uniform["groom_closest_guides"] = groom.closest_guides
+        uniform["groom_guide_weights"] = groom.guide_weights
+    for name, values in uniform.items():
+        if values is not None:
+            write_parameter(library, parent, name, values, "Uniform")
+    write_parameter(library, parent, "groom_width", _widths(part, preset), "Vertex")
+    if groom.color is not None:
+        write_parameter(library, parent, "groom_color", part.capped(groom.color), "Vertex")
+    _write_group_names(library, parent, groom)
+
+
+def _write_group_names(library: Any, parent: Any, groom: Groom) -> None:
+    """Each name once, and for each strand which one."""
+    if not groom.group_names:
+        return
+    groups, which = np.unique(groom.strands.group, return_inverse=True)
+    names = library.imath.StringArray(len(groups))
+    for place, group in enumerate(groups.tolist()):
+        names[place] = groom.group_names.get(group, f"{groom.name}_{group}")
+    # Unsigned ones are not made from a buffer, but from doubles
+    numbers = library.imath.DoubleArrayFromBuffer(which.astype(np.float64))
+    indices = library.imath.UnsignedIntArray(numbers)
+    scope = scope_of(library, "Uniform")
+    sample = library.geom.OStringGeomParamSample(names, indices, scope)
+    library.geom.OStringGeomParam(parent, "groom_group_name", True, scope, 1).set(sample)
+
+
+def _widths(part: _Part, preset: GroomPreset) -> Floats:
+    """Widths of the points that are written, in the file's unit."""
+    width = np.maximum(part.capped(part.groom.strands.radius) * np.float32(2.0), LEAST_WIDTH)
+    return (width * preset.space.per_metre).astype(np.float32)

@@ -1,0 +1,174 @@
+"""Reading groom Alembic: ours, other programs' for Unreal, and Blender's own.
+
+A file is read in another process: damaged ones make Alembic's library crash, and Blender with it.
+Several curves objects become one groom; where none of them has group IDs, each is a group.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...strands.clean import clean
+from ..files.apart import run_apart
+from ..files.file_space import FileSpace
+from ..groom import Groom
+from ..read_groom import ReadGroom, finite, kept_points
+from . import alembic_curves
+from .alembic_curves import Arrays
+from .alembic_library import alembic_library
+from .alembic_objects import Joined, joined
+from .groom_alembic import is_finished
+
+#: Hair wider than this in the file's units is in centimetres, not in metres.
+WIDEST_IN_METRES = 5.0
+
+
+def read_groom_alembic(
+    path: Path,
+    *,
+    space: FileSpace | None = None,
+    up: str | None = None,
+    factor: float = 1.0,
+    with_guides: bool = True,
+    python: Sequence[str] | None = None,
+) -> ReadGroom:
+    """Read all curves of a file, at their first frame.
+
+    Args:
+        space: the file's unit and axes. None: what our own files say of themselves; of others, Y
+            up, in metres where Blender wrote them or they are smaller than WIDEST_IN_METRES, else
+            in centimetres.
+        up: "Y" or "Z" in place of what that says.
+        factor: what lengths are multiplied by beside that.
+        with_guides: whether strands that are marked as guides are kept.
+        python: the command that starts another Python, see `run_apart`.
+
+    Raises:
+        HairloomError: no such file, no Alembic, one without curves, a damaged one, no alembic3d,
+            or no usable strand.
+    """
+    _check(path)
+    found = _read_apart(path, python)
+    curves = joined(found, path)
+    notes, space = list(curves.notes), space or _told_space(found)
+    if space is None:
+        space = _guessed_space(curves)
+        unit = "metres" if space.per_metre == 1.0 else "centimetres"
+        notes.append(f"it names no unit and no axes: read in {unit}, {up or space.up} up")
+    space = replace(space, up=up or space.up, per_metre=space.per_metre / factor)
+    groom = _groom(curves, space, path)
+    if not with_guides:
+        groom = groom.without_guides()
+    if not groom.strands.strand_count:
+        raise _error(path, "it holds nothing but guides", "Read it with its guides")
+    version = f"{_number(found, 'major')}.{_number(found, 'minor')}"
+    return ReadGroom(groom, float(version), tuple(f"{path.name}: {note}." for note in notes))
+
+
+def _check(path: Path) -> None:
+    """What can be said of a file without the library."""
+    if path.is_dir():
+        raise _error(path, "this is a folder, not a file", "Choose an .abc file")
+    try:
+        size = os.stat(path).st_size
+        with path.open("rb") as file:
+            start = file.read(8)
+    except OSError as error:
+        remedy = "Check the path and that you may read it"
+        raise _error(path, f"this file cannot be read ({error.strerror})", remedy) from error
+    if not size:
+        raise _error(path, "the file is empty", "Export the groom again")
+    if start == b"\x89HDF\r\n\x1a\n":
+        raise _error(path, "this is an Alembic of the old kind, HDF5", "Export it again as Ogawa")
+    if not start.startswith(b"Ogawa"):
+        raise _error(path, "this is no Alembic file", "Choose an .abc file")
+    if not is_finished(path):
+        raise _error(path, "it was never finished", "Export the groom again")
+
+
+def _read_apart(path: Path, python: Sequence[str] | None) -> Arrays:
+    """The file's curves, read by another process."""
+    alembic_library(str(path))  # for its message, should it be missing
+    script = Path(alembic_curves.__file__)
+    with tempfile.TemporaryDirectory(prefix="hairloom-") as folder:
+        result = Path(folder) / "curves.npz"
+        run_apart(script, path, [result], library="Alembic", python=python)
+        with np.load(result, allow_pickle=False) as arrays:
+            return dict(arrays)
+
+
+def _told_space(found: Arrays) -> FileSpace | None:
+    """What our own files say of themselves, or what Blender's always are."""
+    if "blender" in str(found.get("application", "")).lower():
+        return FileSpace("Y", 1.0)
+    text = str(found.get("groom_properties", ""))
+    told = dict(each.split("=", 1) for each in text.split(";") if "=" in each)
+    try:
+        per_metre = float(told["per_metre"])
+        space = FileSpace(told["up"], per_metre, told["mirrored"] == "1")
+    except (KeyError, ValueError):
+        return None
+    return space if space.up in ("Y", "Z") and 1e-6 < per_metre < 1e6 else None
+
+
+def _guessed_space(curves: Joined) -> FileSpace:
+    points = curves.points[np.isfinite(curves.points).all(axis=1)]
+    extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    return FileSpace("Y", 1.0 if extent < WIDEST_IN_METRES else 100.0)
+
+
+def _groom(curves: Joined, space: FileSpace, path: Path) -> Groom:
+    # What overflows becomes infinite, and what is not finite is dropped and counted.
+    with np.errstate(over="ignore", invalid="ignore"):
+        points = space.from_file(curves.points)
+        radius = None if curves.widths is None else _radius(curves.widths, space)
+        cleaned = clean(
+            points, curves.offsets, radius=radius, group=curves.group, root_uv=curves.root_uv
+        )
+    if not cleaned.strands.strand_count:
+        reasons = ", ".join(f"{count} with {why}" for why, count in cleaned.dropped.items())
+        problem = f"none of its strands can be used ({reasons})"
+        raise _error(path, problem, "Export the groom again")
+    kept = cleaned.kept
+    optional: dict[str, Any] = {name: values[kept] for name, values in curves.uniform.items()}
+    color = None
+    if curves.color is not None:
+        color = finite(kept_points(curves.color, curves.offsets, cleaned))
+    return Groom(
+        cleaned.strands,
+        path.stem,
+        color=color,
+        group_names=curves.group_names,
+        dropped=cleaned.dropped,
+        source=path,
+        **optional,
+    )
+
+
+def _radius(widths: Floats, space: FileSpace) -> Floats:
+    """Of a strand that ends in a point the tip stays thin; where no width is known NaN, which
+    `clean` replaces."""
+    radius = widths.astype(np.float32) / np.float32(2.0 * space.per_metre)
+    if not (radius > 0.0).any():
+        return np.full_like(radius, np.nan)
+    return np.where(radius == 0.0, np.float32(1.0e-7), radius)
+
+
+def _number(found: Arrays, which: str) -> int:
+    value = found.get(f"groom_version_{which}")
+    return (
+        int(value.flat[0]) if value is not None and value.size and value.dtype.kind in "iu" else 0
+    )
+
+
+def _error(path: Path, problem: str, remedy: str) -> HairloomError:
+    return HairloomError(problem, place=str(path), remedy=remedy)

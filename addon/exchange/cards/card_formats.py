@@ -1,0 +1,150 @@
+"""The files that cards are written to: their suffixes, axes, units and names of attributes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ..files.axes import from_z_up
+
+_OCCLUSION = "ambient occlusion of the vertex, 0 shut in to 1 open"
+_OPENNESS = (
+    f"first component: {_OCCLUSION}; multiply the shaded colour with it. Second component: how far "
+    "along the strands the vertex lies, 0 at the root to 1 at the tip"
+)
+_REST = "rest pose"
+_NORMAL = "of the card, away from the head, rounded across the card"
+_TANGENT = "xyz across the strands, along u; strands run from root to tip along "
+_TILE_TOP = "place in the texture, v from the top: it falls from root to tip of a tile"
+_TILE = "place in the texture, v from the bottom: it rises from root to tip of a tile"
+
+
+@dataclass(frozen=True)
+class CardFormat:
+    """One of the formats.
+
+    name: as the command line has it.
+    suffixes: of such files, the usual one first.
+    up: "Y" or "Z"; axes are right-handed.
+    unit: of lengths in the file, and how many of them are a metre.
+    attributes: what the file calls each attribute of a vertex -> what it is.
+    extra: those that are there where custom attributes are asked for.
+    """
+
+    name: str
+    title: str
+    suffixes: tuple[str, ...]
+    up: str
+    unit: str
+    units_per_metre: float
+    attributes: Mapping[str, str]
+    extra: Mapping[str, str]
+
+    def placed(self, points: Floats) -> Floats:
+        """World space, Z up [m], as the file has it, (..., 3)."""
+        return from_z_up(points, self.up) * self.units_per_metre
+
+    @property
+    def space(self) -> dict[str, object]:
+        """Its axes and units, as the sidecar has them."""
+        return {
+            "handedness": "right",
+            "up": self.up,
+            "unit": self.unit,
+            "metres_per_unit": 1.0 / self.units_per_metre,
+            "front": "triangles counter-clockwise seen from outside",
+        }
+
+
+GLB = CardFormat(
+    "glb",
+    "glTF Binary",
+    (".glb",),
+    "Y",
+    "metre",
+    1.0,
+    {
+        "POSITION": _REST,
+        "NORMAL": _NORMAL,
+        "TANGENT": _TANGENT + "cross(NORMAL, TANGENT.xyz)",
+        "TEXCOORD_0": _TILE_TOP,
+        "TEXCOORD_1": _OPENNESS,
+    },
+    {"_AO": _OCCLUSION},
+)
+FBX = CardFormat(
+    "fbx",
+    "FBX",
+    (".fbx",),
+    "Y",
+    "centimetre",
+    100.0,
+    {
+        "Vertices": _REST,
+        "LayerElementNormal": _NORMAL,
+        "LayerElementTangent 0": _TANGENT + "cross(normal, tangent)",
+        "LayerElementUV 0": _TILE,
+        "LayerElementUV 1": _OPENNESS
+        + ". An importer that turns v of textures around turns the second component around too",
+    },
+    {},
+)
+USD = CardFormat(
+    "usd",
+    "Universal Scene Description",
+    (".usd", ".usda", ".usdc"),
+    "Z",
+    "metre",
+    1.0,
+    {
+        "points": _REST,
+        "normals": _NORMAL,
+        "primvars:tangents": _TANGENT + "cross(normals, tangents)",
+        "primvars:st": _TILE,
+        "primvars:st1": _OPENNESS,
+    },
+    {"primvars:_AO": _OCCLUSION},
+)
+OBJ = CardFormat(
+    "obj",
+    "Wavefront OBJ",
+    (".obj",),
+    "Y",
+    "metre",
+    1.0,
+    {
+        "v": f"{_REST}, with a colour behind it. Red: {_OCCLUSION}. Green: how far along the "
+        "strands the vertex lies, 0 at the root to 1 at the tip",
+        "vn": _NORMAL,
+        "vt": f"{_TILE}. Tangents are along u",
+    },
+    {},
+)
+FORMATS = (GLB, FBX, USD, OBJ)
+
+
+def format_of(path: Path, name: str | None = None) -> tuple[Path, CardFormat]:
+    """The format of a file to write, and its path, which gets the usual suffix where it has none.
+
+    Args:
+        name: of the format; None goes by the suffix.
+
+    Raises:
+        HairloomError: another suffix, or one that is not of the format.
+    """
+    suffix = path.suffix.lower()
+    for known in FORMATS:
+        if suffix in known.suffixes and name in (None, known.name):
+            return path, known
+    named = next((known for known in FORMATS if known.name == name), None)
+    if named is not None and not any(suffix in known.suffixes for known in FORMATS):
+        return path.with_name(path.name + named.suffixes[0]), named
+    suffixes = named.suffixes if named else [s for known in FORMATS for s in known.suffixes]
+    raise HairloomError(
+        f"cards are not written as '{path.suffix}'" + (f" in the format {name}" if name else ""),
+        place=str(path),
+        remedy=f"Use {', '.join(suffixes)}",
+    )

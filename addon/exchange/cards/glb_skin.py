@@ -1,0 +1,208 @@
+"""Joints, weights and keys into a GLB of cards that Blender's exporter wrote.
+
+Blender's own way, an armature with actions, takes minutes for what is there already as arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...cards.card_mesh import CardMesh
+from ...cards.joint_keys import ChainKeys, beside_parent, quaternions
+from ...cards.joint_solve import Skin
+from ...cards.joints import JointRig, joint_names
+from ...errors import HairloomError
+from .card_formats import GLB
+from .glb_file import GlbFile
+
+#: The root joint, which carries all chains.
+ROOT_JOINT = "hair_root"
+ANIMATION = "hair_motion"
+_OF_VERTICES = 34962  # ARRAY_BUFFER
+#: Turns Z-up vectors into the file's: (x, z, -y).
+_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+#: How far a vertex of the file may be from ours, a share of the hair's size.
+_SAME = 1.0e-5
+#: Weights below this are none.
+_LEAST_WEIGHT = 1.0e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """What goes into the file beside the meshes, in metres and Z up.
+
+    keys: of each chain. root: (3,) where the root joint is at rest.
+    root_keys: of the root joint, of one chain with one joint; None leaves it at rest.
+    frame_rate: [1/s], of the keys' frames.
+    """
+
+    rig: JointRig
+    keys: tuple[ChainKeys, ...]
+    root: Floats
+    root_keys: ChainKeys | None
+    frame_rate: float
+
+
+def with_skeleton(
+    data: bytes, nodes: Sequence[str], levels: Sequence[CardMesh], skeleton: Skeleton, place: str
+) -> bytes:
+    """The same GLB, its meshes skinned and its joints animated.
+
+    Args:
+        data: as Blender wrote it. nodes: of the levels in it.
+
+    Raises:
+        HairloomError: its vertices are not those of the levels.
+    """
+    file = GlbFile.of(data, place)
+    joints = _add_joints(file, skeleton)
+    skin = _add_skin(file, skeleton, joints)
+    for node, mesh, weights in zip(nodes, levels, skeleton.rig.skins, strict=True):
+        number = file.node(node)
+        _add_weights(file, number, mesh, weights, place)
+        file.content["nodes"][number]["skin"] = skin
+    _add_to_scene(file, [file.node(node) for node in nodes], joints[0])
+    _add_animation(file, skeleton, joints)
+    return file.data()
+
+
+def vertices_of(file: GlbFile, primitive: dict[str, Any], mesh: CardMesh, place: str) -> Ints:
+    """Which vertex of the mesh each vertex of the file is; known by the order of corners.
+
+    Raises:
+        HairloomError: the file's corners are others.
+    """
+    corners = np.asarray(file.values(primitive["indices"])).reshape(-1).astype(np.int64)
+    positions = np.asarray(file.values(primitive["attributes"]["POSITION"]))
+    ours = mesh.triangles.reshape(-1)
+    owner = np.full(len(positions), -1)
+    if len(corners) == len(ours):
+        owner[corners] = ours
+        low, high = mesh.bounds()
+        miss = np.abs(GLB.placed(mesh.positions[owner]) - positions).max(initial=0.0)
+        near = _SAME * float(np.max(high - low, initial=0.0))
+        if np.array_equal(owner[corners], ours) and owner.min() >= 0 and miss <= near:
+            return owner
+    raise HairloomError(
+        "Blender's exporter wrote other vertices than those that were to be skinned",
+        place=place,
+        remedy="Write a motion texture instead, and tell us the version of Blender",
+    )
+
+
+def _add_weights(file: GlbFile, node: int, mesh: CardMesh, skin: Skin, place: str) -> None:
+    (primitive,) = file.content["meshes"][file.content["nodes"][node]["mesh"]]["primitives"]
+    owner = vertices_of(file, primitive, mesh, place)
+    weight = np.where(skin.weight < _LEAST_WEIGHT, 0.0, skin.weight)
+    weight = (weight / weight.sum(axis=1, keepdims=True)).astype(np.float32)
+    # the root is joint 0, and what has no weight names no joint
+    joint = np.where(weight > 0.0, skin.joint + 1, 0)
+    is_small = joint.max(initial=0) < 256
+    numbers: Ints = joint[owner].astype(np.uint8) if is_small else joint[owner].astype(np.uint16)
+    attributes = primitive["attributes"]
+    attributes["JOINTS_0"] = file.add(numbers, "VEC4", target=_OF_VERTICES)
+    attributes["WEIGHTS_0"] = file.add(weight[owner], "VEC4", target=_OF_VERTICES)
+
+
+def _add_joints(file: GlbFile, skeleton: Skeleton) -> list[int]:
+    """Nodes of all joints, the root first; numbers."""
+    root = {"name": ROOT_JOINT, "translation": _vector(skeleton.root), "children": []}
+    numbers = [file.append("nodes", root)]
+    names = iter(joint_names(skeleton.rig))
+    at_root = np.eye(4)
+    at_root[:3, 3] = skeleton.root
+    for chain in skeleton.rig.rest:
+        parents = [at_root, *chain[:-1]]
+        owner: dict[str, Any] = root
+        for parent, own in zip(parents, chain, strict=True):
+            local = beside_parent(parent, own)
+            node = {
+                "name": next(names),
+                "translation": _vector(local[:3, 3]),
+                "rotation": _rotation(quaternions(local[:3, :3])),
+            }
+            numbers.append(file.append("nodes", node))
+            owner.setdefault("children", []).append(numbers[-1])
+            owner = node
+    return numbers
+
+
+def _add_skin(file: GlbFile, skeleton: Skeleton, joints: list[int]) -> int:
+    rest = np.concatenate([np.eye(4)[None], skeleton.rig.rest.reshape(-1, 4, 4)])
+    rest[0, :3, 3] = skeleton.root
+    axes = np.eye(4)
+    axes[:3, :3] = _AXES
+    inverse = np.linalg.inv(axes @ rest @ axes.T)
+    inverse[:, 3] = [0.0, 0.0, 0.0, 1.0]
+    columns = inverse.swapaxes(-1, -2).reshape(-1, 16).astype(np.float32)
+    skin = {
+        "name": ROOT_JOINT,
+        "joints": joints,
+        "skeleton": joints[0],
+        "inverseBindMatrices": file.add(columns, "MAT4"),
+    }
+    return file.append("skins", skin)
+
+
+def _add_to_scene(file: GlbFile, meshes: list[int], root: int) -> None:
+    """Meshes and the root joint below one node, as Blender's own exporter has them: readers look
+    for what they have in common.
+    """
+    (scene,) = file.content["scenes"]
+    if scene["nodes"] == meshes:
+        name = file.content["nodes"][meshes[0]]["name"]
+        scene["nodes"] = [file.append("nodes", {"name": f"{name}_rig"})]
+    (parent,) = scene["nodes"]
+    file.content["nodes"][parent]["children"] = [root, *meshes]
+
+
+def _add_animation(file: GlbFile, skeleton: Skeleton, joints: list[int]) -> None:
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
+    times: dict[bytes, int] = {}
+
+    def add(node: int, path: str, frames: Ints, values: Floats, kind: str) -> None:
+        known = frames.tobytes()
+        if known not in times:
+            seconds = (frames / skeleton.frame_rate).astype(np.float32)
+            times[known] = file.add(seconds, "SCALAR")
+        output = file.add(np.ascontiguousarray(values, np.float32), kind)
+        samplers.append({"input": times[known], "output": output, "interpolation": "LINEAR"})
+        target = {"node": node, "path": path}
+        channels.append({"sampler": len(samplers) - 1, "target": target})
+
+    still: Floats = np.zeros(3)
+    chains: list[tuple[ChainKeys, list[int], Floats]] = []
+    if skeleton.root_keys is not None:
+        chains.append((skeleton.root_keys, joints[:1], still))
+    size = skeleton.rig.joints
+    for number, own in enumerate(skeleton.keys):
+        chains.append((own, joints[1 + number * size :][:size], skeleton.root))
+    for keys, nodes, parent in chains:
+        for joint, node in enumerate(nodes):
+            turns, ways = keys.rotation[joint], keys.translation[joint]
+            ways = ways if joint else ways - parent
+            add(node, "rotation", keys.frame, _rotations(turns), "VEC4")
+            add(node, "translation", keys.frame, GLB.placed(ways), "VEC3")
+    animation = {"name": ANIMATION, "samplers": samplers, "channels": channels}
+    file.append("animations", animation)
+
+
+def _vector(way: Floats) -> list[float]:
+    return [float(value) for value in GLB.placed(way)]
+
+
+def _rotations(quaternion: Floats) -> Floats:
+    """Of Z-up space as the file has them."""
+    vector = GLB.placed(quaternion[..., :3])
+    turned: Floats = np.concatenate([vector, quaternion[..., 3:]], axis=-1)
+    return turned
+
+
+def _rotation(quaternion: Floats) -> list[float]:
+    return [float(value) for value in _rotations(quaternion)]

@@ -1,0 +1,220 @@
+"""NAME.hairloom.json beside a mesh: what its file cannot say about how its hair is to be drawn.
+
+For the engine programmer who writes the hair material. Plain data, by docs/sidecar.schema.json; all
+lengths and vectors in the file's own units and axes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...cards.card_mesh import CardMesh
+from . import sidecar_texts as texts
+from .card_formats import CardFormat
+from .draw_ranges import card_ranges, group_ranges
+from .index_buffer import IndexBuffer
+
+#: Version 1 knew GLB alone, one level and no material. Its readers find what they read: file,
+#: counts, bounds, attributes, draw_order, passes, opaque_alpha, least_alpha and textures are where
+#: they were; `texture` became `atlas`, `axes` became `space`.
+SIDECAR_VERSION = 2
+#: name of the sidecar of NAME.glb
+SUFFIX = ".hairloom.json"
+
+#: From this alpha on a pixel counts as opaque: nearly 1, for textures that were compressed.
+OPAQUE_ALPHA = 0.99
+#: Below it a pixel cannot be seen in 8 bits, and must not hide what is drawn after it.
+LEAST_ALPHA = 0.004
+
+
+@dataclass(frozen=True)
+class DrawPass:
+    """One of the passes in which cards are drawn; tests and culling in the words of the GPU.
+
+    pixels: which of them; "all" needs no test of alpha.
+    """
+
+    name: str
+    pixels: str
+    color_write: bool
+    depth_write: bool
+    depth_test: str
+    cull: str
+
+    @property
+    def is_blended(self) -> bool:
+        return "transparent" in self.name
+
+    @property
+    def alpha_range(self) -> tuple[float, float] | None:
+        """Alpha of what it draws, from the first to below the second; None without a test."""
+        if self.pixels == "all":
+            return None
+        least = {_OPAQUE: OPAQUE_ALPHA, _REST: 0.0}.get(self.pixels, LEAST_ALPHA)
+        return least, OPAQUE_ALPHA if _REST in self.pixels else math.inf
+
+    def as_dict(self) -> dict[str, Any]:
+        blend = "source alpha, one minus source alpha" if self.is_blended else "off"
+        return {**asdict(self), "blend": blend}
+
+
+_OPAQUE = "alpha >= opaque_alpha"
+_REST = "alpha < opaque_alpha"
+_VISIBLE = "alpha >= least_alpha"
+#: Scheuermann 2004, where the first pass alone tests alpha, so that the others keep early depth
+#: tests. The last one, which writes depth, tests it here too: else a card's clear pixels hide what
+#: is drawn after it, which doubles the difference to hair that is sorted for each view.
+FOUR_PASSES = (
+    DrawPass("prime depth", _OPAQUE, False, True, "less", "none"),
+    DrawPass("opaque", "all", True, False, "equal", "none"),
+    DrawPass("transparent back faces", "all", True, False, "less", "front"),
+    DrawPass("transparent front faces", _VISIBLE, True, True, "less", "back"),
+)
+#: The simpler scheme of the same author, with an alpha test in every pass.
+THREE_PASSES = (
+    DrawPass("opaque", _OPAQUE, True, True, "less", "none"),
+    DrawPass("transparent back faces", _REST, True, False, "less", "front"),
+    DrawPass("transparent front faces", f"{_VISIBLE} and {_REST}", True, True, "less", "back"),
+)
+
+
+@dataclass(frozen=True)
+class CardFile:
+    """A file of cards that was written.
+
+    levels: as they were written, world space, Z up [m], the finest first; nodes: their names there.
+    errors: of each level [m], how far it is from the strands' own way; empty: not known.
+    portable: without custom attributes.
+    textures: role -> {"file", "channels"} of those that lie beside it; texture_files: file -> what
+        its channels hold. highlights: which of them breaks up the highlights, "shift" or "tangent".
+    base_gain: what the base texture is to be multiplied by.
+    even_alpha: mean_facing and least_facing where alpha is that of baked strands, else empty.
+    material: model, values, units, fibre and tables, see host/cards/card_material.py.
+    indices: the index buffer and its file, or None.
+    motion: what moves, see exchange/cards/sidecar_motion.py; empty: nothing.
+    generator: version of Hairloom.
+    """
+
+    name: str
+    format: CardFormat
+    levels: tuple[CardMesh, ...]
+    nodes: tuple[str, ...]
+    errors: tuple[float, ...] = ()
+    portable: bool = True
+    textures: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    texture_files: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    base_gain: float = 1.0
+    highlights: str = "shift"
+    even_alpha: Mapping[str, float] = field(default_factory=dict)
+    material: Mapping[str, Any] = field(default_factory=dict)
+    indices: tuple[str, IndexBuffer] | None = None
+    motion: Mapping[str, Any] = field(default_factory=dict)
+    generator: str = ""
+
+
+def sidecar_text(cards: CardFile) -> str:
+    """The whole sidecar; numbers of a list stand in one line."""
+    text = json.dumps(description(cards), indent=2, ensure_ascii=False)
+    lists = re.compile(r"\[\s+(-?[\d.][^\[\]{}\"]*?)\s+\]")
+    return lists.sub(lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
+
+
+def description(cards: CardFile) -> dict[str, Any]:
+    """The sidecar as plain data."""
+    atlas, finest = cards.levels[0].atlas, cards.levels[0]
+    content = {
+        "hairloom_sidecar": SIDECAR_VERSION,
+        "generator": {"name": "Hairloom", "version": cards.generator},
+        "file": cards.name,
+        "format": cards.format.name,
+        "space": cards.format.space,
+        "counts": _counts(finest),
+        "bounds": _bounds(cards.format, *cards.levels),
+        "attributes": {**cards.format.attributes, **({} if cards.portable else cards.format.extra)},
+        "levels": [_level(cards, number) for number in range(len(cards.levels))],
+        "atlas": {
+            "columns": atlas.columns,
+            "rows": atlas.rows,
+            "padding": list(atlas.padding),
+            **texts.ATLAS,
+        },
+        "draw_order": {**texts.DRAW_ORDER, **_back_order(cards)},
+        "opaque_alpha": OPAQUE_ALPHA,
+        "least_alpha": LEAST_ALPHA,
+        "passes": [each.as_dict() for each in FOUR_PASSES],
+        "passes_fallback": [each.as_dict() for each in THREE_PASSES],
+        "textures": _textures(cards),
+        "texture_files": dict(cards.texture_files),
+        "material": {**cards.material, **texts.MATERIAL} if cards.material else {},
+        "shading": texts.SHADING,
+        "engines": texts.ENGINES,
+    }
+    if cards.motion:
+        content["motion"] = dict(cards.motion)
+    if cards.indices is not None:
+        file, buffer = cards.indices
+        content["index_buffer"] = {
+            "file": file,
+            "type": buffer.type,
+            "byte_order": "little-endian",
+            "vertices": "of each level counted from 0, as the file lists them",
+        }
+    return content
+
+
+def _level(cards: CardFile, number: int) -> dict[str, Any]:
+    mesh, scale = cards.levels[number], cards.format.units_per_metre
+    whole = card_ranges(mesh)
+    level: dict[str, Any] = {
+        "node": cards.nodes[number],
+        **_counts(mesh),
+        "bounds": _bounds(cards.format, mesh),
+        **({"error": cards.errors[number] * scale} if cards.errors else {}),
+        "indices": len(mesh.triangles) * 3,
+        "ranges": group_ranges(mesh, by_layer=whole is not None),
+        **({} if whole is None else {"cards_in_order": whole}),
+    }
+    if cards.indices is not None:
+        buffer = cards.indices[1]
+        level["buffer_first"] = buffer.first[number]
+        if buffer.back_first:
+            level["buffer_back_first"] = buffer.back_first[number]
+    return level
+
+
+def _counts(mesh: CardMesh) -> dict[str, int]:
+    return {
+        "cards": mesh.card_count,
+        "triangles": len(mesh.triangles),
+        "vertices": len(mesh.positions),
+    }
+
+
+def _bounds(file_format: CardFormat, *meshes: CardMesh) -> dict[str, list[float]]:
+    corners = file_format.placed(np.concatenate([mesh.positions for mesh in meshes]))
+    return {"minimum": corners.min(axis=0).tolist(), "maximum": corners.max(axis=0).tolist()}
+
+
+def _back_order(cards: CardFile) -> dict[str, str]:
+    has_one = cards.indices is not None and cards.indices[1].back_first
+    return {"back_faces": texts.BACK_ORDER} if has_one else {}
+
+
+def _textures(cards: CardFile) -> dict[str, Any]:
+    """Role -> file, channels and how they are read."""
+    if not cards.textures:
+        return {}
+    roles = {}
+    for role, where in cards.textures.items():
+        space, meaning = texts.ROLES[role]
+        gain = {"gain": cards.base_gain} if role == "base" else {}
+        roles[role] = {**where, "color_space": space, **gain, "meaning": meaning}
+    even = {"even_alpha": {**cards.even_alpha, "is": texts.EVEN_ALPHA}} if cards.even_alpha else {}
+    return {**texts.TEXTURES, "highlights_by": cards.highlights, **even, **roles}

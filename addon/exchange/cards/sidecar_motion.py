@@ -1,0 +1,111 @@
+"""What the sidecar says of cards in motion, as plain data in the file's own units and axes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Floats
+from ...cards.joints import CardTracks, FitError
+from ...cards.vertex_animation import MotionLayout
+from .card_formats import GLB, CardFormat
+from .glb_skin import ANIMATION, ROOT_JOINT, Skeleton
+
+#: format -> where the texel of each vertex is
+TEXEL_ATTRIBUTES = {"glb": "TEXCOORD_2", "fbx": "LayerElementUV 2", "usd": "primvars:st2"}
+TEXTURE_MEANINGS = {
+    "position": "from the place of the vertex in the file to where it is in the frame",
+    "normal": "of the card in the frame, unit length",
+    "tangent": "along the strands in the frame, from root to tip, unit length",
+}
+_SPACES = {
+    "head": "the hair rides with the head already: carry the object, or its root joint, with the "
+    "head, from where the head is at rest in the file",
+    "world": "the motion of the head is in it: leave the object where it is",
+}
+_HOW_TO_READ = (
+    "values = texture at texel + (0, frame * frame_step), nearest texel, no mip maps, no sRGB, no "
+    "compression; signed floats in the units and axes of the file. Mix the values of two frames "
+    "between them, and make directions unit length again"
+)
+_HOW_TO_PLAY = (
+    "linear blend skinning; rotations between keys by slerp, translations straight. Keys that this "
+    "reproduces are left out"
+)
+
+
+def joint_motion(
+    tracks: CardTracks, skeleton: Skeleton, error: FitError, space: str
+) -> dict[str, Any]:
+    """Of a GLB with joints."""
+    rig, scale = skeleton.rig, GLB.units_per_metre
+    return {
+        "kind": "joints",
+        **_common(tracks, space),
+        "animation": ANIMATION,
+        "root_joint": ROOT_JOINT,
+        "root_place": GLB.placed(skeleton.root).tolist(),
+        "chains": rig.chains,
+        "joints_in_chain": rig.joints,
+        "joints": rig.chains * rig.joints + 1,
+        "keys": sum(len(keys.frame) for keys in skeleton.keys) * rig.joints,
+        "influences": rig.skins[0].joint.shape[1],
+        "error": {
+            "root_mean_square": error.mean_square_root * scale,
+            "percentile_99": error.most * scale,
+            "worst": error.worst * scale,
+            "hair_length": tracks.hair_length * scale,
+        },
+        "how": _HOW_TO_PLAY,
+    }
+
+
+def texture_motion(
+    tracks: CardTracks,
+    file_format: CardFormat,
+    layout: MotionLayout,
+    files: Mapping[str, str],
+    depth: str,
+    bounds: tuple[Floats, Floats],
+    space: str,
+) -> dict[str, Any]:
+    """Of a vertex animation texture.
+
+    Args:
+        files: position, normal and tangent -> file.
+        bounds: lowest and highest corner of all frames [m], Z up.
+    """
+    corners = file_format.placed(np.stack(bounds))
+    down = 1.0 if file_format == GLB else -1.0
+    return {
+        "kind": "texture",
+        **_common(tracks, space),
+        "textures": {
+            name: {"file": file, "meaning": TEXTURE_MEANINGS[name]} for name, file in files.items()
+        },
+        "depth": depth,
+        "width": layout.width,
+        "height": layout.height,
+        "rows_per_frame": layout.rows,
+        "texel": TEXEL_ATTRIBUTES[file_format.name],
+        "frame_step": down * layout.frame_step,
+        "bounds": {
+            "minimum": corners.min(axis=0).tolist(),
+            "maximum": corners.max(axis=0).tolist(),
+        },
+        "how": _HOW_TO_READ,
+    }
+
+
+def _common(tracks: CardTracks, space: str) -> dict[str, Any]:
+    return {
+        "frames": {
+            "first": tracks.first,
+            "count": tracks.frame_count,
+            "rate": tracks.frame_rate,
+        },
+        "space": space,
+        "space_means": _SPACES[space],
+    }

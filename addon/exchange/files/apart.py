@@ -1,0 +1,109 @@
+"""Letting another process read a file, so that a library that fails on it does not take Blender
+along.
+
+What runs there is a script that imports none of our modules. It ends with TOLD after an error that
+it has written to stderr.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ...errors import HairloomError
+
+#: for a process on Windows, which else would show one
+NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)
+#: exit code of a script that says why on stderr
+TOLD = 3
+#: Seconds for any file, and bytes that a slow disk gives in another one.
+_PATIENCE, _BYTES_A_SECOND = 60.0, 4.0e6
+
+
+def run_apart(
+    script: Path,
+    path: Path,
+    results: Sequence[Path] = (),
+    *,
+    library: str,
+    python: Sequence[str] | None = None,
+    settings: Mapping[str, str] | None = None,
+) -> None:
+    """Run a script on a file, as SCRIPT -- FILE RESULTS, and wait until it has ended well.
+
+    Args:
+        library: whose failure it would be, as it is named in messages.
+        python: how to start a Python: a command to which a script and its arguments are added.
+            None: this one, where it is a program of its own.
+        settings: further environment variables.
+
+    Raises:
+        HairloomError: no Python can be started, it takes too long, or it ends otherwise.
+    """
+    command = [*(python or this_python(path)), str(script), "--", str(path), *map(str, results)]
+    patience = _PATIENCE + path.stat().st_size / _BYTES_A_SECOND
+    try:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            env=os.environ | same_packages() | dict(settings or {}),
+            timeout=patience,
+            creationflags=NO_WINDOW,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise damaged(
+            path, f"{library}'s library could not read it within {patience:.0f} s"
+        ) from error
+    except OSError as error:
+        raise _no_python(path, str(error)) from error
+    if done.returncode == TOLD:
+        lines = done.stderr.decode(errors="replace").strip().splitlines() or ["no reason"]
+        raise damaged(path, refusal(library, lines[-1]))
+    if done.returncode:
+        raise damaged(path, f"{library}'s library failed on it, code {done.returncode}")
+
+
+def this_python(path: Path) -> tuple[str, ...]:
+    """The command that starts a Python like this one; `path` is what it shall read.
+
+    Raises:
+        HairloomError: this Python is a part of another program.
+    """
+    if not Path(sys.executable).stem.lower().startswith("python"):
+        raise _no_python(path, f"this one is a part of {sys.executable or 'another program'}")
+    return python_program(sys.executable)
+
+
+def python_program(program: str) -> tuple[str, ...]:
+    """The command of a Python that takes modules from PYTHONPATH and from its own folders alone."""
+    return (program, "-s", "-P")
+
+
+def same_packages() -> dict[str, str]:
+    """What a Python's environment must hold so that it finds all packages that this one does."""
+    return {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+
+
+def refusal(library: str, reason: str) -> str:
+    return f"{library}'s library cannot read it and says: {reason.rstrip('.')}"
+
+
+def damaged(path: Path, problem: str) -> HairloomError:
+    """The error for a file that its library cannot read."""
+    return HairloomError(
+        problem,
+        place=str(path),
+        remedy="It is cut short, damaged or made otherwise: copy or export it again",
+    )
+
+
+def _no_python(path: Path, why: str) -> HairloomError:
+    return HairloomError(
+        f"no Python can be started to read it apart from Blender ({why})",
+        place=str(path),
+        remedy="Use another format, such as .tfx, or an official build of Blender",
+    )

@@ -1,0 +1,98 @@
+"""Writing a file so that it is there complete or not at all: write beside it, then replace."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ...errors import HairloomError
+from .leftovers import remove_leftovers, temporary_beside
+
+
+@contextmanager
+def atomic_write(path: Path) -> Iterator[Path]:
+    """A path beside `path` to write to; it takes the place of `path` when the block ends well.
+
+    The temporary path has the same suffix, so that exporters accept it. Missing folders are made.
+    When the block fails or is interrupted, what was at `path` before stays as it was. What a killed
+    process left in the folder is removed.
+
+    Raises:
+        HairloomError: nothing can be written there, or the block wrote no file.
+    """
+    target = Path(os.path.realpath(path))  # through a link, as plain writing would go
+    temporary = temporary_beside(target)
+    try:
+        _check_writable(target, temporary)
+    except OSError as error:
+        raise unwritable(path, error.strerror or str(error)) from error
+    try:
+        yield temporary
+        if not temporary.is_file():
+            raise unwritable(path, "nothing was written")
+        _replace(temporary, target)
+    except OSError as error:
+        raise unwritable(path, error.strerror or str(error)) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_bytes_atomic(path: Path, content: bytes | bytearray | memoryview) -> None:
+    """Write a whole file at once.
+
+    Raises:
+        HairloomError: nothing can be written there.
+    """
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def write_text_atomic(path: Path, text: str) -> None:
+    """Write a whole text file as UTF-8 with the same line ends everywhere.
+
+    Raises:
+        HairloomError: nothing can be written there.
+    """
+    write_bytes_atomic(path, text.encode("utf-8"))
+
+
+def _check_writable(target: Path, temporary: Path) -> None:
+    """Fail now rather than after a long export."""
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "a folder has this name")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    remove_leftovers(target.parent)
+    temporary.touch(exist_ok=False)
+    temporary.unlink()
+
+
+def _replace(temporary: Path, target: Path) -> None:
+    if target.exists():
+        shutil.copymode(target, temporary)
+    flush_to_disk(temporary, os.O_RDWR)
+    os.replace(temporary, target)
+    if os.name == "posix":  # elsewhere a folder cannot be opened
+        flush_to_disk(target.parent, os.O_RDONLY)
+
+
+def flush_to_disk(path: Path, flags: int) -> None:
+    """Wait until a file, or a folder's list of files, is on the disk."""
+    descriptor = os.open(path, flags)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def unwritable(path: Path, why: str) -> HairloomError:
+    """The message for a place where nothing can be written."""
+    return HairloomError(
+        f"this file cannot be written ({why})",
+        place=str(path),
+        remedy="Choose a folder that you may write to, with space left, "
+        "and close other programs that use the file",
+    )

@@ -1,0 +1,233 @@
+"""Mip maps of card textures, down to a single texel, that keep what a texture is for.
+
+Averaged as they stand, textures of hair go wrong at a distance: alpha falls below the threshold of
+the alpha test and the hair grows thin, colours take in what lies beside the strands, directions
+grow shorter, and tiles of an atlas run into each other. Here
+
+    alpha       keeps its coverage: in each tile as many texels pass the alpha test as at full size
+                (Castano 2010, "Computing alpha mipmaps")
+    colours     and all other values are averaged by how much hair there is
+    directions  are averaged as vectors and are unit vectors again
+    strand IDs  are not averaged: the ID that has most hair stays
+
+Each level is half the one before it, rounded down, as GPUs have it; row 0 is the lowest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...cards.atlas_grid import AtlasGrid
+
+#: Maps that hold directions as 0.5 d + 0.5.
+DIRECTIONS = ("normal", "tangent")
+#: Maps of names rather than amounts.
+LABELS = ("strand_id",)
+#: Fewer texels than these say nothing about a tile's coverage: the whole texture's is kept then.
+_LEAST_TILE_TEXELS = 16
+#: What texels without hair weigh, so that where there is none at all the mean is that of all.
+_LEAST_WEIGHT = 1e-12
+#: Below it there is no direction [1].
+_NOTHING = 1e-6
+
+
+def level_sizes(width: int, height: int) -> list[tuple[int, int]]:
+    """(width, height) of all levels, the full size first and 1 x 1 last."""
+    count = max(width, height).bit_length()
+    return [(max(width >> level, 1), max(height >> level, 1)) for level in range(count)]
+
+
+def mip_levels(
+    maps: Mapping[str, Floats], *, grid: AtlasGrid | None = None, threshold: float | None = 0.5
+) -> Iterator[dict[str, Floats]]:
+    """All levels of a set of maps, the maps themselves first.
+
+    Args:
+        maps: name -> (height, width) or (height, width, channels) in [0, 1], all of one size;
+            "alpha", where it is there, says where there is hair. See DIRECTIONS and LABELS.
+        grid: the tiles that must not run into each other.
+        threshold: of the alpha test, in (0, 1); None averages alpha as it stands, for blending.
+
+    Yields:
+        The same names with arrays of that level's size.
+    """
+    height, width = next(iter(maps.values())).shape[:2]
+    grid = grid or AtlasGrid()
+    alpha = maps.get("alpha")
+    weight = np.ones((height, width), np.float32) if alpha is None else alpha
+    coverage = None if threshold is None else _coverage(weight, grid, threshold)
+    level = {name: _as_averaged(name, values, weight) for name, values in maps.items()}
+    yield dict(maps)
+    for smaller in level_sizes(width, height)[1:]:
+        halving = _Halving.between(weight.shape, (smaller[1], smaller[0]), grid)
+        kept = {name: halving.with_most(level[name], weight) for name in LABELS if name in level}
+        averaged = {name: halving.mean(level[name]) for name in level if name not in kept}
+        weight = halving.mean(weight)
+        level = averaged | kept
+        made = {name: _as_shown(name, values, weight) for name, values in level.items()}
+        if alpha is not None and coverage is not None and threshold is not None:
+            made["alpha"] = _with_coverage(weight, coverage, grid, threshold)
+        yield {name: made[name] for name in maps}
+
+
+@dataclass(frozen=True)
+class _Taps:
+    """Along one axis: what each texel of the smaller level is made of.
+
+    index: (new, taps) texels of the larger level; share: (new, taps) of each, 1 in sum.
+    """
+
+    index: Ints
+    share: Floats
+
+    @classmethod
+    def between(cls, old: int, new: int, tiles: int) -> _Taps:
+        """By the lengths in which texels lie over each other, within the tile of the new one."""
+        ratio = old / new
+        first = np.floor(np.arange(new) * ratio + 1e-9).astype(np.intp)
+        index = first[:, None] + np.arange(int(np.ceil(ratio)) + (old % new > 0))
+        begin, end = np.arange(new)[:, None] * ratio, np.arange(1, new + 1)[:, None] * ratio
+        share = np.minimum(end, index + 1) - np.maximum(begin, index)
+        share = np.where(index < old, np.maximum(share, 0.0), 0.0)
+        index = np.minimum(index, old - 1)
+        if new >= tiles:  # else a texel is larger than a tile
+            is_own = _tile_of(old, tiles)[index] == _tile_of(new, tiles)[:, None]
+            share = share * is_own
+        share = share / share.sum(axis=1, keepdims=True)
+        return cls(index, share.astype(np.float32))
+
+    def mean(self, values: Floats) -> Floats:
+        """Along axis 0, (new, ...)."""
+        if np.array_equal(self.index.ravel(), np.arange(len(values))) and self.is_even:
+            pairs = values.reshape(len(self.index), -1, *values.shape[1:])
+            total = sum(pairs[:, each] for each in range(1, pairs.shape[1])) + pairs[:, 0]
+            return (total / np.float32(pairs.shape[1])).astype(np.float32, copy=False)
+        total = np.zeros((len(self.index), *values.shape[1:]), np.float32)
+        for index, share in zip(self.index.T, self.share.T, strict=True):
+            total += values[index] * share.reshape(-1, *(1,) * (values.ndim - 1))
+        return total
+
+    @property
+    def is_even(self) -> bool:
+        return bool(np.all(self.share == self.share[0, 0]))
+
+    def with_most(self, values: Floats, weight: Floats) -> tuple[Floats, Floats]:
+        """The value of greatest weight along axis 0, and that weight."""
+        weights = np.where(self.share.reshape(*self.share.shape, 1) > 0, weight[self.index], -1.0)
+        best = np.argmax(weights, axis=1)[:, None]
+        chosen = np.take_along_axis(values[self.index], best, axis=1)[:, 0]
+        return chosen, np.take_along_axis(weights, best, axis=1)[:, 0]
+
+
+@dataclass(frozen=True)
+class _Halving:
+    """From one level to the next."""
+
+    rows: _Taps
+    columns: _Taps
+
+    @classmethod
+    def between(cls, old: tuple[int, ...], new: tuple[int, int], grid: AtlasGrid) -> _Halving:
+        return cls(
+            _Taps.between(old[0], new[0], grid.rows), _Taps.between(old[1], new[1], grid.columns)
+        )
+
+    def mean(self, values: Floats) -> Floats:
+        by_rows = self.rows.mean(values)
+        return np.swapaxes(self.columns.mean(np.swapaxes(by_rows, 0, 1)), 0, 1)
+
+    def with_most(self, values: Floats, weight: Floats) -> Floats:
+        by_rows, weights = self.rows.with_most(values, weight)
+        return self.columns.with_most(by_rows.T, weights.T)[0].T
+
+
+def _tile_of(texels: int, tiles: int) -> Ints:
+    """The tile in which each texel's middle lies, along one axis."""
+    return np.floor((np.arange(texels) + 0.5) * (tiles / texels)).astype(np.intp)
+
+
+def _as_averaged(name: str, values: Floats, weight: Floats) -> Floats:
+    """What can be summed up level by level: the value by its weight, which is never nothing."""
+    if name == "alpha" or name in LABELS:
+        return values
+    plain = 2.0 * values - 1.0 if name in DIRECTIONS else values
+    by_weight = weight if values.ndim == 2 else weight[..., None]
+    weighted: Floats = (plain * (by_weight + np.float32(_LEAST_WEIGHT))).astype(
+        np.float32, copy=False
+    )
+    return weighted
+
+
+def _as_shown(name: str, values: Floats, weight: Floats) -> Floats:
+    """What a texture holds of such a sum: where there is no hair, the mean of all."""
+    if name == "alpha" or name in LABELS:
+        return values
+    by_weight = weight if values.ndim == 2 else weight[..., None]
+    mean = values / (by_weight + np.float32(_LEAST_WEIGHT))
+    if name in DIRECTIONS:
+        return np.asarray(0.5 * _unit(mean) + 0.5, np.float32)
+    return np.clip(mean, 0.0, 1.0)
+
+
+def _unit(vectors: Floats) -> Floats:
+    """(..., 3); directions that cancel each other out become the card's normal."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    unit: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > _NOTHING)
+    unit[..., 2][length[..., 0] <= _NOTHING] = 1.0
+    return unit
+
+
+def _tiles(shape: tuple[int, ...], grid: AtlasGrid) -> list[tuple[slice, slice]]:
+    """The texels of each tile; the whole level as one where tiles are too small."""
+    height, width = shape
+    texels = height * width / grid.tile_count
+    if height < grid.rows or width < grid.columns or texels < _LEAST_TILE_TEXELS:
+        return [(slice(None), slice(None))]
+    rows = np.searchsorted(_tile_of(height, grid.rows), np.arange(grid.rows + 1))
+    columns = np.searchsorted(_tile_of(width, grid.columns), np.arange(grid.columns + 1))
+    return [
+        (slice(*rows[row : row + 2]), slice(*columns[column : column + 2]))
+        for row in range(grid.rows)
+        for column in range(grid.columns)
+    ]
+
+
+def _coverage(alpha: Floats, grid: AtlasGrid, threshold: float) -> Floats:
+    """(tiles,) share of each tile's texels that pass the alpha test."""
+    return np.array([np.mean(alpha[tile] >= threshold) for tile in _tiles(alpha.shape, grid)])
+
+
+def _with_coverage(alpha: Floats, coverage: Floats, grid: AtlasGrid, threshold: float) -> Floats:
+    """An alpha whose tiles have the coverage of the first level."""
+    tiles = _tiles(alpha.shape, grid)
+    if len(tiles) != len(coverage):
+        coverage = np.array([coverage.mean()])
+    kept = np.empty_like(alpha)
+    for tile, share in zip(tiles, coverage, strict=True):
+        kept[tile] = _passing(alpha[tile], share, threshold)
+    return kept
+
+
+def _passing(alpha: Floats, share: float, threshold: float) -> Floats:
+    """Alpha, scaled so that this share of it passes the test, and one texel at least if any did.
+
+    Castano scales all alphas by one factor; here this goes for those below the threshold, and
+    those above it are scaled by their distance to 1, so that opaque hair stays opaque.
+    """
+    if share == 0.0:
+        return np.minimum(alpha, np.nextafter(np.float32(threshold), np.float32(0.0)))
+    values = np.sort(alpha, axis=None)[::-1]
+    wanted = min(max(round(share * values.size), 1), values.size)
+    # Equal texels pass together or not at all
+    steps = np.append(np.flatnonzero(values[:-1] > values[1:]) + 1, values.size)
+    count = steps[np.argmin(np.abs(steps - wanted))]
+    border = values[count - 1 : count + 1].mean() if count < values.size else values[-1]
+    if border <= 0.0 or border >= 1.0:
+        return alpha
+    below = alpha * (threshold / border)
+    above = threshold + (alpha - border) * ((1.0 - threshold) / (1.0 - border))
+    return np.where(alpha < border, below, above).astype(np.float32)

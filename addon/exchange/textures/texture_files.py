@@ -1,0 +1,246 @@
+"""Pictures to and from files through OpenImageIO, without Blender.
+
+Colours are scene-linear here, and by the sRGB curve in files of integers; everything else (alpha,
+shifts, directions) is stored as it is. Alpha is straight: OpenImageIO would multiply colours with
+it, which loses them where it is 0. Only EXR files hold them multiplied, as all programs take them,
+but for packed textures, whose channels are values of their own.
+
+OpenImageIO comes with official builds of Blender and lies on PyPI as `openimageio`. Where it is
+missing, host/pictures/images.py has Blender's own readers and writers in its place.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ..files.atomic import atomic_write
+from .srgb import srgb_decoded, srgb_encoded
+
+#: The largest side of a texture on every GPU that Blender supports [pixels].
+LARGEST_SIDE = 16384
+#: More than anybody paints [pixels]; as four float channels they take 1 GiB.
+MOST_PIXELS = 1 << 26
+#: suffix -> the depths that such a file can have, the first being the usual one
+DEPTHS = {
+    ".png": ("uint8", "uint16"),
+    ".exr": ("half", "float"),
+    ".tif": ("uint8", "uint16", "float"),
+    ".tiff": ("uint8", "uint16", "float"),
+}
+
+#: The chunk IEND with its checksum.
+_END_OF_PNG = b"\0\0\0\0IEND\xaeB`\x82"
+#: In EXR files, whose alpha is multiplied otherwise: this one's is not.
+_STRAIGHT = "hairloom_straight_alpha"
+
+
+def has_openimageio() -> bool:
+    """Whether the functions here can work in this Python."""
+    try:
+        import OpenImageIO  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+def check_size(width: int, height: int, place: str) -> None:
+    """Refuse a picture [pixels] that no GPU can hold, or that fills the memory.
+
+    Raises:
+        HairloomError: it is too large.
+    """
+    if max(width, height) > LARGEST_SIDE or width * height > MOST_PIXELS:
+        raise HairloomError(
+            f"{width} x {height} pixels are too many",
+            place=place,
+            remedy=f"Make it smaller: up to {LARGEST_SIDE} pixels a side, and 8192 x 8192 in all",
+        )
+
+
+def read_texture(path: Path, *, is_color: bool) -> Floats:
+    """Read a picture of any format that OpenImageIO knows.
+
+    Args:
+        is_color: integers are decoded by the sRGB curve; without it values come as they are stored.
+
+    Returns:
+        (height, width, 1 to 4) float32, row 0 at the bottom: grey, grey and alpha, rgb, or rgb and
+        straight alpha; integers as [0, 1]. What a file holds beyond four channels is left out.
+
+    Raises:
+        HairloomError: no OpenImageIO, no such file, or none that can be read, whole, as a picture
+            of a size that can be used.
+    """
+    library = _openimageio(path)
+    if path.is_dir():
+        raise _unreadable(path, "this is a folder, not a file", "Choose a picture")
+    if not path.is_file():
+        raise _unreadable(path, "there is no such file", "Check the path")
+    if not path.stat().st_size:
+        raise _unreadable(path, "the file is empty", "Save the picture again")
+    config = library.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    source = library.ImageInput.open(str(path), config)
+    if source is None:
+        raise _broken(path, library)
+    try:
+        return _pixels(path, source, library, is_color=is_color)
+    finally:
+        source.close()
+
+
+def write_texture(
+    path: Path,
+    pixels: Floats,
+    *,
+    is_color: bool,
+    depth: str | None = None,
+    is_packed: bool = False,
+) -> None:
+    """Write a picture as PNG, EXR or TIFF, by the suffix.
+
+    Args:
+        pixels: (height, width) or (height, width, 1 to 4), row 0 at the bottom, straight alpha;
+            integers hold [0, 1].
+        is_color: integers are coded by the sRGB curve.
+        depth: one of DEPTHS for this suffix; None is the usual one.
+        is_packed: engines unpack its channels, so that nothing is multiplied in EXR files either.
+
+    Raises:
+        HairloomError: no OpenImageIO, another suffix or depth, or nothing can be written there.
+    """
+    library = _openimageio(path)
+    depth = _depth(path, depth)
+    image = np.atleast_3d(np.asarray(pixels, np.float32))[::-1]
+    if is_color and depth.startswith("uint"):
+        image = _with_colors(image, srgb_encoded(np.clip(_colors(image), 0.0, 1.0)))
+    height, width, channels = image.shape
+    is_multiplied = path.suffix.lower() == ".exr" and not is_packed
+    if channels in (2, 4) and is_multiplied:
+        image = _with_colors(image, _colors(image) * image[..., -1:])
+    spec = library.ImageSpec(width, height, channels, depth)
+    if channels in (2, 4):
+        spec.alpha_channel = channels - 1
+        spec.attribute("oiio:UnassociatedAlpha", int(not is_multiplied))
+        spec.attribute(_STRAIGHT, int(not is_multiplied))
+    spec.attribute("oiio:ColorSpace", _space(is_color=is_color, depth=depth))
+    with atomic_write(path) as temporary:
+        target = library.ImageOutput.create(str(temporary))
+        done = target is not None and target.open(str(temporary), spec)
+        done = done and target.write_image(np.ascontiguousarray(image))
+        if not (done and target.close() and has_its_end(temporary)):
+            raise HairloomError(
+                f"this picture cannot be written ({_reason(target or library)})",
+                place=str(path),
+                remedy="Choose another folder or format",
+            )
+
+
+def has_its_end(path: Path) -> bool:
+    """Whether a PNG has its closing chunk: those who write them are silent about a full disk."""
+    if path.suffix.lower() != ".png":
+        return True
+    with path.open("rb") as file:
+        file.seek(0, os.SEEK_END)
+        file.seek(-min(len(_END_OF_PNG), file.tell()), os.SEEK_END)
+        return file.read() == _END_OF_PNG
+
+
+def _openimageio(path: Path) -> Any:
+    try:
+        import OpenImageIO
+    except ImportError as error:
+        raise HairloomError(
+            "OpenImageIO, which reads and writes pictures, is missing in this Python",
+            place=str(path),
+            remedy="Use an official build of Blender, or install the package 'openimageio'",
+        ) from error
+    return OpenImageIO
+
+
+def _pixels(path: Path, source: Any, library: Any, *, is_color: bool) -> Floats:
+    """What an open file holds, once its header is known to make sense."""
+    spec = source.spec()
+    width, height, channels = spec.width, spec.height, min(spec.nchannels, 4)
+    if spec.deep or spec.depth > 1 or min(width, height, channels) < 1:
+        raise _unreadable(path, "this is no flat picture", "Save it as a plain picture")
+    check_size(width, height, str(path))
+    image = source.read_image(0, 0, 0, channels, library.FLOAT)
+    # What could not be read would come as zeros, or not at all
+    if image is None or source.has_error:
+        raise _broken(path, source)
+    image = np.asarray(image, np.float32).reshape(height, width, channels)
+    is_straight = any(map(spec.get_int_attribute, ("oiio:UnassociatedAlpha", _STRAIGHT)))
+    if channels in (2, 4) and not (is_straight or source.format_name() == "dds"):
+        image = _straight(image)
+    if is_color and str(spec.format) not in ("half", "float", "double"):
+        image = _with_colors(image, srgb_decoded(_colors(image)))
+    return np.ascontiguousarray(image[::-1], np.float32)
+
+
+def _colors(image: Floats) -> Floats:
+    """An image without its alpha."""
+    return image[..., :-1] if image.shape[-1] in (2, 4) else image
+
+
+def _straight(image: Floats) -> Floats:
+    """Colours divided by their alpha, where there is any."""
+    alpha = image[..., -1:]
+    colors = _colors(image)
+    return _with_colors(image, np.divide(colors, alpha, out=colors.copy(), where=alpha > 0.0))
+
+
+def _with_colors(image: Floats, colors: Floats) -> Floats:
+    return np.concatenate([colors, image[..., colors.shape[-1] :]], axis=-1)
+
+
+def _space(*, is_color: bool, depth: str) -> str:
+    """OpenImageIO's name of what the values mean."""
+    if not is_color:
+        return "raw"
+    return "sRGB" if depth.startswith("uint") else "lin_rec709"
+
+
+def _depth(path: Path, depth: str | None) -> str:
+    depths = DEPTHS.get(path.suffix.lower())
+    if depths is None:
+        raise HairloomError(
+            f"pictures are not written as '{path.suffix}'",
+            place=str(path),
+            remedy=f"Use {', '.join(DEPTHS)}",
+        )
+    if depth is None or depth in depths:
+        return depth or depths[0]
+    raise HairloomError(
+        f"{path.suffix} files do not hold {depth}",
+        place=str(path),
+        remedy=f"Use {' or '.join(depths)}",
+    )
+
+
+def _broken(path: Path, source: Any) -> HairloomError:
+    return _unreadable(
+        path,
+        f"this file cannot be read as a picture ({_reason(source)})",
+        "It is damaged or no picture: save it again, as PNG, TIFF or EXR",
+    )
+
+
+def _unreadable(path: Path, problem: str, remedy: str) -> HairloomError:
+    return HairloomError(problem, place=str(path), remedy=remedy)
+
+
+def _reason(source: Any) -> str:
+    """The first line of what OpenImageIO, or one of its readers or writers, has to say."""
+    try:
+        text = source.geterror()
+    except UnicodeDecodeError:  # it quotes what it found in the file
+        text = "it holds names that are no text"
+    lines = [line.strip().rstrip(".") for line in text.splitlines() if line.strip()]
+    return lines[0] if lines else "no reason given"

@@ -1,0 +1,277 @@
+"""Writing grooms as USD BasisCurves, in the manner of Blender's own exporter.
+
+    /name            Xform, the default prim
+    /name/strands    BasisCurves: cubic, catmullRom, pinned, so that curves pass through all points
+                     and end at the first and the last; or one such prim for each group, by its name
+
+Widths are twice the radii. What a groom says beyond that are primvars with the names of Epic's
+"Using Alembic for Grooms". Unreal Engine takes primvars of the plain types (float3, not color3f)
+and for each strand or point alone, takes the version from user properties of the topmost prim, and
+wants GroomAPI applied to it. Root UVs go in once more as `st`, and colours as `displayColor`, for
+all others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
+from ..files.atomic import atomic_write, unwritable
+from ..files.axes import from_z_up
+from ..files.names import plain_name
+from ..groom import Groom, GroomMotion, points_of
+from .usd_library import SUFFIXES, usd_library
+from .usd_probe import told
+
+#: The version of Epic's conventions that the names of primvars are from.
+GROOM_VERSION = (1, 5)
+
+#: Frames that wait in memory before they go to the file [bytes].
+_WAITING = 1 << 28
+
+
+@dataclass(frozen=True)
+class UsdSpace:
+    """What a program takes for granted.
+
+    up: "Y" or "Z".
+    scale: metres in one unit.
+    """
+
+    up: str
+    scale: float
+
+
+USD_SPACES = MappingProxyType(
+    {
+        "blender": UsdSpace("Z", 1.0),
+        "unreal": UsdSpace("Z", 0.01),
+        "unity": UsdSpace("Y", 1.0),
+        "maya": UsdSpace("Y", 0.01),
+        "houdini": UsdSpace("Y", 1.0),
+    }
+)
+
+
+def write_usd(
+    path: Path,
+    groom: Groom,
+    *,
+    up: str = "Z",
+    scale: float = 1.0,
+    by_group: bool = False,
+    is_linear: bool = False,
+    motion: GroomMotion | None = None,
+) -> None:
+    """Write a groom with all that it says; the file is there complete or not at all.
+
+    Args:
+        path: .usdc (binary), .usda (text), or .usd, which is binary.
+        up: the file's up axis, "Y" or "Z".
+        scale: metres in one unit of the file.
+        by_group: a prim for each group in place of one for all.
+        is_linear: straight between points, in place of cubic.
+        motion: time samples, one a frame; the groom itself stays the value for no time.
+
+    Raises:
+        HairloomError: no strands, no OpenUSD, another suffix, frames that do not fit the groom, or
+            nothing can be written there.
+    """
+    usd = usd_library(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise HairloomError(
+            f"'{path.suffix}' is no suffix of USD files",
+            place=str(path),
+            remedy="Use .usdc, .usda or .usd",
+        )
+    if not groom.strands.strand_count:
+        raise HairloomError(
+            "there are no strands to write", place=str(path), remedy="Choose hair that has strands"
+        )
+    space = _checked(up, scale, path)
+    with atomic_write(path) as temporary:
+        try:
+            stage = usd.Usd.Stage.CreateNew(str(temporary))
+            root = _root(usd, stage, groom, space)
+            parts = [
+                _written_part(usd, root, name, part, space, is_linear)
+                for name, part in _parts(groom, by_group)
+            ]
+            if motion is not None:
+                _write_motion(usd, stage, parts, motion, space, path)
+            stage.GetRootLayer().Save()
+        except usd.Tf.ErrorException as error:
+            raise unwritable(path, told(error)) from error
+
+
+def _checked(up: str, scale: float, path: Path) -> UsdSpace:
+    from_z_up(np.zeros(3), up)  # refuses another axis
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise HairloomError(
+            f"a unit of {scale} m makes no sense",
+            place=str(path),
+            remedy="Use a number above 0, such as 0.01 for centimetres",
+        )
+    return UsdSpace(up, scale)
+
+
+def _root(usd: ModuleType, stage: Any, groom: Groom, space: UsdSpace) -> Any:
+    """The topmost prim, with the stage's units and axes."""
+    geometry = usd.UsdGeom
+    geometry.SetStageMetersPerUnit(stage, space.scale)
+    geometry.SetStageUpAxis(stage, getattr(geometry.Tokens, space.up.lower()))
+    prim = geometry.Xform.Define(stage, f"/{plain_name(groom.name)}").GetPrim()
+    prim.SetDisplayName(groom.name)
+    prim.AddAppliedSchema("GroomAPI")
+    stage.SetDefaultPrim(prim)
+    types = usd.Sdf.ValueTypeNames
+    major, minor = GROOM_VERSION
+    for name, kind, value in (
+        ("groom_version_major", types.Int, major),
+        ("groom_version_minor", types.Int, minor),
+        ("groom_tool", types.String, "Hairloom"),
+    ):
+        prim.CreateAttribute(f"userProperties:{name}", kind, custom=True).Set(value)
+    return prim
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Strands that share a prim: their indices in the whole groom, their points', themselves."""
+
+    points: Ints | slice
+    groom: Groom
+
+
+def _parts(groom: Groom, by_group: bool) -> Iterator[tuple[str, _Part]]:
+    """(name, strands) of each prim."""
+    if not by_group:
+        yield "strands", _Part(slice(None), groom)
+        return
+    taken: set[str] = set()
+    for group in np.unique(groom.strands.group).tolist():
+        wanted = plain_name(groom.group_names.get(group, ""), f"group_{group}".replace("-", "_"))
+        name = wanted if wanted not in taken else f"{wanted}_{len(taken)}"
+        taken.add(name)
+        strands = np.flatnonzero(groom.strands.group == group)
+        yield name, _Part(points_of(groom.strands, strands), groom.take(strands))
+
+
+def _written_part(
+    usd: ModuleType, root: Any, name: str, part: _Part, space: UsdSpace, is_linear: bool
+) -> tuple[Any, _Part]:
+    """A prim of curves as the groom is at rest, and whose it is."""
+    tokens, strands = usd.UsdGeom.Tokens, part.groom.strands
+    path = root.GetPath().AppendChild(name)
+    curves = usd.UsdGeom.BasisCurves.Define(root.GetStage(), path)
+    curves.CreateTypeAttr(tokens.linear if is_linear else tokens.cubic)
+    curves.CreateBasisAttr(tokens.catmullRom)
+    curves.CreateWrapAttr(tokens.pinned)
+    curves.CreateCurveVertexCountsAttr(usd.Vt.IntArray.FromNumpy(strands.point_counts))
+    widths = strands.radius * np.float32(2.0 / space.scale)
+    curves.CreateWidthsAttr(usd.Vt.FloatArray.FromNumpy(widths))
+    curves.SetWidthsInterpolation(tokens.vertex)
+    _set_points(usd, curves, strands.points, float(widths.max()), space)
+    primvars = usd.UsdGeom.PrimvarsAPI(curves)
+    for primvar, kind, of, values in _primvars(part.groom):
+        array = _VT_ARRAYS[kind]
+        value_type = usd.Sdf.ValueTypeNames.Find(f"{kind}[]")
+        primvars.CreatePrimvar(primvar, value_type, of).Set(
+            getattr(usd.Vt, array).FromNumpy(np.ascontiguousarray(values))
+        )
+    names = _group_names(part.groom)
+    if names:
+        text = usd.Sdf.ValueTypeNames.StringArray
+        primvars.CreatePrimvar("groom_group_name", text, "uniform").Set(usd.Vt.StringArray(names))
+    return curves, part
+
+
+_VT_ARRAYS = {
+    "int": "IntArray",
+    "int3": "Vec3iArray",
+    "float2": "Vec2fArray",
+    "texCoord2f": "Vec2fArray",
+    "float3": "Vec3fArray",
+    "color3f": "Vec3fArray",
+}
+
+
+def _primvars(groom: Groom) -> Iterator[tuple[str, str, str, NDArray[Any]]]:
+    """(name, type, interpolation, values) of all that is known."""
+    strands = groom.strands
+    yield "groom_group_id", "int", "uniform", strands.group
+    if groom.is_guide is not None:
+        yield "groom_guide", "int", "uniform", groom.is_guide.astype(np.int32)
+    if groom.strand_id is not None:
+        yield "groom_id", "int", "uniform", groom.strand_id
+    if strands.root_uv is not None:
+        yield "groom_root_uv", "float2", "uniform", strands.root_uv
+        yield "st", "texCoord2f", "uniform", strands.root_uv
+    if groom.color is not None:
+        yield "groom_color", "float3", "vertex", groom.color
+        yield "displayColor", "color3f", "vertex", groom.color
+    if groom.closest_guides is not None and groom.guide_weights is not None:
+        yield "groom_closest_guides", "int3", "uniform", groom.closest_guides
+        yield "groom_guide_weights", "float3", "uniform", groom.guide_weights
+
+
+def _group_names(groom: Groom) -> list[str]:
+    """For each strand the name of its group, empty where it has none; nothing without any."""
+    if not groom.group_names:
+        return []
+    groups, which = np.unique(groom.strands.group, return_inverse=True)
+    names = [groom.group_names.get(group, "") for group in groups.tolist()]
+    return [names[each] for each in which.tolist()]
+
+
+def _set_points(
+    usd: ModuleType, curves: Any, points: Floats, width: float, space: UsdSpace, *time: float
+) -> None:
+    """Points [m] and the box around them, at a time, or at none."""
+    placed = np.ascontiguousarray(from_z_up(points, space.up), np.float32)
+    if space.scale != 1.0:
+        placed = placed / np.float32(space.scale)
+    curves.CreatePointsAttr().Set(usd.Vt.Vec3fArray.FromNumpy(placed), *time)
+    extent = np.stack([placed.min(axis=0), placed.max(axis=0)]) + [[-width / 2], [width / 2]]
+    box = usd.Vt.Vec3fArray.FromNumpy(extent.astype(np.float32))
+    curves.CreateExtentAttr().Set(box, *time)
+
+
+def _write_motion(
+    usd: ModuleType,
+    stage: Any,
+    parts: list[tuple[Any, _Part]],
+    motion: GroomMotion,
+    space: UsdSpace,
+    path: Path,
+) -> None:
+    """Time samples at the numbers of frames."""
+    point_count = sum(part.groom.strands.point_count for _, part in parts)
+    is_binary, waiting, count = path.suffix.lower() != ".usda", 0, 0
+    widths = [2.0 * float(part.groom.strands.radius.max()) / space.scale for _, part in parts]
+    for points in motion.positions:
+        if points.shape != (point_count, 3) or not np.isfinite(points).all():
+            raise HairloomError(
+                f"frame {motion.first_frame + count} has points that do not fit the groom",
+                place=str(path),
+                remedy="Bake the motion again",
+            )
+        for (curves, part), width in zip(parts, widths, strict=True):
+            time = float(motion.first_frame + count)
+            _set_points(usd, curves, points[part.points], width, space, time)
+        count, waiting = count + 1, waiting + points.nbytes
+        if is_binary and waiting > _WAITING:  # a binary file grows at its end; a text is one piece
+            stage.GetRootLayer().Save()
+            waiting = 0
+    stage.SetTimeCodesPerSecond(motion.rate)
+    stage.SetFramesPerSecond(motion.rate)
+    stage.SetStartTimeCode(motion.first_frame)
+    stage.SetEndTimeCode(motion.first_frame + max(count - 1, 0))

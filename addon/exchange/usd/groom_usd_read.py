@@ -1,0 +1,265 @@
+"""Reading grooms from the BasisCurves of USD files: whichever prims, bases and primvars they use.
+
+Units, axes and the places of prims come from the file. Strands are read at rest: values without a
+time, or those of the first one. Instances of prims are read as often as they stand in the file;
+point instancers are not, and of other geometry only its number is told.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Bools, Floats, Ints
+from ...errors import HairloomError
+from ...strands.clean import clean
+from ..files.axes import to_z_up
+from ..groom import Groom
+from ..read_groom import ReadGroom, kept_points
+from .usd_curves import Curves, UnusableCurvesError, curves_of
+from .usd_library import damage_told, opened_stage, usd_library
+
+#: More than any groom; their positions alone take 3 GiB.
+MOST_POINTS = 1 << 28
+
+
+def read_usd(
+    path: Path,
+    *,
+    up: str | None = None,
+    scale: float | None = None,
+    factor: float = 1.0,
+    python: Sequence[str] | None = None,
+) -> ReadGroom:
+    """Read all hair of a file as one groom.
+
+    Args:
+        path: .usd, .usdc or .usda.
+        up: "Y" or "Z" in place of what the file says.
+        scale: metres in one unit, in place of what the file says.
+        factor: what lengths are multiplied by beside that.
+        python: the command that starts another Python, see `run_apart`.
+
+    Returns:
+        The groom: groups as the file has them, or one for each prim; the version of Epic's
+        conventions that it names, else 0; notes on all that was changed or left out.
+
+    Raises:
+        HairloomError: no OpenUSD, a file that cannot be read, or one without a usable strand.
+    """
+    usd = usd_library(path)
+    stage = opened_stage(path, python)
+    with damage_told(path):
+        reading = _Reading(usd, stage, path, up, scale, factor)
+        pieces = list(reading.pieces())
+        if not pieces:
+            raise reading.nothing_found()
+        version, name = reading.version(), reading.name()
+    groom = _joined(pieces, path, name, reading.notes)
+    return ReadGroom(groom, version, tuple(f"{path.name}: {note}." for note in reading.notes))
+
+
+class _Reading:
+    """A walk over a stage, and what there is to say of it."""
+
+    def __init__(
+        self,
+        usd: ModuleType,
+        stage: Any,
+        path: Path,
+        up: str | None,
+        scale: float | None,
+        factor: float,
+    ) -> None:
+        self.notes: list[str] = []
+        self._usd, self._stage, self._path = usd, stage, path
+        self._problems: list[str] = []
+        geometry = usd.UsdGeom
+        unit = geometry.GetStageMetersPerUnit(stage) if scale is None else scale
+        if scale is None and not stage.HasAuthoredMetadata("metersPerUnit"):
+            self.notes.append("it names no unit, so that lengths were taken as centimetres")
+        if not (np.isfinite(unit) and unit > 0.0):
+            self.notes.append(f"its unit of {unit} m makes no sense and was taken as a metre")
+            unit = 1.0
+        axes = to_z_up(np.eye(3), up or str(geometry.GetStageUpAxis(stage))).T
+        self._to_blender = np.eye(4)
+        self._to_blender[:3, :3] = axes * (unit * factor)
+
+    def pieces(self) -> Iterator[Curves]:
+        """The curves of each prim that has usable ones."""
+        usd, total = self._usd, 0
+        cache = usd.UsdGeom.XformCache(usd.Usd.TimeCode.EarliestTime())
+        others: Counter[str] = Counter()
+        walk = iter(
+            usd.Usd.PrimRange(self._stage.GetPseudoRoot(), usd.Usd.TraverseInstanceProxies())
+        )
+        for prim in walk:
+            if prim.IsA(usd.UsdGeom.BasisCurves):
+                local = np.array(cache.GetLocalToWorldTransform(prim)).T  # USD has row vectors
+                try:
+                    piece = curves_of(usd, prim, self._to_blender @ local)
+                except UnusableCurvesError as error:
+                    self._problems.append(f"{prim.GetPath()} was left out: {error}")
+                    continue
+                total += len(piece.points)
+                if total > MOST_POINTS:
+                    raise self._error(
+                        f"it has more than {MOST_POINTS:,} points", "Export fewer strands"
+                    )
+                self.notes += [f"{prim.GetPath()}: {note}" for note in piece.notes]
+                yield piece
+            elif prim.IsA(usd.UsdGeom.PointInstancer):
+                others["PointInstancer"] += 1
+                walk.PruneChildren()
+            elif prim.IsA(usd.UsdGeom.Gprim):
+                others[str(prim.GetTypeName())] += 1
+        self.notes += self._problems
+        if others:
+            counts = ", ".join(f"{count:,} {kind}" for kind, count in sorted(others.items()))
+            self.notes.append(f"prims that are no BasisCurves were left out ({counts})")
+
+    def nothing_found(self) -> HairloomError:
+        if self._problems:
+            return self._error(
+                "none of its curves can be used: " + "; ".join(self._problems[:3]),
+                "Export the groom again",
+            )
+        return self._error(
+            "it has no curves" + (f": {self.notes[-1]}" if self.notes else ""),
+            "Choose a file with BasisCurves, or export hair as curves",
+        )
+
+    def version(self) -> float:
+        """Of the conventions for grooms, as the topmost prim says."""
+        prim = self._stage.GetDefaultPrim()
+        if not prim:
+            return 0.0
+        major = prim.GetAttribute("userProperties:groom_version_major").Get()
+        minor = prim.GetAttribute("userProperties:groom_version_minor").Get()
+        if not (isinstance(major, int) and isinstance(minor, int)):
+            return 0.0
+        return float(f"{abs(major)}.{abs(minor)}")
+
+    def name(self) -> str:
+        """The topmost prim's, unless that is Blender's "root"."""
+        prim = self._stage.GetDefaultPrim()
+        if not prim or prim.GetName() == "root":
+            return self._path.stem
+        return str(prim.GetDisplayName() or prim.GetName())
+
+    def _error(self, problem: str, remedy: str) -> HairloomError:
+        return HairloomError(problem, place=str(self._path), remedy=remedy)
+
+
+def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Groom:
+    """All pieces as one groom of usable strands; notes grow."""
+    counts = np.concatenate([np.diff(piece.offsets) for piece in pieces])
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    groups, group_names = _groups(pieces)
+    with np.errstate(over="ignore", invalid="ignore"):
+        cleaned = clean(
+            _together([piece.points for piece in pieces]),
+            offsets,
+            radius=_together([_radius(piece) for piece in pieces]),
+            group=groups,
+            root_uv=_of_all("root UVs", [piece.root_uv for piece in pieces], notes),
+        )
+    if not cleaned.strands.strand_count:
+        reasons = ", ".join(f"{count:,} with {why}" for why, count in cleaned.dropped.items())
+        raise HairloomError(
+            f"none of its strands can be used ({reasons})",
+            place=str(path),
+            remedy="Export the groom again",
+        )
+    if len(pieces) > 1:
+        notes.append(f"its {len(pieces):,} prims of curves became one groom")
+    color = _of_all("colours", [piece.color for piece in pieces], notes)
+    return Groom(
+        cleaned.strands,
+        name=name,
+        color=None if color is None else kept_points(color, offsets, cleaned),
+        is_guide=_guides(pieces, cleaned.kept),
+        group_names=group_names,
+        dropped=cleaned.dropped,
+        source=path,
+        **_identities(pieces, cleaned.kept, notes),
+    )
+
+
+def _together(arrays: list[NDArray[Any]]) -> NDArray[Any]:
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def _of_all(what: str, arrays: list[NDArray[Any] | None], notes: list[str]) -> NDArray[Any] | None:
+    """All arrays as one, or None where a prim has none; told where another one has."""
+    known = [array for array in arrays if array is not None]
+    if len(known) == len(arrays):
+        return _together(known)
+    if known:
+        notes.append(f"{what} were left out, which only some of its prims have")
+    return None
+
+
+def _radius(piece: Curves) -> Floats:
+    """NaN, which `clean` replaces, where it is not known."""
+    if piece.radius is not None:
+        return piece.radius
+    return np.full(len(piece.points), np.nan, np.float32)
+
+
+def _groups(pieces: list[Curves]) -> tuple[Ints, dict[int, str]]:
+    """Groups as prims have them, else one for each prim; and their names."""
+    groups: list[Ints] = []
+    names: dict[int, str] = {}
+    free = max([-1, *(int(piece.group.max()) for piece in pieces if piece.group is not None)]) + 1
+    for piece in pieces:
+        if piece.group is None:
+            groups.append(np.full(piece.curve_count, free, np.int32))
+            if len(pieces) > 1:
+                names[free] = piece.name
+            free += 1
+            continue
+        groups.append(piece.group)
+        if piece.group_name is not None:
+            found, firsts = np.unique(piece.group, return_index=True)
+            for group, first in zip(found.tolist(), firsts.tolist(), strict=True):
+                if piece.group_name[first]:
+                    names[group] = piece.group_name[first]
+    return _together(groups), names
+
+
+def _guides(pieces: list[Curves], kept: Ints) -> Bools | None:
+    """Strands are none where a prim does not say."""
+    if all(piece.is_guide is None for piece in pieces):
+        return None
+    flags = [
+        np.zeros(piece.curve_count, bool) if piece.is_guide is None else piece.is_guide
+        for piece in pieces
+    ]
+    return _together(flags)[kept]
+
+
+def _identities(pieces: list[Curves], kept: Ints, notes: list[str]) -> dict[str, Any]:
+    """IDs, and what names strands by them; nothing where two strands have the same."""
+    numbers = _of_all("IDs", [piece.strand_id for piece in pieces], notes)
+    if numbers is None:
+        return {}
+    numbers = numbers[kept]
+    if len(np.unique(numbers)) < len(numbers):
+        notes.append("IDs were left out, because strands share them")
+        return {}
+    closest = _of_all("closest guides", [piece.closest_guides for piece in pieces], notes)
+    weights = _of_all("guide weights", [piece.guide_weights for piece in pieces], notes)
+    if closest is None or weights is None:
+        return {"strand_id": numbers}
+    weights = weights[kept]
+    if not np.isfinite(weights).all():
+        notes.append("closest guides were left out, because weights of them are no numbers")
+        return {"strand_id": numbers}
+    return {"strand_id": numbers, "closest_guides": closest[kept], "guide_weights": weights}

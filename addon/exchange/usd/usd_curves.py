@@ -1,0 +1,243 @@
+"""One prim of USD BasisCurves as strands in Blender's space, with the primvars that grooms have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Bools, Floats, Ints
+from ...strands.affine import mean_scale, moved
+from ..read_groom import finite, plausible
+from .usd_basis import OnCurves, points_on_curves
+
+#: Where programs put the UVs of roots, Blender's among them; the first one found counts.
+_ROOT_UVS = ("groom_root_uv", "surface_uv_coordinate", "st", "uv", "map1")
+
+
+@dataclass(frozen=True)
+class Curves:
+    """What a prim holds; what is None is not known. Arrays are as in `Groom`.
+
+    offsets: (curve_count + 1,).
+    notes: what had to be changed or left out.
+    """
+
+    name: str
+    points: Floats
+    offsets: Ints
+    radius: Floats | None
+    group: Ints | None
+    group_name: list[str] | None
+    root_uv: Floats | None
+    color: Floats | None
+    strand_id: Ints | None
+    is_guide: Bools | None
+    closest_guides: Ints | None
+    guide_weights: Floats | None
+    notes: tuple[str, ...]
+
+    @property
+    def curve_count(self) -> int:
+        return len(self.offsets) - 1
+
+
+class UnusableCurvesError(Exception):
+    """Why nothing of a prim can be used."""
+
+
+def curves_of(usd: ModuleType, prim: Any, matrix: Floats) -> Curves:
+    """Read a prim.
+
+    Args:
+        prim: a UsdGeomBasisCurves.
+        matrix: (4, 4), from the prim's space to Blender's, in metres.
+
+    Raises:
+        UnusableCurvesError: it has no curves, counts that do not fit, or is closed.
+    """
+    curves = usd.UsdGeom.BasisCurves(prim)
+    points = _array(_value(usd, curves.GetPointsAttr()), np.float32, 3)
+    counts = _array(_value(usd, curves.GetCurveVertexCountsAttr()), np.int64)
+    if points is None or counts is None or not len(points) or not len(counts):
+        raise UnusableCurvesError("it has no curves")
+    if counts.min() < 0 or int(counts.sum()) != len(points):
+        raise UnusableCurvesError(
+            f"its {len(counts):,} counts of points add up to {int(counts.sum()):,}, and it has "
+            f"{len(points):,} points"
+        )
+    wrap, basis = str(_value(usd, curves.GetWrapAttr())), "linear"
+    if str(_value(usd, curves.GetTypeAttr())) != "linear":
+        basis = str(_value(usd, curves.GetBasisAttr()))
+    if wrap == "periodic":
+        raise UnusableCurvesError("its curves are closed")
+    values = _Values(usd, prim, points_on_curves(basis, wrap == "pinned", counts), counts)
+    radius, notes = _radius(values, curves, mean_scale(matrix))
+    if values.on_curves.vertex is not None:
+        notes += (f"its {basis} curves became points on the curves",)
+    if curves.GetPointsAttr().GetNumTimeSamples() > 1:
+        notes += ("its motion was left out",)
+    wrong = values.on_curves.wrong_count
+    if wrong:
+        notes += (f"{wrong:,} curves have a number of points that {basis} curves cannot have",)
+    color = values.of_points("groom_color", 3)
+    if color is None:
+        color = values.of_points("displayColor", 3)
+    ids = values.of_strands("groom_id", np.int32)
+    guide = values.of_strands("groom_guide", np.int32)
+    uvs = (values.of_strands(name, np.float32, 2) for name in _ROOT_UVS)
+    return Curves(
+        name=prim.GetName(),
+        points=moved(values.mixed(points), matrix),
+        offsets=values.on_curves.offsets,
+        radius=radius,
+        group=values.of_strands("groom_group_id", np.int32),
+        group_name=values.texts_of_strands("groom_group_name"),
+        root_uv=next((uv for uv in uvs if uv is not None), None),
+        color=None if color is None else finite(color, 0.0),
+        strand_id=ids,
+        is_guide=None if guide is None else guide > 0,
+        closest_guides=values.of_strands("groom_closest_guides", np.int32, 3),
+        guide_weights=values.of_strands("groom_guide_weights", np.float32, 3),
+        notes=notes + tuple(values.notes),
+    )
+
+
+def _radius(values: _Values, curves: Any, scale: float) -> tuple[Floats | None, tuple[str, ...]]:
+    """Half the widths [m], NaN where they cannot be hair's, and what to say of that."""
+    widths = _array(_value(values.usd, curves.GetWidthsAttr()), np.float32)
+    if widths is None or not len(widths):
+        return None, ("it has no widths",)
+    radius = values.on_points(widths, str(curves.GetWidthsInterpolation()), "widths")
+    if radius is None:
+        return None, ()
+    with np.errstate(over="ignore", invalid="ignore"):
+        radius = plausible(radius * np.float32(0.5 * scale))
+    wrong = int(np.isnan(radius).sum())
+    notes = (f"{wrong:,} widths are none of hair and were replaced",) if wrong else ()
+    return radius, notes
+
+
+class _Values:
+    """A prim's primvars for each strand or each of its points, whatever their interpolation."""
+
+    def __init__(self, usd: ModuleType, prim: Any, on_curves: OnCurves, counts: Ints) -> None:
+        self.usd = usd
+        self.on_curves = on_curves
+        self.notes: list[str] = []
+        self._primvars = usd.UsdGeom.PrimvarsAPI(prim)
+        self._counts = counts
+        self._point_count = int(counts.sum())
+
+    def mixed(self, values: Floats) -> Floats:
+        """Points of curves from control points."""
+        mix = self.on_curves.vertex
+        with np.errstate(over="ignore", invalid="ignore"):
+            return values if mix is None else mix.of(values)
+
+    def of_points(self, name: str, width: int) -> Floats | None:
+        values, interpolation = self._flat(name, np.float32, width)
+        return None if values is None else self.on_points(values, interpolation, name)
+
+    def on_points(self, values: Floats, interpolation: str, name: str) -> Floats | None:
+        """Values brought to each point, or None, and a note, where there are not enough."""
+        on_curves = self.on_curves
+        expected = self._expected(interpolation)
+        if len(values) == 1 or interpolation == "constant":
+            return np.repeat(values[:1], on_curves.offsets[-1], axis=0)
+        if len(values) != expected:
+            self._unfit(name, len(values), expected, interpolation)
+            return None
+        if interpolation == "uniform":
+            return np.repeat(values, np.diff(on_curves.offsets), axis=0)
+        if interpolation == "vertex":
+            return self.mixed(values)
+        return values if on_curves.varying is None else on_curves.varying.of(values)
+
+    def of_strands(self, name: str, dtype: type, width: int = 1) -> NDArray[Any] | None:
+        """Values of each strand; of its root where there are more."""
+        values, interpolation = self._flat(name, dtype, width)
+        if values is None:
+            return None
+        rows = self._rows(name, len(values), interpolation)
+        return None if rows is None else values[rows]
+
+    def texts_of_strands(self, name: str) -> list[str] | None:
+        texts, interpolation = self._flattened(name)
+        if texts is None or isinstance(texts, str) or not isinstance(texts, Iterable):
+            return None
+        names = [str(each) for each in texts]
+        rows = self._rows(name, len(names), interpolation) if names else None
+        return None if rows is None else [names[row] for row in rows.tolist()]
+
+    def _rows(self, name: str, length: int, interpolation: str) -> Ints | None:
+        """For each strand, which of the values is its own."""
+        if length == 1 or interpolation == "constant":
+            return np.zeros(len(self._counts), np.int64)
+        expected = self._expected(interpolation)
+        if length != expected or not self._counts.all():
+            self._unfit(name, length, expected, interpolation)
+            return None
+        if interpolation == "uniform":
+            return np.arange(length)
+        if interpolation == "vertex":
+            return np.cumsum(self._counts) - self._counts
+        ends = np.maximum(self._counts - self._lost_ends(), 0)
+        return np.minimum(np.cumsum(ends) - ends, length - 1)
+
+    def _lost_ends(self) -> Ints:
+        """Control points of each curve that are no end of a segment."""
+        if self.on_curves.varying is None:
+            return self._counts - np.diff(self.on_curves.offsets)
+        return self._counts - (self._counts + 2) // 3
+
+    def _expected(self, interpolation: str) -> int:
+        if interpolation == "uniform":
+            return len(self._counts)
+        return self._point_count if interpolation == "vertex" else self.on_curves.varying_count
+
+    def _flat(self, name: str, dtype: type, width: int) -> tuple[NDArray[Any] | None, str]:
+        values, interpolation = self._flattened(name)
+        array = _array(values, dtype, width)
+        return (array if array is not None and len(array) else None), interpolation
+
+    def _flattened(self, name: str) -> tuple[Any, str]:
+        """A primvar without its indices, and its interpolation."""
+        primvar = self._primvars.GetPrimvar(name)
+        if not primvar or not primvar.HasValue():
+            return None, ""
+        time = self.usd.Usd.TimeCode
+        value = primvar.ComputeFlattened(time.Default())
+        if value is None:
+            value = primvar.ComputeFlattened(time.EarliestTime())
+        return value, str(primvar.GetInterpolation())
+
+    def _unfit(self, name: str, count: int, expected: int, interpolation: str) -> None:
+        self.notes.append(
+            f"its {name} were left out: {count:,} values where '{interpolation}' wants {expected:,}"
+        )
+
+
+def _value(usd: ModuleType, attribute: Any) -> Any:
+    """At no time; where an attribute has time samples alone, the first of them."""
+    value = attribute.Get()
+    return attribute.Get(usd.Usd.TimeCode.EarliestTime()) if value is None else value
+
+
+def _array(value: Any, dtype: type, width: int = 1) -> NDArray[Any] | None:
+    """(count,) or (count, width), or None for a value of another shape or kind."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "biuf":
+            return None
+        if array.ndim == (0 if width == 1 else 1):
+            array = array[None]
+        with np.errstate(invalid="ignore", over="ignore"):
+            array = array.astype(dtype, copy=False)
+    except (TypeError, ValueError):
+        return None
+    return array if array.shape[1:] == ((width,) if width > 1 else ()) else None

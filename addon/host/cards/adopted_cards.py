@@ -1,0 +1,228 @@
+"""Hair cards that an artist has made: a mesh of Blender is read as cards, sorted and shaded.
+
+What is written is the order of the mesh's own faces, which every exporter keeps, and ambient
+occlusion and the way from root to tip, under the names that our own cards have: as attributes, and
+as a map of UVs, (occlusion, along), that every format carries. Faces are not triangulated: their
+corners, materials, maps and all else stay as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...cards.adopted import AdoptedCards, adopt_cards
+from ...cards.occlusion import CardShade, occlusion_steps
+from ...cards.occlusion_settings import CardOcclusionSettings
+from ...cards.settings import CardSettings
+from ...cards.sort import SortBy, order_steps
+from ...cards.steps import result_of, retold
+from ...cards.uv_ways import Way
+from ...errors import HairloomError
+from ...strands import Surface
+from ..scene.surfaces import read_corner_uv, read_surface
+from ..scene.vertex_weights import weights_on
+from .adopted_writing import face_order, reorder_faces, write_shares
+from .card_alpha import alpha_of
+from .other_cards import other_cards
+
+__all__ = [
+    "ORDERS",
+    "CardOcclusionSettings",
+    "SortChoices",
+    "SortedCards",
+    "sort_mesh",
+    "sort_steps",
+]
+
+#: What may be sorted: identifier, label, description.
+(ORDERS,) = (p.choices for p in CardSettings.parameters() if p.name == "order_by")
+#: Weight from which on a vertex belongs to a vertex group.
+_MEMBER = 0.5
+#: The group of cards that dangle.
+_DANGLING = 1
+
+
+@dataclass(frozen=True)
+class SortChoices:
+    """What the artist has chosen.
+
+    head: what the hair grows from and is shaded by, or None.
+    by: see cards.sort.
+    way: see cards.uv_ways.
+    dangling: a vertex group, whose cards are drawn after all others; "" for none.
+    occlusion: None leaves ambient occlusion as it is.
+    alpha: a picture that says where cards are clear; None takes that of their material.
+    """
+
+    head: bpy.types.Object | None = None
+    by: SortBy = "pieces"
+    way: Way = "auto"
+    dangling: str = ""
+    occlusion: CardOcclusionSettings | None = field(default_factory=CardOcclusionSettings)
+    alpha: bpy.types.Image | None = None
+
+
+@dataclass(frozen=True)
+class CardSource:
+    """A mesh read as cards, world space.
+
+    polygon: (triangle_count,) the face that each triangle of the cards is of.
+    corner: (triangle_count, 3) the corner of a face that each of its corners is.
+    notes: what is doubtful, for the artist.
+    """
+
+    cards: AdoptedCards
+    head: Surface | None
+    polygon: Ints
+    corner: Ints
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SortedCards:
+    """What was done. moved: how many faces have another place than before."""
+
+    card_count: int
+    face_count: int
+    moved: int
+    notes: tuple[str, ...]
+
+
+def sort_steps(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, choices: SortChoices
+) -> Generator[float, None, SortedCards]:
+    """Put the faces of a mesh into the order in which its cards are to be drawn.
+
+    Each step gives the share that is done; the mesh changes in the last.
+
+    Raises:
+        HairloomError: not a mesh, in Edit Mode, no faces, no UVs, or no such vertex group.
+    """
+    source = read_cards(obj, depsgraph, choices)
+    mesh = source.cards.mesh
+    notes = list(source.notes)
+    apart = [_DANGLING] if choices.dangling else None
+    part_count = 1.0 if choices.occlusion is None else 2.0
+    ordering = order_steps(mesh, source.head, choices.by, apart)
+    orders = yield from retold(ordering, lambda share: share / part_count)
+    order = orders.front
+    if choices.occlusion is not None:
+        alpha, problems = alpha_of(obj, choices.alpha)
+        bodies = [] if source.head is None else [source.head]
+        others, doubts = other_cards(choices.occlusion, obj, depsgraph)
+        problems += doubts
+        shades = [CardShade(mesh, alpha), *others]
+        shading = occlusion_steps(mesh, shades, bodies, choices.occlusion)
+        openness = yield from retold(shading, lambda share: (1.0 + share) / 2.0)
+        corner = np.zeros(len(obj.data.loops), np.int32)
+        corner[source.corner] = source.cards.corner
+        problems += write_shares(obj.data, source.cards.vertex, corner, openness, mesh.along)
+        notes += problems
+    moved = reorder_faces(obj.data, face_order(source.polygon[order]))
+    return SortedCards(mesh.card_count, len(obj.data.polygons), moved, tuple(notes))
+
+
+def sort_mesh(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, choices: SortChoices
+) -> SortedCards:
+    """All steps of `sort_steps` at once."""
+    return result_of(sort_steps(obj, depsgraph, choices))
+
+
+def read_cards(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, choices: SortChoices
+) -> CardSource:
+    """A mesh as cards, as modifiers have bent it, with the way of the hair on them.
+
+    Raises:
+        HairloomError: not a mesh, in Edit Mode, no faces, no UVs, or no such vertex group.
+    """
+    _check(obj)
+    head = choices.head
+    surface = None
+    if head is not None:
+        surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    source, polygon, corner, notes = _read_faces(obj, depsgraph)
+    group = _dangling(obj, choices.dangling)
+    cards = adopt_cards(source, surface, group=group, way=choices.way, place=obj.name)
+    return CardSource(cards, surface, polygon, corner, (*notes, *_shared(obj.data), *cards.notes))
+
+
+def _check(obj: bpy.types.Object) -> None:
+    if obj.type != "MESH":
+        raise HairloomError(
+            f"it is a {obj.type.lower()} object, not a mesh of cards",
+            place=obj.name,
+            remedy="Select the mesh of your hair cards",
+        )
+    if obj.mode == "EDIT":
+        raise HairloomError(
+            "it is in Edit Mode", place=obj.name, remedy="Leave Edit Mode and sort again"
+        )
+
+
+def _read_faces(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[Surface, Ints, Ints, list[str]]:
+    """Triangles as Blender draws them, in world space; the face and the corners of each; notes."""
+    evaluated = obj.evaluated_get(depsgraph)
+    matrix = np.array(evaluated.matrix_world)
+    bent = evaluated.to_mesh()
+    try:
+        if np.array_equal(_corners(bent), _corners(obj.data)):
+            return (*_triangles(bent, matrix), [])
+    finally:
+        evaluated.to_mesh_clear()
+    note = "Modifiers that add or remove faces were left out, because they come after the order"
+    return (*_triangles(obj.data, matrix), [note])
+
+
+def _corners(mesh: bpy.types.Mesh) -> Ints:
+    """Vertices of all faces, one after the other, and behind them where each face begins."""
+    loops, polygons = len(mesh.loops), len(mesh.polygons)
+    found = np.empty(loops + polygons, np.int32)
+    mesh.loops.foreach_get("vertex_index", found[:loops])
+    mesh.polygons.foreach_get("loop_start", found[loops:])
+    return found
+
+
+def _triangles(mesh: bpy.types.Mesh, matrix: Floats) -> tuple[Surface, Ints, Ints]:
+    mesh.calc_loop_triangles()
+    count = len(mesh.loop_triangles)
+    triangles, corner = np.empty((2, count, 3), np.int32)
+    polygon = np.empty(count, np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    mesh.loop_triangles.foreach_get("loops", corner.ravel())
+    mesh.loop_triangles.foreach_get("polygon_index", polygon)
+    positions = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", positions.ravel())
+    corner_uv = read_corner_uv(mesh) if count else None
+    surface = Surface(positions, triangles, corner_uv).transformed(matrix)
+    if np.linalg.det(matrix[:3, :3]) < 0.0:  # mirrored triangles have been turned over
+        corner = corner[:, ::-1]
+    return surface, polygon, corner
+
+
+def _dangling(obj: bpy.types.Object, name: str) -> Ints | None:
+    """(vertex_count,) _DANGLING for members of a vertex group, 0 for all others."""
+    if not name:
+        return None
+    if name not in obj.vertex_groups:
+        raise HairloomError(
+            f"it has no vertex group '{name}'",
+            place=obj.name,
+            remedy="Choose one of its vertex groups, or none",
+        )
+    is_member = weights_on(obj, obj.data, name) >= _MEMBER
+    return np.where(is_member, _DANGLING, 0)
+
+
+def _shared(mesh: bpy.types.Mesh) -> list[str]:
+    if mesh.users < 2:
+        return []
+    return [f"{mesh.users} objects share the mesh '{mesh.name}' and have been sorted together"]

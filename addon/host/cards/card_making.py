@@ -1,0 +1,82 @@
+"""Settings become cards here, whoever shows them, writes them or puts them into the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
+
+from ...arrays import Floats
+from ...card_flow import card_build_steps
+from ...cards.atlas_settings import AtlasSettings
+from ...cards.build import CardBuild
+from ...cards.occlusion import CardShade
+from ...cards.occlusion_settings import CardOcclusionSettings
+from ...cards.settings import CardSettings
+from ...pipeline import Rig
+from ...shading.settings import ShadingSettings, StrandSettings
+from ...shading.textures import TextureSettings
+from .card_maps import CardMaps, made_maps
+
+
+@dataclass(frozen=True)
+class CardChoices:
+    """All that cards hang on.
+
+    pictures: what takes the place of generated textures, see `textures.picture_as`.
+    others: cards of other grooms, which shade these, world space.
+    """
+
+    cards: CardSettings
+    atlas: AtlasSettings
+    occlusion: CardOcclusionSettings
+    texture: TextureSettings
+    shading: ShadingSettings
+    strands: StrandSettings
+    pictures: Mapping[str, Floats] = field(default_factory=dict)
+    others: tuple[CardShade, ...] = ()
+
+
+@dataclass(frozen=True)
+class MadeCards:
+    """Cards at rest, and their maps."""
+
+    build: CardBuild
+    maps: CardMaps
+
+
+#: Makes the maps of cards, which is the main thread's work where the GPU bakes them.
+type MapsOf = Callable[[CardBuild], CardMaps]
+
+
+def making_steps(
+    rig: Rig, choices: CardChoices, maps_of: MapsOf | None = None
+) -> Generator[str, None, MadeCards]:
+    """Cards with their maps; each step tells what comes next.
+
+    Args:
+        maps_of: None makes them here.
+
+    Raises:
+        HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
+    """
+    made: list[CardMaps] = []
+
+    def alpha_of(build: CardBuild) -> Floats:
+        made.append(made_maps(rig, build, choices) if maps_of is None else maps_of(build))
+        return made[-1].textures.alpha
+
+    build = yield from card_build_steps(
+        rig,
+        choices.cards,
+        choices.atlas,
+        choices.occlusion,
+        alpha_of,
+        choices.strands,
+        choices.others,
+    )
+    return MadeCards(build, made[-1])
+
+
+def order_line(wrong_share: float) -> str:
+    """How often the order of cards is wrong, such as "Order: 18 % of pixels wrong"."""
+    return f"Order: {100.0 * wrong_share:.0f} % of pixels wrong"

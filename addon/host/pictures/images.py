@@ -1,0 +1,153 @@
+"""Pictures to and from files and Blender's images, and the contact sheet.
+
+Textures go through OpenImageIO where this Python has it, else through Blender's own images.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...exchange.files.atomic import atomic_write, unwritable
+from ...exchange.textures import texture_files
+from ...exchange.textures.srgb import srgb_decoded, srgb_encoded
+
+
+def write_png(path: Path, linear: Floats) -> None:
+    """Write a picture as 8-bit sRGB PNG.
+
+    Args:
+        linear: (height, width, 4) scene-linear Rec.709, premultiplied alpha, row 0 at the bottom.
+
+    Raises:
+        HairloomError: the folder or file cannot be written.
+    """
+    _save_png(path, display_encoded(linear), has_alpha=True)
+
+
+def write_texture(
+    path: Path, pixels: Floats, *, is_color: bool, depth: str, is_packed: bool = False
+) -> None:
+    """Write a texture, see `texture_files.write_texture`; without OpenImageIO as PNG in 8 bits.
+
+    Args:
+        pixels: (height, width) or (height, width, 1, 3 or 4), row 0 at the bottom.
+
+    Raises:
+        HairloomError: the folder or file cannot be written.
+    """
+    if texture_files.has_openimageio():
+        texture_files.write_texture(
+            path, pixels, is_color=is_color, depth=depth, is_packed=is_packed
+        )
+        return
+    if path.suffix.lower() != ".png":
+        raise HairloomError(
+            f"without OpenImageIO textures are not written as '{path.suffix}'",
+            place=str(path),
+            remedy="Choose PNG, or use an official build of Blender",
+        )
+    values = np.clip(np.atleast_3d(pixels).astype(np.float32), 0.0, 1.0)
+    coded = np.ones((*values.shape[:2], 4), np.float32)
+    coded[..., :3] = srgb_encoded(values[..., :3]) if is_color else values[..., :3]
+    coded[..., 3:] = values[..., 3:] if values.shape[2] == 4 else 1.0
+    _save_png(path, coded, has_alpha=values.shape[2] == 4)
+
+
+def read_texture(path: Path, *, is_color: bool) -> Floats:
+    """Read a picture from a file, see `texture_files.read_texture`.
+
+    Raises:
+        HairloomError: no such file, or none that can be read as a picture.
+    """
+    if texture_files.has_openimageio():
+        return texture_files.read_texture(path, is_color=is_color)
+    try:
+        image = bpy.data.images.load(str(path))
+    except RuntimeError as error:
+        raise HairloomError(
+            "there is no such file, or it cannot be read", place=str(path), remedy="Check the path"
+        ) from error
+    try:
+        return read_image(image, is_color=is_color, place=str(path))
+    finally:
+        bpy.data.images.remove(image)
+
+
+def read_image(image: bpy.types.Image, *, is_color: bool, place: str) -> Floats:
+    """The pixels of one of Blender's images as it is, saved or not, of its own size.
+
+    Args:
+        is_color: as scene-linear colour; else as it is stored, whatever its colour space says.
+        place: names it in error messages.
+
+    Returns:
+        (height, width, 4) float32, row 0 at the bottom, straight alpha.
+
+    Raises:
+        HairloomError: its file is missing or broken, or it is too large.
+    """
+    width, height = image.size  # loads it, if that has not happened
+    if not (width and height and image.has_data):
+        raise HairloomError(
+            "this picture has no pixels: its file is missing or broken",
+            place=place,
+            remedy="Find it by File > External Data > Find Missing Files, or choose another one",
+        )
+    texture_files.check_size(width, height, place)
+    pixels = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(height, width, 4)
+    is_coded = image.colorspace_settings.name == "sRGB"
+    if not image.is_float:  # stored as it is
+        if is_color and is_coded:
+            pixels[..., :3] = srgb_decoded(pixels[..., :3])
+        return pixels
+    # scene-linear already, and multiplied with alpha
+    if image.alpha_mode != "CHANNEL_PACKED":
+        alpha = pixels[..., 3:]
+        np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0.0)
+    if is_coded and not is_color:
+        pixels[..., :3] = srgb_encoded(pixels[..., :3])
+    return pixels
+
+
+def display_encoded(linear: Floats) -> Floats:
+    """Scene-linear premultiplied to sRGB-coded straight alpha, (..., 4) (IEC 61966-2-1)."""
+    alpha = np.clip(linear[..., 3:], 0.0, 1.0)
+    straight = np.divide(
+        linear[..., :3], alpha, out=np.zeros_like(linear[..., :3]), where=alpha > 0.0
+    )
+    coded = srgb_encoded(np.clip(straight, 0.0, 1.0))
+    return np.concatenate([coded, alpha], axis=-1).astype(np.float32)
+
+
+def contact_sheet(pictures: list[Floats], columns: int) -> Floats:
+    """Pictures of one size as one, in reading order, (rows * height, columns * width, 4)."""
+    height, width, channels = pictures[0].shape
+    rows = -(-len(pictures) // columns)
+    sheet = np.zeros((rows * height, columns * width, channels), np.float32)
+    for index, picture in enumerate(pictures):
+        row, column = divmod(index, columns)
+        top = (rows - 1 - row) * height  # row 0 of a picture is its bottom
+        sheet[top : top + height, column * width : (column + 1) * width] = picture
+    return sheet
+
+
+def _save_png(path: Path, coded: Floats, *, has_alpha: bool) -> None:
+    """Write values that are coded already, (height, width, 4), in 8 bits."""
+    height, width = coded.shape[:2]
+    image = bpy.data.images.new("Hairloom", width, height, alpha=has_alpha)
+    try:
+        image.pixels.foreach_set(np.ascontiguousarray(coded, np.float32).ravel())
+        image.file_format = "PNG"
+        with atomic_write(path) as temporary:
+            image.save(filepath=str(temporary))
+            if not texture_files.has_its_end(temporary):
+                raise unwritable(path, "the disk is full")
+    finally:
+        bpy.data.images.remove(image)

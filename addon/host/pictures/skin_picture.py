@@ -1,0 +1,93 @@
+"""The soft shadow on a head's skin as a picture: its map in UV space, see render/skin_pass.py."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...pipeline import Pose, Rig
+from ...render.marschner_textures import hair_forward
+from ...render.skin_pass import SkinPass, SkinShadow
+from ...render.snapshot import MeshSnapshot, Snapshot
+from ...render.strand_pass import StrandPass
+from ...shading.lights import kept_lights
+from ...shading.skin.diffusion import SKIN_LIGHTS
+from ...strands import Surface
+from .slices import lit_as_in
+
+#: the image in which it is shown; each time the same
+IMAGE = "Skin Shadow"
+
+
+def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str) -> Floats:
+    """How much of each light reaches the skin, (rows, columns, 4) scene-linear, row 0 at v = 0.
+
+    White where all light is left, transparent where the map shows no skin. The maps of several
+    lights lie side by side, in the order of the lights, four at most.
+
+    Args:
+        snapshot: its meshes are the head.
+        place: of what was asked for, for errors.
+
+    Raises:
+        HairloomError: there is no such shadow; says why.
+    """
+    maps = strand_pass.opacity(snapshot)
+    if maps is None or not snapshot.skin.soft_shadow or not snapshot.skin.softness:
+        raise HairloomError(
+            "there is no soft shadow on skin that could be shown",
+            place=place,
+            remedy="Set Shadows to Deep Opacity or Opacity Slices, and Soft Shadow on Skin with a "
+            "Softness above 0",
+        )
+    if not maps.size.map_count:
+        raise HairloomError(
+            "no light throws a shadow of hair here",
+            place=place,
+            remedy="Add a light outside of the hair, and raise Lights in Shadows if it is 0",
+        )
+    lights, skin_pass = len(kept_lights(snapshot.lights)), SkinPass()
+    skin_pass.shadows(snapshot.meshes, maps, snapshot.skin, lights, hair_forward(snapshot))
+    if not skin_pass.drawn:
+        raise HairloomError(
+            "there is no head with UVs",
+            place=place,
+            remedy="Choose a head, and unwrap it (UV > Unwrap in Edit Mode)",
+        )
+    return _side_by_side(skin_pass.drawn[0], min(maps.size.map_count, SKIN_LIGHTS))
+
+
+def skin_shadow_of_view(
+    snapshot: Snapshot, rig: Rig, pose: Pose, context: bpy.types.Context, *, place: str
+) -> Floats:
+    """The same of previewed hair on its head, in the light in which a 3D view shows it.
+
+    Raises:
+        HairloomError: as `shown_skin_shadow`.
+    """
+    shown = lit_as_in(context, _on_its_head(snapshot, rig, pose))
+    return shown_skin_shadow(shown, StrandPass(), place=place)
+
+
+def _on_its_head(snapshot: Snapshot, rig: Rig, pose: Pose) -> Snapshot:
+    """The hair with its head as a mesh."""
+    head = rig.head
+    if head is None or pose.head_positions is None:
+        return snapshot
+    surface = Surface(pose.head_positions, head.triangles, head.corner_uv)
+    mesh = MeshSnapshot.of(surface, is_skin=True)
+    return replace(snapshot, meshes=(mesh,), casters=())
+
+
+def _side_by_side(shadow: SkinShadow, count: int) -> Floats:
+    """The first `count` channels of a map, each as a picture of its own."""
+    is_skin = shadow.layout.island >= 0
+    values = np.where(is_skin[..., None], shadow.picture(), 0.0)
+    pictures = [
+        np.dstack([values[..., light]] * 3 + [is_skin]).astype(np.float32) for light in range(count)
+    ]
+    return np.concatenate(pictures, axis=1)

@@ -1,0 +1,91 @@
+"""Pictures as a video, by Blender's own writer: no other program is asked.
+
+Blender writes videos of what a scene's sequencer holds, so there is one for as long as it takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+
+from ...errors import HairloomError
+from ...exchange.files.atomic import atomic_write
+
+#: those that the writer may have been built with, the one that more players know first
+_CODECS = ("H264", "MPEG4")
+
+
+def can_write_video() -> bool:
+    """Whether this Blender was built with a writer of videos."""
+    return bool(bpy.app.build_options.codec_ffmpeg)
+
+
+def write_video(
+    path: Path, frames: Sequence[Path], size: tuple[int, int], frame_rate: float
+) -> None:
+    """Write pictures as an .mp4. Sides are made even, as the codecs want them.
+
+    Args:
+        frames: pictures of one folder and one size, in order.
+        size: width and height [pixels].
+        frame_rate: [frames / s].
+
+    Raises:
+        HairloomError: this Blender writes no videos, or the file cannot be written.
+    """
+    if not can_write_video():
+        raise _failed(path, "this Blender was built without FFmpeg")
+    why = "it has neither of the codecs " + " and ".join(_CODECS)
+    with atomic_write(path) as temporary, _sequence_of(frames, size, frame_rate) as scene:
+        scene.render.filepath = str(temporary)
+        for codec in _CODECS:
+            scene.render.ffmpeg.codec = codec
+            try:
+                bpy.ops.render.render(animation=True, scene=scene.name)
+            except RuntimeError as error:
+                why = str(error).strip()
+            if temporary.is_file() and temporary.stat().st_size:
+                return
+        raise _failed(path, why)
+
+
+@contextmanager
+def _sequence_of(
+    frames: Sequence[Path], size: tuple[int, int], frame_rate: float
+) -> Iterator[bpy.types.Scene]:
+    """A scene that renders to these pictures, colours as they are."""
+    scene = bpy.data.scenes.new("Hairloom Video")
+    try:
+        strip = scene.sequence_editor_create().strips.new_image(
+            "Frames", str(frames[0]), 1, 1, fit_method="ORIGINAL"
+        )
+        for frame in frames[1:]:
+            strip.elements.append(frame.name)
+        strip.right_handle = 1 + len(frames)
+        scene.frame_start, scene.frame_end = 1, len(frames)
+        scene.view_settings.view_transform = "Standard"
+        render = scene.render
+        render.resolution_x, render.resolution_y = (max(side // 2 * 2, 2) for side in size)
+        render.resolution_percentage = 100
+        render.fps = max(round(frame_rate), 1)
+        render.fps_base = render.fps / frame_rate
+        render.use_file_extension = False
+        render.image_settings.media_type = "VIDEO"
+        render.image_settings.file_format = "FFMPEG"
+        render.ffmpeg.format = "MPEG4"
+        render.ffmpeg.constant_rate_factor = "HIGH"
+        render.ffmpeg.audio_codec = "NONE"
+        yield scene
+    finally:
+        bpy.data.scenes.remove(scene)
+
+
+def _failed(path: Path, why: str) -> HairloomError:
+    return HairloomError(
+        f"no video was written ({why})",
+        place=str(path),
+        remedy="The pictures are there: make a video of them with an official build of Blender",
+    )

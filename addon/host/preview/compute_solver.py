@@ -1,0 +1,131 @@
+"""The solver on the GPU: guides stay there from the simulation to the drawing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ... import pipeline
+from ...arrays import Floats
+from ...dynamics.colliders import PosedCollider
+from ...dynamics.settings import DynamicsSettings
+from ...pipeline import Motion, Pose, Rig
+from ...render.dynamics_pass import DynamicsPass
+from ...render.ride_pass import RidePass
+from ...render.snapshot import Snapshot
+from ...render.textures import from_strand_rows, texture_to_array
+from .numpy_solver import checked_guides, let_go
+
+
+class ComputeSolver:
+    """On the GPU. Textures come with the first frame that is simulated or shown.
+
+    It keeps a motion whose dynamics are those from which the GPU started; what is newer lies there.
+    """
+
+    form = "compute"
+
+    def __init__(self, rig: Rig, motion: Motion | None = None) -> None:
+        self._rig = rig
+        self._motion = motion or pipeline.begin(rig, rig.rest_pose)
+        self._is_baked = False
+        self._is_resting = motion is None
+        self._is_drawn = False
+        self._dynamics: DynamicsPass | None = None
+        self._ride = RidePass(rig.strands, rig.head, rig.guides, rig.weights)
+
+    @property
+    def pose(self) -> Pose:
+        return self._motion.pose
+
+    @property
+    def motion(self) -> Motion:
+        if self._is_baked:
+            return let_go(self._rig, self._motion)
+        if self._dynamics is None:
+            return self._motion
+        return replace(self._motion, dynamics=self._dynamics.read(), guides=self.guides())
+
+    def rest(self, pose: Pose) -> None:
+        self._take(pipeline.begin(self._rig, pose))
+        self._is_resting = True
+
+    def advance(
+        self,
+        pose: Pose,
+        colliders: tuple[PosedCollider, ...],
+        settings: DynamicsSettings,
+        gravity: Floats,
+        duration: float,
+        scene_wind: Floats = pipeline.NO_WIND,
+    ) -> None:
+        if self._is_baked:
+            self._take(self.motion)
+        motion = self._motion
+        if self._dynamics is None:
+            self._dynamics = DynamicsPass(motion.dynamics)
+        target = pipeline.carried(self._rig, pose, self._rig.guides)
+        drive = motion.drive(target, colliders, gravity, duration, scene_wind)
+        self._dynamics.advance(drive, settings, duration)
+        self._motion = replace(
+            motion,
+            carried_guides=target,
+            pose=pose,
+            carried_earlier=motion.carried_guides,
+            duration=duration,
+        )
+        self._is_resting = self._is_drawn = False
+
+    def carry(self, pose: Pose, guides: Floats) -> None:
+        self._take(replace(self._motion, pose=pose, guides=checked_guides(self._rig, guides)))
+        self._is_baked = True
+
+    def guides(self) -> Floats:
+        texture = self._guides_texture
+        if texture is None:
+            return self._motion.guides
+        guide_count, cv_count, _ = self._motion.guides.shape
+        pixels = from_strand_rows(texture_to_array(texture), guide_count, cv_count)
+        return np.ascontiguousarray(pixels[..., :3])
+
+    def strands(self) -> Floats:
+        self._draw()
+        return self._ride.read()
+
+    def shown(self, snapshot: Snapshot) -> Snapshot:
+        self._draw()
+        return replace(snapshot, device_points=self._ride.points)
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU; the next frame goes on from what was read back."""
+        is_resting, is_baked = self._is_resting, self._is_baked
+        self._take(self._motion if is_baked else self.motion)
+        self._is_resting, self._is_baked = is_resting, is_baked
+        self._ride.release()
+
+    @property
+    def _guides_texture(self) -> Any:
+        """The guides on the GPU; None where those of the motion are meant."""
+        return None if self._dynamics is None else self._dynamics.guides
+
+    def _take(self, motion: Motion) -> None:
+        """Show the guides of this motion; what was simulated on the GPU is over."""
+        if self._dynamics is not None:
+            self._dynamics.release()
+            self._dynamics = None
+        self._motion = motion
+        self._is_baked = self._is_resting = self._is_drawn = False
+
+    def _draw(self) -> None:
+        """Bring the strands on the GPU to this moment, once."""
+        if self._is_drawn and self._ride.points.texture is not None:
+            return
+        head, matrix = self.pose.head_positions, self.pose.matrix
+        if self._is_resting:
+            self._ride.carry(head, matrix)
+        else:
+            texture = self._guides_texture
+            self._ride.ride(head, matrix, self._motion.guides if texture is None else texture)
+        self._is_drawn = True

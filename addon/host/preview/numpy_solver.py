@@ -1,0 +1,93 @@
+"""The solver on the CPU, and what both solvers do with baked guides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ... import pipeline
+from ...arrays import Floats
+from ...dynamics.colliders import PosedCollider
+from ...dynamics.settings import DynamicsSettings
+from ...dynamics.state import rows_of
+from ...errors import HairloomError
+from ...pipeline import Motion, Pose, Rig
+from ...render.snapshot import Snapshot
+
+
+class NumpySolver:
+    """On the CPU; the same to the last bit on every machine."""
+
+    form = "numpy"
+
+    def __init__(self, rig: Rig, motion: Motion | None = None) -> None:
+        self._rig = rig
+        self._motion = motion or pipeline.begin(rig, rig.rest_pose)
+        self._is_baked = False
+        self._strands: Floats | None = None
+
+    @property
+    def pose(self) -> Pose:
+        return self._motion.pose
+
+    @property
+    def motion(self) -> Motion:
+        return let_go(self._rig, self._motion) if self._is_baked else self._motion
+
+    def rest(self, pose: Pose) -> None:
+        self._take(pipeline.begin(self._rig, pose))
+        self._strands = pipeline.carried(self._rig, pose)  # guides at rest move nothing
+
+    def advance(
+        self,
+        pose: Pose,
+        colliders: tuple[PosedCollider, ...],
+        settings: DynamicsSettings,
+        gravity: Floats,
+        duration: float,
+        scene_wind: Floats = pipeline.NO_WIND,
+    ) -> None:
+        self._take(
+            pipeline.advance(
+                self._rig, self.motion, pose, colliders, settings, gravity, duration, scene_wind
+            )
+        )
+
+    def carry(self, pose: Pose, guides: Floats) -> None:
+        self._take(replace(self._motion, pose=pose, guides=checked_guides(self._rig, guides)))
+        self._is_baked = True
+
+    def guides(self) -> Floats:
+        return self._motion.guides
+
+    def strands(self) -> Floats:
+        if self._strands is None:
+            self._strands = pipeline.strands_now(self._rig, self._motion)
+        return self._strands
+
+    def shown(self, snapshot: Snapshot) -> Snapshot:
+        return replace(snapshot, strands=self.strands(), device_points=None)
+
+    def _take(self, motion: Motion) -> None:
+        self._motion, self._is_baked, self._strands = motion, False, None
+
+
+def checked_guides(rig: Rig, guides: Floats) -> Floats:
+    """Baked guides as float32, if they belong to this rig."""
+    wanted = len(rig.guides), rig.strands.grid.shape[1], 3
+    if guides.shape != wanted:
+        raise HairloomError(
+            f"it holds guides of shape {guides.shape}, this groom has {wanted}",
+            place="bake",
+            remedy="Bake again",
+        )
+    return np.ascontiguousarray(guides, np.float32)
+
+
+def let_go(rig: Rig, shown: Motion) -> Motion:
+    """The motion that starts from shown guides at no speed."""
+    begun = pipeline.begin(rig, shown.pose)
+    rows = rows_of(shown.guides, "bake")
+    dynamics = replace(begun.dynamics, position=rows, previous=rows)
+    return replace(begun, dynamics=dynamics, guides=shown.guides)

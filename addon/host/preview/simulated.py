@@ -1,0 +1,102 @@
+"""What moves: a groom or a fin, as the window's Play, the timeline and a bake see it.
+
+Fingerprints and moments are hashes with names, such as "hair=3f2a settings=91bc", so that an
+artist can be told which of them has changed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any, Protocol
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...params import Settings
+
+type Arrays = dict[str, NDArray[Any]]
+type Hashed = NDArray[Any] | Settings | str | float | None
+
+#: Raise it when the same input gives other motion than before, so that old bakes say so.
+SOLVER_VERSION = 1
+
+
+class Simulated(Protocol):
+    """One groom or fin in motion.
+
+    uid: session number of its object. is_playing: whether it is being simulated.
+    is_stale: whether what it was read from has been edited since.
+    All but `uid`, `name` and `stop` raise HairloomError when what it is made of is gone or broken.
+    """
+
+    is_playing: bool
+    is_stale: bool
+
+    @property
+    def uid(self) -> int: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the artist should know, each with its remedy."""
+
+    def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """In its style, where its body is now, at no speed."""
+
+    def play(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Get ready to be simulated, from rest."""
+
+    def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Simulate no longer; back to rest."""
+
+    def advance(self, depsgraph: bpy.types.Depsgraph, duration: float) -> None:
+        """Simulate the time [s] in which everything moved to where it is now."""
+
+    def constants(self) -> Arrays:
+        """What a bake needs once: to show its frames without reading anything of the scene."""
+
+    def recorded(self) -> Arrays:
+        """This frame."""
+
+    def show_recorded(self, frame: Arrays) -> None:
+        """Show a frame of a bake in place of what was simulated."""
+
+    def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """Hashes of what a bake hangs on beside the animation."""
+
+    def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """Hashes of what drives this frame."""
+
+
+def hashes(**parts: Hashed | tuple[Hashed, ...]) -> str:
+    """Named hashes: "hair=3f2a settings=91bc" for parts of arrays, settings, text and numbers."""
+    return " ".join(f"{name}={_hash(part)}" for name, part in parts.items())
+
+
+def differences(known: str, now: str) -> tuple[str, ...]:
+    """The names of the parts that differ, in words."""
+    before, after = (_parts(one) for one in (known, now))
+    names = [name for name in after if before.get(name) != after[name]]
+    names += [name for name in before if name not in after]
+    return tuple(name.replace("_", " ") for name in names)
+
+
+def _parts(named: str) -> dict[str, str]:
+    """A plain hash counts as one part without a name of its own."""
+    pairs = (part.rpartition("=") for part in named.split())
+    return {name or "what it was made from": value for name, _, value in pairs}
+
+
+def _hash(part: Hashed | tuple[Hashed, ...]) -> str:
+    state = hashlib.blake2b(digest_size=8)
+    for value in part if isinstance(part, tuple) else (part,):
+        if isinstance(value, np.ndarray):
+            state.update(f"{value.dtype} {value.shape}".encode())
+            state.update(np.ascontiguousarray(value).tobytes())
+        else:
+            state.update(repr(value).encode())
+        state.update(b"\0")
+    return state.hexdigest()

@@ -1,0 +1,145 @@
+"""The camera of a render, as the renderer knows it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...render.camera import Camera
+from ...render.camera_window import Window, cropped
+
+#: Blender's own limit of a picture's side
+_SMALLEST = 1
+
+
+def read_camera(
+    engine: Any, depsgraph: bpy.types.Depsgraph, width: int, height: int, window: Window
+) -> Camera:
+    """The camera that renders now, of the view that is rendered.
+
+    Args:
+        width, height: of the whole picture [pixels].
+        window: the part of it that is drawn.
+
+    Raises:
+        HairloomError: there is no camera.
+    """
+    camera = engine.camera_override or depsgraph.scene.camera
+    if camera is None or camera.type != "CAMERA":
+        raise HairloomError(
+            "there is no camera", place=depsgraph.scene.name, remedy="Add one (Add > Camera)"
+        )
+    evaluated = camera.evaluated_get(depsgraph)
+    render = depsgraph.scene.render
+    projection = np.array(
+        evaluated.calc_matrix_camera(
+            depsgraph,
+            x=width,
+            y=height,
+            scale_x=render.pixel_aspect_x,
+            scale_y=render.pixel_aspect_y,
+        )
+    )
+    # the two eyes of a stereo camera look through shifted windows
+    shift = engine.camera_shift_x(evaluated) - evaluated.data.shift_x
+    projection[0] -= 2.0 * shift * _fit_share(evaluated.data, render, width, height) * projection[3]
+    matrix = np.array(engine.camera_model_matrix(evaluated)).reshape(4, 4)
+    return cropped(Camera(_view_matrix(matrix), projection), window)
+
+
+def camera_warnings(depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
+    """What the artist should know about the camera, with its remedy; mostly nothing."""
+    camera = depsgraph.scene.camera
+    if camera is None or camera.data.type != "PANO":
+        return ()
+    return (
+        f"{camera.name}: panoramic cameras are not drawn, this is a perspective one. Set its "
+        "Type to Perspective or Orthographic.",
+    )
+
+
+def border_window(
+    render: bpy.types.RenderSettings, width: int, height: int
+) -> tuple[Window, tuple[int, int]]:
+    """The part of the picture that is rendered, and how many pixels that is.
+
+    Raises:
+        HairloomError: the part has no pixels.
+    """
+    left, bottom, right, top = 0, 0, width, height
+    if render.use_border:
+        left, right = int(render.border_min_x * width), int(render.border_max_x * width)
+        bottom, top = int(render.border_min_y * height), int(render.border_max_y * height)
+    size = right - left, top - bottom
+    if min(size) < _SMALLEST:
+        raise HairloomError(
+            f"the picture has {max(size[0], 0)} x {max(size[1], 0)} pixels",
+            place="render",
+            remedy="Set a larger resolution, or clear the render region (Ctrl Alt B)",
+        )
+    return (left / width, bottom / height, right / width, top / height), size
+
+
+def view_rectangle(
+    context: Any, depsgraph: bpy.types.Depsgraph, width: int, height: int
+) -> tuple[int, int, int, int]:
+    """The part of a 3D view that is drawn: its render region, in a camera's view the scene's.
+
+    Args:
+        width, height: of the view [pixels].
+
+    Returns:
+        Left, bottom, width and height [pixels]; the two last are 0 where the region lies outside
+        of the view or has no pixels.
+    """
+    space, region, scene = context.space_data, context.region_data, depsgraph.scene
+    corners = np.array([[0.0, 0.0], [1.0, 1.0]])
+    if region.view_perspective != "CAMERA":
+        if space.use_render_border:
+            corners = _border(space, "render_border")
+    elif scene.render.use_border:
+        camera = space.camera or scene.camera
+        if camera is not None and camera.type == "CAMERA":
+            frame = _camera_frame(camera.evaluated_get(depsgraph), scene, region)
+            corners = frame[0] + _border(scene.render, "border") * (frame[1] - frame[0])
+    low, high = np.clip(corners * (width, height), 0, (width, height)).round().astype(int)
+    across, up = np.maximum(high - low, 0)
+    return int(low[0]), int(low[1]), int(across), int(up)
+
+
+def _border(owner: Any, name: str) -> Floats:
+    """Lower left and upper right corner, (2, 2), as shares."""
+    return np.array(
+        [[getattr(owner, f"{name}_{end}_{axis}") for axis in "xy"] for end in ("min", "max")]
+    )
+
+
+def _camera_frame(camera: bpy.types.Object, scene: bpy.types.Scene, region: Any) -> Floats:
+    """Lower left and upper right corner of what a camera sees, as shares of its 3D view."""
+    frame = np.array([(*corner, 1.0) for corner in camera.data.view_frame(scene=scene)])
+    clip = frame @ np.array(region.window_matrix).T
+    places = 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
+    return np.array([places.min(axis=0), places.max(axis=0)])
+
+
+def _view_matrix(matrix: Floats) -> Floats:
+    """World to view space of a camera's matrix, whose scale counts for nothing."""
+    rigid = np.eye(4)
+    rigid[:3, :3] = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    rigid[:3, 3] = matrix[:3, 3]
+    return np.linalg.inv(rigid)
+
+
+def _fit_share(
+    camera: bpy.types.Camera, render: bpy.types.RenderSettings, width: int, height: int
+) -> float:
+    """The side that a shift is a share of, as a share of the picture's width."""
+    wide, high = width * render.pixel_aspect_x, height * render.pixel_aspect_y
+    is_by_width = camera.sensor_fit == "HORIZONTAL" or (
+        camera.sensor_fit == "AUTO" and wide >= high
+    )
+    return 1.0 if is_by_width else high / wide

@@ -1,0 +1,179 @@
+"""The grooms of a render: as they were baked, or else as Blender has evaluated their curves.
+
+What costs time and seldom changes, such as children and ambient occlusion, is kept from frame to
+frame as long as curves, head and settings are the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ... import pipeline
+from ...arrays import Floats
+from ...cards.follow import moved_mesh
+from ...pipeline import Rig
+from ...render.snapshot import Snapshot
+from ...strands.affine import moved
+from ..bakes import playback
+from ..bakes.baked_rig import BakedRig
+from ..bakes.cache import Cache
+from ..cards.card_builds import BuiltCards, CardForm, built_cards
+from ..cards.card_images import chosen_pictures
+from ..cards.other_cards import other_cards
+from ..cards.shown_cards import as_shown
+from ..preview.reading import Reading
+from ..preview.shown import snapshot_of, with_all_strands, with_choices
+from ..scene.objects import head_of
+from ..settings.choices import Choices
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A groom at rest, and the values it was made from."""
+
+    made_from: tuple[Any, ...]
+    rig: Rig
+    snapshot: Snapshot
+    _cards: list[BuiltCards] = field(default_factory=list)
+
+    def cards(
+        self, owner: bpy.types.Object, form: CardForm, depsgraph: bpy.types.Depsgraph
+    ) -> BuiltCards:
+        """Its cards; those of the last form are kept, to the last colour."""
+        kept = [each for each in self._cards if each.form == form]
+        if not kept or kept[0].form.shading != form.shading:
+            pictures, _ = chosen_pictures(owner.data.hairloom.card_images)
+            others, _ = other_cards(form.occlusion, owner, depsgraph)
+            self._cards[:] = [built_cards(self.rig, form, pictures, others)]
+        return self._cards[0]
+
+
+_kept: dict[int, _Kept] = {}
+
+
+def owner_of(hair: bpy.types.Object) -> bpy.types.Object:
+    """The groom that a copy for renders stands for; of all other hair, itself.
+
+    Args:
+        hair: not the evaluated copy.
+    """
+    if not hair.data.hairloom.baked_in:
+        return hair
+    return next((obj for obj in bpy.data.objects if obj.hairloom.bake.copy == hair), hair)
+
+
+def read_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Snapshot:
+    """One groom as a render shows it, in world space, without light.
+
+    Args:
+        hair: not the evaluated copy; hair curves, or the copy of a bake.
+
+    Raises:
+        HairloomError: none of its curves can be used, or its bake is damaged.
+    """
+    owner = owner_of(hair)
+    choices = Choices.of(owner)
+    cache, scene = playback.cache_of(owner), depsgraph.scene
+    # A copy stays as it is beyond the baked frames; curves of the artist's go on by themselves.
+    if cache is not None and (owner != hair or _shows_bake(owner, cache, scene.frame_current)):
+        strands = playback.strands_in(cache, scene.frame_current, scene.frame_subframe)
+        kept = _of_bake(owner, playback.rig_in(cache), choices)
+        pose = playback.pose_in(cache, scene.frame_current, scene.frame_subframe)
+    else:
+        kept = _of_curves(owner, choices, depsgraph)
+        strands, pose = kept.snapshot.strands, kept.rig.rest_pose
+    snapshot = replace(kept.snapshot, strands=strands)
+    if choices.shows_cards:
+        built = kept.cards(owner, choices.card_form, depsgraph)
+        cards = built.at(pose, strands[kept.rig.guides], choices.cards_drawn)
+        snapshot = as_shown(replace(snapshot, cards=cards))
+    return with_all_strands(with_choices(snapshot, choices))
+
+
+def state_of(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Any, ...]:
+    """What decides how hair looks, but for its curves and its head.
+
+    Raises:
+        HairloomError: its bake is damaged.
+    """
+    owner, scene = owner_of(hair), depsgraph.scene
+    cache = playback.cache_of(owner)
+    # where a bake is shown, it moves from frame to frame
+    frame = 0.0 if cache is None else scene.frame_current_final
+    return Choices.of(owner), cache, owner.hairloom.bake.is_shown, frame
+
+
+def uids_of(hair: bpy.types.Object) -> set[int]:
+    """Session numbers of hair and head, and of their data."""
+    objects = [owner_of(hair), head_of(owner_of(hair))]
+    return {each.session_uid for obj in objects if obj is not None for each in (obj, obj.data)}
+
+
+def placed(snapshot: Snapshot, motion: Floats) -> Snapshot:
+    """The same, moved by an affine (4, 4) matrix, as an instance is."""
+    strands = moved(snapshot.strands.reshape(-1, 3), motion).reshape(snapshot.strands.shape)
+    cards, center = snapshot.cards, snapshot.volume_center
+    if cards is not None:
+        cards = replace(cards, mesh=moved_mesh(cards.mesh, motion))
+    if center is not None:
+        center = moved(center[None], motion)[0]
+    return replace(snapshot, strands=strands, cards=cards, volume_center=center)
+
+
+def forget() -> None:
+    """Keep no groom in memory."""
+    _kept.clear()
+
+
+def forget_but(uids: set[int]) -> None:
+    """Keep these alone, by session number of their objects."""
+    for uid in set(_kept) - uids:
+        del _kept[uid]
+
+
+def _shows_bake(hair: bpy.types.Object, cache: Cache, frame: int) -> bool:
+    return bool(hair.hairloom.bake.is_shown and cache.holds(frame))
+
+
+def _of_bake(owner: bpy.types.Object, baked: BakedRig, choices: Choices) -> _Kept:
+    made_from = baked.rig.strands.points, choices.ambient
+    return _made(owner, made_from, choices, lambda: baked.rig)
+
+
+def _of_curves(hair: bpy.types.Object, choices: Choices, depsgraph: bpy.types.Depsgraph) -> _Kept:
+    reading = Reading(hair, depsgraph)
+    source = reading.source
+    made_from = (
+        source.strands.points,
+        source.strands.offsets,
+        source.strands.radius,
+        source.strands.group,
+        None if source.head is None else source.head.positions,
+        source.density,
+        choices.of_rig,
+        choices.ambient,
+    )
+    return _made(hair, made_from, choices, reading.rig)
+
+
+def _made(owner: bpy.types.Object, made_from: tuple[Any, ...], choices: Choices, rig: Any) -> _Kept:
+    kept = _kept.get(owner.session_uid)
+    if kept is None or not _alike(kept.made_from, made_from):
+        made = rig()
+        occlusion = pipeline.rest_occlusion(made, choices.ambient)
+        snapshot = snapshot_of(made, occlusion, pipeline.strand_ranks(made))
+        kept = _kept[owner.session_uid] = _Kept(made_from, made, snapshot)
+    return kept
+
+
+def _alike(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
+    return len(one) == len(other) and all(
+        np.array_equal(a, b)
+        if isinstance(a, np.ndarray) and isinstance(b, np.ndarray)
+        else not isinstance(a, np.ndarray) and not isinstance(b, np.ndarray) and a == b
+        for a, b in zip(one, other, strict=True)
+    )

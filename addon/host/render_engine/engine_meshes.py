@@ -1,0 +1,141 @@
+"""Evaluated objects as meshes to draw: meshes, and whatever Blender turns into one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...render.snapshot import MeshPictures, MeshSnapshot, Skin
+from ...strands import Surface
+from ...strands.affine import moved
+from ..scene.mesh_materials import MeshMaterial, material_of
+from ..scene.surfaces import read_corner_uv
+
+#: types of objects that have faces; Blender hands out what texts and legacy curves become as meshes
+SOLID_TYPES = frozenset({"MESH", "META"})
+
+
+def read_meshes(
+    obj: bpy.types.Object, matrix: Floats, *, is_head: bool
+) -> tuple[MeshSnapshot, ...]:
+    """One for each material that an evaluated object uses; none without faces.
+
+    Args:
+        matrix: (4, 4) from object to world space, of the instance.
+        is_head: whether hair grows on it, whose shadow is soft then.
+    """
+    mesh = obj.data if obj.type == "MESH" else obj.to_mesh()
+    if mesh is None:
+        return ()
+    try:
+        return _split(mesh, obj, matrix, is_head) if len(mesh.polygons) else ()
+    finally:
+        if obj.type != "MESH":
+            obj.to_mesh_clear()
+
+
+def _split(
+    mesh: bpy.types.Mesh, obj: bpy.types.Object, matrix: Floats, is_head: bool
+) -> tuple[MeshSnapshot, ...]:
+    triangles, positions, normals = _corners(mesh)
+    # rows: the transpose of the inverse, which normals need, from the right
+    from_world = np.linalg.pinv(matrix[:3, :3])
+    positions = moved(positions, matrix)
+    if not np.isfinite(positions).all():
+        return ()
+    normals = normals @ from_world.astype(np.float32)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0.0)
+    slots = np.zeros(len(triangles), np.int32)
+    if len(obj.material_slots) > 1:
+        mesh.loop_triangles.foreach_get("material_index", slots)
+    found = []
+    corner_uv = read_corner_uv(mesh)
+    is_skin = is_head and corner_uv is not None
+    head = Surface(positions, triangles, corner_uv) if is_skin else None
+    for slot in np.unique(slots):
+        here = np.flatnonzero(slots == slot)
+        own, vertices = np.unique(triangles[here], return_inverse=True)
+        material = _material(obj, int(slot))
+        uv = None if corner_uv is None or material.pictures is None else corner_uv[here]
+        surface = Surface(positions[own], vertices.reshape(-1, 3).astype(np.int32), uv)
+        skin = None if head is None else Skin(head, here)
+        found.append(_with_material(MeshSnapshot(surface, normals[own], skin=skin), material))
+    return tuple(found)
+
+
+def _corners(mesh: bpy.types.Mesh) -> tuple[Ints, Floats, Floats]:
+    """Triangles, positions and normals; a vertex is there once for each of its normals."""
+    mesh.calc_loop_triangles()
+    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    positions = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", positions.ravel())
+    if mesh.normals_domain == "POINT":
+        mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+        normals = np.empty_like(positions)
+        mesh.vertex_normals.foreach_get("vector", normals.ravel())
+        return triangles, positions, normals
+    mesh.loop_triangles.foreach_get("loops", triangles.ravel())
+    vertices = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    normals = np.empty((len(mesh.loops), 3), np.float32)
+    mesh.corner_normals.foreach_get("vector", normals.ravel())
+    return triangles, positions[vertices], normals
+
+
+def _material(obj: bpy.types.Object, slot: int) -> MeshMaterial:
+    slots = obj.material_slots
+    return material_of(slots[min(slot, len(slots) - 1)].material if len(slots) else None)
+
+
+def _with_material(mesh: MeshSnapshot, material: MeshMaterial) -> MeshSnapshot:
+    return replace(
+        mesh,
+        color=material.color,
+        sheen=material.sheen,
+        pictures=material.pictures,
+        alpha=material.alpha,
+        transparency=material.transparency,
+    )
+
+
+def as_before(old: MeshSnapshot, new: MeshSnapshot) -> MeshSnapshot:
+    """The old one where both draw the same, so that it may stay on the GPU; of a head that has
+    only moved, the new one with the old triangles and UVs.
+    """
+    is_same = (
+        _looks(old) == _looks(new)
+        and np.array_equal(old.surface.triangles, new.surface.triangles)
+        and _same_uv(old.surface, new.surface)
+        and np.array_equal(old.surface.positions, new.surface.positions)
+        and np.array_equal(old.vertex_normals, new.vertex_normals)
+    )
+    was, now = old.skin, new.skin
+    if was is None or now is None or not _same_chart(was.surface, now.surface):
+        return old if is_same else new
+    if is_same:
+        return old
+    kept = replace(now.surface, triangles=was.surface.triangles, corner_uv=was.surface.corner_uv)
+    return replace(new, skin=replace(now, surface=kept))
+
+
+def _looks(mesh: MeshSnapshot) -> tuple[object, ...]:
+    """What decides how it is drawn, beside its surface."""
+    pictures = mesh.pictures or MeshPictures()
+    return (
+        *(mesh.color, mesh.sheen, mesh.number, mesh.is_holdout, mesh.skin is None),
+        *(mesh.alpha, mesh.transparency, pictures.bump),
+        *(id(pictures.color), id(pictures.normal)),
+    )
+
+
+def _same_chart(one: Surface, other: Surface) -> bool:
+    return np.array_equal(one.triangles, other.triangles) and _same_uv(one, other)
+
+
+def _same_uv(one: Surface, other: Surface) -> bool:
+    was, now = one.corner_uv, other.corner_uv
+    return was is now or (was is not None and now is not None and np.array_equal(was, now))

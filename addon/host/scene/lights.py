@@ -1,0 +1,197 @@
+"""The scene's lights and world, as the renderer knows them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...arrays import Floats
+from ...shading.area_lights import Panel
+from ...shading.lights import LIGHT_CAPACITY, Cone, Light, light_irradiance
+
+type Color = tuple[float, float, float]
+
+
+def read_lights(depsgraph: bpy.types.Depsgraph, center: Floats) -> tuple[Light, ...]:
+    """The visible lights that shine most strongly on a place, strongest first, at most eight.
+
+    As Cycles takes them, but for what is left out: shadows, light linking, lights that are
+    instanced, textures and other nodes of a light than its plain Emission, and the factors by
+    which EEVEE weighs diffuse light and highlights.
+
+    Args:
+        center: (3,) [m], world space.
+    """
+    lights = list(_lights(depsgraph))
+    return tuple(sorted(lights, key=lambda light: -_strength(light, center))[:LIGHT_CAPACITY])
+
+
+def light_warnings(depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
+    """What the artist should know about the scene's lights, each with its remedy; mostly none."""
+    count = sum(1 for _ in _lights(depsgraph))
+    if count <= LIGHT_CAPACITY:
+        return ()
+    return (
+        f"Lights: {count} shine here, but the preview draws only the {LIGHT_CAPACITY} that are "
+        "brightest at the middle of the hair. Hide those that add least.",
+    )
+
+
+def no_light_warnings(lights: Sequence[Light], ambient: Color) -> tuple[str, ...]:
+    """What the artist should know where nothing shines although a view goes by the scene's lights.
+
+    Such a view shows hair by the world alone, or, if that is black, by a studio's lights; see
+    `overlay.lit`.
+    """
+    if lights or not scene_lights_are_shown():
+        return ()
+    if any(ambient):
+        return (
+            "Lights: no light shines here, so where views go by the scene's lights, hair has only "
+            "the world's colour. Add a light, or turn Scene Lights off in Viewport Shading.",
+        )
+    return (
+        "Lights: no light shines here and the world is black, so hair is shown by the lights of a "
+        "studio. Add a light, or give the world a colour.",
+    )
+
+
+def scene_lights_are_shown() -> bool:
+    """Whether a view goes by the scene's lights."""
+    return any(uses_scene_light(each)[0] for each in _open_shadings())
+
+
+def uses_scene_light(shading: bpy.types.View3DShading) -> tuple[bool, bool]:
+    """Whether a 3D view shows things by the scene's lights, and by its world."""
+    if shading.type == "MATERIAL":
+        return shading.use_scene_lights, shading.use_scene_world
+    if shading.type == "RENDERED":
+        return shading.use_scene_lights_render, shading.use_scene_world_render
+    return False, False
+
+
+def _open_shadings() -> Iterator[bpy.types.View3DShading]:
+    """Of all 3D views that are open."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                yield area.spaces.active.shading
+
+
+def read_ambient(scene: bpy.types.Scene) -> Color:
+    """The world's plain colour [W/(m^2 sr)]; of an image or a sky the background's own colour."""
+    world = scene.world
+    if world is None:
+        return (0.0, 0.0, 0.0)
+    background = _node(world.node_tree, "BACKGROUND")
+    if background is None:
+        return _triple(world.color)
+    strength = background.inputs["Strength"].default_value
+    return _triple(channel * strength for channel in background.inputs["Color"].default_value)
+
+
+def _lights(depsgraph: bpy.types.Depsgraph) -> Iterator[Light]:
+    for instance in depsgraph.objects:
+        if instance.type == "LIGHT":
+            light = _light(instance)
+            if light is not None and sum(light.power) > 0.0:
+                yield replace(light, name=instance.name, casts_shadow=instance.data.use_shadow)
+
+
+def _light(instance: bpy.types.Object) -> Light | None:
+    """None: it sends out no light of its own, or has no direction, being scaled to nothing."""
+    data, matrix = instance.data, instance.matrix_world
+    color = _emission(data) * np.array(data.color) * data.energy * 2.0**data.exposure
+    if data.use_temperature:
+        color = color * np.array(data.temperature_color)
+    place = np.array(matrix.translation)
+    along = -np.array(matrix.col[2][:3])
+    if data.type in ("SUN", "AREA") and not along.any():
+        return None
+    if data.type == "SUN":
+        return Light.sun(along, color, 1.0 if data.normalize else _sun_disk(data.angle))
+    if data.type == "AREA":
+        if _is_portal(data):
+            return None
+        panel = _panel(data, matrix)
+        return Light.area(place, color, 1.0 if data.normalize else _panel_size(panel), panel)
+    radius, is_ball = data.shadow_soft_size, not data.use_soft_falloff
+    power = 1.0 if data.normalize or radius == 0.0 else 4.0 * np.pi * radius * radius
+    if data.type == "SPOT":
+        cone = Cone(_inverse(matrix), data.spot_size, data.spot_blend)
+        return Light.spot(place, color, power, cone, radius, is_ball)
+    return Light.point(place, color, power, radius, is_ball)
+
+
+def _sun_disk(angle: float) -> float:
+    """Irradiance of a sun of this full angle [rad] and the radiance 1."""
+    return float(np.pi * np.sin(0.5 * angle) ** 2) if angle > 0.0 else 1.0
+
+
+def _panel(data: bpy.types.AreaLight, matrix: Matrix) -> Panel:
+    """The object's scale makes a panel larger, but not a spread wider."""
+    right, up, back = (np.array(matrix.col[axis][:3]) for axis in range(3))
+    height = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
+    along = -back / np.linalg.norm(back)
+    width_scale, height_scale = float(np.linalg.norm(right)), float(np.linalg.norm(up))
+    # whatever the axes are, a panel's are right across each other
+    up = np.cross(along, right)
+    if not up.any():
+        right = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+        up = np.cross(along, right)
+    right = np.cross(up, along)
+    return Panel(
+        right=_triple(right / np.linalg.norm(right)),
+        up=_triple(up / np.linalg.norm(up)),
+        shines_along=_triple(along),
+        half_width=0.5 * data.size * width_scale,
+        half_height=0.5 * height * height_scale,
+        is_round=data.shape in ("DISK", "ELLIPSE"),
+        spread=data.spread,
+    )
+
+
+def _panel_size(panel: Panel) -> float:
+    """Area [m^2]."""
+    size = 4.0 * panel.half_width * panel.half_height
+    return size * np.pi / 4.0 if panel.is_round else size
+
+
+def _is_portal(data: bpy.types.AreaLight) -> bool:
+    """Whether it only guides Cycles to the world's light; Cycles may be switched off."""
+    cycles = getattr(data, "cycles", None)
+    return cycles is not None and cycles.is_portal
+
+
+def _inverse(matrix: Matrix) -> tuple[Color, Color, Color]:
+    """Rows that turn directions into an object's own axes, to a common factor."""
+    rows = np.array(matrix.to_3x3().inverted_safe())
+    x, y, z = rows / np.abs(rows).max()
+    return _triple(x), _triple(y), _triple(z)
+
+
+def _emission(data: bpy.types.Light) -> Floats:
+    """By what a light's nodes multiply it, as far as that is one plain Emission."""
+    node = _node(data.node_tree, "EMISSION")
+    if node is None:
+        return np.ones(3)
+    color, strength = node.inputs["Color"], node.inputs["Strength"]
+    return np.array(color.default_value[:3]) * strength.default_value
+
+
+def _strength(light: Light, center: Floats) -> float:
+    return float(light_irradiance(light, np.asarray(center, np.float64)).sum())
+
+
+def _node(tree: bpy.types.NodeTree | None, kind: str) -> bpy.types.Node | None:
+    nodes = () if tree is None else tree.nodes
+    return next((node for node in nodes if node.type == kind and not node.mute), None)
+
+
+def _triple(values: Iterable[float]) -> Color:
+    first, second, third, *_ = (float(value) for value in values)
+    return (first, second, third)

@@ -1,0 +1,110 @@
+"""Meshes from files, through Blender's own importers, to read them or to have them in the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...errors import HairloomError
+from ...strands import Surface
+from .surfaces import read_surface
+
+_IMPORTERS: dict[str, Callable[[str], Any]] = {
+    ".obj": lambda path: bpy.ops.wm.obj_import(filepath=path),
+    ".ply": lambda path: bpy.ops.wm.ply_import(filepath=path),
+    ".stl": lambda path: bpy.ops.wm.stl_import(filepath=path),
+    ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
+    ".gltf": lambda path: bpy.ops.import_scene.gltf(filepath=path),
+    ".fbx": lambda path: bpy.ops.wm.fbx_import(filepath=path),
+    ".usd": lambda path: bpy.ops.wm.usd_import(filepath=path),
+    ".usdc": lambda path: bpy.ops.wm.usd_import(filepath=path),
+    ".usda": lambda path: bpy.ops.wm.usd_import(filepath=path),
+}
+
+_PURGED = ("objects", "meshes", "materials", "images", "collections", "cameras", "lights")
+
+
+def read_mesh_file(path: Path, *, need_uv: bool) -> Surface:
+    """All meshes of a file as one Surface, in metres, Blender's Z up; the scene stays as it is.
+
+    Raises:
+        HairloomError: no such file, a format that Blender does not read, no faces, or no UVs
+            where they are needed.
+    """
+    before = _data_blocks()
+    try:
+        meshes = _imported(path)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        parts = [read_surface(mesh, depsgraph, need_uv=need_uv, place=str(path)) for mesh in meshes]
+    finally:
+        bpy.data.batch_remove(_data_blocks() - before)
+    return merged(parts)
+
+
+def import_mesh_file(path: Path) -> bpy.types.Object:
+    """The one mesh of a file, in the open scene.
+
+    Raises:
+        HairloomError: no such file, a format that Blender does not read, or not one mesh.
+    """
+    meshes = _imported(path)
+    if len(meshes) == 1:
+        return meshes[0]
+    raise HairloomError(
+        f"it holds {len(meshes)} meshes, and hair grows on one",
+        place=str(path),
+        remedy="Join them, or open a scene with them and name one",
+    )
+
+
+def _imported(path: Path) -> list[bpy.types.Object]:
+    """The file's mesh objects, new in the scene, by name; one or more."""
+    importer = _IMPORTERS.get(path.suffix.lower())
+    if importer is None:
+        raise HairloomError(
+            f"'{path.suffix}' is not a mesh format that Hairloom reads",
+            place=str(path),
+            remedy="Use one of " + ", ".join(_IMPORTERS),
+        )
+    if not path.is_file():
+        raise HairloomError("there is no such file", place=str(path), remedy="Check the path")
+    before = _data_blocks()
+    try:
+        importer(str(path))
+    except RuntimeError as error:
+        raise _unreadable(path, str(error).strip()) from error
+    meshes = [block for block in _data_blocks() - before if _is_mesh_object(block)]
+    if not meshes:
+        raise _unreadable(path, "it holds no mesh")
+    return sorted(meshes, key=lambda block: str(block.name))
+
+
+def merged(parts: list[Surface]) -> Surface:
+    """Several surfaces as one; UVs survive only where every part has them."""
+    starts = np.cumsum([0, *(len(part.positions) for part in parts[:-1])])
+    has_uv = all(part.corner_uv is not None for part in parts)
+    return Surface(
+        np.concatenate([part.positions for part in parts]),
+        np.concatenate([p.triangles + start for p, start in zip(parts, starts, strict=True)]),
+        np.concatenate([p.corner_uv for p in parts if p.corner_uv is not None]) if has_uv else None,
+    )
+
+
+def _data_blocks() -> set[bpy.types.ID]:
+    return {block for name in _PURGED for block in getattr(bpy.data, name)}
+
+
+def _is_mesh_object(block: bpy.types.ID) -> bool:
+    return isinstance(block, bpy.types.Object) and block.type == "MESH"
+
+
+def _unreadable(path: Path, why: str) -> HairloomError:
+    return HairloomError(
+        f"this mesh cannot be read ({why})",
+        place=str(path),
+        remedy="Open it in Blender to see what is wrong, or export it again",
+    )

@@ -1,0 +1,114 @@
+"""Finding objects again, and how far they have moved.
+
+A reference to a data-block does not survive undo or loading, and dies with its object; a number
+that Blender keeps for the whole session does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+
+
+@dataclass
+class Handle:
+    """An object by its session number; the name only makes finding it fast."""
+
+    uid: int
+    name: str
+
+    @classmethod
+    def of(cls, obj: bpy.types.Object) -> Handle:
+        return cls(obj.session_uid, obj.name)
+
+    def find(self) -> bpy.types.Object | None:
+        """The object, also after undo and renaming; None once it is gone."""
+        obj = bpy.data.objects.get(self.name)
+        if obj is None or obj.session_uid != self.uid:
+            obj = next((each for each in bpy.data.objects if each.session_uid == self.uid), None)
+        if obj is not None:
+            self.name = obj.name
+        return obj
+
+
+@dataclass
+class Body:
+    """An object whose motion is followed since the moment that is called rest.
+
+    rest: (4, 4) its matrix_world at rest.
+    """
+
+    handle: Handle
+    rest: Floats
+
+    @classmethod
+    def at_rest(cls, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Body:
+        return cls(Handle.of(obj), matrix_of(obj, depsgraph))
+
+    def found(self) -> bpy.types.Object:
+        """The object.
+
+        Raises:
+            HairloomError: it is gone.
+        """
+        obj = self.handle.find()
+        if obj is None:
+            raise HairloomError(
+                "this object is gone", place=self.handle.name, remedy="Press Preview again"
+            )
+        return obj
+
+    def moved(self, depsgraph: bpy.types.Depsgraph) -> Floats:
+        """(4, 4), from where it was at rest to where it is now.
+
+        Raises:
+            HairloomError: it is gone.
+        """
+        return matrix_of(self.found(), depsgraph) @ np.linalg.pinv(self.rest)
+
+
+def matrix_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+    """(4, 4) float64, from object to world space, as evaluated."""
+    return np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64)
+
+
+def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
+    """The mesh that the hair grows from: its surface, else a mesh that is its parent."""
+    surface = hair.data.surface
+    if surface is not None and surface.type == "MESH":
+        return surface
+    parent = hair.parent
+    return parent if parent is not None and parent.type == "MESH" else None
+
+
+def is_solid(obj: bpy.types.Object) -> bool:
+    """Whether the 3D views show it as something that hides what is behind it."""
+    return bool(obj.visible_get() and obj.display_type in {"SOLID", "TEXTURED"})
+
+
+def spaces_without(obj: bpy.types.Object) -> frozenset[int]:
+    """The 3D views in which an object cannot be seen, by address: local view, local collections."""
+    return frozenset(
+        space.as_pointer()
+        for window in bpy.context.window_manager.windows
+        for area in window.screen.areas
+        for space in area.spaces
+        if space.type == "VIEW_3D" and not obj.visible_in_viewport_get(space)
+    )
+
+
+def is_elsewhere(uid: int, name: str, scene: bpy.types.Scene) -> bool:
+    """Whether an object is in another scene alone; one that is gone is nowhere."""
+    named = scene.objects.get(name)
+    if named is not None and named.session_uid == uid:
+        return False
+    here, everywhere = (
+        any(obj.session_uid == uid for obj in objects)
+        for objects in (scene.objects, bpy.data.objects)
+    )
+    return everywhere and not here

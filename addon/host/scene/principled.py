@@ -1,0 +1,138 @@
+"""The Principled Hair of a hair's material, read as a starting point for our look."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+
+from ...errors import HairloomError
+from ...params import Settings
+from ...shading.marschner.principled import PrincipledHair, settings_from
+from ...shading.settings import ShadingSettings
+
+_NODE = "BSDF_HAIR_PRINCIPLED"
+#: name of an input -> what it is called here; inputs that a node's choices hide are not read
+_INPUTS = {
+    "Color": "color",
+    "Melanin": "melanin",
+    "Melanin Redness": "melanin_redness",
+    "Tint": "tint",
+    "Absorption Coefficient": "absorption_coefficient",
+    "Roughness": "roughness",
+    "Radial Roughness": "radial_roughness",
+    "Coat": "coat",
+    "IOR": "ior",
+    "Offset": "offset",
+    "Random Color": "random_color",
+    "Random Roughness": "random_roughness",
+    "Aspect Ratio": "aspect_ratio",
+    "Reflection": "reflection",
+    "Transmission": "transmission",
+    "Secondary Reflection": "secondary_reflection",
+}
+
+
+def has_principled_hair(hair: bpy.types.Object) -> bool:
+    """Whether its material has such a node; quick enough for a panel."""
+    material = hair.active_material
+    return material is not None and _node_of(material) is not None
+
+
+def look_from_material(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, before: ShadingSettings | None = None
+) -> tuple[ShadingSettings, tuple[str, ...]]:
+    """Settings that answer light as its material does, and notes on what could not be read.
+
+    Args:
+        before: gives what a material does not speak of.
+
+    Raises:
+        HairloomError: there is no material with a Principled Hair.
+    """
+    material = hair.evaluated_get(depsgraph).active_material
+    node = None if material is None else _node_of(material)
+    if node is None:
+        raise HairloomError(
+            "its material has no Principled Hair BSDF",
+            place=hair.name,
+            remedy="Give the hair a material with that node, or choose a preset",
+        )
+    values, notes = _values(node)
+    settings, more = settings_from(PrincipledHair(**values), before)
+    return settings, (*notes, *more)
+
+
+def look_from_named(name: str | None, before: Settings) -> tuple[ShadingSettings, tuple[str, ...]]:
+    """The same for a hair object of the open scene, by its name.
+
+    Raises:
+        HairloomError: there is no such hair object, or as `look_from_material`.
+    """
+    hair = None if name is None else bpy.data.objects.get(name)
+    if hair is None or hair.type != "CURVES":
+        raise HairloomError(
+            "there is no hair object of this name",
+            place=f"--groom {name or ''}",
+            remedy="Open a scene and name its hair curves by --groom",
+        )
+    assert isinstance(before, ShadingSettings)
+    return look_from_material(hair, bpy.context.evaluated_depsgraph_get(), before)
+
+
+def _node_of(material: bpy.types.Material) -> bpy.types.Node | None:
+    """The one that is nearest to the output, through mixing nodes and groups."""
+    tree = material.node_tree
+    output = None if tree is None else tree.get_output_node("ALL")
+    if output is None:
+        return None
+    ends = [link.from_node for link in output.inputs["Surface"].links]
+    return next((each for each in _behind(ends, {tree}) if each.type == _NODE), None)
+
+
+def _behind(
+    ends: list[bpy.types.Node], entered: set[bpy.types.NodeTree]
+) -> Iterator[bpy.types.Node]:
+    """These nodes and all that they hang on, the nearest first, those inside groups as well."""
+    waiting, seen = list(ends), set()
+    while waiting:
+        found = waiting.pop(0)
+        if found in seen or found.mute:
+            continue
+        seen.add(found)
+        yield found
+        tree = found.node_tree if found.type == "GROUP" else None
+        if tree is not None and tree not in entered:
+            entered.add(tree)
+            outputs = (each for each in tree.nodes if each.type == "GROUP_OUTPUT")
+            yield from _behind([giver for each in outputs for giver in _givers(each)], entered)
+        waiting += _givers(found)
+
+
+def _givers(node: bpy.types.Node) -> list[bpy.types.Node]:
+    return [link.from_node for socket in node.inputs for link in socket.links]
+
+
+def _values(node: bpy.types.Node) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Its own numbers, and notes on those that other nodes give."""
+    values: dict[str, Any] = {"model": node.model, "parametrization": node.parametrization}
+    notes = []
+    for socket in node.inputs:
+        if socket.name not in _INPUTS or not socket.enabled:
+            continue
+        value = _constant(socket)
+        if value is None:
+            value = socket.default_value
+            notes.append(f"{socket.name} comes from other nodes: its own value was taken")
+        is_color = socket.type in ("RGBA", "VECTOR")
+        values[_INPUTS[socket.name]] = tuple(value)[:3] if is_color else float(value)
+    return values, tuple(notes)
+
+
+def _constant(socket: bpy.types.NodeSocket) -> Any:
+    """The input's value where it is one: its own, or that of a Value or RGB node; else None."""
+    if not socket.links:
+        return socket.default_value
+    giver = socket.links[0].from_node
+    return giver.outputs[0].default_value if giver.type in ("VALUE", "RGB") else None

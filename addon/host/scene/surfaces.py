@@ -1,0 +1,93 @@
+"""Meshes that hair grows from or collides with: evaluated mesh to a `Surface` in world space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...strands import Surface
+
+
+def read_surface(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, need_uv: bool, place: str
+) -> Surface:
+    """The mesh that Blender shows after all modifiers, triangulated, in world space.
+
+    Args:
+        need_uv: without it a mesh without UVs gives a Surface without them.
+        place: names the mesh in error messages.
+
+    Raises:
+        HairloomError: not a mesh, no faces, or no UVs where they are needed.
+    """
+    with _evaluated_mesh(obj, depsgraph, place) as mesh:
+        mesh.calc_loop_triangles()
+        triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
+        mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+        if not len(triangles):
+            raise HairloomError(
+                "this mesh has no faces", place=place, remedy="Choose a mesh with faces"
+            )
+        corner_uv = read_corner_uv(mesh)
+        if corner_uv is None and need_uv:
+            raise HairloomError(
+                "this mesh has no UVs, so hair cannot be placed on its texture",
+                place=place,
+                remedy="Unwrap it (Edit Mode, UV > Unwrap), or go on without with --no-uv",
+            )
+        surface = Surface(_positions(mesh), triangles, corner_uv)
+    return surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world))
+
+
+def read_positions(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, place: str) -> Floats:
+    """The vertices of the evaluated mesh, (vertex_count, 3) float32 [m], world space.
+
+    Raises:
+        HairloomError: not a mesh.
+    """
+    with _evaluated_mesh(obj, depsgraph, place) as mesh:
+        positions = _positions(mesh)
+    matrix = np.array(obj.evaluated_get(depsgraph).matrix_world, np.float32)
+    return positions @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+@contextmanager
+def _evaluated_mesh(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, place: str
+) -> Iterator[bpy.types.Mesh]:
+    """The evaluated mesh, also of an object in edit mode; gone when the block ends."""
+    if obj.type != "MESH":
+        raise HairloomError(
+            f"it is a {obj.type.lower()} object, not a mesh",
+            place=place,
+            remedy="Choose a mesh object",
+        )
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        yield mesh
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def _positions(mesh: bpy.types.Mesh) -> Floats:
+    """(vertex_count, 3) float32, object space."""
+    positions = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", positions.ravel())
+    return positions
+
+
+def read_corner_uv(mesh: bpy.types.Mesh) -> Floats | None:
+    """UVs of the active map at each triangle's corners, (triangle_count, 3, 2), or None."""
+    if mesh.uv_layers.active is None:
+        return None
+    uv = np.empty((len(mesh.loops), 2), np.float32)
+    mesh.uv_layers.active.uv.foreach_get("vector", uv.ravel())
+    loops = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    mesh.loop_triangles.foreach_get("loops", loops.ravel())
+    return uv[loops]

@@ -1,0 +1,34 @@
+"""The scene's gravity, and the wind of its force fields."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+
+
+def gravity_of(scene: bpy.types.Scene) -> Floats:
+    """(3,) [m/s^2], world space."""
+    return np.array(scene.gravity) if scene.use_gravity else np.zeros(3)
+
+
+def scene_wind(depsgraph: bpy.types.Depsgraph) -> Floats:
+    """The sum of the scene's Wind force fields, (3,) float64 [m/s], world space.
+
+    Each blows along its object's local +Z everywhere alike, and a strength of 1 is 1 m/s, so that
+    Blender's default is a breath and 10 a fresh breeze; a negative one blows backwards. The
+    object's place and scale do not matter. As in Blender, fields that are hidden or excluded from
+    the view layer do not blow. Other kinds of fields, falloff and the field's noise are left out:
+    gusts are set with the hair's own wind.
+    """
+    total = np.zeros(3)
+    for instance in depsgraph.objects:
+        field = instance.field
+        if field is None or field.type != "WIND":
+            continue
+        along = np.array(instance.matrix_world, np.float64)[:3, 2]
+        length = float(np.linalg.norm(along))
+        if length > 0.0 and np.isfinite(length) and np.isfinite(field.strength):
+            total += along / length * field.strength
+    return total

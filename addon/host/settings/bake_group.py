@@ -1,0 +1,75 @@
+"""The properties of a bake; they live on the object that is baked."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, IntProperty, PointerProperty, StringProperty
+
+from ..preview import live
+
+
+def _changed(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    if not live.is_suspended():
+        live.bake_changed(group.id_data, context.evaluated_depsgraph_get())
+
+
+class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):
+    """The bake of one object"""
+
+    folder: StringProperty(
+        name="Cache",
+        description="Folder of the bake; empty: a folder named after the object, in "
+        "hairloom_cache beside the file",
+        subtype="DIR_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        update=_changed,
+    )
+    use_own_range: BoolProperty(
+        name="Own Frame Range",
+        description="Bake other frames than those of the scene",
+        default=False,
+    )
+    first: IntProperty(
+        name="First",
+        description="Frame at which the hair is at rest",
+        default=1,
+        min=-99999,
+        max=999999,
+    )
+    last: IntProperty(
+        name="Last", description="Last frame to bake", default=250, min=-99999, max=999999
+    )
+    is_shown: BoolProperty(
+        name="Play the Bake",
+        description="Show the baked frames in place of simulating them; off: simulate again",
+        default=True,
+        update=_changed,
+    )
+    in_renders: BoolProperty(
+        name="Show in Renders",
+        description="Add a copy of the hair that shows the bake in renders, where it takes the "
+        "place of these curves",
+        default=True,
+    )
+    follows: BoolProperty(
+        name="Simulate on Playback",
+        description="While Blender plays its animation, simulate this hair frame by frame, from "
+        "rest at the first frame",
+        default=True,
+    )
+    copy: PointerProperty(
+        type=bpy.types.Object,
+        name="Copy in Renders",
+        description="The hair curves that show the bake in renders",
+        options={"HIDDEN"},
+    )
+    hides: BoolProperty(
+        name="Is Replaced in Renders",
+        description="Whether the copy takes the place of these curves in renders",
+        options={"HIDDEN"},
+    )
+    was_hidden: BoolProperty(
+        name="Was Hidden in Renders",
+        description="Whether renders left these curves out before there was a bake",
+        options={"HIDDEN"},
+    )

@@ -1,0 +1,218 @@
+"""Presets: those that come with Hairloom and the artist's own, found by section, put onto a groom.
+
+The artist's own lie in the folder that Blender keeps for the extension. They are data like all
+presets, checked and never executed; a file there that is none is told of and otherwise left alone.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...errors import HairloomError
+from ...exchange.files.atomic import write_text_atomic
+from ...parameters import ALL_SETTINGS
+from ...params import Settings
+from ...params.preset import Preset, preset_as_dict, read_any_preset
+from . import previews
+from .properties import settings_of
+
+PRESET_FOLDER = Path(__file__).resolve().parents[3] / "presets"
+#: what the names of the artist's own presets begin with
+OWN = "own/"
+#: no preset is nearly as long [bytes]
+_LONGEST = 1_000_000
+_LONGEST_TITLE = 40
+#: section of a preset -> those that it keeps as well: cards are little without their atlas
+_TOGETHER = {"cards": ("atlas", "card_texture")}
+#: the package that Blender knows, two above this one
+_EXTENSION = __package__.rpartition(".addon")[0]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One preset in a menu.
+
+    name: as `named_preset` knows it.
+    """
+
+    name: str
+    title: str
+    path: Path
+
+    @property
+    def is_own(self) -> bool:
+        return self.name.startswith(OWN)
+
+    @property
+    def icon(self) -> int:
+        """See `previews.icon_of`."""
+        return previews.icon_of(self.path)
+
+
+@cache
+def shipped(section: str) -> tuple[Entry, ...]:
+    """The presets of one section that come with Hairloom; a name is a path below their folder."""
+    found = []
+    for path in sorted(PRESET_FOLDER.rglob("*.json")):
+        preset = read_any_preset(path, ALL_SETTINGS)
+        if preset.settings.section == section:
+            name = path.relative_to(PRESET_FOLDER).with_suffix("").as_posix()
+            found.append(Entry(name, preset.title, path))
+    return tuple(found)
+
+
+def own(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
+    """The artist's own presets of one section, and what is wrong with other files there."""
+    entries, warnings = [], []
+    for path in _own_files():
+        try:
+            stat = path.stat()
+            title, found = _read(path, stat.st_mtime_ns, stat.st_size)
+        except (HairloomError, OSError, RecursionError) as error:
+            why = error.problem if isinstance(error, HairloomError) else error
+            warnings.append(f"{path.name} is no preset: {why}")
+            continue
+        if found == section:
+            entries.append(Entry(OWN + path.stem, title, path))
+    return tuple(sorted(entries, key=lambda entry: entry.title.lower())), tuple(warnings)
+
+
+def names(section: str) -> list[str]:
+    """All presets of one section, as `named_preset` knows them: those that ship come first."""
+    return [entry.name for entry in (*shipped(section), *own(section)[0])]
+
+
+def own_folder() -> Path:
+    """Where the artist's own presets lie; it may not be there yet."""
+    try:
+        return Path(bpy.utils.extension_path_user(_EXTENSION, path="presets"))
+    except ValueError:  # not installed as an extension
+        return Path(bpy.utils.user_resource("CONFIG", path="hairloom")) / "presets"
+
+
+def kept_settings(hair: bpy.types.Object, section: str) -> tuple[Settings, ...]:
+    """What a preset of this section keeps of a groom: that section, then those that go with it."""
+    owners, found = (hair.data.hairloom, hair.hairloom), []
+    for name in (section, *_TOGETHER.get(section, ())):
+        owner = next(each for each in owners if hasattr(each, name))
+        found.append(settings_of(getattr(owner, name), ALL_SETTINGS[name]))
+    return tuple(found)
+
+
+def save_own(title: str, settings: Settings, *also: Settings) -> Path:
+    """Keep settings as a preset of this title; one that has the same title is replaced.
+
+    Args:
+        settings: of the section under which it is found.
+        also: of others that go with it.
+
+    Raises:
+        HairloomError: the title is empty, or the file cannot be written.
+    """
+    title = " ".join(title.split())[:_LONGEST_TITLE]
+    stem = re.sub(r"[^a-z0-9]+", "_", title.lower()).strip("_")
+    if not title:
+        raise HairloomError("a preset needs a name", place="Save Preset", remedy="Type one")
+    path = _file_for(stem or "preset", title, settings.section)
+    data = preset_as_dict(Preset(title, "saved by the artist", settings, also))
+    write_text_atomic(path, json.dumps(data, indent=2) + "\n")
+    return path
+
+
+def delete_own(name: str) -> None:
+    """Delete one of the artist's own presets, with its picture.
+
+    Raises:
+        HairloomError: there is no such preset of the artist's own, or it cannot be deleted.
+    """
+    path = _own_path(name)
+    if path is None:
+        raise HairloomError("there is no such preset of your own", place=name, remedy=_KNOWN_OWN)
+    previews.forget(path)
+    try:
+        path.unlink()
+        path.with_suffix(".png").unlink(missing_ok=True)
+    except OSError as error:
+        raise HairloomError(
+            f"it cannot be deleted ({error.strerror})", place=str(path), remedy="Delete it yourself"
+        ) from error
+
+
+def named_preset(name: str) -> Preset[Any]:
+    """A preset by its name, such as looks/blond or own/mine, or by the path of a file.
+
+    Raises:
+        HairloomError: there is no such preset, or it is damaged.
+    """
+    below = PRESET_FOLDER / f"{name}.json"
+    is_shipped = below.is_file() and below.resolve().is_relative_to(PRESET_FOLDER)
+    path = (below if is_shipped else None) or _own_path(name) or Path(name)
+    if not path.is_file():
+        known = ", ".join(one.name for section in ALL_SETTINGS for one in shipped(section))
+        raise HairloomError("there is no such preset", place=name, remedy=f"Use a file or {known}")
+    return read_any_preset(path, ALL_SETTINGS)
+
+
+def apply(settings: Settings, hair: bpy.types.Object) -> None:
+    """Put all values of one section onto a groom or its object.
+
+    Raises:
+        HairloomError: settings that a groom does not keep, such as those for growing one.
+    """
+    owners = hair.data.hairloom, hair.hairloom
+    for owner in owners:
+        group = getattr(owner, settings.section, None)
+        if group is not None:
+            for name, value in settings.as_dict().items():
+                setattr(group, name, value)
+            return
+    kept = [name for name in ALL_SETTINGS if any(hasattr(owner, name) for owner in owners)]
+    raise HairloomError(
+        f"a groom keeps no '{settings.section}' settings",
+        place="preset",
+        remedy=f"Choose a preset of {', '.join(kept)}",
+    )
+
+
+_KNOWN_OWN = "Choose one from the menu of presets"
+
+
+def _own_files() -> list[Path]:
+    try:
+        return sorted(own_folder().glob("*.json"))
+    except OSError:
+        return []
+
+
+def _own_path(name: str) -> Path | None:
+    """The file of a name such as own/mine, if there is one; never one outside of the folder."""
+    found = {OWN + path.stem: path for path in _own_files()} if name.startswith(OWN) else {}
+    return found.get(name)
+
+
+@lru_cache(maxsize=256)
+def _read(path: Path, _changed: int, size: int) -> tuple[str, str]:
+    """Title and section of a preset file; read again only when it has changed."""
+    if size > _LONGEST:
+        raise HairloomError("it is too long", place=path.name, remedy="Delete it")
+    preset = read_any_preset(path, ALL_SETTINGS)
+    title = " ".join(preset.title.split())[:_LONGEST_TITLE]
+    return title or path.stem, preset.settings.section
+
+
+def _file_for(stem: str, title: str, section: str) -> Path:
+    """The file of this title, else a new one whose name no other has."""
+    entries, _ = own(section)
+    for entry in entries:
+        if entry.title == title:
+            return entry.path
+    taken = {path.stem for path in _own_files()}
+    names = [stem, *(f"{stem}_{number}" for number in range(2, len(taken) + 3))]
+    return own_folder() / f"{next(name for name in names if name not in taken)}.json"

@@ -1,0 +1,115 @@
+"""Blender properties from parameter declarations, and back to checked settings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
+
+from ...params import Parameter, Settings
+from ...params.curve import PLACES
+
+type Changed = Callable[[bpy.types.ID], None]
+
+#: unit of a parameter -> how Blender shows it
+_SHOWN_AS = {
+    "none": {},
+    "length": {"subtype": "DISTANCE"},
+    "angle": {"subtype": "ANGLE"},
+    "time": {"subtype": "TIME_ABSOLUTE"},
+    "rate": {},
+    "speed": {"unit": "VELOCITY"},
+    "acceleration": {"unit": "ACCELERATION"},
+    "factor": {"subtype": "FACTOR"},
+}
+#: decimals that a field shows; lengths of hair are fractions of a millimetre
+_PRECISION = {"length": 5, "rate": 2}
+#: float32, which Blender stores, holds this many decimal digits of what the artist typed
+_STORED_DIGITS = 7
+_LARGEST_INTEGER = 2**31 - 1
+
+
+def property_group(settings: type[Settings], changed: Changed | None = None) -> type[Any]:
+    """A PropertyGroup class with one property a parameter, same names, same order.
+
+    Args:
+        changed: called with the data-block that owns the group, as soon as a value is edited.
+    """
+    namespace = {
+        "__doc__": settings.title,
+        "__annotations__": property_annotations(settings, changed),
+        "settings": settings,
+    }
+    return type(f"HAIRLOOM_PG_{settings.section}", (bpy.types.PropertyGroup,), namespace)
+
+
+def property_annotations(
+    settings: type[Settings], changed: Changed | None = None
+) -> dict[str, Any]:
+    """name -> Blender property, for the `__annotations__` of a group or an operator."""
+    return {parameter.name: _property(parameter, changed) for parameter in settings.parameters()}
+
+
+def settings_of[S: Settings](group: Any, settings: type[S]) -> S:
+    """The values in a property group (or operator) made from these settings, checked."""
+    return settings(**{p.name: _value(group, p) for p in settings.parameters()})
+
+
+def _property(parameter: Parameter, changed: Changed | None) -> Any:
+    common: dict[str, Any] = {
+        "name": parameter.label,
+        "description": parameter.description,
+        "default": parameter.default,
+        "update": None if changed is None else _update(changed),
+    }
+    if parameter.kind == "toggle":
+        return BoolProperty(**common)
+    if parameter.kind == "choice":
+        return EnumProperty(items=parameter.choices, **common)
+    common |= _ranges(parameter)
+    if parameter.kind == "integer":
+        return IntProperty(**common)
+    if parameter.kind == "color":
+        return FloatVectorProperty(size=3, subtype="COLOR", **common)
+    if parameter.kind == "curve":
+        return FloatVectorProperty(size=len(PLACES), precision=2, **common)
+    precision = _PRECISION.get(parameter.unit, 3)
+    return FloatProperty(precision=precision, **_SHOWN_AS[parameter.unit], **common)
+
+
+def _ranges(parameter: Parameter) -> dict[str, float]:
+    limits: dict[str, float] = {}
+    for prefix, span in (("", parameter.hard_range), ("soft_", parameter.soft_range)):
+        if span is None:
+            continue
+        low, high = span
+        if parameter.kind == "integer":
+            low, high = (int(max(-_LARGEST_INTEGER, min(x, _LARGEST_INTEGER))) for x in span)
+        limits |= {f"{prefix}min": low, f"{prefix}max": high}
+    return limits
+
+
+def _update(changed: Changed) -> Callable[[Any, bpy.types.Context], None]:
+    def update(group: Any, _context: bpy.types.Context) -> None:
+        changed(group.id_data)
+
+    return update
+
+
+def _value(group: Any, parameter: Parameter) -> Any:
+    value = getattr(group, parameter.name)
+    if parameter.kind in {"color", "curve"}:
+        return tuple(_as_typed(channel) for channel in value)
+    if parameter.kind == "number":
+        # 30 degrees in radians have more digits than are stored: what was declared comes first
+        declared = (parameter.default, *(parameter.hard_range or ()))
+        return next((one for one in declared if np.float32(one) == value), _as_typed(value))
+    return value
+
+
+def _as_typed(value: float) -> float:
+    """0.01 is stored as 0.00999999978, which lies outside a range that starts at 0.01."""
+    return float(f"{value:.{_STORED_DIGITS}g}")

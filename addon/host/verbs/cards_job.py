@@ -1,0 +1,131 @@
+"""The verb `cards`: hair cards as a file for engines."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...exchange.cards.card_formats import format_of
+from ...pipeline import Rig
+from ..bakes.bake_settings import folder_of
+from ..cards.card_choices import add_card_options, motion_choices
+from ..cards.card_files import CardOutput, WrittenCards, write_cards
+from ..cards.card_images import chosen_pictures, named_pictures
+from ..cards.card_making import order_line
+from ..cards.card_motion import GuideMotion, baked_motion, take_motion
+from ..cards.card_textures import TextureFiles
+from ..cards.other_cards import other_cards
+from .job_options import add_texture_option, frames_of_option
+from .job_steps import Job, card_form, finish, read_rig, tell_notes
+from .verb import Verb
+
+
+def cards(job: Job) -> None:
+    """Turn hair into cards, sorted from inside to outside: GLB, FBX, USD or OBJ, and textures."""
+    options = job.options
+    pictures = _own_pictures(job) | named_pictures(options.texture)
+    path, _ = format_of(job.output, options.format)
+    output = CardOutput(
+        options.format,
+        portable=options.portable,
+        index_buffer=options.index_buffer,
+        textures=TextureFiles(options.packing, options.textures),
+        motion=motion_choices(options),
+    )
+    rig, motion = _moving(job)
+    written_cards(job, path, rig, pictures, output, motion)
+    finish(job, path)
+
+
+def _own_pictures(job: Job) -> dict[str, Floats]:
+    """Those that the artist has chosen for the hair object that --groom names."""
+    hair = bpy.data.objects.get(job.sources.groom or "")
+    if hair is None or hair.type != "CURVES":
+        return {}
+    pictures, warnings = chosen_pictures(hair.data.hairloom.card_images)
+    tell_notes(list(warnings), job.report)
+    return pictures
+
+
+def written_cards(
+    job: Job,
+    path: Path,
+    rig: Rig,
+    pictures: Mapping[str, Floats],
+    output: CardOutput | None = None,
+    motion: GuideMotion | None = None,
+) -> WrittenCards:
+    """Build and write the cards, and say what they are."""
+    print("building hair cards", flush=True)
+    levels = getattr(job.options, "levels", None)
+    form, report = card_form(job), job.report
+    if levels is not None:
+        form = replace(form, cards=replace(form.cards, levels=levels))
+    hair = bpy.data.objects.get(job.sources.groom or "")
+    others, notes = other_cards(form.occlusion, hair)
+    choices = form.choices(pictures, others)
+    written = write_cards(path, rig, choices, output, report.stage, motion)
+    report.facts.update(
+        cards=written.mesh.card_count,
+        card_triangles=len(written.mesh.triangles),
+        card_levels=[len(level.triangles) for level in written.levels],
+        card_order_wrong=round(written.build.wrong_share, 4),
+    )
+    if written.motion:
+        report.facts["card_motion"] = dict(written.motion)
+    print(order_line(written.build.wrong_share), flush=True)
+    tell_notes([*written.notes, *notes], report)
+    for file in written.files:
+        report.add_output(file)
+    return written
+
+
+def _moving(job: Job) -> tuple[Rig, GuideMotion | None]:
+    """The hair, and what moves it if motion is asked for: a take, or the bake of an object."""
+    options = job.options
+    frames = frames_of_option(options.frames)
+    if options.motion == "none":
+        if options.take or frames is not None:
+            raise HairloomError(
+                "a take and frames are for cards in motion",
+                place="--take" if options.take else "--frames",
+                remedy="Add --motion joints, or --motion texture",
+            )
+        return read_rig(job)[0], None
+    hair = bpy.data.objects.get(options.groom or "")
+    if options.take:
+        rig, _ = read_rig(job)
+        motion = take_motion(rig, Path(options.take), frames)
+        job.report.add_input(Path(options.take))
+        return rig, motion
+    if hair is None:
+        raise HairloomError(
+            "this hair does not move",
+            place="--motion",
+            remedy="Give a take with --take, or a baked object of the scene with --groom",
+        )
+    motion = baked_motion(hair, frames)
+    folder = folder_of(hair)
+    if folder is not None:
+        job.report.add_input(folder)
+    return motion.rig, motion
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    add_texture_option(parser)
+    add_card_options(parser.add_argument_group("the files"))
+
+
+CARDS = Verb(
+    "cards",
+    cards,
+    _add_options,
+    output="hair cards to write (.glb, .fbx, .usd, .usda, .usdc or .obj)",
+    operators=("export_cards",),
+)

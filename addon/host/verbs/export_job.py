@@ -1,0 +1,278 @@
+"""The verb `export`: strands as a file for engines, still or in motion, or a check of it alone."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ... import pipeline
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...exchange.groom import Groom
+from ...exchange.strand_check import check_lines
+from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat
+from ...exchange.strand_output import ENGINES, StrandOutput
+from ...pipeline import Rig
+from ...shading.settings import ShadingSettings
+from ..bakes.take import Take, read_take
+from ..strands.groom_motion import BakedMotion
+from ..strands.groom_out import HairOut, hair_of_rig
+from ..strands.strand_choices import BASES, COUNTS, PARTS, Items, path_in, strand_output
+from ..strands.strand_export import StrandExport, wishes_of
+from .inputs import Inputs
+from .job_options import (
+    add_at_most_option,
+    add_frames_option,
+    add_moment_options,
+    add_object_option,
+    frames_of_option,
+)
+from .job_steps import Job, moment_of, read_rig, tell_notes
+from .object_settings import named_grooms, put_settings
+from .verb import Verb
+
+
+def export(job: Job) -> None:
+    """Write the strands for an engine, at rest, at a frame of a take, or over frames."""
+    options, report = job.options, job.report
+    path, kind = path_in(job.output, options.format)
+    output, frames = strand_output(options), frames_of_option(options.frames, options.at_most)
+    if options.object or _is_of_scene(options):
+        plan = _of_objects(job, kind, output, frames)
+    else:
+        plan = _of_rig(job, kind, output, frames)
+    facts = plan.check()
+    report.facts.update(preflight=facts, dropped=plan.dropped)
+    if options.preflight:
+        tell_notes(list(plan.notes), report)
+        _tell_check(facts, options.preflight)
+        return
+    with report.stage("write strands"):
+        outcome = plan.write(path, None if frames is None else _counted(job, plan))
+    tell_notes(list(outcome.warnings), report)
+    for file in plan.files:
+        report.add_output(file)
+    print(outcome.result)
+
+
+def _is_of_scene(options: argparse.Namespace) -> bool:
+    """Whether a scene was named, and nothing else that strands could come from: all its hair."""
+    return bool(options.scene and not (options.groom or options.head or options.take))
+
+
+@dataclass(frozen=True)
+class TakeMotion:
+    """Hair that goes by a take; its frames count from 0."""
+
+    out: HairOut
+    rig: Rig
+    take: Take
+    needs_scene: bool = False
+
+    @property
+    def rate(self) -> float:
+        return self.take.frame_rate
+
+    def at(self, frame: int, _depsgraph: bpy.types.Depsgraph) -> Floats:
+        pose = self.take.pose(frame)
+        return pipeline.strands_at(self.rig, pose, self.take.guides[frame]).reshape(-1, 3)
+
+
+def _of_objects(
+    job: Job, kind: StrandFormat, output: StrandOutput, frames: range | None
+) -> StrandExport:
+    """Hair of the scene, as the artist's operators write it."""
+    options = job.options
+    if options.groom or options.take:
+        raise HairloomError(
+            "hair of the scene has no take, and is no --groom",
+            place="--object",
+            remedy="Give --object alone, or --groom with --take",
+        )
+    hair = named_grooms(options.object)
+    for each in hair:
+        put_settings(each, options.preset, options.set)
+    with job.report.stage("read hair"):
+        plan = StrandExport.of(
+            hair,
+            bpy.context.evaluated_depsgraph_get(),
+            kind,
+            output,
+            frames=frames,
+            use_bake=not options.no_bake,
+            with_bones=not options.no_bones,
+        )
+    for part in plan.moving:
+        if isinstance(part, BakedMotion):
+            job.report.add_input(part.cache.folder)
+    return plan
+
+
+def _of_rig(
+    job: Job, kind: StrandFormat, output: StrandOutput, frames: range | None
+) -> StrandExport:
+    """Hair of --groom, or hair that is grown here."""
+    rig, inputs = read_rig(job)
+    wishes, color = wishes_of(kind, output), job.set(ShadingSettings).base_color
+    groom = _groom(job, rig, inputs)
+    plan = StrandExport(groom, output, kind, inputs.dropped, frames=frames)
+    if frames is None:
+        plan.groom = hair_of_rig(rig, groom, wishes, color).groom
+        return plan
+    take = _take(job, rig, frames)
+    moving = TakeMotion(hair_of_rig(rig, groom, wishes, color), rig, take)
+    plan.groom, plan.moving, plan.rate = moving.out.groom, (moving,), moving.rate
+    return plan
+
+
+def _groom(job: Job, rig: Rig, inputs: Inputs) -> Groom:
+    """The strands with their own points; those of the rig where they move or are children."""
+    name = Path(inputs.groom_name).stem
+    is_whole = inputs.strands.strand_count == rig.strands.strand_count
+    if job.options.take or not is_whole:
+        _, points = moment_of(job, rig)
+        groom = Groom(rig.strands.with_points(points.reshape(-1, 3)), name)
+        if inputs.groom is not None and is_whole:
+            return replace(groom, **_of_strands(inputs.groom))
+        return groom
+    return Groom(inputs.strands, name) if inputs.groom is None else replace(inputs.groom, name=name)
+
+
+def _take(job: Job, rig: Rig, frames: range) -> Take:
+    if not job.options.take:
+        raise HairloomError(
+            "this hair does not move",
+            place="--frames",
+            remedy="Give a take with --take, or hair of the scene with --object",
+        )
+    take = read_take(Path(job.options.take), rig)
+    if not 0 <= frames[0] <= frames[-1] < take.frame_count:
+        raise HairloomError(
+            f"frames {frames[0]} to {frames[-1]} are not all in this take",
+            place=job.options.take,
+            remedy=f"Use frames from 0 to {take.frame_count - 1}",
+        )
+    return take
+
+
+def _of_strands(groom: Groom) -> dict[str, Any]:
+    """What a groom says of whole strands."""
+    names = ("strand_id", "is_guide", "closest_guides", "guide_weights", "group_names")
+    return {name: getattr(groom, name) for name in names}
+
+
+def _counted(job: Job, plan: StrandExport) -> Iterator[Floats]:
+    progress = job.report.progress("writing frames", plan.frame_count)
+    for points in plan.positions():
+        yield points
+        progress.show(plan.done + 1)
+
+
+def _tell_check(facts: dict[str, Any], form: str) -> None:
+    if form == "json":
+        print(json.dumps(facts, indent=2))
+        return
+    for line in check_lines(facts):
+        print(line)
+    for warning in facts["warnings"]:
+        print(f"Warning: {warning}")
+
+
+def add_export_options(parser: argparse.ArgumentParser) -> None:
+    """The same choices as the artist's, and when."""
+    add_moment_options(parser)
+    hair = parser.add_argument_group("hair of the scene")
+    add_object_option(
+        hair,
+        "hair curves; can be given again, and goes into the same file (default: all of --scene)",
+    )
+    add_frames_option(
+        hair,
+        "write the motion over these frames (Alembic, USD): of the bake of --object, or of --take",
+    )
+    add_at_most_option(hair)
+    hair.add_argument(
+        "--no-bake",
+        action="store_true",
+        help="the motion of Blender's own animation and modifiers, in place of the bake",
+    )
+    file = parser.add_argument_group("the file")
+    file.add_argument(
+        "--format",
+        choices=[each.name for each in STRAND_FORMATS],
+        help="of the file (default: by its suffix)",
+    )
+    file.add_argument(
+        "--engine",
+        choices=list(dict.fromkeys(name for known in ENGINES.values() for name in known)),
+        help="unit, axes and parts as this program wants them (default: unreal for Alembic, "
+        "blender for USD)",
+    )
+    file.add_argument("--parts", choices=_names(PARTS), help="(default: as the engine wants)")
+    file.add_argument(
+        "--split-groups",
+        dest="by_group",
+        action="store_true",
+        help="an object for each group; a file for each where the format has no groups",
+    )
+    file.add_argument("--basis", choices=_names(BASES), help="between points, of Alembic and USD")
+    file.add_argument("--up", choices=("Y", "Z"), help="up in the file; not for Alembic")
+    file.add_argument(
+        "--unit",
+        dest="scale",
+        type=float,
+        metavar="METRES",
+        help="metres in one unit of the file, such as 0.01; not for Alembic",
+    )
+    file.add_argument(
+        "--preflight",
+        nargs="?",
+        const="text",
+        choices=("text", "json"),
+        help="say what the engine will see, and write nothing",
+    )
+    tressfx = parser.add_argument_group("TressFX and .hair")
+    tressfx.add_argument(
+        "--vertices",
+        dest="vertex_count",
+        choices=_names(COUNTS),
+        help="on each strand (default: as needed)",
+    )
+    tressfx.add_argument(
+        "--held", dest="held_count", type=int, default=1, help="vertices at the root that stay"
+    )
+    tressfx.add_argument(
+        "--fill",
+        dest="fills_groups",
+        action="store_true",
+        help="repeat the last strand up to a multiple of 64, for loaders that do not",
+    )
+    tressfx.add_argument(
+        "--point-uv", action="store_true", help="UVs of points too; in .hair as LuxCore has them"
+    )
+    tressfx.add_argument("--no-bones", action="store_true", help="no .tfxbone of a skinned head")
+
+
+def _names(items: Items) -> list[str]:
+    return [name for name, *_ in items if name not in ("engine", "fit")]
+
+
+EXPORT = Verb(
+    "export",
+    export,
+    add_export_options,
+    output="strands to write (.abc, .usdc, .usd, .usda, .tfx or .hair)",
+    operators=(
+        "export_alembic",
+        "export_usd",
+        "export_tfx",
+        "export_hair",
+        "check_export",
+    ),
+)

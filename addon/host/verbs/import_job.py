@@ -1,0 +1,97 @@
+"""The verb `import`: the artist's File > Import of grooms."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...errors import HairloomError
+from ...exchange.strand_formats import SUFFIXES
+from ..scene.mesh_files import import_mesh_file
+from ..strands.groom_files import dropped_phrase
+from ..strands.groom_in import GUIDES, Ground, StrandImport, import_strands, read_ground
+from .job_steps import Job, tell_notes
+from .object_settings import named_objects, put_settings
+from .verb import Verb
+
+
+def import_grooms(job: Job) -> None:
+    """Import grooms of files into a scene: hair curves, bound to a head if one is named."""
+    options, report = job.options, job.report
+    choices = StrandImport(options.groom_up, options.groom_scale, options.guides)
+    ground = _ground(options.head)
+    objects: list[dict[str, Any]] = []
+    for path in options.files:
+        with report.stage("import"):
+            hair, outcome = import_strands(path, ground, bpy.context.collection, choices)
+        if outcome.dropped and options.strict:
+            raise HairloomError(
+                f"strands would be {dropped_phrase(outcome.dropped)}",
+                place=str(path),
+                remedy="Mend the groom, or leave out --strict",
+            )
+        tell_notes(list(outcome.warnings), report)
+        print(
+            "; ".join(filter(None, (outcome.result, dropped_phrase(outcome.dropped)))), flush=True
+        )
+        for each in hair:
+            put_settings(each, options.preset, options.set)
+            count = len(each.data.curves)
+            objects.append({"object": each.name, "file": path.name, "strands": count})
+        for reason, count in outcome.dropped.items():
+            report.facts["dropped"][reason] = report.facts["dropped"].get(reason, 0) + count
+    report.facts.update(head=ground and ground.head.name, objects=objects)
+
+
+def _ground(head: str | None) -> Ground | None:
+    """The mesh of the scene, or of a file, that hair is bound to."""
+    if head is None:
+        return None
+    if head in bpy.context.view_layer.objects or not Path(head).suffix:
+        (mesh,) = named_objects([head], lambda obj: bool(obj.type == "MESH"), "a mesh")
+    else:
+        mesh = import_mesh_file(Path(head))
+    return read_ground(mesh, bpy.context.evaluated_depsgraph_get())
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    what = parser.add_argument_group("what to import")
+    what.add_argument(
+        "files", nargs="+", type=Path, metavar="FILE", help="grooms: " + ", ".join(SUFFIXES)
+    )
+    what.add_argument(
+        "--head", help="mesh that the hair is bound to: of the scene, or a file such as head.obj"
+    )
+    what.add_argument(
+        "--groom-up", choices=("Y", "Z"), help="up in the files (default: as they say)"
+    )
+    what.add_argument(
+        "--groom-scale",
+        type=float,
+        default=1.0,
+        metavar="FACTOR",
+        help="what lengths are multiplied by, beside what the files say of their unit",
+    )
+    what.add_argument(
+        "--guides",
+        choices=GUIDES,
+        default=GUIDES[0],
+        help="guides beside strands: leave them out, apart as hair curves of their own, or among "
+        "the strands (default: leave)",
+    )
+    what.add_argument(
+        "--strict", action="store_true", help="fail when a single strand must be dropped"
+    )
+
+
+IMPORT = Verb(
+    "import",
+    import_grooms,
+    _add_options,
+    takes_hair=False,
+    saves_scene=True,
+    operators=("import_strands",),
+)
