@@ -118,7 +118,8 @@ class _Scene:
                 if normal.dot(way) < 0.0:
                     return 0.0
             elif self._mesh.card[index] != own or travelled > self._settings.own_reach:
-                light *= 1.0 - self._alpha_at(index, np.array(place))
+                through = 1.0 - self._alpha_at(index, np.array(place))
+                light *= through**self._settings.extinction
             travelled += STEP
         return light
 

@@ -47,22 +47,24 @@ class Shots:
         return self._studio.picture(rig.rest_pose, rig.strands.grid, WIDTH, HEIGHT, SAMPLES)
 
     def built(self, way: str, levels: int = 1) -> tuple[Any, Any]:
-        """Cards in this way, and their textures."""
-        settings = self.settings
-        choices = of_addon("host.cards.card_making").CardChoices(
+        """Cards in this way, and how they are drawn."""
+        settings, builds = self.settings, of_addon("host.cards.card_builds")
+        form = builds.CardForm(
             settings["cards"](way=way, card_count=CARDS, levels=levels),
             settings["atlas"](),
             settings["card_occlusion"](rays=64),
             settings["card_texture"](),
-            self._shading,
             self._drawn,
+            shading=self._shading,
         )
-        steps = of_addon("host.cards.card_making").making_steps(self.rig, choices)
+        steps = of_addon("host.cards.card_making").making_steps(self.rig, form.choices({}))
         made = of_addon("cards.steps").result_of(steps)
-        return made.build, made.maps.textures
+        tied = builds.tied_cards(self.rig, form, made)
+        return made.build, tied.drawn(tied.rest, (settings["card_drawing"](), self._drawn))
 
-    def cards(self, mesh: Any, textures: Any) -> Any:
-        shown = of_addon("render.card_snapshot").CardSnapshot(mesh, textures)
+    def cards(self, mesh: Any, drawn: Any, back: Any = None) -> Any:
+        """These cards of those that are drawn, with the order of their back faces."""
+        shown = replace(drawn, mesh=mesh, back_triangles=back)
         return self._studio.card_picture(shown, WIDTH, HEIGHT, SAMPLES)
 
 
@@ -84,11 +86,17 @@ def main(folder: Path) -> None:
     build, baked = shots.built("clusters", levels=5)
     sheet(
         "card_ways.png",
-        [shots.strands(), shots.cards(guides.finest, along), shots.cards(build.finest, baked)],
+        [
+            shots.strands(),
+            shots.cards(guides.finest, along, guides.backs[0]),
+            shots.cards(build.finest, baked, build.backs[0]),
+        ],
     )
     layers = np.unique(build.finest.layer)
     sheet("card_layers.png", [shots.cards(of_layer(build.finest, n), baked) for n in layers])
-    sheet("card_levels.png", [shots.cards(build.levels[n], baked) for n in (0, 2, 4)])
+    sheet(
+        "card_levels.png", [shots.cards(build.levels[n], baked, build.backs[n]) for n in (0, 2, 4)]
+    )
     for mesh, error in zip(build.levels, build.errors, strict=True):
         triangles, millimetres = len(mesh.triangles), error * 1000.0
         print(f"{triangles:,} triangles, {mesh.card_count} cards, within {millimetres:.1f} mm")

@@ -62,9 +62,11 @@ class CardTracks:
 
 @dataclass(frozen=True)
 class JointChoices:
-    """chains: at most. joints: at most, in a chain, 2 to 16. error: share of the hair's length."""
+    """chains: at most; 127 of two joints each, and the root, are as many as a byte can number.
+    joints: at most, in a chain, 2 to 16. error: root mean square, a share of the hair's length.
+    """
 
-    chains: int = 64
+    chains: int = 127
     joints: int = 16
     error: float = 0.01
 

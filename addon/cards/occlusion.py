@@ -4,8 +4,9 @@ What is stored is the light that a vertex gets from an even sky, as a share of w
 its normal gets in the open:  A = sum_i |n . d_i| T_i / sum_i |n . d_i|,  over directions d_i that
 are spread evenly over the half sphere about the normal n, which faces away from the head. So a
 card that lies open on the head has 1. T is the transmittance of the ray: a body lets nothing
-through, each card 1 - alpha at the place that is met (Scheuermann 2004, section 5; Zhukov,
-Iones and Kronin 1998, ambient light under an even sky).
+through, each card (1 - alpha)^extinction at the place that is met (Scheuermann 2004, section 5;
+Zhukov, Iones and Kronin 1998, ambient light under an even sky). With an extinction of 1 a card is
+what it looks like; strands of a groom shade with more, see shading/ambient.py, and so do its cards.
 
 All vertices share one set of axes. Along each axis every vertex has one ray, to that side to which
 its normal leans, and all rays are found together (see parallel_rays.py).
@@ -198,7 +199,7 @@ class _Scene:
         for layer in self._layers:
             depth += rays.depth(frame @ layer.triangles.corners, layer, self._settings)
         transmittance = np.zeros(len(leaning))
-        transmittance[rays.vertex] = np.exp(-depth)
+        transmittance[rays.vertex] = np.exp(-self._settings.extinction * depth)
         return np.abs(leaning), transmittance
 
 

@@ -23,6 +23,14 @@ class CardOcclusionSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
     )
+    extinction: float = number(
+        2.5,
+        label="Extinction",
+        description="How fast light dies in the cards, as a power of what their alpha lets "
+        "through; about that of the strands, and a little more since a card does not shade itself",
+        soft=(0.0, 10.0),
+        hard=(0.0, 1_000.0),
+    )
     rays: int = integer(
         256,
         label="Rays",

@@ -25,6 +25,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import Surface
 from ..strands.closest_point import closest_point
+from .canonical import canonical
 from .card_mesh import OF_VERTICES, CardMesh
 from .order_groups import dangling_groups, sections
 from .order_pairs import Pairs, all_pairs, pairs_by_view
@@ -69,14 +70,15 @@ def card_orders(
     apart: Collection[int] | None = None,
     view_count: int = VIEW_COUNT,
 ) -> CardOrders:
-    """The best orders that hold for all views around the head; the same for the same mesh.
+    """The best orders that hold for all views around the head; the same for the same cards,
+    whatever order they come in.
 
     Args:
         head: in the space of the mesh; without one the middle of the hair stands for it.
-        by: "cards" and "distance" keep the triangles of a card together and in their order;
+        by: "cards" and "distance" keep the triangles of a card together, from root to tip;
             "pieces" sorts those of cards that cross each other apart, which halves what is wrong.
             Cards that are nowhere seen together keep their order by distance, and those at equal
-            distance the order they have.
+            distance go by where their roots are.
         apart: groups that are drawn on their own after all others, so that they can be left out or
             moved; None finds those that dangle.
         view_count: directions to look from. A third is enough for coarser levels of detail.
@@ -92,6 +94,19 @@ def order_steps(
     view_count: int = VIEW_COUNT,
 ) -> Generator[float, None, CardOrders]:
     """As card_orders, some views a step; each gives the share that is done."""
+    numbered = canonical(mesh)
+    orders = yield from _canonical_orders(numbered.mesh, head, by, apart, view_count)
+    return CardOrders(numbered.triangle[orders.front], numbered.triangle[orders.back])
+
+
+def _canonical_orders(
+    mesh: CardMesh,
+    head: Surface | None,
+    by: SortBy,
+    apart: Collection[int] | None,
+    view_count: int,
+) -> Generator[float, None, CardOrders]:
+    """As order_steps, of a mesh that is numbered by canonical.py."""
     distance = card_distances(mesh, head)
     section = _section_of_cards(mesh, distance, apart)
     inside_out = np.lexsort((distance, section))

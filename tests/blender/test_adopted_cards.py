@@ -11,6 +11,7 @@ import pytest
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.host.cards.adopted_cards import SortChoices, read_cards, sort_mesh
+from hairloom.addon.host.cards.adopted_writing import reorder_faces
 
 QUICK = CardOcclusionSettings(rays=16)
 
@@ -322,7 +323,13 @@ def test_real_cards_leave_blender_in_their_order(
     uv = {tuple(face.vertices): None for face in hair.data.polygons}
     done = sort_mesh(hair, evaluated(), SortChoices(head=body, occlusion=QUICK))
     assert done.moved > 0.5 * done.face_count
-    assert {tuple(face.vertices) for face in hair.data.polygons} == set(uv)
+    sorted_faces = polygons(hair.data)
+    assert {vertices for vertices, _ in sorted_faces} == set(uv)
+    unshaded = SortChoices(head=body, occlusion=None)
+    assert sort_mesh(hair, evaluated(), unshaded).moved == 0
+    reorder_faces(hair.data, np.random.default_rng(0).permutation(done.face_count))
+    assert sort_mesh(hair, evaluated(), unshaded).moved > 0.5 * done.face_count
+    assert polygons(hair.data) == sorted_faces
     hair.select_set(True)
     body.select_set(False)
     written = tmp_path / "hair.obj"

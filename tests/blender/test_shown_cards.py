@@ -9,6 +9,7 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 
 from hairloom.addon.host.preview import live, overlay, reactions  # noqa: E402
 from hairloom.addon.host.render_engine.engine_hair import read_groom  # noqa: E402
+from hairloom.addon.host.thread_work import GivenUpError  # noqa: E402
 
 
 @pytest.fixture
@@ -16,14 +17,29 @@ def preview(new_hair, sphere, evaluated):
     """Hair on the sphere, shown as cards."""
     hair = new_hair(sphere)
     hair.data.hairloom.cards.way = "guides"
+    hair.data.hairloom.card_occlusion.rays = 4
     hair.data.hairloom.card_drawing.shown_as = "cards"
     session = live.start(hair, evaluated())
     yield hair, sphere, session
     live.stop_all()
 
 
+@pytest.fixture
+def in_window(preview, monkeypatch):
+    """The same preview, where cards are built beside the window."""
+    monkeypatch.setattr(preview[2].cards, "_is_awaited", lambda: False)
+    return preview
+
+
 def drawn(session):
     return overlay.drawing_of(session.uid).snapshot
+
+
+def served(session):
+    """The cards that are shown once all that is on its way is built."""
+    while session.cards.is_pending:
+        live._take_cards()
+    return drawn(session).cards
 
 
 def test_cards_are_drawn_in_place_of_strands(preview):
@@ -109,14 +125,42 @@ def test_a_render_shows_the_same_cards(preview, evaluated):
     assert read_groom(hair, evaluated()).strand_count == 60
 
 
-def test_in_a_window_old_cards_stay_until_others_are_built(preview, monkeypatch):
-    hair, _, session = preview
+def test_in_a_window_old_cards_stay_until_others_are_built(in_window):
+    hair, _, session = in_window
     before = drawn(session).cards.mesh
-    monkeypatch.setattr(session.cards, "_is_awaited", lambda: False)
     for count in (4, 6, 7):  # a slider is dragged
         hair.data.hairloom.cards.segment_count = count
         assert len(drawn(session).cards.mesh.triangles) == len(before.triangles)
-    while session.cards.is_pending:
-        live._take_cards()
-    mesh = drawn(session).cards.mesh
+    mesh = served(session).mesh
     assert len(mesh.triangles) == len(before.triangles) * 7 // 12
+
+
+def test_in_a_window_textures_are_on_the_gpu_before_cards_are_shown(in_window, gpu_context):
+    hair, _, session = in_window
+    assert drawn(session).cards.device is None, "in the background each draw has its own"
+    hair.data.hairloom.cards.segment_count = 5
+    cards = served(session)
+    before = cards.device.of("alpha")
+    cards.device.upload(cards)
+    assert cards.device.of("alpha") is before, "the draw uploads them again"
+    assert (before.height, before.width) > cards.textures.alpha.shape, "it holds the mip maps too"
+
+
+def test_strands_again_give_up_what_is_being_built(in_window):
+    hair, _, session = in_window
+    hair.data.hairloom.cards.segment_count = 5
+    work = session.cards._build.work
+    hair.data.hairloom.card_drawing.shown_as = "strands"
+    assert not session.cards.is_pending and drawn(session).cards is None
+    work._thread.join(timeout=60.0)
+    assert work.is_done, "it goes on and asks for more"
+    with pytest.raises(GivenUpError):
+        work.result()
+
+
+def test_cards_throw_the_shadow_of_their_strands(preview):
+    hair, _, session = preview
+    before = drawn(session).cards.thickness
+    assert before > 0.0 and before != 1.0
+    hair.data.hairloom.strands.width_scale *= 2.0
+    assert drawn(session).cards.thickness == pytest.approx(2.0 * before, rel=1e-3)

@@ -115,7 +115,7 @@ def built_cards(
     Raises:
         HairloomError: no cards can be made.
     """
-    return _bound(rig, form, result_of(making_steps(rig, form.choices(pictures, others))))
+    return tied_cards(rig, form, result_of(making_steps(rig, form.choices(pictures, others))))
 
 
 def building_cards(
@@ -128,7 +128,7 @@ def building_cards(
     choices = form.choices(pictures, others)
 
     def build(work: ThreadWork[BuiltCards]) -> BuiltCards:
-        built = _bound(rig, form, made_in_thread(work, rig, choices))
+        built = tied_cards(rig, form, made_in_thread(work, rig, choices))
         work.tell("Textures")
         device = _uploaded(work, built.rest)
         return replace(built, rest=replace(built.rest, device=device))
@@ -169,7 +169,8 @@ def made_in_thread(work: ThreadWork[Any], rig: Rig, choices: CardChoices) -> Mad
     return result_of(retold(steps, work.tell))
 
 
-def _bound(rig: Rig, form: CardForm, made: MadeCards) -> BuiltCards:
+def tied_cards(rig: Rig, form: CardForm, made: MadeCards) -> BuiltCards:
+    """Cards that are made, with all that drawing them needs."""
     build, textures = made.build, made.maps.textures
     mesh, strands = build.finest, rig.strands
     return BuiltCards(

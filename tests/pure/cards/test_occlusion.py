@@ -67,7 +67,8 @@ def stacked(heights: list[float], size: float = 1.0) -> CardMesh:
 
 
 def plain(**changed: float) -> CardOcclusionSettings:
-    return CardOcclusionSettings(**{"reach": 100.0, **changed})  # type: ignore[arg-type]
+    """Cards let through what their alpha says."""
+    return CardOcclusionSettings(**{"reach": 100.0, "extinction": 1.0, **changed})  # type: ignore[arg-type]
 
 
 def brute_force(
@@ -116,7 +117,8 @@ def test_the_mean_error_against_brute_force_is_below_two_hundredths() -> None:
     settings = CardOcclusionSettings()
     found = vertex_occlusion(mesh, [CardShade(mesh, alpha)], [head], settings)
     chosen = np.random.default_rng(2).choice(len(found), 50, replace=False)
-    expected = brute_force(mesh, alpha, head, chosen, 512, settings.own_reach)
+    through = (1.0 - alpha) ** settings.extinction
+    expected = brute_force(mesh, 1.0 - through, head, chosen, 512, settings.own_reach)
     assert expected.min() < 0.3 and expected.max() > 0.95  # it is not all alike
     error = found[chosen] - expected
     assert np.abs(error).mean() < 0.02
@@ -160,13 +162,17 @@ def test_below_a_wide_square_only_the_light_past_its_edge_arrives() -> None:
     np.testing.assert_allclose(found, 1.0 - blocked, atol=0.005)
 
 
+@pytest.mark.parametrize("extinction", [1.0, 2.5])
 @pytest.mark.parametrize("alpha", [0.0, 0.3, 1.0])
-def test_cards_let_one_minus_alpha_through_and_several_multiply(alpha: float) -> None:
+def test_cards_let_one_minus_alpha_through_and_several_multiply(
+    alpha: float, extinction: float
+) -> None:
     shades = stacked([0.01, 0.02, 0.03], size=50.0)
     below = stacked([0.0], size=0.01)
     picture = np.full((4, 4), alpha, np.float32)
-    found = vertex_occlusion(below, [CardShade(shades, picture)], [], plain())
-    np.testing.assert_allclose(found, (1.0 - alpha) ** 3, atol=0.01)
+    settings = plain(extinction=extinction)
+    found = vertex_occlusion(below, [CardShade(shades, picture)], [], settings)
+    np.testing.assert_allclose(found, (1.0 - alpha) ** (3.0 * extinction), atol=0.01)
 
 
 def test_alpha_is_read_at_the_place_that_is_hit() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from guide_cards import build_cards
 
-from hairloom.addon.cards.card_mesh import CardMesh, joined
+from hairloom.addon.cards.card_mesh import OF_CARDS, OF_VERTICES, CardMesh, joined
 from hairloom.addon.cards.order_check import wrong_share
 from hairloom.addon.cards.order_pairs import all_pairs, pairs_by_view
 from hairloom.addon.cards.settings import CardSettings
@@ -101,15 +101,61 @@ def test_shells_are_drawn_from_the_inside_to_the_outside(head: Surface | None, b
 
 
 @pytest.mark.parametrize("by", ["cards", "distance"])
-def test_triangles_of_a_card_stay_together_and_in_order(by: SortBy) -> None:
+def test_triangles_of_a_card_stay_together_from_root_to_tip(by: SortBy) -> None:
     mesh = crossing_cards()
     orders = card_orders(mesh, sphere(), by)
+    lowest = mesh.along[mesh.triangles].min(axis=1)
     for order in (orders.front, orders.back):
+        np.testing.assert_array_equal(np.sort(order), np.arange(len(order)))
         drawn = mesh.card[order]
-        starts = np.flatnonzero(np.diff(drawn, prepend=-1))
-        assert len(starts) == mesh.card_count
-        expected = [np.flatnonzero(mesh.card == card) for card in drawn[starts].tolist()]
-        np.testing.assert_array_equal(order, np.concatenate(expected))
+        is_next = np.diff(drawn) != 0
+        assert is_next.sum() == mesh.card_count - 1
+        assert (np.diff(lowest[order])[~is_next] >= 0.0).all()
+
+
+def shuffled(mesh: CardMesh, seed: int) -> CardMesh:
+    """The same cards: vertices, triangles, their corners and the numbers of cards by chance."""
+    random = np.random.default_rng(seed)
+    vertices = random.permutation(len(mesh.positions))
+    cards = random.permutation(len(mesh.group))
+    order = random.permutation(len(mesh.triangles))
+    turned = (random.integers(0, 3, (len(order), 1)) + np.arange(3)) % 3
+    corners = np.argsort(vertices)[np.take_along_axis(mesh.triangles[order], turned, axis=1)]
+    of_vertices = {name: getattr(mesh, name)[vertices] for name in OF_VERTICES}
+    of_cards = {name: getattr(mesh, name)[cards] for name in OF_CARDS}
+    return replace(
+        mesh, triangles=corners, card=np.argsort(cards)[mesh.card[order]], **of_vertices, **of_cards
+    )
+
+
+def as_drawn(mesh: CardMesh, order: np.ndarray) -> np.ndarray:
+    """Where the corners of triangles are, the lowest of each first, (triangle_count, 9)."""
+    corners = mesh.positions[mesh.triangles[order]]
+    first = np.lexsort(corners.transpose(2, 0, 1)[::-1], axis=1)[:, :1]
+    turned = (first + np.arange(3)) % 3
+    return np.take_along_axis(corners, turned[..., None], axis=1).reshape(-1, 9)
+
+
+@pytest.mark.parametrize("by", WAYS)
+@pytest.mark.parametrize("head", [None, sphere()])
+def test_the_order_hangs_on_where_cards_are_alone(head: Surface | None, by: SortBy) -> None:
+    group = np.arange(40) % 3
+    mesh = replace(crossing_cards(), group=group)
+    expected = card_orders(mesh, head, by, apart=(2,), view_count=8)
+    for seed in range(2):
+        other = shuffled(mesh, seed)
+        found = card_orders(other, head, by, apart=(2,), view_count=8)
+        for one, two in ((expected.front, found.front), (expected.back, found.back)):
+            np.testing.assert_array_equal(as_drawn(mesh, one), as_drawn(other, two))
+
+
+@pytest.mark.parametrize("by", WAYS)
+def test_cards_that_are_sorted_stay_as_they_are(by: SortBy) -> None:
+    mesh = replace(crossing_cards(), **{name: np.zeros(80) for name in OF_CARDS})
+    twice = joined([mesh, replace(mesh, card=mesh.card + 40)])  # each card lies on one like it
+    once = in_order(twice, card_orders(twice, sphere(), by, view_count=8).front)
+    again = card_orders(once, sphere(), by, view_count=8)
+    np.testing.assert_array_equal(again.front, np.arange(len(once.triangles)))
 
 
 def test_everything_of_a_triangle_and_a_vertex_travels_with_it() -> None:
@@ -202,8 +248,8 @@ def test_what_is_learnt_is_better_than_the_distance() -> None:
     )
 
 
-def test_cards_side_by_side_keep_their_order() -> None:
-    """No view sees one before the other, so that the distance decides, and then the number."""
+def test_cards_side_by_side_go_by_their_place() -> None:
+    """No view sees one before the other, so that the distance decides, and then where it is."""
     along = np.linspace(0.0, 0.1, 4)[:, None] * [0.0, 0.0, 1.0]
     places = np.array([[0.03, 0.0, 0.0], [0.0, 0.0, 0.0], [-0.03, 0.0, 0.0]])
     guides = (places[:, None] + along).astype(np.float32)
@@ -212,9 +258,10 @@ def test_cards_side_by_side_keep_their_order() -> None:
     wall = np.float32([[-9, -1, -9], [9, -1, -9], [0, -1, 9]])
     for by in WAYS:
         orders = card_orders(mesh, Surface(wall, np.array([[0, 1, 2]])), by, apart=())
-        np.testing.assert_array_equal(np.sort(orders.front), np.arange(len(mesh.triangles)))
-    np.testing.assert_array_equal(orders.front, np.arange(len(mesh.triangles)))
-    np.testing.assert_array_equal(orders.back, np.arange(len(mesh.triangles)))
+        for order in (orders.front, orders.back):
+            np.testing.assert_array_equal(np.sort(order), np.arange(len(mesh.triangles)))
+            if by != "pieces":
+                np.testing.assert_array_equal(mesh.card[order], np.repeat([2, 1, 0], 48))
 
 
 @pytest.mark.parametrize("by", WAYS)
