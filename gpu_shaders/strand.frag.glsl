@@ -18,7 +18,9 @@
 #if DEBUG
 vec3 debug_color()
 {
-#  if DEBUG != {{debug_detail}}
+#  if DEBUG == {{debug_occlusion}}
+  return vec3(strand_along_and_occlusion.y);
+#  elif DEBUG != {{debug_detail}}
   return index_color(int(texelFetch(debug_numbers, strand_texel(strand_index, 0, 1), 0).x));
 #  elif ADAPTIVE
   int segment = clamp(int(strand_along_and_occlusion.x * float(cv_count - 1)), 0, cv_count - 2);

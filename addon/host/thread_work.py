@@ -92,6 +92,15 @@ class ThreadWork[T]:
                 request.answer.set_exception(error)
         return not self._thread.is_alive()
 
+    @property
+    def is_done(self) -> bool:
+        """Whether it has a result, or an error."""
+        return not self._thread.is_alive()
+
+    def wait(self) -> None:
+        """Until it is done; only for work that asks the main thread for nothing."""
+        self._thread.join()
+
     def result(self) -> T:
         """What the work has made, once it is done.
 

@@ -61,7 +61,7 @@ OTHERS_LIGHTS = 4
 #: how a pass writes its colour; see encoded() in lib_output.glsl
 OUTPUTS = ("scene_linear", "viewport")
 #: what strands may be coloured by in place of their shading, see lib_debug_color.glsl
-DEBUG_VIEWS = ("none", "detail", "guide", "group")
+DEBUG_VIEWS = ("none", "detail", "guide", "group", "occlusion")
 #: the choices of DetailSettings, by the numbers under which shaders know them
 DETAIL_CHOICES = {
     parameter.name: tuple(name for name, _, _ in parameter.choices)

@@ -12,6 +12,7 @@ from contextlib import closing
 from typing import Any, NamedTuple
 
 import bpy
+from bpy.app.handlers import persistent
 
 from ..host.preview.redraw import redraw_panels
 from ..host.thread_work import ThreadWork
@@ -135,6 +136,8 @@ class _Running:
         manager = bpy.context.window_manager
         self._timer = manager.event_timer_add(_PAUSE, window=window)
         manager.modal_handler_add(operator)
+        for each in _undoing():
+            each.append(_on_undo)
 
     def tell(self, progress: Progress) -> None:
         """In the status bar, at the mouse pointer and in panels."""
@@ -152,7 +155,9 @@ class _Running:
         redraw_panels()
 
     def end(self) -> None:
-        """Leave no timer and no text."""
+        """Leave no timer, no handler and no text."""
+        for each in _undoing():
+            each.remove(_on_undo)
         manager = bpy.context.window_manager  # another than before, when a file is loaded
         manager.event_timer_remove(self._timer)
         if self._has_cursor:
@@ -160,6 +165,16 @@ class _Running:
         if bpy.context.workspace is not None:
             bpy.context.workspace.status_text_set(None)
         redraw_panels()
+
+
+def _undoing() -> tuple[list[Any], ...]:
+    return (bpy.app.handlers.undo_pre, bpy.app.handlers.redo_pre)
+
+
+@persistent  # it goes when the work ends, which may be after a file is loaded
+def _on_undo(*_: Any) -> None:
+    """Keys cannot undo meanwhile, but scripts can, and what the work holds on to would be gone."""
+    stop()
 
 
 _running: _Running | None = None

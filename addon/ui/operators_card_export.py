@@ -98,7 +98,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     chains: IntProperty(
         name="Chains",
         description="How many chains of joints there are at most; cards that move alike share one",
-        default=64,
+        default=127,
         min=1,
         max=2048,
         soft_max=256,

@@ -33,7 +33,8 @@ class HAIRLOOM_OT_set_surface(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair, depsgraph = chosen_hair(context)[0], context.evaluated_depsgraph_get()
         selected = [obj for obj in context.selected_objects if obj.type == "MESH"]
-        visible = [obj for obj in context.view_layer.objects if obj.visible_get()]
+        there = filter(None, context.view_layer.objects)  # None where one was just removed
+        visible = [obj for obj in there if obj.visible_get()]
         mesh = surface_for(hair, selected or visible, depsgraph)
         set_surface(hair, mesh)
         self.report({"INFO"}, f"{hair.name} grows from {mesh.name} now")

@@ -83,7 +83,8 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
             if not live.simulated():
                 start_preview(self, context, chosen_hair(context))
             depsgraph = context.evaluated_depsgraph_get()
-            for warning in (*fins.start_enabled(depsgraph), *live.play(depsgraph)):
+            fin_warnings = fins.start_enabled(depsgraph)
+            for warning in (*fin_warnings, *live.play(depsgraph, waits=False)):
                 self.report({"WARNING"}, warning)
         if not live.is_playing():
             return {"CANCELLED"}

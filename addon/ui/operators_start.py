@@ -212,7 +212,7 @@ def _begin(
     if live.is_playing():
         depsgraph = context.evaluated_depsgraph_get()
         for session in filter(None, map(live.session_of, grooms)):
-            session.play(depsgraph)
+            live.begin(session, depsgraph, waits=False)
     else:
         bpy.ops.hairloom.play("INVOKE_DEFAULT")
 

@@ -27,7 +27,8 @@ def _made_into(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
 
 
 def _grown_on(meshes: list[bpy.types.Object], context: bpy.types.Context) -> list[bpy.types.Object]:
-    everything = context.view_layer.objects
+    # right after a script has removed an object there is None in its place
+    everything = filter(None, context.view_layer.objects)
     return [obj for obj in everything if obj.type == "CURVES" and head_of(obj) in meshes]
 
 

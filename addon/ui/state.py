@@ -71,6 +71,8 @@ def _moved_by(session: Session) -> str:
     baked = timeline.baked(session.uid)
     if baked is not None and baked.is_shown:
         return "Shown from the bake" + (", which is out of date" if baked.changed else "")
+    if live.is_waiting(session):
+        return f"It {live.WAITING}"
     computed = "Simulated" if session.is_playing else "To be simulated"
     return f"{computed} on the {session.computed_on}"
 

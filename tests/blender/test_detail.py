@@ -71,7 +71,7 @@ def test_of_children_the_last_to_grow_are_the_first_to_go(new_hair, sphere, eval
     assert rank[:60].max() < 60 / 300 and len(np.unique(rank[:60])) == 60
 
 
-@pytest.mark.parametrize("view", ["detail", "guide", "group", "none"])
+@pytest.mark.parametrize("view", ["detail", "guide", "group", "occlusion", "none"])
 def test_a_debug_view_reaches_the_snapshot_and_brings_its_counts(view, preview):
     hair, _, session = preview
     assert drawing(session).counts_of == ""

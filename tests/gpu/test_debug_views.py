@@ -115,3 +115,22 @@ def test_guides_and_groups_have_colours_of_their_own(frame: Any, front: Any, nam
         assert np.abs(shown[place] - shown[other]).max() > 0.1
     plain = colors(debug_view=name)
     assert np.abs(plain - plain[0]).max() < 1e-3, "without numbers all are alike"
+
+
+def test_the_occlusion_view_shows_it_in_grey(frame: Any, front: Any) -> None:
+    strands = np.zeros((1, 3, 3), np.float32)
+    strands[0, :, 2] = [-0.5, 0.0, 0.5]
+    occlusion = np.array([[0.2, 0.6, 1.0]], np.float32)
+    settings = StrandSettings(width_scale=60.0, tip_width=1.0)
+    snapshot = snapshot_of(
+        frame,
+        strands,
+        BARE,
+        strand_settings=settings,
+        debug_view="occlusion",
+        occlusion=occlusion,
+    )
+    picture = frame.render_image(snapshot, front, 200, 200, 1)
+    grey = picture[[50, 100, 150], 100, :3]
+    assert np.ptp(grey, axis=1).max() < 1e-3 and grey[1].max() > 0.2
+    assert grey[:, 0] / grey[1, 0] == pytest.approx([2.0 / 3.0, 1.0, 4.0 / 3.0], abs=0.05)

@@ -52,6 +52,8 @@ class _Part:
             self.writer.add_constants(session.constants())
         else:
             session = self.session
+            if isinstance(session, Session):
+                session.take_settings()  # those that are animated
             session.advance(depsgraph, 1.0 / frame_rate(depsgraph.scene))
         self.writer.add(frame, session.recorded(), session.moment(depsgraph))
 

@@ -114,14 +114,20 @@ def export_cards(
 
 
 def _motion_line(written: WrittenCards) -> str:
-    """How the motion was written, such as "; 64 chains of 3 joints, off by 0.8 %"."""
+    """How the motion was written, such as "; 127 chains of 2 joints, off by 0.6% of the
+    hair's length (root mean square; 99% by less than 2.1%, the worst by 14.0%)".
+    """
     motion = written.motion
     if not motion:
         return ""
     if motion["kind"] == "texture":
         return f"; motion textures of {motion['width']} x {motion['height']} texels"
-    share = motion["error"]["root_mean_square"] / motion["error"]["hair_length"]
+    length = motion["error"]["hair_length"]
+    share, most, worst = (
+        motion["error"][name] / length for name in ("root_mean_square", "percentile_99", "worst")
+    )
     return (
-        f"; {motion['chains']} chains of {motion['joints_in_chain']} joints, off by {share:.1%} "
-        "of the hair's length"
+        f"; {motion['chains']} chains of {motion['joints_in_chain']} joints, off by {share:.1%} of "
+        f"the hair's length (root mean square; 99% by less than {most:.1%}, the worst by "
+        f"{worst:.1%})"
     )

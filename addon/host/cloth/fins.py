@@ -72,7 +72,7 @@ class FinSession:
         if self.is_playing and self.obstacles is not None:
             self.obstacles.rest(depsgraph)
 
-    def play(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def play(self, depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> None:
         """Get ready to be simulated; the mesh as it arrives now is what edges keep."""
         obj = self._found()
         self._corners = corners_of(obj.data)
@@ -85,7 +85,9 @@ class FinSession:
             )
         )
         settings = self.settings.as_dynamics()
-        self.obstacles = Obstacles.of(obj, None, None, settings, depsgraph, self.obstacles)
+        self.obstacles = Obstacles.of(
+            obj, None, None, settings, depsgraph, self.obstacles, waits=waits
+        )
         self.is_playing = True
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
@@ -265,4 +267,4 @@ def any_enabled(layer: bpy.types.ViewLayer) -> bool:
 
 def fins_in(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
     """The objects of a view layer that are fins, by their modifier."""
-    return [obj for obj in layer.objects if fin_modifier(obj) is not None]
+    return [obj for obj in filter(None, layer.objects) if fin_modifier(obj) is not None]

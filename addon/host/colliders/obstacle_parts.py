@@ -21,6 +21,7 @@ from ...dynamics.way import bow
 from ...strands import Surface
 from ...strands.affine import moved
 from .carriers import Carrier, scales_of
+from .fields import field_of
 
 #: A mesh that came back to within this of its rest is the same mesh [m].
 _SAME_SHAPE = 1.0e-5
@@ -96,8 +97,11 @@ class FieldPart:
     warnings: dict[str, str] = field(default_factory=dict)
 
     @classmethod
-    def new(cls, carrier: Carrier, surface: Surface, settings: DynamicsSettings) -> FieldPart:
-        made = DistanceField.from_surface(surface, settings, place=carrier.body.handle.name)
+    def new(
+        cls, carrier: Carrier, surface: Surface, settings: DynamicsSettings, *, waits: bool
+    ) -> FieldPart:
+        """As `fields.field_of`."""
+        made = field_of(surface, settings, place=carrier.body.handle.name, waits=waits)
         return cls(carrier, surface, made, settings.collider_resolution)
 
     @property

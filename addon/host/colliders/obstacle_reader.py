@@ -55,12 +55,16 @@ _SOLID = frozenset(("CURVE", "SURFACE", "META", "FONT", "VOLUME", "POINTCLOUD"))
 
 @dataclass
 class Reader:
-    """Makes the part of one object. known: its field from before, if it had one."""
+    """Makes the part of one object.
+
+    known: its field from before, if it had one. waits: for a new one; see `fields.field_of`.
+    """
 
     obj: bpy.types.Object
     depsgraph: bpy.types.Depsgraph
     settings: DynamicsSettings
     known: FieldPart | None
+    waits: bool
 
     def part_of_head(self, head: Body, at_rest: Surface, roots: Ints | None) -> Part | Ball | None:
         """The head was read when the session began, perhaps in another pose than it is in now."""
@@ -72,6 +76,7 @@ class Reader:
     def part(self) -> Part | Ball | None:
         """Raises:
         HairloomError: it cannot collide as it should.
+        NotMadeYetError: its field is being made, and nobody waits.
         """
         shape, obj = shape_of(self.obj), self.obj
         if shape == "none":
@@ -91,12 +96,12 @@ class Reader:
             matrix = self.known.carrier.moved(self.depsgraph)
             if self.known.is_of(surface, matrix, self.settings):
                 return self._again(self.known.carrier)
-        return FieldPart.new(carrier, surface, self.settings)
+        return FieldPart.new(carrier, surface, self.settings, waits=self.waits)
 
     def _field_part(self, carrier: Carrier, surface: Surface, matrix: Floats) -> FieldPart:
         if self.known is not None and self.known.is_of(surface, matrix, self.settings):
             return self._again(carrier)
-        return FieldPart.new(carrier, surface, self.settings)
+        return FieldPart.new(carrier, surface, self.settings, waits=self.waits)
 
     def _again(self, carrier: Carrier) -> FieldPart:
         assert self.known is not None

@@ -20,6 +20,7 @@ from ...errors import HairloomError
 from ...strands import Surface
 from ..scene.objects import Body
 from .carriers import is_left_out
+from .fields import NotMadeYetError
 from .obstacle_balls import Ball, BallsPart
 from .obstacle_parts import FieldPart, Part, ShapePart
 from .obstacle_reader import Reader, left_out, shape_of
@@ -44,6 +45,8 @@ class Obstacles:
         depsgraph: bpy.types.Depsgraph,
         known: Obstacles | None,
         roots: Ints | None = None,
+        *,
+        waits: bool = True,
     ) -> Obstacles:
         """All that collides with `owner`, at rest where it is now.
 
@@ -52,13 +55,19 @@ class Obstacles:
             head: what it grows from, and head_at_rest: its mesh in world space at rest; or None.
             known: its distance fields are used again where nothing has changed.
             roots: vertices of the head that hair grows from; they tell how it moves.
+            waits: False: do not wait for fields that are to be made.
+
+        Raises:
+            HairloomError: as `move`.
+            NotMadeYetError: a field is being made, and nobody waits.
         """
         found = cls([], None if head is None else head.handle.uid)
         fields = {} if known is None else known._fields()
         balls: dict[object, list[Ball]] = {}
+        is_whole = True
         for obj in sources_of(owner, None if head is None else head.handle.find()):
             is_head = head is not None and head.handle.uid == obj.session_uid
-            reader = Reader(obj, depsgraph, settings, fields.get(obj.session_uid))
+            reader = Reader(obj, depsgraph, settings, fields.get(obj.session_uid), waits)
             try:
                 if is_head and head is not None and head_at_rest is not None:
                     made = reader.part_of_head(head, head_at_rest, roots)
@@ -67,10 +76,15 @@ class Obstacles:
             except HairloomError as error:
                 found._unusable[obj.name] = str(_named(obj.name, error))
                 continue
+            except NotMadeYetError:  # the others are begun as well
+                is_whole = False
+                continue
             if isinstance(made, Ball):
                 balls.setdefault(_carried_by(obj), []).append(made)
             elif made is not None:
                 found.parts.append(made)
+        if not is_whole:
+            raise NotMadeYetError
         found.parts += [BallsPart.new(group, depsgraph) for group in balls.values()]
         found.rest(depsgraph)
         return found

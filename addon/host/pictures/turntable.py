@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -18,6 +17,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
+from ...exchange.files.leftovers import remove_leftovers, temporary_beside
 from ...pipeline import Pose
 from ...render.camera import Camera, frame_camera
 from ...shading.lights import Light, three_point_lights
@@ -176,7 +176,9 @@ def _moved_when_done(folder: Path) -> Iterator[Path]:
     is_new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        beside = Path(tempfile.mkdtemp(prefix=".turntable-", dir=folder))
+        remove_leftovers(folder)
+        beside = temporary_beside(folder / "turntable")
+        beside.mkdir()
     except OSError as error:
         raise _unwritable(folder, error) from error
     is_done = False

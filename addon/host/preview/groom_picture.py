@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import bpy
+import numpy as np
 
 from ... import pipeline
+from ...arrays import Floats
 from ...pipeline import Pose, Rig
 from ...render.hair_ball import HairBall
 from ...render.snapshot import Snapshot
+from ...shading.ambient import AmbientSettings
 from ...shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
@@ -40,6 +43,9 @@ class GroomPicture:
         self._is_drawn = is_drawn
         self._ball = HairBall()
         self._hiders: Hiders | None = None
+        self._rig: Rig | None = None
+        self._occlusion: Floats | None = None
+        self._ambient: AmbientSettings | None = None
         self._light_warnings: tuple[str, ...] = ()
         self.cards = ShownCards()
 
@@ -58,13 +64,28 @@ class GroomPicture:
 
     def take_rig(self, hair: bpy.types.Object, rig: Rig, choices: Choices) -> None:
         """All that hangs on the strands; it stands at rest, without light."""
-        occlusion, rank, self._hiders = None, None, None
+        occlusion, rank = None, None
         if self._is_drawn:
-            occlusion = pipeline.rest_occlusion(rig, choices.ambient)
+            occlusion = self._occlusion_of(rig, choices.ambient)
             rank = pipeline.strand_ranks(rig)
-            self._hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
+            self._hiders = self._hiders_of(rig)
+        self._rig = rig
         self.snapshot = with_choices(snapshot_of(rig, occlusion, rank), choices)
         self._want_cards(hair, rig, choices)
+
+    def _occlusion_of(self, rig: Rig, ambient: AmbientSettings) -> Floats:
+        """That from before where nothing changes it, as where other guides are chosen."""
+        was, known = self._rig, self._occlusion
+        if known is None or was is None or ambient != self._ambient or not _same_hair(was, rig):
+            known = pipeline.rest_occlusion(rig, ambient)
+        self._occlusion, self._ambient = known, ambient
+        return known
+
+    def _hiders_of(self, rig: Rig) -> Hiders | None:
+        was = self._rig
+        if was is not None and _same_hair(was, rig):
+            return self._hiders
+        return None if rig.head is None else Hiders(rig.head, rig.strands.roots)
 
     def take_choices(self, hair: bpy.types.Object, rig: Rig, was: Choices, now: Choices) -> bool:
         """Take over what acts at once; whether hair has to be shown again where it is."""
@@ -121,3 +142,11 @@ def _casters(rig: Rig, pose: Pose, choices: Choices) -> tuple[Surface, ...]:
     if rig.head is None or pose.head_positions is None or choices.volume.shadows == "none":
         return ()
     return (Surface(pose.head_positions, rig.head.triangles),)
+
+
+def _same_hair(one: Rig, other: Rig) -> bool:
+    """Whether two rigs have the same strands on the same head, whatever their guides."""
+    return one.head is other.head and all(
+        np.array_equal(getattr(one.strands, name), getattr(other.strands, name))
+        for name in ("points", "offsets", "radius")
+    )

@@ -14,20 +14,24 @@ import bpy
 
 from ...errors import HairloomError
 from ..bakes import playback
-from ..cards.shown_cards import as_shown
-from ..scene.objects import is_elsewhere, is_solid, spaces_without
+from ..colliders import fields
+from ..colliders.fields import NotMadeYetError
+from ..scene.objects import is_elsewhere
 from ..scene.originals import refresh_views, show_originals
 from . import overlay, timeline
-from .overlay import Drawing
+from .drawings import drawing_of
 from .redraw import redraw_panels, refresh_panels
 from .session import Session
-from .shown import with_all_strands
 from .simulated import Simulated
 
+#: What is told of hair that is about to play.
+WAITING = "plays as soon as its collider is made"
 #: Cards that are being built are looked for this often [s], or where they wait for this thread.
 CARDS_TIME, ASKING_TIME = 0.1, 0.01
 
 _sessions: dict[int, Simulated] = {}
+#: uids of what is to play once its colliders are made
+_waiting: set[int] = set()
 _notice = ""
 _is_paused = False
 _is_suspended = False
@@ -42,6 +46,8 @@ def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
     session = Session(hair, depsgraph, baked=timeline.rig_for(hair, depsgraph.scene))
     overlay.retry()
     add(session, depsgraph)
+    if not bpy.app.background:
+        session.make_fields(depsgraph)
     refresh_views()
     return session
 
@@ -55,6 +61,7 @@ def add(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     global _notice
     _notice = ""
     timeline.forget(session.uid)
+    _waiting.discard(session.uid)
     _take_bake(session, depsgraph)
     _sessions[session.uid] = session
     _publish(session, depsgraph)
@@ -83,6 +90,7 @@ def end() -> None:
     global _notice
     stop_all()
     playback.forget()
+    fields.forget()
     _notice = ""
 
 
@@ -95,6 +103,7 @@ def forget_all() -> None:
 
 def _forget(session: Simulated) -> None:
     _sessions.pop(session.uid, None)
+    _waiting.discard(session.uid)
     if isinstance(session, Session):
         session.cards.forget()
     timeline.forget(session.uid)
@@ -127,8 +136,8 @@ def notice() -> str:
 
 
 def is_playing() -> bool:
-    """Whether hair plays freely, by the clock."""
-    return any(is_free(session) for session in simulated())
+    """Whether hair plays freely, by the clock, or is about to."""
+    return any(is_free(session) or is_waiting(session) for session in simulated())
 
 
 def is_paused() -> bool:
@@ -142,21 +151,63 @@ def pause(is_paused: bool) -> None:
     redraw_panels()
 
 
-def play(depsgraph: bpy.types.Depsgraph) -> list[str]:
-    """Let all previewed grooms and fins play freely, from rest; returns warnings."""
+def is_waiting(session: Simulated) -> bool:
+    """Whether it is to play freely, and is shown at rest until its colliders are made."""
+    return session.uid in _waiting and not timeline.is_following(session)
+
+
+def play(depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> list[str]:
+    """Let all previewed grooms and fins play freely, from rest; returns warnings.
+
+    Args:
+        waits: False: what lacks a collider that is being made begins later, in `advance`.
+    """
     pause(False)
+    fields.trim()
     warnings = []
     for session in simulated():
         timeline.release(session)
         try:
-            session.play(depsgraph)
+            begin(session, depsgraph, waits=waits)
         except HairloomError as error:
             warnings.append(str(error))
     return warnings
 
 
+def begin(session: Simulated, depsgraph: bpy.types.Depsgraph, *, waits: bool) -> None:
+    """Let one play freely, now or as soon as its colliders are made; see `play`.
+
+    Raises:
+        HairloomError: as `Simulated.play`.
+    """
+    _waiting.discard(session.uid)
+    try:
+        session.play(depsgraph, waits=waits)
+    except NotMadeYetError:
+        _waiting.add(session.uid)
+        _publish(session, depsgraph)
+
+
+def _begin_waiting(depsgraph: bpy.types.Depsgraph) -> None:
+    """Let play what has all of its colliders by now."""
+    if not fields.are_made():
+        return
+    for session in simulated():
+        if is_waiting(session):
+            attempt(session, depsgraph, partial(_begin, depsgraph=depsgraph))
+        else:  # the timeline has taken it over
+            _waiting.discard(session.uid)
+
+
+def _begin(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
+    action = partial(begin, session, depsgraph, waits=False)
+    timeline.attempt(session, depsgraph, action)
+
+
 def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
     """Simulate the time [s] that has passed since the last call."""
+    if _waiting:
+        _begin_waiting(depsgraph)
     for session in simulated():
         if is_free(session) and not _is_paused:
             attempt(session, depsgraph, partial(_advance, depsgraph=depsgraph, duration=duration))
@@ -177,6 +228,7 @@ def _put_back(session: Simulated, depsgraph: bpy.types.Depsgraph, keep_playing: 
     if keep_playing:
         session.rest(depsgraph)
     else:
+        _waiting.discard(session.uid)
         session.stop(depsgraph)
         timeline.show_frame(session, depsgraph)
 
@@ -252,7 +304,8 @@ def _publish(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     hair = session.hair.found()
     if session.cards.is_pending:
         _await_cards()
-    overlay.show(session.uid, _drawing(session, hair))
+    note = f"{hair.name}: {WAITING}" if is_waiting(session) else ""
+    overlay.show(session.uid, drawing_of(session, hair, depsgraph, note))
     refresh_panels()
     is_replaced = hair.mode == "OBJECT" and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original
@@ -277,20 +330,3 @@ def _take_cards() -> float | None:
     if any(session.cards.asks for session in sessions()):
         return ASKING_TIME
     return CARDS_TIME if any(session.cards.is_pending for session in sessions()) else None
-
-
-def _drawing(session: Session, hair: bpy.types.Object) -> Drawing:
-    snapshot, head = as_shown(session.snapshot), None
-    if session.head is not None:
-        head = session.head.handle.find()
-    if head is None or not is_solid(head):
-        snapshot = with_all_strands(snapshot)
-    return Drawing(
-        snapshot,
-        hair.visible_get(),
-        hidden_in=spaces_without(hair),
-        bare_in=frozenset() if head is None else spaces_without(head),
-        guide_count=len(session.rig.guides),
-        card_counts=session.cards.counts if snapshot.cards is not None else (),
-        counts_of=hair.name if hair.hairloom.show_counts or snapshot.debug_view != "none" else "",
-    )

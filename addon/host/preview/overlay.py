@@ -24,6 +24,7 @@ from ...render.strand_pass import Statistics, StrandPass
 from ...shading.lights import Light, three_point_lights
 from ..scene.lights import uses_scene_light
 from . import view_transform
+from .lines import Lines, draw_lines
 from .measures import forget, frame_line, measured
 from .overlay_text import card_counts_line, counts_line, write_lines
 from .redraw import redraw_panels, redraw_views
@@ -38,6 +39,8 @@ class Drawing:
     bare_in: of those that do not show its head, which hides nothing there.
     card_counts: cards, triangles and vertices where it is shown as cards.
     counts_of: the name under which its counts are written; empty: they are not.
+    note: what else is written, with overlays or without.
+    aids: lines of what acts on it.
     """
 
     snapshot: Snapshot
@@ -47,6 +50,8 @@ class Drawing:
     guide_count: int = 0
     card_counts: tuple[int, ...] = ()
     counts_of: str = ""
+    note: str = ""
+    aids: tuple[Lines, ...] = ()
 
 
 #: by which Blender knows our render engine
@@ -67,7 +72,11 @@ def show(uid: int, drawing: Drawing) -> None:
         add = bpy.types.SpaceView3D.draw_handler_add
         _handles = tuple(
             add(_draw, (draw,), "WINDOW", kind)
-            for draw, kind in ((_draw_strands, "POST_VIEW"), (_draw_counts, "POST_PIXEL"))
+            for draw, kind in (
+                (_draw_strands, "POST_VIEW"),
+                (_draw_aids, "POST_VIEW"),
+                (_draw_counts, "POST_PIXEL"),
+            )
         )
         view_transform.prepare()
     redraw_views()
@@ -163,16 +172,26 @@ def _draw_groom(
     )
 
 
+def _draw_aids(context: Any) -> None:
+    """Through all that is in front of them, as Blender's own gizmos are."""
+    if context.space_data.overlay.show_overlays:
+        for _, drawing in shown_in(context.space_data):
+            for lines in drawing.aids:
+                draw_lines(lines.points, lines.color)
+
+
 def _draw_counts(context: Any) -> None:
     """What was drawn of each groom just before, into the same view."""
+    notes = [drawing.note for _, drawing in shown_in(context.space_data) if drawing.note]
     if not context.space_data.overlay.show_overlays:
+        write_lines(context, notes)
         return
     lines = [
         "   ".join(filter(None, (_counts_of(drawing, strand_pass), frame_line(uid))))
         for uid, drawing in shown_in(context.space_data)
         if drawing.counts_of and (strand_pass := _passes.get(uid)) is not None
     ]
-    write_lines(context, lines)
+    write_lines(context, lines + notes)
 
 
 def _counts_of(drawing: Drawing, strand_pass: StrandPass) -> str:

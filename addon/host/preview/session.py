@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import bpy
 import numpy as np
 
@@ -11,6 +13,7 @@ from ...pipeline import Motion, Pose, Rig
 from ...render.snapshot import Snapshot
 from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays, used_vertices
 from ..cards.shown_cards import ShownCards
+from ..colliders.fields import NotMadeYetError
 from ..colliders.obstacles import Obstacles
 from ..scene.objects import Body
 from ..scene.source import Source, dynamics_warnings, refuse_own_dynamics
@@ -200,27 +203,42 @@ class Session:
             return not np.array_equal(now.matrix, shown.matrix)
         return not np.array_equal(now.head_positions, shown.head_positions)
 
-    def play(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def play(self, depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> None:
         """Get ready to simulate from the style on; makes the colliders, which can take a second.
+
+        Args:
+            waits: False: do not wait for the fields of colliders that are to be made.
 
         Raises:
             HairloomError: as `rest`, or Blender's own hair dynamics is on.
+            NotMadeYetError: a field is being made, and nobody waits.
         """
-        hair = self.hair.found()
         self.is_playing = False
-        refuse_own_dynamics(hair)
+        refuse_own_dynamics(self.hair.found())
         self.take_settings()
+        self._read_obstacles(depsgraph, waits=waits)
+        self.is_playing = True
+        self.rest(depsgraph)
+
+    def make_fields(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Have the fields of its colliders made beside the window's work, so that Play finds them.
+
+        What is wrong with a collider is told by Play.
+        """
+        with suppress(HairloomError, NotMadeYetError):
+            self._read_obstacles(depsgraph, waits=False)
+
+    def _read_obstacles(self, depsgraph: bpy.types.Depsgraph, *, waits: bool) -> None:
         self.obstacles = Obstacles.of(
-            hair,
+            self.hair.found(),
             self.head,
             self.rig.head,
             self.choices.dynamics,
             depsgraph,
             self.obstacles,
             self._used,
+            waits=waits,
         )
-        self.is_playing = True
-        self.rest(depsgraph)
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Back to the style."""

@@ -46,8 +46,15 @@ class Simulated(Protocol):
     def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
         """In its style, where its body is now, at no speed."""
 
-    def play(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Get ready to be simulated, from rest."""
+    def play(self, depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> None:
+        """Get ready to be simulated, from rest.
+
+        Args:
+            waits: False: do not wait for the fields of colliders that are to be made.
+
+        Raises:
+            NotMadeYetError: a field is being made, and nobody waits; it is as at rest until then.
+        """
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Simulate no longer; back to rest."""

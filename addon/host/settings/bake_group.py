@@ -6,6 +6,7 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, PointerProperty, StringProperty
 
 from ..preview import live
+from .properties import OVERRIDABLE
 
 
 def _changed(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -23,11 +24,13 @@ class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         update=_changed,
+        override=OVERRIDABLE,
     )
     use_own_range: BoolProperty(
         name="Own Frame Range",
         description="Bake other frames than those of the scene",
         default=False,
+        override=OVERRIDABLE,
     )
     first: IntProperty(
         name="First",
@@ -35,41 +38,53 @@ class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):
         default=1,
         min=-99999,
         max=999999,
+        override=OVERRIDABLE,
     )
     last: IntProperty(
-        name="Last", description="Last frame to bake", default=250, min=-99999, max=999999
+        name="Last",
+        description="Last frame to bake",
+        default=250,
+        min=-99999,
+        max=999999,
+        override=OVERRIDABLE,
     )
     is_shown: BoolProperty(
         name="Play the Bake",
         description="Show the baked frames in place of simulating them; off: simulate again",
         default=True,
         update=_changed,
+        override=OVERRIDABLE,
     )
     in_renders: BoolProperty(
         name="Show in Renders",
         description="Add a copy of the hair that shows the bake in renders, where it takes the "
         "place of these curves",
         default=True,
+        override=OVERRIDABLE,
     )
     follows: BoolProperty(
         name="Simulate on Playback",
         description="While Blender plays its animation, simulate this hair frame by frame, from "
         "rest at the first frame",
         default=True,
+        override=OVERRIDABLE,
     )
     copy: PointerProperty(
         type=bpy.types.Object,
         name="Copy in Renders",
         description="The hair curves that show the bake in renders",
         options={"HIDDEN"},
+        override=OVERRIDABLE,
     )
     hides: BoolProperty(
         name="Is Replaced in Renders",
         description="Whether the copy takes the place of these curves in renders",
         options={"HIDDEN"},
+        override=OVERRIDABLE,
     )
     was_hidden: BoolProperty(
         name="Was Hidden in Renders",
         description="Whether renders left these curves out before there was a bake",
         options={"HIDDEN"},
+        override=OVERRIDABLE,
     )

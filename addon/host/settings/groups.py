@@ -11,12 +11,13 @@ from ...parameters import ALL_SETTINGS
 from ..cards.card_images import HAIRLOOM_PG_card_images
 from ..colliders.obstacle_reader import SHAPES
 from ..preview import reactions
+from ..preview.aids import KINDS as AIDS
 from ..scene.objects import head_of
 from ..scene.vertex_weights import weight_names
 from .bake_group import HAIRLOOM_PG_bake
 from .card_group import HAIRLOOM_PG_card_object
 from .fin_group import FIN_PROPERTIES
-from .properties import property_annotations, property_group
+from .properties import OVERRIDABLE, property_annotations, property_group
 
 GROOM_SECTIONS = (
     "guides",
@@ -42,6 +43,7 @@ _DEBUG_VIEWS = (
     ("detail", "Detail", "Each segment by the number of pieces it is divided into"),
     ("guide", "Guides", "Each strand by the guide that it follows most"),
     ("group", "Groups", "Each strand by its group"),
+    ("occlusion", "Ambient Occlusion", "How much of the sky's light comes to each point, in grey"),
 )
 
 
@@ -55,6 +57,7 @@ def _pointers(sections: tuple[str, ...]) -> dict[str, Any]:
             type=SECTION_GROUPS[section],
             name=ALL_SETTINGS[section].title,
             description=f"Settings of {ALL_SETTINGS[section].title.lower()}",
+            override=OVERRIDABLE,
         )
         for section in sections
     }
@@ -124,11 +127,13 @@ class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
             type=HAIRLOOM_PG_card_images,
             name="Card Pictures",
             description="Pictures in the place of generated textures of hair cards",
+            override=OVERRIDABLE,
         ),
         "baked_in": StringProperty(
             name="Baked In",
             description="Folder of the bake that these curves show in renders",
             options={"HIDDEN"},
+            override=OVERRIDABLE,
         ),
     }
 
@@ -139,12 +144,16 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
     __annotations__ = {
         **_pointers(CHARACTER_SECTIONS),
         "bake": PointerProperty(
-            type=HAIRLOOM_PG_bake, name="Bake", description="How and where this object is baked"
+            type=HAIRLOOM_PG_bake,
+            name="Bake",
+            description="How and where this object is baked",
+            override=OVERRIDABLE,
         ),
         "card_object": PointerProperty(
             type=HAIRLOOM_PG_card_object,
             name="Cards",
             description="Whose cards this mesh holds, if it does",
+            override=OVERRIDABLE,
         ),
         "children_density": StringProperty(
             name="Density",
@@ -153,12 +162,14 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             search=_densities,
             search_options={"SUGGESTION"},
             update=lambda self, _context: reactions.settings_changed(self.id_data),
+            override=OVERRIDABLE,
         ),
         "debug_view": EnumProperty(
             items=_DEBUG_VIEWS,
             name="Show",
             description="What the strands of the preview are coloured by",
             update=lambda self, _context: reactions.settings_changed(self.id_data),
+            override=OVERRIDABLE,
         ),
         "show_counts": BoolProperty(
             name="Counts",
@@ -166,28 +177,42 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             "drawn; with a colouring they are always there",
             default=False,
             update=lambda self, _context: reactions.settings_changed(self.id_data),
+            override=OVERRIDABLE,
+        ),
+        "shown_aids": EnumProperty(
+            items=AIDS,
+            options={"ENUM_FLAG"},
+            name="Overlays",
+            description="What acts on the hair, drawn into the viewport as lines",
+            default=set(),
+            update=lambda self, _context: reactions.settings_changed(self.id_data),
+            override=OVERRIDABLE,
         ),
         "collider": PointerProperty(
             type=bpy.types.Object,
             name="Collider",
             description="Closed mesh that the hair stays out of; empty: the surface it grows from",
             poll=_is_mesh,
+            override=OVERRIDABLE,
         ),
         "collider_collection": PointerProperty(
             type=bpy.types.Collection,
             name="Colliders",
             description="Collection of more objects that hair stays out of; read as Play begins",
+            override=OVERRIDABLE,
         ),
         "collider_shape": EnumProperty(
             items=SHAPES,
             name="Collides As",
             description="As what this object collides with hair and cloth",
+            override=OVERRIDABLE,
         ),
         "hide_original": BoolProperty(
             name="Hide Blender's Strands",
             description="While previewing, show Blender's own drawing of these curves as a box",
             default=True,
             update=lambda self, _context: reactions.display_changed(self.id_data),
+            override=OVERRIDABLE,
         ),
     }
 
@@ -205,10 +230,16 @@ CLASSES = (
 def register() -> None:
     """After CLASSES are registered."""
     bpy.types.Curves.hairloom = PointerProperty(
-        type=HAIRLOOM_PG_groom, name="Hairloom", description="Settings of this groom"
+        type=HAIRLOOM_PG_groom,
+        name="Hairloom",
+        description="Settings of this groom",
+        override=OVERRIDABLE,
     )
     bpy.types.Object.hairloom = PointerProperty(
-        type=HAIRLOOM_PG_character, name="Hairloom", description="Settings of this object's hair"
+        type=HAIRLOOM_PG_character,
+        name="Hairloom",
+        description="Settings of this object's hair",
+        override=OVERRIDABLE,
     )
 
 

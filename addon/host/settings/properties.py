@@ -30,6 +30,8 @@ _PRECISION = {"length": 5, "rate": 2}
 #: float32, which Blender stores, holds this many decimal digits of what the artist typed
 _STORED_DIGITS = 7
 _LARGEST_INTEGER = 2**31 - 1
+#: Of a groom that is linked from another file, an override may have settings of its own.
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 
 
 def property_group(settings: type[Settings], changed: Changed | None = None) -> type[Any]:
@@ -64,6 +66,7 @@ def _property(parameter: Parameter, changed: Changed | None) -> Any:
         "description": parameter.description,
         "default": parameter.default,
         "update": None if changed is None else _update(changed),
+        "override": OVERRIDABLE,
     }
     if parameter.kind == "toggle":
         return BoolProperty(**common)

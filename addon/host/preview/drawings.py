@@ -1,0 +1,38 @@
+"""What the overlay draws of a groom, and in which views, as Blender shows it and its head."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..cards.shown_cards import as_shown
+from ..scene.objects import is_solid, spaces_without
+from .aids import aids_of
+from .overlay import Drawing
+from .session import Session
+from .shown import with_all_strands
+
+
+def drawing_of(
+    session: Session, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, note: str = ""
+) -> Drawing:
+    """What is drawn of this groom now.
+
+    Args:
+        note: is written into the views.
+    """
+    snapshot, head = as_shown(session.snapshot), None
+    if session.head is not None:
+        head = session.head.handle.find()
+    if head is None or not is_solid(head):
+        snapshot = with_all_strands(snapshot)
+    return Drawing(
+        snapshot,
+        hair.visible_get(),
+        hidden_in=spaces_without(hair),
+        bare_in=frozenset() if head is None else spaces_without(head),
+        guide_count=len(session.rig.guides),
+        card_counts=session.cards.counts if snapshot.cards is not None else (),
+        counts_of=hair.name if hair.hairloom.show_counts or snapshot.debug_view != "none" else "",
+        note=note,
+        aids=aids_of(session, hair, depsgraph),
+    )

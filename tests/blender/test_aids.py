@@ -1,0 +1,102 @@
+"""Lines in the viewport for what acts on the hair: each lies on what it stands for."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.dynamics.colliders import CapsuleCollider, SphereCollider, SphereSetCollider
+from hairloom.addon.host.preview import live, overlay
+from hairloom.addon.host.preview.aids import KINDS, shape_lines
+
+
+@pytest.fixture
+def preview(new_hair, sphere, evaluated):
+    """Hair on a head, previewed: (hair, head, session)."""
+    hair = new_hair(sphere)
+    hair.hairloom.dynamics.collider_resolution = 16
+    return hair, sphere, live.start(hair, evaluated())
+
+
+def aids(session):
+    return overlay.drawing_of(session.uid).aids
+
+
+def lines_of(hair, session, kind):
+    hair.hairloom.shown_aids = {kind}
+    (lines,) = aids(session)
+    assert lines.points.dtype == np.float32 and len(lines.points) % 2 == 0
+    return lines.points
+
+
+@pytest.mark.parametrize(
+    "collider",
+    [
+        SphereCollider(np.array([0.1, 0.2, 0.3]), 0.5),
+        CapsuleCollider(np.array([0.0, 0.0, -1.0]), np.array([0.3, 0.1, 1.0]), 0.4),
+        CapsuleCollider(np.zeros(3), np.zeros(3), 0.4),
+        SphereSetCollider(np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]]), np.array([0.5, 0.2])),
+    ],
+    ids=["ball", "capsule", "capsule without length", "balls"],
+)
+def test_the_lines_of_a_shape_lie_on_its_surface(collider):
+    points = shape_lines(collider).astype(np.float32)
+    distance, _ = collider.distance(np.ascontiguousarray(points.T))
+    assert len(points) >= 96 and np.abs(distance).max() < 1e-5
+
+
+def test_nothing_is_drawn_until_it_is_wanted(preview):
+    hair, _, session = preview
+    assert aids(session) == ()
+    hair.hairloom.shown_aids = {kind for kind, _, _ in KINDS}
+    hair.hairloom.shown_aids = set()
+    assert aids(session) == ()
+
+
+def test_the_box_of_a_field_is_around_its_mesh_and_follows_it(preview, evaluated):
+    hair, head, session = preview
+    live.play(evaluated())
+    for x in (0.0, 0.3):
+        head.location.x = x
+        bpy.context.view_layer.update()
+        live.advance(evaluated(), 0.04)
+        points = lines_of(hair, session, "colliders")
+        assert len(points) == 24
+        middle, size = (points.min(axis=0) + points.max(axis=0)) / 2.0, np.ptp(points, axis=0)
+        assert middle == pytest.approx([x, 0.0, 0.0], abs=0.01)
+        assert size == pytest.approx([0.2] * 3, abs=0.03)
+
+
+def test_the_arrow_points_where_the_wind_blows_and_is_as_long_as_it_is_strong(preview):
+    hair, _, session = preview
+    hair.hairloom.shown_aids = {"wind"}
+    assert aids(session) == (), "still air"
+    lengths = []
+    for speed in (5.0, 10.0):
+        hair.hairloom.dynamics.wind_speed = speed
+        hair.hairloom.dynamics.wind_direction = np.pi / 2.0
+        tail, tip = lines_of(hair, session, "wind")[:2]
+        lengths.append(np.linalg.norm(tip - tail))
+        assert (tip - tail) / lengths[-1] == pytest.approx([0.0, 1.0, 0.0], abs=1e-6)
+    assert lengths[1] == pytest.approx(2.0 * lengths[0])
+    hair.hairloom.dynamics.wind_speed = 0.0
+    field = bpy.data.objects.new("Wind", None)
+    bpy.context.collection.objects.link(field)
+    with bpy.context.temp_override(object=field, active_object=field):
+        bpy.ops.object.forcefield_toggle()
+    field.field.type, field.field.strength = "WIND", 10.0
+    bpy.context.view_layer.update()
+    tail, tip = lines_of(hair, session, "wind")[:2]
+    assert tip - tail == pytest.approx([0.0, 0.0, lengths[1]], rel=1e-5, abs=1e-6)
+
+
+def test_each_light_has_a_line_towards_it(preview):
+    hair, _, session = preview
+    for kind, place in (("POINT", (0.0, 0.0, 5.0)), ("SUN", (3.0, 0.0, 0.0))):
+        light = bpy.data.objects.new(kind, bpy.data.lights.new(kind, kind))
+        light.location = place
+        bpy.context.collection.objects.link(light)
+    bpy.context.view_layer.update()
+    points = lines_of(hair, session, "lights")
+    ways = np.diff(points.reshape(2, -1, 3)[:, :2], axis=1)[:, 0]
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    assert sorted(ways[:, 2]) == pytest.approx([1.0, 1.0], abs=1e-3), "a sun shines down"

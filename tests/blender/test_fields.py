@@ -1,0 +1,158 @@
+"""Distance fields that are made beside the window's work: hair waits for them, at rest."""
+
+import threading
+import time
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.dynamics.colliders import DistanceField
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.host.colliders import fields
+from hairloom.addon.host.preview import live, reactions, timeline
+from hairloom.addon.host.scene.surfaces import read_surface
+from hairloom.addon.strands import Surface
+
+COARSE = DynamicsSettings(collider_resolution=16)
+FRAME = 1.0 / 60.0
+
+
+@pytest.fixture(autouse=True)
+def no_fields():
+    fields.forget()
+    yield
+    fields.forget()
+
+
+@pytest.fixture
+def gate(monkeypatch):
+    """Holds fields back until it is opened."""
+    opened, make = threading.Event(), DistanceField.from_surface
+
+    def wait_and_make(*arguments, **named):
+        assert opened.wait(60.0)
+        return make(*arguments, **named)
+
+    monkeypatch.setattr(DistanceField, "from_surface", wait_and_make)
+    yield opened
+    opened.set()
+
+
+def until_made():
+    end = time.monotonic() + 60.0
+    while not fields.are_made():
+        assert time.monotonic() < end, "the field is not made"
+        time.sleep(0.005)
+
+
+def surface_of(obj, evaluated):
+    return read_surface(obj, evaluated(), need_uv=False, place=obj.name)
+
+
+def test_a_field_is_the_same_whoever_makes_it_and_is_made_once(sphere, evaluated, extension):
+    surface = surface_of(sphere, evaluated)
+    with pytest.raises(fields.NotMadeYetError):
+        fields.field_of(surface, COARSE, place="Head", waits=False)
+    beside = fields.field_of(surface, COARSE, place="Head")
+    alone = DistanceField.from_surface(surface, COARSE)
+    assert np.array_equal(beside.values, alone.values) and beside.cell == alone.cell
+    again = surface_of(sphere, evaluated)
+    assert fields.field_of(again, COARSE, place="Head", waits=False) is beside
+    finer = DynamicsSettings(collider_resolution=17)
+    assert fields.field_of(again, finer, place="Head") is not beside
+
+
+def test_what_cannot_be_made_is_told_each_time_it_is_asked_for():
+    flat = Surface(np.eye(3, dtype=np.float32), np.zeros((0, 3), np.int32))
+    for _ in range(2):
+        with pytest.raises(HairloomError, match="no faces"):
+            fields.field_of(flat, COARSE, place="Sheet")
+
+
+def test_only_the_youngest_fields_are_kept(sphere, evaluated, extension):
+    surface = surface_of(sphere, evaluated)
+    first = fields.field_of(surface, COARSE, place="0")
+    for number in range(1, fields.KEPT + 1):
+        fields.field_of(surface, COARSE, place=str(number))
+    assert fields.field_of(surface, COARSE, place="0") is not first
+
+
+def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(
+    new_hair, sphere, evaluated, gate
+):
+    hair = new_hair(sphere)
+    session = live.start(hair, evaluated())
+    at_rest = session.strands
+    assert live.play(evaluated(), waits=False) == []
+    assert live.is_playing() and live.is_waiting(session) and not session.is_playing
+    sphere.location.x = 0.05
+    evaluated()
+    live.advance(evaluated(), FRAME)
+    live.rest(evaluated(), keep_playing=True)
+    assert live.is_waiting(session)
+    assert session.strands == pytest.approx(at_rest + [0.05, 0.0, 0.0], abs=2e-6)
+    gate.set()
+    until_made()
+    live.advance(evaluated(), FRAME)
+    assert session.is_playing and not live.is_waiting(session)
+    sphere.location.x = 0.08
+    evaluated()
+    live.advance(evaluated(), FRAME)
+    carried = at_rest + [0.08, 0.0, 0.0]
+    assert np.abs(session.strands - carried)[:, -1].max() > 1e-3, "tips stay behind"
+
+
+def test_stop_while_hair_waits_ends_the_waiting(new_hair, sphere, evaluated, gate):
+    session = live.start(new_hair(sphere), evaluated())
+    live.play(evaluated(), waits=False)
+    live.rest(evaluated(), keep_playing=False)
+    assert not live.is_playing()
+    gate.set()
+    until_made()
+    live.advance(evaluated(), FRAME)
+    assert not live.is_playing() and not session.is_playing
+
+
+def test_a_collider_that_cannot_be_made_is_left_out_with_a_warning_as_ever(
+    new_hair, sphere, evaluated, extension
+):
+    hair = new_hair(sphere)
+    bpy.ops.mesh.primitive_plane_add(size=0.1)
+    hair.hairloom.collider = bpy.context.object
+    session = live.start(hair, evaluated())
+    live.play(evaluated(), waits=False)
+    until_made()
+    live.advance(evaluated(), FRAME)
+    assert session.is_playing
+    assert any("encloses no volume" in warning for warning in session.warnings)
+
+
+def test_more_meshes_than_are_kept_are_all_waited_for(new_hair, sphere, evaluated, extension):
+    hair = new_hair(sphere)
+    hair.hairloom.dynamics.collider_resolution = 16
+    colliders = bpy.data.collections.new("Colliders")
+    bpy.context.scene.collection.children.link(colliders)
+    for number in range(fields.KEPT + 2):
+        bpy.ops.mesh.primitive_cube_add(size=0.02, location=(1.0 + number, 0.0, 0.0))
+        colliders.objects.link(bpy.context.object)
+    hair.hairloom.collider_collection = colliders
+    session = live.start(hair, evaluated())
+    live.play(evaluated(), waits=False)
+    for _ in range(2):
+        until_made()
+        live.advance(evaluated(), FRAME)
+    assert session.is_playing and len(session.obstacles.parts) == fields.KEPT + 3
+
+
+def test_blenders_playback_waits_and_takes_over(new_hair, sphere, evaluated, extension):
+    hair = new_hair(sphere)
+    hair.hairloom.bake.follows = True
+    session = live.start(hair, evaluated())
+    live.play(evaluated(), waits=False)
+    bpy.context.scene.frame_set(bpy.context.scene.frame_start)
+    timeline.follow(session, evaluated())
+    assert session.is_playing and not live.is_waiting(session)
+    live.advance(evaluated(), FRAME)
+    reactions.clear()

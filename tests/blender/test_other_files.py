@@ -1,0 +1,178 @@
+"""Grooms from other files and older versions, and settings that are animated or driven."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.host.bakes import playback
+from hairloom.addon.host.bakes.bake import Bake
+from hairloom.addon.host.preview import live, overlay
+from hairloom.addon.host.render_engine import engine_hair
+from hairloom.addon.host.settings.choices import Choices
+from hairloom.addon.shading.volume.settings import VolumeSettings
+
+#: Saved before there were shadows, cards that are shown, densities and debug views.
+OLD = Path(__file__).parents[1] / "data" / "first_settings.blend"
+FRAME = 1.0 / 24.0
+
+
+@pytest.fixture
+def library(new_hair, sphere, evaluated, tmp_path):
+    """A file with a groom on its head, in the collection Groom."""
+    hair = new_hair(sphere)
+    collection = bpy.data.collections.new("Groom")
+    bpy.context.scene.collection.children.link(collection)
+    for obj in (hair, sphere):
+        collection.objects.link(obj)
+        bpy.context.scene.collection.objects.unlink(obj)
+    hair.hairloom.dynamics.damping = 2.0
+    hair.data.hairloom.shading.ambient = 0.5
+    live.start(hair, evaluated())  # as an artist would; Blender then stores all groups of settings
+    live.stop_all()
+    file = str(tmp_path / "groom.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return file
+
+
+def brought(file, *, link):
+    with bpy.data.libraries.load(file, link=link) as (_, wanted):
+        wanted.collections = ["Groom"]
+    return bpy.data.collections["Groom"]
+
+
+def settings(hair):
+    choices = Choices.of(hair)
+    return choices.dynamics.damping, choices.shading.ambient
+
+
+def plays(hair):
+    """Whether hair lags behind a head that is pushed."""
+    session = live.start(hair, bpy.context.evaluated_depsgraph_get())
+    rest = session.strands
+    assert live.play(bpy.context.evaluated_depsgraph_get()) == []
+    head = session.head.found()
+    for frame in range(4):
+        head.location.x = 0.03 * (frame + 1)
+        live.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
+    offset = session.strands - rest - [head.location.x, 0.0, 0.0]
+    return bool(offset[:, -1, 0].mean() < -0.005 and np.abs(offset[:, 0]).max() < 1e-5)
+
+
+def test_an_appended_groom_keeps_its_settings_and_moves(library):
+    bpy.context.scene.collection.children.link(brought(library, link=False))
+    hair = bpy.data.objects["Hair"]
+    assert settings(hair) == (2.0, 0.5) and hair.library is None
+    assert plays(hair)
+
+
+def test_a_linked_groom_is_shown_as_it_is_there(library):
+    bpy.context.scene.collection.children.link(brought(library, link=True))
+    hair = bpy.data.objects["Hair"]
+    assert settings(hair) == (2.0, 0.5) and hair.library is not None
+    session = live.start(hair, bpy.context.evaluated_depsgraph_get())
+    assert live.play(bpy.context.evaluated_depsgraph_get()) == []
+    live.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
+    assert np.isfinite(session.strands).all() and live.notice() == ""
+
+
+def test_an_override_has_settings_of_its_own_which_last(library, tmp_path):
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    brought(library, link=True).override_hierarchy_create(scene, layer)
+    hair = next(obj for obj in scene.objects if obj.type == "CURVES")
+    hair.data.override_create(remap_local_usages=True)
+    hair.hairloom.dynamics.damping = 5.0
+    hair.hairloom.bake.is_shown = False
+    hair.hairloom.debug_view = "guide"
+    hair.data.hairloom.shading.ambient = 0.25
+    assert plays(hair)
+    scene_file = str(tmp_path / "scene.blend")
+    live.stop_all()
+    bpy.ops.wm.save_as_mainfile(filepath=scene_file)
+    bpy.ops.wm.open_mainfile(filepath=scene_file)
+    hair = next(obj for obj in bpy.context.scene.objects if obj.type == "CURVES")
+    assert hair.override_library is not None and settings(hair) == (5.0, 0.25)
+    assert hair.hairloom.debug_view == "guide" and not hair.hairloom.bake.is_shown
+    assert hair.data.hairloom.strands.width_scale == 1.0, "what was not set is the library's"
+
+
+def test_a_file_of_an_old_version_has_what_was_set_and_defaults_for_the_rest(extension):
+    bpy.ops.wm.open_mainfile(filepath=str(OLD))
+    hair = bpy.data.objects["Hair"]
+    choices = Choices.of(hair)
+    assert choices.shading.base_color == (0.5, 0.25, 0.125) and choices.dynamics.damping == 2.0
+    assert choices.volume == VolumeSettings() and choices.debug_view == "none"
+    assert hair.hairloom.shown_aids == set()
+    assert plays(hair)
+
+
+def keyed(owner, path, values):
+    """Keyframes of a setting: frame -> value."""
+    group, _, name = path.rpartition(".")
+    for frame, value in values.items():
+        setattr(owner.path_resolve(group), name, value)
+        owner.keyframe_insert(path, frame=frame)
+
+
+def driven(owner, path, source):
+    """A setting that is the x of an object."""
+    driver = owner.driver_add(path).driver
+    driver.type = "SUM"
+    variable = driver.variables.new()
+    variable.type = "TRANSFORMS"
+    variable.targets[0].id = source
+    variable.targets[0].transform_type = "LOC_X"
+
+
+def frames(scene, last):
+    for frame in range(1, last + 1):
+        scene.frame_set(frame)
+
+
+def test_keyframes_and_drivers_act_in_preview_and_engine(new_hair, sphere, evaluated):
+    hair, scene = new_hair(sphere), bpy.context.scene
+    source = bpy.data.objects.new("Source", None)
+    scene.collection.objects.link(source)
+    keyed(hair.data, "hairloom.strands.width_scale", {1: 1.0, 5: 3.0})
+    driven(hair.data, "hairloom.shading.ambient", source)
+    session = live.start(hair, evaluated())
+    source.location.x = 0.75
+    scene.frame_set(5)
+    snapshot = overlay.drawing_of(session.uid).snapshot
+    assert (snapshot.strand_settings.width_scale, snapshot.shading.ambient) == (3.0, 0.75)
+    found = engine_hair.read_groom(hair, evaluated())
+    assert (found.strand_settings.width_scale, found.shading.ambient) == (3.0, 0.75)
+
+
+@pytest.mark.parametrize("way", ["keyframe", "driver"])
+def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
+    way, new_hair, sphere, evaluated, tmp_path
+):
+    hair, scene = new_hair(sphere), bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 6
+    hair.hairloom.bake.follows = True
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    hair.hairloom.dynamics.gusts = 0.0
+    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.collider_resolution = 16
+    session = live.start(hair, evaluated())
+    frames(scene, 6)
+    still = session.strands
+    path = "hairloom.dynamics.wind_speed"
+    if way == "keyframe":
+        keyed(hair, path, {1: 0.0, 3: 40.0})
+    else:
+        source = bpy.data.objects.new("Source", None)
+        scene.collection.objects.link(source)
+        for frame, x in ((1, 0.0), (3, 40.0)):
+            source.location.x = x
+            source.keyframe_insert("location", frame=frame)
+        driven(hair, path, source)
+    frames(scene, 6)
+    blown = session.strands
+    assert (blown - still)[:, -1, 0].mean() > 0.005
+    list(Bake.of([hair], scene).steps())
+    baked = playback.strands_in(playback.cache_of(hair), 6)
+    np.testing.assert_array_equal(baked, blown)
