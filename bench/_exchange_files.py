@@ -25,8 +25,10 @@ from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
 from hairloom.addon.strands import StrandSet
 
 STRANDS, POINTS, ROUNDS = 100_000, 16, 7
-#: damaged files of a format that we parse, and of one that a library parses in another process
-FUZZED, FUZZED_APART, KILLS = 10_000, 1_000, 100
+#: damaged files of a format that we parse, and of one that a library parses in another process, and
+#: kills of a format's writer; and what the whole proof has of the latter two
+FUZZED, FUZZED_APART, KILLS = 10_000, 100, 15
+ALL_APART, ALL_KILLS = 1_000, 100
 OUR_FORMATS, LIBRARIES_FORMATS = ("tfx", "tfxbone", "hair", "preset"), ("abc", "usdc", "usda")
 KILLED_FORMATS = ("tfx", "tfxbone", "hair", "preset", "abc", "usdc", "glb")
 

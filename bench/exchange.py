@@ -4,25 +4,35 @@ damaged files and killed writers do; and cards that move.
 See `_exchange_alembic`, `_exchange_usd`, `_exchange_files`, `_exchange_round_trip`,
 `_exchange_motion` and `_exchange_blender` for what is measured, and against what.
 
-make bench NAME=exchange        half an hour, nearly all of it damaged files and kills
+make bench NAME=exchange              some minutes, most of it damaged files and kills
+python bench/exchange.py whole        ten times as many files for libraries, 100 kills a format
 """
 
 from __future__ import annotations
 
 import json
 import platform
+import sys
 from typing import Any
 
 import numpy as np
 from _exchange_alembic import alembic_figures
 from _exchange_blender import blender_figures
-from _exchange_files import file_timings, fuzz_figures, kill_figures
+from _exchange_files import (
+    ALL_APART,
+    ALL_KILLS,
+    FUZZED_APART,
+    KILLS,
+    file_timings,
+    fuzz_figures,
+    kill_figures,
+)
 from _exchange_motion import motion_figures
 from _exchange_round_trip import round_trip_figures
 from _exchange_usd import usd_figures
 
 
-def main() -> None:
+def main(*, is_whole: bool) -> None:
     found: dict[str, Any] = {
         **alembic_figures(),
         **usd_figures(),
@@ -30,8 +40,8 @@ def main() -> None:
         **blender_figures(),
         **round_trip_figures(),
         **motion_figures(),
-        **kill_figures(),
-        **fuzz_figures(),
+        **kill_figures(ALL_KILLS if is_whole else KILLS),
+        **fuzz_figures(libraries=ALL_APART if is_whole else FUZZED_APART),
     }
     for name, value in found.items():
         print(f"{name:40} {value:14.6g}")
@@ -65,4 +75,4 @@ def machine() -> dict[str, str]:
     }
 
 
-main()
+main(is_whole="whole" in sys.argv[1:])

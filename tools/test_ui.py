@@ -26,7 +26,7 @@ OUTPUT = REPOSITORY / "out" / "window"
 INSTALLED = OUTPUT / "installed"
 BACKENDS = ("opengl", "vulkan")
 TESTS_LIMIT_S = 2400
-SESSION_LIMIT_S = 480
+SESSION_LIMIT_S = 900
 CLOSING_LINE = "SESSION PASSED"
 PROBLEM_LINES = 30
 #: mean FLIP of the same picture on both backends

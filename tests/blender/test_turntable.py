@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +17,7 @@ pytest.importorskip("bpy", reason="turntables are drawn inside Blender")
 import bpy
 
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.files import leftovers
 from hairloom.addon.host.pictures import turntable as turntable_module
 from hairloom.addon.host.pictures import video
 from hairloom.addon.host.pictures.images import read_texture
@@ -147,6 +150,22 @@ def test_what_is_cancelled_leaves_nothing(table: Turntable, is_there: bool) -> N
         assert kept.read_text() == "of an earlier turn"
     else:
         assert not table.folder.exists()
+
+
+def test_the_next_turn_removes_what_a_killed_one_left(
+    table: Turntable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    with monkeypatch.context() as patched:
+        patched.setattr(leftovers.os, "getpid", lambda: ended.pid)
+        left = leftovers.temporary_beside(table.folder / "turntable")
+    left.mkdir(parents=True)
+    (left / "turntable_0001.png").write_text("half")
+    steps = table.steps()
+    next(steps)
+    assert not left.exists()
+    steps.close()
 
 
 def test_what_fails_leaves_nothing(table: Turntable, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -95,6 +95,31 @@ def until(is_so: Callable[[], bool], message: str, tries: int = 60) -> Iterator[
     raise AssertionError(message)
 
 
+def file_browser() -> Any:
+    """The area that asks for a file, in whichever window; None when there is none."""
+    windows = bpy.context.window_manager.windows
+    areas = [area for window in windows for area in window.screen.areas]
+    return next((area for area in areas if area.type == "FILE_BROWSER"), None)
+
+
+def confirm_file(folder: Path | None = None) -> Iterator[int]:
+    """The button of a file browser that fills the window, in this folder instead of its own."""
+    yield from until(lambda: file_browser() is not None, "no file browser opens")
+    yield 5
+    browser = file_browser()
+    if folder is not None:
+        browser.spaces.active.params.directory = bytes(str(folder), "utf-8")
+    # Blender closes the browser under the mouse, and crashes over one that has not been drawn
+    # since its folder changed
+    x, y = browser.x + browser.width // 2, browser.y + browser.height // 2
+    bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+    yield 5
+    main = next(each for each in browser.regions if each.type == "WINDOW")
+    with bpy.context.temp_override(area=browser, region=main):
+        bpy.ops.file.execute("INVOKE_DEFAULT")
+    yield from until(lambda: file_browser() is None, "the file browser stays")
+
+
 def viewport_middle(screenshot: Path, reach: int = 20) -> np.ndarray:
     """The pixels around the middle of the view, as in `viewport_pixels`."""
     view = region("WINDOW")

@@ -1,5 +1,5 @@
 """Long work in the window: begun from a dialog and from the file browser, one at a time, cancelled
-by Esc, undone, repeated with other settings, and left by loading and by disabling."""
+by Esc, undone, repeated with other settings, and left by undo, by loading and by disabling."""
 
 import sys
 from pathlib import Path
@@ -10,7 +10,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import look_from_front, open_our_sidebar, press, region, until, viewport
+from artist import confirm_file, look_from_front, open_our_sidebar, press, region, until, viewport
 
 FOLDER = Path(bpy.app.tempdir) / "long"
 SMALL = {"size": 64, "samples": 1}
@@ -30,6 +30,7 @@ def steps():
     driver.enable_extension()
     yield from set_the_scene()
     yield from from_a_dialog()
+    yield from undone_in_mid_work()
     yield from from_the_file_browser()
     yield from another_file_in_mid_work()
     yield from disabled_in_mid_work()
@@ -120,16 +121,24 @@ def repeated_at_once(repeat):
     assert not running()
 
 
+def undone_in_mid_work():
+    """A script may undo what the work stands on."""
+    after = order()
+    yield from sort_by_dialog(MANY)
+    bpy.ops.ed.undo()
+    assert not running(), "the work goes on with data that is gone"
+    yield 3
+    assert bpy.ops.hairloom.sort_cards.poll()
+    bpy.ops.ed.redo()
+    yield 3
+    assert np.array_equal(order(), after)
+
+
 def turntable(frames):
     choose(bpy.data.objects["Hair"])
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         bpy.ops.hairloom.turntable("INVOKE_DEFAULT", frames=frames, **SMALL)
-    yield 5
-    (browser,) = [area for area in bpy.context.window.screen.areas if area.type == "FILE_BROWSER"]
-    browser.spaces.active.params.directory = bytes(str(FOLDER), "utf-8")
-    main = next(each for each in browser.regions if each.type == "WINDOW")
-    with bpy.context.temp_override(area=browser, region=main):
-        bpy.ops.file.execute("INVOKE_DEFAULT")
+    yield from confirm_file(FOLDER)
     yield from until(lambda: running() == "Turntable", "the file browser starts nothing")
 
 

@@ -7,7 +7,16 @@ import bpy
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import look_from_front, open_our_sidebar, press, region, until, viewport
+from artist import (
+    confirm_file,
+    file_browser,
+    look_from_front,
+    open_our_sidebar,
+    press,
+    region,
+    until,
+    viewport,
+)
 
 FOLDER = Path(bpy.app.tempdir) / "strands"
 
@@ -40,7 +49,7 @@ def set_the_scene():
     bpy.data.batch_remove(bpy.data.objects)
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
     bpy.context.object.name = "Head"
-    assert bpy.ops.hairloom.grow(strand_count=3000, length=0.12) == {"FINISHED"}
+    assert bpy.ops.hairloom.grow(strand_count=1000, length=0.12) == {"FINISHED"}
     hair = bpy.context.object
     hair.name = "Hair"
     head = bpy.data.objects["Head"]
@@ -52,34 +61,14 @@ def set_the_scene():
     yield from open_our_sidebar()
 
 
-def browser():
-    return next(
-        (
-            a
-            for w in bpy.context.window_manager.windows
-            for a in w.screen.areas
-            if a.type == "FILE_BROWSER"
-        ),
-        None,
-    )
-
-
 def export(**options):
     """Open the file browser for a groom Alembic."""
     path = str(FOLDER / "hair.abc")
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         asked = bpy.ops.hairloom.export_alembic("INVOKE_DEFAULT", filepath=path, **options)
     assert asked == {"RUNNING_MODAL"}
-    yield from until(lambda: browser() is not None, "no file browser opens")
+    yield from until(lambda: file_browser() is not None, "no file browser opens")
     yield 8
-
-
-def confirm():
-    with bpy.context.temp_override(
-        area=browser(), region=next(r for r in browser().regions if r.type == "WINDOW")
-    ):
-        bpy.ops.file.execute("INVOKE_DEFAULT")
-    yield from until(lambda: browser() is None, "the file browser stays")
 
 
 def the_check_stands_beside_the_options():
@@ -87,15 +76,15 @@ def the_check_stands_beside_the_options():
     check = of_hairloom("ui.operators_export_check")
     assert check.count() == 1 and "guides" in check._check.lines[0], check._check
     driver.screenshot("options")
-    yield from confirm()
+    yield from confirm_file()
     yield from until((FOLDER / "hair.abc").exists, "nothing is written")
     assert check.count() == 0 and not running()
 
 
 def motion_comes_in_steps():
     (FOLDER / "hair.abc").unlink()
-    yield from export(frames="own", first=1, last=60)
-    yield from confirm()
+    yield from export(frames="own", first=1, last=20)
+    yield from confirm_file()
     yield from until(lambda: bool(running()), "the export does not begin")
     yield 3
     driver.screenshot("writing")
@@ -107,7 +96,7 @@ def motion_comes_in_steps():
 def escape_leaves_the_old_file():
     (FOLDER / "hair.abc").write_bytes(b"old")
     yield from export(frames="own", first=1, last=4000)
-    yield from confirm()
+    yield from confirm_file()
     yield from until(lambda: bool(running()), "the export does not begin")
     yield 5
     yield from press("ESC")

@@ -1,0 +1,238 @@
+"""Strands in motion out of the open scene: of bakes and of modifiers, in steps and cancelled."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from strand_files import curves_of, hedgehog, push_up, stage_of, straight, to_unreal
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.groom import Groom
+from hairloom.addon.exchange.strand_formats import ALEMBIC, TRESSFX, USD
+from hairloom.addon.exchange.strand_output import StrandOutput
+from hairloom.addon.host.bakes import playback
+from hairloom.addon.host.bakes.bake import Bake
+from hairloom.addon.host.strands.export_check import ExportCheck
+from hairloom.addon.host.strands.groom_attributes import store_groom
+from hairloom.addon.host.strands.strand_export import StrandExport
+
+LAST = 6
+
+
+@pytest.fixture
+def told(capfd: pytest.CaptureFixture[str]) -> Callable[[], str]:
+    return lambda: "".join(capfd.readouterr())
+
+
+@pytest.fixture
+def swinging(new_hair: Any, sphere: Any, tmp_path: Path) -> tuple[Any, Any]:
+    """Hair on a head that is thrown about for some frames: (hair, head)."""
+    hair = new_hair(sphere)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    for frame, x in ((1, 0.0), (3, 0.1), (LAST, -0.05)):
+        sphere.location.x = x
+        sphere.keyframe_insert("location", frame=frame)
+    hair.hairloom.dynamics.collider_resolution = 8
+    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    scene.frame_set(1)
+    return hair, sphere
+
+
+def bake(*objects: Any, **options: Any) -> None:
+    list(Bake.of(list(objects), bpy.context.scene, **options).steps())
+
+
+def test_each_frame_is_that_of_the_bake(swinging: Any, tmp_path: Path) -> None:
+    hair, _ = swinging
+    bake(hair)
+    bpy.context.scene.frame_set(3)
+    abc, usd = tmp_path / "hair.abc", tmp_path / "hair.usdc"
+    for operator, path in (("export_alembic", abc), ("export_usd", usd)):
+        getattr(bpy.ops.hairloom, operator)(filepath=str(path), frames="scene", parts="strands")
+    assert bpy.context.scene.frame_current == 3
+    cache = playback.cache_of(hair)
+    assert cache is not None
+    (curves,) = curves_of(abc).values()
+    stage, prim = stage_of(usd)
+    rate = bpy.context.scene.render.fps
+    assert len(curves["points"]) == LAST and stage.GetTimeCodesPerSecond() == rate
+    np.testing.assert_allclose(curves["times"], np.arange(1, LAST + 1) / rate)
+    moved = 0.0
+    for frame in range(1, LAST + 1):
+        baked = playback.strands_in(cache, frame).reshape(-1, 3)
+        np.testing.assert_allclose(curves["points"][frame - 1], to_unreal(baked), rtol=1e-6)
+        np.testing.assert_array_equal(prim.GetPointsAttr().Get(frame), baked)
+        moved = max(moved, np.abs(baked - playback.strands_in(cache, 1).reshape(-1, 3)).max())
+    assert moved > 0.05
+    assert curves["groom_root_uv"].shape == (60, 2)
+
+
+def test_guides_of_a_bake_move_as_their_strands_do(swinging: Any, tmp_path: Path) -> None:
+    hair, _ = swinging
+    hair.data.hairloom.guides.guide_count = 9
+    bake(hair)
+    bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "a.abc"), frames="own", first=2, last=4)
+    (curves,) = curves_of(tmp_path / "a.abc").values()
+    (line,) = ExportCheck.of([hair]).motion_lines(use_bake=True)
+    assert line == "Hair: bake of frames 1 to 6 at 24 fps"
+    cache = playback.cache_of(hair)
+    assert cache is not None and curves["groom_guide"].sum() == 9
+    rig = playback.rig_in(cache).rig
+    for place, frame in enumerate((2, 3, 4)):
+        strands = playback.strands_in(cache, frame)
+        expected = np.concatenate([strands, strands[rig.guides]]).reshape(-1, 3)
+        np.testing.assert_allclose(curves["points"][place], to_unreal(expected), rtol=1e-6)
+
+
+def test_a_bake_keeps_what_its_curves_say(swinging: Any, tmp_path: Path) -> None:
+    hair, _ = swinging
+    hair.data.hairloom.guides.cv_count = 15
+    color = np.random.default_rng(6).random((480, 3)).astype(np.float32)
+    said = Groom(hedgehog(), color=color, strand_id=np.arange(60) + 9, group_names={1: "nape"})
+    store_groom(hair.data, said)
+    bake(hair, frames=range(1, 3))
+    path = tmp_path / "a.abc"
+    bpy.ops.hairloom.export_alembic(
+        filepath=str(path), frames="own", first=1, last=2, parts="strands", by_group=True
+    )
+    found = curves_of(path)
+    assert set(found) == {"Hair_0", "nape"}
+    own = found["nape"]
+    np.testing.assert_array_equal(own["groom_id"], np.arange(60)[1::2] + 9)
+    written, expected = own["groom_color"].reshape(30, 15, 3), color.reshape(60, 8, 3)[1::2]
+    np.testing.assert_allclose(written[:, [0, -1]], expected[:, [0, -1]], atol=1e-6)
+    np.testing.assert_allclose(written[:, ::2], expected, atol=1e-5)  # straight: evenly spaced
+
+
+def test_frames_that_were_not_baked_are_named_and_nothing_is_written(
+    swinging: Any, tmp_path: Path, told: Callable[[], str]
+) -> None:
+    hair, _ = swinging
+    bake(hair, frames=range(2, 5))
+    path = tmp_path / "hair.abc"
+    with pytest.raises(RuntimeError, match=r"bake holds frames 2 to 4, not all of 1 to 6.*Bake"):
+        bpy.ops.hairloom.export_alembic(filepath=str(path), frames="scene")
+    (tmp_path / "bake" / "frame_000003.npz").unlink()
+    path.write_bytes(b"old")
+    playback.forget()
+    with pytest.raises(RuntimeError, match=r"frame_000003\.npz.*Bake again"):
+        bpy.ops.hairloom.export_alembic(filepath=str(path), frames="own", first=2, last=4)
+    told()
+    assert path.read_bytes() == b"old"
+    assert {p.name for p in tmp_path.iterdir()} == {"bake", "hair.abc"}
+
+
+def test_hair_without_a_bake_moves_as_its_modifiers_move_it(
+    new_hair: Any, tmp_path: Path, told: Callable[[], str]
+) -> None:
+    hair = new_hair(strands=straight())
+    push_up(hair, 0.1, frame_driven=True)
+    bpy.context.scene.frame_set(2)
+    path = tmp_path / "hair.usdc"
+    bpy.ops.hairloom.export_usd(filepath=str(path), frames="own", first=1, last=4)
+    assert "no bake" in told()
+    assert bpy.context.scene.frame_current == 2
+    _, curves = stage_of(path)
+    for frame in range(1, 5):
+        expected = straight().points + np.array([0.0, 0.0, 0.1 * frame])
+        np.testing.assert_allclose(curves.GetPointsAttr().Get(frame), expected, rtol=1e-5)
+    bake_too = {"use_bake": False, "frames": "own", "first": 1, "last": 4}
+    bpy.ops.hairloom.export_usd(filepath=str(path), **bake_too)
+    assert "no bake" not in told()
+
+
+def test_children_follow_guides_that_modifiers_move(
+    new_hair: Any, sphere: Any, tmp_path: Path
+) -> None:
+    """All points go up by as much, so the children between them do."""
+    hair = new_hair(sphere)
+    hair.data.hairloom.guides.guide_count = 60
+    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.strand_count = 100
+    push_up(hair, 0.02, frame_driven=True)
+    bpy.context.scene.frame_set(0)
+    bpy.ops.hairloom.export_usd(filepath=str(tmp_path / "a.usdc"), frames="own", first=0, last=3)
+    _, curves = stage_of(tmp_path / "a.usdc")
+    first, last = (np.array(curves.GetPointsAttr().Get(frame)) for frame in (0, 3))
+    rise = (last - first).reshape(160, -1, 3)
+    np.testing.assert_allclose(rise[:60], np.broadcast_to([0, 0, 0.06], rise[:60].shape), atol=1e-6)
+    assert rise[60:, 1:, 2].min() > 0.02, "the children stay"
+
+
+def test_curves_that_come_and_go_are_told_and_leave_nothing(new_hair: Any, tmp_path: Path) -> None:
+    hair = new_hair(strands=straight())
+    plan = StrandExport.of(
+        [hair],
+        bpy.context.evaluated_depsgraph_get(),
+        USD,
+        StrandOutput(),
+        frames=range(1, 4),
+    )
+    hair.data.remove_curves(indices=[0])
+    with pytest.raises(HairloomError, match=r"in frame 1 it has other curves"):
+        plan.write(tmp_path / "a.usdc")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_cancelled_export_leaves_the_old_file(swinging: Any, tmp_path: Path) -> None:
+    """As Esc does in the window: what was begun is given up in the middle."""
+    hair, _ = swinging
+    bake(hair)
+    for suffix, kind in ((".abc", ALEMBIC), (".usdc", USD)):
+        path = tmp_path / f"hair{suffix}"
+        path.write_bytes(b"old")
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        plan = StrandExport.of([hair], depsgraph, kind, StrandOutput(), frames=range(1, LAST + 1))
+        positions = plan.positions()
+        work = plan.writing(path, positions)
+        limit = time.monotonic() + 20.0
+        while plan.done < 3 and time.monotonic() < limit:
+            assert not work.serve()
+        work.give_up()
+        positions.close()
+        while time.monotonic() < limit and not work.serve():
+            time.sleep(0.01)
+        assert plan.done >= 3
+        assert path.read_bytes() == b"old"
+    assert {p.name for p in tmp_path.iterdir()} == {"bake", "hair.abc", "hair.usdc"}
+
+
+def test_in_steps_the_same_file_is_written_as_at_once(swinging: Any, tmp_path: Path) -> None:
+    hair, _ = swinging
+    bake(hair)
+    for path in (tmp_path / "once.abc", tmp_path / "steps.abc"):
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        plan = StrandExport.of(
+            [hair], depsgraph, ALEMBIC, StrandOutput(), frames=range(1, LAST + 1)
+        )
+        if path.stem == "once":
+            plan.write(path)
+        else:
+            work = plan.writing(path, plan.positions())
+            while not work.serve():
+                time.sleep(0.001)
+            assert "frames 1 to 6" in work.result().result
+    once, steps = (curves_of(tmp_path / name) for name in ("once.abc", "steps.abc"))
+    for name, curves in once.items():
+        for one, other in zip(curves["points"], steps[name]["points"], strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_motion_into_a_format_without_is_refused(new_hair: Any, tmp_path: Path) -> None:
+    plan = StrandExport.of(
+        [new_hair(strands=straight())],
+        bpy.context.evaluated_depsgraph_get(),
+        TRESSFX,
+        StrandOutput(),
+        frames=range(1, 3),
+    )
+    with pytest.raises(HairloomError, match=r"TressFX holds no motion.*Alembic"):
+        plan.write(tmp_path / "a.tfx")

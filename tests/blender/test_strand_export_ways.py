@@ -1,0 +1,196 @@
+"""What goes with exports of strands: bones, the check, collections, and the way in again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from strand_files import curves_of, hedgehog, straight
+
+from hairloom.addon.exchange.groom import Groom
+from hairloom.addon.exchange.hair_file import read_hair_file
+from hairloom.addon.exchange.tfxbone import read_tfxbone
+from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.host.scene.curves import write_curves
+from hairloom.addon.host.strands.groom_attributes import store_groom
+from hairloom.addon.host.strands.groom_out import Wishes, still_hair
+
+
+@pytest.fixture
+def told(capfd: pytest.CaptureFixture[str]) -> Callable[[], str]:
+    return lambda: "".join(capfd.readouterr())
+
+
+def skinned(head: Any) -> Any:
+    """An armature whose bones hold the upper and the lower half of a head; one does not deform."""
+    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name in ("skull", "jaw", "ik"):
+        bone = armature.data.edit_bones.new(name)
+        bone.tail = (0.0, 0.0, 0.1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    armature.data.bones["ik"].use_deform = False
+    for name, is_upper in (("skull", True), ("jaw", False), ("ik", True)):
+        chosen = [v.index for v in head.data.vertices if (v.co.z > 0.0) == is_upper]
+        head.vertex_groups.new(name=name).add(chosen, 1.0, "REPLACE")
+    modifier = head.modifiers.new("Armature", "ARMATURE")
+    modifier.object = armature
+    return armature
+
+
+def test_bones_of_a_skinned_head_lie_beside_tressfx(
+    new_hair: Any, sphere: Any, tmp_path: Path
+) -> None:
+    skinned(sphere)
+    new_hair(sphere)
+    bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "hair.tfx"), up="Z", fills_groups=True)
+    read = read_tfx(tmp_path / "hair.tfx", up="Z").strands
+    assert read.strand_count == 64 and set(read.point_counts) == {8}
+    bones = read_tfxbone(tmp_path / "hair.tfxbone").weights
+    assert bones.names == ("skull", "jaw") and bones.strand_count == 64
+    carrier = bones.bone[np.arange(64), bones.weight.argmax(axis=1)]
+    clear = np.abs(read.roots[:, 2]) > 0.03
+    np.testing.assert_array_equal(carrier[clear], (read.roots[:, 2] < 0.0)[clear])
+
+    bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "split.tfx"), by_group=True, up="Z")
+    names = {f"split_group{g}{suffix}" for g in (0, 1) for suffix in (".tfx", ".tfxbone")}
+    assert {p.name for p in tmp_path.glob("split*")} == names
+    part = read_tfxbone(tmp_path / "split_group1.tfxbone").weights
+    np.testing.assert_array_equal(part.bone[:30], bones.bone[1:60:2])
+
+
+def test_bones_are_left_out_where_they_are_not_wanted_or_not_there(
+    new_hair: Any, sphere: Any, tmp_path: Path
+) -> None:
+    new_hair(sphere)
+    bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "a.tfx"))
+    skinned(sphere)
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.data.objects["Hair"].select_set(True)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
+    bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "b.tfx"), bones=False)
+    assert {p.name for p in tmp_path.iterdir()} == {"a.tfx", "b.tfx"}
+
+
+def test_the_check_says_what_the_engine_will_see(
+    new_hair: Any, sphere: Any, told: Callable[[], str]
+) -> None:
+    hair = new_hair(sphere)
+    hair.data.hairloom.guides.guide_count = 10
+    assert bpy.ops.hairloom.check_export(engine="alembic unreal") == {"FINISHED"}
+    text = told()
+    assert "60 strands, 10 guides, 560 points" in text
+    assert "Width: 0.01 cm" in text and "Z up, left-handed" in text
+    hair.data.remove_curves()
+    bpy.ops.hairloom.check_export(engine="usd maya")
+    assert "no curves" in told()
+
+
+def test_a_collection_writes_its_own_hair(new_hair: Any, sphere: Any, tmp_path: Path) -> None:
+    other = bpy.data.collections.new("Other")
+    bpy.context.scene.collection.children.link(other)
+    write_curves("Brows", hedgehog(20, 5), sphere, other)
+    new_hair(sphere)
+    for operator, suffix in (("alembic", "abc"), ("usd", "usda"), ("tfx", "tfx"), ("hair", "hair")):
+        path = tmp_path / f"a.{suffix}"
+        run = getattr(bpy.ops.hairloom, f"export_{operator}")
+        assert run(filepath=str(path), collection="Other") == {"FINISHED"}
+    assert read_hair_file(tmp_path / "a.hair").strands.strand_count == 20
+    with pytest.raises(RuntimeError, match="no hair to write"):
+        bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "b.tfx"), collection="Nothing")
+    for name, suffixes in (("alembic", ".abc"), ("usd", ".usdc;.usd;.usda"), ("tfx", ".tfx")):
+        handler = getattr(bpy.types, f"HAIRLOOM_FH_export_{name}")
+        assert handler.bl_export_operator == f"hairloom.export_{name}"
+        assert handler.bl_file_extensions == suffixes
+
+
+def test_a_collections_exporter_is_run_by_blender(
+    new_hair: Any, sphere: Any, tmp_path: Path
+) -> None:
+    """As Properties > Collection > Exporters does."""
+    new_hair(sphere)
+    collection = bpy.context.scene.collection
+    if not hasattr(bpy.ops.collection, "exporter_add"):
+        pytest.skip("this Blender has no exporters of collections")
+    with bpy.context.temp_override(collection=collection):
+        assert bpy.ops.collection.exporter_add(name="HAIRLOOM_FH_export_hair") == {"FINISHED"}
+        (exporter,) = collection.exporters
+        exporter.export_properties.filepath = str(tmp_path / "own.hair")
+        assert bpy.ops.collection.exporter_export(index=0) == {"FINISHED"}
+    assert read_hair_file(tmp_path / "own.hair").strands.strand_count == 60
+
+
+def test_without_alembics_library_usd_is_offered(
+    new_hair: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import sys
+
+    new_hair(strands=straight())
+    monkeypatch.setitem(sys.modules, "alembic3d", None)
+    with pytest.raises(RuntimeError, match=r"alembic3d.*Use USD instead"):
+        bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "a.abc"))
+    assert bpy.ops.hairloom.export_usd(filepath=str(tmp_path / "a.usdc")) == {"FINISHED"}
+
+
+def test_hair_of_guides_alone_is_written_as_strands(new_hair: Any, tmp_path: Path) -> None:
+    """As an import leaves it that puts guides apart."""
+    hair = new_hair()
+    store_groom(hair.data, Groom(hedgehog(), is_guide=np.ones(60, bool)))
+    bpy.ops.hairloom.export_hair(filepath=str(tmp_path / "a.hair"))
+    assert read_hair_file(tmp_path / "a.hair").strands.strand_count == 60
+    bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "a.abc"))
+    (curves,) = curves_of(tmp_path / "a.abc").values()
+    assert "groom_guide" not in curves
+    bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "g.abc"), parts="guides")
+    (curves,) = curves_of(tmp_path / "g.abc").values()
+    assert curves["groom_guide"].all()
+
+
+@pytest.mark.parametrize(
+    ("operator", "suffix", "options"),
+    [
+        ("export_alembic", ".abc", {"engine": "blender"}),
+        ("export_alembic", ".abc", {"engine": "unreal"}),
+        ("export_usd", ".usdc", {"engine": "blender", "parts": "both"}),
+        ("export_usd", ".usda", {"engine": "maya", "parts": "both"}),
+        ("export_tfx", ".tfx", {}),
+        ("export_hair", ".hair", {}),
+    ],
+)
+def test_what_is_written_comes_in_again(
+    new_hair: Any, sphere: Any, tmp_path: Path, operator: str, suffix: str, options: Any
+) -> None:
+    hair, random = new_hair(sphere), np.random.default_rng(8)
+    said = Groom(
+        hedgehog(),
+        color=random.random((480, 3)),
+        strand_id=np.arange(60) + 5,
+        group_names={0: "crown", 1: "nape"},
+    )
+    store_groom(hair.data, said)
+    before = still_hair(hair, bpy.context.evaluated_depsgraph_get(), Wishes(guides=False)).groom
+    path = tmp_path / f"hair{suffix}"
+    getattr(bpy.ops.hairloom, operator)(filepath=str(path), **options)
+    bpy.ops.object.select_all(action="DESELECT")
+    sphere.select_set(True)
+    bpy.context.view_layer.objects.active = sphere
+    assert bpy.ops.hairloom.import_strands(filepath=str(path)) == {"FINISHED"}
+    again = next(o for o in bpy.data.objects if o.type == "CURVES" and o != hair)
+    after = still_hair(again, bpy.context.evaluated_depsgraph_get(), Wishes(guides=False)).groom
+    bits = options.get("engine") == "blender"
+    tolerance = 0.0 if bits else 1e-6
+    np.testing.assert_allclose(after.strands.points, before.strands.points, atol=tolerance, rtol=0)
+    np.testing.assert_allclose(after.strands.radius, before.strands.radius, rtol=1e-5)
+    np.testing.assert_allclose(after.color, before.color, atol=1e-6)
+    if suffix != ".hair":
+        np.testing.assert_allclose(after.strands.root_uv, before.strands.root_uv, atol=1e-4)
+    if suffix not in (".hair", ".tfx"):
+        np.testing.assert_array_equal(after.strands.group, before.strands.group)
+        np.testing.assert_array_equal(after.strand_id, before.strand_id)
+        assert dict(after.group_names) == dict(before.group_names)

@@ -1,0 +1,128 @@
+"""Dice for random actions, and the hands that do them.
+
+An action may be refused (its button is grey, its input is wrong); it may not raise. It says by
+`dice.note` what it is about to do.
+"""
+
+import random
+from collections.abc import Callable
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+#: an integer is drawn from this share of its slider: many strands only take long
+SHARE_OF_SLIDER = 0.05
+
+
+def action(weight: int = 1) -> Callable[..., Any]:
+    """Marks an action; weight: how often it comes beside the others."""
+
+    def mark(function: Callable[["Dice"], Any]) -> Any:
+        function.weight = weight
+        return function
+
+    return mark
+
+
+def actions_in(*modules: Any) -> list[Callable[["Dice"], Any]]:
+    return [each for module in modules for each in vars(module).values() if hasattr(each, "weight")]
+
+
+class Dice:
+    """Chance, from a seed; and the folder in which files are written."""
+
+    def __init__(self, seed: int, folder: Path) -> None:
+        self.chance, self.folder = random.Random(seed), folder
+
+    def pick(self, things: Any) -> Any:
+        """One of them; a RuntimeError, as an operator's refusal, if there is none."""
+        things = list(things)
+        if not things:
+            raise RuntimeError("there is none")
+        return self.chance.choice(things)
+
+    def often(self, share: float) -> bool:
+        return self.chance.random() < share
+
+    def action(self, actions: list[Callable[["Dice"], Any]]) -> Callable[["Dice"], Any]:
+        return self.chance.choices(actions, [each.weight for each in actions])[0]
+
+    def note(self, text: str) -> None:
+        print(f"      {text}", flush=True)
+
+    def object(self, *types: str) -> Any:
+        return self.pick(o for o in objects() if not types or o.type in types)
+
+    def value(self, prop: Any) -> Any:
+        """Any that the property may have, seldom its hard ends."""
+        if prop.type == "BOOLEAN":
+            return self.often(0.5)
+        if prop.type == "ENUM":
+            names = [item.identifier for item in prop.enum_items]
+            return self.pick(names[:2] if names[0].isdigit() else names)
+        if prop.type == "INT":
+            width = max(int((prop.soft_max - prop.soft_min) * SHARE_OF_SLIDER), 2)
+            low = prop.hard_min if self.often(0.1) else prop.soft_min
+            return self.chance.randint(low, min(prop.soft_min + width, prop.hard_max))
+        ends = (prop.hard_min, prop.soft_min, prop.soft_max)
+        count = prop.array_length
+        values = [
+            self.pick(ends) if self.often(0.1) else self.chance.uniform(*ends[1:])
+            for _ in range(max(count, 1))
+        ]
+        return values if count else values[0]
+
+
+def objects() -> list[Any]:
+    """Of the view layer, which has gaps right after an object was removed."""
+    return [obj for obj in bpy.context.view_layer.objects if obj is not None]
+
+
+def views() -> list[Any]:
+    return [area for area in bpy.context.window.screen.areas if area.type == "VIEW_3D"]
+
+
+def in_view() -> Any:
+    """As if the pointer were in the 3D view, if one is there."""
+    if not views():
+        return nullcontext()
+    area = views()[0]
+    region = next(each for each in area.regions if each.type == "WINDOW")
+    return bpy.context.temp_override(area=area, region=region)
+
+
+def call(dice: Dice, operator: str, *how: Any, **settings: Any) -> None:
+    dice.note(f"{operator} {' '.join(map(str, how))} {settings or ''}")
+    room, name = operator.split(".")
+    with in_view():
+        getattr(getattr(bpy.ops, room), name)(*how, **settings)
+
+
+def clicked(dice: Dice, operator: str, **settings: Any) -> None:
+    """As a button does: with its undo step, and in the window if its work is long."""
+    call(dice, operator, "INVOKE_DEFAULT", True, **settings)
+
+
+def select(obj: Any) -> None:
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+
+
+def step(dice: Dice, name: str) -> None:
+    """What a script changes is no undo step by itself."""
+    if dice.often(0.5):
+        bpy.ops.ed.undo_push(message=name)
+
+
+def press(key: str, **held: bool) -> Any:
+    window, area = bpy.context.window, views()[0] if views() else bpy.context.window.screen.areas[0]
+    where = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
+    window.event_simulate("MOUSEMOVE", "NOTHING", **where)
+    yield 0.2
+    for value in ("PRESS", "RELEASE"):
+        bpy.context.window.event_simulate(key, value, **where, **held)
+        yield 0.2

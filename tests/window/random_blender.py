@@ -1,0 +1,215 @@
+"""What an artist may do with Blender, in any order, while hair is previewed."""
+
+from pathlib import Path
+
+import bpy
+from dice import action, call, clicked, press, select, step, views
+
+MOST_OBJECTS = 12
+
+
+@action(14)
+def undo_or_redo_by_keys(dice):
+    shift = dice.often(0.45)
+    dice.note("Ctrl-Shift-Z" if shift else "Ctrl-Z")
+    yield from press("Z", ctrl=True, shift=shift)
+
+
+@action(8)
+def undo_or_redo(dice):
+    call(dice, dice.pick(["ed.undo", "ed.redo"]))
+
+
+@action(4)
+def press_escape(dice):
+    yield from press("ESC")
+
+
+@action(8)
+def move_something(dice):
+    obj = dice.object()
+    what = dice.pick(["location", "rotation_euler", "scale"])
+    middle, width = (1.0, 0.2) if what == "scale" else (0.0, 0.3)
+    value = [dice.chance.uniform(middle - width, middle + width) for _ in range(3)]
+    dice.note(f"{obj.name}.{what} = {value}")
+    setattr(obj, what, value)
+    if dice.often(0.3):
+        obj.keyframe_insert(what, frame=dice.chance.randint(1, 20))
+    step(dice, "move")
+
+
+@action(5)
+def select_something(dice):
+    obj = dice.object()
+    dice.note(obj.name)
+    select(obj)
+    dice.object().select_set(True)
+
+
+@action(3)
+def delete_something(dice):
+    obj = dice.object("MESH", "CURVES")
+    dice.note(obj.name)
+    if dice.often(0.5):
+        bpy.data.objects.remove(obj)
+        step(dice, "removed")
+    else:
+        select(obj)
+        clicked(dice, "object.delete", confirm=False)
+
+
+@action(1)
+def delete_data(dice):
+    data = dice.pick([*bpy.data.hair_curves, *bpy.data.meshes])
+    dice.note(repr(data))
+    (bpy.data.hair_curves if data in list(bpy.data.hair_curves) else bpy.data.meshes).remove(data)
+    step(dice, "data")
+
+
+@action(3)
+def duplicate(dice):
+    if len(bpy.data.objects) < MOST_OBJECTS:
+        select(dice.object("MESH", "CURVES"))
+        call(dice, "object.duplicate", "EXEC_DEFAULT", True, linked=dice.often(0.5))
+
+
+@action(2)
+def rename(dice):
+    obj = dice.object()
+    name = dice.pick(["Hair", "Head", "Hairöß", "x" * 63, "a/b:c"])
+    dice.note(f"{obj.name} -> {name}")
+    obj.name = name
+    if obj.data is not None:
+        obj.data.name = name
+
+
+@action(5)
+def hide_or_show(dice):
+    obj = dice.object()
+    dice.note(obj.name)
+    if dice.often(0.5):
+        obj.hide_set(not obj.hide_get())
+    else:
+        obj.hide_viewport = not obj.hide_viewport
+    step(dice, "hide")
+
+
+@action(1)
+def exclude_a_collection(dice):
+    layer = dice.pick(bpy.context.view_layer.layer_collection.children)
+    layer.exclude = not layer.exclude
+
+
+@action(3)
+def local_view(dice):
+    call(dice, "view3d.localview", frame_selected=False)
+
+
+@action(6)
+def switch_mode(dice):
+    modes = ["SCULPT_CURVES", "EDIT", "OBJECT", "OBJECT"]
+    call(dice, "object.mode_set", "EXEC_DEFAULT", True, mode=dice.pick(modes))
+
+
+@action(4)
+def go_to_a_frame(dice):
+    frame = dice.chance.randint(-2, 30)
+    dice.note(str(frame))
+    bpy.context.scene.frame_set(frame)
+
+
+@action(4)
+def play_the_animation(dice):
+    call(dice, "screen.animation_play")
+    yield dice.pick([0.2, 2])
+
+
+@action(2)
+def save_and_load(dice):
+    path = str(dice.folder / "saved.blend")
+    call(dice, "wm.save_as_mainfile", filepath=path, copy=dice.often(0.5))
+    if dice.often(0.5):
+        call(dice, "wm.open_mainfile", filepath=path)
+        yield 1
+
+
+@action(1)
+def append_or_link(dice):
+    path = str(dice.folder / "saved.blend")
+    if not Path(path).is_file() or bpy.data.filepath == path:  # no file links itself
+        return
+    is_linked = dice.often(0.5)
+    with bpy.data.libraries.load(path, link=is_linked) as (there, here):
+        here.objects = there.objects[:2]
+    dice.note(f"{'linked' if is_linked else 'appended'} {here.objects}")
+    for obj in filter(None, here.objects):
+        if obj.name not in bpy.context.scene.objects:
+            bpy.context.scene.collection.objects.link(obj)
+            if is_linked and dice.often(0.5):
+                obj.override_create(remap_local_usages=True)
+
+
+@action(1)
+def new_file(dice):
+    call(dice, "wm.read_homefile", use_factory_startup=False)
+    yield 1
+
+
+@action(6)
+def switch_shading(dice):
+    for area in views():
+        shading = area.spaces.active.shading
+        kinds = ["SOLID", "WIREFRAME", "MATERIAL"]
+        if bpy.context.scene.render.engine != "CYCLES":
+            kinds.append("RENDERED")
+        shading.type = dice.pick(kinds)
+        shading.show_xray = dice.often(0.3)
+        dice.note(f"{shading.type} {shading.show_xray}")
+
+
+@action(2)
+def switch_scene(dice):
+    if dice.often(0.3) and len(bpy.data.scenes) < 3:
+        call(dice, "scene.new", type=dice.pick(["NEW", "LINK_COPY"]))
+    elif dice.often(0.2):
+        call(dice, "scene.delete")
+    else:
+        bpy.context.window.scene = dice.pick(bpy.data.scenes)
+        dice.note(bpy.context.window.scene.name)
+
+
+@action(1)
+def switch_workspace(dice):
+    names = ["Layout", "Sculpting", "Modeling", "Scripting"]
+    bpy.context.window.workspace = dice.pick(w for w in bpy.data.workspaces if w.name in names)
+    dice.note(bpy.context.window.workspace.name)
+    yield 1
+
+
+@action(2)
+def resize(dice):
+    if dice.often(0.5):
+        call(dice, "screen.screen_full_area")
+    else:
+        for area in views():
+            area.spaces.active.show_region_ui = not area.spaces.active.show_region_ui
+            area.spaces.active.overlay.show_overlays = dice.often(0.7)
+    yield 1
+
+
+@action(1)
+def open_or_close_a_window(dice):
+    windows = bpy.context.window_manager.windows
+    if len(windows) > 1:
+        with bpy.context.temp_override(window=windows[-1]):
+            bpy.ops.wm.window_close()
+    else:
+        call(dice, "wm.window_new")
+    yield 1
+
+
+@action(3)
+def look_at_a_tab(dice):
+    for area in bpy.context.window.screen.areas:
+        if area.type == "PROPERTIES":
+            area.spaces.active.context = dice.pick(["DATA", "OBJECT", "SCENE", "RENDER"])

@@ -1,0 +1,136 @@
+"""What an artist may do with Hairloom, in any order."""
+
+from pathlib import Path
+
+import addon_utils
+import bpy
+import driver
+from dice import action, call, clicked, objects, press, select, step
+from traces import of_hairloom
+
+SECTIONS = {
+    bpy.types.Curves: ["shading", "strands", "volume", "detail", "guides", "children", "skin"]
+    + ["shafts", "ambient", "cards", "atlas", "card_occlusion", "card_texture", "card_drawing"],
+    bpy.types.Object: ["dynamics", "dynamics", "fin"],
+}
+MOST_GROOMS = 3
+
+
+@action(6)
+def add_groom(dice):
+    grooms = [o for o in bpy.data.objects if o.type == "CURVES"]
+    if len(grooms) >= MOST_GROOMS:
+        bpy.data.objects.remove(grooms[0])
+    if dice.often(0.4) or not any(o.type == "MESH" for o in objects()):
+        call(dice, "mesh.primitive_uv_sphere_add", segments=16, ring_count=8, radius=0.1)
+    select(dice.object("MESH"))
+    how = {"strand_count": dice.chance.randint(2, 150), "way": dice.pick(["combed", "normals"])}
+    clicked(dice, dice.pick(["hairloom.add_groom", "hairloom.grow"]), **how)
+
+
+@action(12)
+def press_a_button(dice):
+    """Of those that are done at once."""
+    buttons = "preview play pause reset preview play pause use_groom set_surface snap_roots"
+    buttons += " unwrap_surface apply_scale look_from_material mute_hair_dynamics show_settings"
+    buttons += " convert_particles fin_add fin_preview fin_remove fin_reset remove_spheres"
+    buttons += " bake_free check_export sort_cards show_skin_shadow"
+    clicked(dice, f"hairloom.{dice.pick(buttons.split())}")
+
+
+@action(2)
+def press_a_slow_button(dice):
+    """Work that goes on in the window, and that Esc or what comes next may end."""
+    hair = dice.object("CURVES")
+    select(hair)
+    hair.hairloom.bake.folder = str(dice.folder / "bake")
+    hair.hairloom.bake.use_own_range, hair.hairloom.bake.last = True, 4
+    clicked(dice, f"hairloom.{dice.pick(['bake', 'bake', 'make_cards', 'fit_spheres'])}")
+    yield dice.pick([0.2, 3])
+    yield from press("ESC")
+
+
+@action(40)
+def move_a_slider(dice):
+    kind = dice.pick(SECTIONS)
+    hair = dice.object("CURVES")
+    owner = hair.data if kind is bpy.types.Curves else hair
+    group = getattr(owner.hairloom, dice.pick(SECTIONS[kind]))
+    prop = dice.pick(p for p in group.bl_rna.properties if p.identifier not in ("rna_type", "name"))
+    if prop.is_readonly or prop.type not in ("BOOLEAN", "ENUM", "INT", "FLOAT"):
+        return
+    value = dice.value(prop)
+    dice.note(f"{owner.name} {group.bl_rna.identifier}.{prop.identifier} = {value}")
+    setattr(group, prop.identifier, value)
+    step(dice, "slider")
+
+
+@action(6)
+def choose_for_an_object(dice):
+    hair = dice.object("CURVES")
+    ours = hair.hairloom
+    name = dice.pick(["debug_view", "show_counts", "hide_original", "collider"])
+    if name == "collider":
+        ours.collider = dice.object("MESH")
+    else:
+        value = dice.value(ours.bl_rna.properties[name])
+        dice.note(f"{hair.name} {name} = {value}")
+        setattr(ours, name, value)
+    ours.bake.follows, ours.bake.is_shown = dice.often(0.5), dice.often(0.5)
+    step(dice, "choice")
+
+
+@action(4)
+def take_a_preset(dice):
+    presets = Path(of_hairloom("host.settings.presets").PRESET_FOLDER)
+    path = dice.pick(sorted(presets.rglob("*.json")))
+    name = path.relative_to(presets).with_suffix("").as_posix()
+    clicked(dice, "hairloom.apply_preset", name=name)
+
+
+@action(1)
+def keep_a_preset(dice):
+    section = dice.pick(["shading", "dynamics", "cards"])
+    call(dice, "hairloom.save_preset", section=section, title="Random")
+    if dice.often(0.5):
+        call(dice, "hairloom.delete_preset", name="own/random")
+
+
+@action(2)
+def out_and_in_again(dice):
+    formats = {"tfx": "tfx", "hair": "hair", "alembic": "abc", "usd": "usda"}
+    kind, suffix = dice.pick(formats.items())
+    select(dice.object("CURVES"))
+    path = str(dice.folder / f"strands.{suffix}")
+    call(dice, f"hairloom.export_{kind}", filepath=path)
+    if dice.often(0.5):
+        call(dice, "hairloom.import_strands", filepath=path)
+
+
+@action(3)
+def disable_and_enable(dice):
+    dice.note("the extension off")
+    addon_utils.disable(driver.EXTENSION, default_set=True)
+    yield dice.pick([0.2, 2])
+    dice.note("the extension on")
+    driver.enable_extension()
+
+
+@action(2)
+def switch_engine(dice):
+    scene = bpy.context.scene
+    scene.render.engine = dice.pick(["HAIRLOOM", "HAIRLOOM", "BLENDER_WORKBENCH"])
+    dice.note(scene.render.engine)
+
+
+@action(1)
+def render_a_picture(dice):
+    scene = bpy.context.scene
+    if scene.camera is None:
+        scene.camera = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
+        scene.collection.objects.link(scene.camera)
+        scene.camera.location.y, scene.camera.rotation_euler.x = -1.0, 1.57
+    scene.render.engine = "HAIRLOOM"
+    scene.render.resolution_x, scene.render.resolution_y = 32, 24
+    scene.hairloom.picture.samples, scene.hairloom.picture.motion_steps = 1, 2
+    call(dice, "render.render")

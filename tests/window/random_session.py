@@ -1,0 +1,107 @@
+"""Five times 500 random actions: nothing raises, nothing crashes, nothing is left behind.
+
+Each action is printed before it is done, so that the log of a crash ends with its cause.
+HAIRLOOM_SEEDS="3" plays one seed again, HAIRLOOM_ACTIONS="120" only its first 120 actions.
+"""
+
+import os
+import sys
+import tempfile
+import time
+from inspect import isgenerator
+from pathlib import Path
+
+import addon_utils
+import bpy
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+import random_blender
+import random_hairloom
+import traces
+from artist import press, until
+from dice import Dice, actions_in
+
+SEEDS = [int(seed) for seed in os.environ.get("HAIRLOOM_SEEDS", "1 2 3 4 5").split()]
+ACTIONS = actions_in(random_hairloom, random_blender)
+ACTION_COUNT = int(os.environ.get("HAIRLOOM_ACTIONS", "500"))
+#: seldom an action is followed by a redraw, so that several meet in one
+REDRAWN = 0.3
+#: a part of a tick: Blender redraws, and goes on
+BRIEFLY = 0.1
+RAISED = ("Traceback (most recent call last)", "Error: Python:", "SystemError")
+
+log, registered = traces.Log(), traces.Registered()
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()  # once before: Blender turns menus into lists the first time
+    addon_utils.disable(driver.EXTENSION, default_set=True)
+    yield 2
+    before = traces.of_blender()
+    driver.enable_extension()
+    enabled = traces.of_blender()
+    assert enabled != before, "the traces show nothing"
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in SEEDS:
+            yield from play(seed, Path(folder))
+            bpy.ops.wm.read_homefile(use_factory_startup=False)
+            yield from until(lambda: is_at_rest(enabled), f"seed {seed}: something is left")
+    addon_utils.disable(driver.EXTENSION, default_set=True)
+    yield 3
+    assert traces.of_blender() == before, (traces.of_blender(), before)
+    assert registered.timers() == []
+    assert_nothing_raised("disabling")
+
+
+def play(seed, folder):
+    dice, began, refused = Dice(seed, folder), time.monotonic(), 0
+    bpy.ops.wm.read_homefile(use_factory_startup=False)
+    yield 3
+    shrink_the_view()
+    for number in range(ACTION_COUNT):
+        action = dice.action(ACTIONS)
+        print(f"{seed}.{number} {action.__name__} at {time.process_time():.1f} s", flush=True)
+        try:
+            doing = action(dice)
+            if isgenerator(doing):
+                yield from doing
+        except RuntimeError as error:  # so Blender hands on what an operator reports
+            assert "Traceback" not in str(error), error
+            refused += 1
+        if dice.often(REDRAWN):
+            yield BRIEFLY
+        assert_nothing_raised(f"{seed}.{number} {action.__name__}")
+    print(
+        f"seed {seed}: {ACTION_COUNT} actions, {refused} refused, "
+        f"{time.monotonic() - began:.0f} s, {len(bpy.data.objects)} objects",
+        flush=True,
+    )
+
+
+def shrink_the_view():
+    """Drawing takes most of the time here."""
+    area = next(a for a in bpy.context.window.screen.areas if a.type == "VIEW_3D")
+    for direction, part in (("VERTICAL", 0.4), ("HORIZONTAL", 0.4)):
+        with bpy.context.temp_override(area=area):
+            bpy.ops.screen.area_split(direction=direction, factor=part)
+        others = [a for a in bpy.context.window.screen.areas if a.type == "VIEW_3D"]
+        area = min(others, key=lambda a: a.width * a.height)
+        for other in others:
+            if other != area:
+                other.type = "TEXT_EDITOR"
+
+
+def is_at_rest(enabled):
+    """Whether an empty file has ended all that went on."""
+    is_idle = not any(traces.of_previews().values()) and registered.timers() == []
+    return is_idle and traces.of_blender() == enabled
+
+
+def assert_nothing_raised(where):
+    said = log.added()
+    assert not any(sign in said for sign in RAISED), f"{where} raised"
+
+
+driver.play(steps())

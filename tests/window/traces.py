@@ -1,0 +1,87 @@
+"""What an extension may leave behind in Blender, and what Blender says when something raises."""
+
+import os
+import stat
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import bpy
+import driver
+
+MENUS = ("TOPBAR_MT_file_import", "TOPBAR_MT_file_export", "VIEW3D_MT_curve_add")
+OWNERS = ("Curves", "Object", "Scene", "WindowManager", "Mesh", "Material")
+
+
+def of_hairloom(module: str) -> Any:
+    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
+
+
+class Log:
+    """All that this Blender has printed, from Python and from C: tools/test_ui.py keeps it."""
+
+    def __init__(self) -> None:
+        # the runner sends both streams into one file; anything else could not be read again
+        assert stat.S_ISREG(os.fstat(1).st_mode), "send the output into a file"
+        self._path, self._offset = Path("/proc/self/fd/1"), 0
+
+    def added(self) -> str:
+        """What has been printed since the last call."""
+        sys.stdout.flush()
+        sys.stderr.flush()
+        with self._path.open("rb") as stream:
+            stream.seek(self._offset)
+            new = stream.read()
+        self._offset += len(new)
+        return new.decode(errors="replace")
+
+
+class Registered:
+    """Timers and draw handlers of ours: Blender has no list of either, so each is noted."""
+
+    def __init__(self) -> None:
+        self._timers: dict[Any, None] = {}
+        self._register = bpy.app.timers.register
+        bpy.app.timers.register = self._note
+
+    def _note(self, function: Any, **settings: Any) -> None:
+        self._timers[function] = None
+        self._register(function, **settings)
+
+    def timers(self) -> list[str]:
+        """Those of Hairloom that are still to come."""
+        return [
+            f"{each.__module__}.{each.__qualname__}"
+            for each in self._timers
+            if each.__module__.startswith(driver.EXTENSION) and bpy.app.timers.is_registered(each)
+        ]
+
+
+def of_blender() -> dict[str, Any]:
+    """All of ours that Blender can know of."""
+    return {
+        "handlers": {
+            name: [f"{each.__module__}.{each.__qualname__}" for each in handlers]
+            for name in dir(bpy.app.handlers)
+            if isinstance(handlers := getattr(bpy.app.handlers, name), list)
+        },
+        "menus": {name: len(getattr(bpy.types, name).draw._draw_funcs) for name in MENUS},
+        "properties": {
+            name: sorted(getattr(bpy.types, name).bl_rna.properties.keys()) for name in OWNERS
+        },
+        "classes": [name for name in dir(bpy.types) if "hairloom" in name.lower()],
+        "operators": dir(bpy.ops.hairloom),
+        "threads": sorted(each.name for each in threading.enumerate()),
+    }
+
+
+def of_previews() -> dict[str, Any]:
+    """What only a preview, Play or long work keeps; all empty when nothing of them goes on."""
+    return {
+        "previews": [each.name for each in of_hairloom("host.preview.live").simulated()],
+        "draw handlers": of_hairloom("host.preview.overlay")._handles,
+        "drawn": sorted(of_hairloom("host.preview.overlay").drawn()),
+        "ticks": of_hairloom("ui.operators_preview")._timer,
+        "work": of_hairloom("ui.long_work").running(),
+    }
