@@ -2,8 +2,8 @@
 
 python tools/test_ui.py [SESSION ...]      all of it, or only the named window sessions
 
-First the extension's zip is installed as an artist would, then all tests run in that Blender in
-the background, and what they have drawn on both backends is compared; then each
+First the extension's zip is installed as an artist would, then tests run in that Blender in the
+background, and what they have drawn on both backends is compared; then each
 tests/window/session_*.py plays with a real window under Xvfb. Logs and
 screenshots go to out/window/. The last line is `N passed, N failed`.
 """
@@ -25,6 +25,9 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 OUTPUT = REPOSITORY / "out" / "window"
 INSTALLED = OUTPUT / "installed"
 BACKENDS = ("opengl", "vulkan")
+#: What runs in this Blender's own Python. On OpenGL `make test` has run the rest already, in Blender
+#: as a module: so each test runs on each backend that concerns it, and in both Blenders.
+TESTS = {"opengl": ("tests/pure", "tests/gpu"), "vulkan": ("tests/gpu", "tests/blender")}
 TESTS_LIMIT_S = 2400
 SESSION_LIMIT_S = 900
 CLOSING_LINE = "SESSION PASSED"
@@ -118,14 +121,11 @@ def run_command_line(tally: Tally) -> None:
 
 
 def run_tests(backend: str, tally: Tally) -> None:
-    """tests/gpu and tests/blender in Blender's own Python, in the background; on the first backend
-    tests/pure as well, which no backend concerns.
-    """
+    """In Blender's own Python, in the background."""
     log, report = OUTPUT / f"tests-{backend}.log", OUTPUT / f"tests-{backend}.xml"
     arguments = ["--factory-startup", "--gpu-backend", backend, "--python-exit-code", "1"]
     arguments += ["--python", "tests/run_in_blender.py", "--", f"--junitxml={report}"]
-    if backend != BACKENDS[0]:
-        arguments += ["tests/gpu", "tests/blender"]
+    arguments += TESTS[backend]
     resources = OUTPUT / f"resources-tests-{backend}"
     shutil.copytree(INSTALLED, resources)  # for the packages that the zip brings along
     kept = {"HAIRLOOM_PICTURES": str(OUTPUT), "BLENDER_USER_RESOURCES": str(resources)}

@@ -52,7 +52,8 @@ def sidecar_of(path: Path) -> dict[str, Any]:
     """The sidecar, which follows the schema and names files that are there."""
     content = json.loads(path.with_suffix(".hairloom.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator(SCHEMA).validate(content)
-    roles = [value for value in content["textures"].values() if isinstance(value, dict)]
+    textures = content["textures"].values()
+    roles = [value for value in textures if isinstance(value, dict) and "file" in value]
     tables = content["material"]["tables"].values()
     beside = [each["file"] for each in (*roles, *tables, content.get("index_buffer", roles[0]))]
     for file in (content["file"], *beside, *content["texture_files"]):
