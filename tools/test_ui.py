@@ -25,8 +25,8 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 OUTPUT = REPOSITORY / "out" / "window"
 INSTALLED = OUTPUT / "installed"
 BACKENDS = ("opengl", "vulkan")
-#: What runs in this Blender's own Python. On OpenGL `make test` has run the rest already, in Blender
-#: as a module: so each test runs on each backend that concerns it, and in both Blenders.
+#: What runs in this Blender's own Python. On OpenGL `make test` has run the rest already, with
+#: Blender as a module: each test runs on each backend that concerns it, and in both Blenders.
 TESTS = {"opengl": ("tests/pure", "tests/gpu"), "vulkan": ("tests/gpu", "tests/blender")}
 TESTS_LIMIT_S = 2400
 SESSION_LIMIT_S = 900
