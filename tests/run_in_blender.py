@@ -2,7 +2,9 @@
 
 blender -b --factory-startup --python-exit-code 1 --python tests/run_in_blender.py [-- PYTEST ARGS]
 
-Blender's exit code is pytest's own. Add --gpu-backend vulkan before --python for Vulkan.
+Blender's exit code is pytest's own. Add --gpu-backend vulkan before --python for Vulkan. Packages
+that Blender lacks, such as those that the extension's zip brings along, can be in the folder
+HAIRLOOM_PACKAGES.
 """
 
 import os
@@ -21,6 +23,8 @@ def main() -> int:
     except ImportError:
         print(f"pytest is missing in this Blender: {sys.executable} -m pip install pytest")
         return 1
+    if packages := os.environ.get("HAIRLOOM_PACKAGES"):
+        sys.path.append(packages)
     gpu.init()
     print(
         f"GPU: {gpu.platform.backend_type_get()}, {gpu.platform.renderer_get()}, "

@@ -126,11 +126,10 @@ def run_tests(backend: str, tally: Tally) -> None:
     arguments = ["--factory-startup", "--gpu-backend", backend, "--python-exit-code", "1"]
     arguments += ["--python", "tests/run_in_blender.py", "--", f"--junitxml={report}"]
     arguments += TESTS[backend]
-    resources = OUTPUT / f"resources-tests-{backend}"
-    shutil.copytree(INSTALLED, resources)  # for the packages that the zip brings along
-    kept = {"HAIRLOOM_PICTURES": str(OUTPUT), "BLENDER_USER_RESOURCES": str(resources)}
+    kept = {"HAIRLOOM_PICTURES": str(OUTPUT)}
+    for packages in INSTALLED.glob("extensions/.local/lib/python*/site-packages"):
+        kept["HAIRLOOM_PACKAGES"] = str(packages)
     code = run_blender("background", arguments, log, TESTS_LIMIT_S, kept)
-    shutil.rmtree(resources)
     if not report.is_file():
         announce("tests", backend, False, f"exit code {code} and no report", log)
         tally.add(0, 1)

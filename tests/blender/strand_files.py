@@ -3,6 +3,7 @@ them."""
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,12 @@ def curves_of(path: Path) -> dict[str, dict[str, Any]]:
             **values,
         }
     return found
+
+
+#: for tests that write or read USD
+needs_usd = pytest.mark.skipif(
+    importlib.util.find_spec("pxr") is None, reason="this Python has no OpenUSD"
+)
 
 
 def stage_of(path: Path) -> tuple[Any, Any]:

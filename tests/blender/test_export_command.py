@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from strand_files import needs_usd
 
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
@@ -108,6 +109,7 @@ def test_a_check_writes_nothing(
     assert [path.name for path in tmp_path.iterdir()] == ["report.json"]
 
 
+@needs_usd
 def test_a_take_moves_in_usd(
     extension: None, sphere: Any, tmp_path: Path, run: Callable[..., Any]
 ) -> None:
@@ -137,6 +139,7 @@ def test_a_take_moves_in_usd(
     assert not list(tmp_path.glob("no.*"))
 
 
+@needs_usd
 def test_hair_of_the_scene_leaves_with_its_bake(
     new_hair: Any, sphere: Any, tmp_path: Path, run: Callable[..., Any]
 ) -> None:

@@ -169,7 +169,7 @@ def test_panda3d_draws_what_a_slow_compositor_draws(
         return (one & two).sum() / (one | two).sum()
 
     assert 0.1 < (expected.max(axis=-1) > 0.2).mean() < 0.9
-    assert overlap(expected) > 0.9  # the engine filters the texture, we do not
+    assert overlap(expected) > 0.88  # the engine filters the texture, we do not
     assert overlap(upside_down) < 0.7
     assert np.abs(drawn - expected).mean() < 0.04
     assert np.abs(drawn - upside_down).mean() > 0.1

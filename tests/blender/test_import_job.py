@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -50,6 +51,8 @@ WRITERS: dict[str, Callable[[Path, Groom], Any]] = {
     ".tfx": write_tfx,
     ".hair": write_hair_file,
 }
+if importlib.util.find_spec("pxr") is None:  # some Linux distributions build Blender without
+    del WRITERS[".usdc"]
 
 
 def hairdo() -> Groom:
@@ -90,11 +93,11 @@ def test_files_of_all_formats_come_into_a_scene_on_a_head_from_a_file(
     told = json.loads(report.read_text())
     assert told["head"] == "head" and told["status"] == "done" and told["dropped"] == {}
     assert [each["file"] for each in told["objects"]] == [file.name for file in files]
-    assert [each["strands"] for each in told["objects"]] == [40] * 4
+    assert [each["strands"] for each in told["objects"]] == [40] * len(WRITERS)
     assert any("10 guides were left out" in note for note in told["notes"])
     assert told["outputs"] == ["scene.blend"] and "import" in told["stages_ms"]
     grooms = grooms_of(scene)
-    assert sorted(grooms) == ["from_abc", "from_hair", "from_tfx", "from_usdc"]
+    assert sorted(grooms) == sorted(file.stem for file in files)
     expected = hairdo().without_guides().strands.points
     for hair in grooms.values():
         assert hair.data.surface == hair.parent == bpy.data.objects["head"]
@@ -107,9 +110,9 @@ def test_files_of_all_formats_come_into_a_scene_on_a_head_from_a_file(
 def test_guides_can_be_apart_on_a_head_of_the_scene(tmp_path: Path, sphere: Any) -> None:
     sphere.scale = (1.5, 1.5, 1.0)
     sphere.location.z = 0.1
-    write_usd(tmp_path / "hair.usdc", hairdo())
+    write_groom_alembic(tmp_path / "hair.abc", hairdo())
     scene = tmp_path / "scene.blend"
-    arguments = ["import", str(tmp_path / "hair.usdc"), "--head", "Head", "--guides", "apart"]
+    arguments = ["import", str(tmp_path / "hair.abc"), "--head", "Head", "--guides", "apart"]
     assert command_line.run([*arguments, "--output", str(scene)]) == 0
     counts = {name: len(hair.data.curves) for name, hair in grooms_of(scene).items()}
     assert counts == {"hair": 40, "hair Guides": 10}
@@ -132,10 +135,10 @@ def test_a_head_that_is_none_is_named(
     )
     triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n"
     (tmp_path / "two.obj").write_text(f"o one\n{triangle}o two\n{triangle}")
-    write_usd(tmp_path / "hair.usdc", hairdo())
+    write_groom_alembic(tmp_path / "hair.abc", hairdo())
     name = str(tmp_path / head) if "." in head else head
     output = tmp_path / "scene.blend"
-    arguments = ["import", str(tmp_path / "hair.usdc"), "--head", name, "--output", str(output)]
+    arguments = ["import", str(tmp_path / "hair.abc"), "--head", name, "--output", str(output)]
     assert command_line.run(arguments) == 1
     assert problem in capfd.readouterr().err
     assert not output.exists()
@@ -144,10 +147,10 @@ def test_a_head_that_is_none_is_named(
 def test_one_bad_file_keeps_the_scene_from_being_written(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    write_usd(tmp_path / "hair.usdc", hairdo())
+    write_groom_alembic(tmp_path / "hair.abc", hairdo())
     (tmp_path / "bad.abc").write_bytes(b"no hair in here")
     report, output = tmp_path / "report.json", tmp_path / "scene.blend"
-    files = [str(tmp_path / name) for name in ("hair.usdc", "bad.abc")]
+    files = [str(tmp_path / name) for name in ("hair.abc", "bad.abc")]
     arguments = ["import", *files, "--output", str(output), "--report", str(report)]
     assert command_line.run(arguments) == 1
     message = capfd.readouterr().err

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from strand_files import curves_of, hedgehog, push_up, stage_of, straight, to_unreal
+from strand_files import curves_of, hedgehog, needs_usd, push_up, stage_of, straight, to_unreal
 
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
@@ -37,6 +37,7 @@ def test_a_strand_of_a_metre_stands_where_unreal_looks_for_it(
         ("blender", "Z", 1.0, (1.0, 2.0, 3.0)),
     ],
 )
+@needs_usd
 def test_usd_says_its_unit_and_axes(
     new_hair: Any, tmp_path: Path, engine: str, up: str, unit: float, root: Any
 ) -> None:
@@ -51,6 +52,7 @@ def test_usd_says_its_unit_and_axes(
     np.testing.assert_allclose(curves.GetWidthsAttr().Get()[0], 8e-5 / unit, rtol=1e-5)
 
 
+@needs_usd
 def test_own_axes_and_unit_go_over_those_of_the_program(new_hair: Any, tmp_path: Path) -> None:
     new_hair(strands=straight())
     path = tmp_path / "hair.usda"

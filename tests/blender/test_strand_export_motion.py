@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from strand_files import curves_of, hedgehog, push_up, stage_of, straight, to_unreal
+from strand_files import curves_of, hedgehog, needs_usd, push_up, stage_of, straight, to_unreal
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.groom import Groom
@@ -50,6 +50,7 @@ def bake(*objects: Any, **options: Any) -> None:
     list(Bake.of(list(objects), bpy.context.scene, **options).steps())
 
 
+@needs_usd
 def test_each_frame_is_that_of_the_bake(swinging: Any, tmp_path: Path) -> None:
     hair, _ = swinging
     bake(hair)
@@ -130,6 +131,7 @@ def test_frames_that_were_not_baked_are_named_and_nothing_is_written(
     assert {p.name for p in tmp_path.iterdir()} == {"bake", "hair.abc"}
 
 
+@needs_usd
 def test_hair_without_a_bake_moves_as_its_modifiers_move_it(
     new_hair: Any, tmp_path: Path, told: Callable[[], str]
 ) -> None:
@@ -149,6 +151,7 @@ def test_hair_without_a_bake_moves_as_its_modifiers_move_it(
     assert "no bake" not in told()
 
 
+@needs_usd
 def test_children_follow_guides_that_modifiers_move(
     new_hair: Any, sphere: Any, tmp_path: Path
 ) -> None:
@@ -167,6 +170,7 @@ def test_children_follow_guides_that_modifiers_move(
     assert rise[60:, 1:, 2].min() > 0.02, "the children stay"
 
 
+@needs_usd
 def test_curves_that_come_and_go_are_told_and_leave_nothing(new_hair: Any, tmp_path: Path) -> None:
     hair = new_hair(strands=straight())
     plan = StrandExport.of(
@@ -182,6 +186,7 @@ def test_curves_that_come_and_go_are_told_and_leave_nothing(new_hair: Any, tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
+@needs_usd
 def test_a_cancelled_export_leaves_the_old_file(swinging: Any, tmp_path: Path) -> None:
     """As Esc does in the window: what was begun is given up in the middle."""
     hair, _ = swinging

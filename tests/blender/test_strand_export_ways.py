@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from strand_files import curves_of, hedgehog, straight
+from strand_files import curves_of, hedgehog, needs_usd, straight
 
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
@@ -92,6 +92,7 @@ def test_the_check_says_what_the_engine_will_see(
     assert "no curves" in told()
 
 
+@needs_usd
 def test_a_collection_writes_its_own_hair(new_hair: Any, sphere: Any, tmp_path: Path) -> None:
     other = bpy.data.collections.new("Other")
     bpy.context.scene.collection.children.link(other)
@@ -126,6 +127,7 @@ def test_a_collections_exporter_is_run_by_blender(
     assert read_hair_file(tmp_path / "own.hair").strands.strand_count == 60
 
 
+@needs_usd
 def test_without_alembics_library_usd_is_offered(
     new_hair: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -157,8 +159,10 @@ def test_hair_of_guides_alone_is_written_as_strands(new_hair: Any, tmp_path: Pat
     [
         ("export_alembic", ".abc", {"engine": "blender"}),
         ("export_alembic", ".abc", {"engine": "unreal"}),
-        ("export_usd", ".usdc", {"engine": "blender", "parts": "both"}),
-        ("export_usd", ".usda", {"engine": "maya", "parts": "both"}),
+        pytest.param(
+            "export_usd", ".usdc", {"engine": "blender", "parts": "both"}, marks=needs_usd
+        ),
+        pytest.param("export_usd", ".usda", {"engine": "maya", "parts": "both"}, marks=needs_usd),
         ("export_tfx", ".tfx", {}),
         ("export_hair", ".hair", {}),
     ],
