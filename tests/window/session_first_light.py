@@ -17,6 +17,7 @@ from artist import (
     open_our_sidebar,
     press,
     sidebar_button,
+    until,
     viewport,
     viewport_middle,
     viewport_pixels,
@@ -79,9 +80,12 @@ def preview(shading):
     yield from click(*sidebar_button("hairloom.preview"))
     yield 10
     assert len(live().sessions()) == 1, "the Preview button did nothing"
-    on = pixels(f"{shading.lower()}-preview")
+    name = f"{shading.lower()}-preview"
+    yield from until(
+        lambda: changed(off, pixels(name)) > 0.02, f"{shading}: the strands do not show"
+    )
+    on = pixels(name)
     assert overlay().failure() == ""
-    assert changed(off, on) > 0.02, f"{shading}: the strands do not show"
     yield from depth_is_tested(shading)
     if shading == "SOLID":
         yield from click(*sidebar_button("hairloom.preview"))
