@@ -159,9 +159,11 @@ def new_file(dice):
 def switch_shading(dice):
     for area in views():
         shading = area.spaces.active.shading
-        kinds = ["SOLID", "WIREFRAME", "MATERIAL"]
-        if bpy.context.scene.render.engine != "CYCLES":
+        kinds, engine = ["SOLID", "WIREFRAME"], bpy.context.scene.render.engine
+        if engine != "CYCLES":
             kinds.append("RENDERED")
+        if engine != "HAIRLOOM":  # without EEVEE there is no Material Preview
+            kinds.append("MATERIAL")
         shading.type = dice.pick(kinds)
         shading.show_xray = dice.often(0.3)
         dice.note(f"{shading.type} {shading.show_xray}")
