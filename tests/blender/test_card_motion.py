@@ -314,10 +314,9 @@ def test_texels_are_in_other_formats_too(
     motion: GuideMotion, tmp_path: Path, file_format: Any
 ) -> None:
     path = tmp_path / f"hair{file_format.suffixes[0]}"
-    try:
-        written = write(path, motion, kind="texture")
-    except HairloomError as error:
-        pytest.skip(str(error))
+    if file_format is USD and not bpy.app.build_options.usd:
+        pytest.skip("this Blender was built without USD")
+    written = write(path, motion, kind="texture")
     assert written.motion["frame_step"] < 0.0
     assert written.motion["texel"] in ("LayerElementUV 2", "primvars:st2")
     assert (tmp_path / "hair_motion_position.exr").is_file()
