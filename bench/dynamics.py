@@ -13,17 +13,15 @@ make bench NAME="dynamics --peer-10k"   the peer with 10,000 guides too: three m
 from __future__ import annotations
 
 import argparse
-import json
-import platform
 import statistics
 from collections.abc import Callable
 from typing import Any
 
 import bpy
-import gpu
 import numpy as np
 from _forms import ComputeForm, Form, NumpyForm, has_compute, play
 from _hair_dynamics import HairDynamics, animate
+from _report import tell
 from _shaken_head import RADIUS, Shake, depth_in, guides_on, new_head, surface_of, sway
 
 from hairloom.addon.dynamics.colliders import DistanceField, SphereCollider
@@ -67,8 +65,7 @@ def main() -> None:
         )
     if asked.peer_10k:
         found["hair_dynamics_10k_ms"] = peer_10k(head, surface)
-    show(found)
-    print(json.dumps({**{key: rounded(value) for key, value in found.items()}, **machine()}))
+    tell(found, "Hair Dynamics, Physics, surface collision, 10 x 15 (as shipped)")
 
 
 def race(
@@ -181,26 +178,6 @@ def peer_10k(head: bpy.types.Object, surface: Surface) -> float:
     times, _ = peer.play(25, 5)
     peer.remove()
     return statistics.median(times)
-
-
-def show(found: dict[str, Any]) -> None:
-    for name, value in found.items():
-        print(f"{name:40} {'-' if value is None else format(value, '12.3f')}")
-
-
-def rounded(value: Any) -> Any:
-    return value if value is None else round(value, 4)
-
-
-def machine() -> dict[str, str]:
-    return {
-        "reference": "Hair Dynamics, Physics, surface collision, 10 x 15 (as shipped)",
-        "backend": gpu.platform.backend_type_get(),
-        "renderer": gpu.platform.renderer_get(),
-        "blender": bpy.app.version_string,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-    }
 
 
 main()
