@@ -1,29 +1,39 @@
 """The closest point of a triangle mesh, exact, for many points at once.
 
-The distance to a triangle is a quadratic form in its barycentric coordinates; its minimum lies
-inside or on one of the three edges (Ericson, Real-Time Collision Detection 2005, section 5.1.5).
-Taking the least of those four candidates, instead of Ericson's region tests, needs no division by
-the area, so that slivers, doubled corners and single points are answered like any triangle.
+Points that lie together share the search (`point_clusters`): the distance to a triangle changes by
+no more than a point is moved. So a triangle that is farther from the middle of a cluster than the
+nearest one by more than twice the cluster's radius is nearest to none of its points, and is left
+out for all at once.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
+from .point_clusters import PointClusters, clustered
 from .surface import Surface
+from .triangle_distance import TriangleForms
 from .triangle_tree import TriangleTree, build_tree
 
 #: Points searched at once: their pairs with boxes stay in the processor's cache.
 _CHUNK = 4096
 #: Pairs of points and boxes held at once; more than this halves the chunk.
 _PAIR_LIMIT = 2_000_000
-#: A triangle whose area^2 is below this part of its edges' product has no inside, only edges.
-_FLAT = 1.0e-12
+#: Pairs of points and their cluster's triangles looked at at once.
+_PAIRS = 1 << 16
+#: Clusters save work where they have so many points on average, and no more triangles than this.
+_WORTHWHILE, _CROWDED = 3, 512
+#: A hair more than a distance, so that rounding leaves nothing out.
+_HAIR = 1.0 + 1.0e-9
+
+
+type _Pairs = Iterator[tuple[Ints, Ints]]
 
 
 @dataclass(frozen=True)
@@ -40,6 +50,28 @@ class ClosestPoints:
     triangle: Ints
     barycentric: Floats
     distance: Floats
+
+
+@dataclass
+class _Best:
+    """The nearest triangles so far: squared distance and index, one a point."""
+
+    distance: Floats
+    triangle: Ints
+
+
+@dataclass(frozen=True)
+class _Candidates:
+    """Triangles that may be nearest to a point of a cluster, cluster after cluster.
+
+    away: distance of each from the cluster's middle.
+    first, count: of each cluster.
+    """
+
+    triangle: Ints
+    away: Floats
+    first: Ints
+    count: Ints
 
 
 class ClosestPointSearch:
@@ -59,7 +91,10 @@ class ClosestPointSearch:
         low, high = surface.bounds()
         self._center = (low.astype(np.float64) + high) / 2.0  # keeps the dot products small
         self._corners = surface.corners - self._center
-        self._forms = _forms(self._corners)
+        self._forms = TriangleForms(self._corners)
+        low, high = self._corners.min(axis=1), self._corners.max(axis=1)
+        self._size = float(np.median(np.linalg.norm(high - low, axis=1)))
+        self._low, self._high = np.ascontiguousarray(low.T), np.ascontiguousarray(high.T)
         self._tree: TriangleTree = build_tree(self._corners)
 
     def closest(self, points: Floats, reach: float = np.inf) -> ClosestPoints:
@@ -70,61 +105,127 @@ class ClosestPointSearch:
                 that is farther than this as well. Much faster where few points are near.
         """
         local = np.asarray(points, np.float64).reshape(-1, 3) - self._center
-        starts = range(0, len(local), _CHUNK)
-        chunks = [self._search(local[i : i + _CHUNK], reach) for i in starts]
-        triangle = np.concatenate(chunks) if chunks else np.zeros(0, np.int64)
-        _, barycentric = self._measure(local, triangle)
+        triangle = self._nearest(local, reach)
+        barycentric = self._forms.closest(local, triangle)
         closest = np.einsum("ni,nij->nj", barycentric, self._corners[triangle])
         distance = np.linalg.norm(local - closest, axis=1)
         return ClosestPoints(
             closest + self._center, triangle.astype(np.int32), barycentric, distance
         )
 
-    def _search(self, points: Floats, reach: float) -> Ints:
-        """The nearest triangle of each point: a good guess, then all that could be nearer."""
-        guess = self._tree.nearest_leaf(points)
-        distance, triangle = self._nearest_in_leaves(points, guess)
-        # a hair more than the reach, so that a point just within it is found
-        within = np.minimum(distance, reach * reach * (1.0 + 1e-9))
-        pairs = self._tree.leaves_within(
-            points, within, _PAIR_LIMIT if len(points) > 1 else sys.maxsize
+    def _nearest(self, points: Floats, reach: float) -> Ints:
+        """The nearest triangle of each point, by clusters where that saves work."""
+        if len(points) < _WORTHWHILE:
+            return self._search_all(points, reach)
+        clusters = clustered(points, self._size)
+        if len(points) < _WORTHWHILE * len(clusters.middle):
+            return self._search_all(points, reach)
+        nearest = self._search_all(clusters.middle, reach + float(clusters.radius.max()))
+        candidates = self._candidates(clusters, nearest, reach)
+        is_crowded = (candidates.count > _CROWDED)[clusters.cluster]
+        found = np.empty(len(points), np.int64)
+        alone, together = np.flatnonzero(is_crowded), np.flatnonzero(~is_crowded)
+        found[clusters.order[together]] = self._of_clusters(
+            points, clusters, together, nearest, candidates, reach
         )
-        if pairs is None:
-            half = len(points) // 2
-            halves = (points[:half], points[half:])
-            return np.concatenate([self._search(part, reach) for part in halves])
-        point, leaf = pairs
+        found[clusters.order[alone]] = self._search_all(points[clusters.order[alone]], reach)
+        return found
+
+    def _search_all(self, points: Floats, reach: float) -> Ints:
+        """The nearest triangle of each point, each for itself."""
+        starts = range(0, len(points), _CHUNK)
+        found = [self._search(points[i : i + _CHUNK], reach) for i in starts]
+        return np.concatenate([np.zeros(0, np.int64), *found])
+
+    def _search(self, points: Floats, reach: float) -> Ints:
+        """A good guess, then all that could be nearer."""
+        leaf = self._tree.leaf_triangles[self._tree.nearest_leaf(points)]
+        best = _Best(np.full(len(points), np.inf), leaf[:, 0].astype(np.int64))
+        self._improve(best, points, *_each(np.arange(len(points)), leaf))
+        # a hair more than the reach, so that a point just within it is found
+        within = np.minimum(best.distance, reach * reach * _HAIR)
+        for point, triangle in self._near_triangles(points, within):
+            self._improve(best, points, point, triangle)
+        return best.triangle
+
+    def _near_triangles(self, points: Floats, squared_within: Floats) -> _Pairs:
+        """Pairs of point and triangle that may be so near, ascending by point, some at a time."""
+        limit = _PAIR_LIMIT if len(points) > 1 else sys.maxsize
+        pairs = self._tree.leaves_within(points, squared_within, limit)
+        if pairs is not None:
+            yield _each(pairs[0], self._tree.leaf_triangles[pairs[1]])
+            return
+        half = len(points) // 2
+        yield from self._near_triangles(points[:half], squared_within[:half])
+        for point, triangle in self._near_triangles(points[half:], squared_within[half:]):
+            yield point + half, triangle
+
+    def _candidates(self, clusters: PointClusters, nearest: Ints, reach: float) -> _Candidates:
+        """For each cluster, but for the triangle that is nearest to its middle."""
+        middle, radius = clusters.middle, clusters.radius
+        away = np.sqrt(self._forms.squared_distance(middle, nearest))
+        within = np.minimum(away + 2.0 * radius, reach + radius) * _HAIR
+        found = []
+        for start in range(0, len(middle), _CHUNK):
+            part = slice(start, start + _CHUNK)
+            for near, triangle in self._near_triangles(middle[part], within[part] ** 2):
+                cluster = near + start
+                far = np.sqrt(self._forms.squared_distance(middle[cluster], triangle))
+                is_near = (far <= within[cluster]) & (triangle != nearest[cluster])
+                found.append((cluster[is_near], triangle[is_near], far[is_near]))
+        cluster, triangle, far = (np.concatenate(each) for each in zip(*found, strict=True))
+        count = np.bincount(cluster, minlength=len(middle))
+        return _Candidates(triangle, far, np.cumsum(count) - count, count)
+
+    def _of_clusters(
+        self,
+        points: Floats,
+        clusters: PointClusters,
+        chosen: Ints,
+        nearest: Ints,
+        candidates: _Candidates,
+        reach: float,
+    ) -> Ints:
+        """The nearest triangle of these of the points in the order of the clusters."""
+        found: list[Ints] = [np.zeros(0, np.int64)]
+        for piece in _pieces(candidates.count[clusters.cluster[chosen]]):
+            part = chosen[piece]
+            here, cluster = points[clusters.order[part]], clusters.cluster[part]
+            triangle = nearest[cluster]
+            best = _Best(self._forms.squared_distance(here, triangle), triangle)
+            count, first = candidates.count[cluster], candidates.first[cluster]
+            point = np.repeat(np.arange(len(here)), count)
+            pair = np.arange(len(point)) + np.repeat(first - (np.cumsum(count) - count), count)
+            so_far = np.minimum(np.sqrt(best.distance), reach) + clusters.away[part]
+            is_near = candidates.away[pair] <= (so_far * _HAIR)[point]
+            self._improve(best, here, point[is_near], candidates.triangle[pair[is_near]])
+            found.append(best.triangle)
+        return np.concatenate(found)
+
+    def _improve(self, best: _Best, points: Floats, point: Ints, triangle: Ints) -> None:
+        """Let the best know of these pairs of point and triangle, ascending by point."""
+        is_near = self._is_near(best, points, point, triangle)
+        point, triangle = point[is_near], triangle[is_near]
         if not len(point):
-            return triangle
-        pair_distance, pair_triangle = self._nearest_in_leaves(points[point], leaf)
+            return
+        distance = self._forms.squared_distance(points[point], triangle)
         first = np.flatnonzero(np.diff(point, prepend=-1))
         seen = point[first]
-        distance[seen] = np.minimum(distance[seen], np.minimum.reduceat(pair_distance, first))
-        is_best = pair_distance == distance[point]
-        triangle[point[is_best]] = pair_triangle[is_best]
-        return triangle
+        best.distance[seen] = np.minimum(best.distance[seen], np.minimum.reduceat(distance, first))
+        is_best = distance == best.distance[point]
+        best.triangle[point[is_best]] = triangle[is_best]
 
-    def _nearest_in_leaves(self, points: Floats, leaf: Ints) -> tuple[Floats, Ints]:
-        """Squared distance and index of the nearest triangle of one leaf a point, (n,) each."""
-        triangles = self._tree.leaf_triangles[leaf]
-        leaf_size = triangles.shape[1]
-        distance, _ = self._measure(np.repeat(points, leaf_size, axis=0), triangles.ravel())
-        distance = distance.reshape(triangles.shape)
-        best = distance.argmin(axis=1)[:, None]
-        return (
-            np.take_along_axis(distance, best, axis=1)[:, 0],
-            np.take_along_axis(triangles, best, axis=1)[:, 0],
-        )
-
-    def _measure(self, points: Floats, triangle: Ints) -> tuple[Floats, Floats]:
-        """Squared distance (n,) and barycentric (n, 3) of the closest point, pair by pair."""
-        from_a = points - self._corners[triangle, 0]
-        ab, ac, form = (part[triangle] for part in self._forms)
-        along_ab = np.einsum("ij,ij->i", ab, from_a)
-        along_ac = np.einsum("ij,ij->i", ac, from_a)
-        v, w = _minimum(along_ab, along_ac, *form.T)
-        gap = from_a - v[:, None] * ab - w[:, None] * ac
-        return np.einsum("ij,ij->i", gap, gap), np.stack([1.0 - v - w, v, w], axis=1)
+    def _is_near(self, best: _Best, points: Floats, point: Ints, triangle: Ints) -> Bools:
+        """Which pairs are worth measuring: those whose triangle's box is nearer than the best."""
+        gap = np.zeros(len(point))
+        for axis in range(3):
+            here = points[point, axis]
+            outside = np.maximum(
+                self._low[axis, triangle] - here, here - self._high[axis, triangle]
+            )
+            np.maximum(outside, 0.0, out=outside)
+            gap += outside * outside
+        return np.asarray(gap <= best.distance[point])
 
 
 def closest_point(points: Floats, surface: Surface) -> ClosestPoints:
@@ -136,36 +237,18 @@ def closest_point(points: Floats, surface: Surface) -> ClosestPoints:
     return ClosestPointSearch(surface).closest(points)
 
 
-def _forms(corners: Floats) -> tuple[Floats, Floats, Floats]:
-    """Edges ab, ac, and the form (ab.ab, ab.ac, ac.ac, determinant or 0) of each triangle."""
-    ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    bb, bc, cc = ((one * two).sum(axis=1) for one, two in ((ab, ab), (ab, ac), (ac, ac)))
-    determinant = bb * cc - bc * bc
-    determinant[determinant <= _FLAT * bb * cc] = 0.0
-    return ab, ac, np.stack([bb, bc, cc, determinant], axis=1)
+def _each(point: Ints, triangles: Ints) -> tuple[Ints, Ints]:
+    """Pairs of point (n,) and each of its triangles (n, width)."""
+    return np.repeat(point, triangles.shape[1]), triangles.ravel()
 
 
-def _minimum(
-    d1: Floats, d2: Floats, bb: Floats, bc: Floats, cc: Floats, determinant: Floats
-) -> tuple[Floats, Floats]:
-    """Where v^2 bb + 2 v w bc + w^2 cc - 2 v d1 - 2 w d2 is least over the triangle."""
-    v = _divided(cc * d1 - bc * d2, determinant)
-    w = _divided(bb * d2 - bc * d1, determinant)
-    is_inside = (determinant > 0.0) & (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0)
-
-    on_ab = np.clip(_divided(d1, bb), 0.0, 1.0)
-    on_ac = np.clip(_divided(d2, cc), 0.0, 1.0)
-    on_bc = np.clip(_divided(d2 - d1 + bb - bc, bb - 2.0 * bc + cc), 0.0, 1.0)
-    best = on_ab * (on_ab * bb - 2.0 * d1)
-    edge_v, edge_w = on_ab, np.zeros_like(on_ab)
-    for other_v, other_w in ((np.zeros_like(on_ac), on_ac), (1.0 - on_bc, on_bc)):
-        value = other_v * (other_v * bb + 2.0 * (other_w * bc - d1))
-        value += other_w * (other_w * cc - 2.0 * d2)
-        is_less = value < best
-        best = np.where(is_less, value, best)
-        edge_v, edge_w = np.where(is_less, other_v, edge_v), np.where(is_less, other_w, edge_w)
-    return np.where(is_inside, v, edge_v), np.where(is_inside, w, edge_w)
-
-
-def _divided(value: Floats, by: Floats) -> Floats:
-    return np.divide(value, by, out=np.zeros_like(value), where=by > 0.0)
+def _pieces(pair_counts: Ints) -> Iterator[slice]:
+    """Points in a row that have about _PAIRS pairs together, at least one each."""
+    ends = np.cumsum(pair_counts)
+    start = 0
+    while start < len(ends):
+        before = int(ends[start - 1]) if start else 0
+        stop = max(int(np.searchsorted(ends, before + _PAIRS, side="right")), start + 1)
+        stop = min(stop, start + _PAIRS)
+        yield slice(start, stop)
+        start = stop

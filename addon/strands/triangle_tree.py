@@ -14,6 +14,9 @@ from ..arrays import Floats, Ints
 
 #: Triangles in a leaf; fewer cost more box tests, more cost more exact tests.
 LEAF_SIZE = 4
+#: How much more the distance to a box counts than that to its middle; 2 to 8 find nearer leaves
+#: than either alone.
+_BOX_WEIGHT = 4.0
 
 
 @dataclass(frozen=True)
@@ -26,11 +29,19 @@ class TriangleTree:
     leaf_triangles: Ints
 
     def nearest_leaf(self, points: Floats) -> Ints:
-        """The leaf reached by always entering the nearer box, (point_count,): a first guess."""
+        """The leaf reached by always entering the nearer child, (point_count,): a first guess.
+
+        Boxes of children overlap, and a point in both is at distance 0 from both: so the distance
+        to the middle of a box counts beside that to the box.
+        """
         node = np.zeros(len(points), np.int64)
         for low, high in self.levels[1:]:
-            left = _squared_distance(points, low[2 * node], high[2 * node])
-            right = _squared_distance(points, low[2 * node + 1], high[2 * node + 1])
+            middle = (low + high) / 2.0
+            left, right = (
+                _BOX_WEIGHT * _squared_distance(points, low[child], high[child])
+                + _squared_distance(points, middle[child], middle[child])
+                for child in (2 * node, 2 * node + 1)
+            )
             node = 2 * node + (right < left)
         return node
 

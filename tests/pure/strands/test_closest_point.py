@@ -9,6 +9,7 @@ from hairloom.addon.arrays import Floats
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.strands import Surface
 from hairloom.addon.strands.closest_point import ClosestPointSearch, closest_point
+from hairloom.addon.strands.triangle_distance import TriangleForms
 
 BOX_CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 BOX_QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -135,6 +136,42 @@ def test_reach_keeps_near_answers_and_tells_far_ones_apart() -> None:
     assert 0 < is_near.sum() < len(points)
     assert short.distance[is_near] == pytest.approx(exact.distance[is_near], abs=1e-15)
     assert short.distance[~is_near].min() > 0.25
+
+
+@pytest.mark.parametrize(("spread", "shift"), [(0.01, 0.0), (0.2, 0.0), (0.02, 3.0), (3.0, 0.0)])
+@pytest.mark.parametrize("reach", [np.inf, 0.3])
+def test_points_that_lie_together_agree_with_all_triangles(
+    spread: float, shift: float, reach: float
+) -> None:
+    """In clusters of many points near to and far from a soup of triangles of all sizes."""
+    random = np.random.default_rng(11)
+    sizes = random.uniform(0.01, 0.4, (300, 1, 1))
+    corners = random.uniform(-1, 1, (300, 1, 3)) + sizes * random.normal(size=(300, 3, 3))
+    surface = Surface(corners.reshape(-1, 3), np.arange(900).reshape(-1, 3))
+    middles = random.uniform(-1, 1, (12, 1, 3)) + shift
+    points = (middles + spread * random.normal(size=(12, 80, 3))).reshape(-1, 3)
+    found = ClosestPointSearch(surface).closest(points, reach)
+    every = TriangleForms(surface.corners.astype(np.float64))
+    brute = np.sqrt(
+        [every.squared_distance(np.tile(point, (300, 1)), np.arange(300)) for point in points]
+    )
+    is_near = brute.min(axis=1) <= reach
+    assert found.distance[is_near] == pytest.approx(brute.min(axis=1)[is_near], abs=1e-12)
+    assert (found.triangle == brute.argmin(axis=1))[is_near].all()
+    assert (found.distance[~is_near] > reach).all()
+
+
+def test_a_cluster_in_the_middle_of_a_ball_finds_the_nearest_of_all_its_triangles() -> None:
+    """Each of so many may be the nearest one, so that they are searched point by point."""
+    random = np.random.default_rng(12)
+    directions = random.normal(size=(4000, 1, 3))
+    directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+    corners = directions + 0.01 * random.normal(size=(4000, 3, 3))
+    surface = Surface(corners.reshape(-1, 3), np.arange(12000).reshape(-1, 3))
+    points = 0.01 * random.normal(size=(200, 3))
+    every = TriangleForms(surface.corners.astype(np.float64))
+    brute = [every.squared_distance(np.tile(p, (4000, 1)), np.arange(4000)).min() for p in points]
+    assert closest_point(points, surface).distance == pytest.approx(np.sqrt(brute), abs=1e-12)
 
 
 def test_no_points_and_no_triangles() -> None:
