@@ -75,6 +75,15 @@ def chosen_parts(groom: Groom, parts: str) -> Groom:
     return groom.guides() if parts == "guides" else groom
 
 
+def chosen_strands(groom: Groom, parts: str) -> Ints:
+    """Indices of the strands that `chosen_parts` takes."""
+    count = groom.strands.strand_count
+    if parts == "both" or (parts == "strands" and groom.is_guide is None):
+        return np.arange(count)
+    is_guide = np.zeros(count, bool) if groom.is_guide is None else groom.is_guide
+    return np.flatnonzero(is_guide if parts == "guides" else ~is_guide)
+
+
 def preflight(groom: Groom, preset: GroomPreset) -> dict[str, Any]:
     """What the engine will see of a groom that is written so, in the units and axes of the file.
 

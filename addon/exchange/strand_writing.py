@@ -13,7 +13,7 @@ from ..errors import HairloomError
 from .alembic.groom_alembic import write_groom_alembic
 from .files.file_set import written_together
 from .groom import Groom, GroomMotion, points_of
-from .groom_presets import chosen_parts
+from .groom_presets import chosen_strands
 from .group_files import group_files
 from .hair_file import write_hair_file
 from .strand_formats import ALEMBIC, HAIR, TRESSFX, USD, strand_format
@@ -65,7 +65,8 @@ def _write_alembic(
 ) -> WrittenStrands:
     preset = layout_of(ALEMBIC, output)
     write_groom_alembic(path, groom, preset, motion=motion)
-    long = int((chosen_parts(groom, preset.parts).strands.point_counts > preset.most_points).sum())
+    counts = groom.strands.point_counts[chosen_strands(groom, preset.parts)]
+    long = int((counts > preset.most_points).sum())
     notes: tuple[str, ...] = ()
     if long:
         notes = (f"{path.name}: {long:,} strands were resampled to {preset.most_points} points.",)
@@ -76,7 +77,7 @@ def _write_usd(
     path: Path, groom: Groom, output: StrandOutput, motion: GroomMotion | None
 ) -> WrittenStrands:
     layout = layout_of(USD, output)
-    chosen = _chosen(groom, layout.parts)
+    chosen = chosen_strands(groom, layout.parts)
     if motion is not None and len(chosen) < groom.strands.strand_count:
         points = points_of(groom.strands, chosen)
         motion = replace(motion, positions=_only(motion, points))
@@ -147,7 +148,7 @@ def _write_files(
     write: Callable[[Path, Groom, BoneWeights | None], tuple[str, ...]],
 ) -> WrittenStrands:
     """One file, or one for each group, with what lies beside them."""
-    chosen = _chosen(groom, parts)
+    chosen = chosen_strands(groom, parts)
     groom = _part(groom, chosen, parts)
     bones = None if output.bones is None else output.bones.take(chosen)
     files: dict[Path, Ints] = {path: np.arange(len(chosen))}
@@ -170,13 +171,6 @@ def _strands_of_files(path: Path, groom: Groom) -> dict[Path, Ints]:
     count = groom.strands.strand_count
     numbered = replace(groom, strand_id=np.arange(count), closest_guides=None, guide_weights=None)
     return {file: _numbers(part) for file, part in group_files(path, numbered).items()}
-
-
-def _chosen(groom: Groom, parts: str) -> Ints:
-    """Indices of the strands that these parts are."""
-    count = groom.strands.strand_count
-    numbered = replace(groom, strand_id=np.arange(count), closest_guides=None, guide_weights=None)
-    return _numbers(chosen_parts(numbered, parts))
 
 
 def _numbers(groom: Groom) -> Ints:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +19,12 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
+from ...strands import StrandSet
 from ..files.atomic import atomic_write, unwritable
 from ..files.disk_room import check_room
 from ..files.names import plain_name
 from ..groom import Groom, GroomMotion, points_of
-from ..groom_presets import LEAST_WIDTH, UNREAL, GroomPreset, chosen_parts
+from ..groom_presets import LEAST_WIDTH, UNREAL, GroomPreset, chosen_strands
 from ..point_cap import PointCap, point_cap
 from .alembic_library import alembic_library, array_of, sample_of, scope_of, write_parameter
 
@@ -78,43 +79,66 @@ def is_finished(path: Path) -> bool:
 
 @dataclass(frozen=True)
 class _Part:
-    """One curves object: its strands, and how to get its points from the groom's."""
+    """One curves object: its name, and which strands it has; None are all, in their order."""
 
     name: str
+    chosen: Ints | None
+
+    def taken(self, groom: Groom, preset: GroomPreset) -> _Taken:
+        """Its own copy of the groom, as large as the object: for as long as it is written."""
+        own = groom if self.chosen is None else groom.take(self.chosen)
+        return _Taken(own, point_cap(own.strands, preset.most_points))
+
+    def point_counts(self, strands: StrandSet, most: int) -> Ints:
+        """Points of each curve that is written."""
+        counts = strands.point_counts
+        return np.minimum(counts if self.chosen is None else counts[self.chosen], most)
+
+
+@dataclass(frozen=True)
+class _Taken:
+    """The strands of a curves object, and which of their points are written."""
+
     groom: Groom
-    points: Ints | None
     cap: PointCap | None
 
     @property
     def point_counts(self) -> Ints:
         return self.groom.strands.point_counts if self.cap is None else np.diff(self.cap.offsets)
 
-    def of_points(self, values: Floats) -> Floats:
-        """Values at the groom's points at the points of this object."""
-        return self.capped(values if self.points is None else values[self.points])
-
     def capped(self, values: Floats) -> Floats:
         """Values at the points of this object's strands at those that are written."""
         return values if self.cap is None else self.cap.apply(values)
 
 
+@dataclass(frozen=True)
+class _Moved:
+    """How a curves object gets its points from a frame: indices, None for all, and the cap."""
+
+    points: Ints | None
+    cap: PointCap | None
+
+    @classmethod
+    def of(cls, part: _Part, taken: _Taken, strands: StrandSet) -> _Moved:
+        points = None if part.chosen is None else points_of(strands, part.chosen)
+        return cls(points, taken.cap)
+
+    def of_frame(self, frame: Floats, preset: GroomPreset) -> Floats:
+        """The points that are written, in the file's space."""
+        placed = preset.space.to_file(frame if self.points is None else frame[self.points])
+        return placed if self.cap is None else self.cap.apply(placed)
+
+
 def _parts(groom: Groom, preset: GroomPreset) -> list[_Part]:
-    parts = []
-    for name, chosen in _chosen(groom, preset):
-        if chosen is not None and not len(chosen):
-            continue
-        own = groom if chosen is None else groom.take(chosen)
-        points = None if chosen is None else points_of(groom.strands, chosen)
-        parts.append(_Part(name, own, points, point_cap(own.strands, preset.most_points)))
-    return [part for part in parts if part.groom.strands.strand_count]
+    parts = (_Part(name, chosen) for name, chosen in _chosen(groom, preset))
+    count = groom.strands.strand_count
+    return [p for p in parts if (count if p.chosen is None else len(p.chosen))]
 
 
 def _chosen(groom: Groom, preset: GroomPreset) -> Iterator[tuple[str, Ints | None]]:
     """Name and strands of each curves object; None are all of them, in their order."""
     count = groom.strands.strand_count
-    numbered = replace(groom, strand_id=np.arange(count), closest_guides=None, guide_weights=None)
-    wanted = chosen_parts(numbered, preset.parts).strand_id
-    assert wanted is not None
+    wanted = chosen_strands(groom, preset.parts)
     if not preset.is_split:
         yield plain_name(groom.name), None if len(wanted) == count else wanted
         return
@@ -139,26 +163,28 @@ def _write(
 
     Alembic's library ends the process where the disk is full, so that is looked at before.
     """
-    points = sum(int(part.point_counts.sum()) for part in parts)
-    strands = sum(part.groom.strands.strand_count for part in parts)
+    counts = [part.point_counts(groom.strands, preset.most_points) for part in parts]
+    points, strands = sum(int(each.sum()) for each in counts), sum(map(len, counts))
     check_room(path, points * _POINT_BYTES + strands * _STRAND_BYTES + _HEADER_BYTES)
     archive, time = _archive(library, path, groom, motion)
     top = library.geom.OXform(archive.getTop(), f"{plain_name(groom.name)}_groom")
     _write_version(library, top.getSchema().getUserProperties(), groom, preset)
-    schemas = []
-    for part in parts:
-        curves = library.geom.OCurves(top, part.name, library.abc.Argument(time))
-        schemas.append(curves.getSchema())
     frames = iter([groom.strands.points] if motion is None else motion.positions)
-    first = _checked(next(frames, None), groom, preset)
-    for part, schema in zip(parts, schemas, strict=True):
-        schema.set(_first_sample(library, part, preset, part.of_points(first)))
-        _write_attributes(library, schema.getArbGeomParams(), part, preset)
+    first = _checked(next(frames, None), groom)
+    moving = []
+    for part in parts:  # one after the other, so that no more than one is in memory twice
+        curves = library.geom.OCurves(top, part.name, library.abc.Argument(time))
+        schema, taken = curves.getSchema(), part.taken(groom, preset)
+        moved = _Moved.of(part, taken, groom.strands)
+        schema.set(_first_sample(library, taken, preset, moved.of_frame(first, preset)))
+        _write_attributes(library, schema.getArbGeomParams(), taken, preset)
+        if motion is not None:
+            moving.append((schema, moved))
     for frame in frames:
-        moved = _checked(frame, groom, preset)
+        checked = _checked(frame, groom)
         check_room(path, points * _POINT_BYTES + _HEADER_BYTES)
-        for part, schema in zip(parts, schemas, strict=True):
-            schema.set(_sample(library, preset, part.of_points(moved)))
+        for schema, moved in moving:
+            schema.set(_sample(library, preset, moved.of_frame(checked, preset)))
 
 
 def _archive(library: Any, path: Path, groom: Groom, motion: GroomMotion | None) -> tuple[Any, int]:
@@ -177,8 +203,8 @@ def _archive(library: Any, path: Path, groom: Groom, motion: GroomMotion | None)
     return archive, archive.addTimeSampling(sampling)
 
 
-def _checked(frame: Floats | None, groom: Groom, preset: GroomPreset) -> Floats:
-    """A frame's points in the file's space."""
+def _checked(frame: Floats | None, groom: Groom) -> Floats:
+    """A frame's points, which are as many as the groom's."""
     expected = (groom.strands.point_count, 3)
     if frame is None or frame.shape != expected or not np.isfinite(frame).all():
         found = "none" if frame is None else f"{frame.shape}"
@@ -187,7 +213,7 @@ def _checked(frame: Floats | None, groom: Groom, preset: GroomPreset) -> Floats:
             place=groom.name,
             remedy="Bake the motion again",
         )
-    return preset.space.to_file(frame)
+    return frame
 
 
 def _write_version(library: Any, properties: Any, groom: Groom, preset: GroomPreset) -> None:
@@ -211,7 +237,7 @@ def _sample(library: Any, preset: GroomPreset, points: Floats) -> Any:
     return sample
 
 
-def _first_sample(library: Any, part: _Part, preset: GroomPreset, points: Floats) -> Any:
+def _first_sample(library: Any, part: _Taken, preset: GroomPreset, points: Floats) -> Any:
     """What the later ones repeat, too: counts, widths and UVs."""
     sample = _sample(library, preset, points)
     sample.setCurvesNumVertices(array_of(library, part.point_counts.astype(np.int32)))
@@ -222,7 +248,7 @@ def _first_sample(library: Any, part: _Part, preset: GroomPreset, points: Floats
     return sample
 
 
-def _write_attributes(library: Any, parent: Any, part: _Part, preset: GroomPreset) -> None:
+def _write_attributes(library: Any, parent: Any, part: _Taken, preset: GroomPreset) -> None:
     groom, count = part.groom, part.groom.strands.strand_count
     number = np.arange(count) if groom.strand_id is None else groom.strand_id
     uniform: dict[str, Floats | Ints | None] = {
@@ -260,7 +286,7 @@ def _write_group_names(library: Any, parent: Any, groom: Groom) -> None:
     library.geom.OStringGeomParam(parent, "groom_group_name", True, scope, 1).set(sample)
 
 
-def _widths(part: _Part, preset: GroomPreset) -> Floats:
+def _widths(part: _Taken, preset: GroomPreset) -> Floats:
     """Widths of the points that are written, in the file's unit."""
     width = np.maximum(part.capped(part.groom.strands.radius) * np.float32(2.0), LEAST_WIDTH)
     return (width * preset.space.per_metre).astype(np.float32)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from ...errors import HairloomError
 from .atomic import flush_to_disk, unwritable
 from .leftovers import remove_leftovers, temporary_beside
 
@@ -40,6 +41,10 @@ def written_together(path: Path) -> Iterator[Path]:
         _put_in_place(staging, folder)
     except OSError as error:
         raise unwritable(path, error.strerror or str(error)) from error
+    except HairloomError as error:
+        # nobody knows the hidden folder, in which the file is no more
+        place = error.place.replace(str(staging), str(folder))
+        raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 

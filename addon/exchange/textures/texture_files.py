@@ -138,7 +138,7 @@ def write_texture(
             raise HairloomError(
                 f"this picture cannot be written ({_reason(target or library)})",
                 place=str(path),
-                remedy="Choose another folder or format",
+                remedy="Choose a folder with space left, or another format",
             )
 
 

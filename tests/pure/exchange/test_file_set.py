@@ -43,6 +43,15 @@ def test_a_failing_writer_leaves_what_was_there(
     assert contents(tmp_path) == dict.fromkeys(sorted(FILES), "old")
 
 
+def test_what_went_wrong_names_the_files_own_folder(tmp_path: Path) -> None:
+    with (
+        pytest.raises(HairloomError) as caught,
+        written_together(tmp_path / "hair.glb") as folder,
+    ):
+        raise HairloomError("it is full", place=str(folder / "hair_base.png"), remedy="Wait")
+    assert str(caught.value) == f"{tmp_path / 'hair_base.png'}: it is full. Wait."
+
+
 @pytest.mark.parametrize("last", range(3))
 def test_a_disk_that_fills_up_while_files_are_replaced_leaves_what_was_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, last: int

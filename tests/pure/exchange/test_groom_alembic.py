@@ -7,6 +7,7 @@ import resource
 import signal
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -161,6 +162,26 @@ def test_unity_gets_all_strands_in_an_object_for_each_group(tmp_path: Path) -> N
         uv = np.repeat(hair.strands.root_uv[chosen], COUNTS[chosen], axis=0)
         np.testing.assert_array_equal(own_values(schema, "uv"), uv)
         assert attribute(schema, "groom_group_id")[-1].tolist() == [group] * len(chosen)
+
+
+def test_groups_are_in_memory_one_at_a_time(tmp_path: Path) -> None:
+    """Unity's file has an object for each; what Alembic itself keeps is not counted here."""
+    count, groups = 10_000, 40
+    points = np.random.default_rng(3).random((count * 16, 3), np.float32)
+    strands = StrandSet(
+        points,
+        np.arange(count + 1) * 16,
+        np.full(count * 16, 5.0e-5),
+        np.arange(count) % groups,
+        np.zeros((count, 2)),
+    )
+    groom = Groom(strands, color=points, is_guide=np.arange(count) % 50 == 0)
+    write_groom_alembic(tmp_path / "first.abc", groom, UNITY)  # loads the library
+    tracemalloc.start()
+    write_groom_alembic(tmp_path / "second.abc", groom, UNITY)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 0.5 * points.nbytes
 
 
 def test_all_comes_back_to_the_bit(tmp_path: Path) -> None:
