@@ -88,14 +88,14 @@ def _act(act: str, preset: str, path: Path) -> dict[str, float]:
 
     timings, processor, memory = [], [], megabytes_beside(work)
     for _ in range(ROUNDS):
-        started, processed = time.perf_counter(), _processor_seconds()
+        started, processed = time.perf_counter(), processor_seconds()
         work()
         timings.append(time.perf_counter() - started)
-        processor.append(_processor_seconds() - processed)
+        processor.append(processor_seconds() - processed)
     return {"seconds": min(timings), "processor_seconds": min(processor), "memory": memory}
 
 
-def _processor_seconds() -> float:
+def processor_seconds() -> float:
     """Of this process and of those that it has waited for; other work does not count in it."""
     who = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     usage = [resource.getrusage(each) for each in who]

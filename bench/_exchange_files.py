@@ -25,10 +25,6 @@ from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
 from hairloom.addon.strands import StrandSet
 
 STRANDS, POINTS, ROUNDS = 100_000, 16, 7
-#: damaged files of a format that we parse, and of one that a library parses in another process, and
-#: kills of a format's writer; and what the whole proof has of the latter two
-FUZZED, FUZZED_APART, KILLS = 10_000, 100, 15
-ALL_APART, ALL_KILLS = 1_000, 100
 OUR_FORMATS, LIBRARIES_FORMATS = ("tfx", "tfxbone", "hair", "preset"), ("abc", "usdc", "usda")
 KILLED_FORMATS = ("tfx", "tfxbone", "hair", "preset", "abc", "usdc", "glb")
 
@@ -56,10 +52,14 @@ def file_timings() -> dict[str, float]:
     return found
 
 
-def fuzz_figures(ours: int = FUZZED, libraries: int = FUZZED_APART) -> dict[str, float]:
+def fuzz_figures(ours: int, libraries: int) -> dict[str, float]:
     """How many damaged files were read, refused, or neither (failures); the slowest, and the most
     memory as a multiple of the file, of those that we parse; and of those that libraries parse how
-    many ended all right."""
+    many ended all right.
+
+    Args:
+        ours, libraries: how many of a format that we parse, and of one that a library parses.
+    """
     counts = dict.fromkeys(OUR_FORMATS, ours) | dict.fromkeys(LIBRARIES_FORMATS, libraries)
     with ThreadPoolExecutor(2) as pool:
         found = dict(zip(counts, pool.map(_fuzzed, counts, counts.values()), strict=True))
@@ -82,9 +82,13 @@ def _fuzzed(kind: str, count: int) -> dict[str, Any]:
     return _child("fuzz_files", kind, count)
 
 
-def kill_figures(trials: int = KILLS) -> dict[str, float]:
+def kill_figures(trials: int) -> dict[str, float]:
     """Kills, files that were neither old nor new, kills that left something half-written, sets of
-    old and new files, and what still lay there after one write more."""
+    old and new files, and what still lay there after one write more.
+
+    Args:
+        trials: kills of the writer of each format.
+    """
     found = [_child("kill_writes", kind, trials) for kind in KILLED_FORMATS]
     names = ("trials", "failures", "amid", "mixed", "leftovers")
     return {f"kill_{name}": float(sum(each[name] for each in found)) for name in names}

@@ -1,9 +1,12 @@
 """How long the window stands still: the main thread's stops while hair is shown, played and set.
 
-The sample scene at default settings. For each thing that an artist does, the longest stop of the
-main thread, in wall time and in its own processor time: on a machine that does other work as well
-the latter is what counts. Drawing is left out. Play waits for its collider as in a window; the
-ticks of that time are `waiting`.
+The sample scene at default settings, then with 100,000 children. For each thing that an artist
+does, the longest stop of the main thread, in wall time and in its own processor time: on a machine
+that does other work as well the latter is what counts. Drawing is left out. Play waits for its
+collider as in a window; the ticks of that time are `waiting`. Hair is made in a thread: its
+`arrives` is what the main thread does to show it, and the heartbeat, a millisecond of sleep, is as
+late as the thread holds it up; to be compared with the one without a thread, late by what else runs
+on the machine.
 
 make bench NAME="freeze --form numpy"
 """
@@ -15,16 +18,18 @@ import json
 import platform
 import time
 from collections.abc import Callable
+from functools import partial
 
 import bpy
 import gpu
+import numpy as np
 
 import hairloom
 from hairloom.addon.host.colliders import fields
-from hairloom.addon.host.preview import live, reactions
+from hairloom.addon.host.preview import live, making, reactions
 from hairloom.addon.host.sample_scene import add_sample_scene
 
-RATE, FRAMES, MOVES = 24.0, 24, 8
+RATE, FRAMES, MOVES, BEATS = 24.0, 24, 8, 2000
 #: group of settings -> a slider of it and what it is dragged to
 SLIDERS = {
     "dynamics.damping": 0.3,
@@ -53,12 +58,14 @@ class Stops:
 def main() -> None:
     options = argparse.ArgumentParser()
     options.add_argument("--form", default="automatic", help="automatic, compute or numpy")
-    form = options.parse_args().form
+    options.add_argument("--children", type=int, default=100_000)
+    given = options.parse_args()
     gpu.init()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     hairloom.register()
+    making.is_awaited = lambda: False  # as in a window
     scene, hair = add_sample_scene(())
-    hair.hairloom.dynamics.form = form
+    hair.hairloom.dynamics.form = given.form
     depsgraph = scene.view_layers[0].depsgraph
     stops = Stops()
     session = stops.timed("preview", lambda: live.start(hair, depsgraph))
@@ -68,6 +75,27 @@ def main() -> None:
     def tick() -> None:
         live.advance(depsgraph, 1.0 / RATE)
 
+    def arrive(kind: str) -> None:
+        """Frames until the hair that is being made is shown, and one with it."""
+        begin = time.perf_counter()
+        while session.is_pending:
+            is_there = session.has_arrived
+            stops.timed(f"{kind}: arrives" if is_there else f"{kind}: is made", take)
+            stops.timed(f"{kind}: frame meanwhile", tick)
+            beat(f"{kind}: heartbeat")
+        seconds[kind] = round(time.perf_counter() - begin, 1)
+        stops.timed(f"{kind}: frame", tick)
+
+    def beat(kind: str) -> None:
+        stops.timed(kind, lambda: time.sleep(0.001))
+
+    def take() -> None:
+        attempt = partial(session.take_made, depsgraph)
+        if session.has_arrived:
+            live.attempt(session, depsgraph, lambda _: attempt())
+
+    seconds: dict[str, float] = {}
+    arrive("preview")
     ticks, begin = 0, time.perf_counter()
     while live.is_waiting(session):
         stops.timed("waiting" if not fields.are_made() else "play begins", tick)
@@ -77,20 +105,44 @@ def main() -> None:
     stops.timed("first frame", tick)
     for _ in range(FRAMES):
         stops.timed("frame", tick)
+    for _ in range(BEATS):
+        beat("heartbeat without a thread")
+
+    def read_again(kind: str) -> None:
+        stops.timed(f"{kind}: read again", lambda: reactions.catch_up(depsgraph))
+        arrive(kind)
+
     for name, value in SLIDERS.items():
         drag(stops, hair, name, value)
-        stops.timed(f"{name}: read again", lambda: reactions.catch_up(depsgraph))
-        stops.timed(f"{name}: frame", tick)
+        read_again(name)
+    hair.data.hairloom.children.strand_count = given.children
+    hair.data.hairloom.children.way = "multi"
+    read_again("children")
+    for kind in ("comb", "comb again"):
+        stops.timed(f"{kind}: Blender evaluates", lambda: comb(hair, scene))
+        session.is_stale = True
+        read_again(kind)
     facts = {
         "longest stops [ms], wall and processor": stops.longest,
+        "seconds until it was made": seconds,
         "ticks until the collider was made": ticks,
         "seconds until then": round(waited, 1),
+        "strands with children": session.rig.strands.strand_count,
         "computed on": session.computed_on,
         "renderer": gpu.platform.renderer_get(),
         "python": platform.python_version(),
     }
     print(json.dumps(facts))
+    live.stop_all()
     hairloom.unregister()
+
+
+def comb(hair: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Move all points, as a brush does."""
+    points = np.empty(len(hair.data.points) * 3, np.float32)
+    hair.data.position_data.foreach_get("vector", points)
+    hair.data.position_data.foreach_set("vector", points * 1.01)
+    scene.view_layers[0].update()
 
 
 def drag(stops: Stops, hair: bpy.types.Object, name: str, value: float) -> None:
