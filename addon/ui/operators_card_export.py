@@ -11,6 +11,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from bpy_extras.io_utils import ExportHelper
 
 from ..errors import HairloomError
+from ..host.bakes import playback
+from ..host.bakes.stale_bakes import stale_notes
 from ..host.cards.card_choices import (
     DEPTH_ITEMS,
     FORMAT_ITEMS,
@@ -27,6 +29,7 @@ from ..host.cards.card_files import FileSteps
 from ..host.cards.card_out import CardExport
 from ..host.strands.groom_files import Outcome
 from .long_work import LongWork, Progress, Steps, threaded
+from .messages import draw_lines
 from .reports import tell
 from .selection import chosen_hair, needs_hair
 
@@ -38,6 +41,8 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     bl_label = "Export Hair Cards"
     bl_options = {"PRESET"}
     unharmed = "nothing was written"
+    #: of bakes, while the file browser is open
+    stale: tuple[str, ...] = ()
 
     filter_glob: StringProperty(
         default=";".join(f"*{suffix}" for suffix in SUFFIXES), options={"HIDDEN"}
@@ -139,6 +144,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         if hair and not self.filepath:
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
+        self.stale = _stale(hair[:1], context.evaluated_depsgraph_get())
         return super().invoke(context, event)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
@@ -190,11 +196,11 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         path = Path(bpy.path.abspath(self.filepath))
         return path if is_alone else path.with_stem(f"{path.stem}_{file_stem(hair.name)}")
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "format")
-        levels = layout.row(heading="Levels of Detail")
+        levels = layout.row(heading="Levels")
         levels.prop(self, "own_levels", text="")
         count = levels.row()
         count.active = self.own_levels
@@ -202,9 +208,9 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         for name in ("packing", "textures", "attributes", "index_buffer", "motion"):
             layout.prop(self, name)
         if self.motion != "none":
-            self._draw_motion(layout)
+            self._draw_motion(layout, context)
 
-    def _draw_motion(self, layout: bpy.types.UILayout) -> None:
+    def _draw_motion(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         frames = layout.row(heading="Frames")
         frames.prop(self, "own_frames", text="")
         ends = frames.row(align=True)
@@ -214,6 +220,18 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         of_joints = ("chains", "joints", "joint_error")
         for name in ("motion_space", *(of_joints if self.motion == "joints" else ["motion_depth"])):
             layout.prop(self, name)
+        for note in self.stale:
+            draw_lines(layout.column(align=True), context, note, "ERROR")
+
+
+def _stale(hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
+    """What is out of date of its bake; one that cannot be read is told when it is written."""
+    try:
+        found = [(each, playback.cache_of(each)) for each in hair]
+        stale = [stale_notes(each, cache, depsgraph) for each, cache in found if cache is not None]
+    except HairloomError:
+        return ()
+    return tuple(note for notes in stale for note in notes)
 
 
 def _shown(writing: FileSteps[Outcome]) -> Steps[Outcome]:

@@ -10,8 +10,10 @@ import pytest
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.host.bakes import playback
 from hairloom.addon.host.bakes.bake import Bake, free
-from hairloom.addon.host.bakes.cache import Cache
+from hairloom.addon.host.bakes.bake_settings import folder_of
+from hairloom.addon.host.bakes.cache import FACTS, Cache
 from hairloom.addon.host.preview import live, reactions, timeline
+from hairloom.addon.host.preview.simulated import SOLVER_VERSION, solver_part
 
 LAST = 8
 
@@ -182,6 +184,34 @@ def test_what_has_changed_since_is_said_and_the_bake_still_plays(swinging, evalu
     bpy.context.view_layer.update()
     reactions.catch_up(evaluated())
     assert "hair" in changed_at(5)
+
+
+def aged(folder):
+    """Make a bake one of the solver's first version."""
+    file = folder / FACTS
+    content = json.loads(file.read_text(encoding="utf-8"))
+    now, old = solver_part(str(SOLVER_VERSION)), solver_part("1")
+    assert now in content["fingerprint"]
+    content["fingerprint"] = content["fingerprint"].replace(now, old)
+    file.write_text(json.dumps(content), encoding="utf-8")
+    playback.forget()
+
+
+@pytest.mark.parametrize("is_animated", [False, True])
+def test_old_bakes_of_animated_settings_are_out_of_date(is_animated, swinging, evaluated):
+    hair, _ = swinging
+    if is_animated:
+        for frame, value in ((1, 0.5), (5, 4.0)):
+            hair.hairloom.dynamics.damping = value
+            hair.keyframe_insert("hairloom.dynamics.damping", frame=frame)
+    bake(hair)
+    live.start(hair, evaluated())
+    assert timeline.baked(hair.session_uid).changed == ()
+    live.stop_all()
+    aged(folder_of(hair))
+    live.start(hair, evaluated())
+    changed = timeline.baked(hair.session_uid).changed
+    assert changed == (("solver",) if is_animated else ())
 
 
 def test_a_head_that_is_posed_by_hand_takes_its_hair_along(swinging, evaluated):

@@ -8,6 +8,7 @@ import pytest
 
 from hairloom.addon.host.bakes import playback
 from hairloom.addon.host.bakes.cache import Cache
+from hairloom.addon.host.pictures.images import read_texture
 from hairloom.addon.host.verbs import command_line
 
 LAST = 5
@@ -113,3 +114,40 @@ def test_the_bake_of_the_command_line_is_that_of_the_button(file, tmp_path):
     for frame in range(1, LAST + 1):
         for name, array in one.frame(frame).items():
             np.testing.assert_array_equal(two.frame(frame)[name], array)
+
+
+def test_a_baked_frame_is_drawn(file, tmp_path):
+    """The verb render; what has changed since the bake is told."""
+    assert command_line.run(["bake", "--scene", str(file), "--save"]) == 0
+    picture, report = tmp_path / "hair.png", tmp_path / "report.json"
+    arguments = ["render", "--scene", str(file), "--groom", "Hair", "--baked", "--width", "96"]
+    arguments += ["--height", "72", "--samples", "1", "--output", str(picture)]
+    drawn = {}
+    for frame in (1, LAST):
+        more = ["--frame", str(frame), "--report", str(report)]
+        assert command_line.run([*arguments, *more]) == 0
+        drawn[frame] = read_texture(picture, is_color=False)
+        assert json.loads(report.read_text())["notes"] == []
+    assert drawn[1].std() > 0.01
+    assert np.abs(drawn[1] - drawn[LAST]).max() > 0.1, "the hair does not move"
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    bpy.data.objects["Hair"].hairloom.dynamics.damping = 7.0
+    bpy.ops.wm.save_mainfile()
+    assert command_line.run([*arguments, "--frame", "1", "--report", str(report)]) == 0
+    assert "out of date (settings)" in json.loads(report.read_text())["notes"][0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--groom", "Hair"], "it has no bake"),
+        (["--groom", "Hair", "--take", "take.npz"], "give no take"),
+        (["--groom", "Sphere"], "this is no hair object"),
+        ([], "this is no hair object"),
+    ],
+)
+def test_what_is_not_baked_is_not_drawn(arguments, message, file, tmp_path, capsys):
+    whole = ["render", "--scene", str(file), "--baked", "--output", str(tmp_path / "hair.png")]
+    assert command_line.run([*whole, *arguments]) == 1
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "hair.png").exists()

@@ -6,6 +6,7 @@ import importlib.util
 import json
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from hairloom.addon.host.bakes.take import shaken_poses  # noqa: E402
 from hairloom.addon.host.cards.card_builds import CardForm  # noqa: E402
 from hairloom.addon.host.cards.card_files import CardOutput, WrittenCards, write_cards  # noqa: E402
 from hairloom.addon.host.cards.card_motion import GuideMotion, MotionChoices  # noqa: E402
+from hairloom.addon.host.cards.card_out import CardExport  # noqa: E402
 from hairloom.addon.host.verbs import command_line  # noqa: E402
 from hairloom.addon.host.verbs.inputs import Sources, read_inputs  # noqa: E402
 from hairloom.addon.pipeline import Pose, Rig  # noqa: E402
@@ -401,3 +403,51 @@ def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
         assert (told["frames"]["first"], told["frames"]["count"]) == (first, count)
     with pytest.raises(RuntimeError, match="holds frames 3 to 9"):
         bpy.ops.hairloom.export_cards(**options, own_frames=True, first_frame=4, last_frame=20)
+
+
+@pytest.mark.usefixtures("extension")
+@pytest.mark.parametrize(
+    ("kind", "amid"),
+    [("joints", "Moving the cards"), ("joints", "Fitting joints"), ("texture", "Writing")],
+)
+def test_cancelled_in_its_midst_it_leaves_the_old_files(
+    kind: str, amid: str, sphere: Any, tmp_path: Path
+) -> None:
+    """The steps that Esc closes in the window, as far as each of them."""
+    bpy.context.view_layer.objects.active = sphere
+    bpy.ops.hairloom.grow(strand_count=40, length=0.05)
+    hair, scene = bpy.context.object, bpy.context.scene
+    hair.data.hairloom.cards.way = "guides"
+    hair.data.hairloom.card_occlusion.rays = 8
+    hair.data.hairloom.atlas.source = "made"
+    scene.frame_start, scene.frame_end = 1, 6
+    for frame in (1, 6):
+        sphere.location.x = 0.02 * frame
+        sphere.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.collider_resolution = 8
+    list(Bake.of([hair], scene).steps())
+    folder = tmp_path / "out"
+    folder.mkdir()
+    old = {"hair.glb": b"old mesh", "hair_base.png": b"old picture", "note.txt": b"the artist's"}
+    for name, content in old.items():
+        (folder / name).write_bytes(content)
+    plan = CardExport.of(
+        hair,
+        bpy.context.evaluated_depsgraph_get(),
+        folder / "hair.glb",
+        CardOutput(motion=MotionChoices(kind)),
+    )
+    making = plan.making()
+    while not making.serve():
+        time.sleep(0.001)
+    writing = plan.writing(making.result())
+    for text, _ in writing:
+        if text == amid:
+            break
+    else:
+        pytest.fail(f"it never comes to '{amid}'")
+    writing.close()
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == old

@@ -14,6 +14,8 @@ from typing import Any
 import bpy
 import pytest
 
+from hairloom.addon.host.pictures.images import read_texture
+
 pytest.importorskip("openjd.cli", reason="openjd-cli runs the template")
 yaml = pytest.importorskip("yaml", reason="openjd-cli brings it along")
 
@@ -118,6 +120,10 @@ def test_a_farm_bakes_exports_and_does_only_what_is_missing(folder: Path) -> Non
     tasks = [strands_of(folder, *task) for task in (("anna", 1), ("anna", 3), ("ben", 1))]
     assert at_once(*tasks) == [0, 0, 0]
     assert run(folder, "Cards", "-tp", "Character=anna").returncode == 0
+    done = run(folder, "Pictures", "-tp", "Character=anna", "-tp", "First=3")
+    assert done.returncode == 0 and "bake is out of date" not in done.stdout, done.stdout
+    drawn = read_texture(folder / "out" / "anna" / "picture_3.png", is_color=False)
+    assert drawn.std() > 0.01, "the picture is empty"
 
     before = made(folder)
     assert {"anna/baked.blend", "anna/strands_1.abc", "anna/cards.glb"} <= before.keys()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -85,6 +86,30 @@ def test_a_task_is_done_again_when_anything_has_changed(
     assert task(*more)["status"] == "done"
     assert frame.stat().st_size == size and Cache(bake).facts.last == 3
     assert task(*more)["status"] == "skipped"
+
+
+def test_a_job_whose_folders_are_moved_together_is_still_done(scene: Path, tmp_path: Path) -> None:
+    """All that it has written is seen from its stamp: scene, bake, and the scene that plays it."""
+    job, report = tmp_path / "job", tmp_path / "report.json"
+    (job / "scenes").mkdir(parents=True)
+    shutil.copy(scene, job / "scenes" / "wig.blend")
+
+    def status(folder: Path, *more: str) -> str:
+        arguments = ["bake", "--scene", str(folder / "scenes" / "wig.blend"), "--frames", "1", "3"]
+        arguments += ["--output", str(folder / "out" / "bake"), *QUICK, "--skip-existing"]
+        arguments += ["--save-as", str(folder / "out" / "baked.blend"), "--report", str(report)]
+        assert command_line.run([*arguments, *more]) == 0
+        return str(json.loads(report.read_text())["status"])
+
+    assert status(job) == "done" and status(job) == "skipped"
+    stamp = (job / "out" / "bake.done.json").read_text()
+    assert str(tmp_path) not in stamp and "../scenes/wig.blend" in json.loads(stamp)["inputs"]
+    moved = job.rename(tmp_path / "elsewhere")
+    assert status(moved) == "skipped"
+    assert status(moved, "--set", "dynamics.damping=3") == "done"
+    with open(moved / "scenes" / "wig.blend", "ab") as file:
+        file.write(b"changed")
+    assert status(moved, "--set", "dynamics.damping=3") == "done"
 
 
 def test_a_linked_library_is_an_input(

@@ -200,8 +200,10 @@ def simulated_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simu
         return FinSession(obj, depsgraph)
     if known is None:
         return Session(obj, depsgraph, is_drawn=False)
-    if known.is_stale and isinstance(known, Session):
-        known.read_again(depsgraph)
+    if isinstance(known, Session):
+        if known.is_stale:
+            known.read_again(depsgraph)
+        known.finish(depsgraph)
     return known
 
 

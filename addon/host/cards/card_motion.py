@@ -24,6 +24,7 @@ from ...exchange.cards.glb_skin import Skeleton, with_skeleton
 from ...exchange.cards.sidecar_motion import joint_motion, texture_motion
 from ...pipeline import Pose, Rig
 from ..bakes import playback
+from ..bakes.stale_bakes import stale_notes
 from ..bakes.take import read_take
 from ..pictures.images import write_texture
 from ..strands.groom_motion import check_frames
@@ -54,12 +55,14 @@ class GuideMotion:
 
     rig: what they belong to.
     moment: the pose, and the guides (guide_count, cv_count, 3) [m, world], at a frame.
+    notes: what the artist should know.
     """
 
     rig: Rig
     frames: range
     frame_rate: float
     moment: Callable[[int], tuple[Pose, Floats]]
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +115,8 @@ def baked_motion(hair: bpy.types.Object, frames: range | None) -> GuideMotion:
         arrays = cache.frame(frame)
         return baked.pose(arrays), arrays["guides"]
 
-    return GuideMotion(baked.rig, chosen, facts.frame_rate, moment)
+    notes = stale_notes(hair, cache, bpy.context.evaluated_depsgraph_get())
+    return GuideMotion(baked.rig, chosen, facts.frame_rate, moment, notes)
 
 
 def check_motion(choices: MotionChoices, motion: GuideMotion, file_format: CardFormat) -> None:

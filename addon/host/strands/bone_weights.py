@@ -31,6 +31,12 @@ def bones_of(
     return bones_at_roots(strands, head.triangles, names, weights)
 
 
+def has_bones(hair: bpy.types.Object) -> bool:
+    """Whether deforming bones can move its head."""
+    skin = head_of(hair)
+    return skin is not None and bool(_bone_names(skin))
+
+
 def _bone_names(skin: bpy.types.Object) -> tuple[str, ...]:
     """Deforming bones that have a vertex group, in the order of the groups."""
     armature = skin.find_armature()

@@ -13,6 +13,7 @@ from ...exchange.strand_check import check_lines, check_strands
 from ...exchange.strand_formats import StrandFormat
 from ...exchange.strand_output import StrandOutput
 from ..bakes import playback
+from ..bakes.stale_bakes import changed_since
 from ..scene.objects import Handle
 from .groom_out import Wishes, still_hair
 from .strand_export import wishes_of
@@ -29,6 +30,7 @@ class ExportCheck:
     lines: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     _read: dict[Wishes, tuple[Groom, tuple[str, ...]]] = field(default_factory=dict)
+    _stale: dict[int, tuple[str, ...]] = field(default_factory=dict)
     _checked: tuple[StrandFormat, StrandOutput] | None = None
 
     @classmethod
@@ -41,6 +43,8 @@ class ExportCheck:
         """Check it for a format and what is asked of it; whether anything may be new since."""
         if self._checked == (kind, output):
             return False
+        if self._checked is None:
+            self._look_at_bakes(depsgraph)
         try:
             groom, notes = self._groom(depsgraph, wishes_of(kind, output))
             facts = check_strands(groom, kind, output)
@@ -54,7 +58,7 @@ class ExportCheck:
     def motion_lines(self, *, use_bake: bool) -> list[str]:
         """What each hair goes by where frames are written."""
         hair = filter(None, (each.find() for each in self.hair))
-        return [f"{each.name}: {_moved_by(each, use_bake)}" for each in hair]
+        return [f"{each.name}: {self._moved_by(each, use_bake)}" for each in hair]
 
     def _groom(
         self, depsgraph: bpy.types.Depsgraph, wishes: Wishes
@@ -69,13 +73,24 @@ class ExportCheck:
             self._read[wishes] = groom, (*notes, *lost)
         return self._read[wishes]
 
+    def _moved_by(self, hair: bpy.types.Object, use_bake: bool) -> str:
+        try:
+            cache = playback.cache_of(hair) if use_bake else None
+            if cache is None:
+                return ("no bake, " if use_bake else "") + "as modifiers and animation move it"
+        except HairloomError as error:
+            return error.problem
+        facts = cache.facts
+        line = f"bake of frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps"
+        changed = self._stale.get(hair.session_uid, ())
+        return f"{line}, out of date ({', '.join(changed)})" if changed else line
 
-def _moved_by(hair: bpy.types.Object, use_bake: bool) -> str:
-    try:
-        cache = playback.cache_of(hair) if use_bake else None
-    except HairloomError as error:
-        return error.problem
-    if cache is None:
-        return ("no bake, " if use_bake else "") + "as modifiers and animation move it"
-    facts = cache.facts
-    return f"bake of frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps"
+    def _look_at_bakes(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Once: hashing all that a bake hangs on takes too long for drawing."""
+        for hair in filter(None, (each.find() for each in self.hair)):
+            try:
+                cache = playback.cache_of(hair)
+                changed = () if cache is None else changed_since(hair, cache, depsgraph)
+            except HairloomError:  # told in the lines of its motion, and when it is written
+                changed = ()
+            self._stale[hair.session_uid] = changed

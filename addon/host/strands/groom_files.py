@@ -8,16 +8,13 @@ from typing import Any
 
 import bpy
 
-from ... import pipeline
-from ...groom.children_settings import ChildrenSettings
 from ...groom.grow import grow, scalp_density
-from ...groom.settings import GrowSettings, GuideSettings
+from ...groom.settings import GrowSettings
 from ...pipeline import Rig
 from ..cards.card_images import chosen_pictures
 from ..cards.card_making import CardChoices
 from ..cards.other_cards import other_cards
 from ..scene.curves import write_curves
-from ..scene.source import Source
 from ..scene.surfaces import read_surface
 from ..scene.vertex_weights import read_weights
 from ..settings.choices import Choices
@@ -69,23 +66,6 @@ def card_choices(hair: bpy.types.Object) -> tuple[CardChoices, tuple[str, ...]]:
     form = Choices.of(hair).card_form
     others, notes = other_cards(form.occlusion, hair)
     return form.choices(pictures, others), (*warnings, *notes)
-
-
-def rig_of(hair: bpy.types.Object, source: Source) -> Rig:
-    """The hair made ready by its own settings, at rest as it was read.
-
-    Raises:
-        HairloomError: no hair that can be used.
-    """
-    groom = hair.data.hairloom
-    return pipeline.prepare(
-        source.strands,
-        source.head,
-        settings_of(groom.guides, GuideSettings),
-        place=hair.name,
-        children=settings_of(groom.children, ChildrenSettings),
-        density=source.density,
-    )
 
 
 def notes_of(hair: bpy.types.Object, rig: Rig) -> tuple[str, ...]:

@@ -18,13 +18,14 @@ from ...pipeline import Pose, Rig
 from ...strands.resample import resample
 from ..bakes import playback
 from ..bakes.cache import Cache
+from ..bakes.stale_bakes import stale_notes
 from ..preview import live
 from ..preview.fingerprints import frame_rate
 from ..scene.objects import Body, Handle, head_of
+from ..scene.rigs import rig_of
 from ..scene.source import read_source, usable_curves
 from ..scene.surfaces import read_positions
 from ..settings.properties import settings_of
-from .groom_files import rig_of
 from .groom_out import HairOut, Wishes, baked_hair, still_hair
 
 
@@ -131,7 +132,8 @@ def moving_hair(
     cache = playback.cache_of(hair) if use_bake else None
     if cache is not None:
         check_frames(hair.name, frames, cache)
-        return BakedMotion(baked_hair(hair, depsgraph, cache, wishes), cache), ()
+        motion = BakedMotion(baked_hair(hair, depsgraph, cache, wishes), cache)
+        return motion, stale_notes(hair, cache, depsgraph)
     out, rate = still_hair(hair, depsgraph, wishes), frame_rate(depsgraph.scene)
     notes: tuple[str, ...] = ()
     if use_bake:

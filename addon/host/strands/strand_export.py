@@ -20,7 +20,7 @@ from ...exchange.strand_output import StrandOutput, layout_of
 from ...exchange.strand_writing import WrittenStrands, write_strands
 from ...exchange.tfxbone import BoneWeights
 from ..thread_work import ThreadWork
-from .bone_weights import bones_of
+from .bone_weights import bones_of, has_bones
 from .groom_files import Outcome
 from .groom_motion import Moving, common_rate, moving_hair, positions_of
 from .groom_out import HairOut, Wishes, still_hair
@@ -68,7 +68,8 @@ class StrandExport:
             HairloomError: no hair that can be used, frames that were not baked, or an engine or
                 unit that cannot be.
         """
-        wishes = replace(wishes_of(kind, output), roots=kind is TRESSFX and with_bones)
+        has_roots = kind is TRESSFX and with_bones and any(has_bones(each) for each in hair)
+        wishes = replace(wishes_of(kind, output), roots=has_roots)
         if frames is None:
             outs, moving, notes = _still(hair, depsgraph, wishes)
         else:

@@ -12,6 +12,7 @@ from ..bakes import playback
 from ..bakes.bake import Bake, bakeable, free, show_in_renders
 from ..bakes.bake_settings import folder_of
 from ..report import Report
+from ..scene.objects import objects_in
 from .job_options import add_frames_option, add_object_option, frames_of_option
 from .job_steps import Job, tell_notes
 from .object_settings import named_objects, put_settings
@@ -65,7 +66,7 @@ def _objects(names: list[str]) -> list[bpy.types.Object]:
     """Those that were named, else all hair and fins of the view layer that are to be simulated."""
     if names:
         return named_objects(names, bakeable, "hair curves or a fin")
-    return [obj for obj in bpy.context.view_layer.objects if bakeable(obj) and _is_wanted(obj)]
+    return [o for o in objects_in(bpy.context.view_layer) if bakeable(o) and _is_wanted(o)]
 
 
 def _is_wanted(obj: bpy.types.Object) -> bool:

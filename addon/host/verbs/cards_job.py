@@ -80,7 +80,8 @@ def written_cards(
     if written.motion:
         report.facts["card_motion"] = dict(written.motion)
     print(order_line(written.build.wrong_share), flush=True)
-    tell_notes([*written.notes, *notes], report)
+    moving = () if motion is None else motion.notes
+    tell_notes([*written.notes, *moving, *notes], report)
     for file in written.files:
         report.add_output(file)
     return written

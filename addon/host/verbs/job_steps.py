@@ -67,17 +67,22 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
             density=inputs.density,
         )
     tell_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
+    tell_rig(report, rig, inputs.groom_name)
+    report.facts["dropped"] = inputs.dropped
+    return rig, inputs
+
+
+def tell_rig(report: Report, rig: Rig, name: str) -> None:
+    """What hair there is."""
     low, high = rig.strands.bounds()
     report.facts.update(
-        groom=Path(inputs.groom_name).name,
+        groom=Path(name).name,
         strands=rig.strands.strand_count,
         guides=len(rig.guides),
         children=rig.strands.strand_count - len(rig.guides),
         cv_count=rig.strands.grid.shape[1],
         bounds_m=[low.round(5).tolist(), high.round(5).tolist()],
-        dropped=inputs.dropped,
     )
-    return rig, inputs
 
 
 def _tell_drops(job: Job, inputs: Inputs) -> None:

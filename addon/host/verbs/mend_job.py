@@ -9,6 +9,7 @@ import bpy
 
 from ...errors import HairloomError
 from ..preview.troubles import set_surface, surface_for
+from ..scene.objects import objects_in
 from ..scene.source import mute_own_dynamics
 from ..starting import take_over
 from ..strands.particle_hair import convert_particle_hair
@@ -60,7 +61,7 @@ def _mended(hair: bpy.types.Object, options: argparse.Namespace) -> list[str]:
 def _surface(hair: bpy.types.Object, name: str) -> bpy.types.Object:
     if name:
         return named_objects([name], _is_mesh, "a mesh")[0]
-    candidates = list(bpy.context.view_layer.objects)
+    candidates = objects_in(bpy.context.view_layer)
     return surface_for(hair, candidates, bpy.context.evaluated_depsgraph_get())
 
 

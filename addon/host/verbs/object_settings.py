@@ -10,6 +10,7 @@ import bpy
 from ...errors import HairloomError
 from ...parameters import ALL_SETTINGS
 from ...params import Settings
+from ..scene.objects import objects_in
 from ..settings.presets import named_preset
 from ..settings.properties import settings_of
 from .overrides import overrides
@@ -48,7 +49,7 @@ def named_grooms(names: list[str]) -> list[bpy.types.Object]:
     Raises:
         HairloomError: there is none, or no such.
     """
-    grooms = [obj for obj in bpy.context.view_layer.objects if is_groom(obj)]
+    grooms = [obj for obj in objects_in(bpy.context.view_layer) if is_groom(obj)]
     if not names and not grooms:
         raise HairloomError(
             "there is no hair in the open scene",

@@ -3,6 +3,9 @@
 A job that is told to skip what exists leaves a stamp beside its output: what it was asked for, and
 digests of all that it has read and written. It is done when all of these are still the same, so a
 changed scene, another option, a cut or missing file make it run again.
+
+Paths are as seen from the stamp, so that a job whose folders are moved together, or are mounted
+elsewhere on another machine, is still done.
 """
 
 from __future__ import annotations
@@ -50,7 +53,8 @@ class Stamp:
                 remedy="Save another file: --save-as, or --output",
             )
         self.path = output.with_name(output.name + SUFFIX)
-        self._asked = _asked(options)
+        self._folder = Path(os.path.abspath(self.path.parent))
+        self._asked = _asked(options, self._folder)
         self._inputs = {path: digest(Path(path)) for path in _named_files(options)}
 
     def why_not_done(self) -> str:
@@ -58,7 +62,8 @@ class Stamp:
         try:
             known = json.loads(self.path.read_text(encoding="utf-8"))
             asked, inputs, outputs = known["asked"], known["inputs"], known["outputs"]
-            changed = [path for path, was in _pairs(inputs, outputs) if digest(Path(path)) != was]
+            pairs = _pairs(inputs, outputs)
+            changed = [path for path, was in pairs if digest(self._folder / path) != was]
         except FileNotFoundError:
             return "it was never done"
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
@@ -78,8 +83,12 @@ class Stamp:
         inputs = {path: digest(Path(path)) for path in found} | self._inputs
         content = {
             "asked": self._asked,
-            "inputs": {path: was for path, was in inputs.items() if path not in outputs},
-            "outputs": {path: digest(Path(path)) for path in outputs},
+            "inputs": {
+                _seen_from(self._folder, path): was
+                for path, was in inputs.items()
+                if path not in outputs
+            },
+            "outputs": {_seen_from(self._folder, path): digest(Path(path)) for path in outputs},
         }
         write_text_atomic(self.path, json.dumps(content, indent=2) + "\n")
 
@@ -103,13 +112,38 @@ def _pairs(*tables: dict[str, str]) -> Iterable[tuple[str, str]]:
     return (pair for table in tables for pair in table.items())
 
 
-def _asked(options: argparse.Namespace) -> dict[str, Any]:
-    """All options as JSON has them, what their presets say, and which Hairloom and Blender."""
-    asked = {name: value for name, value in vars(options).items() if name not in _NOT_ASKED}
+def _seen_from(folder: Path, path: str) -> str:
+    """An absolute path as seen from a folder; as it is where that is on another drive."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return path
+
+
+def _asked(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """All options as JSON has them, absolute paths in them as seen from a folder; what their
+    presets say; and which Hairloom and Blender."""
+    asked = {
+        name: _moved_with(folder, value)
+        for name, value in vars(options).items()
+        if name not in _NOT_ASKED
+    }
     presets = [preset_as_dict(named_preset(name)) for name in getattr(options, "preset", ())]
     asked |= {"presets": presets, "made_by": [hairloom_version(), bpy.app.version_string]}
     plain: dict[str, Any] = json.loads(json.dumps(asked, default=str))
     return plain
+
+
+def _moved_with(folder: Path, value: Any) -> Any:
+    """An option's value, in which absolute paths, also those of NAME=FILE, are seen from here."""
+    if isinstance(value, list):
+        return [_moved_with(folder, each) for each in value]
+    if isinstance(value, Path):
+        return _seen_from(folder, os.path.abspath(value))
+    if not isinstance(value, str):
+        return value
+    name, sign, path = value.rpartition("=")
+    return f"{name}{sign}{_seen_from(folder, path)}" if os.path.isabs(path) else value
 
 
 def _named_files(options: argparse.Namespace) -> set[str]:

@@ -1,0 +1,136 @@
+"""Bakes that are out of date are told before and after their motion is written to a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.exchange.strand_formats import ALEMBIC
+from hairloom.addon.exchange.strand_output import StrandOutput
+from hairloom.addon.host.bakes import playback
+from hairloom.addon.host.bakes.bake import Bake
+from hairloom.addon.host.bakes.stale_bakes import changed_since
+from hairloom.addon.host.cards.card_motion import baked_motion
+from hairloom.addon.host.strands.export_check import ExportCheck
+from hairloom.addon.host.strands.strand_export import StrandExport
+
+LAST = 4
+
+
+@pytest.fixture
+def baked(new_hair: Any, sphere: Any, tmp_path: Path) -> tuple[Any, Any]:
+    """Hair and the head that carries it along, baked; the scene stands in the second frame."""
+    hair, scene = new_hair(sphere), bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    for frame, x in ((1, 0.0), (LAST, 0.1)):
+        sphere.location.x = x
+        sphere.keyframe_insert("location", frame=frame)
+    hair.hairloom.dynamics.collider_resolution = 8
+    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    scene.frame_set(1)
+    list(Bake.of([hair], scene).steps())
+    scene.frame_set(2)
+    return hair, sphere
+
+
+@pytest.fixture
+def changed(baked: tuple[Any, Any], evaluated: Callable[[], Any]) -> Callable[[], tuple[str, ...]]:
+    def look() -> tuple[str, ...]:
+        cache = playback.cache_of(baked[0])
+        assert cache is not None
+        return changed_since(baked[0], cache, evaluated())
+
+    return look
+
+
+@pytest.mark.parametrize("frame", [0, 1, 2, LAST, LAST + 5])
+def test_a_new_bake_is_up_to_date_in_any_frame(frame: int, changed: Any) -> None:
+    bpy.context.scene.frame_set(frame)
+    assert changed() == ()
+
+
+@pytest.mark.parametrize("frame", [0, 2])
+def test_settings_are_told_in_any_frame(frame: int, baked: Any, changed: Any) -> None:
+    bpy.context.scene.frame_set(frame)
+    baked[0].hairloom.dynamics.damping = 7.0
+    assert changed() == ("settings",)
+
+
+def test_another_form_of_the_solver_is_no_change(baked: Any, changed: Any) -> None:
+    baked[0].hairloom.dynamics.form = "automatic"
+    assert changed() == ()
+
+
+def test_animated_settings_are_those_of_their_frame(baked: Any, changed: Any) -> None:
+    hair, scene = baked[0], bpy.context.scene
+    for frame, value in ((1, 0.5), (LAST, 6.0)):
+        hair.hairloom.dynamics.damping = value
+        hair.keyframe_insert("hairloom.dynamics.damping", frame=frame)
+    assert changed() == ("settings",)
+    list(Bake.of([hair], scene).steps())
+    for frame in (0, 3, LAST, 9):
+        scene.frame_set(frame)
+        assert changed() == ()
+
+
+def test_what_drives_and_what_makes_the_hair_is_told_by_name(baked: Any, changed: Any) -> None:
+    hair, head = baked
+    scene = bpy.context.scene
+    head.location.z = 0.2
+    bpy.context.view_layer.update()
+    assert changed() == ("pose",)
+    scene.frame_set(2)
+    head.location.z = 0.0
+    scene.use_gravity = False
+    assert "forces" in changed()
+    scene.use_gravity = True
+    scene.render.fps = 30
+    assert "frame rate" in changed()
+    scene.render.fps = 24
+    hair.data.hairloom.guides.guide_count += 5
+    assert "guides" in changed()
+    head.data.vertices[0].co.x += 0.01
+    assert "head" in changed()
+    hair.data.remove_curves(indices=[0])
+    assert "hair" in changed()
+
+
+def test_a_head_of_other_vertices_is_told_and_stops_nothing(baked: Any, changed: Any) -> None:
+    baked[1].modifiers.new("Subdivision", "SUBSURF").levels = 1
+    bpy.context.view_layer.update()
+    assert "pose" in changed()
+
+
+def test_motion_of_strands_and_of_cards_says_so(
+    baked: Any, tmp_path: Path, evaluated: Any, capfd: pytest.CaptureFixture[str]
+) -> None:
+    hair, frames = baked[0], range(1, LAST + 1)
+
+    def notes() -> list[tuple[str, ...]]:
+        plan = StrandExport.of([hair], evaluated(), ALEMBIC, StrandOutput(), frames=frames)
+        return [baked_motion(hair, None).notes, tuple(n for n in plan.notes if "bake" in n)]
+
+    def line() -> str:
+        check = ExportCheck.of([hair])
+        check.refresh(evaluated(), ALEMBIC, StrandOutput())
+        return check.motion_lines(use_bake=True)[0]
+
+    assert notes() == [(), ()] and "out of date" not in line()
+    hair.hairloom.dynamics.damping = 7.0
+    for (note,) in notes():
+        assert "out of date (settings)" in note and "Bake again" in note
+    assert line().endswith("at 24 fps, out of date (settings)")
+    still = StrandExport.of([hair], evaluated(), ALEMBIC, StrandOutput())
+    assert not any("out of date" in note for note in still.notes), "a still has no motion"
+
+    capfd.readouterr()
+    before = playback.strands_in(playback.cache_of(hair), LAST)
+    bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "hair.abc"), frames="scene")
+    assert "out of date (settings)" in "".join(capfd.readouterr())
+    np.testing.assert_array_equal(playback.strands_in(playback.cache_of(hair), LAST), before)
