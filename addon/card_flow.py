@@ -15,6 +15,7 @@ from .cards.occlusion import CardShade
 from .cards.occlusion_settings import CardOcclusionSettings
 from .cards.settings import CardSettings
 from .cards.steps import result_of
+from .cards.strand_shade import strand_shade
 from .groom.weights import guide_weights
 from .pipeline import Pose, Rig, root_normals, root_turns
 from .shading.drawn_strands import drawn_radius
@@ -52,6 +53,11 @@ def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
     strands = rig.strands
     radius = drawn_radius(strands.radius.reshape(strands.strand_count, -1), drawn)
     return CardGroom(strands, rig.guides, radius, root_normals(rig), rig.head)
+
+
+def shade_of(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardShade:
+    """What shades others in the place of this groom's strands, world space."""
+    return strand_shade(card_groom(rig, drawn))
 
 
 def card_build(

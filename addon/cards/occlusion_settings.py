@@ -57,7 +57,7 @@ class CardOcclusionSettings(Settings):
     )
     others: bool = toggle(
         False,
-        label="Other Cards",
-        description="Hair cards of other grooms shade as well: all meshes in sight that Make Cards "
-        "or Sort Hair Cards has written",
+        label="Other Hair",
+        description="Hair of other grooms shades as well: their cards that Make Cards or Sort Hair "
+        "Cards has written, and the strands of those without",
     )

@@ -132,11 +132,31 @@ def area_of(one: np.ndarray, two: np.ndarray) -> np.ndarray:
     return one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
 
 
+def filtered(texture: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Between the four texels around each place, as engines filter; it does not repeat."""
+    height, width = texture.shape[:2]
+    place = uv * (width, height) - 0.5
+    low = np.floor(place).astype(int)
+    column, row = low[..., 0], low[..., 1]
+    x, y = np.moveaxis((place - low)[..., None], -2, 0)
+
+    def texel(at: np.ndarray, across: np.ndarray) -> np.ndarray:
+        return texture[at.clip(0, height - 1), across.clip(0, width - 1)]
+
+    def mixed(at: np.ndarray) -> np.ndarray:
+        return texel(at, column) * (1.0 - x) + texel(at, column + 1) * x
+
+    return mixed(row) * (1.0 - y) + mixed(row + 1) * y
+
+
 def composed(mesh: CardMesh, texture: np.ndarray, size: int, extent: float) -> np.ndarray:
-    """The same picture, triangle by triangle: nearest texel, depth test and write, blend over."""
+    """The same picture, triangle by triangle: filtered texture, depth test and write, blend over.
+
+    The filter matters most where it makes alpha: a pixel of hardly any still writes depth and hides
+    what is drawn later behind it. How many such pixels there are hangs on the order of the cards.
+    """
     picture, depth = np.zeros((size, size, 3)), np.full((size, size), np.inf)
     pixel = (mesh.positions[:, [0, 2]].astype(np.float64) / extent + 0.5) * size - 0.5
-    shape = np.array(texture.shape[:2])
     for triangle in mesh.triangles:
         a, b, c = pixel[triangle]
         low = np.ceil(np.minimum(np.minimum(a, b), c)).astype(int).clip(0)
@@ -146,8 +166,7 @@ def composed(mesh: CardMesh, texture: np.ndarray, size: int, extent: float) -> n
         weight = np.stack([area_of(c - b, at - b), area_of(a - c, at - c)], axis=-1) / area
         weight = np.concatenate([weight, 1.0 - weight.sum(axis=-1, keepdims=True)], axis=-1)
         y_depth, uv = weight @ mesh.positions[triangle, 1], weight @ mesh.uv[triangle]
-        row, column = np.moveaxis((uv[..., ::-1] * shape).astype(int).clip(0, shape - 1), -1, 0)
-        texel = texture[row, column]
+        texel = filtered(texture, uv)
         shown = (weight >= 0.0).all(axis=-1) & (y_depth < depth[y, x]) & (texel[..., 3] > 0.0)
         x, y, alpha = x[shown], y[shown], texel[shown][:, 3:]
         picture[y, x] = picture[y, x] * (1.0 - alpha) + texel[shown][:, :3] * alpha
@@ -169,9 +188,9 @@ def test_panda3d_draws_what_a_slow_compositor_draws(
         return (one & two).sum() / (one | two).sum()
 
     assert 0.1 < (expected.max(axis=-1) > 0.2).mean() < 0.9
-    assert overlap(expected) > 0.88  # the engine filters the texture, we do not
+    assert overlap(expected) > 0.96  # measured 0.978; 0.89 with a compositor that does not filter
     assert overlap(upside_down) < 0.7
-    assert np.abs(drawn - expected).mean() < 0.04
+    assert np.abs(drawn - expected).mean() < 0.01
     assert np.abs(drawn - upside_down).mean() > 0.1
 
 

@@ -10,6 +10,7 @@ from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.host.cards.adopted_cards import SortChoices, sort_mesh
 from hairloom.addon.host.cards.card_object import card_objects
 from hairloom.addon.host.cards.other_cards import other_cards
+from hairloom.addon.host.preview import live, overlay, reactions
 from hairloom.addon.host.strands.groom_files import card_choices
 
 
@@ -72,6 +73,61 @@ def test_what_is_written_has_the_same_shade(hair, other):
     middle = np.array([tuple(other.matrix_world @ each.center) for each in mesh.polygons])
     found = shade.mesh.positions[shade.mesh.triangles].mean(axis=1)
     np.testing.assert_allclose(found, middle, atol=1e-6)
+
+
+def test_grooms_without_cards_shade_by_their_strands(hair, new_hair, sphere):
+    alone = openness(card_objects(hair)[0])
+    strands = new_hair(sphere)
+    strands.rotation_euler.z += 0.3
+    strands.data.hairloom.strands.width_scale = 20.0
+    bpy.context.view_layer.update()
+    on = CardOcclusionSettings(others=True)
+    (shade,), notes = other_cards(on, hair)
+    assert notes == [] and shade.alpha is not None and (shade.alpha > 0.0).all()
+    hair.data.hairloom.card_occlusion.others = True
+    bpy.context.view_layer.objects.active = hair
+    press()
+    assert openness(card_objects(hair)[0]).mean() < alone.mean() - 0.02
+    # its own cards stand for them once there are some
+    bpy.context.view_layer.objects.active = strands
+    strands.data.hairloom.atlas.source = "made"
+    press()
+    (other,), _ = other_cards(on, hair)
+    assert len(other.mesh.triangles) == len(card_objects(strands)[0].data.polygons)
+
+
+def test_hair_that_cannot_be_used_shades_nothing_and_says_why(hair, new_hair, sphere):
+    strands = new_hair(sphere)
+    strands.name = "Bald"
+    strands.data.remove_curves()
+    bpy.context.view_layer.update()
+    shades, (note,) = other_cards(CardOcclusionSettings(others=True), hair)
+    assert shades == () and "Bald" in note and "no curves" in note
+
+
+def test_the_preview_follows_other_hair(hair, new_hair, sphere, evaluated):
+    strands = new_hair(sphere)
+    strands.data.hairloom.strands.width_scale = 20.0
+    groom = hair.data.hairloom
+    groom.card_occlusion.others, groom.card_drawing.shown_as = True, "cards"
+    bpy.context.view_layer.update()
+    session = live.start(hair, evaluated())
+    try:
+
+        def shown():
+            return overlay.drawing_of(session.uid).snapshot.cards.mesh.occlusion
+
+        near = shown()
+        reactions.updated(evaluated())
+        reactions.catch_up(evaluated())
+        assert shown() is near, "nothing has moved"
+        strands.location.x = 5.0
+        bpy.context.view_layer.update()
+        reactions.updated(evaluated())
+        reactions.catch_up(evaluated())
+        assert shown().mean() > near.mean() + 0.02
+    finally:
+        live.stop_all()
 
 
 def test_own_cards_and_coarser_levels_and_other_meshes_are_left_out(hair, sphere):

@@ -7,7 +7,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from hairloom.addon.host.preview import live, overlay, reactions  # noqa: E402
+from hairloom.addon.host.preview import live, overlay, previewed, reactions  # noqa: E402
 from hairloom.addon.host.render_engine.engine_hair import read_groom  # noqa: E402
 from hairloom.addon.host.thread_work import GivenUpError  # noqa: E402
 
@@ -38,7 +38,7 @@ def drawn(session):
 def served(session):
     """The cards that are shown once all that is on its way is built."""
     while session.cards.is_pending:
-        live._take_cards()
+        previewed.take_arrivals()
     return drawn(session).cards
 
 
@@ -164,3 +164,14 @@ def test_cards_throw_the_shadow_of_their_strands(preview):
     assert before > 0.0 and before != 1.0
     hair.data.hairloom.strands.width_scale *= 2.0
     assert drawn(session).cards.thickness == pytest.approx(2.0 * before, rel=1e-3)
+
+
+def test_cards_that_cannot_be_made_leave_strands_and_say_why(preview):
+    hair, _, session = preview
+    groom = hair.data.hairloom
+    groom.atlas.size, groom.atlas.columns, groom.atlas.rows = "512", 256, 256
+    groom.cards.card_count = 60
+    groom.cards.way = "clusters"
+    assert drawn(session).cards is None and drawn(session).strand_count == 60
+    (warning,) = session.cards.warnings
+    assert "no cards" in warning and "atlas" in warning.lower()

@@ -12,6 +12,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...shading.textures import TEXTURES, picture_as
 from ..pictures.images import read_image, read_texture
+from ..settings.properties import OVERRIDABLE
 
 _ABOUT = {
     "base": ("Base", "Brightness of the strands, or their colour: multiplied by the hair's"),
@@ -27,7 +28,10 @@ class HAIRLOOM_PG_card_images(bpy.types.PropertyGroup):
 
     __annotations__ = {
         name: PointerProperty(
-            type=bpy.types.Image, name=label, description=f"{about}; empty: generated"
+            type=bpy.types.Image,
+            name=label,
+            description=f"{about}; empty: generated",
+            override=OVERRIDABLE,
         )
         for name, (label, about) in _ABOUT.items()
     }

@@ -24,6 +24,7 @@ _UNITS = {
     "speed": "m/s",
     "factor": "0 to 1",
     "acceleration": "m/s^2",
+    "pixels": "px",
     "none": "1",
 }
 _OF_KIND = {"color": "scene-linear Rec. 709", "choice": "name", "toggle": "true or false"}

@@ -19,8 +19,9 @@ from ...cards.build import CardBuild
 from ...cards.card_mesh import OF_CARDS, CardMesh
 from ...errors import HairloomError
 from ..scene.objects import Handle, head_of, matrix_of
+from ..scene.rigs import rig_of
 from ..scene.source import read_source
-from ..strands.groom_files import card_choices, notes_of, rig_of
+from ..strands.groom_files import card_choices, notes_of
 from ..thread_work import ThreadWork
 from .card_builds import made_in_thread
 from .card_making import MadeCards, order_line

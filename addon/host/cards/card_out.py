@@ -8,8 +8,9 @@ from pathlib import Path
 import bpy
 
 from ...pipeline import Rig
+from ..scene.rigs import rig_of
 from ..scene.source import read_source
-from ..strands.groom_files import Outcome, card_choices, notes_of, rig_of
+from ..strands.groom_files import Outcome, card_choices, notes_of
 from ..thread_work import ThreadWork
 from .card_builds import made_in_thread
 from .card_files import CardOutput, FileSteps, WrittenCards, check_output, file_steps, write_cards
@@ -55,7 +56,7 @@ class CardExport:
         if output.motion.kind != "none":
             motion = baked_motion(hair, frames)
             check_output(path, output, motion)
-            notes = (*notes_of(hair, motion.rig), *warnings)
+            notes = (*notes_of(hair, motion.rig), *motion.notes, *warnings)
             return cls(path, output, motion.rig, choices, motion, {}, notes)
         check_output(path, output, None)
         source = read_source(hair, depsgraph)

@@ -38,6 +38,11 @@ def as_shown(snapshot: Snapshot) -> Snapshot:
     """
     if snapshot.cards is None or snapshot.debug_view != "none":
         return replace(snapshot, cards=None)
+    return without_strands(snapshot)
+
+
+def without_strands(snapshot: Snapshot) -> Snapshot:
+    """The same with its cards at most."""
     none = snapshot.strands[:0]
     return replace(
         snapshot,
@@ -74,6 +79,7 @@ class ShownCards:
         self._wanted: tuple[Rig, CardForm] | None = None
         self._build: _Building | None = None
         self._shown: CardSnapshot | None = None
+        self._notes: tuple[str, ...] = ()
         self.warnings: tuple[str, ...] = ()
 
     @property
@@ -109,6 +115,20 @@ class ShownCards:
         self._wanted = rig, form
         if self._build is None:
             self._begin(hair)
+
+    @property
+    def is_shaded_by_others(self) -> bool:
+        """Whether other hair shades what is shown."""
+        return self._wanted is not None and self._wanted[1].occlusion.others
+
+    def shade_again(self, hair: bpy.types.Object) -> None:
+        """The same cards once more, because other hair is elsewhere now."""
+        if self._wanted is None:
+            return
+        if self._build is not None:
+            self._build.work.give_up()
+            self._build = None
+        self._begin(hair)
 
     def serve(self) -> bool:
         """Do a part of what only the main thread may; whether there is something to collect."""
@@ -151,7 +171,8 @@ class ShownCards:
         assert self._wanted is not None
         rig, form = self._wanted
         pictures = self._pictures(hair)
-        others, _ = other_cards(form.occlusion, hair, bpy.context.view_layer.depsgraph)
+        others, notes = other_cards(form.occlusion, hair, bpy.context.view_layer.depsgraph)
+        self._notes = tuple(notes)
         if self._is_awaited():
             self._take(lambda: built_cards(rig, form, pictures, others))
         else:
@@ -160,7 +181,7 @@ class ShownCards:
     def _take(self, result: Callable[[], BuiltCards]) -> None:
         try:
             self._built = result()
-            self.warnings = self._built.notes
+            self.warnings = (*self._built.notes, *self._notes)
         except HairloomError as error:
             self._built, self._shown, self.warnings = None, None, (told(error),)
 

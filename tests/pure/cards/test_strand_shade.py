@@ -1,0 +1,56 @@
+"""Strands that shade others' cards: quick cards take as much light as the strands do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hairloom.addon import card_flow, pipeline
+from hairloom.addon.cards.occlusion import CardShade
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.pipeline import Rig
+from hairloom.addon.shading.settings import StrandSettings
+from hairloom.addon.shading.volume.card_opacity import StrandArea
+from hairloom.addon.strands import StrandSet
+
+
+def curtain(count: int, radius: float = 2.0e-4) -> Rig:
+    """Upright strands at random in a slab 0.4 m wide and 0.05 m deep, 0.3 m high."""
+    random = np.random.default_rng(3)
+    roots = random.uniform((-0.2, -0.025, 0.0), (0.2, 0.025, 0.0), (count, 3))
+    grid = roots[:, None] + np.linspace(0.0, 0.3, 8)[:, None] * [0.0, 0.0, -1.0]
+    strands = StrandSet(
+        points=grid.reshape(-1, 3).astype(np.float32),
+        offsets=np.arange(count + 1) * 8,
+        radius=np.full(count * 8, radius),
+        group=np.zeros(count, np.int64),
+    )
+    return pipeline.prepare(strands, None, GuideSettings(guide_count=20), place="curtain")
+
+
+def taken(shade: CardShade) -> float:
+    """What cards take of light from everywhere [m^2]: half of their area times tau (Cauchy)."""
+    mesh = shade.mesh
+    assert shade.alpha is not None
+    a, b, c = (mesh.positions[mesh.triangles[:, corner]] for corner in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    at = mesh.uv[mesh.triangles].mean(axis=1) * shade.alpha.shape[::-1]
+    column, row = at.astype(int).T
+    return 0.5 * float((area * -np.log1p(-shade.alpha[row, column])).sum())
+
+
+def test_they_take_what_the_strands_take() -> None:
+    for count, radius in ((3000, 1.0e-4), (300, 3.0e-4)):
+        rig = curtain(count, radius)
+        strands = rig.strands
+        area = StrandArea.of(strands.grid, strands.radius.reshape(count, -1))
+        drawn = StrandSettings(width_scale=2.0, tip_width=1.0)
+        found = taken(card_flow.shade_of(rig, drawn))
+        # cards are a little longer than the mean of their strands
+        assert np.isclose(found, area.shade(drawn), rtol=0.06)
+
+
+def test_one_strand_and_short_strands_shade_too() -> None:
+    for count in (1, 2):
+        shade = card_flow.shade_of(curtain(count))
+        assert len(np.unique(shade.mesh.card)) == 1
+        assert shade.alpha is not None and (shade.alpha > 0.0).all()
