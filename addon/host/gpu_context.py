@@ -12,6 +12,17 @@ def ensure_gpu() -> None:
         gpu.init()
 
 
+def is_interrupted() -> bool:
+    """Whether the window's context is gone: between a window's closing and the next redraw."""
+    if bpy.app.background:
+        return False
+    try:
+        gpu.types.GPUTexture((1, 1))
+    except RuntimeError:
+        return True
+    return False
+
+
 def gpu_in_use() -> dict[str, str]:
     """Backend, renderer and driver; empty strings where this process has no GPU context."""
     try:

@@ -10,6 +10,7 @@ from bpy.app.handlers import persistent
 
 from .bakes import playback
 from .preview import live, reactions
+from .settings import library_overrides
 
 _is_reacting = False
 
@@ -22,6 +23,11 @@ def on_load_pre(*_: Any) -> None:
 @persistent
 def on_load_post(*_: Any) -> None:
     live.forget_all()
+
+
+@persistent
+def on_save_pre(*_: Any) -> None:
+    library_overrides.make_last()
 
 
 @persistent
@@ -76,6 +82,7 @@ def _react(reaction: Callable[[bpy.types.Depsgraph], None], depsgraph: bpy.types
 HANDLERS = (
     (bpy.app.handlers.load_pre, on_load_pre),
     (bpy.app.handlers.load_post, on_load_post),
+    (bpy.app.handlers.save_pre, on_save_pre),
     (bpy.app.handlers.undo_post, on_undo_post),
     (bpy.app.handlers.redo_post, on_undo_post),
     (bpy.app.handlers.depsgraph_update_post, on_depsgraph_update),

@@ -10,7 +10,7 @@ import bpy
 
 from ..errors import HairloomError
 from ..host.preview.troubles import is_unevenly_scaled, set_surface, surface_for
-from ..host.scene.objects import head_of
+from ..host.scene.objects import head_of, objects_in
 from .reports import reporting, waiting
 from .selection import chosen_hair, needs_hair
 
@@ -33,8 +33,7 @@ class HAIRLOOM_OT_set_surface(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair, depsgraph = chosen_hair(context)[0], context.evaluated_depsgraph_get()
         selected = [obj for obj in context.selected_objects if obj.type == "MESH"]
-        there = filter(None, context.view_layer.objects)  # None where one was just removed
-        visible = [obj for obj in there if obj.visible_get()]
+        visible = [obj for obj in objects_in(context.view_layer) if obj.visible_get()]
         mesh = surface_for(hair, selected or visible, depsgraph)
         set_surface(hair, mesh)
         self.report({"INFO"}, f"{hair.name} grows from {mesh.name} now")

@@ -211,6 +211,8 @@ def start_preview(
             session = live.start(each, depsgraph)
             rig = session.rig
             counts = f"{rig.strands.strand_count:,} strands, {len(rig.guides):,} guides"
+            if not session.is_made:
+                counts = f"{session.source.strands.strand_count:,} strands"
             tell(operator, Outcome(counts, session.source.dropped, session.warnings))
 
 

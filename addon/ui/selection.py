@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import bpy
 
+from ..errors import HairloomError
 from ..host.preview import live
-from ..host.scene.objects import head_of
+from ..host.scene.objects import head_of, objects_in
 
 
 def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -27,8 +28,7 @@ def _made_into(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
 
 
 def _grown_on(meshes: list[bpy.types.Object], context: bpy.types.Context) -> list[bpy.types.Object]:
-    # right after a script has removed an object there is None in its place
-    everything = filter(None, context.view_layer.objects)
+    everything = objects_in(context.view_layer)
     return [obj for obj in everything if obj.type == "CURVES" and head_of(obj) in meshes]
 
 
@@ -53,9 +53,20 @@ def needs_hair(operator: type[bpy.types.Operator], context: bpy.types.Context) -
 
 
 def make_active(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
-    """Select these alone; the last is active."""
+    """Select these alone; the last is active.
+
+    Raises:
+        HairloomError: one is not in this view layer, as hair that is previewed elsewhere.
+    """
     for selected in context.selected_objects:
         selected.select_set(False)
     for obj in objects:
-        obj.select_set(True)
+        try:
+            obj.select_set(True)
+        except RuntimeError as error:
+            raise HairloomError(
+                "it is not in this view layer",
+                place=obj.name,
+                remedy="Go to its scene, or do not exclude its collection",
+            ) from error
         context.view_layer.objects.active = obj

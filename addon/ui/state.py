@@ -7,7 +7,7 @@ import bpy
 from ..host.preview import live, measures, timeline, view_transform
 from ..host.preview.overlay import statistics_of
 from ..host.preview.session import Session
-from ..host.preview.troubles import Trouble, troubles_of
+from ..host.preview.troubles import Trouble, instances_note, troubles_of
 from ..host.strands.groom_files import dropped_phrase
 from .messages import draw_lines, draw_message
 
@@ -17,6 +17,9 @@ _MEGABYTE = 1 << 20
 def draw_state(layout: bpy.types.UILayout, context: bpy.types.Context, session: Session) -> None:
     """Counts, times and memory of a previewed groom."""
     lines = layout.column(align=True)
+    if not session.is_made:
+        draw_lines(lines, context, f"It {live.MAKING}")
+        return
     rig = session.rig
     lines.label(text=f"{rig.strands.strand_count:,} strands, {len(rig.guides):,} guides")
     if session.snapshot.cards is not None:
@@ -54,10 +57,12 @@ def draw_troubles(
     if session.source.dropped:
         draw_message(layout, context, dropped_phrase(session.source.dropped).capitalize(), "INFO")
     told = {trouble.instead_of for trouble in troubles}
-    others = filter(None, (timeline.trouble(session.uid), view_transform.trouble()))
+    others = filter(
+        None, (timeline.trouble(session.uid), view_transform.trouble(), instances_note(hair))
+    )
     for warning in dict.fromkeys((*session.warnings, *others)):
         if warning not in told:
-            draw_message(layout, context, warning, "ERROR")
+            draw_message(layout, context, warning.removeprefix(f"{hair.name}: "), "ERROR")
 
 
 def _draw_trouble(layout: bpy.types.UILayout, context: bpy.types.Context, trouble: Trouble) -> None:
@@ -71,6 +76,8 @@ def _moved_by(session: Session) -> str:
     baked = timeline.baked(session.uid)
     if baked is not None and baked.is_shown:
         return "Shown from the bake" + (", which is out of date" if baked.changed else "")
+    if session.is_pending:
+        return f"Other hair {live.MAKING}"
     if live.is_waiting(session):
         return f"It {live.WAITING}"
     computed = "Simulated" if session.is_playing else "To be simulated"

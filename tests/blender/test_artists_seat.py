@@ -74,6 +74,8 @@ def test_units_are_those_that_were_declared():
                 checked += 1
             if parameter.unit == "factor" and parameter.kind == "number":
                 assert shown.subtype == "FACTOR", parameter.name
+            if parameter.unit == "pixels":
+                assert shown.subtype == "PIXEL", parameter.name
     assert checked > 10
 
 

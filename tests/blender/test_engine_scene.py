@@ -13,6 +13,8 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 
 from engine_stage import SIZE, add_ball, picture, rendered  # noqa: E402
 
+from hairloom.addon.host.render_engine.engine_meshes import read_meshes  # noqa: E402
+
 pytestmark = pytest.mark.usefixtures("gpu_context", "extension")
 
 
@@ -115,6 +117,24 @@ def test_texts_metaballs_and_instances_are_drawn(stage: Any, tmp_path: Path) -> 
         stage.collection.objects.link(empty)
     alpha = picture(tmp_path)[SIZE // 2, :, 3]
     assert np.count_nonzero(np.diff((alpha > 0.5).astype(int))) == 4
+
+
+def test_a_mesh_that_is_edited_is_seen_as_it_is(sphere: Any) -> None:
+    """Rendered mode in Edit Mode: Blender keeps its data elsewhere."""
+    before, edited = (seen_in(mode, sphere) for mode in ("OBJECT", "EDIT"))
+    assert len(before) == len(edited) == 1
+    for one, other in zip(before, edited, strict=True):
+        assert np.array_equal(one.surface.triangles, other.surface.triangles)
+        assert np.array_equal(one.surface.positions, other.surface.positions)
+        assert np.allclose(one.vertex_normals, other.vertex_normals, atol=1e-6)
+        assert one.skin is not None and other.skin is not None
+        assert np.array_equal(one.skin.surface.corner_uv, other.skin.surface.corner_uv)
+
+
+def seen_in(mode: str, obj: Any) -> tuple[Any, ...]:
+    bpy.ops.object.mode_set(mode=mode)
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return read_meshes(evaluated, np.eye(4), is_head=True)
 
 
 def test_hidden_in_renders_is_not_drawn(

@@ -19,7 +19,7 @@ FRAME = 1.0 / 24.0
 
 
 @pytest.fixture
-def library(new_hair, sphere, evaluated, tmp_path):
+def library(new_hair, sphere, tmp_path):
     """A file with a groom on its head, in the collection Groom."""
     hair = new_hair(sphere)
     collection = bpy.data.collections.new("Groom")
@@ -29,8 +29,6 @@ def library(new_hair, sphere, evaluated, tmp_path):
         bpy.context.scene.collection.objects.unlink(obj)
     hair.hairloom.dynamics.damping = 2.0
     hair.data.hairloom.shading.ambient = 0.5
-    live.start(hair, evaluated())  # as an artist would; Blender then stores all groups of settings
-    live.stop_all()
     file = str(tmp_path / "groom.blend")
     bpy.ops.wm.save_as_mainfile(filepath=file)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -78,24 +76,72 @@ def test_a_linked_groom_is_shown_as_it_is_there(library):
     assert np.isfinite(session.strands).all() and live.notice() == ""
 
 
-def test_an_override_has_settings_of_its_own_which_last(library, tmp_path):
-    scene, layer = bpy.context.scene, bpy.context.view_layer
-    brought(library, link=True).override_hierarchy_create(scene, layer)
-    hair = next(obj for obj in scene.objects if obj.type == "CURVES")
-    hair.data.override_create(remap_local_usages=True)
+def test_an_override_has_settings_of_its_own_which_last(override, tmp_path):
+    hair = override
     hair.hairloom.dynamics.damping = 5.0
     hair.hairloom.bake.is_shown = False
     hair.hairloom.debug_view = "guide"
     hair.data.hairloom.shading.ambient = 0.25
     assert plays(hair)
-    scene_file = str(tmp_path / "scene.blend")
     live.stop_all()
-    bpy.ops.wm.save_as_mainfile(filepath=scene_file)
-    bpy.ops.wm.open_mainfile(filepath=scene_file)
-    hair = next(obj for obj in bpy.context.scene.objects if obj.type == "CURVES")
+    hair = saved_and_loaded(tmp_path)
     assert hair.override_library is not None and settings(hair) == (5.0, 0.25)
     assert hair.hairloom.debug_view == "guide" and not hair.hairloom.bake.is_shown
     assert hair.data.hairloom.strands.width_scale == 1.0, "what was not set is the library's"
+
+
+@pytest.fixture
+def override(library):
+    """Hair of the library, overridden with its curves and its head."""
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    brought(library, link=True).override_hierarchy_create(scene, layer)
+    hair = next(obj for obj in scene.objects if obj.type == "CURVES")
+    hair.data.override_create(remap_local_usages=True)
+    return hair
+
+
+def saved_and_loaded(tmp_path):
+    file = str(tmp_path / "scene.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    return next(obj for obj in bpy.context.scene.objects if obj.type == "CURVES")
+
+
+def test_groups_that_the_library_has_not_got_are_kept_on_overrides(override, tmp_path):
+    override.data.hairloom.shafts.strength = 0.75  # nobody has looked at these in the library
+    override.data.hairloom.children.way = "multi"
+    override.hairloom.bake.in_renders = not (before := override.hairloom.bake.in_renders)
+    bpy.ops.ed.undo_push(message="Set")  # Blender compares with the library then, too
+    hair = saved_and_loaded(tmp_path)
+    assert hair.data.override_library is not None
+    assert hair.data.hairloom.shafts.strength == 0.75
+    assert hair.data.hairloom.children.way == "multi"
+    assert hair.hairloom.bake.in_renders is not before
+    assert settings(hair) == (2.0, 0.5), "the library's"
+
+
+def test_pictures_of_cards_and_whose_they_are_can_be_overridden(override, tmp_path):
+    image = bpy.data.images.new("Strands", 4, 4)
+    image.pack()
+    head = override.parent
+    override.data.hairloom.card_images.alpha = image
+    head.hairloom.card_object.groom = override
+    head.hairloom.card_object.level = 2
+    head.hairloom.card_object.image = image
+    head.hairloom.collider_shape = "sphere"
+    hair = saved_and_loaded(tmp_path)
+    head = hair.parent
+    assert hair.data.hairloom.card_images.alpha == bpy.data.images["Strands"]
+    assert head.hairloom.card_object.groom == hair and head.hairloom.card_object.level == 2
+    assert head.hairloom.card_object.image == bpy.data.images["Strands"]
+    assert head.hairloom.collider_shape == "sphere"
+
+
+def test_saving_leaves_the_file_of_the_library_as_it_is(override, library, tmp_path):
+    before = Path(library).read_bytes()
+    saved_and_loaded(tmp_path)
+    assert Path(library).read_bytes() == before
 
 
 def test_a_file_of_an_old_version_has_what_was_set_and_defaults_for_the_rest(extension):
@@ -112,7 +158,7 @@ def keyed(owner, path, values):
     """Keyframes of a setting: frame -> value."""
     group, _, name = path.rpartition(".")
     for frame, value in values.items():
-        setattr(owner.path_resolve(group), name, value)
+        setattr(owner.path_resolve(group) if group else owner, name, value)
         owner.keyframe_insert(path, frame=frame)
 
 
@@ -144,6 +190,33 @@ def test_keyframes_and_drivers_act_in_preview_and_engine(new_hair, sphere, evalu
     assert (snapshot.strand_settings.width_scale, snapshot.shading.ambient) == (3.0, 0.75)
     found = engine_hair.read_groom(hair, evaluated())
     assert (found.strand_settings.width_scale, found.shading.ambient) == (3.0, 0.75)
+
+
+@pytest.mark.parametrize("is_previewed", [False, True])
+def test_a_rendered_animation_has_the_settings_of_each_frame(
+    is_previewed, stage, new_hair, sphere, evaluated, monkeypatch, tmp_path
+):
+    hair, source = new_hair(sphere), bpy.data.objects.new("Source", None)
+    stage.collection.objects.link(source)
+    keyed(hair.data, "hairloom.strands.width_scale", {1: 1.0, 3: 3.0})
+    keyed(hair.data, "hairloom.guides.guide_count", {1: 40, 3: 10})
+    driven(hair.data, "hairloom.shading.ambient", source)
+    keyed(source, "location", {1: (0.0, 0.0, 0.0), 3: (1.0, 0.0, 0.0)})
+    if is_previewed:
+        live.start(hair, evaluated())
+    found, read = {}, engine_hair.read_groom
+
+    def reading(*arguments):
+        snapshot = read(*arguments)
+        values = snapshot.strand_settings.width_scale, snapshot.shading.ambient
+        found[stage.frame_current] = (*values, len(np.unique(snapshot.guide)))
+        return snapshot
+
+    monkeypatch.setattr(engine_hair, "read_groom", reading)
+    stage.frame_start, stage.frame_end, stage.render.filepath = 1, 3, str(tmp_path / "frame_")
+    bpy.ops.render.render(animation=True)
+    assert found[1][:2] == (1.0, 0.0) and found[2][:2] == pytest.approx((2.0, 0.5))
+    assert found[3][:2] == (3.0, 1.0) and found[3][2] <= 10 < found[1][2]
 
 
 @pytest.mark.parametrize("way", ["keyframe", "driver"])

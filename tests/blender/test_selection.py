@@ -1,12 +1,20 @@
-"""What buttons are about, in a view layer that Blender has not put in order yet."""
+"""What buttons and jobs are about, in a view layer that Blender has not put in order yet."""
 
 import bpy
+import pytest
 
+from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
+from hairloom.addon.host.cards.other_cards import other_cards
 from hairloom.addon.host.cloth.fins import fins_in
+from hairloom.addon.host.colliders.spheres import grown_on
+from hairloom.addon.host.scene.objects import objects_in
+from hairloom.addon.host.verbs import bake_job, mend_job, object_settings
 from hairloom.addon.ui.selection import chosen_hair
 
 
-def test_an_object_that_was_just_removed_is_no_obstacle(new_hair, sphere):
+@pytest.fixture
+def hair(new_hair, sphere):
+    """On a sphere that is selected, beside an object that was just removed."""
     hair = new_hair(sphere)
     other = bpy.data.objects.new("Other", None)
     bpy.context.collection.objects.link(other)
@@ -16,5 +24,36 @@ def test_an_object_that_was_just_removed_is_no_obstacle(new_hair, sphere):
     assert other.name in bpy.context.view_layer.objects
     bpy.data.objects.remove(other)
     assert None in list(bpy.context.view_layer.objects), "Blender leaves no gap any more"
+    return hair
+
+
+def test_an_object_that_was_just_removed_is_no_obstacle(hair, sphere):
+    layer = bpy.context.view_layer
+    assert objects_in(layer) == [sphere, hair]
     assert chosen_hair(bpy.context) == [hair]
-    assert fins_in(bpy.context.view_layer) == []
+    assert fins_in(layer) == []
+    assert grown_on(sphere, layer) == [hair]
+
+
+def test_nor_for_cards_beside_it(hair):
+    """Cards that are shown are built with the depsgraph as it is."""
+    depsgraph = bpy.context.view_layer.depsgraph
+    assert other_cards(CardOcclusionSettings(others=True), hair, depsgraph) == ((), [])
+
+
+def test_nor_for_a_job(hair):
+    assert object_settings.named_grooms([]) == [hair]
+    assert bake_job._objects([]) == [hair]
+
+
+def test_nor_for_the_mesh_that_hair_grows_from(hair, sphere):
+    assert mend_job._surface(hair, "") == sphere
+
+
+def test_hair_of_another_view_layer_is_not_selected_but_told(hair, sphere):
+    """As when it is previewed in a scene that is not shown."""
+    bpy.ops.hairloom.preview()
+    bpy.context.window.scene = bpy.data.scenes.new("Other")
+    assert chosen_hair(bpy.context) == [hair]
+    with pytest.raises(RuntimeError, match="Hair: it is not in this view layer"):
+        bpy.ops.hairloom.show_settings()

@@ -11,6 +11,7 @@ import pytest
 from mathutils import Matrix
 
 from hairloom.addon.host.preview import live, overlay, reactions
+from hairloom.addon.host.scene.objects import layer_key
 from hairloom.addon.strands import StrandSet
 
 
@@ -201,6 +202,20 @@ def test_hidden_hair_is_not_drawn(preview):
     hair.hide_set(True)
     update()
     assert not overlay.drawing_of(session.uid).is_visible
+
+
+def test_each_view_layer_draws_what_it_shows(preview):
+    """Two windows may show two of them."""
+    hair, _, session = preview
+    scene = bpy.context.scene
+    first, other = bpy.context.view_layer, scene.view_layers.new("Other")
+    update()
+    keys = {layer_key(scene, layer) for layer in (first, other)}
+    assert overlay.drawing_of(session.uid).seen_in == keys
+    hair.hide_set(True, view_layer=other)
+    update()
+    assert overlay.drawing_of(session.uid).seen_in == {layer_key(scene, first)}
+    assert overlay.drawing_of(session.uid).is_visible
 
 
 def test_two_objects_that_share_their_curves(preview, evaluated):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.preview import live, overlay, reactions
+from hairloom.addon.host.preview import live, overlay, previewed, reactions
 
 
 @pytest.fixture
@@ -187,3 +187,15 @@ def test_a_head_without_faces_or_uvs_is_a_warning(new_hair, sphere, evaluated):
     session = live.start(hair, evaluated())
     assert "no faces" in session.source.warnings[0]
     assert session.rig.head is None
+
+
+def test_a_moment_without_a_gpu_is_waited_for(preview, evaluated, monkeypatch):
+    """Blender has no context from a window's closing to the next redraw."""
+    _, _, session = preview
+    done = []
+    monkeypatch.setattr(previewed, "is_interrupted", lambda: True)
+    live.attempt(session, evaluated(), done.append)
+    assert done == [] and live.sessions() == (session,) and session.is_stale
+    monkeypatch.setattr(previewed, "is_interrupted", lambda: False)
+    reactions.catch_up(evaluated())
+    assert not session.is_stale and live.notice() == ""

@@ -138,3 +138,18 @@ def test_blenders_dynamics_are_muted(sphere, extension):
     assert told(hair) == ["hairloom.mute_hair_dynamics"]
     mend(hair)
     assert told(hair) == []
+
+
+def test_instances_that_the_preview_leaves_out_are_told(new_hair, sphere):
+    hair = new_hair(sphere)
+    assert troubles.instances_note(hair) == ""
+    outer, inner = bpy.data.collections.new("Outer"), bpy.data.collections.new("Inner")
+    outer.children.link(inner)
+    twin = bpy.data.objects.new("Twin", None)
+    bpy.context.collection.objects.link(twin)
+    twin.instance_type, twin.instance_collection = "COLLECTION", outer
+    assert troubles.instances_note(hair) == ""
+    inner.objects.link(hair)
+    assert "no hair in the preview" in troubles.instances_note(hair)
+    twin.instance_type = "NONE"
+    assert troubles.instances_note(hair) == ""

@@ -19,8 +19,8 @@ from ...errors import HairloomError
 from ..colliders.obstacles import Obstacles
 from ..preview import live
 from ..preview.fingerprints import collider_places, collider_shapes, frame_rate, mesh_parts
-from ..preview.simulated import SOLVER_VERSION, Arrays, hashes
-from ..scene.objects import Body, matrix_of
+from ..preview.simulated import CLOTH_VERSION, Arrays, hashes
+from ..scene.objects import Body, matrix_of, objects_in
 from ..scene.vertex_weights import read_weights
 from ..scene.wind import gravity_of, scene_wind
 from ..settings.properties import settings_of
@@ -167,7 +167,7 @@ class FinSession:
             pins=self._pins(obj, depsgraph),
             colliders=collider_shapes(obj, None),
             frame_rate=frame_rate(depsgraph.scene),
-            solver=str(SOLVER_VERSION),
+            solver=str(CLOTH_VERSION),
         )
 
     def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
@@ -267,4 +267,4 @@ def any_enabled(layer: bpy.types.ViewLayer) -> bool:
 
 def fins_in(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
     """The objects of a view layer that are fins, by their modifier."""
-    return [obj for obj in filter(None, layer.objects) if fin_modifier(obj) is not None]
+    return [obj for obj in objects_in(layer) if fin_modifier(obj) is not None]

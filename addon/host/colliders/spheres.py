@@ -15,7 +15,7 @@ from mathutils import Matrix
 
 from ...arrays import Floats, Ints
 from ...dynamics.fitting.sphere_fit import SphereFit, SphereFitSettings, fit_spheres
-from ..scene.objects import head_of
+from ..scene.objects import head_of, objects_in
 from ..scene.surfaces import read_positions, read_surface
 
 __all__ = [
@@ -101,7 +101,7 @@ def remove_spheres(mesh: bpy.types.Object) -> int:
 
 def grown_on(mesh: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
     """The hair of a mesh."""
-    return [obj for obj in view_layer.objects if obj.type == "CURVES" and head_of(obj) == mesh]
+    return [obj for obj in objects_in(view_layer) if obj.type == "CURVES" and head_of(obj) == mesh]
 
 
 def _emptied_collection(mesh: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:

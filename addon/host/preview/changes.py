@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..cards.other_cards import shading_objects
 from .session import Session
 
 #: what may light hair anew; a light that was hidden or deleted is told of as its scene's change
@@ -39,6 +40,14 @@ def is_weighted_anew(session: Session, edited: set[int]) -> bool:
         return False
     head = session.head.handle.find()
     return head is not None and head.data.session_uid in edited
+
+
+def is_shaded_anew(session: Session, moved: set[int], layer: bpy.types.ViewLayer) -> bool:
+    """Whether other hair has moved that shades the cards of this groom."""
+    if not session.cards.is_shaded_by_others:
+        return False
+    others = shading_objects(session.hair.handle.find(), layer)
+    return any(each.session_uid in moved for each in others)
 
 
 def is_among(session: Session, moved: set[int]) -> bool:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..cards.shown_cards import as_shown
-from ..scene.objects import is_solid, spaces_without
+from ..cards.shown_cards import as_shown, without_strands
+from ..scene.objects import is_solid, layers_with, spaces_without
 from .aids import aids_of
 from .overlay import Drawing
 from .session import Session
@@ -21,13 +21,17 @@ def drawing_of(
         note: is written into the views.
     """
     snapshot, head = as_shown(session.snapshot), None
+    if not session.is_made:
+        snapshot = without_strands(snapshot)
     if session.head is not None:
         head = session.head.handle.find()
     if head is None or not is_solid(head):
         snapshot = with_all_strands(snapshot)
+    seen_in = layers_with(hair)
     return Drawing(
         snapshot,
-        hair.visible_get(),
+        is_visible=bool(seen_in),
+        seen_in=seen_in,
         hidden_in=spaces_without(hair),
         bare_in=frozenset() if head is None else spaces_without(head),
         guide_count=len(session.rig.guides),

@@ -6,16 +6,21 @@ animation. What modifiers and animation do to them shows in the moment of each f
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 
 from ...arrays import Floats, Ints
+from ...dynamics.settings import DynamicsSettings
+from ...pipeline import Pose
 from ..colliders.carriers import is_deforming
 from ..colliders.obstacles import shape_of, sources_of
 from ..scene.curves import GROUP_ATTRIBUTES
 from ..scene.objects import matrix_of
 from ..scene.surfaces import read_positions
 from ..scene.vertex_weights import weight_names, weights_on
+from ..scene.wind import gravity_of, scene_wind
 from ..settings.choices import Choices
 from .simulated import SOLVER_VERSION, Hashed, hashes
 
@@ -42,6 +47,35 @@ def groom_fingerprint(
         frame_rate=frame_rate(scene),
         solver=str(SOLVER_VERSION),
     )
+
+
+def groom_moment(
+    hair: bpy.types.Object,
+    head: bpy.types.Object | None,
+    pose: Pose,
+    depsgraph: bpy.types.Depsgraph,
+) -> str:
+    """Named hashes of what drives a groom in the scene's frame.
+
+    Args:
+        head: that carries it. pose: where it is, see `poses.read_pose`.
+    """
+    return hashes(
+        pose=pose.matrix if pose.head_positions is None else pose.head_positions,
+        settings=_dynamics(hair),
+        colliders=collider_places(hair, head, depsgraph),
+        forces=(gravity_of(depsgraph.scene), scene_wind(depsgraph)),
+    )
+
+
+def settings_part(hair: bpy.types.Object) -> str:
+    """What such a moment says of the settings."""
+    return hashes(settings=_dynamics(hair))
+
+
+def _dynamics(hair: bpy.types.Object) -> DynamicsSettings:
+    """All forms of the solver give the same motion."""
+    return replace(Choices.of(hair).dynamics, form="automatic")
 
 
 def collider_places(

@@ -5,14 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import bpy
-import numpy as np
 
-from ... import pipeline
-from ...arrays import Floats
 from ...pipeline import Pose, Rig
 from ...render.hair_ball import HairBall
 from ...render.snapshot import Snapshot
-from ...shading.ambient import AmbientSettings
 from ...shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
@@ -25,7 +21,7 @@ from ..scene.lights import (
     scene_lights_are_shown,
 )
 from ..settings.choices import Choices
-from .hiders import Hiders
+from .making import Made
 from .shown import shapes_alike, snapshot_of, with_choices, with_tables
 from .solvers import Solver
 
@@ -42,10 +38,7 @@ class GroomPicture:
     def __init__(self, *, is_drawn: bool) -> None:
         self._is_drawn = is_drawn
         self._ball = HairBall()
-        self._hiders: Hiders | None = None
-        self._rig: Rig | None = None
-        self._occlusion: Floats | None = None
-        self._ambient: AmbientSettings | None = None
+        self._made: Made | None = None
         self._light_warnings: tuple[str, ...] = ()
         self.cards = ShownCards()
 
@@ -62,30 +55,12 @@ class GroomPicture:
         lights = snapshot.lights if scene_lights_are_shown() else ()
         return shadow_warnings(lights, self._ball.of(snapshot), snapshot.volume)
 
-    def take_rig(self, hair: bpy.types.Object, rig: Rig, choices: Choices) -> None:
+    def take_made(self, hair: bpy.types.Object, made: Made, choices: Choices) -> None:
         """All that hangs on the strands; it stands at rest, without light."""
-        occlusion, rank = None, None
-        if self._is_drawn:
-            occlusion = self._occlusion_of(rig, choices.ambient)
-            rank = pipeline.strand_ranks(rig)
-            self._hiders = self._hiders_of(rig)
-        self._rig = rig
-        self.snapshot = with_choices(snapshot_of(rig, occlusion, rank), choices)
-        self._want_cards(hair, rig, choices)
-
-    def _occlusion_of(self, rig: Rig, ambient: AmbientSettings) -> Floats:
-        """That from before where nothing changes it, as where other guides are chosen."""
-        was, known = self._rig, self._occlusion
-        if known is None or was is None or ambient != self._ambient or not _same_hair(was, rig):
-            known = pipeline.rest_occlusion(rig, ambient)
-        self._occlusion, self._ambient = known, ambient
-        return known
-
-    def _hiders_of(self, rig: Rig) -> Hiders | None:
-        was = self._rig
-        if was is not None and _same_hair(was, rig):
-            return self._hiders
-        return None if rig.head is None else Hiders(rig.head, rig.strands.roots)
+        self._made = made
+        snapshot = snapshot_of(made.rig, made.occlusion, made.rank)
+        self.snapshot = with_choices(snapshot, choices)
+        self._want_cards(hair, made.rig, choices)
 
     def take_choices(self, hair: bpy.types.Object, rig: Rig, was: Choices, now: Choices) -> bool:
         """Take over what acts at once; whether hair has to be shown again where it is."""
@@ -100,7 +75,8 @@ class GroomPicture:
 
     def _want_cards(self, hair: bpy.types.Object, rig: Rig, choices: Choices) -> bool:
         """Have cards built if they are to be shown; whether what is shown of them changes now."""
-        if not (self._is_drawn and choices.shows_cards):
+        is_whole = self._made is not None and self._made.is_whole
+        if not (self._is_drawn and is_whole and choices.shows_cards):
             self.cards.forget()
             return self.snapshot.cards is not None
         self.cards.want(hair, rig, choices.card_form)
@@ -127,8 +103,9 @@ class GroomPicture:
     def show(self, rig: Rig, solver: Solver, choices: Choices) -> None:
         """The hair where the solver has it."""
         pose, hiders = solver.pose, None
-        if self._hiders is not None and choices.detail.culling == "hidden":
-            hiders = self._hiders.at(pose)
+        known = None if self._made is None else self._made.hiders
+        if known is not None and choices.detail.culling == "hidden":
+            hiders = known.at(pose)
         self.snapshot = replace(
             solver.shown(self.snapshot),
             hiders=hiders,
@@ -142,11 +119,3 @@ def _casters(rig: Rig, pose: Pose, choices: Choices) -> tuple[Surface, ...]:
     if rig.head is None or pose.head_positions is None or choices.volume.shadows == "none":
         return ()
     return (Surface(pose.head_positions, rig.head.triangles),)
-
-
-def _same_hair(one: Rig, other: Rig) -> bool:
-    """Whether two rigs have the same strands on the same head, whatever their guides."""
-    return one.head is other.head and all(
-        np.array_equal(getattr(one.strands, name), getattr(other.strands, name))
-        for name in ("points", "offsets", "radius")
-    )

@@ -23,6 +23,7 @@ from ...render.snapshot import Snapshot
 from ...render.strand_pass import Statistics, StrandPass
 from ...shading.lights import Light, three_point_lights
 from ..scene.lights import uses_scene_light
+from ..scene.objects import LayerKey, layer_key
 from . import view_transform
 from .lines import Lines, draw_lines
 from .measures import forget, frame_line, measured
@@ -35,6 +36,7 @@ from .shown import with_all_strands
 class Drawing:
     """One groom as it is now.
 
+    seen_in: the view layers that show it; None is all.
     hidden_in: addresses of the 3D views that do not show it.
     bare_in: of those that do not show its head, which hides nothing there.
     card_counts: cards, triangles and vertices where it is shown as cards.
@@ -45,6 +47,7 @@ class Drawing:
 
     snapshot: Snapshot
     is_visible: bool = True
+    seen_in: frozenset[LayerKey] | None = None
     hidden_in: frozenset[int] = frozenset()
     bare_in: frozenset[int] = frozenset()
     guide_count: int = 0
@@ -133,7 +136,7 @@ def _draw_strands(context: Any) -> None:
     camera = Camera(np.array(view.view_matrix), np.array(view.window_matrix))
     address, studio = space.as_pointer(), three_point_lights(camera.view)
     display = view_transform.display_of(space.shading, context.scene)
-    for uid, drawing in shown_in(space):
+    for uid, drawing in shown_in(context):
         snapshot = drawing.snapshot
         if is_seen_through(space.shading) or address in drawing.bare_in:
             snapshot = with_all_strands(snapshot)
@@ -175,20 +178,20 @@ def _draw_groom(
 def _draw_aids(context: Any) -> None:
     """Through all that is in front of them, as Blender's own gizmos are."""
     if context.space_data.overlay.show_overlays:
-        for _, drawing in shown_in(context.space_data):
+        for _, drawing in shown_in(context):
             for lines in drawing.aids:
                 draw_lines(lines.points, lines.color)
 
 
 def _draw_counts(context: Any) -> None:
     """What was drawn of each groom just before, into the same view."""
-    notes = [drawing.note for _, drawing in shown_in(context.space_data) if drawing.note]
+    notes = [drawing.note for _, drawing in shown_in(context) if drawing.note]
     if not context.space_data.overlay.show_overlays:
         write_lines(context, notes)
         return
     lines = [
         "   ".join(filter(None, (_counts_of(drawing, strand_pass), frame_line(uid))))
-        for uid, drawing in shown_in(context.space_data)
+        for uid, drawing in shown_in(context)
         if drawing.counts_of and (strand_pass := _passes.get(uid)) is not None
     ]
     write_lines(context, lines + notes)
@@ -218,13 +221,16 @@ def is_rendered_by_us(context: Any) -> bool:
     return is_ours and context.space_data.shading.type == "RENDERED"
 
 
-def shown_in(space: Any) -> list[tuple[int, Drawing]]:
-    """The grooms that a 3D view shows."""
-    address = space.as_pointer()
+def shown_in(context: Any) -> list[tuple[int, Drawing]]:
+    """The grooms that the 3D view of this context shows."""
+    address = context.space_data.as_pointer()
+    layer = layer_key(context.scene, context.view_layer)
     return [
         (uid, drawing)
         for uid, drawing in _drawings.items()
-        if drawing.is_visible and address not in drawing.hidden_in
+        if drawing.is_visible
+        and address not in drawing.hidden_in
+        and (drawing.seen_in is None or layer in drawing.seen_in)
     ]
 
 

@@ -15,8 +15,9 @@ import bpy
 
 from ..bakes import playback
 from ..scene.originals import refresh_views
-from . import live, timeline, view_transform
-from .changes import changes, is_among, is_edited, is_weighted_anew
+from . import live, making, timeline, view_transform
+from .changes import changes, is_among, is_edited, is_shaded_anew, is_weighted_anew
+from .previewed import take_arrivals
 from .redraw import redraw_panels
 from .session import Session
 from .simulated import Simulated
@@ -28,6 +29,8 @@ SETTLING_TIME = 0.2
 REFINING_TIME = 0.3
 
 _last_edit = 0.0
+#: session numbers of the hair whose cards are to be shaded again once edits have settled
+_shaded_anew: set[int] = set()
 
 
 def settings_changed(owner: bpy.types.ID) -> None:
@@ -62,6 +65,9 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
             _read_again_soon()
         elif session.is_stale and not bpy.app.timers.is_registered(_read_again):
             _read_again_soon()  # its scene is shown again
+        if is_shaded_anew(session, moved, depsgraph.view_layer):
+            _shaded_anew.add(session.uid)
+            _read_again_soon()
         follows = not live.is_free(session) and is_among(session, moved)
         update = partial(_update, depsgraph=depsgraph, follows=follows, is_lit_anew=is_lit_anew)
         live.attempt(session, depsgraph, update)
@@ -153,6 +159,10 @@ def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
     for session in live.simulated():
         if session.is_stale:
             live.attempt(session, depsgraph, partial(_read, depsgraph=depsgraph))
+    for session in live.sessions():
+        if session.uid in _shaded_anew:
+            live.attempt(session, depsgraph, Session.shade_cards_again)
+    _shaded_anew.clear()
     redraw_panels()
 
 
@@ -163,14 +173,15 @@ def _read(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
         live.start(session.hair.found(), depsgraph)
         return
     else:
-        session.read_again(depsgraph)
+        session.read_again(depsgraph, waits=making.is_awaited())
         timeline.check(session, depsgraph)
 
 
 def clear() -> None:
     """Leave nothing behind: no preview, no timer, no notice."""
     live.end()
+    _shaded_anew.clear()
     view_transform.forget()
-    for timer in (_read_again, _refine):
+    for timer in (_read_again, _refine, take_arrivals):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)

@@ -10,21 +10,22 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ... import pipeline
 from ...pipeline import Pose, Rig
 from ...strands import StrandSet
 from ..bakes.baked_rig import BakedRig, RestMatrices
 from ..scene.objects import Body, head_of, matrix_of
 from ..scene.poses import check_finite, read_pose
 from ..scene.source import read_density, read_source, usable_curves
-from ..scene.wind import gravity_of, scene_wind
 from ..settings.choices import Choices
-from .fingerprints import collider_places, groom_fingerprint
-from .simulated import hashes
+from .fingerprints import groom_fingerprint, groom_moment
+from .making import Order, rig_of
 
 
 class Reading:
     """One groom as it was read.
+
+    source, choices: of the hair that is shown.
+    ordered: what was read last, from which hair is being made unless it is shown already.
 
     Args:
         hair: a hair curves object.
@@ -40,7 +41,8 @@ class Reading:
         uses_head = self.source.head is not None and head is not None
         self.head = Body.at_rest(head, depsgraph) if uses_head else None
         self._head_uid = head and head.session_uid
-        self.choices = Choices.of(hair)
+        self.choices = Choices.of(hair, depsgraph)
+        self.ordered = Order(self.name, self.source, self.choices)
         check_finite(hair.name, self.hair.rest)
 
     @property
@@ -51,25 +53,19 @@ class Reading:
     def rests(self) -> RestMatrices:
         return RestMatrices(self.hair.rest, None if self.head is None else self.head.rest)
 
-    def rig(self, baked: BakedRig | None = None) -> Rig:
+    def rig(self) -> Rig:
         """The groom made ready to move.
-
-        Args:
-            baked: the rig of a bake of this very groom, to be the same to the bit.
 
         Raises:
             HairloomError: the groom is of another scale than the head.
         """
+        return rig_of(self.ordered)
+
+    def use_bake(self, baked: BakedRig | None) -> None:
+        """Order the rig of a bake of this very groom, to be the same to the bit."""
         if baked is not None and (baked.rests.head is None) == (self.head is None):
-            return self._rig_of(baked)
-        return pipeline.prepare(
-            self.source.strands,
-            self.source.head,
-            self.choices.guides,
-            place=self.name,
-            children=self.choices.children,
-            density=self.source.density,
-        )
+            rig = self._rig_of(baked)
+            self.ordered = Order(self.name, self.source, self.choices, rig)
 
     def _rig_of(self, baked: BakedRig) -> Rig:
         """The rig of a bake; rest is where hair and head were then."""
@@ -86,43 +82,47 @@ class Reading:
         head = head_of(self.hair.found())
         return (head and head.session_uid) != self._head_uid
 
-    def read_again(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Take over edited curves, weights and settings; whether the rig is another one now.
+    def read_again(self, depsgraph: bpy.types.Depsgraph) -> Order | None:
+        """Read edited curves, weights and settings; what is to be made of them, None where nothing
+        is.
 
         The curves are taken to be in the pose in which the reading began, as edits are.
 
         Raises:
             HairloomError: the hair is gone, or none that can be used is left.
         """
-        hair, before = self.hair.found(), self.source
+        hair, known = self.hair.found(), self.ordered
+        before = known.source
         read = usable_curves(hair, depsgraph)
         back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
         strands = read.strands if np.allclose(back, np.eye(4)) else read.strands.transformed(back)
         if _same(strands, before.strands):
             strands = before.strands
-        choices = Choices.of(hair)
         density, warning = read_density(hair, before.head, depsgraph)
-        is_same = (
-            choices.acts_at_once(self.choices)
-            and strands is before.strands
-            and np.array_equal(density, before.density)  # type: ignore[arg-type]
-        )
-        self.source = replace(
+        source = replace(
             before,
             strands=strands,
             dropped=read.dropped,
             density=density,
             density_warning=warning,
         )
-        if not is_same:
-            self.choices = choices
-        return not is_same
+        order = Order(self.name, source, Choices.of(hair))
+        if order.gives_rig_of(known) and order.choices.ambient == known.choices.ambient:
+            self.source = replace(self.source, dropped=read.dropped, density_warning=warning)
+            return None
+        self.ordered = order
+        return order
 
-    def take_choices(self) -> Choices:
-        """Take over what acts at once; returns all that the artist has set by now."""
+    def accept(self, order: Order) -> None:
+        """Its hair is shown from now on; what acts at once is as it is set now."""
+        self.source = order.source
+        self.choices = Choices.of(self.hair.found()).at_once(order.choices)
+
+    def take_choices(self) -> bool:
+        """Take over what acts at once; whether there is more, for which hair is to be made anew."""
         choices = Choices.of(self.hair.found())
         self.choices = choices.at_once(self.choices)
-        return choices
+        return not choices.acts_at_once(self.ordered.choices)
 
     def pose(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Pose:
         """Where the body is now; see `poses.read_pose`."""
@@ -139,12 +139,7 @@ class Reading:
         """See `simulated.Simulated`."""
         hair = self.hair.found()
         head = None if self.head is None else self.head.found()
-        return hashes(
-            pose=pose.matrix if pose.head_positions is None else pose.head_positions,
-            settings=replace(Choices.of(hair).dynamics, form="automatic"),
-            colliders=collider_places(hair, head, depsgraph),
-            forces=(gravity_of(depsgraph.scene), scene_wind(depsgraph)),
-        )
+        return groom_moment(hair, head, pose, depsgraph)
 
 
 def _same(one: StrandSet, other: StrandSet) -> bool:

@@ -9,33 +9,26 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...pipeline import Motion, Pose, Rig
+from ...pipeline import Rig
 from ...render.snapshot import Snapshot
-from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays, used_vertices
+from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays
 from ..cards.shown_cards import ShownCards
 from ..colliders.fields import NotMadeYetError
 from ..colliders.obstacles import Obstacles
-from ..scene.objects import Body
-from ..scene.source import Source, dynamics_warnings, refuse_own_dynamics
+from ..scene.source import dynamics_warnings, refuse_own_dynamics
 from ..scene.wind import gravity_of, scene_wind
-from ..settings.choices import Choices
+from .groom import Groom
 from .groom_picture import GroomPicture
+from .making import Made, make
 from .measures import measured
-from .reading import Reading
 from .simulated import Arrays
 from .solvers import Solver, computed_on, form_of, solver_of
 
 
-class Session:
+class Session(Groom):
     """One groom while it is previewed or baked; fulfils `simulated.Simulated`.
 
-    Args:
-        hair: a hair curves object.
-        baked: the rig of a bake of this very groom, to be the same to the bit.
-        is_drawn: False leaves out what only drawing needs.
-
-    Raises:
-        HairloomError: no hair curves, none that can be used, or of another scale than the head.
+    Args and errors are those of `Groom`.
     """
 
     def __init__(
@@ -45,33 +38,14 @@ class Session:
         *,
         baked: BakedRig | None = None,
         is_drawn: bool = True,
+        waits: bool = True,
     ) -> None:
-        self._reading = Reading(hair, depsgraph)
+        super().__init__(hair, depsgraph, baked, is_drawn=is_drawn, waits=waits)
         self.obstacles: Obstacles | None = None
         self.is_playing = False
         self.is_stale = False
         self.picture = GroomPicture(is_drawn=is_drawn)
-        self._take_rig(self._reading.rig(baked), depsgraph)
-
-    @property
-    def uid(self) -> int:
-        return self.hair.handle.uid
-
-    @property
-    def name(self) -> str:
-        return self._reading.name
-
-    @property
-    def hair(self) -> Body:
-        return self._reading.hair
-
-    @property
-    def head(self) -> Body | None:
-        return self._reading.head
-
-    @property
-    def source(self) -> Source:
-        return self._reading.source
+        self._take(self.made, None, depsgraph)
 
     @property
     def snapshot(self) -> Snapshot:
@@ -81,11 +55,6 @@ class Session:
     @property
     def cards(self) -> ShownCards:
         return self.picture.cards
-
-    @property
-    def choices(self) -> Choices:
-        """What the artist has set, as far as it is taken over."""
-        return self._reading.choices
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -107,41 +76,66 @@ class Session:
         """All strands as they are shown, (strand_count, cv_count, 3) [m]; reads back from a GPU."""
         return self.solver.strands()
 
-    def _take_rig(
-        self, rig: Rig, depsgraph: bpy.types.Depsgraph, motion: Motion | None = None
-    ) -> None:
+    def _take(self, made: Made, before: Made | None, depsgraph: bpy.types.Depsgraph) -> None:
         """Everything that hangs on the strands and on the choice of guides.
-
-        Args:
-            motion: to go on from; None: from rest.
-        """
-        self.rig = rig
-        self._used = used_vertices(rig)
-        self.solver: Solver = solver_of(rig, self.choices.dynamics.form, motion)
-        self.picture.take_rig(self.hair.found(), rig, self.choices)
-        self.light(depsgraph)
-        if motion is None:
-            self.rest(depsgraph)
-        else:
-            self._show()
-        self.is_stale = False
-
-    def has_another_head(self) -> bool:
-        """Whether the artist has set another surface since the session began."""
-        return self._reading.has_another_head()
-
-    def read_again(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Take over edited curves and settings of the rig; what did not change stays as it is.
 
         Hair that plays goes on, unless its guides are others now.
         """
+        self.made = made
+        self._reading.accept(made.order)
+        is_same = before is not None and before.rig is made.rig
+        goes_on = before is not None and self.is_playing and _same_guides(made.rig, before.rig)
+        if not is_same:
+            motion = self.solver.motion if goes_on else None
+            self.solver: Solver = solver_of(made.rig, self.choices.dynamics.form, motion)
+        self.picture.take_made(self.hair.found(), made, self.choices)
+        self.light(depsgraph)
+        if is_same or goes_on:
+            self._show()
+        else:
+            self.rest(depsgraph)
+
+    def take_made(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Show the hair that was made meanwhile; waits for it.
+
+        Raises:
+            HairloomError: it cannot be made.
+        """
+        made = self._made_meanwhile()
+        if made is not None:
+            self._take(made, self.made, depsgraph)
+
+    def finish(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Wait for the hair that is being made, and show it.
+
+        Raises:
+            HairloomError: it cannot be made.
+        """
+        while self.is_pending:
+            self.take_made(depsgraph)
+
+    def forget(self) -> None:
+        """Nobody waits any more for hair and cards that are on their way."""
+        self._give_up()
+        self.cards.forget()
+
+    def read_again(self, depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> None:
+        """Take over edited curves and settings of the rig; what did not change stays as it is.
+
+        Args:
+            waits: False: other hair is made in a thread, and what was shown is shown until then.
+        """
+        order = self._reading.read_again(depsgraph)
         self.is_stale = False
-        if not self._reading.read_again(depsgraph):
-            self.take_settings()
+        if order is not None and waits and not self.is_pending:
+            made = make(order, self.made, is_drawn=self._is_drawn)
+            self._take(made, self.made, depsgraph)
             return
-        rig = self._reading.rig()
-        goes_on = self.is_playing and _same_guides(rig, self.rig)
-        self._take_rig(rig, depsgraph, self.solver.motion if goes_on else None)
+        self.take_settings()
+        if order is not None:
+            self._begin()
+        if waits:
+            self.finish(depsgraph)
 
     def take_settings(self) -> None:
         """Take over what acts at once; settings of guides, children and ambient light make the
@@ -151,7 +145,7 @@ class Session:
             HairloomError: the form of computing that was chosen is not to be had here.
         """
         before = self.choices
-        self.is_stale |= not self._reading.take_choices().acts_at_once(before)
+        self.is_stale |= self._reading.take_choices()
         if self.picture.take_choices(self.hair.found(), self.rig, before, self.choices):
             self._show()
         if self.choices.dynamics.form != before.dynamics.form:
@@ -160,6 +154,11 @@ class Session:
     def take_cards(self) -> None:
         """Show the cards that were built meanwhile."""
         self.cards.collect(self.hair.found())
+        self._show()
+
+    def shade_cards_again(self) -> None:
+        """Other hair that shades its cards is elsewhere now."""
+        self.cards.shade_again(self.hair.found())
         self._show()
 
     @property
@@ -211,12 +210,16 @@ class Session:
 
         Raises:
             HairloomError: as `rest`, or Blender's own hair dynamics is on.
-            NotMadeYetError: a field is being made, and nobody waits.
+            NotMadeYetError: a field, or all of the hair, is being made, and nobody waits.
         """
         self.is_playing = False
         refuse_own_dynamics(self.hair.found())
         self.take_settings()
+        if waits:
+            self.finish(depsgraph)
         self._read_obstacles(depsgraph, waits=waits)
+        if not self.is_made:
+            raise NotMadeYetError
         self.is_playing = True
         self.rest(depsgraph)
 
@@ -236,7 +239,7 @@ class Session:
             self.choices.dynamics,
             depsgraph,
             self.obstacles,
-            self._used,
+            self.made.used,
             waits=waits,
         )
 
@@ -263,13 +266,9 @@ class Session:
             )
             self._show()
 
-    def constants(self) -> Arrays:
-        """See `baked_rig.rig_arrays`."""
-        return rig_arrays(self.rig, self._reading.rests)
-
     def recorded(self) -> Arrays:
         """See `baked_rig.frame_arrays`."""
-        return frame_arrays(self.solver.pose, self.solver.guides(), self._used)
+        return frame_arrays(self.solver.pose, self.solver.guides(), self.made.used)
 
     def show_recorded(self, frame: Arrays) -> None:
         """Hair as it was recorded, on the head as that was.
@@ -278,8 +277,8 @@ class Session:
             HairloomError: the frame is of another groom.
         """
         rig = self.rig
-        baked = BakedRig(rig, RestMatrices(self.hair.rest, None), self._used)
-        shapes = [len(rig.guides), rig.strands.grid.shape[1], 3], len(self._used)
+        baked = BakedRig(rig, RestMatrices(self.hair.rest, None), self.made.used)
+        shapes = [len(rig.guides), rig.strands.grid.shape[1], 3], len(self.made.used)
         found = list(frame["guides"].shape), len(frame.get("head", ()))
         if found != shapes:
             raise HairloomError(
@@ -289,17 +288,6 @@ class Session:
             )
         self.solver.carry(baked.pose(frame), frame["guides"])
         self._show()
-
-    def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
-        """See `simulated.Simulated`."""
-        return self._reading.fingerprint(depsgraph)
-
-    def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
-        """See `simulated.Simulated`."""
-        return self._reading.moment(self._pose(depsgraph), depsgraph)
-
-    def _pose(self, depsgraph: bpy.types.Depsgraph) -> Pose:
-        return self._reading.pose(self.rig, depsgraph)
 
     def _show(self) -> None:
         self.picture.show(self.rig, self.solver, self.choices)

@@ -39,6 +39,9 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
         HairloomError: no hair that can be used, or of another scale than the head.
     """
     session = live.session_of(hair)
+    if session is not None:
+        live.finish(session, depsgraph)
+        session = live.session_of(hair)
     if isinstance(session, Session):
         studio = _studio(hair, session.rig, session.choices)
         return ShownGroom(studio, session.solver.pose, session.strands, studio.warnings)

@@ -7,6 +7,7 @@ artist can be told which of them has changed.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import bpy
@@ -19,7 +20,9 @@ type Arrays = dict[str, NDArray[Any]]
 type Hashed = NDArray[Any] | Settings | str | float | None
 
 #: Raise it when the same input gives other motion than before, so that old bakes say so.
-SOLVER_VERSION = 1
+SOLVER_VERSION, CLOTH_VERSION = 2, 1
+#: The first version baked hair by the settings of its first frame; nothing else is different.
+_WITHOUT_ANIMATED_SETTINGS = "1"
 
 
 class Simulated(Protocol):
@@ -89,6 +92,24 @@ def differences(known: str, now: str) -> tuple[str, ...]:
     names = [name for name in after if before.get(name) != after[name]]
     names += [name for name in before if name not in after]
     return tuple(name.replace("_", " ") for name in names)
+
+
+def solver_part(version: str) -> str:
+    """What a fingerprint says of the version of the solver."""
+    return hashes(solver=version)
+
+
+def as_now(fingerprint: str, moments: Sequence[str]) -> str:
+    """The fingerprint of a bake of hair, by the version of now where that gives the same motion.
+
+    Args:
+        moments: those of its frames.
+    """
+    settings = {_parts(moment).get("settings") for moment in moments}
+    if len(settings) > 1:
+        return fingerprint
+    old, now = (solver_part(each) for each in (_WITHOUT_ANIMATED_SETTINGS, str(SOLVER_VERSION)))
+    return " ".join(now if part == old else part for part in fingerprint.split())
 
 
 def _parts(named: str) -> dict[str, str]:

@@ -27,7 +27,7 @@ from ..scene.objects import Handle, head_of
 from ..settings.choices import Choices
 from .fingerprints import RIG_PARTS, frame_rate, groom_fingerprint
 from .session import Session
-from .simulated import Simulated, differences
+from .simulated import Simulated, as_now, differences
 
 #: More frames than those of this time [s] on are a jump, not frames that were dropped.
 _LONGEST_DROP = 1.0
@@ -217,7 +217,10 @@ def _state(
 def _changed(
     session: Simulated, facts: Facts, depsgraph: bpy.types.Depsgraph, moment: str = ""
 ) -> tuple[str, ...]:
-    changed = differences(facts.fingerprint, _fingerprints.get(session.uid, facts.fingerprint))
+    baked = facts.fingerprint
+    if isinstance(session, Session):
+        baked = as_now(baked, facts.moments)
+    changed = differences(baked, _fingerprints.get(session.uid, baked))
     frame = depsgraph.scene.frame_current
     if facts.first <= frame <= facts.last:
         recorded = facts.moments[frame - facts.first]

@@ -81,8 +81,20 @@ def troubles_of(hair: bpy.types.Object, session: Session | None) -> tuple[Troubl
     return tuple(found)
 
 
+def instances_note(hair: bpy.types.Object) -> str:
+    """What the preview leaves out where a collection that holds the hair is instanced; "" if none
+    is. Instances by geometry nodes are not looked for."""
+    objects = bpy.context.scene.objects
+    collections = {obj.instance_collection for obj in objects if obj.is_instancer}
+    if any(each is not None and hair in each.all_objects.values() for each in collections):
+        return "Instances of its collection have no hair in the preview; they have it in renders"
+    return ""
+
+
 def loose_roots(session: Session) -> int:
     """How many roots are too far from the surface to be on it; counted once for each rig."""
+    if not session.is_made:
+        return 0
     rig = session.rig
     known = _loose.get(session.uid)
     if known is None or known[0]() is not rig:

@@ -76,7 +76,7 @@ def read_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Snapsh
         HairloomError: none of its curves can be used, or its bake is damaged.
     """
     owner = owner_of(hair)
-    choices = Choices.of(owner)
+    choices = Choices.of(owner, depsgraph)
     cache, scene = playback.cache_of(owner), depsgraph.scene
     # A copy stays as it is beyond the baked frames; curves of the artist's go on by themselves.
     if cache is not None and (owner != hair or _shows_bake(owner, cache, scene.frame_current)):
@@ -104,7 +104,7 @@ def state_of(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[An
     cache = playback.cache_of(owner)
     # where a bake is shown, it moves from frame to frame
     frame = 0.0 if cache is None else scene.frame_current_final
-    return Choices.of(owner), cache, owner.hairloom.bake.is_shown, frame
+    return Choices.of(owner, depsgraph), cache, owner.hairloom.bake.is_shown, frame
 
 
 def uids_of(hair: bpy.types.Object) -> set[int]:

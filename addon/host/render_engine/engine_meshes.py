@@ -27,13 +27,15 @@ def read_meshes(
         matrix: (4, 4) from object to world space, of the instance.
         is_head: whether hair grows on it, whose shadow is soft then.
     """
-    mesh = obj.data if obj.type == "MESH" else obj.to_mesh()
+    # a mesh that is being edited has its data elsewhere
+    is_plain = obj.type == "MESH" and not obj.data.is_editmode
+    mesh = obj.data if is_plain else obj.to_mesh()
     if mesh is None:
         return ()
     try:
         return _split(mesh, obj, matrix, is_head) if len(mesh.polygons) else ()
     finally:
-        if obj.type != "MESH":
+        if not is_plain:
             obj.to_mesh_clear()
 
 

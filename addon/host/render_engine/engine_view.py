@@ -129,7 +129,7 @@ class EngineView:
         unknown = Visibility(is_seen=True, is_holdout=False, casts=True)
         found = (
             (*each, self._reader.previewed.get(each[0], unknown))
-            for each in overlay.shown_in(space)
+            for each in overlay.shown_in(context)
         )
         previewed = tuple(
             DrawnGroom((uid,), with_all_strands(drawing.snapshot), is_holdout=visibility.is_holdout)
@@ -146,7 +146,7 @@ class EngineView:
             scene = replace(scene, ambient=Snapshot.ambient)
         marks = (
             *(self._scene, shadows),
-            *(drawing.snapshot for _, drawing in overlay.shown_in(space)),
+            *(drawing.snapshot for _, drawing in overlay.shown_in(context)),
             *(_serial(groom.snapshot) for groom in previewed),
             *((groom.key, groom.is_holdout) for groom in previewed),
             camera.view.tobytes(),

@@ -14,6 +14,8 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import HairloomError
 
+type LayerKey = tuple[int, str]
+
 
 @dataclass
 class Handle:
@@ -72,6 +74,11 @@ class Body:
         return matrix_of(self.found(), depsgraph) @ np.linalg.pinv(self.rest)
 
 
+def objects_in(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    """The objects of a view layer, which has None in the place of one that was just removed."""
+    return [obj for obj in layer.objects if obj is not None]
+
+
 def matrix_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """(4, 4) float64, from object to world space, as evaluated."""
     return np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64)
@@ -89,6 +96,21 @@ def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
 def is_solid(obj: bpy.types.Object) -> bool:
     """Whether the 3D views show it as something that hides what is behind it."""
     return bool(obj.visible_get() and obj.display_type in {"SOLID", "TEXTURED"})
+
+
+def layers_with(obj: bpy.types.Object) -> frozenset[LayerKey]:
+    """The view layers of all scenes that show an object; local view is another matter."""
+    return frozenset(
+        layer_key(scene, layer)
+        for scene in bpy.data.scenes
+        for layer in scene.view_layers
+        if obj.visible_get(view_layer=layer)
+    )
+
+
+def layer_key(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> LayerKey:
+    """By which a view layer is known, also after undo."""
+    return scene.session_uid, layer.name
 
 
 def spaces_without(obj: bpy.types.Object) -> frozenset[int]:
@@ -112,3 +134,9 @@ def is_elsewhere(uid: int, name: str, scene: bpy.types.Scene) -> bool:
         for objects in (scene.objects, bpy.data.objects)
     )
     return everywhere and not here
+
+
+def is_on_screen(uid: int, name: str) -> bool:
+    """Whether an object is in the scene of any window."""
+    scenes = {window.scene for window in bpy.context.window_manager.windows}
+    return not all(is_elsewhere(uid, name, scene) for scene in scenes)

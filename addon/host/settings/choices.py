@@ -55,8 +55,20 @@ class Choices:
     debug_view: str = "none"
 
     @classmethod
-    def of(cls, hair: bpy.types.Object) -> Choices:
+    def of(cls, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph | None = None) -> Choices:
+        """What is set at the moment.
+
+        Blender writes animated and driven settings into the data itself only where a window shows
+        them. A render has them in its own copies alone, which in a window lag behind edits.
+
+        Args:
+            hair: not the evaluated copy.
+            depsgraph: where the hair is shown or rendered.
+        """
         groom, character = hair.data.hairloom, hair.hairloom
+        if depsgraph is not None and depsgraph.mode == "RENDER":
+            groom = hair.data.evaluated_get(depsgraph).hairloom
+            character = hair.evaluated_get(depsgraph).hairloom
         return cls(
             settings_of(groom.guides, GuideSettings),
             settings_of(groom.children, ChildrenSettings),

@@ -24,9 +24,10 @@ _SHOWN_AS = {
     "speed": {"unit": "VELOCITY"},
     "acceleration": {"unit": "ACCELERATION"},
     "factor": {"subtype": "FACTOR"},
+    "pixels": {"subtype": "PIXEL"},
 }
 #: decimals that a field shows; lengths of hair are fractions of a millimetre
-_PRECISION = {"length": 5, "rate": 2}
+_PRECISION = {"length": 5, "rate": 2, "pixels": 2}
 #: float32, which Blender stores, holds this many decimal digits of what the artist typed
 _STORED_DIGITS = 7
 _LARGEST_INTEGER = 2**31 - 1
