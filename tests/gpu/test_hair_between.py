@@ -119,6 +119,29 @@ def test_what_lies_beside_or_before_a_groom_is_not_asked(gpu_context: Any) -> No
         assert not may_shade(maps, Ball(np.array([0.0, 0.0, 1.0]), 0.1))
 
 
+def test_places_without_a_serial_are_asked_anew_and_nothing_adds_up(gpu_context: Any) -> None:
+    from hairloom.addon.render.hair_between import NOBODY, HairBetween
+    from hairloom.addon.render.strand_pass import StrandPass
+    from hairloom.addon.render.textures import texture_from, texture_to_array
+
+    maps = StrandPass().opacity(replace(groom("a", sheet(0.3)).snapshot, lights=(SUN,)))
+    assert maps is not None
+    between = HairBetween()
+
+    def found(x: float, serial: int | None) -> np.ndarray:
+        places = np.tile(np.float32([x, 0.0, 0.0, 1.0]), (8, 8, 1))
+        texture = between.at(texture_from(places, "RGBA32F"), serial, [(NOBODY, maps)], 1)
+        return texture_to_array(texture)[..., 0]
+
+    below = found(0.0, None)
+    assert below.min() > 0.1
+    np.testing.assert_array_equal(found(0.0, None), below)
+    assert found(1.5, None).max() == 0.0
+    assert found(0.0, 1).min() > 0.1
+    assert found(1.5, 1).min() > 0.1, "the same serial promises the same places"
+    assert found(1.5, 2).max() == 0.0
+
+
 def test_masks_hold_what_alpha_shows(gpu_context: Any, compute: Callable[..., Any]) -> None:
     """A sheet with holes lets the object behind it through, in both passes."""
     from hairloom.addon.render.accumulation import Target

@@ -157,6 +157,18 @@ def test_an_edge_lies_where_it_should(
     assert found_light(compute, maps, points, UP)[:, 0].max() < 1e-6
 
 
+def test_samples_of_a_picture_ask_places_all_around(gpu_context: Any) -> None:
+    """So that the mean of them has smooth edges: within a texel to each side, each way alike."""
+    maps = maps_of((ground(), box((0.0, 0.0, 0.5), 1.0)), (LIGHTS["sun"],))
+    shifts = np.array([maps.values_of(sample)[-4:-2] for sample in range(64)])
+    assert np.abs(shifts).max() <= 1.0
+    for across in (-1.0, 1.0):
+        for upward in (-1.0, 1.0):
+            assert 12 <= ((shifts * (across, upward)) > 0.0).all(axis=1).sum() <= 20
+    rest = [np.delete(maps.values_of(sample), [-4, -3]) for sample in (0, 5)]
+    np.testing.assert_array_equal(*rest)
+
+
 def test_nothing_shades_itself(gpu_context: Any, compute: Callable[..., np.ndarray]) -> None:
     """Nor the ground under a low sun, nor the sides of a box, nor a ball of many triangles."""
     sun = Light.sun((0.9, 0.35, -0.12), WHITE, 3.0)
@@ -236,7 +248,12 @@ def test_maps_are_drawn_only_when_something_moved(gpu_context: Any) -> None:
     first = shadows.maps(SCENE, (sun,), SETTINGS)
     assert first is not None and shadows.maps(SCENE, (sun,), SETTINGS) is first
     moved = (*SCENE[:-1], box((1.4, -0.4, 0.2), 0.4))
-    assert shadows.maps(moved, (sun,), SETTINGS) is not first
+    second = shadows.maps(moved, (sun,), SETTINGS)
+    assert second is not first
+    # as large as before and at the same place, so that the light's frame is the same too
+    holed = (*moved[:-1], Surface(moved[-1].positions, moved[-1].triangles[2:]))
+    third = shadows.maps(holed, (sun,), SETTINGS)
+    assert third is not second and np.array_equal(third.values, second.values)
     assert shadows.maps(SCENE[:1], (sun,), SETTINGS) is None
     assert shadows.maps((), (sun,), SETTINGS) is None
     assert shadows.maps(SCENE, (), SETTINGS) is None
