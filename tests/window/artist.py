@@ -63,6 +63,27 @@ def sidebar_button(operator: str) -> tuple[int, int]:
     return int(sidebar.x + across * sidebar.width), int(top - below * scale)
 
 
+def field(area: Any, kind: str, path: str) -> Iterator[int]:
+    """Moves the mouse over a part of an area until it is on the field of a property.
+
+    Args:
+        path: how the property's data path ends.
+
+    Returns:
+        where in the window that is.
+    """
+    part = next(each for each in area.regions if each.type == kind)
+    x = part.x + int(0.7 * part.width)
+    for y in range(part.y + part.height - 5, part.y + 5, -6):
+        bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+        yield 1
+        with bpy.context.temp_override(area=area, region=part):
+            found = bpy.context.property
+        if found is not None and found[1].endswith(path):
+            return x, y
+    raise AssertionError(f"no field of {path}")
+
+
 def look_from_front(distance: float) -> None:
     """At the origin, along +Y, from this far away [m]."""
     view = viewport().spaces.active.region_3d
@@ -127,11 +148,38 @@ def viewport_middle(screenshot: Path, reach: int = 20) -> np.ndarray:
     return _rectangle(screenshot, x - reach, x + reach, y - reach, y + reach)
 
 
+def side_by_side() -> None:
+    """Gives each window its part of the screen: nothing else keeps them from covering another."""
+    found = subprocess.run(
+        ["xdotool", "search", "--onlyvisible", "--class", "blender"],
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout.split()
+    screen = subprocess.run(
+        ["xdotool", "getdisplaygeometry"], check=True, capture_output=True, text=True
+    ).stdout.split()
+    width, height = int(screen[0]) // len(found), screen[1]
+    for number, window in enumerate(found):
+        subprocess.run(["xdotool", "windowsize", window, str(width), height], check=True)
+        subprocess.run(["xdotool", "windowmove", window, str(number * width), "0"], check=True)
+
+
+def picture_of(window: Any, area: Any, screenshot: Path) -> np.ndarray:
+    """What an area of a window shows; as `viewport_pixels`."""
+    part = next(each for each in area.regions if each.type == "WINDOW")
+    x, y = window.x + part.x, window.y + part.y
+    return _rectangle(screenshot, x, x + part.width, y, y + part.height)
+
+
 def _rectangle(screenshot: Path, left: int, right: int, bottom: int, top: int) -> np.ndarray:
-    """A part of the screen, which the window fills; the window counts from below."""
+    """A part of the screen, counted from below."""
+    raw = subprocess.run(
+        ["identify", "-format", "%w %h", str(screenshot)], check=True, capture_output=True
+    ).stdout
+    width, height = (int(each) for each in raw.split())
     raw = subprocess.run(
         ["convert", str(screenshot), "-depth", "8", "rgb:-"], check=True, capture_output=True
     ).stdout
-    window = bpy.context.window
-    screen = np.frombuffer(raw, np.uint8).reshape(window.height, window.width, 3)
-    return screen[window.height - top : window.height - bottom, left:right] / 255.0
+    screen = np.frombuffer(raw, np.uint8).reshape(height, width, 3)
+    return screen[height - top : height - bottom, left:right] / 255.0

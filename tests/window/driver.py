@@ -5,6 +5,7 @@ generator: what stands before a `yield` runs in one tick, Blender redraws, the n
 `yield 5` lets five ticks pass. A failed assert or any exception fails the session.
 """
 
+import faulthandler
 import os
 import subprocess
 import traceback
@@ -37,6 +38,7 @@ def play(steps: Iterator[int | None]) -> None:
                 bpy.ops.wm.quit_blender()
         return None
 
+    faulthandler.enable()  # of a crash the log tells the lines of Python as well
     bpy.app.timers.register(tick, first_interval=1.0, persistent=True)
 
 

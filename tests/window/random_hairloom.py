@@ -21,8 +21,17 @@ def add_groom(dice):
     grooms = [o for o in bpy.data.objects if o.type == "CURVES"]
     if len(grooms) >= MOST_GROOMS:
         bpy.data.objects.remove(grooms[0])
+        step("removed")
     if dice.often(0.4) or not any(o.type == "MESH" for o in objects()):
-        call(dice, "mesh.primitive_uv_sphere_add", segments=16, ring_count=8, radius=0.1)
+        call(
+            dice,
+            "mesh.primitive_uv_sphere_add",
+            "EXEC_DEFAULT",
+            True,
+            segments=16,
+            ring_count=8,
+            radius=0.1,
+        )
     select(dice.object("MESH"))
     how = {"strand_count": dice.chance.randint(2, 150), "way": dice.pick(["combed", "normals"])}
     clicked(dice, dice.pick(["hairloom.add_groom", "hairloom.grow"]), **how)
@@ -45,6 +54,7 @@ def press_a_slow_button(dice):
     select(hair)
     hair.hairloom.bake.folder = str(dice.folder / "bake")
     hair.hairloom.bake.use_own_range, hair.hairloom.bake.last = True, 4
+    step("range")
     clicked(dice, f"hairloom.{dice.pick(['bake', 'bake', 'make_cards', 'fit_spheres'])}")
     yield dice.pick([0.2, 3])
     yield from press("ESC")
@@ -62,7 +72,7 @@ def move_a_slider(dice):
     value = dice.value(prop)
     dice.note(f"{owner.name} {group.bl_rna.identifier}.{prop.identifier} = {value}")
     setattr(group, prop.identifier, value)
-    step(dice, "slider")
+    step("slider")
 
 
 @action(6)
@@ -77,7 +87,7 @@ def choose_for_an_object(dice):
         dice.note(f"{hair.name} {name} = {value}")
         setattr(ours, name, value)
     ours.bake.follows, ours.bake.is_shown = dice.often(0.5), dice.often(0.5)
-    step(dice, "choice")
+    step("choice")
 
 
 @action(4)
@@ -104,7 +114,7 @@ def out_and_in_again(dice):
     path = str(dice.folder / f"strands.{suffix}")
     call(dice, f"hairloom.export_{kind}", filepath=path)
     if dice.often(0.5):
-        call(dice, "hairloom.import_strands", filepath=path)
+        call(dice, "hairloom.import_strands", "EXEC_DEFAULT", True, filepath=path)
 
 
 @action(3)
@@ -133,4 +143,5 @@ def render_a_picture(dice):
     scene.render.engine = "HAIRLOOM"
     scene.render.resolution_x, scene.render.resolution_y = 32, 24
     scene.hairloom.picture.samples, scene.hairloom.picture.motion_steps = 1, 2
+    step("camera")
     call(dice, "render.render")

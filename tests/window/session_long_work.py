@@ -16,12 +16,20 @@ FOLDER = Path(bpy.app.tempdir) / "long"
 SMALL = {"size": 64, "samples": 1}
 #: rays that take long, and such that do not
 MANY, FEW = 4096, 64
+#: frames of a bake, whose joints take a while to fit
+MOVED = 60
 
 failures: list[str] = []
 
 
 def running():
     return sys.modules[f"{driver.EXTENSION}.addon.ui.long_work"].running()
+
+
+def told():
+    """What the status bar says of it."""
+    work = sys.modules[f"{driver.EXTENSION}.addon.ui.long_work"]._running
+    return "" if work is None else work.progress.text
 
 
 def steps():
@@ -32,6 +40,7 @@ def steps():
     yield from from_a_dialog()
     yield from undone_in_mid_work()
     yield from from_the_file_browser()
+    yield from cards_in_motion()
     yield from another_file_in_mid_work()
     yield from disabled_in_mid_work()
     assert failures == [], failures
@@ -152,6 +161,37 @@ def from_the_file_browser():
     yield from turntable(3)
     yield from until(lambda: not running(), "the turntable does not end", 300)
     assert len(list(FOLDER.glob("Hair_000*.png"))) == 3
+    yield 3
+
+
+def cards_in_motion():
+    """Esc while joints are fitted: what lies there stays as it was."""
+    hair, scene = bpy.data.objects["Hair"], bpy.context.scene
+    head = bpy.data.objects["Head"]
+    for frame, x in ((1, 0.0), (MOVED // 2, 0.1), (MOVED, -0.1)):
+        head.location.x = x
+        head.keyframe_insert("location", frame=frame)
+    hair.hairloom.bake.folder = str(Path(bpy.app.tempdir) / "bake")
+    hair.hairloom.bake.use_own_range = True
+    hair.hairloom.bake.first, hair.hairloom.bake.last = 1, MOVED
+    hair.hairloom.dynamics.form, hair.hairloom.dynamics.collider_resolution = "numpy", 8
+    scene.frame_set(1)
+    choose(hair)
+    assert bpy.ops.hairloom.bake() == {"FINISHED"}
+    cards = FOLDER / "cards"
+    cards.mkdir()
+    (cards / "Hair.glb").write_bytes(b"the cards of before")
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        bpy.ops.hairloom.export_cards("INVOKE_DEFAULT", motion="joints")
+    yield from confirm_file(cards)
+    yield from until(lambda: running() == "Export Hair Cards", "the browser starts no export")
+    yield from until(lambda: told() == "Fitting joints", "no joints are fitted", 300)
+    driver.screenshot("fitting")
+    yield from press("ESC")
+    yield from until(lambda: not running(), "Esc does not cancel the export of cards")
+    assert [file.name for file in cards.iterdir()] == ["Hair.glb"]
+    assert (cards / "Hair.glb").read_bytes() == b"the cards of before"
+    head.animation_data_clear()
     yield 3
 
 

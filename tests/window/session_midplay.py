@@ -13,13 +13,24 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
-from artist import look_from_front, press, until
+from artist import (
+    changed,
+    field,
+    look_from_front,
+    open_our_sidebar,
+    press,
+    until,
+    viewport,
+    viewport_pixels,
+)
 from dice import in_view
 from dice import press as press_in_view
 from traces import of_hairloom
 
 log, registered = traces.Log(), traces.Registered()
 STRANDS = 300
+#: pixels that the mouse drags a slider
+DRAGGED = 45
 
 
 def live():
@@ -28,19 +39,24 @@ def live():
 
 def steps():
     yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()  # once before: Blender turns menus into lists the first time
+    addon_utils.disable(driver.EXTENSION, default_set=True)
+    yield 2
+    before = traces.of_blender()
     driver.enable_extension()
     with tempfile.TemporaryDirectory() as folder:
-        yield from undo_and_redo_each_step(Path(folder))
+        yield from undo_and_redo_each_step()
         yield from a_slider_is_dragged()
         yield from another_file(Path(folder))
-    for number, delete in enumerate((delete_hair, delete_head, delete_by_key)):
+    for delete in (delete_hair, delete_head, delete_by_key, undo_its_making):
         yield from playing_hair()
         yield from delete()
-        yield from ended(f"deleted, {number}")
-    yield from playing_hair()
+        yield from ended(delete.__name__)
+    yield from disabled_and_enabled()
     addon_utils.disable(driver.EXTENSION, default_set=True)
-    yield from ended("disabled")
-    assert not hasattr(bpy.types.Curves, "hairloom")
+    # a thread that makes a collider comes to its end
+    yield from until(lambda: traces.of_blender() == before, "something of ours is left", 300)
+    nothing_raised("disabling")
 
 
 def playing_hair():
@@ -48,9 +64,8 @@ def playing_hair():
     bpy.ops.wm.read_homefile(use_factory_startup=False)
     yield 5
     new_ball()
-    with in_view():
-        bpy.ops.hairloom.add_groom("INVOKE_DEFAULT", True, strand_count=STRANDS)
-    yield from plays()
+    bpy.ops.ed.undo_push(message="a ball")
+    yield from grow()
 
 
 def new_ball():
@@ -61,18 +76,28 @@ def new_ball():
     look_from_front(0.9)
 
 
+def grow():
+    with in_view():
+        bpy.ops.hairloom.add_groom("INVOKE_DEFAULT", True, strand_count=STRANDS)
+    yield from plays()
+
+
 def plays():
     yield from until(live().is_playing, "it does not play")
+    yield from moves("it plays")
+
+
+def moves(where):
     before = live().sessions()[0].strands
 
     def has_moved():
         return not np.array_equal(live().sessions()[0].strands, before)
 
-    yield from until(has_moved, "nothing moves", tries=300)
+    yield from until(has_moved, f"{where}, but nothing moves", tries=300)
 
 
 def ended(where):
-    """Nothing plays, ticks, draws or has raised."""
+    """Nothing plays, ticks, draws, is on the GPU or has raised."""
     yield from until(lambda: not any(traces.of_previews().values()), f"{where}: something goes on")
     yield from until(lambda: registered.timers() == [], f"{where}: {registered.timers()}")
     nothing_raised(where)
@@ -82,8 +107,8 @@ def nothing_raised(where):
     assert "Traceback" not in log.added(), f"{where} raised"
 
 
-def undo_and_redo_each_step(folder):
-    """Select, grow, change, preset, cards, delete: back to nothing by keys, and forth again."""
+def undo_and_redo_each_step():
+    """Grow, change, preset, cards, move, delete: back to nothing by keys, and forth again."""
     bpy.ops.wm.read_homefile(use_factory_startup=False)
     yield 5
     new_ball()
@@ -127,12 +152,6 @@ def hair():
     return next(obj for obj in bpy.context.scene.objects if obj.type == "CURVES")
 
 
-def grow():
-    with in_view():
-        bpy.ops.hairloom.add_groom("INVOKE_DEFAULT", True, strand_count=STRANDS)
-    yield from plays()
-
-
 def longer_locks():
     hair().hairloom.dynamics.gusts = 0.75
     bpy.ops.ed.undo_push(message="gusts")
@@ -171,31 +190,48 @@ def delete_all():
 
 
 def a_slider_is_dragged():
-    """The mouse drags a field of Properties > Data while hair swings: it goes on, by the value."""
+    """The mouse drags a field of our panel while hair swings: both go on; Ctrl-Z takes it back."""
+    open_from_the_start("HAIRLOOM_PT_sidebar_dynamics")
     yield from playing_hair()
-    editor = next(a for a in bpy.context.screen.areas if a.type == "PROPERTIES")
-    editor.spaces.active.context = "OBJECT"
-    yield 5
-    (session,), obj = live().sessions(), hair()
-    before, strands = tuple(obj.location), session.strands
-    body = next(each for each in editor.regions if each.type == "WINDOW")
-    x, y, window = body.x + int(0.7 * body.width), body.y + body.height, bpy.context.window
-    for below in range(60, 200, 12):  # where the first number is depends on the font
-        window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y - below)
+    look_from_front(0.45)
+    yield from open_our_sidebar()
+    yield 10
+    dynamics, window = hair().hairloom.dynamics, bpy.context.window
+    x, y = yield from field(viewport(), "UI", "dynamics.gravity")
+    before, shot = dynamics.gravity, viewport_pixels(driver.screenshot("before-dragging"))
+    window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
+    yield 1
+    values = []
+    for along in range(5, DRAGGED + 1, 5):
+        window.event_simulate("MOUSEMOVE", "NOTHING", x=x + along, y=y)
         yield 1
-        window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y - below)
-        yield 1
-        for along in range(5, 50, 5):
-            window.event_simulate("MOUSEMOVE", "NOTHING", x=x + along, y=y - below)
-            yield 0.3
-        window.event_simulate("LEFTMOUSE", "RELEASE", x=x + 45, y=y - below)
-        yield 2
-        if tuple(obj.location) != before:
-            break
-    driver.screenshot("dragged")
-    assert tuple(obj.location) != before, "no slider was dragged"
-    assert live().is_playing() and not np.array_equal(session.strands, strands)
+        values.append(dynamics.gravity)
+    yield from moves("the mouse is still pressed")
+    assert live().is_playing(), "the drag has stopped it"
+    window.event_simulate("LEFTMOUSE", "RELEASE", x=x + DRAGGED, y=y)
+    yield 2
+    after = dynamics.gravity
+    print(f"gravity from {before:.3f} by {[round(each, 3) for each in values]} to {after:.3f}")
+    assert after > before and len(set(values)) > 3, "the value did not follow the mouse"
+    assert after == values[-1], "it goes on without the mouse"
+    yield from moves("the mouse is off")
+    moved = changed(shot, viewport_pixels(driver.screenshot("dragged")))
+    assert moved > 0.01, f"the picture stands still: {moved:.4f} of it has changed"
+    yield from press_in_view("Z", ctrl=True)
+    yield from until(lambda: hair().hairloom.dynamics.gravity == before, "Ctrl-Z does nothing")
+    yield from moves("the slider is back")
     nothing_raised("dragging")
+
+
+def open_from_the_start(panel):
+    """It and those below it are registered anew: Blender keeps what it once has drawn."""
+    classes = of_hairloom("registration").CLASSES
+    chosen = [each for each in classes if each.__name__.startswith(panel)]
+    for each in reversed(chosen):
+        bpy.utils.unregister_class(each)
+    for each in chosen:
+        each.bl_options = set() if each.__name__ == panel else each.bl_options
+        bpy.utils.register_class(each)
 
 
 def another_file(folder):
@@ -205,11 +241,16 @@ def another_file(folder):
     bpy.ops.wm.open_mainfile(filepath=path)
     yield from ended("another file")
     assert hair().display_type == "TEXTURED"
+    assert live().notice() == "", "nobody needs to be told"
 
 
 def delete_hair():
+    """By a script: the artist is told why it no longer plays."""
+    name = hair().name
     bpy.data.objects.remove(hair())
-    yield 2
+    yield from until(lambda: live().notice() != "", "no notice")
+    assert live().notice().startswith(f"Preview of {name} ended."), live().notice()
+    assert "gone" in live().notice(), live().notice()
 
 
 def delete_head():
@@ -225,7 +266,35 @@ def delete_by_key():
     with in_view():
         bpy.ops.object.select_all(action="SELECT")
     yield from press_in_view("DEL")
-    yield 2
+    yield from until(lambda: live().notice() != "", "no notice")
+    assert "gone" in live().notice(), live().notice()
+
+
+def undo_its_making():
+    """The artist knows what Ctrl-Z takes away: no notice."""
+    yield from press_in_view("Z", ctrl=True)
+    yield from until(lambda: not live().sessions(), "the preview outlives its hair")
+    assert live().notice() == ""
+    assert [obj.type for obj in bpy.context.scene.objects] == ["MESH"]
+
+
+def disabled_and_enabled():
+    """In mid-play: nothing goes on, the settings are kept, and it plays again."""
+    yield from playing_hair()
+    hair().hairloom.dynamics.gusts = 0.625
+    addon_utils.disable(driver.EXTENSION, default_set=True)
+    assert not hasattr(bpy.types.Curves, "hairloom")
+    yield from ended("disabled")
+    driver.enable_extension()
+    assert hair().hairloom.dynamics.gusts == 0.625, "disabling has lost a setting"
+    assert not live().simulated()
+    with in_view():
+        bpy.ops.hairloom.play("INVOKE_DEFAULT")
+    yield from plays()
+    addon_utils.disable(driver.EXTENSION, default_set=True)
+    yield from ended("disabled again")
+    driver.enable_extension()
+    yield 3
 
 
 driver.play(steps())

@@ -1,0 +1,48 @@
+"""Which panels stand in which picture of docs/user_guide.md, panel_NAME.png.
+
+Names are those of classes behind HAIRLOOM_PT_. A picture is made of columns; a column has panels
+that are open below each other. tests/blender/test_user_guide.py holds that none is missing.
+"""
+
+PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
+    "data": (("data",),),
+    "look": (
+        ("data_look", "data_look_look_colour", "data_look_look_first"),
+        ("data_look_look_second", "data_look_look_rim")
+        + ("data_look_look_fibre", "data_look_look_variation"),
+    ),
+    "shadows": (("data_shadows",), ("data_shadows_skin", "data_shafts")),
+    "strands": (("data_strands", "data_detail", "data_guides"), ("data_children",)),
+    "dynamics": (
+        ("data_dynamics", "data_dynamics_style"),
+        ("data_dynamics_medium", "data_dynamics_lengths"),
+        ("data_dynamics_collisions", "data_dynamics_bake"),
+    ),
+    "cards": (
+        ("data_cards", "data_cards_card_strips"),
+        ("data_cards_card_texture",),
+        ("data_cards_card_occlusion", "data_cards_card_drawing"),
+    ),
+    "show": (("data_show", "data_export"),),
+    "physics": (("collider", "fin"), ("fin_bake",)),
+    "engine": (
+        ("engine_sampling", "engine_mesh_shadows", "engine_motion_blur", "engine_film"),
+        ("engine_passes",),
+    ),
+    "preview": (("sidebar",),),
+    "warnings": (("sidebar",),),
+    "meshes": (("sidebar_mesh_cards", "sidebar_fin"), ("sidebar_fin_bake",)),
+}
+#: pictures of what is no panel: the window, popups, and the options beside a list of files
+OTHERS = ("window", "start", "presets", "check", "sort", "export_cards", "export_strands")
+OTHERS += ("preferences",)
+#: sections that the sidebar has too: they are pictured in Properties > Data
+TWINS = ("sidebar_look", "sidebar_dynamics", "sidebar_show", "sidebar_cards", "sidebar_export")
+
+
+def pictured(name: str) -> bool:
+    """Whether a panel's class, or what it draws, is in a picture."""
+    short = name.removeprefix("HAIRLOOM_PT_")
+    if short.startswith(TWINS):
+        short = short.replace("sidebar_", "data_", 1)
+    return any(short in column for columns in PICTURES.values() for column in columns)

@@ -1,0 +1,78 @@
+"""All panels of Hairloom open, and there while they are wanted, so that they can be pictured."""
+
+import sys
+
+import bpy
+import driver
+
+OURS, SIDEBAR = "HAIRLOOM_PT_", "HAIRLOOM_PT_sidebar"
+
+#: panels that are there, and those of them that draw what they hold
+there: set[str] = set()
+filled: set[str] = set()
+drawn: set[str] = set()
+
+
+def of_hairloom(module):
+    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
+
+
+def ours():
+    return [each for each in of_hairloom("registration").CLASSES if each.__name__.startswith(OURS)]
+
+
+def only_our_panels():
+    """All of ours are open, and are there while they are wanted; Blender's own in their places are
+    gone."""
+    for each in all_panels(bpy.types.Panel):
+        is_here = getattr(each, "bl_context", "") in ("data", "physics")
+        if is_here and each.is_registered and not each.__name__.startswith(OURS):
+            bpy.utils.unregister_class(each)
+    for each in reversed(ours()):
+        bpy.utils.unregister_class(each)
+    for each in ours():
+        each.poll, each.draw = classmethod(polled(each)), noted(each)
+        each.bl_options = set()
+        bpy.utils.register_class(each)
+
+
+def all_panels(parent):
+    """Those that others are made from come last: they cannot go before what stands below them."""
+    found = []
+    for each in parent.__subclasses__():
+        found += [*all_panels(each), each]
+    return dict.fromkeys(found)
+
+
+def polled(panel):
+    original, name = getattr(panel, "poll", lambda _context: True), panel.__name__
+    return lambda _cls, context: name in there and original(context)
+
+
+def noted(panel):
+    """A panel that is there for those below it alone draws nothing."""
+    original, name = panel.draw, panel.__name__
+
+    def draw(self, context):
+        if name in filled:
+            original(self, context)
+            drawn.add(name)
+
+    return draw
+
+
+def show(names):
+    """These panels, whole, and their parents, empty."""
+    parents = {each.__name__: getattr(each, "bl_parent_id", "") for each in ours()}
+    filled.clear()
+    filled.update(names)
+    there.clear()
+    there.add(SIDEBAR)  # without it its tab would go, and another come
+    for name in names:
+        while name.startswith(OURS):
+            there.add(name)
+            name = parents[name]
+    for area in bpy.context.screen.areas:
+        for each in area.regions:  # not the view: the hair in it is slow to draw
+            if each.type == ("UI" if area.type == "VIEW_3D" else "WINDOW"):
+                each.tag_redraw()

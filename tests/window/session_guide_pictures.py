@@ -1,0 +1,307 @@
+"""The pictures of docs/user_guide.md: every panel of ours, open, and the options of every file.
+
+They are left beside the screenshots, as guide_pictures-BACKEND-panel_NAME.png.
+"""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import file_browser, look_from_front, open_our_sidebar, press, region, until, viewport
+from cropping import changed_box, crop, cut, keep, made, pixels_of, raw
+from guide_panels import OTHERS, PICTURES, TWINS
+from open_panels import (
+    OURS,
+    SIDEBAR,
+    all_panels,
+    drawn,
+    of_hairloom,
+    only_our_panels,
+    ours,
+    show,
+    there,
+)
+
+EXPORTS = ("export_cards", "export_alembic", "export_usd", "export_tfx", "export_hair")
+#: ticks after which panels have slid to their places
+SLIDE = 15
+#: [pixels] how wide the Properties editor is
+COLUMN = 340
+#: share of the window's height that is pictured
+USED = 0.8
+#: [pixels] Blender's own lines above an add-on's preferences; one names a folder of this machine
+BLENDERS = 228
+#: so many pixels are of colour where all pictures of looks are there
+COLOURED, COLOURED_COUNT = 40, 10_000
+
+
+def steps():
+    yield from press("ESC")
+    driver.enable_extension()
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    yield from nothing_yet()
+    yield from set_the_scene(distance=0.9)
+    keep("window", [as_far_as_used(driver.screenshot("window"))])
+    bpy.ops.wm.read_homefile()  # panels that have been drawn stay closed
+    yield 5
+    only_our_panels()
+    yield from set_the_scene(distance=4.0)  # far away, where hair is drawn fast
+    yield from the_sidebar()
+    yield from of_meshes_in_the_sidebar()
+    yield from popups()
+    yield from of_hair()
+    yield from of_a_mesh()
+    yield from of_the_engine()
+    yield from options_of_files()
+    yield from the_preferences()
+    missing = {each.__name__ for each in ours()} - drawn
+    assert not missing, f"never opened: {missing}"
+    assert made == {*PICTURES, *OTHERS}, f"not the pictures that are wanted: {made}"
+
+
+def nothing_yet():
+    yield from clear()
+    yield SLIDE
+    keep("start", [crop("start", *sidebar())])
+
+
+def set_the_scene(distance):
+    """Hair on a ball, seen from so far [m], and the window as an artist has it."""
+    show([SIDEBAR])
+    yield from clear()
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    bpy.ops.object.shade_smooth()
+    bpy.context.object.name = "Head"
+    bpy.ops.hairloom.grow(strand_count=4000, length=0.12)
+    hair = bpy.context.object
+    hair.name = "Hair"
+    look_from_front(distance)
+    for name in ("looks/brown", "cards/crowd", "dynamics/breeze"):
+        bpy.ops.hairloom.apply_preset(name=name)
+    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.shafts.use_shafts = True
+    bpy.ops.hairloom.preview()
+    yield from until(lambda: is_drawn(hair), "the hair is not drawn", 300)
+    yield 3 * SLIDE
+    region("UI").tag_redraw()
+    properties = next(a for a in bpy.context.screen.areas if a.type == "PROPERTIES")
+    properties.spaces.active.context = "DATA"
+    yield SLIDE
+
+
+def clear():
+    """No objects, and nothing behind the sidebar, which lets the view shine through."""
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    overlay = viewport().spaces.active.overlay
+    overlay.show_floor = overlay.show_axis_x = overlay.show_axis_y = overlay.show_cursor = False
+    yield from open_our_sidebar()
+
+
+def is_drawn(hair, at_least=50):
+    """With its children: until they are made others stand in for them."""
+    drawn = of_hairloom("host.preview.overlay").statistics_of(hair.session_uid)
+    return drawn.strands >= at_least
+
+
+def as_far_as_used(screen):
+    """The window without the empty lower part of the Properties editor, and what is beside it."""
+    window = bpy.context.window
+    return cut(screen, 0, 0, window.width, int(USED * window.height))
+
+
+def picture(name, place):
+    """The columns of a picture, each with its panels open."""
+    files = []
+    for number, names in enumerate(PICTURES[name]):
+        full = [OURS + each for each in names]
+        show(full)
+        place()
+        yield SLIDE
+        yield from until(lambda full=full: drawn.issuperset(full), f"not drawn for {name}: {full}")
+        seen: list[bytes] = []
+        while len(seen) < 3 or seen[-1] != seen[-2]:  # panels slide, on a busy machine for long
+            show(full)
+            yield SLIDE
+            file = crop(f"{name}{number}", *place())
+            seen.append(raw(file))
+        files.append(file)
+    keep(name, files)
+
+
+def sidebar():
+    return viewport(), region("UI")
+
+
+def the_sidebar():
+    yield from picture("preview", sidebar)
+    live = of_hairloom("host.preview.live")
+    hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
+    live.stop_all()
+    hair.data.surface, hair.parent = None, None
+    hair.scale.x = 1.4
+    bpy.ops.hairloom.preview()
+    yield from until(lambda: is_drawn(hair), "the guides are not drawn", 300)
+    yield from picture("warnings", sidebar)
+    hair.scale.x = 1.0
+    live.stop_all()
+    hair.data.surface = head
+    bpy.ops.hairloom.preview()
+    twins = [e.__name__ for e in ours() if e.__name__.removeprefix(OURS).startswith(TWINS)]
+    for name in twins:  # all is pictured in Properties > Data
+        show([name])
+        yield from until(lambda name=name: name in drawn, f"{name} is not drawn")
+        yield 3
+        driver.screenshot(f"twin_{name}")
+
+
+def of_meshes_in_the_sidebar():
+    head = bpy.data.objects["Head"]
+    choose(head)
+    of_hairloom("host.cloth.fin_modifier").add_modifier(head)
+    yield from picture("meshes", sidebar)
+
+
+def choose(obj):
+    for each in bpy.context.selected_objects:
+        each.select_set(False)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+
+
+def popups():
+    """The presets, the check before an export, and the options of sorting cards."""
+    of_hairloom("host.preview.live").stop_all()
+    yield from popup("sort", "sort_cards")
+    choose(bpy.data.objects["Hair"])
+    yield from popup("presets", "choose_preset", section="shading")
+    yield from popup("check", "check_export")
+    assert of_hairloom("ui.operators_export_check").count() == 0, "the check goes on unseen"
+    bpy.ops.hairloom.preview()
+    yield from until(lambda: is_drawn(bpy.data.objects["Hair"]), "the hair is not drawn", 300)
+
+
+def popup(name, operator, **settings):
+    """A popup is no region that scripts see: it is what has changed."""
+    view = region("WINDOW")
+    x, y = view.x + view.width // 2, view.y + view.height // 2
+    bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+    yield SLIDE
+    before = pixels_of(driver.screenshot(f"before_{name}"))
+    with bpy.context.temp_override(area=viewport(), region=view):
+        getattr(bpy.ops.hairloom, operator)("INVOKE_DEFAULT", **settings)
+    yield SLIDE
+    if operator == "choose_preset":
+        yield from until(lambda: is_coloured(before, name), "pictures of presets do not come")
+    yield SLIDE
+    screen = driver.screenshot(f"part_{name}")
+    keep(name, [cut(screen, *changed_box(before, pixels_of(screen)))])
+    yield from press("ESC")
+    yield 5
+
+
+def is_coloured(before, name):
+    """Whether the pictures of looks are there, which come one by one."""
+    now = pixels_of(driver.screenshot(f"part_{name}"))
+    counts = [int(np.sum(np.ptp(each, axis=2) > COLOURED)) for each in (before, now)]
+    return counts[1] - counts[0] > COLOURED_COUNT
+
+
+def column():
+    """The Properties editor, in a column of its own that is as high as the viewport."""
+    area = max((a for a in bpy.context.screen.areas if a.type == "PROPERTIES"), key=height)
+    return area, next(each for each in area.regions if each.type == "WINDOW")
+
+
+def height(area):
+    return area.height
+
+
+def of_hair():
+    viewport().spaces.active.show_region_ui = False
+    share = 1.0 - COLUMN / viewport().width
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=share)
+    yield 5
+    views = [a for a in bpy.context.screen.areas if a.type == "VIEW_3D"]
+    min(views, key=lambda each: each.width).type = "PROPERTIES"
+    yield 5
+    column()[0].spaces.active.context = "DATA"
+    yield 5
+    for name in ("data", "look", "shadows", "strands", "dynamics", "cards", "show"):
+        yield from picture(name, column)
+
+
+def of_a_mesh():
+    choose(bpy.data.objects["Head"])
+    yield 5
+    column()[0].spaces.active.context = "PHYSICS"
+    yield from picture("physics", column)
+    choose(bpy.data.objects["Hair"])
+
+
+def of_the_engine():
+    bpy.context.scene.render.engine = "HAIRLOOM"
+    for each in all_panels(bpy.types.Panel):
+        is_blenders = each.__name__.startswith("RENDER_PT") and each.is_registered
+        if is_blenders and each.__name__ != "RENDER_PT_context":
+            bpy.utils.unregister_class(each)
+    yield from picture("engine", at_the_tab)
+    bpy.context.scene.render.engine = "BLENDER_EEVEE"
+
+
+def at_the_tab():
+    """The tab in which the panels of the engine stand that are there."""
+    area, window = column()
+    area.spaces.active.context = "VIEW_LAYER" if f"{OURS}engine_passes" in there else "RENDER"
+    return area, window
+
+
+def options_of_files():
+    """The right of the file browser, format by format; those of strands beside each other."""
+    of_hairloom("host.preview.live").stop_all()
+    pictures = {}
+    for name in (*EXPORTS, "import_strands"):
+        settings = {"filepath": str(Path(bpy.app.tempdir) / "hair")} if name in EXPORTS else {}
+        if name == "export_cards":
+            settings["motion"] = "joints"
+        with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+            getattr(bpy.ops.hairloom, name)("INVOKE_DEFAULT", **settings)
+        yield from until(lambda: file_browser() is not None, f"no options for {name}")
+        yield SLIDE
+        area = file_browser()
+        pictures[name] = crop(name, area, next(r for r in area.regions if r.type == "TOOL_PROPS"))
+        x, y = area.x + area.width // 3, area.y + area.height // 2
+        bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+        yield 5
+        main = next(each for each in area.regions if each.type == "WINDOW")
+        with bpy.context.temp_override(area=area, region=main):
+            bpy.ops.file.cancel()
+        yield from until(lambda: file_browser() is None, "the file browser stays")
+        yield 5
+    keep("export_cards", [pictures["export_cards"], pictures["import_strands"]])
+    keep("export_strands", [pictures[name] for name in EXPORTS[1:]])
+
+
+def the_preferences():
+    area = viewport()
+    area.type = "PREFERENCES"
+    bpy.context.preferences.active_section = "ADDONS"
+    bpy.context.window_manager.addon_search = "hairloom"
+    bpy.ops.preferences.addon_expand(module=driver.EXTENSION)
+    yield 5
+    assert bpy.ops.hairloom.self_test() == {"FINISHED"}
+    yield SLIDE
+    window = next(each for each in area.regions if each.type == "WINDOW")
+    whole = crop("preferences", area, window)
+    height = len(raw(whole)) // (3 * window.width)
+    keep("preferences", [cut(whole, 0, BLENDERS, window.width, height - BLENDERS)])
+    area.type = "VIEW_3D"
+    yield 3
+
+
+driver.play(steps())

@@ -1,0 +1,238 @@
+"""Several windows, scenes, view layers and instances: hair is drawn where Blender shows it, and
+nowhere else."""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+import traces
+from artist import changed, picture_of, press, side_by_side, until
+from mathutils import Euler
+from traces import of_hairloom
+
+log = traces.Log()
+#: shares of a view's pixels: what hair covers, and what Blender's own redraw differs by
+HAIR, SAME = 0.02, 0.002
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    yield from set_the_scene()
+    yield from two_windows()
+    yield from local_view_in_one_window()
+    yield from another_view_layer_in_one_window()
+    yield from another_scene_in_one_window()
+    yield from hidden_in_every_way()
+    yield from instances_are_told()
+    assert "Traceback" not in log.added()
+
+
+def set_the_scene():
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    bpy.context.object.name = "Head"
+    bpy.ops.hairloom.grow(strand_count=3000, length=0.12)
+    bpy.context.object.name = "Hair"
+    collection = bpy.data.collections.new("Groom")
+    bpy.context.scene.collection.children.link(collection)
+    for obj in (bpy.data.objects["Head"], hair()):
+        obj.users_collection[0].objects.unlink(obj)
+        collection.objects.link(obj)
+    yield 2
+    hair().select_set(True)
+    bpy.context.view_layer.objects.active = hair()
+    bpy.ops.hairloom.preview()
+    yield from until(live().sessions, "there is no preview")
+    look()
+    yield 5
+
+
+def live():
+    return of_hairloom("host.preview.live")
+
+
+def hair():
+    return bpy.data.objects["Hair"]
+
+
+def windows():
+    return list(bpy.context.window_manager.windows)
+
+
+def view_of(window):
+    areas = [area for area in window.screen.areas if area.type == "VIEW_3D"]
+    return max(areas, key=lambda area: area.width * area.height)
+
+
+def look():
+    """From the front, in every window, without what is not hair."""
+    for window in windows():
+        space = view_of(window).spaces.active
+        space.overlay.show_overlays = False
+        view = space.region_3d
+        view.view_perspective, view.view_location = "PERSP", (0.0, 0.0, 0.0)
+        view.view_rotation = Euler((np.pi / 2.0, 0.0, 0.0)).to_quaternion()
+        view.view_distance = 0.45
+
+
+def pictures(label):
+    """The 3D view of each window, as it is now."""
+    for window in windows():
+        view_of(window).tag_redraw()
+    yield 5
+    shot = driver.screenshot(label)
+    return [picture_of(window, view_of(window), shot) for window in windows()]
+
+
+def two_windows():
+    bpy.ops.wm.window_new_main()  # any other shares the scene and the view layer of the first
+    yield 5
+    assert len(windows()) == 2
+    side_by_side()
+    yield 10
+    look()
+    yield from with_and_without("two-windows", [True, True])
+
+
+def with_and_without(label, drawn):
+    """Whether hair is drawn in each window: hiding it changes that picture."""
+    shown = yield from pictures(f"{label}-shown")
+    hair().hide_viewport = True
+    hidden = yield from pictures(f"{label}-hidden")
+    hair().hide_viewport = False
+    yield 5
+    shares = [changed(one, other) for one, other in zip(shown, hidden, strict=True)]
+    print(f"{label}: {[round(share, 4) for share in shares]}", flush=True)
+    for share, is_drawn in zip(shares, drawn, strict=True):
+        assert share > HAIR if is_drawn else share < SAME, (label, shares)
+    assert len(live().sessions()) == 1, f"{label}: {live().notice()}"
+
+
+def local_view_in_one_window():
+    head, second = bpy.data.objects["Head"], windows()[1]
+    hair().select_set(False)
+    head.select_set(True)
+
+    def switch():
+        area = view_of(second)
+        part = next(each for each in area.regions if each.type == "WINDOW")
+        with bpy.context.temp_override(window=second, area=area, region=part):
+            bpy.ops.view3d.localview(frame_selected=False)
+
+    switch()
+    yield 5
+    yield from with_and_without("local-view", [True, False])
+    switch()
+    yield 5
+
+
+def another_view_layer_in_one_window():
+    """In which the collection of the hair is left out."""
+    scene, second = bpy.context.scene, windows()[1]
+    layer = scene.view_layers.new("Without")
+    layer.layer_collection.children["Groom"].exclude = True
+    first = second.view_layer
+    second.view_layer = layer
+    yield 5
+    yield from with_and_without("view-layer", [True, False])
+    second.view_layer = first
+    scene.view_layers.remove(layer)
+    yield 5
+    yield from with_and_without("view-layer-back", [True, True])
+
+
+def another_scene_in_one_window():
+    """The preview goes on where its scene is shown, also while the other scene is worked on."""
+    first, second = windows()
+    mine, other = first.scene, bpy.data.scenes.new("Other")
+    second.scene = other
+    yield 5
+    look()
+    yield from with_and_without("scene", [True, False])
+    (session,) = live().sessions()
+    rig = session.rig
+    ball = bpy.data.objects.new("Ball", bpy.data.objects["Head"].data)
+    other.collection.objects.link(ball)
+    for x in (0.01, 0.02, 0.0):  # updates of the other scene
+        ball.location.x = x
+        yield 3
+    assert session.rig is rig, "work in another scene reads the hair again"
+    yield from with_and_without("scene-worked-on", [True, False])
+    second.scene = mine
+    bpy.data.objects.remove(ball)
+    bpy.data.scenes.remove(other)
+    yield 5
+    look()
+    yield from with_and_without("scene-back", [True, True])
+    yield from closed_while_it_moves(second)
+
+
+def closed_while_it_moves(second):
+    """Until the next redraw there is no GPU context: what comes in between waits for it."""
+    with bpy.context.temp_override(window=second):
+        bpy.ops.wm.window_close()
+    bpy.ops.hairloom.reset()
+    yield 5
+    assert len(windows()) == 1
+    assert len(live().sessions()) == 1, live().notice()
+    yield from until(lambda: not live().sessions()[0].is_stale, "it is not read again")
+
+
+def hidden_in_every_way():
+    """By the eye, with its collection, out of the view layer; not by what hides it in renders."""
+    layer = bpy.context.view_layer.layer_collection.children["Groom"]
+    (shown,) = yield from pictures("ways-shown")
+    hair().hide_viewport = True
+    (without,) = yield from pictures("ways-without")
+    hair().hide_viewport = False
+    head = bpy.data.objects["Head"]
+    for owner, name in (
+        (layer, "hide_viewport"),
+        (layer.collection, "hide_viewport"),
+        (layer, "exclude"),
+    ):
+        setattr(owner, name, True)
+        (found,) = yield from pictures(f"ways-{name}")
+        setattr(owner, name, False)
+        yield 5
+        assert not live().notice(), live().notice()
+        (back,) = yield from pictures(f"ways-{name}-back")
+        assert changed(found, without) > HAIR, "the head is hidden as well"
+        assert hair_pixels(found, shown, without) < SAME, f"{name} does not hide it"
+        assert changed(back, shown) < SAME, f"{name} does not show it again"
+    hair().hide_render = head.hide_render = True
+    (found,) = yield from pictures("ways-hide-render")
+    assert changed(found, shown) < SAME, "hidden in renders, it is gone from the view"
+    hair().hide_render = head.hide_render = False
+
+
+def hair_pixels(found, shown, without):
+    """The share of pixels that are as with hair, and not as without."""
+    is_hair = np.abs(shown - without).max(axis=2) > 0.1
+    as_shown = np.abs(found - shown).max(axis=2) < 0.02
+    return float((is_hair & as_shown).mean())
+
+
+def instances_are_told():
+    """An instance of the groom's collection has its head alone, and the panel says so."""
+    scene, note = bpy.context.scene, of_hairloom("host.preview.troubles").instances_note
+    twin = bpy.data.objects.new("Twin", None)
+    twin.instance_type, twin.instance_collection = "COLLECTION", bpy.data.collections["Groom"]
+    twin.location.x = 0.25
+    (before,) = yield from pictures("instance-before")
+    assert note(hair()) == ""
+    scene.collection.objects.link(twin)
+    (after,) = yield from pictures("instance")
+    assert changed(before, after) > HAIR, "Blender does not draw the instance"
+    assert "no hair in the preview" in note(hair())
+    bpy.data.objects.remove(twin)
+    assert note(hair()) == ""
+
+
+driver.play(steps())
