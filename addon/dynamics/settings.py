@@ -100,7 +100,7 @@ class DynamicsSettings(WindSettings):
     )
     style_root: float = number(
         4.0,
-        label="Style Stiffness, Root",
+        label="Root Stiffness",
         description="Pull of the first CVs to their place in the style, in swings a second",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
@@ -109,7 +109,7 @@ class DynamicsSettings(WindSettings):
     )
     style_tip: float = number(
         1.2,
-        label="Style Stiffness, Tip",
+        label="Tip Stiffness",
         description="Pull of the tip to its place in the style, in swings a second",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
@@ -163,7 +163,7 @@ class DynamicsSettings(WindSettings):
     )
     long_range: bool = toggle(
         True,
-        label="Long-range Attachment",
+        label="Long Range",
         description="With relaxation, no point goes farther from its root than its length along "
         "the strand",
         source="Kim, Chentanez and Mueller 2012",
@@ -200,7 +200,7 @@ class DynamicsSettings(WindSettings):
     )
     radius_root: float = number(
         0.001,
-        label="Collision Radius, Root",
+        label="Root Radius",
         description="Distance that the first CVs keep from colliders",
         soft=(0.0, 0.01),
         hard=(0.0, 0.1),
@@ -209,7 +209,7 @@ class DynamicsSettings(WindSettings):
     )
     radius_tip: float = number(
         0.004,
-        label="Collision Radius, Tip",
+        label="Tip Radius",
         description="Distance that the tip keeps from colliders, so that none slips between CVs",
         soft=(0.0, 0.02),
         hard=(0.0, 0.1),
@@ -226,7 +226,7 @@ class DynamicsSettings(WindSettings):
     )
     collider_resolution: int = integer(
         56,
-        label="Collider Resolution",
+        label="Collider Cells",
         description="Cells along the longest side of a mesh collider's distance field",
         soft=(24, 96),
         hard=(8, 192),

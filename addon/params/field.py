@@ -13,7 +13,9 @@ from .curve import PLACES, Curve
 
 Kind = Literal["number", "integer", "toggle", "color", "choice", "curve"]
 #: length [m], angle [rad], time [s], rate [1/s], speed [m/s], factor [0..1], acceleration [m/s^2]
-Unit = Literal["none", "length", "angle", "time", "rate", "speed", "factor", "acceleration"]
+Unit = Literal[
+    "none", "length", "angle", "time", "rate", "speed", "factor", "acceleration", "pixels"
+]
 Range = tuple[float, float]
 
 _METADATA_KEY = "parameter"

@@ -32,18 +32,19 @@ class DetailSettings(Settings):
     error: float = number(
         0.5,
         label="Error",
-        description="Adaptive: how far from its curve a strand may be drawn, in pixels",
+        description="Adaptive: how far from its curve a strand may be drawn",
         soft=(0.1, 2.0),
         hard=(0.01, 100.0),
+        unit="pixels",
         source=_WANG,
     )
     piece_length: float = number(
         8.0,
         label="Piece Length",
-        description="By size and angle: length of a piece in pixels where hair bends by 45 degrees "
-        "or more",
+        description="By size and angle: length of a piece where hair bends by 45 degrees or more",
         soft=(2.0, 32.0),
         hard=(0.5, 1000.0),
+        unit="pixels",
         source=_SSALOD,
     )
     subdivisions: int = integer(
@@ -75,10 +76,11 @@ class DetailSettings(Settings):
     full_size: float = number(
         300.0,
         label="Full Size",
-        description="Height of the groom in pixels below which fewer strands are drawn, wider to "
+        description="Height of the groom below which fewer strands are drawn, wider to "
         "make up for it; 0 draws all of them always",
         soft=(0.0, 1000.0),
         hard=(0.0, 100_000.0),
+        unit="pixels",
     )
     least_share: float = number(
         0.125,

@@ -163,10 +163,10 @@ class StrandSettings(Settings):
     minimum_width: float = number(
         1.0,
         label="Minimum Width",
-        description="Without transparency, strands are never drawn thinner than this many pixels "
-        "at the root",
+        description="Without transparency, strands are never drawn thinner than this at the root",
         soft=(0.0, 4.0),
         hard=(0.0, 100.0),
+        unit="pixels",
     )
 
     @property

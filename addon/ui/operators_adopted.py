@@ -79,7 +79,7 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
         if not self.alpha:
             image = alpha_image(obj)
             self.alpha = "" if image is None else image.name
-        return context.window_manager.invoke_props_dialog(self)
+        return context.window_manager.invoke_props_dialog(self, confirm_text="Sort")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

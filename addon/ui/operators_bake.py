@@ -132,9 +132,9 @@ class _FinBake:
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout  # type: ignore[attr-defined]
+        layout.prop(context.object.hairloom.bake, "follows")  # beside a split it would be cut off
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.prop(context.object.hairloom.bake, "follows")
         draw_bake(layout, context.object)
 
 

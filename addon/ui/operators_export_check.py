@@ -1,4 +1,4 @@
-"""Check for Export: what an engine will see of the hair, in a dialog or beside a file's options."""
+"""Check for Export: what an engine will see of the hair, in a popup or beside a file's options."""
 
 from __future__ import annotations
 
@@ -15,20 +15,22 @@ from .messages import draw_lines
 from .reports import tell, waiting
 from .selection import chosen_hair, needs_hair
 
-#: of the file browser or dialog that is open
+#: of the file browser or popup that is open
 _check: ExportCheck | None = None
 
 
-def begin(hair: list[bpy.types.Object]) -> None:
-    """A file browser or dialog opens for this hair."""
+def begin(hair: list[bpy.types.Object]) -> ExportCheck:
+    """A file browser or popup opens for this hair."""
     global _check
     _check = ExportCheck.of(hair)
+    return _check
 
 
-def end() -> None:
-    """It is closed: let go of the hair that was read."""
+def end(of: ExportCheck | None = None) -> None:
+    """It is closed: let go of the hair that was read, unless another one has opened since."""
     global _check
-    _check = None
+    if of is None or of is _check:
+        _check = None
 
 
 def count() -> int:
@@ -74,6 +76,12 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context, panel: str) -> 
         draw_lines(column, context, warning, trouble)
 
 
+def _look(operator: Any, context: bpy.types.Context) -> None:
+    """Look at the hair as the chosen engine will."""
+    kind, _, engine = operator.engine.partition(" ")
+    refresh(context, kind, strand_output(_Engine(engine)))
+
+
 class HAIRLOOM_OT_check_export(bpy.types.Operator):
     """Say what an engine will see of the hair, and write nothing"""
 
@@ -92,6 +100,7 @@ class HAIRLOOM_OT_check_export(bpy.types.Operator):
             ("tressfx", "TressFX", "Metres, Y up"),
             ("hair", "Cem Yuksel's .hair", "Metres, Z up"),
         ),
+        update=_look,
     )
 
     @classmethod
@@ -99,31 +108,32 @@ class HAIRLOOM_OT_check_export(bpy.types.Operator):
         return needs_hair(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        begin(writable(chosen_hair(context)))
-        self.check(context)
-        return context.window_manager.invoke_props_dialog(self, width=440)
-
-    def check(self, context: bpy.types.Context) -> bool:
-        """Blender calls it when the engine has changed."""
-        kind, _, engine = self.engine.partition(" ")
-        return refresh(context, kind, strand_output(_Engine(engine)))
+        """A popup that only shows; what it offers is the export itself."""
+        self.own = begin(writable(chosen_hair(context)))
+        _look(self, context)
+        return context.window_manager.invoke_popup(self, width=440)
 
     def draw(self, context: bpy.types.Context) -> None:
-        self.layout.use_property_split = True
-        self.layout.prop(self, "engine")
-        draw(self.layout, context, "HAIRLOOM_check_export")
+        layout = self.layout
+        layout.use_property_split = True
+        layout.label(text=self.bl_label)
+        layout.prop(self, "engine")
+        draw(layout, context, "HAIRLOOM_check_export")
+        kind, _, engine = self.engine.partition(" ")
+        layout.operator_context = "INVOKE_DEFAULT"
+        export = layout.operator(f"hairloom.export_{kind}", icon="EXPORT")
+        if engine:
+            export.engine = engine
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        if _check is None:
-            begin(writable(chosen_hair(context)))
-            self.check(context)
-        assert _check is not None
-        tell(self, Outcome("; ".join(_check.lines), {}, tuple(_check.warnings)))
-        end()
+        own = begin(writable(chosen_hair(context)))
+        _look(self, context)
+        tell(self, Outcome("; ".join(own.lines), {}, tuple(own.warnings)))
+        end(own)
         return {"FINISHED"}
 
     def cancel(self, _context: bpy.types.Context) -> None:
-        end()
+        end(self.own)
 
 
 class _Engine:

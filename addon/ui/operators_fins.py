@@ -9,6 +9,7 @@ import bpy
 from ..host.cloth import fins
 from ..host.cloth.fin_modifier import add_modifier, clear, fin_modifier, is_shown, remove_modifier
 from ..host.preview import live
+from .drawing import draw_named
 from .messages import draw_message
 from .reports import reporting, waiting
 from .selection import active_mesh
@@ -112,6 +113,16 @@ class HAIRLOOM_OT_fin_reset(bpy.types.Operator):
         return {"FINISHED"}
 
 
+#: section of a fin -> its parameters
+FIN: dict[str, tuple[str, ...]] = {
+    "Cloth": ("gravity", "stretch", "bend", "shape", "pin_pull", "long_range"),
+    "Medium & Wind": ("buoyancy", "damping", "drag", "edgewise", "wind_speed", "wind_direction")
+    + ("wind_rise", "gusts", "gust_size", "gust_seed"),
+    "Collisions": ("friction", "radius", "push_speed", "collider_resolution"),
+    "Steps": ("substep_rate", "small_steps", "longest_frame"),
+}
+
+
 def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     """Buttons and settings of a mesh that is, or may become, a fin."""
     if fin_modifier(obj) is None:
@@ -128,10 +139,15 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     column = layout.column()
     column.active = fin.enabled
     column.prop_search(fin, "pin_group", obj, "vertex_groups")
-    column.prop(obj.hairloom, "collider")
-    column.prop(obj.hairloom, "collider_collection")
-    for parameter in fin.settings.parameters():
-        column.prop(fin, parameter.name, slider=parameter.kind in {"number", "integer"})
+    for label, names in FIN.items():
+        header, body = column.panel(f"hairloom_fin_{label}")
+        header.label(text=label)
+        if body is None:
+            continue
+        if label == "Collisions":
+            body.prop(obj.hairloom, "collider")
+            body.prop(obj.hairloom, "collider_collection")
+        draw_named(body, fin, names)
 
 
 def draw_switch(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:

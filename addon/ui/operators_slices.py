@@ -65,6 +65,7 @@ def _needs_preview(operator: type[bpy.types.Operator], context: bpy.types.Contex
 def _previewed(context: bpy.types.Context) -> Session:
     session = live.session_of(chosen_hair(context)[0])
     assert session is not None, "poll"
+    session.finish(context.evaluated_depsgraph_get())
     return session
 
 

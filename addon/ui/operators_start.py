@@ -176,6 +176,7 @@ class HAIRLOOM_OT_show_settings(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return needs_hair(cls, context)
 
+    @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         make_active(context, chosen_hair(context)[:1])
         for area in () if context.screen is None else context.screen.areas:

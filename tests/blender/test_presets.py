@@ -28,6 +28,12 @@ def hair(new_hair: Callable[..., bpy.types.Object]) -> bpy.types.Object:
     return new_hair()
 
 
+@pytest.mark.parametrize("name", [entry.name for entry in presets.shipped("volume")])
+def test_shadows_keep_key_fill_and_rim_light(name: str) -> None:
+    """Occlusion, which stands in for a light without a map, is 30 % darker on blond hair."""
+    assert presets.named_preset(name).settings.most_lights >= 3
+
+
 @pytest.mark.parametrize("name", [entry.name for entry in presets.shipped("shading")])
 def test_a_look_goes_onto_the_selected_hair(hair: bpy.types.Object, name: str) -> None:
     assert bpy.ops.hairloom.apply_preset(name=name) == {"FINISHED"}

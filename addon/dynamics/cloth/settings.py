@@ -128,7 +128,7 @@ class FinSettings(WindSettings):
     )
     long_range: bool = toggle(
         True,
-        label="Long-range Attachment",
+        label="Long Range",
         description="No vertex goes farther from its nearest pinned vertex than its way along "
         "the edges",
         source="Kim, Chentanez and Mueller 2012",
@@ -159,7 +159,7 @@ class FinSettings(WindSettings):
     )
     collider_resolution: int = integer(
         56,
-        label="Collider Resolution",
+        label="Collider Cells",
         description="Cells along the longest side of a mesh collider's distance field",
         soft=(24, 96),
         hard=(8, 192),
