@@ -209,6 +209,39 @@ def test_animated_settings_are_those_of_the_frame(
     assert found.strand_settings.width_scale == 5.0
 
 
+def test_a_bake_has_the_animated_settings_of_the_frame_too(
+    stage: Any,
+    new_hair: Callable[..., Any],
+    sphere: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Though renders leave out the hair that has them."""
+    from hairloom.addon.host.render_engine import engine_hair
+
+    hair = new_hair(sphere)
+    strands = hair.data.hairloom.strands
+    for frame, width in ((1, 1.0), (3, 5.0)):
+        strands.width_scale = width
+        hair.data.keyframe_insert("hairloom.strands.width_scale", frame=frame)
+    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.collider_resolution = 8
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    stage.frame_start, stage.frame_end = 1, 3
+    assert bpy.ops.hairloom.bake() == {"FINISHED"}
+    widths = []
+    read_groom = engine_hair.read_groom
+
+    def seen(obj: Any, depsgraph: Any) -> Any:
+        widths.append(read_groom(obj, depsgraph).strand_settings.width_scale)
+        return read_groom(obj, depsgraph)
+
+    monkeypatch.setattr(engine_hair, "read_groom", seen)
+    stage.render.filepath = str(tmp_path / "frame_")
+    bpy.ops.render.render(animation=True)
+    assert sorted(set(widths)) == pytest.approx([1.0, 3.0, 5.0])
+
+
 def test_bad_input_is_told(stage: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     stage.world = None
     assert picture(tmp_path)[..., :3].max() == 0.0

@@ -47,6 +47,8 @@ def show_in_renders(
     _link_beside(copy, hair)
     _fill(copy.data, hair, rig, depsgraph)
     copy.data.hairloom.baked_in = bake.folder
+    # what a copy names is evaluated in renders though it is hidden there: so are its settings
+    copy.hairloom.bake.stands_for = hair
     copy.hide_viewport = copy.hide_select = True
     copy.hide_render = bake.was_hidden
     hair.hide_render = True

@@ -63,7 +63,8 @@ def owner_of(hair: bpy.types.Object) -> bpy.types.Object:
     """
     if not hair.data.hairloom.baked_in:
         return hair
-    return next((obj for obj in bpy.data.objects if obj.hairloom.bake.copy == hair), hair)
+    named = hair.hairloom.bake.stands_for  # copies of older bakes name nothing
+    return named or next((obj for obj in bpy.data.objects if obj.hairloom.bake.copy == hair), hair)
 
 
 def read_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Snapshot:

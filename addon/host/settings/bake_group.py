@@ -76,6 +76,13 @@ class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
+    stands_for: PointerProperty(
+        type=bpy.types.Object,
+        name="Stands For",
+        description="The hair whose bake this copy shows; renders have its animated settings by it",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
     hides: BoolProperty(
         name="Is Replaced in Renders",
         description="Whether the copy takes the place of these curves in renders",
