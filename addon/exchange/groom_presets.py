@@ -88,7 +88,7 @@ def preflight(groom: Groom, preset: GroomPreset) -> dict[str, Any]:
     """What the engine will see of a groom that is written so, in the units and axes of the file.
 
     Returns:
-        strands, guides, points: counts; groups: group -> strands of it.
+        strands, guides, points: counts; groups: group -> strands of it, or guides where there is nothing else.
         points_per_curve, width: least and most; length: shortest and longest.
         lowest, highest: corners of the bounds.
         resampled: strands with more points than the engine takes.
@@ -97,9 +97,13 @@ def preflight(groom: Groom, preset: GroomPreset) -> dict[str, Any]:
     """
     written = chosen_parts(groom, preset.parts)
     strands = written.strands
-    guides = 0 if written.is_guide is None else int(written.is_guide.sum())
+    is_guide = (
+        np.zeros(strands.strand_count, bool) if written.is_guide is None else written.is_guide
+    )
+    guides = int(is_guide.sum())
     counts = np.minimum(strands.point_counts, preset.most_points)
-    ids, sizes = np.unique(strands.group, return_counts=True)
+    hair = strands.group if is_guide.all() else strands.group[~is_guide]
+    ids, sizes = np.unique(hair, return_counts=True)
     corners = preset.space.to_file(np.stack(strands.bounds()))
     scale = preset.space.per_metre
     return {
