@@ -13,8 +13,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 import xml.etree.ElementTree as ElementTree
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,6 +39,9 @@ CLOSING_LINE = "SESSION PASSED"
 PROBLEM_LINES = 30
 #: mean FLIP of the same picture on both backends
 MOST_DIFFERENT = 0.02
+
+_running: set[subprocess.Popen[bytes]] = set()
+_interrupted = threading.Event()
 
 
 @dataclass
@@ -62,16 +67,21 @@ def run_blender(
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
+        _running.add(process)
         try:
             return process.wait(limit_s)
         except subprocess.TimeoutExpired:
             stream.write(f"\ntest_ui: stopped after {limit_s:.0f} s\n".encode())
             return 124
         finally:
-            # Not only on a time limit: Ctrl-C must not leave a Blender behind either.
-            if process.poll() is None:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
+            stop(process)
+            _running.discard(process)
+
+
+def stop(process: subprocess.Popen[bytes]) -> None:
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 def announce(name: str, backend: str, passed: bool, detail: str, log: Path) -> None:
@@ -192,6 +202,16 @@ def run_session(script: Path, backend: str, tally: Tally) -> None:
     tally.add(passed, not passed)
 
 
+def run_backend(backend: str, sessions: list[Path], with_tests: bool) -> Tally:
+    tally = Tally()
+    if with_tests:
+        run_tests(backend, tally)
+    for script in sessions:
+        if not _interrupted.is_set():
+            run_session(script, backend, tally)
+    return tally
+
+
 def main(wanted: list[str]) -> int:
     sessions = sorted((REPOSITORY / "tests" / "window").glob("session_*.py"))
     if unknown := set(wanted) - {script.stem for script in sessions}:
@@ -201,16 +221,21 @@ def main(wanted: list[str]) -> int:
     OUTPUT.mkdir(parents=True)
     tally = Tally()
     installed = install_extension(tally)
+    if installed and not wanted:
+        run_command_line(tally)
+    chosen = [s for s in sessions if installed and (not wanted or s.stem in wanted)]
+    # Side by side: a Blender that waits or computes leaves most of the machine to the other.
+    with ThreadPoolExecutor(len(BACKENDS)) as pool:
+        try:
+            for each in pool.map(lambda b: run_backend(b, chosen, not wanted), BACKENDS):
+                tally.add(each.passed, each.failed)
+        except KeyboardInterrupt:
+            _interrupted.set()
+            for process in tuple(_running):
+                stop(process)  # Ctrl-C must not leave a Blender behind
+            raise
     if not wanted:
-        if installed:
-            run_command_line(tally)
-        for backend in BACKENDS:
-            run_tests(backend, tally)
         compare_backends(tally)
-    for script in sessions:
-        for backend in BACKENDS if installed else ():
-            if not wanted or script.stem in wanted:
-                run_session(script, backend, tally)
     print(f"{tally.passed} passed, {tally.failed} failed")
     return int(tally.failed > 0 or tally.passed == 0)
 
