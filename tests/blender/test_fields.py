@@ -2,6 +2,7 @@
 
 import threading
 import time
+import weakref
 
 import bpy
 import numpy as np
@@ -77,6 +78,33 @@ def test_only_the_youngest_fields_are_kept(sphere, evaluated, extension):
     for number in range(1, fields.KEPT + 1):
         fields.field_of(surface, COARSE, place=str(number))
     assert fields.field_of(surface, COARSE, place="0") is not first
+
+
+def made_beside(surface):
+    """More fields than are kept, as previews have them made; the oldest of them."""
+    names = [str(number) for number in range(fields.KEPT + 1)]
+    for name in names:
+        with pytest.raises(fields.NotMadeYetError):
+            fields.field_of(surface, COARSE, place=name, waits=False)
+    until_made()
+    made = [fields.field_of(surface, COARSE, place=name, waits=False) for name in names]
+    return weakref.ref(made[0])
+
+
+def test_previews_keep_the_youngest_fields_only(new_hair, sphere, evaluated, extension):
+    oldest = made_beside(surface_of(sphere, evaluated))
+    live.start(new_hair(sphere), evaluated())
+    assert oldest() is None
+
+
+def test_a_preview_takes_no_field_from_hair_that_waits_for_it(new_hair, sphere, evaluated, gate):
+    waiting = live.start(new_hair(sphere), evaluated())
+    live.play(evaluated(), waits=False)
+    gate.set()
+    oldest = made_beside(surface_of(sphere, evaluated))
+    assert live.is_waiting(waiting)
+    live.start(new_hair(sphere), evaluated())
+    assert oldest() is not None
 
 
 def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import bpy
-import gpu
 from dice import action, call, clicked, press, select, step, views
 
 MOST_OBJECTS = 12
@@ -207,10 +206,6 @@ def resize(dice):
 
 @action(1)
 def open_or_close_a_window(dice):
-    # On Vulkan some draw of Blender's own crashes in lavapipe after a second window was opened and
-    # textures were freed; session_views.py has several windows there too.
-    if gpu.platform.backend_type_get() == "VULKAN":
-        return
     windows = bpy.context.window_manager.windows
     if len(windows) > 1:
         with bpy.context.temp_override(window=windows[-1]):

@@ -58,6 +58,8 @@ def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
     session = Session(hair, depsgraph, baked=baked, waits=making.is_awaited())
     overlay.retry()
     add(session, depsgraph)
+    if not waiting():
+        fields.trim()
     if not bpy.app.background:
         session.make_fields(depsgraph)
     refresh_views()
