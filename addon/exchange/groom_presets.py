@@ -88,7 +88,8 @@ def preflight(groom: Groom, preset: GroomPreset) -> dict[str, Any]:
     """What the engine will see of a groom that is written so, in the units and axes of the file.
 
     Returns:
-        strands, guides, points: counts; groups: group -> strands of it, or guides where there is nothing else.
+        strands, guides, points: counts; groups: group -> strands of it, or guides where there is
+            nothing else.
         points_per_curve, width: least and most; length: shortest and longest.
         lowest, highest: corners of the bounds.
         resampled: strands with more points than the engine takes.
