@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,11 +18,13 @@ from .cards.settings import CardSettings
 from .cards.steps import result_of
 from .cards.strand_shade import strand_shade
 from .groom.weights import guide_weights
-from .pipeline import Pose, Rig, root_normals, root_turns
+from .pipeline import Pose, Rig, rest_occlusion, root_normals, root_turns
+from .shading.ambient import AmbientSettings
 from .shading.drawn_strands import drawn_radius
 from .shading.settings import StrandSettings
 
 _AS_THEY_ARE = StrandSettings()
+_SHADED = AmbientSettings()
 
 
 def card_build_steps(
@@ -32,6 +35,7 @@ def card_build_steps(
     alpha_of: AlphaOf = lambda _build: None,
     drawn: StrandSettings = _AS_THEY_ARE,
     others: Sequence[CardShade] = (),
+    ambient: AmbientSettings = _SHADED,
 ) -> Generator[str, None, CardBuild]:
     """Cards at rest in all levels of detail, with occlusion, from inside to outside.
 
@@ -39,17 +43,19 @@ def card_build_steps(
         alpha_of: the alpha of the atlas, which is best baked here; see `cards.build`.
         drawn: how wide strands are drawn.
         others: cards of other grooms, which shade these, world space.
+        ambient: how the strands shade each other; the cards take it over.
 
     Yields what comes next, and returns the cards.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
     """
-    return card_steps(card_groom(rig, drawn), settings, atlas, occlusion, alpha_of, others)
+    groom = replace(card_groom(rig, drawn), occlusion=rest_occlusion(rig, ambient))
+    return card_steps(groom, settings, atlas, occlusion, alpha_of, others)
 
 
 def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
-    """What cards are made from."""
+    """What cards are made from, without the occlusion of the strands."""
     strands = rig.strands
     radius = drawn_radius(strands.radius.reshape(strands.strand_count, -1), drawn)
     return CardGroom(strands, rig.guides, radius, root_normals(rig), rig.head)
@@ -67,9 +73,11 @@ def card_build(
     occlusion: CardOcclusionSettings,
     alpha_of: AlphaOf = lambda _build: None,
     drawn: StrandSettings = _AS_THEY_ARE,
+    ambient: AmbientSettings = _SHADED,
 ) -> CardBuild:
     """All steps of `card_build_steps` at once."""
-    return result_of(card_build_steps(rig, settings, atlas, occlusion, alpha_of, drawn))
+    steps = card_build_steps(rig, settings, atlas, occlusion, alpha_of, drawn, (), ambient)
+    return result_of(steps)
 
 
 def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:

@@ -23,6 +23,7 @@ from .order_check import wrong_share
 from .settings import CardSettings
 from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, in_order, order_steps
 from .steps import retold
+from .strand_occlusion import strands_occlusion
 from .strip import Strips, UncutCards, guide_strips, scattered_tiles
 
 #: Directions from which coarser levels are looked at to be sorted.
@@ -40,6 +41,8 @@ class CardGroom:
     radius: (strand_count, cv_count) [m], as strands are drawn.
     root_normal: (strand_count, 3) unit normals of the head under the roots.
     head: in the space of the strands, or None.
+    occlusion: (strand_count, cv_count) ambient occlusion of the strands, which their cards take
+        over; None lets rays find that of the cards.
     """
 
     strands: StrandSet
@@ -47,6 +50,7 @@ class CardGroom:
     radius: Floats
     root_normal: Floats
     head: Surface | None
+    occlusion: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -109,9 +113,7 @@ def card_steps(
     build = CardBuild(meshes, unsorted, errors, plan)
     yield "Atlas"
     alpha = alpha_of(build)
-    bodies = [] if groom.head is None else [groom.head]
-    shades = [CardShade(build.finest, alpha), *others]
-    shading = occlusion_steps(build.finest, shades, bodies, occlusion)
+    shading = _occlusion_steps(groom, settings, build.finest, alpha, others, occlusion)
     finest = build.finest.with_occlusion((yield from _told("Ambient occlusion", shading)))
     shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))
     orders = yield from _orders(shaded, groom.head, settings)
@@ -132,6 +134,39 @@ def card_steps(
         backs=tuple(mesh.triangles[each.back] for mesh, each in pairs),
         wrong_share=wrong,
     )
+
+
+def _occlusion_steps(
+    groom: CardGroom,
+    settings: CardSettings,
+    mesh: CardMesh,
+    alpha: Floats | None,
+    others: Sequence[CardShade],
+    occlusion: CardOcclusionSettings,
+) -> Generator[float, None, Floats]:
+    """Of each vertex: that of the strands there, times what rays find of other grooms."""
+    if groom.occlusion is None:
+        bodies = [] if groom.head is None else [groom.head]
+        return (
+            yield from occlusion_steps(mesh, [CardShade(mesh, alpha), *others], bodies, occlusion)
+        )
+    own = strands_occlusion(
+        mesh, groom.strands.grid, groom.occlusion, card_of_strand(groom, settings)
+    )
+    shown = (1.0 - occlusion.strength * (1.0 - own)).astype(np.float32)
+    if not others:
+        return shown
+    return shown * (yield from occlusion_steps(mesh, others, [], occlusion))
+
+
+def card_of_strand(groom: CardGroom, settings: CardSettings) -> Ints:
+    """The card that stands for each strand, (strand_count,); -1 without one. Crossed cards come
+    again after all others, in the same order."""
+    if settings.way == "guides":
+        cards = np.full(groom.strands.strand_count, -1, np.int32)
+        cards[groom.guides] = np.arange(len(groom.guides), dtype=np.int32)
+        return cards
+    return cluster_of_strands(groom.strands.grid, groom.strands.group, settings)
 
 
 def _orders(
@@ -162,7 +197,7 @@ def uncut_cards(
     if settings.way == "guides":
         strips = guide_strips(strands.grid[guides], groom.root_normal[guides], settings)
         one = np.ones(len(guides), np.int32)
-        return _by_chance(strips, one, strands.group[guides], settings), None
+        return _looking_out(_by_chance(strips, one, strands.group[guides], settings), groom), None
     grid, radius = strands.grid, strands.radius.reshape(strands.grid.shape[:2])
     cluster = cluster_of_strands(grid, strands.group, settings)
     strips = fit_strips(grid, radius, cluster, groom.root_normal, settings)
@@ -170,12 +205,18 @@ def uncut_cards(
     # crossed cards come after all others, and stand for the same strands
     owner = np.resize(np.arange(len(first)), len(strips))
     cards = _by_chance(strips, count[owner], strands.group[first][owner], settings)
+    cards = _looking_out(cards, groom)
     if atlas.source != "baked":
         return cards, None
     uncrossed = strips.of(np.arange(len(first)))
     plan = plan_atlas(uncrossed, grid, groom.radius, cluster, strands.group, atlas)
     strips = _wider(cards.strips, plan.width_factor[owner])
     return replace(cards, strips=strips, tile=plan.tile[owner], atlas=plan.grid), plan
+
+
+def _looking_out(cards: UncutCards, groom: CardGroom) -> UncutCards:
+    """With normals away from the middle of all roots, as strands have them."""
+    return replace(cards, center=groom.strands.roots.mean(axis=0, dtype=np.float64))
 
 
 def _by_chance(

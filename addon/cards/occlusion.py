@@ -1,12 +1,15 @@
 """Ambient occlusion of card vertices by rays against cards, with their alpha, and bodies.
 
+For cards of which no strands are known, and for what other grooms shade; cards that are made from
+strands have the occlusion of these, see strand_occlusion.py.
+
 What is stored is the light that a vertex gets from an even sky, as a share of what a surface of
 its normal gets in the open:  A = sum_i |n . d_i| T_i / sum_i |n . d_i|,  over directions d_i that
 are spread evenly over the half sphere about the normal n, which faces away from the head. So a
 card that lies open on the head has 1. T is the transmittance of the ray: a body lets nothing
 through, each card (1 - alpha)^extinction at the place that is met (Scheuermann 2004, section 5;
 Zhukov, Iones and Kronin 1998, ambient light under an even sky). With an extinction of 1 a card is
-what it looks like; strands of a groom shade with more, see shading/ambient.py, and so do its cards.
+what it looks like; strands shade with more, see shading/ambient.py.
 
 All vertices share one set of axes. Along each axis every vertex has one ray, to that side to which
 its normal leans, and all rays are found together (see parallel_rays.py).

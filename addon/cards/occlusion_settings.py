@@ -10,7 +10,7 @@ from ..params import Settings, integer, number, toggle
 
 @dataclass(frozen=True, kw_only=True)
 class CardOcclusionSettings(Settings):
-    """How cards and the body shade the vertices of cards from the light of all sides."""
+    """How hair and the body shade the vertices of cards from the light of all sides."""
 
     section: ClassVar[str] = "card_occlusion"
     title: ClassVar[str] = "Card Occlusion"
@@ -24,10 +24,11 @@ class CardOcclusionSettings(Settings):
         hard=(0.0, 1.0),
     )
     extinction: float = number(
-        2.5,
+        2.0,
         label="Extinction",
-        description="How fast light dies in the cards, as a power of what their alpha lets "
-        "through; about that of the strands, and a little more since a card does not shade itself",
+        description="How fast light dies in others' cards and in adopted ones, as a power of what "
+        "their alpha lets through; the same as in strands. Cards of a groom have the occlusion of "
+        "its strands",
         soft=(0.0, 10.0),
         hard=(0.0, 1_000.0),
     )

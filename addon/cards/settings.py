@@ -120,10 +120,10 @@ class CardSettings(Settings):
         hard=(-1.0, 1.0),
     )
     roundness: float = number(
-        0.5,
+        0.0,
         label="Roundness",
         description="How far the normals lean outwards at the edges, so that light wraps around "
-        "a card; added to the bend",
+        "a card; 0 leaves them those of the strands",
         soft=(0.0, 1.0),
         hard=(0.0, 4.0),
     )

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands import StrandSet
-from ..strands.frames import tangents, transported_normals
+from ..strands.frames import tangents, transported_normals, volume_normals
 from ..strands.resample import resample
 from .atlas_grid import AtlasGrid
 from .card_mesh import CardMesh, joined
@@ -66,6 +66,8 @@ class UncutCards:
     strand_count, group, layer, tile: (card_count,) int32 of each card: the strands that it stands
         for, its group of hair, its layer, 0 next to the head, and its tile of the atlas.
     atlas: how the texture is divided into tiles.
+    center: (3,) [m], what normals look away from, as those of strands do; None gives each card the
+        normals of its own surface.
     """
 
     strips: Strips
@@ -74,6 +76,7 @@ class UncutCards:
     layer: Ints
     tile: Ints
     atlas: AtlasGrid
+    center: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.strips)
@@ -133,12 +136,19 @@ def _part_mesh(
     triangles = strip_triangles(row_count, column_count)
     vertices_per_card = row_count * len(across)
     first = np.arange(card_count, dtype=np.int32) * vertices_per_card
+    positions = _positions(frames, strips.width, across, settings)
+    normals = _normals(frames, across, settings)
+    if cards.center is not None:
+        volume = _normals_of_volume(positions, frames.tangent, cards.center, across, settings)
+        # engines turn normals by which side of a card they draw, so they stay on its front
+        is_front = np.einsum("crai,crai->cra", volume, normals) > 0.0
+        normals = np.where(is_front[..., None], volume, normals)
     return CardMesh(
-        positions=_positions(frames, strips.width, across, settings).reshape(-1, 3),
+        positions=positions.reshape(-1, 3),
         triangles=(first[:, None, None] + triangles).reshape(-1, 3),
         uv=cards.atlas.uv(cards.tile[numbers, None, None], across, along).reshape(-1, 2),
         along=np.broadcast_to(along, (card_count, row_count, len(across))).reshape(-1),
-        normal=_normals(frames, across, settings).reshape(-1, 3),
+        normal=normals.reshape(-1, 3),
         tangent=np.repeat(frames.tangent.reshape(-1, 3), len(across), axis=0),
         occlusion=np.ones(card_count * vertices_per_card, np.float32),
         card=np.repeat(numbers.astype(np.int32), len(triangles)),
@@ -218,6 +228,17 @@ def _normals(frames: CardFrames, across: Floats, settings: CardSettings) -> Floa
     edge = 2.0 * across - 1.0
     lean = (4.0 * settings.bend + settings.roundness) * edge  # the parabola's slope is 4 bend edge
     normals = frames.normal[:, :, None] + frames.side[:, :, None] * lean[:, None]
+    return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+
+
+def _normals_of_volume(
+    positions: Floats, tangent: Floats, center: Floats, across: Floats, settings: CardSettings
+) -> Floats:
+    """Those of strands at the same places, leaning further outwards by `roundness`."""
+    along = np.broadcast_to(tangent[:, :, None], positions.shape)
+    normal = volume_normals(positions, along, center)
+    lean = settings.roundness * (2.0 * across - 1.0)
+    normals = normal + np.cross(along, normal) * lean[:, None]
     return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
+from ..strands.frames import volume_normals
 from .settings import ShadingSettings
 from .tint import tip_share
 
@@ -28,15 +29,8 @@ _SMALLEST = 1.0e-6
 
 
 def strand_normal(point: Floats, tangent: Floats, center: Floats) -> Floats:
-    """Normal of the hair's volume: away from its centre, made perpendicular to the strand.
-
-    Where the strand itself points away from the centre, any perpendicular will do.
-    """
-    outward = _unit_or(point - center, np.array([0.0, 0.0, 1.0]))
-    across = outward - tangent * _dot(outward, tangent)[..., None]
-    axis = np.eye(3)[np.abs(tangent).argmin(axis=-1)]
-    is_long = (_dot(across, across) > _SMALLEST)[..., None]
-    return _unit_or(np.where(is_long, across, np.cross(tangent, axis)), axis)
+    """Normal of the hair's volume at a strand; cards have the same at their vertices."""
+    return volume_normals(point, tangent, center)
 
 
 def diffuse_bias(normal: Floats, to_light: Floats) -> Floats:

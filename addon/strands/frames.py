@@ -6,6 +6,8 @@ import numpy as np
 
 from ..arrays import Floats
 
+_SMALLEST = 1.0e-6
+
 
 def tangents(grid: Floats) -> Floats:
     """Unit tangents from root to tip, (..., cv_count, 3), by central differences.
@@ -46,6 +48,26 @@ def transported_normals(tangent: Floats, root_normal: Floats) -> Floats:
         turned = normal * cosine + np.cross(axis, normal) + axis * along / (1.0 + cosine + 1e-6)
         normals[..., cv, :] = _perpendicular(turned, now)
     return normals
+
+
+def volume_normals(point: Floats, tangent: Floats, center: Floats) -> Floats:
+    """Normals of the hair's volume: away from its centre, made perpendicular to the strand.
+
+    Where the strand itself points away from the centre, any perpendicular will do.
+
+    Args:
+        point: (..., 3) [m]. tangent: (..., 3) unit vectors. center: (3,) [m].
+    """
+    outward = _unit_or(point - center, np.array([0.0, 0.0, 1.0]))
+    across = outward - tangent * np.sum(outward * tangent, axis=-1, keepdims=True)
+    axis = np.eye(3)[np.abs(tangent).argmin(axis=-1)]
+    is_long = np.sum(across * across, axis=-1, keepdims=True) > _SMALLEST
+    return _unit_or(np.where(is_long, across, np.cross(tangent, axis)), axis)
+
+
+def _unit_or(vector: Floats, otherwise: Floats) -> Floats:
+    length = np.linalg.norm(vector, axis=-1, keepdims=True)
+    return np.where(length > _SMALLEST, vector / np.maximum(length, _SMALLEST), otherwise)
 
 
 def _perpendicular(vector: Floats, tangent: Floats) -> Floats:

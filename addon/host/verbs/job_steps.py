@@ -154,6 +154,7 @@ def card_form(job: Job) -> CardForm:
         job.set(TextureSettings),
         job.set(StrandSettings),
         shading=job.set(ShadingSettings),
+        ambient=job.set(AmbientSettings),
     )
 
 

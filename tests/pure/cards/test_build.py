@@ -10,17 +10,27 @@ import pytest
 
 from hairloom.addon import card_flow, pipeline
 from hairloom.addon.cards.atlas_settings import AtlasSettings
-from hairloom.addon.cards.build import CardBuild, CardGroom, uncut_cards, with_occlusion_of
+from hairloom.addon.cards.build import (
+    CardBuild,
+    CardGroom,
+    card_steps,
+    uncut_cards,
+    with_occlusion_of,
+)
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.order_check import wrong_share
 from hairloom.addon.cards.settings import CardSettings
+from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.shading.ambient import AmbientSettings
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.strands import StrandSet
 
 MADE = AtlasSettings(source="made")
 FEW_RAYS = CardOcclusionSettings(rays=16)
+#: as if the few strands here stood for many
+DENSE = AmbientSettings(extinction=100.0)
 
 
 def falling(count: int, *, groups: int = 2, cv_count: int = 12, seed: int = 0) -> StrandSet:
@@ -42,7 +52,7 @@ def falling(count: int, *, groups: int = 2, cv_count: int = 12, seed: int = 0) -
 def built(strands: StrandSet, atlas: AtlasSettings = MADE, **changed: object) -> CardBuild:
     rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
     settings = CardSettings(**{"way": "clusters", "card_count": 30, **changed})  # type: ignore[arg-type]
-    return card_flow.card_build(rig, settings, atlas, FEW_RAYS)
+    return card_flow.card_build(rig, settings, atlas, FEW_RAYS, ambient=DENSE)
 
 
 @pytest.mark.parametrize("way", ["clusters", "guides"])
@@ -165,8 +175,9 @@ def test_alpha_is_asked_for_once_and_darkens_less_than_opaque_cards() -> None:
         asked.append(build)
         return np.zeros((8, 8), np.float32)
 
-    opaque = card_flow.card_build(rig, settings, MADE, FEW_RAYS)
-    seen_through = card_flow.card_build(rig, settings, MADE, FEW_RAYS, clear)
+    groom = card_flow.card_groom(rig)  # the occlusion of its strands is not known
+    opaque = result_of(card_steps(groom, settings, MADE, FEW_RAYS, lambda _build: None))
+    seen_through = result_of(card_steps(groom, settings, MADE, FEW_RAYS, clear))
     assert len(asked) == 1
     np.testing.assert_allclose(seen_through.finest.occlusion, 1.0, atol=1e-5)
     assert opaque.finest.occlusion.mean() < 0.9
@@ -175,7 +186,8 @@ def test_alpha_is_asked_for_once_and_darkens_less_than_opaque_cards() -> None:
 def test_every_step_says_how_far_it_is() -> None:
     rig = pipeline.prepare(falling(600), None, GuideSettings(), place="hair")
     settings = CardSettings(way="clusters", card_count=30, levels=2)
-    steps = list(card_flow.card_build_steps(rig, settings, MADE, FEW_RAYS))
+    groom = card_flow.card_groom(rig)  # so that rays find the occlusion
+    steps = list(card_steps(groom, settings, MADE, FEW_RAYS, lambda _build: None))
     for name in ("Ambient occlusion", "Order of level 0", "Order of level 1"):
         own = [step for step in steps if step.startswith(name)]
         shares = [int(step.removeprefix(f"{name}, ").removesuffix(" %")) for step in own[1:]]

@@ -1,0 +1,144 @@
+"""Cards take over the occlusion and the normals of their strands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon import card_flow, pipeline
+from hairloom.addon.cards.atlas_settings import AtlasSettings
+from hairloom.addon.cards.build import CardBuild, CardGroom, card_of_strand, card_steps
+from hairloom.addon.cards.card_mesh import CardMesh
+from hairloom.addon.cards.occlusion import CardShade, vertex_occlusion
+from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
+from hairloom.addon.cards.settings import CardSettings
+from hairloom.addon.cards.sort import card_of_vertex
+from hairloom.addon.cards.steps import result_of
+from hairloom.addon.cards.strand_occlusion import strands_occlusion
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.pipeline import Rig
+from hairloom.addon.shading.ambient import AmbientSettings
+from hairloom.addon.shading.kajiya_kay import strand_normal
+from tests.pure.cards.test_build import falling
+
+MADE = AtlasSettings(source="made")
+FEW_RAYS = CardOcclusionSettings(rays=32)
+CLUSTERS = CardSettings(way="clusters", card_count=40, levels=1)
+
+
+def rig_of(count: int) -> Rig:
+    return pipeline.prepare(falling(count), None, GuideSettings(guide_count=40), place="hair")
+
+
+def built(groom: CardGroom, settings: CardSettings, *others: CardShade) -> CardBuild:
+    return result_of(card_steps(groom, settings, MADE, FEW_RAYS, lambda _build: None, others))
+
+
+def ladder() -> CardMesh:
+    """A flat card 0.02 m wide, upright, of one column and two segments; its normal is -y."""
+    along = np.repeat([0.0, 0.5, 1.0], 2)
+    across = np.tile([0.0, 1.0], 3)
+    zero = np.zeros(6)
+    return CardMesh(
+        positions=np.column_stack([0.02 * across - 0.01, zero, along]),
+        triangles=[[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]],
+        uv=np.column_stack([across, along]),
+        normal=np.tile([0.0, -1.0, 0.0], (6, 1)),
+        tangent=np.tile([0.0, 0.0, 1.0], (6, 1)),
+        occlusion=zero,
+        card=np.zeros(4, np.int32),
+        along=along,
+    )
+
+
+def upright(x: float, y: float = 0.0) -> np.ndarray:
+    return np.column_stack([np.full(5, x), np.full(5, y), np.linspace(0.0, 1.0, 5)])
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.9])
+def test_each_edge_has_the_occlusion_of_the_strand_that_runs_along_it(turn: float) -> None:
+    """Whatever the depth of the strands, and whichever way the normals of the vertices look."""
+    grid = np.stack([upright(-0.01, 0.03), upright(0.01, -0.05), upright(0.0)])
+    occlusion = np.array([np.linspace(0.1, 0.3, 5), np.linspace(0.5, 0.9, 5), np.full(5, 7.0)])
+    normal = np.tile([np.sin(turn), -np.cos(turn), 0.0], (6, 1))
+    mesh = replace(ladder(), normal=normal)
+    found = strands_occlusion(mesh, grid, occlusion, np.array([0, 0, -1]))
+    np.testing.assert_allclose(found, [0.1, 0.5, 0.2, 0.7, 0.3, 0.9], rtol=1e-5)
+
+
+def test_strands_between_count_by_hat_functions() -> None:
+    grid = np.stack([upright(-0.01), upright(0.005)])
+    found = strands_occlusion(ladder(), grid, np.repeat([[0.2], [0.8]], 5, 1), np.array([0, 0]))
+    left = (1.0 * 0.2 + 0.25 * 0.8) / 1.25
+    np.testing.assert_allclose(found, np.tile([left, 0.8], 3), rtol=1e-5)
+
+
+def test_a_card_whose_strands_are_all_elsewhere_has_their_mean() -> None:
+    grid = np.stack([upright(-0.5), upright(0.7)])
+    found = strands_occlusion(ladder(), grid, np.repeat([[0.2], [0.8]], 5, 1), np.array([0, 0]))
+    np.testing.assert_allclose(found, 0.5, rtol=1e-5)
+
+
+@pytest.mark.parametrize("settings", [CLUSTERS, replace(CLUSTERS, crossed=True)])
+def test_each_card_is_as_open_as_its_own_strands(settings: CardSettings) -> None:
+    """Against a loop over cards; the vertices of a card lie evenly along it."""
+    rig = rig_of(900)
+    dense = AmbientSettings(extinction=100.0)
+    groom = replace(card_flow.card_groom(rig), occlusion=pipeline.rest_occlusion(rig, dense))
+    assert groom.occlusion is not None
+    mesh = built(groom, settings).finest
+    owner, cards = card_of_vertex(mesh), card_of_strand(groom, settings)
+    stations = np.linspace(0.0, 1.0, groom.occlusion.shape[1])
+    found, expected = [], []
+    for card in range(int(owner.max()) + 1):
+        own = groom.occlusion[cards == card % (cards.max() + 1)].mean(axis=0)
+        is_own = owner == card
+        found.append(mesh.occlusion[is_own].mean())
+        expected.append(np.interp(mesh.along[is_own], stations, own).mean())
+    assert len(found) == mesh.card_count
+    assert np.ptp(expected) > 0.2
+    assert np.abs(np.subtract(found, expected)).mean() < 0.02
+    assert np.corrcoef(found, expected)[0, 1] > 0.97
+
+
+def test_guide_cards_have_that_of_their_guides() -> None:
+    rig = rig_of(300)
+    shade = np.random.default_rng(1).random(rig.strands.strand_count).astype(np.float32)
+    groom = replace(
+        card_flow.card_groom(rig), occlusion=np.tile(shade[:, None], rig.strands.grid.shape[1])
+    )
+    mesh = built(groom, replace(CLUSTERS, way="guides")).finest
+    np.testing.assert_allclose(mesh.occlusion, shade[rig.guides][card_of_vertex(mesh)], rtol=1e-5)
+
+
+def test_other_grooms_shade_beside_that() -> None:
+    rig = rig_of(300)
+    groom = card_flow.card_groom(rig)
+    even = np.full(rig.strands.grid.shape[:2], 0.6, np.float32)
+    wall = ladder()
+    wall = replace(wall, positions=wall.positions * [100.0, 1.0, 2.0] + [0.0, -0.4, -0.8])
+    lit = built(replace(groom, occlusion=even), CLUSTERS).finest
+    shaded = built(replace(groom, occlusion=even), CLUSTERS, CardShade(wall)).finest
+    np.testing.assert_allclose(lit.occlusion, 0.6, rtol=1e-5)
+    rays = vertex_occlusion(lit, [CardShade(wall)], [], FEW_RAYS)
+    assert rays.min() < 0.3 < 0.9 < rays.max()
+    np.testing.assert_allclose(shaded.occlusion, 0.6 * rays, rtol=1e-5)
+
+
+@pytest.mark.parametrize("way", ["clusters", "guides"])
+def test_normals_are_those_of_strands_across_the_tangents_and_on_the_front(way: str) -> None:
+    rig = rig_of(300)
+    build = card_flow.card_build(rig, replace(CLUSTERS, way=way, levels=2), MADE, FEW_RAYS)
+    center = rig.strands.roots.mean(axis=0)
+    for mesh in build.levels:
+        expected = strand_normal(mesh.positions, mesh.tangent, center)
+        is_same = np.abs(mesh.normal - expected).max(axis=1) < 1e-5
+        assert is_same.mean() > 0.8  # roots are upright, where any normal would do
+        lean = np.einsum("vi,vi->v", mesh.normal, mesh.tangent)
+        np.testing.assert_allclose(lean, 0.0, atol=1e-5)
+        a, b, c = np.moveaxis(mesh.positions[mesh.triangles], 1, 0)
+        mean = mesh.normal[mesh.triangles].mean(axis=1)
+        facing = np.einsum("ti,ti->t", np.cross(b - a, c - a), mean)
+        assert (facing > 0.0).mean() > 0.95
