@@ -4,11 +4,13 @@ Events are sent one a tick, as Blender wants them: call what yields by `yield fr
 """
 
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import bpy
+import driver
 import numpy as np
 from mathutils import Euler
 
@@ -114,6 +116,12 @@ def until(is_so: Callable[[], bool], message: str, tries: int = 60) -> Iterator[
             return
         yield 2
     raise AssertionError(message)
+
+
+def hair_is_made() -> Iterator[int]:
+    """Ticks until the hair of all previews is there: it is made in a thread."""
+    live = sys.modules[f"{driver.EXTENSION}.addon.host.preview.live"]
+    yield from until(lambda: all(each.is_made for each in live.sessions()), "no hair is made", 300)
 
 
 def file_browser() -> Any:

@@ -15,6 +15,7 @@ import driver
 from artist import (
     changed,
     click,
+    hair_is_made,
     look_from_front,
     open_our_sidebar,
     press,
@@ -111,6 +112,7 @@ def set_the_scene():
     look_from_front(0.9)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
+    yield from hair_is_made()
     yield 10
 
 

@@ -12,6 +12,7 @@ import driver
 from artist import (
     changed,
     click,
+    hair_is_made,
     look_from_front,
     open_our_sidebar,
     press,
@@ -100,6 +101,7 @@ def every_panel_draws():
     yield 5
     drawn.clear()
     yield from click(*sidebar_button("hairloom.preview"))
+    yield from hair_is_made()
     yield 10
     driver.screenshot("all-panels")
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
@@ -192,6 +194,7 @@ def hair_without_a_surface():
     bpy.context.view_layer.objects.active = hair
     yield 3
     yield from click(*sidebar_button("hairloom.preview"))
+    yield from hair_is_made()
     yield 10
     (session,) = live.sessions()
     assert "no surface" in session.source.warnings[0]

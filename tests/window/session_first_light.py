@@ -13,6 +13,7 @@ import driver
 from artist import (
     changed,
     click,
+    hair_is_made,
     look_from_front,
     open_our_sidebar,
     press,
@@ -226,6 +227,7 @@ def save_and_reload():
     assert hair.display_type == "TEXTURED"
     off = pixels("reloaded-off")
     yield from click(*sidebar_button("hairloom.preview"))
+    yield from hair_is_made()
     yield 10
     assert changed(off, pixels("reloaded-preview")) > 0.02
 

@@ -14,6 +14,7 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
     changed,
+    hair_is_made,
     look_from_front,
     open_our_sidebar,
     press,
@@ -111,6 +112,7 @@ def hair_on_a_mesh_of_ones_own():
     invoke("add_groom", strand_count=1500)
     yield from until(lambda: live().is_playing(), "it does not play")
     (session,) = live().sessions()
+    yield from hair_is_made()
     at_first = session.strands
     yield from until(
         lambda: np.abs(session.strands - at_first).max() > 1.0e-3, "nothing moves", tries=300
@@ -135,6 +137,7 @@ def undo_takes_it_away():
     bpy.context.view_layer.objects.active = hair
     hair.select_set(True)
     assert bpy.ops.hairloom.preview() == {"FINISHED"}
+    yield from hair_is_made()
     yield 5
 
 

@@ -15,6 +15,7 @@ import driver
 from artist import (
     _rectangle,
     click,
+    hair_is_made,
     look_from_front,
     open_our_sidebar,
     press,
@@ -132,6 +133,7 @@ def set_the_scene():
     look_from_front(1.2)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
+    yield from hair_is_made()
     yield 10
     hair.select_set(False)  # no outline
     assert session().snapshot.lights == ()

@@ -9,7 +9,15 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import click, look_from_front, open_our_sidebar, press, sidebar_button, viewport
+from artist import (
+    click,
+    hair_is_made,
+    look_from_front,
+    open_our_sidebar,
+    press,
+    sidebar_button,
+    viewport,
+)
 
 LAST = 40
 FOLDER = Path(bpy.app.tempdir) / "bake"
@@ -48,6 +56,7 @@ def set_the_scene():
     look_from_front(0.9)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
+    yield from hair_is_made()
     yield 10
     assert session().rig.strands.strand_count > 100
 

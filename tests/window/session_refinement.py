@@ -11,6 +11,7 @@ import driver
 from artist import (
     changed,
     click,
+    hair_is_made,
     look_from_front,
     open_our_sidebar,
     press,
@@ -218,6 +219,7 @@ def two_grooms():
     live = of_hairloom("host.preview.live")
     live.start(twin, bpy.context.evaluated_depsgraph_get())
     look_from_front(1.2)
+    yield from hair_is_made()
     yield 5
     driver.screenshot("two-grooms")
     assert len(live.sessions()) == 2
