@@ -21,7 +21,7 @@ test: setup ## lint, types, and all tests that need no window
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	$(PYTHON) -m pytest -q -n auto tests/pure
-	$(PYTHON) -m pytest -q tests/gpu tests/blender
+	$(PYTHON) -m pytest -q -n 2 --dist loadfile tests/gpu tests/blender
 
 test-ui: zip ## the tests in a Blender with a window, OpenGL and Vulkan; SESSIONS="session_x" for some
 	tools/window_blender install
