@@ -13,10 +13,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from _cards_atlas import STRANDS
 from _cards_groom import sintel_rig
 
 from hairloom.addon.card_flow import card_build
 from hairloom.addon.cards.atlas_settings import AtlasSettings
+from hairloom.addon.cards.build import CardBuild
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.order_check import seen_cards, views_of, wrong_pixels
@@ -29,6 +31,9 @@ from hairloom.addon.cards.sort import (
     order_from,
     reordered,
 )
+from hairloom.addon.host.cards.card_atlas import baked_atlas
+from hairloom.addon.pipeline import Rig
+from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.textures import TextureSettings, hair_textures
 from hairloom.addon.strands import Surface
 
@@ -42,7 +47,7 @@ type OrderOf = Callable[[View], tuple[np.ndarray, np.ndarray]]
 
 
 def order_figures() -> dict[str, float]:
-    """The figures by name.
+    """The figures by name; those with `baked` have the baked texture, the others the procedural.
 
     order_wrong_unsorted: cards in the order in which they were built.
     order_wrong_sorted: the order of the mesh for front faces, and the one for back faces.
@@ -51,7 +56,7 @@ def order_figures() -> dict[str, float]:
     order_wrong_distance: whole cards by their distance from the head, for all views.
     order_wrong_cards: whole cards in the order that was learnt, with one for back faces.
     order_wrong_one_buffer: the order of the mesh for both sides.
-    order_wrong_guides, order_wrong_guides_unsorted: of one card along each guide.
+    order_wrong_guides_sorted, order_wrong_guides_unsorted: of one card along each guide.
     sort_ms: 100,000 triangles: pieces found and all moved by given distances, the median.
     order_seconds: to learn the orders of 800 cards; order_from_ms: to sort them for an eye.
     """
@@ -59,26 +64,41 @@ def order_figures() -> dict[str, float]:
     head = rig.head
     assert head is not None
     found = {"sort_ms": sort_milliseconds()}
-    for way in ("clusters", "guides"):
-        settings, made = CardSettings(way=way, levels=1), AtlasSettings(source="made")
-        mesh = as_built(card_build(rig, settings, made, CardOcclusionSettings()).finest)
+    for way, source, name in (
+        ("clusters", "made", ""),
+        ("clusters", "baked", "baked_"),
+        ("guides", "made", "guides_"),
+    ):
+        mesh, alpha = cards_and_alpha(rig, way, source)
         begin = time.process_time()
-        learnt = card_orders(mesh, head)
-        seconds = time.process_time() - begin
+        learnt = card_orders(mesh, head, alpha=alpha)
+        found[f"order_{name}seconds"] = time.process_time() - begin
         unsorted = np.arange(len(mesh.triangles))
         orders: dict[str, OrderOf] = {"unsorted": always(unsorted), "sorted": both(learnt)}
         if way == "clusters":
-            found["order_seconds"] = seconds
-            found["order_from_ms"] = eye_milliseconds(mesh)
-            orders |= others(mesh, head, learnt)
+            orders |= others(mesh, head, learnt, alpha)
         view_count = VIEW_COUNT if way == "clusters" else FEWER_VIEWS
-        shares = wrong_shares(mesh, head, orders, view_count)
-        if way == "clusters":
-            found |= {f"order_wrong_{name}": share for name, share in shares.items()}
-        else:
-            found["order_wrong_guides"] = shares["sorted"]
-            found["order_wrong_guides_unsorted"] = shares["unsorted"]
+        shares = wrong_shares(mesh, head, orders, view_count, alpha)
+        found |= {f"order_wrong_{name}{key}": share for key, share in shares.items()}
+        if source == "made" and way == "clusters":
+            found["order_from_ms"] = eye_milliseconds(mesh)
     return found
+
+
+def cards_and_alpha(rig: Rig, way: str, source: str) -> tuple[CardMesh, np.ndarray]:
+    """The cards as they are built, and their texture's alpha."""
+    alphas: list[np.ndarray] = []
+
+    def alpha_of(build: CardBuild) -> np.ndarray:
+        if build.plan is None:
+            alphas.append(tiled_alpha(build.finest))
+        else:
+            alphas.append(baked_atlas(rig, build.plan, ShadingSettings(), STRANDS).alpha)
+        return alphas[0]
+
+    settings, atlas = CardSettings(way=way, levels=1), AtlasSettings(source=source)
+    build = card_build(rig, settings, atlas, CardOcclusionSettings(), alpha_of, STRANDS)
+    return as_built(build.finest), alphas[0]
 
 
 def as_built(mesh: CardMesh) -> CardMesh:
@@ -95,7 +115,9 @@ def both(orders: CardOrders) -> OrderOf:
     return always(orders.front, orders.back)
 
 
-def others(mesh: CardMesh, head: Surface, learnt: CardOrders) -> dict[str, OrderOf]:
+def others(
+    mesh: CardMesh, head: Surface, learnt: CardOrders, alpha: np.ndarray
+) -> dict[str, OrderOf]:
     def per_view(view: View) -> tuple[np.ndarray, np.ndarray]:
         away = mesh.positions[mesh.triangles].mean(axis=1) - eye_of(view)
         far = np.linalg.norm(away, axis=1)
@@ -111,7 +133,7 @@ def others(mesh: CardMesh, head: Surface, learnt: CardOrders) -> dict[str, Order
         "perview": per_view,
         "perview_triangles": per_view_triangles,
         "distance": both(card_orders(mesh, head, "distance")),
-        "cards": both(card_orders(mesh, head, "cards")),
+        "cards": both(card_orders(mesh, head, "cards", alpha=alpha)),
         "one_buffer": always(learnt.front),
     }
 
@@ -121,10 +143,13 @@ def eye_of(view: View) -> np.ndarray:
 
 
 def wrong_shares(
-    mesh: CardMesh, head: Surface, orders: dict[str, OrderOf], view_count: int
+    mesh: CardMesh,
+    head: Surface,
+    orders: dict[str, OrderOf],
+    view_count: int,
+    alpha: np.ndarray,
 ) -> dict[str, float]:
     """The share of wrong pixels for each order, over the same views."""
-    alpha = tiled_alpha(mesh)
     wrong, covered = dict.fromkeys(orders, 0), 0
     for view in views_of(mesh, view_count, SIZE):
         seen = seen_cards(mesh, head, view, alpha)

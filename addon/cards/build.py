@@ -116,7 +116,7 @@ def card_steps(
     shading = _occlusion_steps(groom, settings, build.finest, alpha, others, occlusion)
     finest = build.finest.with_occlusion((yield from _told("Ambient occlusion", shading)))
     shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))
-    orders = yield from _orders(shaded, groom.head, settings)
+    orders = yield from _orders(shaded, groom.head, settings, alpha)
     yield "Check of the order"
     first = orders[0]
     wrong = wrong_share(
@@ -170,14 +170,14 @@ def card_of_strand(groom: CardGroom, settings: CardSettings) -> Ints:
 
 
 def _orders(
-    levels: Sequence[CardMesh], head: Surface | None, settings: CardSettings
+    levels: Sequence[CardMesh], head: Surface | None, settings: CardSettings, alpha: Floats | None
 ) -> Generator[str, None, list[CardOrders]]:
     """Of each level; coarser ones are looked at from fewer sides."""
     by = cast("SortBy", settings.order_by)
     orders = []
     for number, mesh in enumerate(levels):
         view_count = _COARSER_VIEWS if number else VIEW_COUNT
-        steps = order_steps(mesh, head, by, view_count=view_count)
+        steps = order_steps(mesh, head, by, view_count=view_count, alpha=alpha)
         name = f"Order of level {number}" if len(levels) > 1 else "Order"
         orders.append((yield from _told(name, steps)))
     return orders

@@ -20,6 +20,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
 from .card_mesh import CardMesh
+from .order_alpha import LEAST_ALPHA, OPAQUE_ALPHA, alpha_at
 from .order_views import (
     Fragments,
     View,
@@ -29,8 +30,6 @@ from .order_views import (
     view_directions,
 )
 
-#: From this alpha on a pixel is opaque, and below the other it is clear: as in the passes.
-OPAQUE_ALPHA, LEAST_ALPHA = 0.99, 0.004
 #: Two colours that differ by more can be told apart in 8 bits.
 VISIBLE = 1.0 / 255.0
 #: Without a texture, cards cover this much everywhere.
@@ -90,7 +89,10 @@ def seen_cards(
     """What this view sees; the texture's nearest texel counts."""
     met = fragments(view, mesh.positions, mesh.triangles)
     met = met[met.near > nearest(view, head)[met.pixel]]
-    covers = _alpha_at(mesh, met, alpha)
+    if alpha is None:
+        covers = np.full(len(met.pixel), _PLAIN_ALPHA, np.float32)
+    else:
+        covers = alpha_at(mesh, met, alpha)
     hidden = np.full(view.size * view.size, -np.inf, np.float32)
     is_opaque = covers >= OPAQUE_ALPHA
     np.maximum.at(hidden, met.pixel[is_opaque], met.near[is_opaque])
@@ -99,18 +101,6 @@ def seen_cards(
     met, covers = met[is_seen], np.where(is_opaque, 1.0, covers)[is_seen]
     order = np.lexsort((met.near, met.pixel))
     return SeenCards(met[order], covers[order])
-
-
-def _alpha_at(mesh: CardMesh, met: Fragments, alpha: Floats | None) -> Floats:
-    if alpha is None:
-        return np.full(len(met.pixel), _PLAIN_ALPHA, np.float32)
-    first = 1.0 - met.second - met.third
-    shares = np.stack([first, met.second, met.third], axis=1)
-    uv = np.einsum("nc,nci->ni", shares, mesh.uv[mesh.triangles[met.triangle]])
-    height, width = alpha.shape
-    row = np.clip((uv[:, 1] * height).astype(int), 0, height - 1)
-    column = np.clip((uv[:, 0] * width).astype(int), 0, width - 1)
-    return alpha[row, column]
 
 
 def wrong_pixels(mesh: CardMesh, seen: SeenCards, front: Ints, back: Ints) -> Bools:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
 from .card_mesh import CardMesh
+from .order_alpha import LEAST_ALPHA, OPAQUE_ALPHA, alpha_at, seen_from_afar
 from .order_views import (
     LOWEST,
     Fragments,
@@ -22,11 +23,11 @@ from .order_views import (
     view_directions,
 )
 
-#: What a card is taken to cover, since its texture may change after it was sorted. More would see
-#: too few of the layers, less those that hardly show.
+#: What cards without a texture are taken to cover. More would see too few of the layers, less those
+#: that hardly show.
 OPACITY = 0.4
 #: A pair that changes its pixel's colour by less than this share is left out.
-LEAST_WEIGHT = 0.02
+LEAST_WEIGHT = 0.004
 #: Weights are whole numbers, so that their sums do not hang on the order of adding.
 _UNIT = 1000
 #: Views at work at the same time; numpy lets other threads run most of the time.
@@ -55,12 +56,20 @@ _NAMES = ("behind", "before", "weight", "facing")
 
 
 def pairs_by_view(
-    mesh: CardMesh, head: Surface | None, view_count: int, size: int
+    mesh: CardMesh, head: Surface | None, view_count: int, size: int, alpha: Floats | None = None
 ) -> Iterator[Pairs]:
-    """What each of many parallel views around the head sees, `size` pixels across."""
+    """What each of many parallel views around the head sees, `size` pixels across.
+
+    Args:
+        alpha: (height, width) of the cards' texture; None takes cards that cover evenly.
+    """
+    if alpha is not None:
+        _, radius = sphere_of(mesh)
+        alpha = seen_from_afar(alpha, mesh, 2.0 * radius / size)
 
     def seen(direction: Floats) -> Pairs:
-        return all_pairs([pairs_of(met) for met in _both_ways(mesh, head, direction, size)])
+        both_ways = _both_ways(mesh, head, direction, size, alpha)
+        return all_pairs([pairs_of(met, covers) for met, covers in both_ways])
 
     with ThreadPoolExecutor(_THREADS) as threads:
         yield from threads.map(seen, view_directions(view_count))
@@ -72,56 +81,71 @@ def all_pairs(found: Sequence[Pairs]) -> Pairs:
 
 
 def _both_ways(
-    mesh: CardMesh, head: Surface | None, direction: Floats, size: int
-) -> Iterator[Fragments]:
-    """What is seen from there and, unless that is from too far below, from the opposite side.
+    mesh: CardMesh, head: Surface | None, direction: Floats, size: int, alpha: Floats | None
+) -> Iterator[tuple[Fragments, Floats]]:
+    """What is seen from there and, unless that is from too far below, from the opposite side; and
+    how much it covers.
 
     Parallel views from opposite sides have the same fragments in opposite order.
     """
     view = View(*sphere_of(mesh), direction, size)
     met = far_to_near(fragments(view, mesh.positions, mesh.triangles))
+    if alpha is None:
+        covers = np.full(len(met.pixel), OPACITY)
+    else:
+        covers = alpha_at(mesh, met, alpha)
+    is_opaque = covers >= OPAQUE_ALPHA
     body = None if head is None else fragments(view, head.positions, head.triangles)
     for sign in (1.0, -1.0):
         if sign * direction[2] < np.sin(np.radians(LOWEST)):
             continue
+        # opaque pixels have a pass of their own, which hides what lies behind them
         limit = np.full(size * size, -np.inf, np.float32)
+        near = np.float32(sign) * met.near
+        np.maximum.at(limit, met.pixel[is_opaque], near[is_opaque])
         if body is not None:
             np.maximum.at(limit, body.pixel, np.float32(sign) * body.near)
-        seen = met[np.float32(sign) * met.near > limit[met.pixel]]
+        is_seen = (near > limit[met.pixel]) & (covers >= LEAST_ALPHA) & ~is_opaque
+        seen, share = met[is_seen], covers[is_seen]
         if sign > 0.0:
-            yield seen
+            yield seen, share
         else:
             back = seen[np.arange(len(seen.pixel))[::-1]]
-            yield Fragments(
-                back.pixel, back.triangle, -back.near, ~back.is_front, back.second, back.third
-            )
+            turned = replace(back, near=-back.near, is_front=~back.is_front)
+            yield turned, share[::-1]
 
 
-def pairs_of(met: Fragments) -> Pairs:
+def pairs_of(met: Fragments, covers: Floats) -> Pairs:
     """All pairs of fragments that share a pixel, as far in as it matters.
 
-    With n fragments before the nearer one and m between them, exchanging the two changes the colour
-    by opacity^2 (1 - opacity)^(n + m) times the difference of theirs.
+    Exchanging two changes the colour by the difference of theirs times what both cover and what all
+    others that lie before the farther one let through.
 
     Args:
         met: those of a pixel one after the other, the farthest first.
+        covers: (fragment_count,) below 1.
     """
     count = len(met.pixel)
     is_last = np.ones(count, bool)
     is_last[:-1] = met.pixel[1:] != met.pixel[:-1]
     ends = np.flatnonzero(is_last)
     in_front = np.repeat(ends, np.diff(ends, prepend=-1)) - np.arange(count)
-    between = np.arange(int(in_front.max(initial=0)))
-    weight_of = np.append(0.0, OPACITY**2 * (1.0 - OPACITY) ** between)
-    is_seen = (in_front > 0) & (weight_of >= LEAST_WEIGHT)[in_front]
-    behind, depth = np.flatnonzero(is_seen), in_front[is_seen]
-    apart = range(1, int(depth.max(initial=0)) + 1)
-    steps = [np.stack([behind[depth >= far], behind[depth >= far] + far]) for far in apart]
-    behind, before = np.concatenate([np.zeros((2, 0), np.int64), *steps], axis=1)
+    # the logarithm of what all before a fragment let through
+    through = np.log1p(-covers.astype(np.float64)).cumsum()
+    through = np.repeat(through[ends], np.diff(ends, prepend=-1)) - through
+    found = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))]
+    for apart in range(1, int(in_front.max(initial=0)) + 1):
+        behind = np.flatnonzero(in_front >= apart)
+        before = behind + apart
+        others = np.exp(through[behind]) / (1.0 - covers[before])
+        weight = covers[behind] * covers[before] * others
+        matters = weight >= LEAST_WEIGHT
+        found.append((behind[matters], before[matters], weight[matters]))
+    behind, before, weight = (np.concatenate(each) for each in zip(*found, strict=True))
     facing = np.where(met.is_front[behind] == met.is_front[before], met.is_front[behind], 2)
     return Pairs(
         met.triangle[behind].astype(np.int32),
         met.triangle[before].astype(np.int32),
-        np.rint(_UNIT * weight_of[in_front[behind]]).astype(np.int32),
+        np.rint(_UNIT * weight).astype(np.int32),
         facing.astype(np.int8),
     )

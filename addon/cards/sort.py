@@ -69,6 +69,7 @@ def card_orders(
     by: SortBy = "pieces",
     apart: Collection[int] | None = None,
     view_count: int = VIEW_COUNT,
+    alpha: Floats | None = None,
 ) -> CardOrders:
     """The best orders that hold for all views around the head; the same for the same cards,
     whatever order they come in.
@@ -82,8 +83,10 @@ def card_orders(
         apart: groups that are drawn on their own after all others, so that they can be left out or
             moved; None finds those that dangle.
         view_count: directions to look from. A third is enough for coarser levels of detail.
+        alpha: (height, width) of the texture, which says what of a card can be seen at all, and
+            how much behind it; None takes cards that cover evenly.
     """
-    return result_of(order_steps(mesh, head, by, apart, view_count))
+    return result_of(order_steps(mesh, head, by, apart, view_count, alpha))
 
 
 def order_steps(
@@ -92,10 +95,11 @@ def order_steps(
     by: SortBy = "pieces",
     apart: Collection[int] | None = None,
     view_count: int = VIEW_COUNT,
+    alpha: Floats | None = None,
 ) -> Generator[float, None, CardOrders]:
     """As card_orders, some views a step; each gives the share that is done."""
     numbered = canonical(mesh)
-    orders = yield from _canonical_orders(numbered.mesh, head, by, apart, view_count)
+    orders = yield from _canonical_orders(numbered.mesh, head, by, apart, view_count, alpha)
     return CardOrders(numbered.triangle[orders.front], numbered.triangle[orders.back])
 
 
@@ -105,6 +109,7 @@ def _canonical_orders(
     by: SortBy,
     apart: Collection[int] | None,
     view_count: int,
+    alpha: Floats | None,
 ) -> Generator[float, None, CardOrders]:
     """As order_steps, of a mesh that is numbered by canonical.py."""
     distance = card_distances(mesh, head)
@@ -114,7 +119,7 @@ def _canonical_orders(
     if by == "distance" or len(mesh.triangles) > MOST_TRIANGLES:
         return CardOrders(_triangles_of(mesh, inside_out), _triangles_of(mesh, outside_in))
     found = []
-    for seen in pairs_by_view(mesh, head, view_count, VIEW_SIZE):
+    for seen in pairs_by_view(mesh, head, view_count, VIEW_SIZE, alpha):
         found.append(seen)
         if len(found) % _VIEWS_PER_STEP == 0:
             yield _SHARE_OF_VIEWS * len(found) / view_count

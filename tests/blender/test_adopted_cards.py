@@ -242,21 +242,40 @@ def test_a_vertex_group_is_drawn_after_all_others(shells, sphere, evaluated):
         sort_mesh(shells, evaluated(), SortChoices(head=sphere, dangling="Outer"))
 
 
-def test_alpha_comes_from_the_material(shells, sphere, evaluated):
-    sort_mesh(shells, evaluated(), SortChoices(head=sphere, occlusion=QUICK))
-    opaque = values(shells.data, "occlusion")
+def clear_material(obj):
+    """One whose picture is clear everywhere."""
     material = bpy.data.materials.new("Hair")
-    shells.data.materials.append(material)
+    obj.data.materials.append(material)
     image = bpy.data.images.new("Clear", 4, 4, alpha=True)
     image.pixels.foreach_set(np.tile(np.float32([1.0, 1.0, 1.0, 0.0]), 16))
     surface = material.node_tree.nodes["Principled BSDF"]
     picture = material.node_tree.nodes.new("ShaderNodeTexImage")
     picture.image = image
     material.node_tree.links.new(picture.outputs["Alpha"], surface.inputs["Alpha"])
+
+
+def test_alpha_comes_from_the_material(shells, sphere, evaluated):
+    sort_mesh(shells, evaluated(), SortChoices(head=sphere, occlusion=QUICK))
+    opaque = values(shells.data, "occlusion")
+    clear_material(shells)
     done = sort_mesh(shells, evaluated(), SortChoices(head=sphere, occlusion=QUICK))
     clear = values(shells.data, "occlusion")
     assert done.notes == ()
     assert (clear >= opaque - 1e-6).all() and clear.mean() > opaque.mean() + 0.1
+
+
+def test_the_order_goes_by_what_the_material_lets_see(shells, sphere, evaluated):
+    """Cards that are clear all over have none, and stay in the order of their distance."""
+
+    def order(by):
+        sort_mesh(shells, evaluated(), SortChoices(head=sphere, by=by, occlusion=None))
+        return polygons(shells.data)
+
+    sphere.location.x = 0.4  # so that the distance from it is not the best order
+    seen, by_distance = order("pieces"), order("distance")
+    assert seen != by_distance
+    clear_material(shells)
+    assert order("pieces") == by_distance
 
 
 def test_the_operator_sorts_reports_and_can_be_undone(extension, shells, sphere):

@@ -108,11 +108,12 @@ def sort_steps(
     notes = list(source.notes)
     apart = [_DANGLING] if choices.dangling else None
     part_count = 1.0 if choices.occlusion is None else 2.0
-    ordering = order_steps(mesh, source.head, choices.by, apart)
+    needs_alpha = choices.by != "distance" or choices.occlusion is not None
+    alpha, problems = alpha_of(obj, choices.alpha) if needs_alpha else (None, [])
+    ordering = order_steps(mesh, source.head, choices.by, apart, alpha=alpha)
     orders = yield from retold(ordering, lambda share: share / part_count)
     order = orders.front
     if choices.occlusion is not None:
-        alpha, problems = alpha_of(obj, choices.alpha)
         bodies = [] if source.head is None else [source.head]
         others, doubts = other_cards(choices.occlusion, obj, depsgraph)
         problems += doubts
@@ -122,7 +123,7 @@ def sort_steps(
         corner = np.zeros(len(obj.data.loops), np.int32)
         corner[source.corner] = source.cards.corner
         problems += write_shares(obj.data, source.cards.vertex, corner, openness, mesh.along)
-        notes += problems
+    notes += problems
     moved = reorder_faces(obj.data, face_order(source.polygon[order]))
     return SortedCards(mesh.card_count, len(obj.data.polygons), moved, tuple(notes))
 

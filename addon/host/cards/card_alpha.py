@@ -13,16 +13,17 @@ from ..pictures.images import read_image
 def alpha_of(
     obj: bpy.types.Object, chosen: bpy.types.Image | None = None
 ) -> tuple[Floats | None, list[str]]:
-    """Where cards are clear, (height, width), and why not; None for opaque cards."""
+    """Where cards are clear, (height, width), and why not; None where they cover all over."""
     image = chosen or alpha_image(obj)
     if image is None:
-        return None, ["No material has a picture for its alpha, so cards counted as opaque"]
+        problem = "No material has a picture for its alpha"
+        return None, [f"{problem}, so cards counted as covered all over"]
     place = f"Image '{image.name}'"
     try:
         picture = read_image(image, is_color=False, place=place)
         return picture_as("alpha", picture, place=place), []
     except HairloomError as error:
-        return None, [f"{error} Until then cards counted as opaque"]
+        return None, [f"{error} Until then cards counted as covered all over"]
 
 
 def alpha_image(obj: bpy.types.Object) -> bpy.types.Image | None:

@@ -49,10 +49,15 @@ def falling(count: int, *, groups: int = 2, cv_count: int = 12, seed: int = 0) -
     )
 
 
-def built(strands: StrandSet, atlas: AtlasSettings = MADE, **changed: object) -> CardBuild:
+def built(
+    strands: StrandSet,
+    atlas: AtlasSettings = MADE,
+    alpha: np.ndarray | None = None,
+    **changed: object,
+) -> CardBuild:
     rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
     settings = CardSettings(**{"way": "clusters", "card_count": 30, **changed})  # type: ignore[arg-type]
-    return card_flow.card_build(rig, settings, atlas, FEW_RAYS, ambient=DENSE)
+    return card_flow.card_build(rig, settings, atlas, FEW_RAYS, lambda _: alpha, ambient=DENSE)
 
 
 @pytest.mark.parametrize("way", ["clusters", "guides"])
@@ -207,6 +212,16 @@ def test_the_order_is_the_one_that_was_chosen_and_its_faults_are_told(by: str) -
     again = wrong_share(mesh, None, back=back, view_count=8)
     assert 0.0 < build.wrong_share < 1.0
     assert build.wrong_share == pytest.approx(again)
+
+
+def test_cards_that_are_clear_stay_in_the_order_of_their_distance() -> None:
+    """The search has nothing to better there."""
+    clear = np.zeros((4, 4), np.float32)
+    seen, unseen, by_distance = (
+        built(falling(900), levels=1, order_by=by, alpha=alpha).finest.card.tolist()
+        for by, alpha in (("cards", None), ("cards", clear), ("distance", None))
+    )
+    assert unseen == by_distance != seen
 
 
 def test_notes_go_by_how_wide_strands_are_drawn() -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sheets import VIEW, sheets
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.order_check import (
@@ -16,28 +17,6 @@ from hairloom.addon.cards.order_check import (
 )
 from hairloom.addon.cards.order_views import View
 from hairloom.addon.strands import Surface
-
-VIEW = View(np.array([0.01, 0.0, 0.004]), 1.0, np.array([0.0, -1.0, 0.0]), 32)
-
-
-def sheets(depths: tuple[float, ...], turned: tuple[bool, ...] = ()) -> CardMesh:
-    """Square sheets of half the picture's width; the larger depth is nearer to the eye of VIEW."""
-    square = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]) * 0.5
-    points = np.concatenate([square - [0.0, depth, 0.0] for depth in depths])
-    faces = np.array([[0, 1, 2], [0, 2, 3]])
-    turned = turned or (False,) * len(depths)
-    triangles = [4 * card + (faces[:, ::-1] if over else faces) for card, over in enumerate(turned)]
-    ones = np.ones(len(points))
-    return CardMesh(
-        positions=points,
-        triangles=np.concatenate(triangles),
-        uv=np.tile([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], (len(depths), 1)),
-        normal=points,
-        tangent=points,
-        occlusion=ones,
-        card=np.repeat(np.arange(len(depths)), 2),
-        along=ones,
-    )
 
 
 def share(
