@@ -3,9 +3,6 @@
 Sintel's hair from eight sides at one metre, by one sun and the world's light, in front of a head
 that hides what is behind it: strands above, cards below, of two looks and two widths of strands.
 With deep shadows each has those of its own hair; without, what comes of ambient occlusion.
-Strands are hashed, so that the mean colour of a picture is that of all strands that are seen: of
-layers the nearest in each pixel count for those behind them, which in pictures as small as these
-shows strands that lie farther outside, and are lit more, than those of larger pictures.
 """
 
 from __future__ import annotations
@@ -115,7 +112,7 @@ def _strands(rig: Rig, look: str, width: float, occlusion: np.ndarray) -> Snapsh
         lights=(Light.sun(SUN, (1.0, 1.0, 1.0), STRENGTH),),
         ambient=WORLD,
         shading=_look(look),
-        strand_settings=StrandSettings(width_scale=width, transparency="hashed"),
+        strand_settings=StrandSettings(width_scale=width),
     )
 
 

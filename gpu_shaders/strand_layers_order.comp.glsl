@@ -1,22 +1,88 @@
-// Strands as layers, second step, one invocation a pixel that has hair. Its list becomes that of what
-// is seen: the nearest LAYERS in order, as far as enough light comes from behind them. In place of its
-// depth a node has the share of its colour in the pixel's light; what lies deeper covers as much as it
-// does, in the mean colour of those that are seen. `layer_seen` has the numbers of all that are left.
+// Strands as layers, second step, one invocation a pixel that has hair. Its list becomes that of the
+// layers that are shaded, in order: the nearest, as far as enough light comes from behind them, or, where
+// these are more than LAYERS, so many that stand for all. In place of its depth a node has its share of
+// the pixel's light. `layer_seen` has the numbers of all that are left.
 //
-// Twin of over_nearest in addon/shading/volume/transparency.py.
-#include "lib_layer_packing.glsl"
+// Twin of layer_shares in addon/shading/volume/transparency.py.
+#include "lib_layer_sort.glsl"
 
-struct Layer {
-  uint depth, strand, word, number;
-};
+// The list as it is found: the last layer waits until the next one is known.
+uint first_kept = 0u, last_kept = 0u, kept_count = 0u;
+uvec4 last_node;
 
-// Nearest first. Depths of equal layers are floats' bits, which order as the floats do above 0. Where
-// two are equal, what belongs to the strands decides, not when they were drawn.
-bool is_before(Layer one, Layer other)
+void keep_layer(uint number, uvec4 node, float share)
 {
-  return one.depth != other.depth ? one.depth < other.depth :
-         one.word != other.word   ? one.word < other.word :
-                                    one.strand < other.strand;
+  if (last_kept == 0u) {
+    first_kept = number;
+  }
+  else {
+    imageStore(layer_nodes, layer_texel(last_kept), uvec4(number, last_node.yzw));
+  }
+  last_kept = number;
+  last_node = uvec4(0u, floatBitsToUint(share), node.zw);
+  kept_count++;
+}
+
+// x the share of light that comes from behind all, y the depth from which on half of it is hidden, 2
+// where it never is.
+vec2 hidden_by(uint sorted)
+{
+  float through = 1.0, front = 2.0;
+  uint number = sorted;
+  while (number != 0u) {
+    uvec4 node = imageLoad(layer_nodes, layer_texel(number));
+    through *= 1.0 - layer_alpha(node.w);
+    front = front > 1.0 && through <= 0.5 ? uintBitsToFloat(node.y) : front;
+    number = node.x;
+  }
+  return vec2(through, front);
+}
+
+// What one of LAYERS layers stands for: those that have more of the light count by what they have, and
+// the others share out what is left.
+float share_of_one(uint sorted, float covered)
+{
+  float threshold = covered / float(LAYERS);
+  int large = 0, before = 0;
+  do {
+    before = large;
+    large = 0;
+    float left = covered, through = 1.0;
+    uint number = sorted;
+    while (number != 0u) {
+      uvec4 node = imageLoad(layer_nodes, layer_texel(number));
+      float weight = through * layer_alpha(node.w);
+      through *= 1.0 - layer_alpha(node.w);
+      bool is_large = weight > threshold;
+      left -= is_large ? weight : 0.0;
+      large += is_large ? 1 : 0;
+      number = node.x;
+    }
+    float next = left / float(max(LAYERS - large, 1));
+    threshold = clamp(next, 1.0e-6, threshold);
+  } while (large > before);
+  return threshold;
+}
+
+// Of many layers those that stand for all: where their light, summed up from the nearest on, passes the
+// middle of one share after the other.
+void keep_some(uint sorted, float covered)
+{
+  float threshold = share_of_one(sorted, covered);
+  float through = 1.0, passed = 0.5;
+  uint number = sorted;
+  while (number != 0u) {
+    uvec4 node = imageLoad(layer_nodes, layer_texel(number));
+    float weight = through * layer_alpha(node.w);
+    through *= 1.0 - layer_alpha(node.w);
+    bool is_large = weight > threshold;
+    passed += is_large ? 0.0 : weight / threshold;
+    if (is_large || passed >= 1.0) {
+      keep_layer(number, node, max(weight, threshold) / covered);
+      passed -= is_large ? 0.0 : 1.0;
+    }
+    number = node.x;
+  }
 }
 
 void main()
@@ -28,28 +94,19 @@ void main()
   }
   uint packed_pixel = imageLoad(layer_pixels, place).x;
   ivec2 pixel = ivec2(int(packed_pixel & 0xFFFFu), int(packed_pixel >> 16u));
-  Layer nearest[LAYERS];
+  uint head = imageLoad(layer_heads, pixel).x;
+  uvec4 nearest[LAYERS];
   for (int i = 0; i < LAYERS; i++) {
-    nearest[i] = Layer(0xFFFFFFFFu, 0u, 0u, 0u);
+    nearest[i] = NO_LAYER;
   }
   float behind_all = 1.0;
-  uint number = imageLoad(layer_heads, pixel).x;
+  int count = 0;
+  uint number = head;
   while (number != 0u) {
     uvec4 node = imageLoad(layer_nodes, layer_texel(number));
-    Layer found = Layer(node.y, node.z, node.w, number);
     behind_all *= 1.0 - layer_alpha(node.w);
-    for (int i = 0; i < LAYERS; i++) {
-      Layer kept = nearest[i];
-      bool is_nearer = is_before(found, kept);
-      nearest[i].depth = is_nearer ? found.depth : kept.depth;
-      nearest[i].strand = is_nearer ? found.strand : kept.strand;
-      nearest[i].word = is_nearer ? found.word : kept.word;
-      nearest[i].number = is_nearer ? found.number : kept.number;
-      found.depth = is_nearer ? kept.depth : found.depth;
-      found.strand = is_nearer ? kept.strand : found.strand;
-      found.word = is_nearer ? kept.word : found.word;
-      found.number = is_nearer ? kept.number : found.number;
-    }
+    put_layer(nearest, uvec4(number, node.yzw));
+    count++;
     number = node.x;
   }
 
@@ -57,24 +114,36 @@ void main()
   float through = 1.0, front = 2.0;
   int seen = 0;
   for (int i = 0; i < LAYERS; i++) {
-    bool is_seen = nearest[i].number != 0u && (i == 0 || through - behind_all >= {{unseen_share}});
-    float alpha = is_seen ? layer_alpha(nearest[i].word) : 0.0;
+    bool is_seen = nearest[i].x != 0u && (i == 0 || through - behind_all >= {{unseen_share}});
+    float alpha = is_seen ? layer_alpha(nearest[i].w) : 0.0;
     shares[i] = through * alpha;
     through *= 1.0 - alpha;
     bool is_front = is_seen && front > 1.0 && through <= 0.5;
-    front = is_front ? uintBitsToFloat(nearest[i].depth) : front;
+    front = is_front ? uintBitsToFloat(nearest[i].y) : front;
     seen = is_seen ? i + 1 : seen;
   }
-  imageStore(layer_fronts, pixel, vec4(front, 1.0 - behind_all, 0.0, 0.0));
-  uint first = imageAtomicAdd(layer_count, ivec2(2, 0), uint(seen)) + 1u;
-  for (int i = 0; i < LAYERS; i++) {
-    if (i < seen) {
-      uint next = i + 1 < seen ? nearest[min(i + 1, LAYERS - 1)].number : 0u;
-      uint share = floatBitsToUint(shares[i] / max(1.0 - through, 1.0e-6));
-      ivec2 texel = layer_texel(nearest[i].number);
-      imageStore(layer_nodes, texel, uvec4(next, share, nearest[i].strand, nearest[i].word));
-      imageStore(layer_seen, layer_texel(first + uint(i)), uvec4(nearest[i].number));
+  if (count > LAYERS && through - behind_all >= {{unseen_share}}) {
+    uint sorted = sorted_layers(head);
+    vec2 hidden = hidden_by(sorted);
+    behind_all = hidden.x;
+    front = hidden.y;
+    keep_some(sorted, 1.0 - behind_all);
+  }
+  else {
+    for (int i = 0; i < LAYERS; i++) {
+      if (i < seen) {
+        keep_layer(nearest[i].x, nearest[i], shares[i] / max(1.0 - through, 1.0e-6));
+      }
     }
   }
-  imageStore(layer_heads, pixel, uvec4(nearest[0].number));
+  imageStore(layer_nodes, layer_texel(last_kept), last_node);
+  imageStore(layer_fronts, pixel, vec4(front, 1.0 - behind_all, 0.0, 0.0));
+  imageStore(layer_heads, pixel, uvec4(first_kept));
+  uint at = imageAtomicAdd(layer_count, ivec2(2, 0), kept_count) + 1u;
+  number = first_kept;
+  while (number != 0u) {
+    imageStore(layer_seen, layer_texel(at), uvec4(number));
+    at++;
+    number = imageLoad(layer_nodes, layer_texel(number)).x;
+  }
 }

@@ -50,6 +50,8 @@ LAYER_TEXEL_CAPACITY = 18
 START_SCALE = float(1 << 24)
 #: Strands' fragments in one row of the texture that holds the lists of all pixels.
 LAYER_ROW = 4096
+#: binary digits of how many layers a pixel may have
+LIST_DIGITS = 26
 #: Triangles, seams and copies of seams' ends in one row of the textures of skin.
 SKIN_TRIANGLES_ACROSS, SKIN_SEAMS_ACROSS, SKIN_COPIES_ACROSS = 1024, 1024, 4096
 #: Pixels between the layers of a map that are shown side by side.
@@ -101,6 +103,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "least_thickness": repr(LEAST_THICKNESS),
         "layer_row": str(LAYER_ROW),
         "unseen_share": repr(UNSEEN_SHARE),
+        "list_digits": str(LIST_DIGITS),
         "skin_triangles_across": str(SKIN_TRIANGLES_ACROSS),
         "skin_seams_across": str(SKIN_SEAMS_ACROSS),
         "skin_copies_across": str(SKIN_COPIES_ACROSS),

@@ -1,4 +1,4 @@
-"""Strands as layers: the lists of all pixels, of which the nearest are shaded and added up.
+"""Strands as layers: the lists of all pixels, of which some stand for all, shaded and added up.
 
     count   R32UI 3 x 1:   how many fragments there are, how many pixels that have some, and how
                            many fragments are seen

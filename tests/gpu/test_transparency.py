@@ -12,7 +12,12 @@ import pytest
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
-from hairloom.addon.shading.volume.transparency import over_nearest, strip_coverage
+from hairloom.addon.shading.volume.transparency import (
+    LAYERS,
+    layer_shares,
+    over_layers,
+    strip_coverage,
+)
 from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -164,13 +169,76 @@ def test_crossing_strands_are_those_sorted_in_numpy(
     tint = np.clip(tint, 0.0, 1.0)[..., None]
     colors = brightness[:, None] * (1.0 + tint * (np.array(COLORED.tip_color) - 1.0))
     count = alpha.shape[1]
-    exact = over_nearest(depth, alpha, colors, layers=count, unseen_share=0.0)
+    exact = over_layers(depth, alpha, colors, layers=count, unseen_share=0.0)
     assert ((alpha > 0.0).sum(axis=1) > 8).any(), "more than are kept"
     assert np.abs(found - exact).mean() < 0.02
     assert opacity < 1.0 or np.abs(found - exact).mean() < 0.004
     assert np.abs(found[:, 3] - exact[:, 3]).mean() < 1e-3
-    same = over_nearest(depth, alpha, colors)
+    same = over_layers(depth, alpha, colors)
     assert np.abs(found - same).mean() < 0.002
+
+
+def seen_at_points(strands: np.ndarray, width: float, brightness: np.ndarray) -> float:
+    """Mean brightness of the nearest strand at places of the picture, where there is one.
+
+    Strands are straight and opaque, along +y from the eye, without perspective.
+    """
+    places = np.random.default_rng(2).uniform(0.0, SIZE, (6000, 2))
+    ends = strands[..., [0, 2]]
+    run = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(run, axis=-1)
+    away = places[:, None] - ends[None, :, 0]
+    share = (away * run).sum(-1) / length**2
+    distance = (away[..., 0] * -run[:, 1] + away[..., 1] * run[:, 0]) / length
+    is_there = (np.abs(distance) < width / 2.0) & (share >= 0.0) & (share <= 1.0)
+    depth = strands[:, 0, 1] + share * (strands[:, 1, 1] - strands[:, 0, 1])
+    nearest = np.where(is_there, depth, np.inf).argmin(axis=1)
+    return float(brightness[nearest[is_there.any(axis=1)]].mean())
+
+
+@pytest.mark.parametrize("opacity", [1.0, 0.3])
+def test_hair_is_as_bright_in_small_pictures(frame: Any, front: Any, opacity: float) -> None:
+    """Strands get darker farther in, and the fewer pixels, the more of them lie in each."""
+    random = np.random.default_rng(14)
+    width, count = 0.35, 2500
+    strands, _ = crossing(count, random)
+    strands[..., 1] = random.uniform(-40.0, 40.0, (count, 1))
+    brightness = 0.9 - (strands[:, 0, 1] + 40.0) / 100.0
+    settings = StrandSettings(tip_width=1.0, opacity=opacity)
+    shown = snapshot_of(
+        frame,
+        strands,
+        width / 2.0,
+        occlusion=np.repeat(brightness[:, None], 2, axis=1).astype(np.float32),
+        strand_settings=settings,
+        detail=DetailSettings(full_size=0.0, mode="fixed", subdivisions=1),
+    )
+    pictures = {
+        size: frame.render_image(shown, front, size, size, 1) for size in (12, 24, 48, 96, 384)
+    }
+    means = {size: p[..., 0].sum() / p[..., 3].sum() for size, p in pictures.items()}
+    expected = seen_at_points(strands, width, brightness) if opacity == 1.0 else means[384]
+    assert expected < 0.8, "more is seen than the outermost"
+    assert list(means.values()) == pytest.approx([expected] * len(means), rel=0.02)
+    large = pictures[384].reshape(24, 16, 24, 16, 4).mean(axis=(1, 3))
+    assert np.abs(pictures[24] - large).mean() < 0.03
+
+
+def test_layers_that_are_shaded_stand_for_all_of_them() -> None:
+    """So many at most, and with all of the light; what has much of it by what it has."""
+    random = np.random.default_rng(15)
+    depths, alphas = random.random((500, 60)), 0.3 * random.random((500, 60)) ** 2
+    alphas[:, 7] = 0.6
+    exact = layer_shares(depths, alphas, layers=60, unseen_share=0.0)
+    shares = layer_shares(depths, alphas)
+    covered = 1.0 - np.prod(1.0 - alphas, axis=1)
+    assert ((shares > 0.0).sum(axis=1) <= LAYERS).all()
+    assert shares.sum(axis=1) == pytest.approx(covered)
+    assert exact.sum(axis=1) == pytest.approx(covered)
+    is_large = exact > covered[:, None] / LAYERS
+    assert is_large.any() and shares[is_large] == pytest.approx(exact[is_large])
+    of_depth = (shares * depths).sum(axis=1) - (exact * depths).sum(axis=1)
+    assert abs(of_depth.mean()) < 0.01 and np.abs(of_depth).max() < 0.05
 
 
 @pytest.mark.parametrize("mode", ["fixed", "adaptive"])

@@ -5,8 +5,13 @@
     over      C = sum of a_i T_i c_i from near to far, T_i = product of (1 - a_j) of all before it
               (Porter and Duff 1984)
 
-`over_nearest` is what the GPU does: it needs no order but that of the nearest. Twin of
-lib_coverage.glsl and of strand_layers_order.comp.glsl.
+Many thin strands may lie in a pixel, far more than can be shaded. `layer_shares` chooses those
+that stand for all of them, by how much of the light is theirs; were it the nearest, small pictures
+would show the outermost strands alone, which are lit more. They are chosen as in VarOpt (Cohen et
+al. 2009), where single items that weigh much stay as they are and others share out the rest, but
+evenly along the way of light, not by chance. So strands that have not moved are drawn as before.
+
+Twin of lib_coverage.glsl and of strand_layers_order.comp.glsl.
 """
 
 from __future__ import annotations
@@ -17,7 +22,8 @@ from ...arrays import Floats
 
 #: Layers of a pixel that are shaded, at most.
 LAYERS = 8
-#: Layers are shaded until no more than this share of the pixel's light comes from behind them.
+#: Layers are shaded until no more than this share of the pixel's light comes from behind them,
+#: where that are not more of them.
 UNSEEN_SHARE = 0.03
 
 
@@ -48,7 +54,7 @@ def strip_coverage(distance: Floats, half_width: Floats, normal: Floats) -> Floa
     return above - share_below(distance - half_width, normal)
 
 
-def over_nearest(
+def over_layers(
     depths: Floats,
     alphas: Floats,
     colors: Floats,
@@ -57,26 +63,60 @@ def over_nearest(
 ) -> Floats:
     """Layers of pixels one over the other, premultiplied (pixel_count, 4).
 
-    The nearest count in full, until hardly any light comes from behind them; what lies deeper
-    covers as much as it does, in the mean colour of those.
+    Args:
+        depths, alphas, layers, unseen_share: as in layer_shares.
+        colors: (pixel_count, n, 3).
+    """
+    shares = layer_shares(depths, alphas, layers, unseen_share)
+    light = np.einsum("pn,pnc->pc", shares, colors)
+    return np.column_stack([light, 1.0 - np.prod(1.0 - alphas, axis=-1)])
+
+
+def layer_shares(
+    depths: Floats,
+    alphas: Floats,
+    layers: int = LAYERS,
+    unseen_share: float = UNSEEN_SHARE,
+) -> Floats:
+    """The light of each layer that is shaded, (pixel_count, n): their sum is what all cover.
+
+    The nearest are, until hardly any light comes from behind them; where these are too many, so
+    many of all that stand for the others.
 
     Args:
         depths: (pixel_count, n), in any order; ties go by alpha.
         alphas: (pixel_count, n), 0 where there is no layer.
-        colors: (pixel_count, n, 3).
-        layers: how many count in full, at most; n of them and an unseen_share of 0 are exact.
+        layers: how many are shaded, at most; n of them and an unseen_share of 0 are exact.
     """
     order = np.lexsort((alphas, depths, alphas == 0.0), axis=-1)
     alphas = np.take_along_axis(alphas, order, axis=-1)
-    colors = np.take_along_axis(colors, order[..., None], axis=-2)
-    behind_all = np.prod(1.0 - alphas, axis=-1)
-    through = np.ones(len(alphas))
-    light = np.zeros((len(alphas), 3))
-    for layer in range(min(layers, alphas.shape[-1])):
-        is_seen = (layer == 0) | (through - behind_all >= unseen_share)
-        alpha = np.where(is_seen, alphas[:, layer], 0.0)
-        light += (through * alpha)[:, None] * colors[:, layer]
-        through = through * (1.0 - alpha)
-    covered = 1.0 - behind_all
-    light *= (covered / np.maximum(1.0 - through, 1e-6))[:, None]
-    return np.column_stack([light, covered])
+    through = np.cumprod(1.0 - alphas, axis=-1)
+    before = np.column_stack([np.ones(len(alphas)), through[:, :-1]])
+    weights, covered = before * alphas, 1.0 - through[:, -1:]
+    is_seen = (alphas > 0.0) & (before - through[:, -1:] >= unseen_share)
+    is_seen[:, 0] = alphas[:, 0] > 0.0
+    nearest = np.where(is_seen, weights, 0.0)
+    nearest *= covered / np.maximum(nearest.sum(axis=-1, keepdims=True), 1e-6)
+    is_many = is_seen.sum(axis=-1, keepdims=True) > layers
+    chosen = np.where(is_many, _chosen(weights, covered, layers), nearest)
+    shares: Floats = np.zeros_like(chosen)
+    np.put_along_axis(shares, order, chosen, axis=-1)
+    return shares
+
+
+def _chosen(weights: Floats, covered: Floats, layers: int) -> Floats:
+    """What layers stand for that are chosen of all, (pixel_count, n).
+
+    Args:
+        weights: (pixel_count, n) of the light, nearest first. covered: (pixel_count, 1), their sum.
+    """
+    threshold = np.maximum(covered / layers, 1e-6)
+    for _ in range(layers):
+        is_large = weights > threshold
+        left = covered - np.where(is_large, weights, 0.0).sum(axis=-1, keepdims=True)
+        slots = np.maximum(layers - is_large.sum(axis=-1, keepdims=True), 1)
+        threshold = np.clip(left / slots, 1e-6, threshold)
+    is_large = weights > threshold
+    passed = 0.5 + np.cumsum(np.where(is_large, 0.0, weights / threshold), axis=-1)
+    is_next = np.diff(np.floor(passed), axis=-1, prepend=0.0) > 0.0
+    return np.where(is_large, weights, np.where(is_next, threshold, 0.0))
