@@ -24,6 +24,9 @@ _SHELL_DEPTH = 2.5
 _SMALLEST_HAIR = 1.0e-4
 #: Optical depth of a cell of the body: exp(-30) is nothing.
 _OPAQUE = 30.0
+#: Segments that are cut up at once: numpy lets no other thread go on while it repeats and counts,
+#: so that more of them would stop the window.
+_AT_ONCE = 1 << 17
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,16 @@ def hair_depth(strands: StrandSet, grid: Grid) -> Floats:
     """Optical depth of the hair across each cell, sigma x cell, of the grid's shape."""
     is_segment = np.ones(strands.point_count - 1, bool)
     is_segment[strands.offsets[1:-1] - 1] = False  # from one strand's tip to the next one's root
-    start = np.flatnonzero(is_segment)
+    starts = np.flatnonzero(is_segment)
+    splat = np.zeros(int(np.prod(grid.shape)))
+    for first in range(0, len(starts), _AT_ONCE):
+        splat += _area_in_cells(strands, starts[first : first + _AT_ONCE], grid)
+    # area per volume x cell = area / cell^2; spread as a trilinear splat would, on average
+    return _spread((splat / grid.cell**2).reshape(grid.shape).astype(np.float32))
+
+
+def _area_in_cells(strands: StrandSet, start: Ints, grid: Grid) -> Floats:
+    """Seen area of the segments that begin at these CVs in each cell, (cell_count,) [m^2]."""
     way = strands.points[start + 1] - strands.points[start]
     length = np.linalg.norm(way, axis=1)
     piece_count = np.maximum(1, np.ceil(length / (0.7 * grid.cell))).astype(np.int64)
@@ -62,11 +74,9 @@ def hair_depth(strands: StrandSet, grid: Grid) -> Floats:
 
     radius = 0.5 * (strands.radius[start] + strands.radius[start + 1])
     area = (np.pi / 4.0) * 2.0 * radius * length / piece_count
-    splat = np.bincount(
-        _flat_index(middle, grid), area[segment], minlength=int(np.prod(grid.shape))
-    )
-    # area per volume x cell = area / cell^2; spread as a trilinear splat would, on average
-    return _spread((splat / grid.cell**2).reshape(grid.shape).astype(np.float32))
+    cell_count = int(np.prod(grid.shape))
+    found: Floats = np.bincount(_flat_index(middle, grid), area[segment], minlength=cell_count)
+    return found
 
 
 def body_depth(body: Surface, grid: Grid) -> Floats:

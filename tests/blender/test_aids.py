@@ -1,11 +1,20 @@
 """Lines in the viewport for what acts on the hair: each lies on what it stands for."""
 
+import threading
+import time
+
 import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.colliders import CapsuleCollider, SphereCollider, SphereSetCollider
-from hairloom.addon.host.preview import live, overlay
+from hairloom.addon.dynamics.colliders import (
+    CapsuleCollider,
+    DistanceField,
+    SphereCollider,
+    SphereSetCollider,
+)
+from hairloom.addon.host.colliders import fields
+from hairloom.addon.host.preview import live, overlay, previewed
 from hairloom.addon.host.preview.aids import KINDS, shape_lines
 
 
@@ -26,6 +35,26 @@ def lines_of(hair, session, kind):
     (lines,) = aids(session)
     assert lines.points.dtype == np.float32 and len(lines.points) % 2 == 0
     return lines.points
+
+
+def test_lines_of_a_collider_that_is_being_made_come_when_it_is_there(preview, monkeypatch):
+    hair, _, session = preview
+    is_made = threading.Event()
+    make = DistanceField.from_surface
+
+    def late(*arguments, **settings):
+        assert is_made.wait(30.0)
+        return make(*arguments, **settings)
+
+    fields.forget()
+    monkeypatch.setattr(DistanceField, "from_surface", late)
+    hair.hairloom.shown_aids = {"colliders"}
+    assert aids(session) == () and previewed.take_arrivals() == previewed.ARRIVAL_TIME
+    is_made.set()
+    while not fields.are_made():
+        time.sleep(0.001)
+    assert previewed.take_arrivals() is None
+    assert len(aids(session)) == 1
 
 
 @pytest.mark.parametrize(

@@ -2,16 +2,19 @@
 
 import threading
 import time
+from dataclasses import replace
 
 import bpy
 import numpy as np
 import pytest
 
 from hairloom.addon import pipeline
+from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.host.bakes import playback
 from hairloom.addon.host.bakes.bake import simulated_for
 from hairloom.addon.host.colliders import fields
-from hairloom.addon.host.preview import live, making, overlay, previewed, reactions
+from hairloom.addon.host.preview import late, live, making, overlay, previewed, reactions
 from hairloom.addon.host.preview.making import Order, make
 from hairloom.addon.host.preview.reading import Reading
 from hairloom.addon.host.preview.showing import shown_groom
@@ -276,3 +279,125 @@ def test_orders_tell_whether_they_give_the_same_rig(hair, evaluated, extension):
     assert reading.choices.guides.guide_count != 5, "it is not shown yet"
     reading.accept(other)
     assert reading.choices.guides.guide_count == 5
+
+
+@pytest.fixture
+def moving(sphere):
+    """The head is thrown about, and Blender plays as soon as it is told so."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 12
+    for frame, x in ((1, 0.0), (5, 0.1), (12, -0.05)):
+        sphere.location.x = x
+        sphere.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+
+
+def rounds(session, *frames):
+    """The strands in each of these frames."""
+    found = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        found.append(session.strands)
+    return np.array(found)
+
+
+def test_playback_goes_on_before_the_hair_is_made(hair, moving, evaluated, gate, monkeypatch):
+    hair.hairloom.dynamics.form = "numpy"
+    session = live.start(hair, evaluated())
+    fields.field_of(session.source.head, session.choices.dynamics, place="Head")
+    monkeypatch.setattr(playback, "is_played", lambda: True)
+    before = rounds(session, 1, 2, 3, 4)  # would wait for the gate for ever
+    assert not session.is_made and not session.is_playing and late.is_late(session)
+    assert not is_box(hair, evaluated), "Blender's own strands are there until then"
+    assert before[3, :, 0, 0].mean() > before[0, :, 0, 0].mean() + 0.01, "it goes with its body"
+    gate.set()
+    arrive(session)
+    begun = rounds(session, 5)[0]
+    assert session.is_playing and not late.is_late(session)
+    np.testing.assert_array_equal(begun, pipeline.carried(session.rig, session.solver.pose))
+    after = rounds(session, 6, 7)[1]
+    at_rest = pipeline.carried(session.rig, session.solver.pose)
+    assert np.abs(after - at_rest).max() > 1e-3, "it does not swing"
+    second = rounds(session, *range(1, 8))
+    live.stop(session)
+    bpy.context.scene.frame_set(1)  # where the first preview has begun, too
+    monkeypatch.setattr(making, "is_awaited", lambda: True)
+    again = live.start(hair, evaluated())
+    np.testing.assert_array_equal(second, rounds(again, *range(1, 8)))
+
+
+def test_playback_goes_on_before_a_collider_is_made(hair, moving, evaluated, monkeypatch):
+    opened, from_surface = threading.Event(), DistanceField.from_surface
+
+    def wait_and_make(*arguments, **named):
+        assert opened.wait(60.0)
+        return from_surface(*arguments, **named)
+
+    monkeypatch.setattr(DistanceField, "from_surface", wait_and_make)
+    session = live.start(hair, evaluated())
+    monkeypatch.setattr(making, "is_awaited", lambda: False)
+    monkeypatch.setattr(playback, "is_played", lambda: True)
+    rounds(session, 1, 2, 3)
+    assert session.is_made and not session.is_playing and late.is_late(session)
+    opened.set()
+    end = time.monotonic() + 60.0
+    while not fields.are_made():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+    rounds(session, 4)
+    assert session.is_playing and not late.is_late(session)
+
+
+def test_old_hair_goes_on_in_playback_too(playing, hair, moving, evaluated, monkeypatch):
+    opened = hold(monkeypatch)
+    monkeypatch.setattr(playback, "is_played", lambda: True)
+    rounds(playing, 1, 2)
+    hair.data.hairloom.guides.guide_count = 7
+    reactions.catch_up(evaluated())
+    shown = rounds(playing, 3, 4, 1, 2)
+    assert playing.is_pending and playing.is_playing and not late.is_late(playing)
+    assert np.abs(np.diff(shown, axis=0)).max() > 1e-3
+    opened.set()
+    arrive(playing)
+    assert len(playing.rig.guides) == 7
+
+
+def test_a_step_of_a_frame_waits_to_be_exact(hair, moving, evaluated, gate):
+    session = live.start(hair, evaluated())
+    threading.Timer(0.3, gate.set).start()
+    rounds(session, 1, 2)
+    assert session.is_made and session.is_playing
+
+
+def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, evaluated, monkeypatch):
+    bpy.ops.mesh.primitive_ico_sphere_add(radius=0.1, subdivisions=5)
+    hair = new_hair(bpy.context.object)
+    order = Reading(hair, evaluated()).ordered
+    head, searched, bind = order.source.head, [], pipeline.bind_roots
+    assert len(head.triangles) > making._LARGE
+
+    def noted(strands, surface, *, place):
+        searched.append(len(surface.triangles))
+        return bind(strands, surface, place=place)
+
+    monkeypatch.setattr(pipeline, "bind_roots", noted)
+    made = making.stand_in(order)
+    assert len(searched) == 1 and searched[0] < len(head.triangles) / 10
+    assert made.rig.head is head and not made.is_whole
+    wanted = bind(made.rig.strands, head, place="Hair").strands
+    assert np.array_equal(made.rig.strands.root_triangle, wanted.root_triangle)
+    carried = pipeline.carried(made.rig, made.rig.rest_pose)
+    assert np.array_equal(carried, made.rig.strands.grid)
+
+
+def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, evaluated):
+    bpy.ops.mesh.primitive_ico_sphere_add(radius=0.1, subdivisions=5)
+    order = Reading(new_hair(bpy.context.object), evaluated()).ordered
+    large = order.source.strands.transformed(np.diag([1000.0, 1000.0, 1000.0, 1.0]))
+    order = replace(order, source=replace(order.source, strands=large))
+    told = []
+    for make_it in (making.stand_in, making.rig_of):
+        with pytest.raises(HairloomError) as error:
+            make_it(order)
+        told.append(str(error.value))
+    assert told[0] == told[1] and "another scale" in told[0]

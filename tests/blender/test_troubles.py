@@ -145,11 +145,62 @@ def test_instances_that_the_preview_leaves_out_are_told(new_hair, sphere):
     assert troubles.instances_note(hair) == ""
     outer, inner = bpy.data.collections.new("Outer"), bpy.data.collections.new("Inner")
     outer.children.link(inner)
+    inner.objects.link(sphere)  # an instance of the head alone is no matter
     twin = bpy.data.objects.new("Twin", None)
     bpy.context.collection.objects.link(twin)
     twin.instance_type, twin.instance_collection = "COLLECTION", outer
+    bpy.context.view_layer.update()
     assert troubles.instances_note(hair) == ""
     inner.objects.link(hair)
+    bpy.context.view_layer.update()
     assert "no hair in the preview" in troubles.instances_note(hair)
     twin.instance_type = "NONE"
+    bpy.context.view_layer.update()
     assert troubles.instances_note(hair) == ""
+
+
+@pytest.mark.parametrize("what", ["object", "collection"])
+def test_instances_by_geometry_nodes_are_told_too(what, new_hair, sphere):
+    hair = new_hair(sphere)
+    collection = bpy.data.collections.new("Groom")
+    points = bpy.data.meshes.new("Points")
+    points.from_pydata([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], [], [])
+    many = bpy.data.objects.new("Many", points)
+    bpy.context.collection.objects.link(many)
+    info = instancing(many, what)
+    bpy.context.view_layer.update()
+    assert troubles.instances_note(hair) == "", "they are of nothing"
+    if what == "object":
+        info.inputs["Object"].default_value = hair
+    else:
+        collection.objects.link(hair)
+        info.inputs["Collection"].default_value = collection
+    bpy.context.view_layer.update()
+    assert "no hair in the preview" in troubles.instances_note(hair)
+    many.hide_viewport = True
+    bpy.context.view_layer.update()
+    assert troubles.instances_note(hair) == ""
+
+
+def instancing(obj, what):
+    """A modifier that puts an instance on each point; the node that says of what."""
+    tree = bpy.data.node_groups.new("Instances", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    begin, end, on_points, info = (
+        tree.nodes.new(name)
+        for name in (
+            "NodeGroupInput",
+            "NodeGroupOutput",
+            "GeometryNodeInstanceOnPoints",
+            f"GeometryNode{what.capitalize()}Info",
+        )
+    )
+    if what == "object":
+        info.inputs["As Instance"].default_value = True
+    tree.links.new(begin.outputs[0], on_points.inputs["Points"])
+    given = info.outputs["Geometry" if what == "object" else "Instances"]
+    tree.links.new(given, on_points.inputs["Instance"])
+    tree.links.new(on_points.outputs[0], end.inputs[0])
+    obj.modifiers.new("Instances", "NODES").node_group = tree
+    return info

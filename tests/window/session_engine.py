@@ -13,6 +13,7 @@ import driver
 from artist import (
     click,
     look_from_front,
+    new_head,
     open_our_sidebar,
     press,
     region,
@@ -21,14 +22,11 @@ from artist import (
     viewport,
     viewport_middle,
 )
+from driver import of_hairloom
 
 SAMPLES = 8
 #: pixels from the middle of the view that are compared
 REACH = 150
-
-
-def of_hairloom(module):
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
 
 
 def view():
@@ -39,7 +37,8 @@ def view():
 
 
 def is_finished():
-    return view() is not None and view().count == SAMPLES
+    now = view()
+    return now is not None and now.count == SAMPLES and not now.is_waiting
 
 
 def settled():
@@ -66,10 +65,7 @@ def steps():
 
 
 def set_the_scene():
-    for obj in list(bpy.data.objects):
-        bpy.data.objects.remove(obj)
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    bpy.context.object.name = "Head"
+    new_head()
     bpy.ops.object.shade_smooth()
     bpy.ops.hairloom.grow(way="normals", strand_count=800, length=0.06)
     bpy.context.object.name = "Hair"

@@ -42,12 +42,14 @@ def is_weighted_anew(session: Session, edited: set[int]) -> bool:
     return head is not None and head.data.session_uid in edited
 
 
-def is_shaded_anew(session: Session, moved: set[int], layer: bpy.types.ViewLayer) -> bool:
-    """Whether other hair has moved that shades the cards of this groom."""
+def is_shaded_anew(session: Session, changed: set[int], layer: bpy.types.ViewLayer) -> bool:
+    """Whether other hair that shades the cards of this groom may have changed, come or gone."""
     if not session.cards.is_shaded_by_others:
         return False
     others = shading_objects(session.hair.handle.find(), layer)
-    return any(each.session_uid in moved for each in others)
+    uids = {each.session_uid for each in others}
+    data = {each.data.session_uid for each in others}
+    return uids != session.cards.shaded_by or not changed.isdisjoint(uids | data)
 
 
 def is_among(session: Session, moved: set[int]) -> bool:

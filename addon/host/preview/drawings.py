@@ -31,6 +31,7 @@ def drawing_of(
     return Drawing(
         snapshot,
         is_visible=bool(seen_in),
+        is_made=session.is_made,
         seen_in=seen_in,
         hidden_in=spaces_without(hair),
         bare_in=frozenset() if head is None else spaces_without(head),

@@ -8,14 +8,17 @@ do. In the background, where nobody waits before a window, it is made at once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from ... import pipeline
 from ...arrays import Floats, Ints
+from ...errors import HairloomError
 from ...pipeline import Rig
+from ...strands import StrandSet, Surface
 from ..bakes.baked_rig import used_vertices
 from ..scene.source import Source
 from ..settings.choices import Choices
@@ -24,6 +27,8 @@ from .hiders import Hiders
 
 #: Strands that stand in for a groom until it is made.
 _FEW = 32
+#: Heads of more triangles take longer to search than an artist waits.
+_LARGE = 4000
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,13 +142,40 @@ def stand_in(order: Order) -> Made:
     Raises:
         HairloomError: as `rig_of`.
     """
-    if order.rig is not None:
-        rig = order.rig
-    else:
+    rig = order.rig
+    if rig is None:
         source, count = order.source, order.source.strands.strand_count
         few = source.strands.take(np.arange(0, count, max(count // _FEW, 1)))
-        rig = pipeline.prepare(few, source.head, order.choices.guides, place=order.name)
+        rig = _quickly_bound(few, source.head, order)
     return Made(order, rig, used_vertices(rig), is_whole=False)
+
+
+def _quickly_bound(few: StrandSet, head: Surface | None, order: Order) -> Rig:
+    """A few strands on a head of any size; of a large one the triangles near their roots will do.
+
+    Raises:
+        HairloomError: as `rig_of`.
+    """
+    if head is not None and len(head.triangles) > _LARGE:
+        near = _triangles_near(few.roots, head)
+        uv = None if head.corner_uv is None else head.corner_uv[near]
+        part = replace(head, triangles=head.triangles[near], corner_uv=uv)
+        # roots that seem far away may be near to the rest of the head
+        with suppress(HairloomError):
+            rig = pipeline.prepare(few, part, order.choices.guides, place=order.name)
+            bound = replace(rig.strands, root_triangle=near[rig.strands.root_triangle])
+            return replace(rig, strands=bound, head=head)
+    return pipeline.prepare(few, head, order.choices.guides, place=order.name)
+
+
+def _triangles_near(points: Floats, surface: Surface) -> Ints:
+    """Those at the vertices that are nearest to any of these points."""
+    middle = surface.positions.mean(axis=0)
+    vertices, asked = surface.positions - middle, points - middle
+    away = (vertices**2).sum(axis=1)[:, None] - 2.0 * vertices @ asked.T
+    is_near = np.zeros(len(vertices), bool)
+    is_near[away.argmin(axis=0)] = True
+    return np.flatnonzero(is_near[surface.triangles].any(axis=1))
 
 
 class Making:

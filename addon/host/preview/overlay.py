@@ -24,7 +24,7 @@ from ...render.strand_pass import Statistics, StrandPass
 from ...shading.lights import Light, three_point_lights
 from ..scene.lights import uses_scene_light
 from ..scene.objects import LayerKey, layer_key
-from . import view_transform
+from . import layers_shown, view_transform
 from .lines import Lines, draw_lines
 from .measures import forget, frame_line, measured
 from .overlay_text import card_counts_line, counts_line, write_lines
@@ -36,6 +36,7 @@ from .shown import with_all_strands
 class Drawing:
     """One groom as it is now.
 
+    is_made: whether there is hair yet.
     seen_in: the view layers that show it; None is all.
     hidden_in: addresses of the 3D views that do not show it.
     bare_in: of those that do not show its head, which hides nothing there.
@@ -47,6 +48,7 @@ class Drawing:
 
     snapshot: Snapshot
     is_visible: bool = True
+    is_made: bool = True
     seen_in: frozenset[LayerKey] | None = None
     hidden_in: frozenset[int] = frozenset()
     bare_in: frozenset[int] = frozenset()
@@ -132,6 +134,7 @@ def _draw(what: Callable[[Any], None]) -> None:
 
 
 def _draw_strands(context: Any) -> None:
+    layers_shown.look()
     space, view = context.space_data, context.region_data
     camera = Camera(np.array(view.view_matrix), np.array(view.window_matrix))
     address, studio = space.as_pointer(), three_point_lights(camera.view)
@@ -212,7 +215,12 @@ def statistics_of(uid: int) -> Statistics:
 
 def drawn() -> frozenset[int]:
     """Session numbers of the grooms that are drawn here, not by Blender."""
-    return frozenset(_drawings)
+    return frozenset(uid for uid, drawing in _drawings.items() if drawing.is_made)
+
+
+def expected() -> frozenset[int]:
+    """Session numbers of the grooms that are drawn here as soon as they are made."""
+    return frozenset(_drawings) - drawn()
 
 
 def is_rendered_by_us(context: Any) -> bool:
@@ -279,3 +287,4 @@ def _remove_handlers() -> None:
     for handle in _handles:
         bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
     _handles = ()
+    layers_shown.forget()

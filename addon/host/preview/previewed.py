@@ -12,9 +12,10 @@ from functools import partial
 import bpy
 
 from ...errors import HairloomError
+from ..colliders import fields
 from ..gpu_context import is_interrupted
 from ..scene.objects import is_elsewhere, is_on_screen
-from ..scene.originals import refresh_views, show_originals
+from ..scene.originals import all_depsgraphs, refresh_views, show_originals
 from . import overlay, timeline
 from .drawings import drawing_of
 from .redraw import redraw_panels, redraw_views, refresh_panels
@@ -29,6 +30,8 @@ ARRIVAL_TIME, ASKING_TIME = 0.1, 0.01
 _sessions: dict[int, Simulated] = {}
 #: uids of what is to play once its hair and its colliders are made
 _waiting: set[int] = set()
+#: uids of what is shown without the lines of colliders that are being made
+_without_lines: set[int] = set()
 _notice = ""
 
 
@@ -70,7 +73,8 @@ def stop(session: Simulated) -> None:
         return
     hair = session.hair.handle.find()
     if hair is not None:
-        show_originals(hair, bpy.context.view_layer.depsgraph, show=True)
+        for depsgraph in all_depsgraphs():
+            show_originals(hair, depsgraph, show=True)
         refresh_views()
 
 
@@ -83,6 +87,7 @@ def forget(session: Simulated) -> None:
     """As `stop` when its object is about to go: touches nothing of it."""
     _sessions.pop(session.uid, None)
     _waiting.discard(session.uid)
+    _without_lines.discard(session.uid)
     if isinstance(session, Session):
         session.forget()
     timeline.forget(session.uid)
@@ -166,12 +171,15 @@ def publish(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     if not isinstance(session, Session):
         return
     hair = session.hair.found()
-    if session.is_pending or session.cards.is_pending:
-        _await_arrivals()
     note = _note(session)
     if note:
         note = f"{hair.name}: {note}"
     overlay.show(session.uid, drawing_of(session, hair, depsgraph, note))
+    lacks_lines = session.obstacles is None and "colliders" in hair.hairloom.shown_aids
+    if lacks_lines and not fields.are_made():
+        _without_lines.add(session.uid)
+    if _is_awaited(session):
+        _await_arrivals()
     refresh_panels()
     is_replaced = hair.mode == "OBJECT" and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original and session.is_made
@@ -201,13 +209,20 @@ def take_arrivals() -> float | None:
             refresh_views()  # Blender's own strands, which were shown until now
         elif session.cards.is_pending and session.cards.serve():
             attempt(session, bpy.context.view_layer.depsgraph, Session.take_cards)
+        elif session.uid in _without_lines and fields.are_made():
+            _without_lines.discard(session.uid)
+            attempt(session, bpy.context.evaluated_depsgraph_get(), lambda _: None)
         else:
             continue
         redraw_panels()
     if any(session.cards.asks for session in sessions()):
         return ASKING_TIME
-    is_pending = any(each.is_pending or each.cards.is_pending for each in sessions())
-    return ARRIVAL_TIME if is_pending else None
+    return ARRIVAL_TIME if any(map(_is_awaited, sessions())) else None
+
+
+def _is_awaited(session: Session) -> bool:
+    """Whether something that is shown of it is being made."""
+    return session.is_pending or session.cards.is_pending or session.uid in _without_lines
 
 
 def finish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:

@@ -42,6 +42,13 @@ def settings_changed(owner: bpy.types.ID) -> None:
             live.attempt(session, depsgraph, partial(_take_settings, depsgraph=depsgraph))
             if session.is_stale:
                 _read_again_soon()
+        elif is_shaded_anew(session, {owner.session_uid}, depsgraph.view_layer):
+            _shade_again_soon(session)
+
+
+def _shade_again_soon(session: Session) -> None:
+    _shaded_anew.add(session.uid)
+    _read_again_soon()
 
 
 def _take_settings(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
@@ -66,8 +73,7 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
         elif session.is_stale and not bpy.app.timers.is_registered(_read_again):
             _read_again_soon()  # its scene is shown again
         if is_shaded_anew(session, moved, depsgraph.view_layer):
-            _shaded_anew.add(session.uid)
-            _read_again_soon()
+            _shade_again_soon(session)
         follows = not live.is_free(session) and is_among(session, moved)
         update = partial(_update, depsgraph=depsgraph, follows=follows, is_lit_anew=is_lit_anew)
         live.attempt(session, depsgraph, update)
@@ -134,6 +140,7 @@ def undone() -> None:
             live.stop(groom)
     for session in live.simulated():
         session.is_stale = True
+    _shaded_anew.update(each.uid for each in live.sessions())
     if live.simulated():
         _read_again_soon()
 

@@ -157,7 +157,7 @@ class Session(Groom):
         self._show()
 
     def shade_cards_again(self) -> None:
-        """Other hair that shades its cards is elsewhere now."""
+        """Other hair that shades its cards may be elsewhere now, or other hair."""
         self.cards.shade_again(self.hair.found())
         self._show()
 

@@ -9,6 +9,8 @@
 
 Where there is no bake a jump shows the style: how the hair would hang there hangs on all frames
 before it, which nobody wants to wait for while dragging the playhead.
+
+While Blender plays, no frame waits for what is being made: see `late`.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from ..bakes.baked_rig import BakedRig
 from ..bakes.cache import Cache, Facts
 from ..scene.objects import Handle, head_of
 from ..settings.choices import Choices
+from . import late
 from .fingerprints import RIG_PARTS, frame_rate, groom_fingerprint
 from .session import Session
 from .simulated import Simulated, as_now, differences
@@ -88,6 +91,10 @@ def follow(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     if before is None and session.is_playing:
         before = frame - 1  # it was played freely until now
     _stands[uid] = frame
+    late.forget(uid)
+    if late.lacks_hair(session):
+        attempt(session, depsgraph, lambda: late.go_without(session, depsgraph))
+        return
     rate, first = frame_rate(scene), first_frame(scene)
     if frame == first:
         check(session, depsgraph)
@@ -95,7 +102,7 @@ def follow(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
         return
     frames = move(before, frame, first, playback.is_played(), rate * _LONGEST_DROP)
     if frame == first or (frames and not session.is_playing):
-        attempt(session, depsgraph, lambda: session.play(depsgraph))
+        attempt(session, depsgraph, lambda: late.begin(session, depsgraph))
     elif frames is None:
         attempt(session, depsgraph, lambda: session.rest(depsgraph))
     elif frames:
@@ -261,12 +268,14 @@ def follows_playback(session: Simulated) -> bool:
 def release(session: Simulated) -> None:
     """It is played freely, or no longer at all, until the timeline takes it up again."""
     _stands.pop(session.uid, None)
+    late.forget(session.uid)
 
 
 def forget(uid: int) -> None:
     """A groom or fin is previewed no longer."""
     for known in (_stands, _baked, _fingerprints, _troubles, _bake_troubles):
         known.pop(uid, None)
+    late.forget(uid)
 
 
 def baked(uid: int) -> Baked | None:

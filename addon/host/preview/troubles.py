@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import weakref
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ import numpy as np
 from ...errors import HairloomError
 from ...pipeline import Rig
 from ..scene.curves import read_curves
-from ..scene.objects import head_of
+from ..scene.objects import head_of, objects_in
 from ..scene.source import dynamics_warnings, own_dynamics
 from ..scene.surfaces import read_positions
 from . import timeline
@@ -24,6 +25,8 @@ _LOOSE = 0.02
 _UNEVEN = 1.01
 #: So many roots, evenly chosen, say which mesh they are on.
 _ASKED = 100
+#: So many instances of a scene are looked at, 1 us each, for those of a groom.
+_MOST_INSTANCES = 10_000
 
 
 @dataclass(frozen=True)
@@ -82,13 +85,19 @@ def troubles_of(hair: bpy.types.Object, session: Session | None) -> tuple[Troubl
 
 
 def instances_note(hair: bpy.types.Object) -> str:
-    """What the preview leaves out where a collection that holds the hair is instanced; "" if none
-    is. Instances by geometry nodes are not looked for."""
-    objects = bpy.context.scene.objects
-    collections = {obj.instance_collection for obj in objects if obj.is_instancer}
-    if any(each is not None and hair in each.all_objects.values() for each in collections):
-        return "Instances of its collection have no hair in the preview; they have it in renders"
+    """What the preview leaves out where the hair is instanced, such as by a collection or geometry
+    nodes; "" if it is not. Quick enough to ask at every redraw."""
+    layer = bpy.context.view_layer
+    if not any(_may_instance(obj) for obj in objects_in(layer) if obj != hair):
+        return ""
+    looked_at = itertools.islice(layer.depsgraph.object_instances, _MOST_INSTANCES)
+    if any(each.is_instance and each.object.original == hair for each in looked_at):
+        return "Instances of it have no hair in the preview; they have it in renders"
     return ""
+
+
+def _may_instance(obj: bpy.types.Object) -> bool:
+    return obj.is_instancer or any(each.type == "NODES" for each in obj.modifiers)
 
 
 def loose_roots(session: Session) -> int:

@@ -71,7 +71,8 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
             return
         count, wanted = counts
         warning = next(iter(self.view.warnings), "")
-        self.update_stats(f"Sample {count} of {wanted}", warning)
+        lacking = "Hair is being made. " if self.view.is_waiting else ""
+        self.update_stats(f"{lacking}Sample {count} of {wanted}", warning)
         if count < wanted:
             self.tag_redraw()
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import bpy
-import numpy as np
 
 from ... import pipeline
 from ...arrays import Floats
@@ -23,12 +22,14 @@ from ..bakes.baked_rig import BakedRig
 from ..bakes.cache import Cache
 from ..cards.card_builds import BuiltCards, CardForm, built_cards
 from ..cards.card_images import chosen_pictures
-from ..cards.other_cards import other_cards
+from ..cards.other_cards import OtherHair, read_other_hair
 from ..cards.shown_cards import as_shown
 from ..preview.reading import Reading
 from ..preview.shown import snapshot_of, with_all_strands, with_choices
 from ..scene.objects import head_of
 from ..settings.choices import Choices
+from . import engine_making
+from .engine_making import HairNotMadeYetError
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,18 +39,24 @@ class _Kept:
     made_from: tuple[Any, ...]
     rig: Rig
     snapshot: Snapshot
-    _cards: list[BuiltCards] = field(default_factory=list)
+    is_baked: bool
+    _cards: list[tuple[BuiltCards, OtherHair]] = field(default_factory=list)
 
-    def cards(
-        self, owner: bpy.types.Object, form: CardForm, depsgraph: bpy.types.Depsgraph
-    ) -> BuiltCards:
-        """Its cards; those of the last form are kept, to the last colour."""
-        kept = [each for each in self._cards if each.form == form]
-        if not kept or kept[0].form.shading != form.shading:
-            pictures, _ = chosen_pictures(owner.data.hairloom.card_images)
-            others, _ = other_cards(form.occlusion, owner, depsgraph)
-            self._cards[:] = [built_cards(self.rig, form, pictures, others)]
-        return self._cards[0]
+    def cards(self, owner: bpy.types.Object, form: CardForm, others: OtherHair) -> BuiltCards:
+        """Its cards; those of the last form and other hair are kept, to the last colour.
+
+        Baked hair stays at rest, whatever other hair does in the frames: its cards are not built
+        anew for each of them.
+        """
+        for built, before in self._cards:
+            is_same = built.form == form and built.form.shading == form.shading
+            is_lit_alike = others.uids == before.uids if self.is_baked else others.is_like(before)
+            if is_same and is_lit_alike:
+                return built
+        pictures, _ = chosen_pictures(owner.data.hairloom.card_images)
+        built = built_cards(self.rig, form, pictures, others)
+        self._cards[:] = [(built, others)]
+        return built
 
 
 _kept: dict[int, _Kept] = {}
@@ -67,13 +74,17 @@ def owner_of(hair: bpy.types.Object) -> bpy.types.Object:
     return named or next((obj for obj in bpy.data.objects if obj.hairloom.bake.copy == hair), hair)
 
 
-def read_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Snapshot:
+def read_groom(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, waits: bool = True
+) -> Snapshot:
     """One groom as a render shows it, in world space, without light.
 
     Args:
         hair: not the evaluated copy; hair curves, or the copy of a bake.
+        waits: False: it is made in a thread, and what was made last is shown until then.
 
     Raises:
+        HairNotMadeYetError: it is being made for the first time, and nobody waits.
         HairloomError: none of its curves can be used, or its bake is damaged.
     """
     owner = owner_of(hair)
@@ -82,14 +93,16 @@ def read_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Snapsh
     # A copy stays as it is beyond the baked frames; curves of the artist's go on by themselves.
     if cache is not None and (owner != hair or _shows_bake(owner, cache, scene.frame_current)):
         strands = playback.strands_in(cache, scene.frame_current, scene.frame_subframe)
-        kept = _of_bake(owner, playback.rig_in(cache), choices)
+        kept = _of_bake(owner, playback.rig_in(cache), choices, waits=waits)
         pose = playback.pose_in(cache, scene.frame_current, scene.frame_subframe)
     else:
-        kept = _of_curves(owner, choices, depsgraph)
+        kept = _of_curves(owner, choices, depsgraph, waits=waits)
         strands, pose = kept.snapshot.strands, kept.rig.rest_pose
     snapshot = replace(kept.snapshot, strands=strands)
     if choices.shows_cards:
-        built = kept.cards(owner, choices.card_form, depsgraph)
+        form = choices.card_form
+        others = read_other_hair(form.occlusion, owner, depsgraph, pose.matrix)
+        built = kept.cards(owner, form, others)
         cards = built.at(pose, strands[kept.rig.guides], choices.cards_drawn)
         snapshot = as_shown(replace(snapshot, cards=cards))
     return with_all_strands(with_choices(snapshot, choices))
@@ -128,24 +141,28 @@ def placed(snapshot: Snapshot, motion: Floats) -> Snapshot:
 def forget() -> None:
     """Keep no groom in memory."""
     _kept.clear()
+    engine_making.forget()
 
 
 def forget_but(uids: set[int]) -> None:
     """Keep these alone, by session number of their objects."""
     for uid in set(_kept) - uids:
         del _kept[uid]
+    engine_making.forget_but(uids)
 
 
 def _shows_bake(hair: bpy.types.Object, cache: Cache, frame: int) -> bool:
     return bool(hair.hairloom.bake.is_shown and cache.holds(frame))
 
 
-def _of_bake(owner: bpy.types.Object, baked: BakedRig, choices: Choices) -> _Kept:
+def _of_bake(owner: bpy.types.Object, baked: BakedRig, choices: Choices, *, waits: bool) -> _Kept:
     made_from = baked.rig.strands.points, choices.ambient
-    return _made(owner, made_from, choices, lambda: baked.rig)
+    return _made(owner, made_from, choices, lambda: baked.rig, is_baked=True, waits=waits)
 
 
-def _of_curves(hair: bpy.types.Object, choices: Choices, depsgraph: bpy.types.Depsgraph) -> _Kept:
+def _of_curves(
+    hair: bpy.types.Object, choices: Choices, depsgraph: bpy.types.Depsgraph, *, waits: bool
+) -> _Kept:
     reading = Reading(hair, depsgraph)
     source = reading.source
     made_from = (
@@ -158,23 +175,34 @@ def _of_curves(hair: bpy.types.Object, choices: Choices, depsgraph: bpy.types.De
         choices.of_rig,
         choices.ambient,
     )
-    return _made(hair, made_from, choices, reading.rig)
+    return _made(hair, made_from, choices, reading.rig, is_baked=False, waits=waits)
 
 
-def _made(owner: bpy.types.Object, made_from: tuple[Any, ...], choices: Choices, rig: Any) -> _Kept:
-    kept = _kept.get(owner.session_uid)
-    if kept is None or not _alike(kept.made_from, made_from):
+def _made(
+    owner: bpy.types.Object,
+    made_from: tuple[Any, ...],
+    choices: Choices,
+    rig: Any,
+    *,
+    is_baked: bool,
+    waits: bool,
+) -> _Kept:
+    def make() -> _Kept:
         made = rig()
         occlusion = pipeline.rest_occlusion(made, choices.ambient)
         snapshot = snapshot_of(made, occlusion, pipeline.strand_ranks(made))
-        kept = _kept[owner.session_uid] = _Kept(made_from, made, snapshot)
+        return _Kept(made_from, made, snapshot, is_baked)
+
+    uid = owner.session_uid
+    kept = _kept.get(uid)
+    if kept is not None and engine_making.alike(kept.made_from, made_from):
+        if not waits:
+            engine_making.drop(uid)
+        return kept
+    found = make() if waits else engine_making.made(uid, made_from, make)
+    if found is not None:
+        kept = _kept[uid] = found
+    # of a bake no other hair is shown, as the strands of each frame belong to its own
+    if kept is None or (is_baked and not engine_making.alike(kept.made_from, made_from)):
+        raise HairNotMadeYetError
     return kept
-
-
-def _alike(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
-    return len(one) == len(other) and all(
-        np.array_equal(a, b)
-        if isinstance(a, np.ndarray) and isinstance(b, np.ndarray)
-        else not isinstance(a, np.ndarray) and not isinstance(b, np.ndarray) and a == b
-        for a, b in zip(one, other, strict=True)
-    )

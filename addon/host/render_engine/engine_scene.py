@@ -22,7 +22,8 @@ from ..scene.lights import light_warnings, read_ambient, read_lights
 from ..scene.mesh_materials import material_notes
 from ..scene.objects import head_of
 from ..settings.properties import settings_of
-from . import engine_hair
+from . import engine_hair, engine_making
+from .engine_making import HairNotMadeYetError
 from .engine_meshes import SOLID_TYPES, as_before, read_meshes
 
 type Key = tuple[int, ...]
@@ -62,11 +63,13 @@ class SceneReader:
 
     warnings: what the artist should know of the last reading, each with its remedy.
     previewed: grooms that were left out because they are previewed, by session number.
+    awaited: grooms that are as they were, as other hair of them is being made.
     """
 
     def __init__(self) -> None:
         self.warnings: tuple[str, ...] = ()
         self.previewed: dict[int, Visibility] = {}
+        self.awaited: set[int] = set()
         self._meshes: dict[Key, _ReadMesh] = {}
         self._grooms: dict[Key, _ReadGroom] = {}
         self._heads: frozenset[int] = frozenset()
@@ -78,6 +81,8 @@ class SceneReader:
         changed: set[int] | None = None,
         is_shown: IsShown = lambda _: True,
         is_previewed: Callable[[int], bool] = lambda _: False,
+        is_expected: Callable[[int], bool] = lambda _: False,
+        waits: bool = True,
     ) -> SceneSnapshot:
         """The scene of this evaluation.
 
@@ -86,6 +91,8 @@ class SceneReader:
                 read last; None: all.
             is_shown: whether an object is seen at all.
             is_previewed: whether a groom is left out, by its session number.
+            is_expected: whether a groom stays as it was, as its preview is about to be there.
+            waits: False: hair is made in a thread, and is as it was until then.
         """
         warnings: list[str] = []
         drawn: list[MeshSnapshot] = []
@@ -93,7 +100,7 @@ class SceneReader:
         grooms: dict[Key, _ReadGroom] = {}
         read: dict[Key, _ReadMesh] = {}
         uids: set[int] = set()
-        self.previewed = {}
+        self.previewed, self.awaited = {}, set()
         self._heads = _heads(depsgraph)
         for instance in depsgraph.object_instances:
             obj = instance.object
@@ -110,11 +117,14 @@ class SceneReader:
             elif obj.type == "CURVES" and is_previewed(obj.original.session_uid):
                 uids.add(engine_hair.owner_of(obj.original).session_uid)
                 self.previewed[obj.original.session_uid] = visibility
+            elif obj.type == "CURVES" and is_expected(obj.original.session_uid):
+                uids.add(engine_hair.owner_of(obj.original).session_uid)
+                grooms |= {key: self._grooms[key]} if key in self._grooms else {}
             elif obj.type == "CURVES" and visibility.is_seen:
                 hair = obj.original
                 uids.add(engine_hair.owner_of(hair).session_uid)
                 groom = self._read_groom(
-                    key, hair, matrix, depsgraph, changed, warnings, visibility.is_holdout
+                    key, hair, matrix, depsgraph, changed, warnings, visibility.is_holdout, waits
                 )
                 grooms |= {} if groom is None else {key: groom}
         self._meshes, self._grooms = read, grooms
@@ -173,6 +183,7 @@ class SceneReader:
         changed: set[int] | None,
         warnings: list[str],
         is_holdout: bool,
+        waits: bool,
     ) -> _ReadGroom | None:
         """None, and a warning, where the hair cannot be drawn."""
         if hair.type != "CURVES":
@@ -181,13 +192,17 @@ class SceneReader:
                 "drawn. Use hair curves."
             )
             return None
+        known, uid = self._grooms.get(key), engine_hair.owner_of(hair).session_uid
         try:
+            state: tuple[Any, ...]
             state = (*engine_hair.state_of(hair, depsgraph), matrix.tobytes(), is_holdout)
-            known = self._grooms.get(key)
             is_same = known is not None and changed is not None and known.state == state
             if known is not None and is_same and not (changed or set()) & engine_hair.uids_of(hair):
                 return known
-            snapshot = engine_hair.read_groom(hair, depsgraph)
+            snapshot = engine_hair.read_groom(hair, depsgraph, waits=waits)
+        except HairNotMadeYetError:
+            self.awaited.add(uid)
+            return None if known is None else _ReadGroom((), known.groom)  # to be read again
         except HairloomError as error:
             warnings.append(str(error))
             return None
@@ -195,6 +210,9 @@ class SceneReader:
             own = np.array(hair.evaluated_get(depsgraph).matrix_world)
             snapshot = engine_hair.placed(snapshot, matrix @ np.linalg.pinv(own))
         number = engine_hair.owner_of(hair).pass_index
+        if not waits and engine_making.is_pending(uid):
+            self.awaited.add(uid)
+            state = ()
         return _ReadGroom(state, DrawnGroom(key, snapshot, number, is_holdout))
 
 

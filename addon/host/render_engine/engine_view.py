@@ -19,10 +19,11 @@ from ...render.snapshot import Snapshot
 from ...shading.lights import three_point_lights
 from ...shading.mesh_shadow_settings import MeshShadowSettings
 from ...shading.picture_settings import PictureSettings
-from ..preview import overlay
+from ..preview import making, overlay
 from ..preview.shown import with_all_strands
 from ..scene.lights import uses_scene_light
 from ..settings.properties import settings_of
+from . import engine_making
 from .engine_camera import view_rectangle
 from .engine_scene import SceneReader, Visibility
 from .engine_still import sky_of
@@ -56,7 +57,7 @@ class EngineView:
         self._target, self._picture = Target(), Accumulation()
         self._scene: SceneSnapshot | None = None
         self._shown: _Shown | None = None
-        self._previewed: frozenset[int] = frozenset()
+        self._previewed: tuple[frozenset[int], ...] = ()
         self._local: int = 0
 
     def read(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
@@ -72,7 +73,8 @@ class EngineView:
         """
         space, render = context.space_data, depsgraph.scene.render
         local = space.local_view.as_pointer() if space.local_view else 0
-        if self._scene is None or self._previewed != overlay.drawn() or self._local != local:
+        is_other = self._previewed != _previewed() or self._local != local
+        if self._scene is None or is_other or self._has_arrived:
             self._read(context, depsgraph, None if self._scene is None else set())
         settings = settings_of(depsgraph.scene.hairloom.picture, PictureSettings)
         left, bottom, wide, high = gpu.state.viewport_get()
@@ -100,6 +102,15 @@ class EngineView:
         self._picture.add(self._target.color)
 
     @property
+    def is_waiting(self) -> bool:
+        """Whether hair is being made, and the picture is without it."""
+        return bool(self._reader.awaited or overlay.expected())
+
+    @property
+    def _has_arrived(self) -> bool:
+        return any(engine_making.is_done(uid) for uid in self._reader.awaited)
+
+    @property
     def count(self) -> int:
         """Samples so far of what is shown."""
         return self._picture.count
@@ -111,12 +122,14 @@ class EngineView:
     def _read(self, context: Any, depsgraph: bpy.types.Depsgraph, changed: set[int] | None) -> None:
         space = context.space_data
         self._local = space.local_view.as_pointer() if space.local_view else 0
-        self._previewed = overlay.drawn()
+        self._previewed = drawn, expected = _previewed()
         self._scene = self._reader.read(
             depsgraph,
             changed=changed,
             is_shown=lambda obj: obj.visible_in_viewport_get(space),
-            is_previewed=self._previewed.__contains__,
+            is_previewed=drawn.__contains__,
+            is_expected=expected.__contains__,
+            waits=making.is_awaited(),
         )
 
     def _now(
@@ -130,6 +143,7 @@ class EngineView:
         found = (
             (*each, self._reader.previewed.get(each[0], unknown))
             for each in overlay.shown_in(context)
+            if each[1].is_made
         )
         previewed = tuple(
             DrawnGroom((uid,), with_all_strands(drawing.snapshot), is_holdout=visibility.is_holdout)
@@ -154,6 +168,11 @@ class EngineView:
             (uses_lights, uses_world, render.film_transparent, render.filter_size, *size),
         )
         return _Shown(scene, camera, marks)
+
+
+def _previewed() -> tuple[frozenset[int], ...]:
+    """Session numbers of grooms that are previewed, and of those that are about to be."""
+    return overlay.drawn(), overlay.expected()
 
 
 def _serial(snapshot: Snapshot) -> int:

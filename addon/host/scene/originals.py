@@ -32,6 +32,12 @@ def show_originals(
         evaluated.visible_shadow = throws
 
 
+def all_depsgraphs() -> tuple[bpy.types.Depsgraph, ...]:
+    """Of all view layers that a window shows or has shown: each has evaluated copies of its own."""
+    layers = (layer for scene in bpy.data.scenes for layer in scene.view_layers)
+    return tuple(layer.depsgraph for layer in layers if layer.depsgraph is not None)
+
+
 def refresh_views() -> None:
     """Solid view shows the samples it has collected until it hears of an update."""
     bpy.context.scene.update_tag()

@@ -1,0 +1,174 @@
+"""Rendered mode does not stop the window: its hair is made in a thread, and renders wait for it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
+
+from hairloom.addon import pipeline  # noqa: E402
+from hairloom.addon.errors import HairloomError  # noqa: E402
+from hairloom.addon.host.preview import live, making, overlay, previewed, reactions  # noqa: E402
+from hairloom.addon.host.render_engine import engine_hair, engine_making  # noqa: E402
+from hairloom.addon.host.render_engine.engine_scene import SceneReader  # noqa: E402
+
+COUNT = 60
+
+
+class Gate:
+    """Holds hair back that is made elsewhere than in the main thread; notes who made what."""
+
+    def __init__(self) -> None:
+        self.opened, self.makers = threading.Event(), list[str]()
+        self._prepare = pipeline.prepare
+
+    def prepare(self, *arguments: Any, **named: Any) -> Any:
+        self.makers.append(threading.current_thread().name)
+        if threading.current_thread() is not threading.main_thread():
+            assert self.opened.wait(60.0)
+        return self._prepare(*arguments, **named)
+
+
+@pytest.fixture
+def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
+    gate = Gate()
+    monkeypatch.setattr(pipeline, "prepare", gate.prepare)
+    yield gate
+    gate.opened.set()
+    engine_hair.forget()
+
+
+@pytest.fixture
+def hair(new_hair: Callable[..., Any], sphere: Any) -> Any:
+    return new_hair(sphere)
+
+
+class View:
+    """Reads as a 3D view in Rendered mode does: again and again, as long as hair is awaited."""
+
+    def __init__(self) -> None:
+        self.reader = SceneReader()
+        self._is_first = True
+
+    def read(self, changed: set[int] | None = None, **named: Any) -> tuple[Any, ...]:
+        known = None if self._is_first else changed or set()
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        scene = self.reader.read(depsgraph, changed=known, waits=False, **named)
+        self._is_first = False
+        return tuple(groom.snapshot for groom in scene.grooms)
+
+    def arrive(self) -> tuple[Any, ...]:
+        end, found = time.monotonic() + 60.0, ()
+        while self.reader.awaited:
+            assert time.monotonic() < end, "it is never made"
+            if any(engine_making.is_done(uid) for uid in self.reader.awaited):
+                found = self.read()
+            time.sleep(0.005)
+        return found
+
+
+def test_the_first_picture_is_without_hair_until_it_is_made(hair: Any, gate: Gate) -> None:
+    view = View()
+    assert view.read() == () and view.reader.awaited == {hair.session_uid}
+    assert view.read() == (), "nor does the next picture wait"
+    assert bpy.app.timers.is_registered(engine_making._tell)
+    gate.opened.set()
+    (shown,) = view.arrive()
+    assert shown.strand_count == COUNT and gate.makers == ["hair in Rendered mode"]
+    waited = engine_hair.read_groom(hair, bpy.context.evaluated_depsgraph_get())
+    np.testing.assert_array_equal(shown.strands, waited.strands)
+    np.testing.assert_array_equal(shown.occlusion, waited.occlusion)
+    assert len(gate.makers) == 1, "it is made once"
+
+
+def test_old_hair_stays_until_the_new_is_made(hair: Any, gate: Gate) -> None:
+    gate.opened.set()
+    view = View()
+    view.read()
+    view.arrive()
+    gate.opened.clear()
+    hair.data.hairloom.children.way = "multi"
+    for count in (300, 310, 320):
+        hair.data.hairloom.children.strand_count = count
+        (old,) = view.read({hair.data.session_uid})
+        assert old.strand_count == COUNT
+    hair.data.hairloom.strands.width_scale = 3.0
+    (old,) = view.read({hair.data.session_uid})
+    assert old.strand_settings.width_scale == 3.0, "what acts at once does"
+    gate.opened.set()
+    (new,) = view.arrive()
+    assert new.strand_count >= 320 and len(gate.makers) == 3, "what is in between is left out"
+
+
+def test_renders_wait(hair: Any, gate: Gate) -> None:
+    view = View()
+    view.read()
+    scene = SceneReader().read(bpy.context.evaluated_depsgraph_get())
+    assert scene.grooms[0].snapshot.strand_count == COUNT
+    assert gate.makers[-1] == "MainThread"
+    gate.opened.set()
+    (shown,) = view.arrive() or view.read()
+    assert shown.strand_count == COUNT
+
+
+def test_hair_that_cannot_be_made_is_told(
+    hair: Any, gate: Gate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any, **__: Any) -> None:
+        raise HairloomError("it cannot be", place="Hair", remedy="Undo")
+
+    monkeypatch.setattr(pipeline, "prepare", fail)
+    view = View()
+    view.read()
+    assert view.arrive() == () and "it cannot be" in view.reader.warnings[0]
+    assert not view.reader.awaited
+
+
+def test_hair_that_nobody_sees_any_more_is_not_waited_for(hair: Any, gate: Gate) -> None:
+    view = View()
+    view.read()
+    work = engine_making._makings[hair.session_uid].work
+    bpy.data.objects.remove(hair)
+    bpy.context.view_layer.update()
+    assert view.read() == () and not view.reader.awaited
+    assert work._is_given_up and not engine_making._makings
+    engine_hair.forget()
+    assert not bpy.app.timers.is_registered(engine_making._tell)
+
+
+def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
+    hair: Any, gate: Gate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gate.opened.set()
+    view = View()
+    view.read()
+    (before,) = view.arrive()
+    monkeypatch.setattr(making, "is_awaited", lambda: False)
+    gate.opened.clear()
+    session = live.start(hair, bpy.context.evaluated_depsgraph_get())
+    assert overlay.expected() == {hair.session_uid} and not overlay.drawn()
+
+    def read() -> tuple[Any, ...]:
+        drawn, expected = overlay.drawn(), overlay.expected()
+        return view.read(
+            {hair.session_uid},
+            is_previewed=drawn.__contains__,
+            is_expected=expected.__contains__,
+        )
+
+    assert read() == (before,)
+    gate.opened.set()
+    end = time.monotonic() + 60.0
+    while session.is_pending:
+        assert time.monotonic() < end
+        previewed.take_arrivals()
+        time.sleep(0.005)
+    assert overlay.drawn() == {hair.session_uid} and not overlay.expected()
+    assert read() == (), "the preview draws it from now on"
+    reactions.clear()

@@ -1,0 +1,60 @@
+"""Hair in several view layers: Blender's own strands go out of the way in each, and come back."""
+
+import bpy
+import pytest
+
+from hairloom.addon.host.preview import layers_shown, live, reactions
+
+
+@pytest.fixture
+def layers(new_hair, sphere):
+    """Two view layers that both hold the hair, evaluated."""
+    new_hair(sphere)
+    found = [bpy.context.view_layer, bpy.context.scene.view_layers.new("Too")]
+    update(found)
+    yield found
+    reactions.clear()
+
+
+def update(layers):
+    for layer in layers:
+        layer.update()
+
+
+def displays(layers):
+    hair = bpy.data.objects["Hair"]
+    return [hair.evaluated_get(layer.depsgraph).display_type for layer in layers]
+
+
+def test_blenders_strands_go_and_come_in_every_view_layer(layers):
+    live.start(bpy.data.objects["Hair"], layers[0].depsgraph)
+    update(layers)
+    assert displays(layers) == ["BOUNDS", "BOUNDS"]
+    live.stop_all()
+    assert displays(layers) == ["TEXTURED", "TEXTURED"]
+
+
+def test_a_layer_that_a_window_changes_to_is_evaluated(layers):
+    timer, window = layers_shown._evaluate, bpy.context.window_manager.windows[0]
+    layers_shown.forget()
+    layers_shown.look()
+    assert bpy.app.timers.is_registered(timer)
+    bpy.app.timers.unregister(timer)
+    layers_shown.look()
+    assert not bpy.app.timers.is_registered(timer), "nothing is new"
+    for layer in (layers[1], layers[0]):
+        window.view_layer = layer
+        layers_shown.look()
+        assert bpy.app.timers.is_registered(timer)
+        bpy.app.timers.unregister(timer)
+    live.start(bpy.data.objects["Hair"], layers[0].depsgraph)
+    update(layers)
+    layers[1].depsgraph.update()
+    bpy.data.objects["Hair"].evaluated_get(layers[1].depsgraph).display_type = "TEXTURED"
+    timer()
+    update(layers)
+    assert displays(layers) == ["BOUNDS", "BOUNDS"]
+    window.view_layer = layers[1]
+    layers_shown.look()
+    layers_shown.forget()
+    assert not bpy.app.timers.is_registered(timer), "a timer is left"

@@ -1,0 +1,132 @@
+"""Two view layers that both hold the hair, each in a window of its own: both show our strands and
+not Blender's, and hair that Blender plays swings in both."""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+import traces
+from artist import changed, hair_is_made, press, until
+from driver import of_hairloom
+from two_windows import (
+    SAME,
+    hair,
+    live,
+    pictures,
+    set_the_scene,
+    two_windows,
+    windows,
+    with_and_without,
+)
+
+log = traces.Log()
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    yield from set_the_scene()
+    yield from two_windows()
+    yield from two_view_layers_with_the_hair()
+    assert "Traceback" not in log.added()
+
+
+def two_view_layers_with_the_hair():
+    """One in each window: both show ours and not Blender's, whatever happens in either."""
+    scene, (first, second) = bpy.context.scene, windows()
+    mine, other = first.view_layer, scene.view_layers.new("Too")
+    second.view_layer = other
+    yield from ours_alone("both-layers-new", mine)
+    yield from with_and_without("both-layers", [True, True])
+    yield from ours_alone("both-layers", mine)
+    head, settings = bpy.data.objects["Head"], hair().data.hairloom
+    settings.shading.base_color = (0.6, 0.1, 0.05)
+    yield from ours_alone("both-layers-colour", mine)
+    head.location.x = 0.03
+    yield from ours_alone("both-layers-moved", mine)
+    settings.guides.guide_count = 61
+    (session,) = live().sessions()
+    yield from until(lambda: session.is_pending, "no other hair is made")
+    yield from until(lambda: not session.is_pending, "it is never made", 300)
+    yield from ours_alone("both-layers-made", mine)
+    yield from played_in_both(head)
+    yield from ours_alone("both-layers-played", mine)
+    head.animation_data_clear()
+    head.location.x = 0.0
+    yield from ended_in_both(mine, other)
+    second.view_layer = mine
+    scene.view_layers.remove(other)
+    scene.frame_set(1)
+    yield 5
+    yield from with_and_without("both-layers-back", [True, True])
+
+
+def ended_in_both(mine, other):
+    """Blender's own strands are back in each of them; then it is previewed again."""
+    live().stop_all()
+    yield 5
+    assert not is_box(mine) and not is_box(other), "a box is left"
+    bpy.ops.hairloom.preview()
+    yield from hair_is_made()
+    yield from ours_alone("both-layers-again", mine)
+
+
+def ours_alone(label, mine):
+    """What the second window shows of its view layer is what it shows of the first one's."""
+    second = windows()[1]
+    other = second.view_layer
+    yield from until(lambda: is_box(mine) and is_box(other), f"{label}: {is_box(mine)}")
+    _, shown = yield from pictures(label)
+    second.view_layer = mine
+    yield 5
+    _, wanted = yield from pictures(f"{label}-wanted")
+    second.view_layer = other
+    yield 5
+    share = changed(shown, wanted)
+    print(f"{label}: {share:.4f} of the second window is otherwise", flush=True)
+    assert share < SAME, f"{label}: Blender's own strands are seen"
+
+
+def is_box(layer):
+    """Whether Blender's own strands are out of the way in a view layer."""
+    depsgraph = layer.depsgraph  # None before a window has shown it
+    return depsgraph and hair().evaluated_get(depsgraph).display_type == "BOUNDS"
+
+
+def played_in_both(head):
+    """Blender plays: the hair swings, though the other view layer is evaluated as well."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 40
+    for frame, x in ((1, 0.0), (20, 0.08), (40, 0.0)):
+        head.location.x = x
+        head.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    session = live().sessions()[0]
+    bpy.ops.screen.animation_play()
+    yield from until(lambda: session.is_playing, "Blender plays, the hair does not", 300)
+    lags, frames = [], set()
+
+    def has_swung():
+        frames.add(scene.frame_current)
+        lags.append(lag(session))
+        return len(frames) > 12
+
+    yield from until(has_swung, "Blender does not play", 300)
+    bpy.ops.screen.animation_cancel(restore_frame=False)
+    yield 3
+    print("lags [mm]", [round(1000.0 * each, 1) for each in lags], flush=True)
+    swinging = [each > 1.0e-4 for each in lags[2:]]
+    assert sum(swinging) > 0.7 * len(swinging), f"it is put to rest again and again: {lags}"
+
+
+def lag(session):
+    """How far the tips are from where the style would have them [m]."""
+    style = of_hairloom("pipeline").carried(session.rig, session.solver.pose)
+    return float(np.abs(session.strands[:, -1] - style[:, -1]).max())
+
+
+driver.play(steps())

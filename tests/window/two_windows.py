@@ -1,0 +1,90 @@
+"""A previewed groom in two windows side by side, and what each of them shows of it."""
+
+import bpy
+import driver
+import numpy as np
+from artist import changed, new_head, picture_of, side_by_side, until
+from driver import of_hairloom
+from mathutils import Euler
+
+#: shares of a view's pixels: what hair covers, and what Blender's own redraw differs by
+HAIR, SAME = 0.02, 0.002
+
+
+def set_the_scene():
+    new_head()
+    bpy.ops.hairloom.grow(strand_count=3000, length=0.12)
+    bpy.context.object.name = "Hair"
+    collection = bpy.data.collections.new("Groom")
+    bpy.context.scene.collection.children.link(collection)
+    for obj in (bpy.data.objects["Head"], hair()):
+        obj.users_collection[0].objects.unlink(obj)
+        collection.objects.link(obj)
+    yield 2
+    hair().select_set(True)
+    bpy.context.view_layer.objects.active = hair()
+    bpy.ops.hairloom.preview()
+    yield from until(live().sessions, "there is no preview")
+    look()
+    yield 5
+
+
+def live():
+    return of_hairloom("host.preview.live")
+
+
+def hair():
+    return bpy.data.objects["Hair"]
+
+
+def windows():
+    return list(bpy.context.window_manager.windows)
+
+
+def view_of(window):
+    areas = [area for area in window.screen.areas if area.type == "VIEW_3D"]
+    return max(areas, key=lambda area: area.width * area.height)
+
+
+def look():
+    """From the front, in every window, without what is not hair."""
+    for window in windows():
+        space = view_of(window).spaces.active
+        space.overlay.show_overlays = False
+        view = space.region_3d
+        view.view_perspective, view.view_location = "PERSP", (0.0, 0.0, 0.0)
+        view.view_rotation = Euler((np.pi / 2.0, 0.0, 0.0)).to_quaternion()
+        view.view_distance = 0.45
+
+
+def pictures(label):
+    """The 3D view of each window, as it is now."""
+    for window in windows():
+        view_of(window).tag_redraw()
+    yield 5
+    shot = driver.screenshot(label)
+    return [picture_of(window, view_of(window), shot) for window in windows()]
+
+
+def two_windows():
+    bpy.ops.wm.window_new_main()  # any other shares the scene and the view layer of the first
+    yield 5
+    assert len(windows()) == 2
+    side_by_side()
+    yield 10
+    look()
+    yield from with_and_without("two-windows", [True, True])
+
+
+def with_and_without(label, drawn):
+    """Whether hair is drawn in each window: hiding it changes that picture."""
+    shown = yield from pictures(f"{label}-shown")
+    hair().hide_viewport = True
+    hidden = yield from pictures(f"{label}-hidden")
+    hair().hide_viewport = False
+    yield 5
+    shares = [changed(one, other) for one, other in zip(shown, hidden, strict=True)]
+    print(f"{label}: {[round(share, 4) for share in shares]}", flush=True)
+    for share, is_drawn in zip(shares, drawn, strict=True):
+        assert share > HAIR if is_drawn else share < SAME, (label, shares)
+    assert len(live().sessions()) == 1, f"{label}: {live().notice()}"
