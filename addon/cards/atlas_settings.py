@@ -64,7 +64,6 @@ class AtlasSettings(Settings):
         "which makes what is on them narrower, and strands are not",
         soft=(1.0, 2.0),
         hard=(0.01, 100.0),
-        unit="factor",
     )
     seed: int = integer(
         0,

@@ -26,9 +26,9 @@ class CardOcclusionSettings(Settings):
     extinction: float = number(
         2.0,
         label="Extinction",
-        description="How fast light dies in others' cards and in adopted ones, as a power of what "
-        "their alpha lets through; the same as in strands. Cards of a groom have the occlusion of "
-        "its strands",
+        description="How fast light dies in cards of other grooms, and in your own that are "
+        "sorted, as a power of what their alpha lets through; the same as in strands. Cards of a "
+        "groom have the occlusion of its strands",
         soft=(0.0, 10.0),
         hard=(0.0, 1_000.0),
     )

@@ -101,7 +101,7 @@ class DynamicsSettings(WindSettings):
     style_root: float = number(
         4.0,
         label="Root Stiffness",
-        description="Pull of the first CVs to their place in the style, in swings a second",
+        description="Pull of the first points to their place in the style, in swings a second",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -201,7 +201,7 @@ class DynamicsSettings(WindSettings):
     radius_root: float = number(
         0.001,
         label="Root Radius",
-        description="Distance that the first CVs keep from colliders",
+        description="Distance that the first points keep from colliders",
         soft=(0.0, 0.01),
         hard=(0.0, 0.1),
         unit="length",
@@ -210,7 +210,7 @@ class DynamicsSettings(WindSettings):
     radius_tip: float = number(
         0.004,
         label="Tip Radius",
-        description="Distance that the tip keeps from colliders, so that none slips between CVs",
+        description="Distance that the tip keeps from colliders, so that none slips between points",
         soft=(0.0, 0.02),
         hard=(0.0, 0.1),
         unit="length",

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ..params import Settings, integer, number
+
+#: keyframes may turn the wind round and round: sixteen turns [rad]
+_MOST_TURNED = math.radians(16.0 * 360.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,16 +28,16 @@ class WindSettings(Settings):
         0.0,
         label="Wind Direction",
         description="Where the wind blows to: 0 is world +X, a quarter turn +Y",
-        soft=(-3.14159265, 3.14159265),
-        hard=(-100.0, 100.0),
+        soft=(-math.pi, math.pi),
+        hard=(-_MOST_TURNED, _MOST_TURNED),
         unit="angle",
     )
     wind_rise: float = number(
         0.0,
         label="Wind Rise",
         description="How steeply the wind blows upwards",
-        soft=(-1.57079633, 1.57079633),
-        hard=(-100.0, 100.0),
+        soft=(-0.5 * math.pi, 0.5 * math.pi),
+        hard=(-_MOST_TURNED, _MOST_TURNED),
         unit="angle",
     )
     gusts: float = number(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -38,12 +39,12 @@ class ChildrenSettings(Settings):
         source=_NALU,
     )
     parting: float = number(
-        1.0472,
+        math.radians(60.0),
         label="Parting",
         description="Guides that go apart by more than this angle are not mixed",
         unit="angle",
-        soft=(0.17, 1.57),
-        hard=(0.0, 3.1416),
+        soft=(math.radians(10.0), math.radians(90.0)),
+        hard=(0.0, math.pi),
     )
     length_variation: float = number(
         0.2,
@@ -69,7 +70,7 @@ class ChildrenSettings(Settings):
     )
     clump_size: int = integer(
         12,
-        label="Strands a Lock",
+        label="Strands per Lock",
         description="How many children make a lock, on average; 1 makes none",
         soft=(1, 100),
         hard=(1, 100_000),

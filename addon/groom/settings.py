@@ -29,7 +29,7 @@ class GrowSettings(Settings):
     )
     per_vertex: bool = toggle(
         False,
-        label="One a Vertex",
+        label="One per Vertex",
         description="Along the normals: one strand from each vertex instead of a number of strands",
         source=_NALU,
     )
@@ -123,7 +123,7 @@ class GrowSettings(Settings):
     )
     clump_size: int = integer(
         30,
-        label="Strands a Lock",
+        label="Strands per Lock",
         description="How many strands make a lock, on average",
         soft=(1, 100),
         hard=(1, 100_000),

@@ -8,8 +8,10 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ..dynamics.settings import DynamicsSettings
 from ..errors import HairloomError
 from ..groom.settings import GrowSettings
+from ..params import Settings
 from .scene.curves import read_curves
 from .scene.objects import head_of
 from .scene.source import mute_own_dynamics
@@ -24,6 +26,15 @@ _HEAD_SIZE = 0.19
 _REAL = 2.5
 #: lengths that are of the whole head, not of single hairs
 _LENGTHS = ("length", "wave", "wave_length", "frizz", "clearance", "volume", "radius")
+#: settings of dynamics -> the power of the size by which they grow; swings a second stay
+_MOTION = {
+    "gravity": 1,
+    "wind_speed": 1,
+    "gust_size": 1,
+    "drag": -1,
+    "radius_root": 1,
+    "radius_tip": 1,
+}
 
 
 def fitting_factor(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
@@ -43,11 +54,27 @@ def fitted(settings: GrowSettings, factor: float) -> GrowSettings:
     """The same hair on a head that is larger by a factor; declared limits hold."""
     if factor == 1.0:
         return settings
+    return replace(settings, **_grown(settings, dict.fromkeys(_LENGTHS, 1), factor))
+
+
+def fit_motion(hair: bpy.types.Object, factor: float) -> None:
+    """Let hair swing on a head that is larger by a factor as it would on a head: by the same
+    angles, in the same time. A breeze of two metres a second does not move hair of two metres.
+    """
+    if factor == 1.0:
+        return
+    group = hair.hairloom.dynamics
+    for name, value in _grown(settings_of(group, DynamicsSettings), _MOTION, factor).items():
+        setattr(group, name, value)
+
+
+def _grown(settings: Settings, powers: dict[str, int], factor: float) -> dict[str, Any]:
+    """The settings that grow, each times a power of the factor, within its declared limits."""
     limits = {p.name: p.hard_range or (-np.inf, np.inf) for p in settings.parameters()}
-    lengths: dict[str, Any] = {
-        name: float(np.clip(getattr(settings, name) * factor, *limits[name])) for name in _LENGTHS
+    return {
+        name: float(np.clip(getattr(settings, name) * factor**power, *limits[name]))
+        for name, power in powers.items()
     }
-    return replace(settings, **lengths)
 
 
 def new_groom(
@@ -66,14 +93,14 @@ def new_groom(
     Args:
         values: an operator, group or settings with the values of GrowSettings.
         presets: names as in `named_preset`.
-        fits: whether lengths follow the mesh's size where it is none of a head.
+        fits: whether lengths and motion follow the mesh's size where it is none of a head.
 
     Raises:
         HairloomError: as `groom_files.grow_on`, or there is no such preset.
     """
     settings = settings_of(values, GrowSettings)
-    if fits:
-        settings = fitted(settings, fitting_factor(head, depsgraph))
+    factor = fitting_factor(head, depsgraph) if fits else 1.0
+    settings = fitted(settings, factor)
     hair = grow_on(
         head,
         depsgraph,
@@ -83,6 +110,7 @@ def new_groom(
         length_group=length_group,
     )
     dress(hair, presets)
+    fit_motion(hair, factor)
     return hair
 
 
@@ -113,11 +141,13 @@ def take_over(
     done = []
     if mute_own_dynamics(hair):
         done.append("turned off Blender's Hair Dynamics")
+    factor = 1.0
     if not len(hair.data.curves) and not read_curves(hair, depsgraph).strands.strand_count:
-        hair = _grown_in_place(hair, depsgraph)
+        hair, factor = _grown_in_place(hair, depsgraph)
         done.append("grew hair, since there was none")
     if is_untouched(hair):
         dress(hair, presets)
+        fit_motion(hair, factor)
     return hair, tuple(done)
 
 
@@ -127,8 +157,12 @@ def is_untouched(hair: bpy.types.Object) -> bool:
     return not any(group.is_property_set(p.name) for p in group.settings.parameters())
 
 
-def _grown_in_place(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object:
-    """A groom with the name and in the collections of hair that has no curves, which goes."""
+def _grown_in_place(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[bpy.types.Object, float]:
+    """A groom with the name and in the collections of hair that has no curves, which goes; and how
+    much larger than a human head its head is.
+    """
     head = head_of(hair)
     if head is None:
         raise HairloomError(
@@ -136,7 +170,8 @@ def _grown_in_place(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> b
             place=hair.name,
             remedy="Comb some in Sculpt Mode, or select a mesh and press Add Hair",
         )
-    settings = fitted(GrowSettings(), fitting_factor(head, depsgraph))
+    factor = fitting_factor(head, depsgraph)
+    settings = fitted(GrowSettings(), factor)
     name, collections = hair.name, list(hair.users_collection)
     grown = grow_on(head, depsgraph, collections[0], settings)
     for collection in collections[1:]:
@@ -146,4 +181,4 @@ def _grown_in_place(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> b
     if not curves.users:
         bpy.data.hair_curves.remove(curves)
     grown.name = name
-    return grown
+    return grown, factor

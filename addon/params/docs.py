@@ -38,11 +38,19 @@ def _row(parameter: Parameter) -> str:
         _shown(parameter, parameter.default),
         _span(parameter, parameter.soft_range),
         _span(parameter, parameter.hard_range),
-        _UNIT_SYMBOLS[parameter.unit],
+        _unit(parameter),
         parameter.description,
         parameter.source,
     ]
     return "| " + " | ".join(cells) + " |"
+
+
+def _unit(parameter: Parameter) -> str:
+    """A factor that may lie beyond 0 to 1 has none: its range says so."""
+    low, high = parameter.hard_range or (0.0, 1.0)
+    if parameter.unit == "factor" and not 0.0 <= low <= high <= 1.0:
+        return ""
+    return _UNIT_SYMBOLS[parameter.unit]
 
 
 def _span(parameter: Parameter, span: tuple[float, float] | None) -> str:

@@ -76,8 +76,8 @@ class AmbientSettings(Settings):
     scalp_extinction: float = number(
         12.0,
         label="Scalp Extinction",
-        description="The same for light on its way to the skin; higher, so that a scalp does not "
-        "shine through strands that stand for many",
+        description="How fast light dies in hair on its way to the skin; higher than Extinction, "
+        "so that a scalp does not shine through strands that stand for many",
         soft=(0.0, 30.0),
         hard=(0.0, 10_000.0),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -33,12 +34,12 @@ class ShaftSettings(Settings):
         source=_NGUYEN,
     )
     length: float = number(
-        0.1745,
+        math.radians(10.0),
         label="Length",
         description="How far a shaft goes on behind what has cut it, as an angle of the view; "
         "the haze reaches twice as far from the light",
-        soft=(0.0, 0.7854),
-        hard=(0.0, 1.5),
+        soft=(0.0, math.radians(45.0)),
+        hard=(0.0, math.radians(86.0)),
         unit="angle",
         source=_NGUYEN,
     )

@@ -97,7 +97,7 @@ class TextureSettings(Settings):
     softness: float = number(
         0.25,
         label="Softness",
-        description="How softly a strand ends; 0 gives hard edges",
+        description="How softly a strand ends; the less, the harder its edges",
         unit="factor",
         soft=(0.05, 1.0),
         hard=(0.001, 1.0),

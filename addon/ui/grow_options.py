@@ -8,10 +8,9 @@ from typing import Any
 import bpy
 from bpy.props import StringProperty
 
-from ..host.scene.objects import head_of
 from ..host.scene.vertex_weights import weight_names
 from ..host.settings.groups import operator_properties
-from .selection import active_mesh, chosen_hair
+from .selection import ground_mesh
 
 #: settings that say nothing about hair that stands straight along the normals, and the other way
 _COMBED_ONLY: tuple[str, ...] = (
@@ -31,9 +30,7 @@ _NORMALS_ONLY: tuple[str, ...] = ("per_vertex", "threshold")
 
 
 def _weight_names(_operator: Any, context: bpy.types.Context, typed: str) -> list[str]:
-    # while the operator is adjusted the hair that it has grown is active
-    chosen = chosen_hair(context)
-    mesh = active_mesh(context) or (head_of(chosen[0]) if chosen else None)
+    mesh = ground_mesh(context)
     names = [] if mesh is None else weight_names(mesh)
     return [name for name in names if typed.lower() in name.lower()]
 

@@ -7,7 +7,7 @@ import bpy
 from ..host.strands import groom_files
 from .grow_options import GROW_PROPERTIES, draw_grow
 from .reports import reporting, waiting
-from .selection import active_mesh, make_active
+from .selection import ground_mesh, make_active
 
 
 class HAIRLOOM_OT_grow(bpy.types.Operator):
@@ -21,14 +21,14 @@ class HAIRLOOM_OT_grow(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if active_mesh(context) is not None:
+        if ground_mesh(context) is not None:
             return True
         cls.poll_message_set("Select the mesh to grow hair on")
         return False
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        head, depsgraph = active_mesh(context), context.evaluated_depsgraph_get()
+        head, depsgraph = ground_mesh(context), context.evaluated_depsgraph_get()
         with waiting(context):
             hair = groom_files.grow_on(
                 head,

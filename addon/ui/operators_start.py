@@ -4,6 +4,7 @@ and shines at once.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import bpy
@@ -17,7 +18,7 @@ from .grow_options import GROW_PROPERTIES, draw_grow
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences
 from .reports import reporting, waiting
-from .selection import active_mesh, chosen_hair, make_active, needs_hair
+from .selection import active_mesh, chosen_hair, ground_mesh, make_active, needs_hair
 
 _NO_MESH = "Select the mesh to grow hair on, or add a sample: Add > Curve > Hairloom Sample Scene"
 
@@ -33,8 +34,8 @@ class HAIRLOOM_OT_add_groom(bpy.types.Operator):
         **NEW_GROOM,
         "fits": BoolProperty(
             name="Fit to Mesh",
-            description="Hair as long for this mesh as it would be on a head, if its size is none "
-            "of a head or body",
+            description="Hair as long for this mesh as it would be on a head, and wind as strong, "
+            "if its size is none of a head or body",
             default=True,
         ),
         **GROW_PROPERTIES,
@@ -42,7 +43,7 @@ class HAIRLOOM_OT_add_groom(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _in_object_mode(cls, context) and _has_mesh(cls, context)
+        return _in_object_mode(cls, context) and _has_ground(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         _take_preferences(self, context)
@@ -53,7 +54,7 @@ class HAIRLOOM_OT_add_groom(bpy.types.Operator):
         depsgraph = context.evaluated_depsgraph_get()
         with waiting(context):
             hair = new_groom(
-                active_mesh(context),
+                ground_mesh(context),
                 depsgraph,
                 context.collection,
                 self,
@@ -145,9 +146,10 @@ class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (_in_object_mode(cls, context) and _has_mesh(cls, context)):
+        if not _in_object_mode(cls, context):
             return False
-        if hair_systems(active_mesh(context)):
+        mesh = active_mesh(context)
+        if mesh is not None and hair_systems(mesh):
             return True
         cls.poll_message_set("The active mesh has no particle hair")
         return False
@@ -186,10 +188,12 @@ class HAIRLOOM_OT_show_settings(bpy.types.Operator):
 
 
 def _show_data(editor: bpy.types.SpaceProperties) -> None:
-    try:
-        editor.context = "DATA"
-    except TypeError:  # it has no such tab, as while it is pinned to something else
-        editor.context = "OBJECT"
+    for tab in ("DATA", "OBJECT"):
+        # it has no such tab while it is pinned to something else, or where nothing was active when
+        # it was last drawn
+        with suppress(TypeError):
+            editor.context = tab
+            return
 
 
 def _begin(
@@ -238,8 +242,8 @@ def _in_object_mode(operator: type[Any], context: bpy.types.Context) -> bool:
     return False
 
 
-def _has_mesh(operator: type[Any], context: bpy.types.Context) -> bool:
-    if active_mesh(context) is not None:
+def _has_ground(operator: type[Any], context: bpy.types.Context) -> bool:
+    if ground_mesh(context) is not None:
         return True
     operator.poll_message_set(_NO_MESH)
     return False

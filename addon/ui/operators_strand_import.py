@@ -18,7 +18,7 @@ from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
 from ..errors import HairloomError
 from ..host.strands.groom_in import FILE_KINDS, Ground, StrandImport, import_strands, read_ground
 from .reports import reporting, tell, waiting
-from .selection import active_mesh, make_active
+from .selection import active_mesh, ground_mesh, make_active
 
 SUFFIXES = tuple(suffix for _, suffixes in FILE_KINDS for suffix in suffixes)
 UP_AXES = (
@@ -110,7 +110,7 @@ class HAIRLOOM_OT_import_strands(bpy.types.Operator, ImportHelper):
         layout.prop(self, "up")
         layout.prop(self, "scale")
         layout.prop(self, "guides")
-        mesh = active_mesh(context)
+        mesh = ground_mesh(context)  # while it is adjusted what came in is active
         row = layout.row(heading="" if mesh is None else mesh.name)
         row.enabled = mesh is not None
         row.prop(self, "onto_mesh")

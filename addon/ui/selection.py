@@ -44,6 +44,18 @@ def active_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
     return active if is_mesh else None
 
 
+def ground_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The mesh to grow hair on: the active one, or that of the active hair.
+
+    New hair is active once it has grown, and Blender offers to adjust only what could be done again
+    as things are then.
+    """
+    active = context.active_object
+    if active is not None and active.type == "CURVES" and active.select_get():
+        return head_of(active)
+    return active_mesh(context)
+
+
 def needs_hair(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether hair curves are selected; says so on the greyed-out button."""
     if chosen_hair(context):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..host.preview import live, measures, timeline, view_transform
+from ..host.preview import late, live, measures, timeline, view_transform
 from ..host.preview.overlay import statistics_of
 from ..host.preview.session import Session
 from ..host.preview.troubles import Trouble, instances_note, troubles_of
@@ -78,7 +78,7 @@ def _moved_by(session: Session) -> str:
         return "Shown from the bake" + (", which is out of date" if baked.changed else "")
     if session.is_pending:
         return f"Other hair {live.MAKING}"
-    if live.is_waiting(session):
+    if live.is_waiting(session) or late.is_late(session):
         return f"It {live.WAITING}"
     computed = "Simulated" if session.is_playing else "To be simulated"
     return f"{computed} on the {session.computed_on}"

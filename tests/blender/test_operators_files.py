@@ -189,7 +189,7 @@ def test_axes_and_scale_are_undone_by_their_own_inverse(groom_file):
 def test_cards_are_written_with_their_sidecar(sphere, tmp_path, told):
     hair = grown(sphere, strand_count=300, length=0.05)
     hair.data.hairloom.guides.guide_count = 20
-    hair.data.hairloom.cards.way = "guides"
+    hair.data.hairloom.cards.way, hair.data.hairloom.atlas.source = "guides", "made"
     out = tmp_path / "cards.glb"
     data_blocks = {data.name_full for data in bpy.data.user_map()}
     assert bpy.ops.hairloom.export_cards(filepath=str(out)) == {"FINISHED"}

@@ -38,7 +38,7 @@ def test_an_object_that_was_just_removed_is_no_obstacle(hair, sphere):
 def test_nor_for_cards_beside_it(hair):
     """Cards that are shown are built with the depsgraph as it is."""
     depsgraph = bpy.context.view_layer.depsgraph
-    assert other_cards(CardOcclusionSettings(others=True), hair, depsgraph) == ((), [])
+    assert other_cards(CardOcclusionSettings(others=True), hair, depsgraph) == ((), ())
 
 
 def test_nor_for_a_job(hair):

@@ -11,6 +11,7 @@ from hairloom.addon.host.scene.curves import read_curves
 from hairloom.addon.host.scene.source import own_dynamics
 from hairloom.addon.host.settings.presets import named_preset
 from hairloom.addon.host.strands import particle_hair
+from hairloom.addon.ui import operators_start
 from hairloom.addon.ui.preferences import DYNAMICS, LOOK, preferences
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -35,6 +36,22 @@ def test_a_groom_is_grown_dressed_previewed_and_active(sphere):
     assert motion.wind_speed > 0.0, "nothing moves in still air"
     (session,) = live.sessions()
     assert session.rig.strands.strand_count == 150 and session.warnings == ()
+
+
+@pytest.mark.parametrize("name", ["add_groom", "grow"])
+def test_a_new_groom_can_be_adjusted(sphere, name):
+    """Blender shows Adjust Last Operation only where the operator could run once more as things
+    are afterwards, which is with the new hair active; it then grows on the same mesh.
+    """
+    operator = getattr(bpy.ops.hairloom, name)
+    operator(**FEW)
+    first = bpy.context.object
+    assert first.type == "CURVES" and operator.poll()
+    operator(**FEW)
+    assert bpy.context.object != first and bpy.context.object.data.surface == sphere
+    first.data.surface, first.parent = None, None
+    make_active(first)
+    assert not operator.poll()
 
 
 def test_the_presets_of_a_new_groom_can_be_others_or_none(sphere):
@@ -63,6 +80,27 @@ def test_only_meshes_that_are_no_head_or_body_change_the_lengths(size, factor):
     assert fitted.length == pytest.approx(GrowSettings().length * factor)
     assert fitted.radius == pytest.approx(GrowSettings().radius * factor)
     assert fitted.strand_count == GrowSettings().strand_count
+
+
+def swing_of_new_hair(size):
+    """How far the tips of hair on a ball move in half a second, as a share of its length."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.5 * size)
+    bpy.ops.hairloom.add_groom("EXEC_DEFAULT", strand_count=60)
+    (session,) = live.sessions()
+    live.play(bpy.context.evaluated_depsgraph_get())
+    at_first = session.strands.copy()
+    for _ in range(12):
+        live.advance(bpy.context.evaluated_depsgraph_get(), 1.0 / 24.0)
+    length = bpy.context.object.dimensions.z
+    return np.linalg.norm(session.strands - at_first, axis=-1).max() / length
+
+
+def test_hair_swings_in_a_breeze_whatever_the_size_of_its_mesh():
+    on_a_head = swing_of_new_hair(0.2)
+    assert on_a_head > 0.02
+    for size in (0.02, 2.0):
+        assert 0.5 * on_a_head < swing_of_new_hair(size) < 2.0 * on_a_head, size
 
 
 def test_undo_takes_the_groom_and_its_preview_away(sphere):
@@ -172,3 +210,34 @@ def test_hair_of_a_scene_that_is_not_shown_waits_for_it():
     reactions.catch_up(bpy.context.evaluated_depsgraph_get())
     assert live.sessions() == (session,) and not session.is_stale
     assert overlay.drawing_of(session.uid).is_visible
+
+
+class Editor:
+    """A Properties editor with some tabs, as `SpaceProperties` has them."""
+
+    def __init__(self, *tabs):
+        self.tabs, self.shown = tabs, tabs[0]
+
+    @property
+    def context(self):
+        return self.shown
+
+    @context.setter
+    def context(self, tab):
+        if tab not in self.tabs:
+            raise TypeError(f'enum "{tab}" not found in {self.tabs}')
+        self.shown = tab
+
+
+@pytest.mark.parametrize(
+    ("tabs", "shown"),
+    [
+        (("SCENE", "OBJECT", "DATA"), "DATA"),
+        (("SCENE", "OBJECT"), "OBJECT"),
+        (("SCENE", "WORLD"), "SCENE"),
+    ],
+)
+def test_all_settings_leaves_an_editor_alone_that_cannot_show_them(tabs, shown):
+    editor = Editor(*tabs)
+    operators_start._show_data(editor)
+    assert editor.context == shown

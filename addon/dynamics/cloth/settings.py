@@ -121,7 +121,8 @@ class FinSettings(WindSettings):
     pin_pull: float = number(
         4.0,
         label="Pin Pull",
-        description="The same at a pin weight of one half; it grows without bound towards 1",
+        description="Pull of a vertex whose pin weight is one half to where the animation carries "
+        "it, in swings a second; it grows without bound towards a weight of 1",
         soft=(0.0, 20.0),
         hard=(0.0, 1000.0),
         unit="rate",

@@ -13,7 +13,7 @@ from ...groom.settings import GrowSettings
 from ...pipeline import Rig
 from ..cards.card_images import chosen_pictures
 from ..cards.card_making import CardChoices
-from ..cards.other_cards import other_cards
+from ..cards.other_cards import read_other_hair
 from ..scene.curves import write_curves
 from ..scene.surfaces import read_surface
 from ..scene.vertex_weights import read_weights
@@ -64,8 +64,7 @@ def card_choices(hair: bpy.types.Object) -> tuple[CardChoices, tuple[str, ...]]:
     """What the groom's own settings say of its cards, and warnings of pictures that are no use."""
     pictures, warnings = chosen_pictures(hair.data.hairloom.card_images)
     form = Choices.of(hair).card_form
-    others, notes = other_cards(form.occlusion, hair)
-    return form.choices(pictures, others), (*warnings, *notes)
+    return form.choices(pictures, read_other_hair(form.occlusion, hair)), warnings
 
 
 def notes_of(hair: bpy.types.Object, rig: Rig) -> tuple[str, ...]:

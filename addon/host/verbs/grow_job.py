@@ -44,7 +44,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     what.add_argument(
         "--fit",
         action="store_true",
-        help="hair as long for this mesh as it would be on a head, if its size is none of a head",
+        help="hair as long for this mesh as it would be on a head, and what moves it as strong, "
+        "if its size is none of a head; presets and --set go over that",
     )
     what.add_argument(
         "--density-group",

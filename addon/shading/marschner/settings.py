@@ -51,7 +51,7 @@ class MarschnerSettings(Settings):
     absorption: tuple[float, float, float] = color(
         (0.25, 0.42, 0.83),
         label="Absorption",
-        description="Of red, green and blue inside the hair, on the length of its radius",
+        description="How much red, green and blue hair absorbs inside, on the length of its radius",
         maximum=100.0,
         source=_PIGMENT,
     )
@@ -92,7 +92,8 @@ class MarschnerSettings(Settings):
     width_r: float = number(
         float(np.radians(5.0)),
         label="First Width",
-        description="Standard deviation of the half angle in the first highlight",
+        description="How wide the first highlight is along the hair: standard deviation of the "
+        "half angle",
         soft=(float(np.radians(1.0)), float(np.radians(20.0))),
         hard=(0.0, _WIDEST),
         unit="angle",
@@ -117,7 +118,8 @@ class MarschnerSettings(Settings):
     width_tt: float = number(
         float(np.radians(3.0)),
         label="Rim Width",
-        description="Standard deviation of the half angle of the light that passes through",
+        description="How wide the light that passes through is along the hair: standard deviation "
+        "of the half angle",
         soft=(float(np.radians(1.0)), float(np.radians(20.0))),
         hard=(0.0, _WIDEST),
         unit="angle",
@@ -142,7 +144,8 @@ class MarschnerSettings(Settings):
     width_trt: float = number(
         float(np.radians(8.0)),
         label="Second Width",
-        description="Standard deviation of the half angle in the second highlight",
+        description="How wide the second highlight is along the hair: standard deviation of the "
+        "half angle",
         soft=(float(np.radians(1.0)), float(np.radians(20.0))),
         hard=(0.0, _WIDEST),
         unit="angle",

@@ -35,6 +35,37 @@ def test_angles_are_shown_in_degrees() -> None:
     )
 
 
+def test_a_factor_without_those_limits_is_not_called_one_from_0_to_1() -> None:
+    @dataclass(frozen=True, kw_only=True)
+    class Shares(Settings):
+        share: float = number(
+            0.5,
+            label="Share",
+            description="A part",
+            unit="factor",
+            soft=(0.0, 1.0),
+            hard=(0.0, 1.0),
+        )
+        stretch: float = number(
+            0.5, label="Stretch", description="Any", unit="factor", soft=(0.0, 1.0), hard=(0.0, 9.0)
+        )
+
+    one, other = table(Shares).splitlines()[-2:]
+    assert "| 0 to 1 | A part |" in one and "|  | Any |" in other
+
+
+@pytest.mark.parametrize("kind", ALL_SETTINGS.values(), ids=ALL_SETTINGS)
+def test_what_an_artist_reads_stands_alone_and_is_in_round_degrees(kind: type[Settings]) -> None:
+    """A tooltip shows neither its neighbours nor what the code calls a point of a strand."""
+    for parameter in kind.parameters():
+        assert not parameter.description.startswith("The same"), parameter.name
+        assert "CV" not in parameter.description, parameter.name
+        if parameter.unit == "angle":
+            ends = (*(parameter.soft_range or ()), *(parameter.hard_range or ()))
+            for angle in map(math.degrees, (parameter.default, *ends)):
+                assert 2.0 * angle == pytest.approx(round(2.0 * angle), abs=1e-4), parameter.name
+
+
 @pytest.mark.parametrize("kind", ALL_SETTINGS.values(), ids=ALL_SETTINGS)
 def test_each_parameter_has_a_row_of_seven_cells(kind: type[Settings]) -> None:
     lines = table(kind).splitlines()
