@@ -22,6 +22,7 @@ from pathlib import Path
 
 import flip_evaluator
 import numpy as np
+from random_parts import random_parts
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 OUTPUT = REPOSITORY / "out" / "window"
@@ -35,10 +36,9 @@ SESSION_LIMIT_S = float(os.environ.get("HAIRLOOM_SESSION_LIMIT", "900"))
 #: Sessions that need another screen than the usual one: long panels are pictured uncut, and random
 #: actions need not look closely, while most of their time goes into drawing the window.
 SCREENS = {"session_guide_pictures": "1600x1500x24", "session_random": "800x600x24"}
-#: Sessions in parts, each in a Blender of its own, by these settings. On Vulkan Mesa's software
-#: driver lets a Blender draw so much and no more, see docs/troubleshooting.md.
+#: random actions, and how many of each seed
 SEEDS = os.environ.get("HAIRLOOM_SEEDS", "1 2 3 4 5").split()
-PARTS = {"session_random": [{"HAIRLOOM_SEEDS": seed} for seed in SEEDS]}
+ACTIONS = int(os.environ.get("HAIRLOOM_ACTIONS", "80"))
 CLOSING_LINE = "SESSION PASSED"
 PROBLEM_LINES = 30
 #: mean FLIP of the same picture on both backends
@@ -207,11 +207,16 @@ def run_session(script: Path, part: dict[str, str], backend: str, tally: Tally) 
     tally.add(passed, not passed)
 
 
+def parts_of(script: Path, backend: str) -> list[dict[str, str]]:
+    """The settings of each Blender that a session is played in."""
+    return random_parts(SEEDS, ACTIONS, backend) if script.stem == "session_random" else [{}]
+
+
 def run_backend(backend: str, sessions: list[Path], with_tests: bool) -> Tally:
     tally = Tally()
     if with_tests:
         run_tests(backend, tally)
-    for script, part in ((s, p) for s in sessions for p in PARTS.get(s.stem, [{}])):
+    for script, part in ((s, p) for s in sessions for p in parts_of(s, backend)):
         if not _interrupted.is_set():
             run_session(script, part, backend, tally)
     return tally

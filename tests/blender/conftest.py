@@ -91,3 +91,15 @@ def stage(extension: None) -> Any:
     render.dither_intensity = 0.0
     scene.hairloom.picture.samples = 4
     return scene
+
+
+@pytest.fixture
+def flag(extension):
+    """A sheet of 11 x 11 vertices, 0.4 m wide, lying flat, made a fin, pinned at its edge at -x."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=10, y_subdivisions=10, size=0.4)
+    obj = bpy.context.object
+    obj.name = "Flag"
+    group = obj.vertex_groups.new(name="Pins")
+    group.add([v.index for v in obj.data.vertices if v.co.x < -0.19], 1.0, "REPLACE")
+    assert bpy.ops.hairloom.fin_add() == {"FINISHED"}
+    return obj

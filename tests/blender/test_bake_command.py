@@ -137,6 +137,22 @@ def test_a_baked_frame_is_drawn(file, tmp_path):
     assert "out of date (settings)" in json.loads(report.read_text())["notes"][0]
 
 
+def test_a_picture_of_another_bake_is_not_skipped(file, tmp_path, capfd):
+    assert command_line.run(["bake", "--scene", str(file), "--save"]) == 0
+    arguments = ["render", "--scene", str(file), "--groom", "Hair", "--baked", "--skip-existing"]
+    arguments += ["--width", "32", "--height", "24", "--samples", "1", "--frame", str(LAST)]
+    arguments += ["--output", str(tmp_path / "hair.png")]
+
+    def is_skipped():
+        capfd.readouterr()
+        assert command_line.run(arguments) == 0
+        return "Nothing to do" in capfd.readouterr().out
+
+    assert not is_skipped() and is_skipped()
+    assert command_line.run(["bake", "--scene", str(file), "--set", "dynamics.damping=7"]) == 0
+    assert not is_skipped()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

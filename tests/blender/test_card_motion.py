@@ -6,13 +6,13 @@ import importlib.util
 import json
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from glb_player import Player
 from test_glb import Glb
 from test_glb_engines import validated
 
@@ -20,18 +20,16 @@ bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy 
 
 from hairloom.addon import pipeline  # noqa: E402
 from hairloom.addon.card_flow import bound_cards, cards_at  # noqa: E402
+from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
 from hairloom.addon.cards.joints import JointChoices  # noqa: E402
 from hairloom.addon.cards.settings import CardSettings  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import FBX, GLB, USD  # noqa: E402
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings  # noqa: E402
-from hairloom.addon.host.bakes.bake import Bake  # noqa: E402
 from hairloom.addon.host.bakes.take import shaken_poses  # noqa: E402
 from hairloom.addon.host.cards.card_builds import CardForm  # noqa: E402
 from hairloom.addon.host.cards.card_files import CardOutput, WrittenCards, write_cards  # noqa: E402
 from hairloom.addon.host.cards.card_motion import GuideMotion, MotionChoices  # noqa: E402
-from hairloom.addon.host.cards.card_out import CardExport  # noqa: E402
-from hairloom.addon.host.verbs import command_line  # noqa: E402
 from hairloom.addon.host.verbs.inputs import Sources, read_inputs  # noqa: E402
 from hairloom.addon.pipeline import Pose, Rig  # noqa: E402
 from hairloom.addon.shading.textures import TextureSettings  # noqa: E402
@@ -40,6 +38,7 @@ FRAMES, RATE = 31, 30.0
 PANDA_MOTION = Path(__file__).parent / "panda_motion.py"
 FORM = CardForm(
     cards=CardSettings(way="guides", levels=2),
+    atlas=AtlasSettings(source="made"),
     texture=TextureSettings(variant_width=32, height=64),
 )
 
@@ -88,92 +87,6 @@ def joints(
 ) -> tuple[Path, WrittenCards]:
     path = tmp_path_factory.mktemp("joints") / "hair.glb"
     return path, write(path, motion, kind="joints", joints=JointChoices(40, 16, 0.01))
-
-
-class Player:
-    """Plays a skinned GLB by the specification, section 3.7.3 and appendix C, vertex by vertex."""
-
-    def __init__(self, path: Path) -> None:
-        self.file = Glb(path)
-        self.file._WIDTH = {**Glb._WIDTH, "MAT4": 16}
-        self.file._DTYPE = {**Glb._DTYPE, 5121: "u1"}
-        self.json = self.file.json
-
-    def corners(self, seconds: float) -> list[np.ndarray]:
-        """The corners of all triangles of each skinned node, by name, in Blender's axes."""
-        world = self._worlds(seconds)
-        (skin,) = self.json["skins"]
-        inverse = self.file.accessor(skin["inverseBindMatrices"]).reshape(-1, 4, 4)
-        moves = np.stack([world[n] for n in skin["joints"]]) @ inverse.swapaxes(1, 2)
-        nodes = [node for node in self.json["nodes"] if "skin" in node]
-        found = []
-        for node in sorted(nodes, key=lambda each: each["name"]):
-            (primitive,) = self.json["meshes"][node["mesh"]]["primitives"]
-            names = ("POSITION", "JOINTS_0", "WEIGHTS_0")
-            points, joint, weight = (
-                self.file.accessor(primitive["attributes"][name]) for name in names
-            )
-            mixed = np.einsum("nk,nkab->nab", weight, moves[joint])
-            placed = np.einsum("nab,nb->na", mixed[:, :3, :3], points) + mixed[:, :3, 3]
-            index = self.file.accessor(primitive["indices"]).reshape(-1, 3)
-            x, y, z = np.moveaxis(placed, -1, 0)
-            found.append(np.stack([x, -z, y], axis=-1)[index])
-        return found
-
-    def _worlds(self, seconds: float) -> dict[int, np.ndarray]:
-        local = {n: dict(node) for n, node in enumerate(self.json["nodes"])}
-        (animation,) = self.json["animations"]
-        for channel in animation["channels"]:
-            sampler = animation["samplers"][channel["sampler"]]
-            value = self._value(sampler, channel["target"]["path"], seconds)
-            local[channel["target"]["node"]][channel["target"]["path"]] = value
-        world: dict[int, np.ndarray] = {}
-
-        def walk(number: int, parent: np.ndarray) -> None:
-            node, matrix = local[number], np.eye(4)
-            x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
-            # q p q* written out for the three axes
-            matrix[:3, 0] = [
-                w * w + x * x - y * y - z * z,
-                2 * (x * y + w * z),
-                2 * (x * z - w * y),
-            ]
-            matrix[:3, 1] = [
-                2 * (x * y - w * z),
-                w * w - x * x + y * y - z * z,
-                2 * (y * z + w * x),
-            ]
-            matrix[:3, 2] = [
-                2 * (x * z + w * y),
-                2 * (y * z - w * x),
-                w * w - x * x - y * y + z * z,
-            ]
-            matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
-            world[number] = parent @ matrix
-            for child in node.get("children", ()):
-                walk(child, world[number])
-
-        for root in self.json["scenes"][0]["nodes"]:
-            walk(root, np.eye(4))
-        return world
-
-    def _value(self, sampler: dict[str, Any], path: str, seconds: float) -> np.ndarray:
-        times = self.file.accessor(sampler["input"])[:, 0].astype(np.float64)
-        values = self.file.accessor(sampler["output"]).astype(np.float64)
-        after = int(np.searchsorted(times, seconds).clip(1, max(len(times) - 1, 1)))
-        if len(times) == 1:
-            return values[0]
-        one, two = values[after - 1], values[after]
-        share = np.clip((seconds - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)
-        if path == "translation":
-            return one + (two - one) * share
-        cosine = abs(one @ two)
-        angle = np.arccos(min(cosine, 1.0))
-        two = two * np.sign(one @ two)
-        if angle < 1e-6:
-            return one
-        mixed = np.sin((1.0 - share) * angle) * one + np.sin(share * angle) * two
-        return mixed / np.sin(angle)
 
 
 def off(found: list[np.ndarray], expected: list[np.ndarray]) -> np.ndarray:
@@ -334,26 +247,6 @@ def test_what_cannot_be_is_told_before_the_work(motion: GuideMotion, tmp_path: P
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_command_line_writes_a_take(tmp_path: Path, capfd: Any) -> None:
-    few = ["--set", "grow.strand_count=60", "--set", "guides.guide_count=12"]
-    few += ["--set", "grow.length=0.06"]
-    take = str(tmp_path / "take.npz")
-    assert command_line.run(["simulate", *few, "--seconds", "0.2", "--output", take]) == 0
-    small = ["--set", "cards.way=guides", "--levels", "1", "--set", "card_occlusion.rays=8"]
-    arguments = ["cards", *few, *small, "--output", str(tmp_path / "hair.glb")]
-    moving = ["--motion", "joints", "--chains", "4"]
-    assert command_line.run([*arguments, *moving]) == 1
-    assert "--take" in capfd.readouterr().err
-    assert command_line.run([*arguments, "--take", take]) == 1
-    assert "--motion" in capfd.readouterr().err
-    assert command_line.run([*arguments, *moving, "--take", take, "--frames", "2", "99"]) == 1
-    assert "from 0 to 12" in capfd.readouterr().err
-    assert command_line.run([*arguments, *moving, "--take", take, "--frames", "2", "9"]) == 0
-    told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
-    assert told["frames"] == {"first": 2, "count": 8, "rate": 60.0}
-    assert told["chains"] <= 4
-
-
 def test_the_sidecar_follows_the_schema(
     motion: GuideMotion, joints: tuple[Path, WrittenCards], tmp_path: Path
 ) -> None:
@@ -367,87 +260,3 @@ def test_the_sidecar_follows_the_schema(
         content["motion"].pop("kind")
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.Draft202012Validator(schema).validate(content)
-
-
-@pytest.mark.usefixtures("extension")
-def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
-    """Its frames, or some of them; without a bake it says so, and nothing is written."""
-    bpy.ops.object.select_all(action="DESELECT")
-    sphere.select_set(True)
-    bpy.context.view_layer.objects.active = sphere
-    bpy.ops.hairloom.grow(strand_count=60, length=0.05)
-    hair, scene = bpy.context.object, bpy.context.scene
-    hair.data.hairloom.guides.guide_count = 8
-    hair.data.hairloom.card_occlusion.rays = 8
-    hair.data.hairloom.cards.way = "guides"
-    scene.frame_start, scene.frame_end = 3, 9
-    for frame in (3, 6, 9):
-        sphere.location.x = 0.03 * (frame % 2)
-        sphere.keyframe_insert("location", frame=frame)
-    path = tmp_path / "out" / "hair.glb"
-    options = {"filepath": str(path), "motion": "joints", "chains": 4}
-    with pytest.raises(RuntimeError, match="it has no bake"):
-        bpy.ops.hairloom.export_cards(**options)
-    assert not path.parent.exists()
-    scene.frame_set(3)
-    hair.hairloom.bake.folder = str(tmp_path / "bake")
-    hair.hairloom.dynamics.form = "numpy"
-    hair.hairloom.dynamics.collider_resolution = 8
-    list(Bake.of([hair], scene).steps())
-    for chosen, first, count in (
-        ({}, 3, 7),
-        ({"own_frames": True, "first_frame": 4, "last_frame": 6}, 4, 3),
-    ):
-        assert bpy.ops.hairloom.export_cards(**options, **chosen) == {"FINISHED"}
-        told = json.loads((path.parent / "hair.hairloom.json").read_text("utf-8"))["motion"]
-        assert (told["frames"]["first"], told["frames"]["count"]) == (first, count)
-    with pytest.raises(RuntimeError, match="holds frames 3 to 9"):
-        bpy.ops.hairloom.export_cards(**options, own_frames=True, first_frame=4, last_frame=20)
-
-
-@pytest.mark.usefixtures("extension")
-@pytest.mark.parametrize(
-    ("kind", "amid"),
-    [("joints", "Moving the cards"), ("joints", "Fitting joints"), ("texture", "Writing")],
-)
-def test_cancelled_in_its_midst_it_leaves_the_old_files(
-    kind: str, amid: str, sphere: Any, tmp_path: Path
-) -> None:
-    """The steps that Esc closes in the window, as far as each of them."""
-    bpy.context.view_layer.objects.active = sphere
-    bpy.ops.hairloom.grow(strand_count=40, length=0.05)
-    hair, scene = bpy.context.object, bpy.context.scene
-    hair.data.hairloom.cards.way = "guides"
-    hair.data.hairloom.card_occlusion.rays = 8
-    hair.data.hairloom.atlas.source = "made"
-    scene.frame_start, scene.frame_end = 1, 6
-    for frame in (1, 6):
-        sphere.location.x = 0.02 * frame
-        sphere.keyframe_insert("location", frame=frame)
-    scene.frame_set(1)
-    hair.hairloom.bake.folder = str(tmp_path / "bake")
-    hair.hairloom.dynamics.form = "numpy"
-    hair.hairloom.dynamics.collider_resolution = 8
-    list(Bake.of([hair], scene).steps())
-    folder = tmp_path / "out"
-    folder.mkdir()
-    old = {"hair.glb": b"old mesh", "hair_base.png": b"old picture", "note.txt": b"the artist's"}
-    for name, content in old.items():
-        (folder / name).write_bytes(content)
-    plan = CardExport.of(
-        hair,
-        bpy.context.evaluated_depsgraph_get(),
-        folder / "hair.glb",
-        CardOutput(motion=MotionChoices(kind)),
-    )
-    making = plan.making()
-    while not making.serve():
-        time.sleep(0.001)
-    writing = plan.writing(making.result())
-    for text, _ in writing:
-        if text == amid:
-            break
-    else:
-        pytest.fail(f"it never comes to '{amid}'")
-    writing.close()
-    assert {file.name: file.read_bytes() for file in folder.iterdir()} == old

@@ -1,10 +1,11 @@
-"""Everything that hair collides with: kinds of objects, how they move, deform, scale and fail."""
+"""Everything that hair collides with: kinds of objects, how they move and deform."""
 
 import math
 
 import bpy
 import numpy as np
 import pytest
+from collider_scene import COARSE, Scene, depsgraph, distance_now, moved
 from mathutils import Matrix, Vector
 
 from hairloom.addon.dynamics.colliders import (
@@ -12,72 +13,17 @@ from hairloom.addon.dynamics.colliders import (
     DistanceField,
     SphereCollider,
     SphereSetCollider,
-    transform_points,
 )
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.errors import HairloomError
 from hairloom.addon.host.colliders.obstacles import Obstacles
 from hairloom.addon.host.scene.objects import Body
 from hairloom.addon.host.scene.surfaces import read_surface
-from hairloom.addon.host.scene.wind import scene_wind
 from hairloom.addon.strands import Surface
-
-FRAME = 1.0 / 60.0
-COARSE = DynamicsSettings(collider_resolution=16)
 
 
 @pytest.fixture
 def scene(extension):
-    """An owner without a head, whose colliders are in a collection."""
     return Scene()
-
-
-class Scene:
-    def __init__(self):
-        self.colliders = bpy.data.collections.new("Colliders")
-        bpy.context.scene.collection.children.link(self.colliders)
-        self.owner = bpy.data.objects.new("Fin", bpy.data.meshes.new("Fin"))
-        bpy.context.collection.objects.link(self.owner)
-        self.owner.hairloom.collider_collection = self.colliders
-
-    def add(self, obj, shape="automatic"):
-        for collection in obj.users_collection:
-            collection.objects.unlink(obj)
-        self.colliders.objects.link(obj)
-        obj.hairloom.collider_shape = shape
-        return obj
-
-    def ball(self, radius=0.1, place=(0, 0, 0), name="Ball"):
-        empty = bpy.data.objects.new(name, None)
-        empty.empty_display_type, empty.empty_display_size = "SPHERE", radius
-        empty.location = place
-        bpy.context.collection.objects.link(empty)
-        return self.add(empty)
-
-    def cube(self, size=0.2, shape="automatic", name="Cube", place=(0, 0, 0)):
-        bpy.ops.mesh.primitive_cube_add(size=size, location=place)
-        bpy.context.object.name = name
-        return self.add(bpy.context.object, shape)
-
-    def obstacles(self, known=None):
-        return Obstacles.of(self.owner, None, None, COARSE, depsgraph(), known)
-
-
-def depsgraph():
-    bpy.context.view_layer.update()
-    return bpy.context.evaluated_depsgraph_get()
-
-
-def distance_now(posed, point):
-    """Of one place (3,) in the world at the frame's end, to first order."""
-    inverse = np.linalg.inv(posed.matrix_now)
-    local = transform_points(inverse, np.array(point, np.float32)[:, None])
-    distance, gradient = posed.collider.distance(local)
-    return float(distance[0] / np.linalg.norm(inverse[:3, :3].T @ gradient[:, 0]))
-
-
-def moved(found, duration=FRAME):
-    return found.move(depsgraph(), duration)
 
 
 def rig(mesh, name="Rig"):
@@ -361,169 +307,3 @@ def test_one_root_or_none_is_enough_to_follow_a_head(scene, sphere):
         pose(Matrix.Identity(4))
     found = Obstacles.of(scene.owner, head, alone, COARSE, depsgraph(), None)
     assert moved(found) == () and "no faces" in found.warnings[0]
-
-
-# --- what fails
-
-
-def plane(scene):
-    bpy.ops.mesh.primitive_plane_add(size=0.2)
-    return scene.add(bpy.context.object)
-
-
-def flat(scene):
-    cube = scene.cube(name="Flat")
-    cube.scale = (1, 1, 0)
-    return cube
-
-
-def curve(scene):
-    bpy.ops.curve.primitive_bezier_circle_add()
-    return scene.add(bpy.context.object)
-
-
-def empty_as_mesh(scene):
-    ball = scene.ball(name="NoMesh")
-    ball.hairloom.collider_shape = "mesh"
-    return ball
-
-
-def disabled(scene):
-    cube = scene.cube(name="Disabled")
-    cube.hide_viewport = True
-    return cube
-
-
-def not_finite(scene):
-    cube = scene.cube(name="NotFinite")
-    cube.data.vertices[0].co.x = math.nan
-    return cube
-
-
-@pytest.mark.parametrize("make", [plane, flat, curve, empty_as_mesh, disabled, not_finite])
-def test_what_cannot_be_used_is_told_by_name_and_the_others_go_on(scene, make):
-    bad = make(scene)
-    scene.ball()
-    found = scene.obstacles()
-    assert len(moved(found)) == 1
-    (warning,) = found.warnings
-    assert warning.startswith(bad.name + ":") and warning.count(".") >= 2
-
-
-def test_excluded_from_the_view_layer(scene):
-    away = bpy.data.collections.new("Away")
-    scene.colliders.children.link(away)
-    cube = scene.cube(name="Away")
-    scene.colliders.objects.unlink(cube)
-    away.objects.link(cube)
-    found = scene.obstacles()
-    assert len(moved(found)) == 1 and found.warnings == ()
-    layer = bpy.context.view_layer.layer_collection.children["Colliders"]
-    layer.children["Away"].exclude = True
-    assert moved(found) == ()
-    assert "Away" in found.warnings[0]
-    layer.children["Away"].exclude = False
-    cube.location.x = 3.0
-    (posed,) = moved(found)
-    assert found.warnings == ()
-    np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)  # back without a leap
-
-
-def test_hidden_with_the_eye_it_still_collides(scene):
-    ball = scene.ball()
-    ball.hide_set(True)
-    found = scene.obstacles()
-    assert len(moved(found)) == 1 and found.warnings == ()
-    ball.location.x = 1.0
-    assert moved(found)[0].matrix_now[0, 3] == pytest.approx(1.0, abs=1e-6)
-
-
-def test_deleted_in_mid_play(scene):
-    cube, ball, other = scene.cube(), scene.ball(name="A"), scene.ball(0.1, (1, 0, 0), "B")
-    found = scene.obstacles()
-    assert len(moved(found)) == 2
-    bpy.data.objects.remove(cube)
-    bpy.data.objects.remove(ball)
-    (posed,) = moved(found)
-    assert len(posed.collider.radii) == 1
-    assert distance_now(posed, (1.3, 0, 0)) == pytest.approx(0.2, abs=1e-6)
-    assert ["Cube" in text or "A:" in text for text in found.warnings] == [True, True]
-    bpy.data.objects.remove(other)
-    assert moved(found) == ()
-
-
-def test_scaled_to_nothing_and_back_in_mid_play(scene):
-    cube, ball, stretched = scene.cube(), scene.ball(), scene.ball(name="Stretched")
-    stretched.scale = (1, 1, 2)
-    found = scene.obstacles()
-    assert len(moved(found)) == 3
-    for obj in (cube, ball, stretched):
-        obj.scale = (0, 0, 0)
-    assert moved(found) == ()
-    assert len(found.warnings) >= 3
-    for obj in (cube, ball, stretched):
-        obj.scale = (1, 1, 1)
-    assert len(moved(found)) == 3 and found.warnings == ()
-
-
-def test_another_mesh_in_mid_play(scene):
-    cube = scene.cube()
-    found = scene.obstacles()
-    cube.modifiers.new("Subdivision", "SUBSURF").levels = 2
-    assert moved(found) == ()
-    assert "vertices" in found.warnings[0]
-    cube.modifiers.clear()
-    assert len(moved(found)) == 1 and found.warnings == ()
-
-
-def test_the_head_that_is_gone_is_an_error(scene, sphere):
-    head = Body.at_rest(sphere, depsgraph())
-    at_rest = read_surface(sphere, depsgraph(), need_uv=False, place="Head")
-    scene.ball()
-    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
-    assert len(moved(found)) == 2
-    bpy.data.objects.remove(sphere)
-    with pytest.raises(HairloomError, match="gone"):
-        moved(found)
-
-
-def test_a_head_without_volume_is_told_and_the_others_go_on(scene):
-    bpy.ops.mesh.primitive_grid_add(size=0.2)
-    cap = bpy.context.object
-    at_rest = read_surface(cap, depsgraph(), need_uv=False, place="Cap")
-    scene.ball()
-    head = Body.at_rest(cap, depsgraph())
-    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
-    assert len(moved(found)) == 1
-    assert "Grid" in found.warnings[0]
-
-
-def test_a_chosen_collider_stands_in_for_the_head(scene, sphere):
-    at_rest = read_surface(sphere, depsgraph(), need_uv=False, place="Head")
-    head = Body.at_rest(sphere, depsgraph())
-    scene.owner.hairloom.collider_collection = None
-    bpy.ops.mesh.primitive_cube_add(size=0.1, location=(0, 0, 1))
-    scene.owner.hairloom.collider = bpy.context.object
-    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
-    (posed,) = moved(found)
-    assert distance_now(posed, (0, 0, 1.1)) == pytest.approx(0.05, abs=2e-3)
-    sphere.hairloom.collider_shape = "none"
-    scene.owner.hairloom.collider = None
-    assert moved(Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)) == ()
-
-
-# --- wind
-
-
-def test_wind_fields_add_up_along_their_own_z(extension):
-    assert scene_wind(depsgraph()).tolist() == [0.0, 0.0, 0.0]
-    for strength, turn in ((3.0, (0, math.pi / 2, 0)), (-2.0, (0, 0, 0))):
-        bpy.ops.object.effector_add(type="WIND", rotation=turn)
-        bpy.context.object.field.strength = strength
-        bpy.context.object.scale = (5, 5, 5)
-    bpy.ops.object.effector_add(type="VORTEX")
-    np.testing.assert_allclose(scene_wind(depsgraph()), [3.0, 0.0, -2.0], atol=1e-6)
-    bpy.data.objects["Wind"].hide_viewport = True
-    np.testing.assert_allclose(scene_wind(depsgraph()), [0.0, 0.0, -2.0], atol=1e-6)
-    bpy.data.objects["Wind.001"].hide_set(True)
-    assert scene_wind(depsgraph()).tolist() == [0.0, 0.0, 0.0]

@@ -197,5 +197,8 @@ def test_a_moment_without_a_gpu_is_waited_for(preview, evaluated, monkeypatch):
     live.attempt(session, evaluated(), done.append)
     assert done == [] and live.sessions() == (session,) and session.is_stale
     monkeypatch.setattr(previewed, "is_interrupted", lambda: False)
+    assert not bpy.app.timers.is_registered(reactions._read_again)
+    update()
+    assert bpy.app.timers.is_registered(reactions._read_again), "nobody looks again"
     reactions.catch_up(evaluated())
     assert not session.is_stale and live.notice() == ""

@@ -4,7 +4,6 @@ Events are sent one a tick, as Blender wants them: call what yields by `yield fr
 """
 
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import bpy
 import driver
 import numpy as np
+from driver import of_hairloom
 from mathutils import Euler
 
 #: Buttons of our panel, the first of its tab: x from the sidebar's left edge as a part of its
@@ -86,6 +86,27 @@ def field(area: Any, kind: str, path: str) -> Iterator[int]:
     raise AssertionError(f"no field of {path}")
 
 
+def new_head(*, keeps_light: bool = False, **shape: int) -> Any:
+    """A ball of radius 0.1 m named Head, alone, or with the camera and the light of a new file.
+
+    Args:
+        shape: segments and rings of the ball, as its operator has them.
+    """
+    for obj in list(bpy.data.objects):
+        if obj.type == "MESH" or not keeps_light:
+            bpy.data.objects.remove(obj)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, **shape)
+    head = bpy.context.object
+    head.name = "Head"
+    return head
+
+
+def hide_floor() -> None:
+    """And what else Blender draws over hair and head."""
+    overlays = viewport().spaces.active.overlay
+    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+
+
 def look_from_front(distance: float) -> None:
     """At the origin, along +Y, from this far away [m]."""
     view = viewport().spaces.active.region_3d
@@ -104,6 +125,11 @@ def viewport_pixels(screenshot: Path) -> np.ndarray:
     return _rectangle(screenshot, left, right, view.y, top)
 
 
+def pixels(label: str) -> np.ndarray:
+    """The viewport as it is now, as `viewport_pixels`; the screenshot is kept."""
+    return viewport_pixels(driver.screenshot(label))
+
+
 def changed(before: np.ndarray, after: np.ndarray, at_least: float = 0.1) -> float:
     """Share of the pixels that differ by more than Blender's own anti-aliasing does."""
     return float((np.abs(after - before).max(axis=2) > at_least).mean())
@@ -118,9 +144,21 @@ def until(is_so: Callable[[], bool], message: str, tries: int = 60) -> Iterator[
     raise AssertionError(message)
 
 
+def pixels_at_rest(label: str) -> Iterator[int]:
+    """As `pixels`, once Blender has drawn all samples of its own anti-aliasing."""
+    before = pixels(label)
+    for _ in range(30):
+        yield 5
+        now = pixels(label)
+        if np.array_equal(before, now):
+            return now
+        before = now
+    raise AssertionError(f"{label} does not come to rest")
+
+
 def hair_is_made() -> Iterator[int]:
     """Ticks until the hair of all previews is there: it is made in a thread."""
-    live = sys.modules[f"{driver.EXTENSION}.addon.host.preview.live"]
+    live = of_hairloom("host.preview.live")
     yield from until(lambda: all(each.is_made for each in live.sessions()), "no hair is made", 300)
 
 

@@ -8,9 +8,11 @@ generator: what stands before a `yield` runs in one tick, Blender redraws, the n
 import faulthandler
 import os
 import subprocess
+import sys
 import traceback
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import addon_utils
 import bpy
@@ -46,6 +48,11 @@ def enable_extension() -> None:
     """Enables the installed extension; Blender itself only prints when that goes wrong."""
     assert addon_utils.enable(EXTENSION, default_set=True) is not None, f"{EXTENSION} fails"
     assert all(addon_utils.check(EXTENSION)), f"{EXTENSION} is not enabled"
+
+
+def of_hairloom(module: str) -> Any:
+    """A module of the enabled extension, such as "host.preview.live"."""
+    return sys.modules[f"{EXTENSION}.addon.{module}"]
 
 
 def screenshot(label: str) -> Path:

@@ -1,9 +1,7 @@
 """All panels of Hairloom open, and there while they are wanted, so that they can be pictured."""
 
-import sys
-
 import bpy
-import driver
+from driver import of_hairloom
 
 OURS, SIDEBAR = "HAIRLOOM_PT_", "HAIRLOOM_PT_sidebar"
 
@@ -11,10 +9,6 @@ OURS, SIDEBAR = "HAIRLOOM_PT_", "HAIRLOOM_PT_sidebar"
 there: set[str] = set()
 filled: set[str] = set()
 drawn: set[str] = set()
-
-
-def of_hairloom(module):
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
 
 
 def ours():
@@ -76,3 +70,14 @@ def show(names):
         for each in area.regions:  # not the view: the hair in it is slow to draw
             if each.type == ("UI" if area.type == "VIEW_3D" else "WINDOW"):
                 each.tag_redraw()
+
+
+def open_from_the_start(panel):
+    """It and those below it are registered anew: Blender keeps what it once has drawn."""
+    classes = of_hairloom("registration").CLASSES
+    chosen = [each for each in classes if each.__name__.startswith(panel)]
+    for each in reversed(chosen):
+        bpy.utils.unregister_class(each)
+    for each in chosen:
+        each.bl_options = set() if each.__name__ == panel else each.bl_options
+        bpy.utils.register_class(each)

@@ -6,7 +6,7 @@ import addon_utils
 import bpy
 import driver
 from dice import action, call, clicked, objects, press, select, step
-from traces import of_hairloom
+from driver import of_hairloom
 
 SECTIONS = {
     bpy.types.Curves: ["shading", "strands", "volume", "detail", "guides", "children", "skin"]

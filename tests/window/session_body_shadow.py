@@ -11,22 +11,17 @@ import driver
 from artist import (
     changed,
     click,
+    hide_floor,
     look_from_front,
+    new_head,
     open_our_sidebar,
+    pixels,
     press,
     sidebar_button,
     until,
     viewport,
-    viewport_pixels,
 )
-
-
-def of_hairloom(module):
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
-
-
-def pixels(label):
-    return viewport_pixels(driver.screenshot(label))
+from driver import of_hairloom
 
 
 def volume():
@@ -44,12 +39,8 @@ def steps():
 
 def set_the_scene():
     """A fringe above a ball, under a sun from above the eye."""
-    for obj in list(bpy.data.objects):
-        bpy.data.objects.remove(obj)
     bpy.context.scene.render.engine = "BLENDER_EEVEE"
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, segments=48, ring_count=24)
-    head = bpy.context.object
-    head.name = "Head"
+    head = new_head(segments=48, ring_count=24)
     bpy.ops.object.shade_smooth()
     group = head.vertex_groups.new(name="Crown")
     crown = [each.index for each in head.data.vertices if each.co.z > 0.075]
@@ -64,10 +55,10 @@ def set_the_scene():
     bpy.data.objects["Hair"].data.hairloom.strands.width_scale = 3.0
     volume().shadows = "deep"
     volume().on_body = True
-    shading, overlays = viewport().spaces.active.shading, viewport().spaces.active.overlay
+    shading = viewport().spaces.active.shading
     shading.type = "MATERIAL"
     shading.use_scene_lights = shading.use_scene_world = True
-    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    hide_floor()
     look_from_front(0.6)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))

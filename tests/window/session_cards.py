@@ -18,23 +18,20 @@ from artist import (
     hair_is_made,
     look_from_front,
     open_our_sidebar,
+    pixels,
     press,
     region,
     sidebar_button,
     until,
     viewport,
-    viewport_pixels,
 )
+from driver import of_hairloom
 
 STRANDS, CARDS = 400, 60
 FOLDER = Path(bpy.app.tempdir) / "cards"
 BLEND = str(FOLDER / "cards.blend")
 
 failures: list[str] = []
-
-
-def of_hairloom(module):
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
 
 
 def live():
@@ -52,10 +49,6 @@ def hair():
 
 def settings(section):
     return getattr(hair().data.hairloom, section)
-
-
-def pixels(label):
-    return viewport_pixels(driver.screenshot(label))
 
 
 class Stillness:

@@ -1,5 +1,6 @@
-"""What artists do all day: open every panel, hide, go to local view, play the animation; and what
-they may meet: hair without a surface, a file that is none, a GPU that refuses a shader."""
+"""What artists do all day: open every panel, hide, go to local view, show what acts on the hair,
+duplicate, play the animation; and what they may meet: hair without a surface, a GPU that refuses a
+shader."""
 
 import sys
 from pathlib import Path
@@ -13,24 +14,22 @@ from artist import (
     changed,
     click,
     hair_is_made,
+    hide_floor,
     look_from_front,
+    new_head,
     open_our_sidebar,
+    pixels,
+    pixels_at_rest,
     press,
     sidebar_button,
+    until,
     viewport,
-    viewport_pixels,
 )
+from dice import press as press_in_view
+from driver import of_hairloom
 
 failures: list[str] = []
 drawn: set[str] = set()
-
-
-def of_hairloom(module):
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
-
-
-def pixels(label):
-    return viewport_pixels(driver.screenshot(label))
 
 
 def steps():
@@ -41,6 +40,8 @@ def steps():
     yield from set_the_scene()
     yield from every_panel_draws()
     yield from hiding_and_local_view()
+    yield from what_acts_on_it()
+    yield from duplicates_by_keys()
     yield from blenders_own_animation()
     yield from hair_without_a_surface()
     yield from a_failing_shader_is_told_once()
@@ -83,13 +84,11 @@ def nothing_selected():
 
 
 def set_the_scene():
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    bpy.context.object.name = "Head"
+    new_head()
     bpy.ops.hairloom.grow(strand_count=800, length=0.12)
     bpy.context.object.name = "Hair"
     bpy.context.object.data.add_curves([1, 1, 1])
-    overlays = viewport().spaces.active.overlay
-    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    hide_floor()
     look_from_front(0.9)
     yield 5
 
@@ -161,6 +160,85 @@ def hiding_and_local_view():
         bpy.ops.view3d.localview(frame_selected=False)
     yield 10
     assert changed(local, pixels("out-of-local-view")) > 0.01
+
+
+def what_acts_on_it():
+    """Colliders, wind and lights as lines in the view, which go with Blender's own overlays."""
+    hair, overlay = bpy.data.objects["Hair"], viewport().spaces.active.overlay
+    bpy.ops.object.light_add(type="SUN", rotation=(0.6, 0.6, 0.0))
+    ball = bpy.data.objects.new("Ball", bpy.data.objects["Head"].data)
+    bpy.context.collection.objects.link(ball)
+    hair.hairloom.dynamics.wind_speed = 8.0
+    yield 5
+    without = yield from pixels_at_rest("no-aids")
+    for aid in ("colliders", "wind", "lights"):
+        hair.hairloom.shown_aids = set()
+        yield from until(lambda: changed(without, pixels("no-aids-again")) < 1e-4, "lines stay")
+        hair.hairloom.shown_aids = {aid}
+        yield from until(
+            lambda aid=aid: 0.0002 < changed(without, pixels(f"aid-{aid}")) < 0.1, f"no {aid}"
+        )
+    hair.hairloom.shown_aids = {"colliders", "wind", "lights"}
+    yield 5
+    driver.screenshot("all-aids")
+    overlay.show_overlays = False
+    yield 5
+    bare = pixels("aids-without-overlays")
+    hair.hairloom.shown_aids = set()
+    yield 5
+    assert changed(bare, pixels("no-overlays")) < 0.001, "lines without overlays"
+    overlay.show_overlays = True
+    hair.hairloom.dynamics.wind_speed = 0.0
+    yield 3
+
+
+def duplicates_by_keys():
+    """Shift-D and Alt-D while hair plays: it plays on, Blender shows the copy, Ctrl-Z takes it."""
+    live, hair = of_hairloom("host.preview.live"), bpy.data.objects["Hair"]
+    choose(hair)
+    bpy.ops.ed.undo_push(message="the scene")
+    yield from click(*sidebar_button("hairloom.play"))
+    yield from until(live.is_playing, "it does not play")
+    names = set(bpy.data.objects.keys())
+    for held in ({"shift": True}, {"alt": True}):
+        yield from press_in_view("D", **held)
+        yield from press("RET")  # the copy hangs at the mouse
+        yield from until(lambda: len(bpy.data.objects) > len(names), f"no copy by {held}")
+        (copy,) = set(bpy.data.objects.keys()) - names
+        yield from still_plays(f"beside a copy by {held}")
+        driver.screenshot(f"copy-by-{next(iter(held))}")
+        shown = {name: shown_as(name) for name in (copy, "Hair")}
+        assert shown == {copy: "TEXTURED", "Hair": "BOUNDS"}, shown
+        yield from press_in_view("Z", ctrl=True)
+        yield from until(lambda: set(bpy.data.objects.keys()) == names, "Ctrl-Z leaves the copy")
+        yield from still_plays("after Ctrl-Z")
+    choose(bpy.data.objects["Hair"])
+    yield from click(*sidebar_button("hairloom.play"))
+    yield from until(lambda: not live.is_playing(), "it plays on")
+
+
+def still_plays(where):
+    live = of_hairloom("host.preview.live")
+    assert len(live.sessions()) == 1 and live.notice() == "", f"{where}: {live.notice()}"
+    before = live.sessions()[0].strands
+
+    def has_moved():
+        return not np.array_equal(live.sessions()[0].strands, before)
+
+    yield from until(has_moved, f"{where} it stands still", 300)
+
+
+def shown_as(name):
+    """As what Blender itself shows an object."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return bpy.data.objects[name].evaluated_get(depsgraph).display_type
+
+
+def choose(obj):
+    for each in bpy.context.selected_objects:
+        each.select_set(False)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
 
 
 def blenders_own_animation():

@@ -14,8 +14,11 @@ from artist import (
     changed,
     click,
     hair_is_made,
+    hide_floor,
     look_from_front,
+    new_head,
     open_our_sidebar,
+    pixels,
     press,
     sidebar_button,
     until,
@@ -23,6 +26,7 @@ from artist import (
     viewport_middle,
     viewport_pixels,
 )
+from driver import of_hairloom
 
 STRANDS = 1500
 RED = (0.8, 0.05, 0.05)
@@ -31,16 +35,11 @@ FILE = str(Path(bpy.app.tempdir) / "first_light.blend")
 
 
 def live():
-    return sys.modules[f"{driver.EXTENSION}.addon.host.preview.live"]
+    return of_hairloom("host.preview.live")
 
 
 def overlay():
-    return sys.modules[f"{driver.EXTENSION}.addon.host.preview.overlay"]
-
-
-def pixels(label):
-    """What the viewport shows, (height, width, 3) in 0 to 1."""
-    return viewport_pixels(driver.screenshot(label))
+    return of_hairloom("host.preview.overlay")
 
 
 def steps():
@@ -59,16 +58,11 @@ def steps():
 
 def set_the_scene():
     """A head with hair in the middle of the viewport, the sidebar open at our tab."""
-    for obj in list(bpy.data.objects):
-        if obj.type == "MESH":
-            bpy.data.objects.remove(obj)
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    bpy.context.object.name = "Head"
+    new_head(keeps_light=True)
     bpy.ops.object.shade_smooth()
     assert bpy.ops.hairloom.grow(strand_count=STRANDS, length=0.12) == {"FINISHED"}
     bpy.context.object.name = "Hair"
-    overlays = viewport().spaces.active.overlay
-    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    hide_floor()
     look_from_front(DISTANCE)
     yield from open_our_sidebar()
 

@@ -15,26 +15,20 @@ import driver
 from artist import (
     changed,
     hair_is_made,
+    hide_floor,
     look_from_front,
     open_our_sidebar,
+    pixels,
     press,
     region,
     until,
     viewport,
-    viewport_pixels,
 )
-
-
-def of_hairloom(module):
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
+from driver import of_hairloom
 
 
 def live():
     return of_hairloom("host.preview.live")
-
-
-def pixels(label):
-    return viewport_pixels(driver.screenshot(label))
 
 
 def in_view():
@@ -103,8 +97,7 @@ def hair_on_a_mesh_of_ones_own():
             bpy.data.objects.remove(obj)
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
     bpy.context.object.name = "Ball"
-    overlays = viewport().spaces.active.overlay
-    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    hide_floor()
     look_from_front(0.9)
     yield 10
     bare = pixels("bare")

@@ -9,13 +9,10 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import look_from_front, press, until, viewport
+from artist import look_from_front, new_head, press, until, viewport
+from driver import of_hairloom
 
 FOLDER = Path(bpy.app.tempdir) / "grooms"
-
-
-def of_hairloom(module):
-    return __import__(f"{driver.EXTENSION}.addon.{module}", fromlist=["_"])
 
 
 def steps():
@@ -28,11 +25,7 @@ def steps():
 
 
 def set_the_scene():
-    for obj in list(bpy.data.objects):
-        if obj.type == "MESH":
-            bpy.data.objects.remove(obj)
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    bpy.context.object.name = "Head"
+    new_head(keeps_light=True)
     look_from_front(0.9)
     FOLDER.mkdir()
     outward = np.random.default_rng(1).normal(size=(500, 3))

@@ -10,7 +10,18 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import confirm_file, look_from_front, open_our_sidebar, press, region, until, viewport
+import traces
+from artist import (
+    confirm_file,
+    look_from_front,
+    new_head,
+    open_our_sidebar,
+    press,
+    region,
+    until,
+    viewport,
+)
+from driver import of_hairloom
 
 FOLDER = Path(bpy.app.tempdir) / "long"
 SMALL = {"size": 64, "samples": 1}
@@ -23,12 +34,12 @@ failures: list[str] = []
 
 
 def running():
-    return sys.modules[f"{driver.EXTENSION}.addon.ui.long_work"].running()
+    return of_hairloom("ui.long_work").running()
 
 
 def told():
     """What the status bar says of it."""
-    work = sys.modules[f"{driver.EXTENSION}.addon.ui.long_work"]._running
+    work = of_hairloom("ui.long_work")._running
     return "" if work is None else work.progress.text
 
 
@@ -37,11 +48,16 @@ def steps():
     sys.excepthook = lambda kind, error, _: failures.append(f"{kind.__name__}: {error}")
     driver.enable_extension()
     yield from set_the_scene()
-    yield from from_a_dialog()
-    yield from undone_in_mid_work()
-    yield from from_the_file_browser()
-    yield from cards_in_motion()
-    yield from another_file_in_mid_work()
+    at_rest = traces.of_blender()["handlers"]
+    for work in (
+        from_a_dialog,
+        undone_in_mid_work,
+        from_the_file_browser,
+        cards_in_motion,
+        another_file_in_mid_work,
+    ):
+        yield from work()
+        assert traces.of_blender()["handlers"] == at_rest, f"{work.__name__} leaves a handler"
     yield from disabled_in_mid_work()
     assert failures == [], failures
 
@@ -49,9 +65,7 @@ def steps():
 def set_the_scene():
     FOLDER.mkdir()
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
-    bpy.data.batch_remove(bpy.data.objects)
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    bpy.context.object.name = "Head"
+    new_head()
     assert bpy.ops.hairloom.grow(strand_count=300, length=0.12) == {"FINISHED"}
     hair = bpy.context.object
     hair.name = "Hair"

@@ -23,6 +23,7 @@ from artist import (
     sidebar_button,
     viewport,
 )
+from driver import of_hairloom
 
 #: where Blender's own picture of a radiance is, and ours, for the hair's root and its tip
 PLANES = ((-0.25, 0.0, -0.12), (-0.25, 0.0, 0.12))
@@ -32,10 +33,6 @@ LIT = ((0.5, (1.0, 0.4, 0.1), (0.04, 0.024, 0.012)), (2.0, (0.8, 0.45, 0.25), (0
 #: code values; what the table is off by, and the roundings of both to 8 bits
 TOLERANCE = 2.0
 NO_LIGHT = 0.0
-
-
-def of_hairloom(module):
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
 
 
 def session():

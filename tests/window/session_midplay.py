@@ -25,7 +25,8 @@ from artist import (
 )
 from dice import in_view
 from dice import press as press_in_view
-from traces import of_hairloom
+from driver import of_hairloom
+from open_panels import open_from_the_start
 
 log, registered = traces.Log(), traces.Registered()
 STRANDS = 300
@@ -223,25 +224,25 @@ def a_slider_is_dragged():
     nothing_raised("dragging")
 
 
-def open_from_the_start(panel):
-    """It and those below it are registered anew: Blender keeps what it once has drawn."""
-    classes = of_hairloom("registration").CLASSES
-    chosen = [each for each in classes if each.__name__.startswith(panel)]
-    for each in reversed(chosen):
-        bpy.utils.unregister_class(each)
-    for each in chosen:
-        each.bl_options = set() if each.__name__ == panel else each.bl_options
-        bpy.utils.register_class(each)
-
-
 def another_file(folder):
     path = str(folder / "other.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
     assert live().is_playing(), "saving stopped it"
-    bpy.ops.wm.open_mainfile(filepath=path)
-    yield from ended("another file")
-    assert hair().display_type == "TEXTURED"
-    assert live().notice() == "", "nobody needs to be told"
+    in_play, at_rest = [], []
+    for _ in range(3):
+        in_play.append(traces.of_gpu())
+        bpy.ops.wm.open_mainfile(filepath=path)
+        yield 3  # until there is a window again
+        yield from ended("another file")
+        at_rest.append(traces.of_gpu())
+        assert hair().display_type == "TEXTURED"
+        assert live().notice() == "", "nobody needs to be told"
+        with in_view():
+            bpy.ops.hairloom.play("INVOKE_DEFAULT")
+        yield from plays()
+    print(f"on the GPU in play {in_play}, at rest {at_rest}", flush=True)
+    assert in_play[0].total() > at_rest[0].total(), "the counts show nothing"
+    assert at_rest[1] == at_rest[2], "each file leaves something on the GPU"
 
 
 def delete_hair():

@@ -13,18 +13,16 @@ from artist import (
     click,
     hair_is_made,
     look_from_front,
+    new_head,
     open_our_sidebar,
     press,
     sidebar_button,
     viewport,
 )
+from driver import of_hairloom
 
 LAST = 40
 FOLDER = Path(bpy.app.tempdir) / "bake"
-
-
-def of_hairloom(module):
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
 
 
 def session():
@@ -46,11 +44,7 @@ def steps():
 
 
 def set_the_scene():
-    for obj in list(bpy.data.objects):
-        if obj.type == "MESH":
-            bpy.data.objects.remove(obj)
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    bpy.context.object.name = "Head"
+    new_head(keeps_light=True)
     bpy.ops.hairloom.grow(strand_count=600, length=0.12)
     bpy.context.object.name = "Hair"
     look_from_front(0.9)

@@ -13,19 +13,17 @@ from artist import (
     click,
     hair_is_made,
     look_from_front,
+    new_head,
     open_our_sidebar,
+    pixels,
     press,
     sidebar_button,
     until,
     viewport,
-    viewport_pixels,
 )
+from driver import of_hairloom
 
 GUIDES, CHILDREN = 300, 2000
-
-
-def of_hairloom(module):
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
 
 
 def session():
@@ -49,10 +47,6 @@ def draws_all():
 
 def hair():
     return bpy.data.objects["Hair"]
-
-
-def pixels(label):
-    return viewport_pixels(driver.screenshot(label))
 
 
 def corner(picture):
@@ -79,11 +73,7 @@ def steps():
 
 
 def set_the_scene():
-    for obj in list(bpy.data.objects):
-        if obj.type == "MESH":
-            bpy.data.objects.remove(obj)
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    bpy.context.object.name = "Head"
+    new_head(keeps_light=True)
     bpy.ops.object.shade_smooth()
     bpy.ops.hairloom.grow(way="normals", strand_count=GUIDES, length=0.08)
     bpy.context.object.name = "Hair"
@@ -129,6 +119,10 @@ def debug_views_and_counts():
         yield from until(lambda view=view: saturation(pixels(view)) > 0.02, view)
         shown = pixels(view)
         assert changed(corner(plain), corner(shown)) > 0.01, "a debug view without its counts"
+    hair().hairloom.debug_view = "occlusion"  # in grey
+    yield 3
+    yield from until(lambda: changed(shown, pixels("occlusion")) > 0.02, "no occlusion is shown")
+    assert saturation(pixels("occlusion")) < 0.01
     overlays = viewport().spaces.active.overlay
     overlays.show_overlays = False
     yield from until(

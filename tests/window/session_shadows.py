@@ -10,22 +10,16 @@ import driver
 from artist import (
     changed,
     click,
+    hide_floor,
     look_from_front,
+    new_head,
     open_our_sidebar,
+    pixels,
     press,
     sidebar_button,
     until,
-    viewport,
-    viewport_pixels,
 )
-
-
-def of_hairloom(module):
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
-
-
-def pixels(label):
-    return viewport_pixels(driver.screenshot(label))
+from driver import of_hairloom
 
 
 def volume():
@@ -42,15 +36,11 @@ def steps():
 
 
 def set_the_scene():
-    for obj in list(bpy.data.objects):
-        bpy.data.objects.remove(obj)
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    bpy.context.object.name = "Head"
+    new_head()
     bpy.ops.object.shade_smooth()
     bpy.ops.hairloom.grow(way="normals", strand_count=1500, length=0.06)
     bpy.context.object.name = "Hair"
-    overlays = viewport().spaces.active.overlay
-    overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
+    hide_floor()
     bpy.data.objects["Hair"].data.hairloom.shading.model = "marschner"
     look_from_front(0.7)
     yield from open_our_sidebar()

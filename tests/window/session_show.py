@@ -7,7 +7,8 @@ import bpy
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import look_from_front, open_our_sidebar, press, until
+from artist import look_from_front, new_head, open_our_sidebar, press, until
+from driver import of_hairloom
 
 STRANDS, FRAMES = 300, 5
 FOLDER = Path(bpy.app.tempdir) / "shown"
@@ -15,16 +16,13 @@ SMALL = {"size": 64, "samples": 1}
 
 
 def running():
-    return sys.modules[f"{driver.EXTENSION}.addon.ui.long_work"].running()
+    return of_hairloom("ui.long_work").running()
 
 
 def steps():
     yield from press("ESC")  # the splash screen takes the first event
     driver.enable_extension()
-    for obj in list(bpy.data.objects):
-        if obj.type == "MESH":
-            bpy.data.objects.remove(obj)
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    new_head(keeps_light=True)
     assert bpy.ops.hairloom.grow(strand_count=STRANDS, length=0.12) == {"FINISHED"}
     bpy.context.object.name = "Hair"
     look_from_front(0.9)

@@ -8,23 +8,23 @@ import bpy
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
+    click,
     confirm_file,
     file_browser,
     look_from_front,
+    new_head,
     open_our_sidebar,
     press,
     region,
     until,
     viewport,
 )
+from driver import of_hairloom
+from open_panels import open_from_the_start
 
 FOLDER = Path(bpy.app.tempdir) / "strands"
 
 failures: list[str] = []
-
-
-def of_hairloom(module):
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
 
 
 def running():
@@ -46,9 +46,7 @@ def steps():
 def set_the_scene():
     FOLDER.mkdir()
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
-    bpy.data.batch_remove(bpy.data.objects)
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    bpy.context.object.name = "Head"
+    new_head()
     assert bpy.ops.hairloom.grow(strand_count=1000, length=0.12) == {"FINISHED"}
     hair = bpy.context.object
     hair.name = "Hair"
@@ -58,6 +56,7 @@ def set_the_scene():
         head.keyframe_insert("location", frame=frame)
     bpy.context.scene.frame_set(1)
     look_from_front(0.9)
+    open_from_the_start("HAIRLOOM_PT_sidebar_export")
     yield from open_our_sidebar()
 
 
@@ -109,8 +108,14 @@ def escape_leaves_the_old_file():
 
 
 def the_check_alone():
-    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
-        bpy.ops.hairloom.check_export("INVOKE_DEFAULT")
+    """By its button, the lowest one of all."""
+    check, sidebar = of_hairloom("ui.operators_export_check"), region("UI")
+    for y in range(sidebar.y + 6, sidebar.y + sidebar.height, 12):
+        yield from click(sidebar.x + sidebar.width // 2, y)
+        if check.count():
+            break
+    else:
+        raise AssertionError("no button opens the check")
     yield 5
     driver.screenshot("check")
     yield from press("ESC")

@@ -1,21 +1,21 @@
 """What an extension may leave behind in Blender, and what Blender says when something raises."""
 
+import gc
 import os
 import stat
 import sys
 import threading
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import bpy
 import driver
+import gpu
+from driver import of_hairloom
 
 MENUS = ("TOPBAR_MT_file_import", "TOPBAR_MT_file_export", "VIEW3D_MT_curve_add")
 OWNERS = ("Curves", "Object", "Scene", "WindowManager", "Mesh", "Material")
-
-
-def of_hairloom(module: str) -> Any:
-    return sys.modules[f"{driver.EXTENSION}.addon.{module}"]
 
 
 class Log:
@@ -74,6 +74,20 @@ def of_blender() -> dict[str, Any]:
         "operators": dir(bpy.ops.hairloom),
         "threads": sorted(each.name for each in threading.enumerate()),
     }
+
+
+def of_gpu() -> Counter[str]:
+    """How many GPU objects of each kind Python holds on to, by whatever holds them."""
+    kinds = tuple(each for each in vars(gpu.types).values() if isinstance(each, type))
+    gc.collect()
+    found, waiting = {}, list(gc.get_objects())
+    while waiting:
+        for each in gc.get_referents(waiting.pop()):
+            if isinstance(each, kinds):
+                found[id(each)] = type(each).__name__
+            elif isinstance(each, tuple | dict) and not gc.is_tracked(each):
+                waiting.append(each)  # of things that hold nothing themselves
+    return Counter(found.values())
 
 
 def of_previews() -> dict[str, Any]:

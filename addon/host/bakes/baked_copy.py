@@ -39,7 +39,7 @@ def show_in_renders(
     rig = playback.rig_in(cache)
     bake = hair.hairloom.bake
     copy = bake.copy
-    if copy is None:
+    if copy is None or copy.hairloom.bake.stands_for not in (None, hair):  # its original's
         curves = bpy.data.hair_curves.new(f"{hair.name} Baked")
         copy = bake.copy = bpy.data.objects.new(curves.name, curves)
     if not bake.hides:
@@ -67,15 +67,15 @@ def remove(hair: bpy.types.Object) -> None:
     if copy is None:
         return
     bake.copy = None
-    if not _is_of_another(copy, hair):  # a duplicate of the hair names the same copy
-        curves = copy.data
-        bpy.data.objects.remove(copy)
-        if not curves.users:
-            bpy.data.hair_curves.remove(curves)
-
-
-def _is_of_another(copy: bpy.types.Object, hair: bpy.types.Object) -> bool:
-    return any(obj != hair and obj.hairloom.bake.copy == copy for obj in bpy.data.objects)
+    other = next((obj for obj in bpy.data.objects if obj.hairloom.bake.copy == copy), None)
+    if other is not None:  # a duplicate of the hair, which names the same copy
+        if copy.hairloom.bake.stands_for == hair:
+            copy.hairloom.bake.stands_for = other
+        return
+    curves = copy.data
+    bpy.data.objects.remove(copy)
+    if not curves.users:
+        bpy.data.hair_curves.remove(curves)
 
 
 def _link_beside(copy: bpy.types.Object, hair: bpy.types.Object) -> None:

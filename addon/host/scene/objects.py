@@ -85,12 +85,16 @@ def matrix_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
 
 
 def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
-    """The mesh that the hair grows from: its surface, else a mesh that is its parent."""
-    surface = hair.data.surface
-    if surface is not None and surface.type == "MESH":
-        return surface
-    parent = hair.parent
-    return parent if parent is not None and parent.type == "MESH" else None
+    """The mesh that the hair grows from: its surface, else a mesh that is its parent.
+
+    Linked duplicates of hair and head share the curves, which name the first head; theirs is the
+    parent then, an object of the same mesh.
+    """
+    surface, parent = hair.data.surface, hair.parent
+    carrier = parent if parent is not None and parent.type == "MESH" else None
+    if surface is None or surface.type != "MESH":
+        return carrier
+    return carrier if carrier is not None and carrier.data == surface.data else surface
 
 
 def is_solid(obj: bpy.types.Object) -> bool:

@@ -1,0 +1,122 @@
+"""Cards in motion by a button and by the command line, and work on them that is cancelled."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
+
+from hairloom.addon.host.bakes.bake import Bake  # noqa: E402
+from hairloom.addon.host.cards.card_files import CardOutput  # noqa: E402
+from hairloom.addon.host.cards.card_motion import MotionChoices  # noqa: E402
+from hairloom.addon.host.cards.card_out import CardExport  # noqa: E402
+from hairloom.addon.host.verbs import command_line  # noqa: E402
+
+
+def test_the_command_line_writes_a_take(tmp_path: Path, capfd: Any) -> None:
+    few = ["--set", "grow.strand_count=60", "--set", "guides.guide_count=12"]
+    few += ["--set", "grow.length=0.06"]
+    take = str(tmp_path / "take.npz")
+    assert command_line.run(["simulate", *few, "--seconds", "0.2", "--output", take]) == 0
+    small = ["--set", "cards.way=guides", "--levels", "1", "--set", "atlas.source=made"]
+    arguments = ["cards", *few, *small, "--output", str(tmp_path / "hair.glb")]
+    moving = ["--motion", "joints", "--chains", "4"]
+    assert command_line.run([*arguments, *moving]) == 1
+    assert "--take" in capfd.readouterr().err
+    assert command_line.run([*arguments, "--take", take]) == 1
+    assert "--motion" in capfd.readouterr().err
+    assert command_line.run([*arguments, *moving, "--take", take, "--frames", "2", "99"]) == 1
+    assert "from 0 to 12" in capfd.readouterr().err
+    assert command_line.run([*arguments, *moving, "--take", take, "--frames", "2", "9"]) == 0
+    told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
+    assert told["frames"] == {"first": 2, "count": 8, "rate": 60.0}
+    assert told["chains"] <= 4
+
+
+@pytest.mark.usefixtures("extension")
+def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
+    """Its frames, or some of them; without a bake it says so, and nothing is written."""
+    bpy.ops.object.select_all(action="DESELECT")
+    sphere.select_set(True)
+    bpy.context.view_layer.objects.active = sphere
+    bpy.ops.hairloom.grow(strand_count=60, length=0.05)
+    hair, scene = bpy.context.object, bpy.context.scene
+    hair.data.hairloom.guides.guide_count = 8
+    hair.data.hairloom.card_occlusion.rays = 8
+    hair.data.hairloom.cards.way, hair.data.hairloom.atlas.source = "guides", "made"
+    scene.frame_start, scene.frame_end = 3, 9
+    for frame in (3, 6, 9):
+        sphere.location.x = 0.03 * (frame % 2)
+        sphere.keyframe_insert("location", frame=frame)
+    path = tmp_path / "out" / "hair.glb"
+    options = {"filepath": str(path), "motion": "joints", "chains": 4}
+    with pytest.raises(RuntimeError, match="it has no bake"):
+        bpy.ops.hairloom.export_cards(**options)
+    assert not path.parent.exists()
+    scene.frame_set(3)
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.collider_resolution = 8
+    list(Bake.of([hair], scene).steps())
+    for chosen, first, count in (
+        ({}, 3, 7),
+        ({"own_frames": True, "first_frame": 4, "last_frame": 6}, 4, 3),
+    ):
+        assert bpy.ops.hairloom.export_cards(**options, **chosen) == {"FINISHED"}
+        told = json.loads((path.parent / "hair.hairloom.json").read_text("utf-8"))["motion"]
+        assert (told["frames"]["first"], told["frames"]["count"]) == (first, count)
+    with pytest.raises(RuntimeError, match="holds frames 3 to 9"):
+        bpy.ops.hairloom.export_cards(**options, own_frames=True, first_frame=4, last_frame=20)
+
+
+@pytest.mark.usefixtures("extension")
+@pytest.mark.parametrize(
+    ("kind", "amid"),
+    [("joints", "Moving the cards"), ("joints", "Fitting joints"), ("texture", "Writing")],
+)
+def test_cancelled_in_its_midst_it_leaves_the_old_files(
+    kind: str, amid: str, sphere: Any, tmp_path: Path
+) -> None:
+    """The steps that Esc closes in the window, as far as each of them."""
+    bpy.context.view_layer.objects.active = sphere
+    bpy.ops.hairloom.grow(strand_count=40, length=0.05)
+    hair, scene = bpy.context.object, bpy.context.scene
+    hair.data.hairloom.cards.way = "guides"
+    hair.data.hairloom.card_occlusion.rays = 8
+    hair.data.hairloom.atlas.source = "made"
+    scene.frame_start, scene.frame_end = 1, 6
+    for frame in (1, 6):
+        sphere.location.x = 0.02 * frame
+        sphere.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.collider_resolution = 8
+    list(Bake.of([hair], scene).steps())
+    folder = tmp_path / "out"
+    folder.mkdir()
+    old = {"hair.glb": b"old mesh", "hair_base.png": b"old picture", "note.txt": b"the artist's"}
+    for name, content in old.items():
+        (folder / name).write_bytes(content)
+    plan = CardExport.of(
+        hair,
+        bpy.context.evaluated_depsgraph_get(),
+        folder / "hair.glb",
+        CardOutput(motion=MotionChoices(kind)),
+    )
+    making = plan.making()
+    while not making.serve():
+        time.sleep(0.001)
+    writing = plan.writing(making.result())
+    for text, _ in writing:
+        if text == amid:
+            break
+    else:
+        pytest.fail(f"it never comes to '{amid}'")
+    writing.close()
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == old

@@ -1,0 +1,140 @@
+"""Fins through undo, saving, playback and bakes, and what they leave as it was."""
+
+import bpy
+import numpy as np
+import pytest
+from fin_motion import play, rest_of, shown, started, update
+
+from hairloom.addon.host.bakes.bake import Bake
+from hairloom.addon.host.cloth import fins
+from hairloom.addon.host.cloth.fin_modifier import INDEX, POSITION, fin_modifier, is_shown
+from hairloom.addon.host.preview import live, reactions
+
+
+def test_undo_and_redo_of_the_operator(extension, evaluated):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=3, y_subdivisions=3)
+    name = bpy.context.object.name
+    bpy.ops.ed.undo_push(message="begin")
+    bpy.ops.hairloom.fin_add()
+    bpy.ops.ed.undo_push(message="fin")
+    bpy.ops.ed.undo()
+    assert fin_modifier(bpy.data.objects[name]) is None
+    bpy.ops.ed.redo()
+    assert fin_modifier(bpy.data.objects[name]) is not None
+
+
+def test_undo_in_mid_play_goes_on_or_rests(flag, evaluated):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="begin")
+    session = started(flag, evaluated)
+    play(session, evaluated, 5)
+    flag.location.x = 0.1
+    bpy.ops.ed.undo_push(message="move")
+    bpy.ops.ed.undo()
+    reactions.catch_up(evaluated())
+    flag = bpy.data.objects["Flag"]
+    play(session, evaluated, 2)
+    assert live.simulated() == (session,)
+    session.stop(evaluated())
+    assert POSITION not in flag.data.attributes
+
+
+def test_a_saved_file_keeps_fin_and_settings(flag, evaluated, tmp_path):
+    rest = rest_of(flag)
+    flag.hairloom.fin.stretch = 0.25
+    session = started(flag, evaluated)
+    play(session, evaluated, 5)
+    drawn = shown(flag, evaluated)
+    file = str(tmp_path / "fin.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    flag = bpy.data.objects["Flag"]
+    assert live.simulated() == ()
+    assert flag.hairloom.fin.stretch == 0.25 and flag.hairloom.fin.pin_group == "Pins"
+    update()
+    assert shown(flag, evaluated) == pytest.approx(drawn, abs=1e-6), "the moment that was saved"
+    assert is_shown(flag)
+    bpy.context.view_layer.objects.active = flag
+    assert bpy.ops.hairloom.fin_reset() == {"FINISHED"}
+    assert not is_shown(flag)
+    assert np.array_equal(rest_of(flag), rest)
+    started(flag, evaluated)
+
+
+def test_buttons_say_why_they_are_grey(extension):
+    for operator in ("fin_add", "fin_remove", "fin_preview", "fin_reset"):
+        assert not getattr(bpy.ops.hairloom, operator).poll()
+    bpy.ops.mesh.primitive_grid_add()
+    assert bpy.ops.hairloom.fin_add.poll() and not bpy.ops.hairloom.fin_preview.poll()
+    bpy.ops.hairloom.fin_add()
+    assert bpy.ops.hairloom.fin_preview.poll() and not bpy.ops.hairloom.fin_reset.poll()
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not bpy.ops.hairloom.fin_remove.poll()
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_enabled_fins_start_together(flag, evaluated):
+    update()
+    assert fins.start_enabled(evaluated()) == []
+    assert [each.name for each in live.simulated()] == ["Flag"]
+    assert bpy.ops.hairloom.fin_preview() == {"FINISHED"}
+    assert live.simulated() == ()
+    flag.hairloom.fin.enabled = False
+    assert fins.start_enabled(evaluated()) == [] and live.simulated() == ()
+
+
+def test_attributes_of_the_modifier_stay_out_of_the_mesh(flag, evaluated):
+    started(flag, evaluated)
+    assert INDEX not in flag.data.attributes
+    assert INDEX in flag.evaluated_get(evaluated()).data.attributes
+
+
+def frames_of(obj, frames):
+    """What Blender shows in each frame, going there one after the other; object space."""
+    found = {}
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        there = obj.evaluated_get(bpy.context.view_layer.depsgraph).data
+        points = np.empty((len(there.vertices), 3), np.float32)
+        there.vertices.foreach_get("co", points.ravel())
+        found[frame] = points
+    return found
+
+
+def test_playback_simulates_it_and_a_bake_shows_exactly_that(flag, evaluated, tmp_path):
+    for frame, x in ((1, 0.0), (10, 0.2)):
+        flag.location.x = x
+        flag.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+    session = fins.start(flag, evaluated())
+    simulated = frames_of(flag, range(1, 9))
+    assert np.array_equal(simulated[1], rest_of(flag))
+    assert simulated[8][:, 2].min() < -0.1
+    session.stop(evaluated())
+    live.stop(session)
+    for _ in Bake.of([flag], bpy.context.scene, frames=range(1, 9), folder=tmp_path).steps():
+        pass
+    for preview in (False, True):
+        if preview:
+            fins.start(flag, evaluated())
+        for frame, points in frames_of(flag, (8, 3, 1, 5)).items():
+            assert np.array_equal(points, simulated[frame])
+
+
+def test_other_attributes_stay_as_they_are(flag, evaluated):
+    mesh = flag.data
+    for name, kind in (("A", "FLOAT"), ("B", "FLOAT_COLOR")):
+        mesh.attributes.new(name, kind, "POINT")
+    mesh.attributes.active = mesh.attributes["A"]
+
+    def known():
+        active = mesh.attributes.active.name, mesh.color_attributes.active_color_index
+        return active, [each.name for each in mesh.attributes], mesh.uv_layers.active_index
+
+    before = known()
+    session = started(flag, evaluated)
+    play(session, evaluated, 2)
+    assert known() != before
+    session.stop(evaluated())
+    assert known() == before

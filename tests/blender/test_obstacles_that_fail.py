@@ -1,0 +1,164 @@
+"""Colliders that cannot be used, or are hidden, deleted or changed in mid-play."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from collider_scene import COARSE, Scene, depsgraph, distance_now, moved
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.host.colliders.obstacles import Obstacles
+from hairloom.addon.host.scene.objects import Body
+from hairloom.addon.host.scene.surfaces import read_surface
+
+
+@pytest.fixture
+def scene(extension):
+    return Scene()
+
+
+def plane(scene):
+    bpy.ops.mesh.primitive_plane_add(size=0.2)
+    return scene.add(bpy.context.object)
+
+
+def flat(scene):
+    cube = scene.cube(name="Flat")
+    cube.scale = (1, 1, 0)
+    return cube
+
+
+def curve(scene):
+    bpy.ops.curve.primitive_bezier_circle_add()
+    return scene.add(bpy.context.object)
+
+
+def empty_as_mesh(scene):
+    ball = scene.ball(name="NoMesh")
+    ball.hairloom.collider_shape = "mesh"
+    return ball
+
+
+def disabled(scene):
+    cube = scene.cube(name="Disabled")
+    cube.hide_viewport = True
+    return cube
+
+
+def not_finite(scene):
+    cube = scene.cube(name="NotFinite")
+    cube.data.vertices[0].co.x = math.nan
+    return cube
+
+
+@pytest.mark.parametrize("make", [plane, flat, curve, empty_as_mesh, disabled, not_finite])
+def test_what_cannot_be_used_is_told_by_name_and_the_others_go_on(scene, make):
+    bad = make(scene)
+    scene.ball()
+    found = scene.obstacles()
+    assert len(moved(found)) == 1
+    (warning,) = found.warnings
+    assert warning.startswith(bad.name + ":") and warning.count(".") >= 2
+
+
+def test_excluded_from_the_view_layer(scene):
+    away = bpy.data.collections.new("Away")
+    scene.colliders.children.link(away)
+    cube = scene.cube(name="Away")
+    scene.colliders.objects.unlink(cube)
+    away.objects.link(cube)
+    found = scene.obstacles()
+    assert len(moved(found)) == 1 and found.warnings == ()
+    layer = bpy.context.view_layer.layer_collection.children["Colliders"]
+    layer.children["Away"].exclude = True
+    assert moved(found) == ()
+    assert "Away" in found.warnings[0]
+    layer.children["Away"].exclude = False
+    cube.location.x = 3.0
+    (posed,) = moved(found)
+    assert found.warnings == ()
+    np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)  # back without a leap
+
+
+def test_hidden_with_the_eye_it_still_collides(scene):
+    ball = scene.ball()
+    ball.hide_set(True)
+    found = scene.obstacles()
+    assert len(moved(found)) == 1 and found.warnings == ()
+    ball.location.x = 1.0
+    assert moved(found)[0].matrix_now[0, 3] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_deleted_in_mid_play(scene):
+    cube, ball, other = scene.cube(), scene.ball(name="A"), scene.ball(0.1, (1, 0, 0), "B")
+    found = scene.obstacles()
+    assert len(moved(found)) == 2
+    bpy.data.objects.remove(cube)
+    bpy.data.objects.remove(ball)
+    (posed,) = moved(found)
+    assert len(posed.collider.radii) == 1
+    assert distance_now(posed, (1.3, 0, 0)) == pytest.approx(0.2, abs=1e-6)
+    assert ["Cube" in text or "A:" in text for text in found.warnings] == [True, True]
+    bpy.data.objects.remove(other)
+    assert moved(found) == ()
+
+
+def test_scaled_to_nothing_and_back_in_mid_play(scene):
+    cube, ball, stretched = scene.cube(), scene.ball(), scene.ball(name="Stretched")
+    stretched.scale = (1, 1, 2)
+    found = scene.obstacles()
+    assert len(moved(found)) == 3
+    for obj in (cube, ball, stretched):
+        obj.scale = (0, 0, 0)
+    assert moved(found) == ()
+    assert len(found.warnings) >= 3
+    for obj in (cube, ball, stretched):
+        obj.scale = (1, 1, 1)
+    assert len(moved(found)) == 3 and found.warnings == ()
+
+
+def test_another_mesh_in_mid_play(scene):
+    cube = scene.cube()
+    found = scene.obstacles()
+    cube.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    assert moved(found) == ()
+    assert "vertices" in found.warnings[0]
+    cube.modifiers.clear()
+    assert len(moved(found)) == 1 and found.warnings == ()
+
+
+def test_the_head_that_is_gone_is_an_error(scene, sphere):
+    head = Body.at_rest(sphere, depsgraph())
+    at_rest = read_surface(sphere, depsgraph(), need_uv=False, place="Head")
+    scene.ball()
+    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
+    assert len(moved(found)) == 2
+    bpy.data.objects.remove(sphere)
+    with pytest.raises(HairloomError, match="gone"):
+        moved(found)
+
+
+def test_a_head_without_volume_is_told_and_the_others_go_on(scene):
+    bpy.ops.mesh.primitive_grid_add(size=0.2)
+    cap = bpy.context.object
+    at_rest = read_surface(cap, depsgraph(), need_uv=False, place="Cap")
+    scene.ball()
+    head = Body.at_rest(cap, depsgraph())
+    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
+    assert len(moved(found)) == 1
+    assert "Grid" in found.warnings[0]
+
+
+def test_a_chosen_collider_stands_in_for_the_head(scene, sphere):
+    at_rest = read_surface(sphere, depsgraph(), need_uv=False, place="Head")
+    head = Body.at_rest(sphere, depsgraph())
+    scene.owner.hairloom.collider_collection = None
+    bpy.ops.mesh.primitive_cube_add(size=0.1, location=(0, 0, 1))
+    scene.owner.hairloom.collider = bpy.context.object
+    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
+    (posed,) = moved(found)
+    assert distance_now(posed, (0, 0, 1.1)) == pytest.approx(0.05, abs=2e-3)
+    sphere.hairloom.collider_shape = "none"
+    scene.owner.hairloom.collider = None
+    assert moved(Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)) == ()
