@@ -37,9 +37,10 @@ SCHEMA = json.loads(
 SMALL = (
     *("--set", "grow.strand_count=100", "--set", "guides.guide_count=10"),
     *("--set", "card_occlusion.rays=16", "--set", "cards.way=guides"),
+    *("--set", "atlas.source=made"),
 )
 BAKED = (
-    *("--set", "cards.way=clusters", "--set", "cards.card_count=8"),
+    *("--set", "cards.way=clusters", "--set", "cards.card_count=8", "--set", "atlas.source=baked"),
     *("--set", "atlas.size=512", "--set", "atlas.columns=4", "--set", "atlas.rows=2"),
 )
 
@@ -150,7 +151,10 @@ def test_both_models_give_all_their_values(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", [".glb", ".obj"])
 def test_a_failure_in_the_middle_leaves_the_old_files(
-    tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    suffix: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     """The disk is full when the last file is written."""
     assert cards(tmp_path / f"hair{suffix}", "--levels", "1") == 0
@@ -162,6 +166,8 @@ def test_a_failure_in_the_middle_leaves_the_old_files(
     monkeypatch.setattr(card_files, "sidecar_text", full)
     assert cards(tmp_path / f"hair{suffix}", "--set", "grow.length=0.3", "--levels", "2") == 1
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    told = capfd.readouterr().err
+    assert f"{tmp_path / f'hair{suffix}'}: " in told and "No space left on device" in told
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="folders have no owners here")
@@ -239,7 +245,7 @@ def grown(sphere: Any, name: str) -> Any:
     hair.name = name
     hair.data.hairloom.guides.guide_count = 10
     hair.data.hairloom.card_occlusion.rays = 16
-    hair.data.hairloom.cards.way = "guides"
+    hair.data.hairloom.cards.way, hair.data.hairloom.atlas.source = "guides", "made"
     return hair
 
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import threading
+
 import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon import card_flow
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.host.cards.adopted_cards import SortChoices, sort_mesh
 from hairloom.addon.host.cards.card_object import card_objects
 from hairloom.addon.host.cards.other_cards import other_cards
-from hairloom.addon.host.preview import live, overlay, reactions
+from hairloom.addon.host.preview import live, overlay, previewed, reactions
+from hairloom.addon.host.render_engine.engine_hair import read_groom
 from hairloom.addon.host.strands.groom_files import card_choices
+from hairloom.addon.host.thread_work import GivenUpError
 
 
 @pytest.fixture
@@ -64,9 +69,10 @@ def test_they_shade_what_is_made_and_only_while_they_are_seen(hair, other):
 
 def test_what_is_written_has_the_same_shade(hair, other):
     settings = hair.data.hairloom.card_occlusion
-    assert card_choices(hair)[0].others == ()
+    assert card_choices(hair)[0].others.shades() == ((), ())
     settings.others = True
-    (shade,) = card_choices(hair)[0].others
+    (shade,), notes = card_choices(hair)[0].others.shades()
+    assert notes == ()
     mesh = other.data
     assert len(shade.mesh.triangles) == len(mesh.polygons)
     assert shade.alpha.shape[0] > 1 and 0.0 < shade.alpha.mean() < 1.0
@@ -83,7 +89,7 @@ def test_grooms_without_cards_shade_by_their_strands(hair, new_hair, sphere):
     bpy.context.view_layer.update()
     on = CardOcclusionSettings(others=True)
     (shade,), notes = other_cards(on, hair)
-    assert notes == [] and shade.alpha is not None and (shade.alpha > 0.0).all()
+    assert notes == () and shade.alpha is not None and (shade.alpha > 0.0).all()
     hair.data.hairloom.card_occlusion.others = True
     bpy.context.view_layer.objects.active = hair
     press()
@@ -105,29 +111,154 @@ def test_hair_that_cannot_be_used_shades_nothing_and_says_why(hair, new_hair, sp
     assert shades == () and "Bald" in note and "no curves" in note
 
 
-def test_the_preview_follows_other_hair(hair, new_hair, sphere, evaluated):
+@pytest.fixture
+def shaded(hair, new_hair, sphere, evaluated):
+    """Hair shown as cards, and other hair that shades them by its strands."""
     strands = new_hair(sphere)
+    strands.name = "Shading"
     strands.data.hairloom.strands.width_scale = 20.0
     groom = hair.data.hairloom
     groom.card_occlusion.others, groom.card_drawing.shown_as = True, "cards"
     bpy.context.view_layer.update()
     session = live.start(hair, evaluated())
-    try:
+    yield session, strands
+    live.stop_all()
 
-        def shown():
-            return overlay.drawing_of(session.uid).snapshot.cards.mesh.occlusion
 
-        near = shown()
-        reactions.updated(evaluated())
-        reactions.catch_up(evaluated())
-        assert shown() is near, "nothing has moved"
-        strands.location.x = 5.0
-        bpy.context.view_layer.update()
-        reactions.updated(evaluated())
-        reactions.catch_up(evaluated())
-        assert shown().mean() > near.mean() + 0.02
-    finally:
-        live.stop_all()
+def shown(session):
+    """Occlusion of the cards that are shown."""
+    return overlay.drawing_of(session.uid).snapshot.cards.mesh.occlusion
+
+
+def follow(evaluated):
+    """What Blender's events lead to."""
+    bpy.context.view_layer.update()
+    reactions.updated(evaluated())
+    reactions.catch_up(evaluated())
+
+
+def test_the_preview_follows_other_hair(shaded, evaluated):
+    session, strands = shaded
+    near = shown(session)
+    follow(evaluated)
+    assert shown(session) is near, "nothing has moved"
+    strands.location.x = 5.0
+    follow(evaluated)
+    assert shown(session).mean() > near.mean() + 0.02
+
+
+@pytest.mark.parametrize("way", ["hidden", "left out of renders and views", "deleted"])
+def test_the_preview_follows_other_hair_that_goes_and_comes(shaded, evaluated, way):
+    session, strands = shaded
+    near, before = shown(session), session.cards.shaded_by
+    if way == "hidden":
+        strands.hide_set(True)
+    elif way == "deleted":
+        bpy.data.objects.remove(strands)
+    else:
+        strands.hide_viewport = True
+    follow(evaluated)
+    assert shown(session).mean() > near.mean() + 0.02 and session.cards.shaded_by == frozenset()
+    if way == "deleted":
+        return
+    strands.hide_set(False)
+    strands.hide_viewport = False
+    follow(evaluated)
+    np.testing.assert_array_equal(shown(session), near)
+    assert session.cards.shaded_by == before
+
+
+def test_the_preview_follows_the_settings_of_other_hair(shaded, evaluated):
+    session, strands = shaded
+    near = shown(session)
+    strands.data.hairloom.strands.width_scale = 1.0
+    reactions.catch_up(evaluated())
+    assert shown(session).mean() > near.mean() + 0.02
+    before = shown(session)
+    strands.data.hairloom.shading.color_variation = 0.5
+    reactions.catch_up(evaluated())
+    assert shown(session) is before, "colours shade nothing"
+
+
+def test_undo_has_cards_shaded_again(shaded, evaluated):
+    session, strands = shaded
+    near = shown(session)
+    strands.location.x = 5.0
+    bpy.context.view_layer.update()  # as undo does it, which tells nobody of objects
+    reactions.undone()
+    reactions.catch_up(evaluated())
+    assert shown(session).mean() > near.mean() + 0.02
+
+
+def test_hair_that_moves_with_other_hair_keeps_its_shade(shaded, sphere, evaluated):
+    session, strands = shaded
+    near, before = shown(session), strands.matrix_world.copy()
+    sphere.location.x, sphere.rotation_euler.z = 0.25, 1.0
+    follow(evaluated)
+    assert strands.matrix_world != before, "both are children of the head"
+    assert shown(session) is near, "the same cards, elsewhere"
+    session.cards.forget()  # built once more, where they are now
+    session.take_settings()
+    np.testing.assert_allclose(shown(session), near, atol=0.02)
+
+
+def test_other_hair_is_made_into_cards_in_the_thread(shaded, evaluated, monkeypatch):
+    session, strands = shaded
+    threads = []
+    shade_of = card_flow.shade_of
+    monkeypatch.setattr(session.cards, "_is_awaited", lambda: False)
+    monkeypatch.setattr(
+        card_flow,
+        "shade_of",
+        lambda *given: threads.append(threading.current_thread()) or shade_of(*given),
+    )
+    near = shown(session)
+    strands.location.x = 5.0
+    follow(evaluated)
+    assert session.cards.is_pending and shown(session) is near
+    first = session.cards._build.work
+    strands.location.x = 0.0
+    strands.rotation_euler.z += 0.3
+    follow(evaluated)
+    second = session.cards._build.work
+    assert second is not first, "it moves while a build is pending"
+    first._thread.join(timeout=60.0)
+    with pytest.raises(GivenUpError):
+        first.result()
+    while session.cards.is_pending:
+        previewed.take_arrivals()
+    assert shown(session) is not near
+    assert threads and threading.main_thread() not in threads
+
+
+def test_a_render_has_the_shade_of_other_hair_as_it_is(shaded, evaluated):
+    session, strands = shaded
+    hair = session.hair.found()
+
+    def rendered():
+        return read_groom(hair, evaluated()).cards.mesh.occlusion
+
+    near = rendered()
+    np.testing.assert_allclose(near, shown(session), atol=1e-6)
+    np.testing.assert_array_equal(rendered(), near)
+    strands.hide_set(True)
+    bpy.context.view_layer.update()
+    assert rendered().mean() > near.mean() + 0.02
+    strands.hide_set(False)
+    strands.location.x = 5.0
+    bpy.context.view_layer.update()
+    assert rendered().mean() > near.mean() + 0.02
+
+
+def test_hair_that_cannot_be_made_ready_is_told_of_by_the_cards(shaded, hair, evaluated):
+    """Its roots lie far from its head, which is found out in the thread."""
+    session, strands = shaded
+    strands.data.attributes["position"].data[0].vector.x = np.inf
+    for each in strands.data.attributes["position"].data:
+        each.vector = each.vector * 1000.0
+    strands.data.update_tag()
+    follow(evaluated)
+    assert any("It shades nothing" in note for note in session.cards.warnings)
 
 
 def test_own_cards_and_coarser_levels_and_other_meshes_are_left_out(hair, sphere):
@@ -135,7 +266,7 @@ def test_own_cards_and_coarser_levels_and_other_meshes_are_left_out(hair, sphere
     for obj in card_objects(hair):
         obj.hide_set(False)
         obj.hide_viewport = False
-    assert other_cards(on, hair) == ((), [])
+    assert other_cards(on, hair) == ((), ())
     (shade,), _ = other_cards(on, sphere)
     assert len(shade.mesh.triangles) == len(card_objects(hair)[0].data.polygons)
 
@@ -161,4 +292,4 @@ def test_without_uvs_or_a_picture_they_are_opaque_and_without_faces_nothing(hair
     assert shade.alpha is None
     other.data.clear_geometry()
     bpy.context.view_layer.update()
-    assert other_cards(on, hair) == ((), [])
+    assert other_cards(on, hair) == ((), ())

@@ -128,9 +128,12 @@ def test_a_render_shows_the_same_cards(preview, evaluated):
 def test_in_a_window_old_cards_stay_until_others_are_built(in_window):
     hair, _, session = in_window
     before = drawn(session).cards.mesh
+    first = None
     for count in (4, 6, 7):  # a slider is dragged
         hair.data.hairloom.cards.segment_count = count
         assert len(drawn(session).cards.mesh.triangles) == len(before.triangles)
+        first = first or session.cards._build
+        assert session.cards._build is first, "one build at a time"
     mesh = served(session).mesh
     assert len(mesh.triangles) == len(before.triangles) * 7 // 12
 
@@ -175,3 +178,58 @@ def test_cards_that_cannot_be_made_leave_strands_and_say_why(preview):
     assert drawn(session).cards is None and drawn(session).strand_count == 60
     (warning,) = session.cards.warnings
     assert "no cards" in warning and "atlas" in warning.lower()
+
+
+def test_lines_say_what_is_built_and_what_is_shown(in_window):
+    hair, _, session = in_window
+    cards, triangles, vertices = session.cards.counts
+    mesh = drawn(session).cards.mesh
+    assert (cards, triangles, vertices) == (60, len(mesh.triangles), len(mesh.positions))
+    assert session.cards.lines[0] == f"60 cards, {triangles:,} triangles"
+    assert "% of pixels wrong" in session.cards.lines[1]
+    hair.data.hairloom.card_drawing.shown_as = "strands"
+    assert session.cards.lines == () and session.cards.counts == (0, 0, 0)
+    hair.data.hairloom.card_drawing.shown_as = "cards"
+    assert session.cards.lines == ("Cards are being built",)
+    served(session)
+    assert len(session.cards.lines) == 2
+
+
+def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_window, evaluated):
+    """They do not ride on guides that they are not tied to, but are drawn as is set now."""
+    hair, _, session = in_window
+    before = drawn(session).cards
+    position = hair.data.attributes["position"]
+    places = np.empty(len(hair.data.points) * 3, np.float32)
+    position.data.foreach_get("vector", places)
+    position.data.foreach_set("vector", places * 1.1)
+    hair.data.update_tag()
+    bpy.context.view_layer.update()
+    reactions.updated(evaluated())
+    reactions.catch_up(evaluated())
+    assert session.cards.is_pending
+    assert drawn(session).cards.mesh is before.mesh
+    hair.data.hairloom.card_drawing.passes = "three"
+    hair.data.hairloom.strands.tip_width = 0.9
+    assert drawn(session).cards.drawing.passes == "three"
+    assert drawn(session).cards.mesh is before.mesh
+    after = served(session).mesh
+    np.testing.assert_allclose(
+        np.ptp(after.positions, axis=0), 1.1 * np.ptp(before.mesh.positions, axis=0), rtol=0.01
+    )
+
+
+def test_cards_that_can_be_made_again_warn_of_nothing(preview):
+    hair, _, session = preview
+    groom = hair.data.hairloom
+    groom.atlas.size, groom.atlas.columns, groom.atlas.rows = "512", 256, 256
+    groom.cards.way = "clusters"
+    assert session.cards.warnings
+    groom.card_drawing.shown_as = "strands"
+    assert session.cards.warnings == ()
+    groom.card_drawing.shown_as = "cards"
+    assert session.cards.warnings
+    groom.cards.way = "guides"
+    groom.atlas.source = "made"
+    assert not any("no cards" in each for each in session.cards.warnings)
+    assert drawn(session).cards is not None

@@ -142,6 +142,65 @@ def test_places_without_a_serial_are_asked_anew_and_nothing_adds_up(gpu_context:
     assert found(1.5, 2).max() == 0.0
 
 
+def test_a_place_has_what_all_but_its_own_groom_have_in_the_way(gpu_context: Any) -> None:
+    from hairloom.addon.render.hair_between import HairBetween
+    from hairloom.addon.render.strand_pass import StrandPass
+    from hairloom.addon.render.textures import texture_from, texture_to_array
+
+    lights = (SUN, Light.sun((1.0, 0.0, 0.0), (1.0, 1.0, 1.0), 3.0))
+    maps = [
+        StrandPass().opacity(replace(groom("a", sheet(height, count)).snapshot, lights=lights))
+        for height, count in ((0.3, 400), (0.4, 200))
+    ]
+    assert maps[0] is not None and maps[1] is not None
+    places = np.zeros((1, 8, 4), np.float32)
+    places[0, :, 3] = (0.0, 1.0, 2.0, -1.0, 0.0, 1.0, 2.0, -1.0)
+    places[0, 4:, 0] = 1.0  # beside both for the first light, behind them for no light
+    found = texture_to_array(
+        HairBetween().at(texture_from(places, "RGBA32F"), None, [(0, maps[0]), (1, maps[1])], 2)
+    )[0]
+    assert found[:4, 0].min() == 0.0 == found[3, 0]
+    of_second, of_first, of_both = found[:3, 0]
+    assert 0.0 < of_second < of_first
+    assert of_both == pytest.approx(of_first + of_second, rel=1e-5)
+    np.testing.assert_array_equal(found[4:, 0], 0.0)
+    np.testing.assert_array_equal(found[:, 1:], 0.0)
+    aside = np.zeros((1, 8, 4), np.float32)
+    aside[0] = (0.0, 1.0, 0.31, 2.0)  # in the way of a light from there alone
+    lights = (SUN, Light.sun((0.0, 1.0, 0.0), (1.0, 1.0, 1.0), 3.0))
+    of_both = StrandPass().opacity(replace(groom("a", sheet(0.3)).snapshot, lights=lights))
+    assert of_both is not None
+    for count in (1, 2):
+        texture = HairBetween().at(texture_from(aside, "RGBA32F"), None, [(0, of_both)], count)
+        way = texture_to_array(texture)[0, 0]
+        assert way[0] == 0.0 and (way[1] > 0.0) == (count == 2)
+
+
+def test_light_from_each_side_may_shade_and_none_without_light(gpu_context: Any) -> None:
+    from hairloom.addon.render.hair_between import may_shade
+    from hairloom.addon.render.strand_pass import StrandPass
+
+    def maps(*lights: Light) -> Any:
+        return StrandPass().opacity(replace(groom("a", sheet(0.3)).snapshot, lights=lights))
+
+    aside = Light.sun((1.0, 0.0, 0.0), (1.0, 1.0, 1.0), 3.0)
+    below, beside = Ball(np.array([0.0, 0.0, -0.4]), 0.1), Ball(np.array([1.0, 0.0, 0.3]), 0.1)
+    for ball, lights, is_reached in (
+        (below, (SUN,), True),
+        (beside, (SUN,), False),
+        (below, (aside,), False),
+        (beside, (aside,), True),
+        (beside, (SUN, aside), True),
+        (Ball(np.array([-1.0, 0.0, 0.3]), 0.1), (SUN, aside), False),
+        (Ball(np.array([0.0, 0.45, 0.0]), 0.1), (SUN,), False),
+        (Ball(np.array([0.0, -0.45, 0.0]), 0.1), (SUN,), False),
+        (Ball(np.array([-0.45, 0.0, 0.0]), 0.1), (SUN,), False),
+        (Ball(np.array([0.0, 0.45, 0.0]), 0.3), (SUN,), True),
+        (Ball(np.array([0.0, 0.0, 1.0]), 0.8), (SUN,), True),
+    ):
+        assert may_shade(maps(*lights), ball) == is_reached, (ball, lights)
+
+
 def test_masks_hold_what_alpha_shows(gpu_context: Any, compute: Callable[..., Any]) -> None:
     """A sheet with holes lets the object behind it through, in both passes."""
     from hairloom.addon.render.accumulation import Target

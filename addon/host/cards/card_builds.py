@@ -17,7 +17,6 @@ from ...cards.atlas_settings import AtlasSettings
 from ...cards.bake_strands import FlatStrands
 from ...cards.drawing_settings import CardDrawingSettings
 from ...cards.follow import CardBinding
-from ...cards.occlusion import CardShade
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...cards.steps import result_of, retold
@@ -33,6 +32,9 @@ from ..thread_work import ThreadWork
 from .card_atlas import drawing_maps, has_gpu
 from .card_making import CardChoices, MadeCards, making_steps
 from .card_maps import made_maps
+from .other_cards import OtherHair
+
+_NO_OTHERS = OtherHair()
 
 #: What acts on cards at once: how they are drawn, and how wide the strands are.
 type CardsDrawn = tuple[CardDrawingSettings, StrandSettings]
@@ -63,9 +65,9 @@ class CardForm:
         object.__setattr__(self, "variation", (look.model, look.color_variation, look.grey_share))
 
     def choices(
-        self, pictures: Mapping[str, Floats], others: tuple[CardShade, ...] = ()
+        self, pictures: Mapping[str, Floats], others: OtherHair = _NO_OTHERS
     ) -> CardChoices:
-        """The same with the pictures themselves, and with the cards of other grooms."""
+        """The same with the pictures themselves, and with the hair of other grooms."""
         return CardChoices(
             self.cards,
             self.atlas,
@@ -112,7 +114,7 @@ def built_cards(
     rig: Rig,
     form: CardForm,
     pictures: Mapping[str, Floats],
-    others: tuple[CardShade, ...] = (),
+    others: OtherHair = _NO_OTHERS,
 ) -> BuiltCards:
     """Build the cards of a rig with their textures, here and now.
 
@@ -126,7 +128,7 @@ def building_cards(
     rig: Rig,
     form: CardForm,
     pictures: Mapping[str, Floats],
-    others: tuple[CardShade, ...] = (),
+    others: OtherHair = _NO_OTHERS,
 ) -> ThreadWork[BuiltCards]:
     """Build them in a thread."""
     choices = form.choices(pictures, others)
@@ -191,7 +193,7 @@ def tied_cards(rig: Rig, form: CardForm, made: MadeCards) -> BuiltCards:
         StrandArea.of(strands.grid, strands.radius.reshape(strands.strand_count, -1)),
         card_shade(mesh.positions, mesh.triangles, mesh.uv, textures.alpha),
         build.wrong_share,
-        build.notes,
+        made.notes,
     )
 
 

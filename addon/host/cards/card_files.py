@@ -156,7 +156,7 @@ def file_steps(
     beside = sorted(names - {path.name, path.stem + SUFFIX})
     files = (path.name, *beside, path.stem + SUFFIX)
     paths = tuple(path.with_name(name) for name in files)
-    notes = (*made.build.notes, *told)
+    notes = (*made.notes, *told)
     return WrittenCards(made.build, made.maps, paths, notes, writer.motion)
 
 

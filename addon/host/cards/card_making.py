@@ -9,7 +9,6 @@ from ...arrays import Floats
 from ...card_flow import card_build_steps
 from ...cards.atlas_settings import AtlasSettings
 from ...cards.build import CardBuild
-from ...cards.occlusion import CardShade
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...pipeline import Rig
@@ -17,6 +16,7 @@ from ...shading.ambient import AmbientSettings
 from ...shading.settings import ShadingSettings, StrandSettings
 from ...shading.textures import TextureSettings
 from .card_maps import CardMaps, made_maps
+from .other_cards import OtherHair
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class CardChoices:
     """All that cards hang on.
 
     pictures: what takes the place of generated textures, see `textures.picture_as`.
-    others: cards of other grooms, which shade these, world space.
+    others: hair of other grooms, which shades these, where it is while these are at rest.
     ambient: of the strands, whose occlusion the cards take over.
     """
 
@@ -35,16 +35,17 @@ class CardChoices:
     shading: ShadingSettings
     strands: StrandSettings
     pictures: Mapping[str, Floats] = field(default_factory=dict)
-    others: tuple[CardShade, ...] = ()
+    others: OtherHair = field(default_factory=OtherHair)
     ambient: AmbientSettings = field(default_factory=AmbientSettings)
 
 
 @dataclass(frozen=True)
 class MadeCards:
-    """Cards at rest, and their maps."""
+    """Cards at rest, and their maps. notes: what the artist should know."""
 
     build: CardBuild
     maps: CardMaps
+    notes: tuple[str, ...] = ()
 
 
 #: Makes the maps of cards, which is the main thread's work where the GPU bakes them.
@@ -68,6 +69,8 @@ def making_steps(
         made.append(made_maps(rig, build, choices) if maps_of is None else maps_of(build))
         return made[-1].textures.alpha
 
+    yield "Other hair"
+    others, notes = choices.others.shades()
     build = yield from card_build_steps(
         rig,
         choices.cards,
@@ -75,10 +78,10 @@ def making_steps(
         choices.occlusion,
         alpha_of,
         choices.strands,
-        choices.others,
+        others,
         choices.ambient,
     )
-    return MadeCards(build, made[-1])
+    return MadeCards(build, made[-1], (*build.notes, *notes))
 
 
 def order_line(wrong_share: float) -> str:

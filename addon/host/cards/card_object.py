@@ -68,7 +68,7 @@ class CardObjectJob:
             )
         for obj in card_objects(hair):
             _check_editable(obj)
-        self.notes += tuple(f"{hair.name}: {note}." for note in build.notes)
+        self.notes += tuple(f"{hair.name}: {note}." for note in made.notes)
         color = self._choices.shading.base_color
         self.objects = _write(hair, build, made.maps.textures.card, color, self._matrix)
         self.order = order_line(build.wrong_share)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
@@ -22,7 +23,7 @@ from ..thread_work import ThreadWork
 from .card_builds import BuiltCards, CardForm, CardsDrawn, building_cards, built_cards, told
 from .card_images import chosen_pictures
 from .card_making import order_line
-from .other_cards import other_cards
+from .other_cards import OtherHair, read_other_hair
 
 
 def picture_names(group: Any) -> tuple[tuple[str, str], ...]:
@@ -79,7 +80,8 @@ class ShownCards:
         self._wanted: tuple[Rig, CardForm] | None = None
         self._build: _Building | None = None
         self._shown: CardSnapshot | None = None
-        self._notes: tuple[str, ...] = ()
+        self._others = OtherHair()
+        self._motion: Floats = np.eye(4)
         self.warnings: tuple[str, ...] = ()
 
     @property
@@ -121,14 +123,22 @@ class ShownCards:
         """Whether other hair shades what is shown."""
         return self._wanted is not None and self._wanted[1].occlusion.others
 
+    @property
+    def shaded_by(self) -> frozenset[int]:
+        """Session numbers of the other hair that shades what is shown, or what is being built."""
+        return self._others.uids
+
     def shade_again(self, hair: bpy.types.Object) -> None:
-        """The same cards once more, because other hair is elsewhere now."""
+        """The same cards once more if other hair is elsewhere or other hair now."""
         if self._wanted is None:
+            return
+        others = self._read_others(hair)
+        if others.is_like(self._others):
             return
         if self._build is not None:
             self._build.work.give_up()
             self._build = None
-        self._begin(hair)
+        self._begin(hair, others)
 
     def serve(self) -> bool:
         """Do a part of what only the main thread may; whether there is something to collect."""
@@ -151,6 +161,7 @@ class ShownCards:
         Args:
             guides: gives the guides of the rig (guide_count, cv_count, 3) [m, world].
         """
+        self._motion = pose.matrix
         built = self._built
         if built is None:
             return None
@@ -165,23 +176,28 @@ class ShownCards:
         if self._build is not None:
             self._build.work.give_up()
         self._built = self._wanted = self._build = self._shown = None
+        self._others = OtherHair()
         self.warnings = ()
 
-    def _begin(self, hair: bpy.types.Object) -> None:
+    def _begin(self, hair: bpy.types.Object, others: OtherHair | None = None) -> None:
         assert self._wanted is not None
         rig, form = self._wanted
         pictures = self._pictures(hair)
-        others, notes = other_cards(form.occlusion, hair, bpy.context.view_layer.depsgraph)
-        self._notes = tuple(notes)
+        self._others = others = others or self._read_others(hair)
         if self._is_awaited():
             self._take(lambda: built_cards(rig, form, pictures, others))
         else:
             self._build = _Building(rig, form, building_cards(rig, form, pictures, others))
 
+    def _read_others(self, hair: bpy.types.Object) -> OtherHair:
+        assert self._wanted is not None
+        depsgraph = bpy.context.view_layer.depsgraph
+        return read_other_hair(self._wanted[1].occlusion, hair, depsgraph, self._motion)
+
     def _take(self, result: Callable[[], BuiltCards]) -> None:
         try:
             self._built = result()
-            self.warnings = (*self._built.notes, *self._notes)
+            self.warnings = self._built.notes
         except HairloomError as error:
             self._built, self._shown, self.warnings = None, None, (told(error),)
 

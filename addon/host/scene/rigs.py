@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import bpy
 
 from ... import pipeline
@@ -12,18 +14,40 @@ from ..settings.properties import settings_of
 from .source import Source
 
 
+@dataclass(frozen=True)
+class RigSettings:
+    """What decides which strands and guides there are; name: of the hair, in messages."""
+
+    name: str
+    guides: GuideSettings
+    children: ChildrenSettings
+
+    @classmethod
+    def of(cls, hair: bpy.types.Object) -> RigSettings:
+        groom = hair.data.hairloom
+        guides = settings_of(groom.guides, GuideSettings)
+        return cls(hair.name, guides, settings_of(groom.children, ChildrenSettings))
+
+    def rig(self, source: Source) -> Rig:
+        """The hair made ready, at rest as it was read; from arrays alone.
+
+        Raises:
+            HairloomError: no hair that can be used.
+        """
+        return pipeline.prepare(
+            source.strands,
+            source.head,
+            self.guides,
+            place=self.name,
+            children=self.children,
+            density=source.density,
+        )
+
+
 def rig_of(hair: bpy.types.Object, source: Source) -> Rig:
     """The hair made ready by its own settings, at rest as it was read.
 
     Raises:
         HairloomError: no hair that can be used.
     """
-    groom = hair.data.hairloom
-    return pipeline.prepare(
-        source.strands,
-        source.head,
-        settings_of(groom.guides, GuideSettings),
-        place=hair.name,
-        children=settings_of(groom.children, ChildrenSettings),
-        density=source.density,
-    )
+    return RigSettings.of(hair).rig(source)

@@ -20,7 +20,7 @@ from ..cards.card_images import chosen_pictures, named_pictures
 from ..cards.card_making import order_line
 from ..cards.card_motion import GuideMotion, baked_motion, take_motion
 from ..cards.card_textures import TextureFiles
-from ..cards.other_cards import other_cards
+from ..cards.other_cards import read_other_hair
 from .job_options import add_texture_option, frames_of_option
 from .job_steps import Job, card_form, finish, read_rig, tell_notes
 from .verb import Verb
@@ -68,8 +68,7 @@ def written_cards(
     if levels is not None:
         form = replace(form, cards=replace(form.cards, levels=levels))
     hair = bpy.data.objects.get(job.sources.groom or "")
-    others, notes = other_cards(form.occlusion, hair)
-    choices = form.choices(pictures, others)
+    choices = form.choices(pictures, read_other_hair(form.occlusion, hair))
     written = write_cards(path, rig, choices, output, report.stage, motion)
     report.facts.update(
         cards=written.mesh.card_count,
@@ -81,7 +80,7 @@ def written_cards(
         report.facts["card_motion"] = dict(written.motion)
     print(order_line(written.build.wrong_share), flush=True)
     moving = () if motion is None else motion.notes
-    tell_notes([*written.notes, *moving, *notes], report)
+    tell_notes([*written.notes, *moving], report)
     for file in written.files:
         report.add_output(file)
     return written

@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 from guide_cards import build_cards
 
+from hairloom.addon.cards.atlas_grid import AtlasGrid
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.cards.strip import mean_spacing
+from hairloom.addon.cards.strip import (
+    UncutCards,
+    card_frames,
+    guide_strips,
+    mean_spacing,
+    strip_mesh,
+)
 from hairloom.addon.errors import HairloomError
 
 
@@ -64,6 +71,21 @@ def test_cards_face_away_from_the_head_where_they_hang() -> None:
     assert hanging.min() > 0.8
 
 
+def test_no_turn_of_a_whole_card_lets_it_face_the_roots_normal_more() -> None:
+    """Where hair leaves the head along the normal, that is decided by the rest of it."""
+    random = np.random.default_rng(4)
+    normal = random.normal(size=(30, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    along = np.linspace(0.0, 1.0, 16)[:, None]
+    bent = random.normal(size=(30, 1, 3)) * np.maximum(along - 0.25, 0.0) ** 2
+    guides = (normal[:, None] * (0.1 + 0.1 * along) + 0.3 * bent).astype(np.float32)
+    frames = card_frames(guides, normal.astype(np.float32), 12)
+    ahead, aside = (np.einsum("gri,gi->g", each, normal) for each in (frames.normal, frames.side))
+    turns = np.radians(np.arange(0.0, 360.0, 5.0))[:, None]
+    assert (ahead >= ahead * np.cos(turns) + aside * np.sin(turns) - 1e-4).all()
+    assert ahead.min() > 0.0
+
+
 def test_frames_do_not_twist() -> None:
     """Along a helix a parallel frame turns no more between rows than the tangent itself does."""
     turn = np.linspace(0.0, 6.0 * np.pi, 64)
@@ -91,6 +113,32 @@ def test_the_guide_runs_through_the_middle_and_the_edges_fall_back() -> None:
     np.testing.assert_allclose(np.linalg.norm(chord, axis=-1), width, rtol=1e-4)
     sagitta = grid[:, :, 1] - (grid[:, :, 0] + grid[:, :, 2]) / 2.0
     np.testing.assert_allclose(np.linalg.norm(sagitta, axis=-1), 0.25 * width, rtol=1e-4)
+
+
+def test_roundness_leans_normals_of_the_volume_outwards_at_the_edges() -> None:
+    """By the angle whose tangent it is, towards the side on which the edge lies."""
+    guides, normals = hanging_guides()
+
+    def of_volume(roundness: float) -> CardMesh:
+        settings = CardSettings(roundness=roundness, bend=0.0, width_factor=0.5)
+        strips, none = guide_strips(guides, normals, settings), np.zeros(len(guides), np.int32)
+        cards = UncutCards(strips, none + 1, none, none, none, AtlasGrid(), np.zeros(3))
+        return strip_mesh([(np.arange(len(strips)), strips)], cards, 2, settings)
+
+    settings = CardSettings()
+    flat, round_ = of_volume(0.0), of_volume(0.5)
+    places = rows(round_, round_.positions, settings)
+    across = places[:, :, 2] - places[:, :, 0]
+    across /= np.linalg.norm(across, axis=-1, keepdims=True)
+    one, other = (rows(each, each.normal, settings) for each in (flat, round_))
+    np.testing.assert_allclose(other[:, :, 1], one[:, :, 1], atol=1e-6)
+    for edge, sign in ((0, -1.0), (2, 1.0)):
+        turn = np.arccos(np.clip((one[:, :, edge] * other[:, :, edge]).sum(axis=-1), -1.0, 1.0))
+        is_front = (one[:, :, edge] * one[:, :, 1]).sum(axis=-1) > 0.9
+        is_usual = np.isclose(turn, np.arctan(0.5), atol=1e-4)
+        assert is_usual[is_front].mean() > 0.95  # but for those that keep the card's own
+        leaning = ((other - one)[:, :, edge] * across).sum(axis=-1) * sign
+        assert leaning[is_usual].min() > 0.0
 
 
 def test_uv_runs_from_root_to_tip_within_one_column() -> None:
