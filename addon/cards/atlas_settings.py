@@ -25,7 +25,7 @@ class AtlasSettings(Settings):
         "baked",
         (
             ("made", "Made", "Strips of hair made by chance, as Card Texture has them"),
-            ("baked", "Baked", "The strands themselves, laid flat; for cards from clusters"),
+            ("baked", "Baked", "The strands themselves, laid flat; of guides alone it is made"),
         ),
         label="Shows",
         description="What hair the texture of the cards shows",

@@ -14,6 +14,7 @@ from .atlas import AtlasPlan, plan_atlas
 from .atlas_grid import AtlasGrid
 from .atlas_settings import AtlasSettings
 from .card_mesh import CardMesh
+from .clusters import cluster_of_guides
 from .fit import cluster_of_strands, fit_strips
 from .layers import card_layers
 from .levels import card_levels
@@ -160,13 +161,12 @@ def _occlusion_steps(
 
 
 def card_of_strand(groom: CardGroom, settings: CardSettings) -> Ints:
-    """The card that stands for each strand, (strand_count,); -1 without one. Crossed cards come
-    again after all others, in the same order."""
+    """The card that stands for each strand, (strand_count,). Crossed cards come again after all
+    others, in the same order."""
+    grid, group = groom.strands.grid, groom.strands.group
     if settings.way == "guides":
-        cards = np.full(groom.strands.strand_count, -1, np.int32)
-        cards[groom.guides] = np.arange(len(groom.guides), dtype=np.int32)
-        return cards
-    return cluster_of_strands(groom.strands.grid, groom.strands.group, settings)
+        return cluster_of_guides(grid, group, groom.guides)
+    return cluster_of_strands(grid, group, settings)
 
 
 def _orders(
@@ -193,20 +193,23 @@ def uncut_cards(
     groom: CardGroom, settings: CardSettings, atlas: AtlasSettings
 ) -> tuple[UncutCards, AtlasPlan | None]:
     """The strips of all cards, with their groups, layers and tiles; and what the tiles show."""
-    strands, guides = groom.strands, groom.guides
-    if settings.way == "guides":
-        strips = guide_strips(strands.grid[guides], groom.root_normal[guides], settings)
-        one = np.ones(len(guides), np.int32)
-        return _looking_out(_by_chance(strips, one, strands.group[guides], settings), groom), None
+    strands, guides, is_baked = groom.strands, groom.guides, atlas.source == "baked"
     grid, radius = strands.grid, strands.radius.reshape(strands.grid.shape[:2])
-    cluster = cluster_of_strands(grid, strands.group, settings)
-    strips = fit_strips(grid, radius, cluster, groom.root_normal, settings)
+    cluster = card_of_strand(groom, settings)
     _, first, count = np.unique(cluster, return_index=True, return_counts=True)
+    if settings.way == "guides":
+        first = guides
+        is_baked &= len(grid) > len(guides)  # guides alone stand for tufts that nobody has made
+        count = count if is_baked else np.ones_like(count)
+        rows = replace(settings, segment_count=grid.shape[1] - 1) if is_baked else settings
+        strips = guide_strips(grid[guides], groom.root_normal[guides], rows)
+    else:
+        strips = fit_strips(grid, radius, cluster, groom.root_normal, settings)
     # crossed cards come after all others, and stand for the same strands
     owner = np.resize(np.arange(len(first)), len(strips))
     cards = _by_chance(strips, count[owner], strands.group[first][owner], settings)
     cards = _looking_out(cards, groom)
-    if atlas.source != "baked":
+    if not is_baked:
         return cards, None
     uncrossed = strips.of(np.arange(len(first)))
     plan = plan_atlas(uncrossed, grid, groom.radius, cluster, strands.group, atlas)

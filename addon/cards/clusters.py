@@ -47,6 +47,25 @@ def cluster_strands(grid: Floats, group: Ints, count: int, seed: int = 0) -> Int
     return label
 
 
+def cluster_of_guides(grid: Floats, group: Ints, guides: Ints) -> Ints:
+    """The guide that each strand lies along, (strand_count,) int32 places in `guides`.
+
+    It is the nearest one of the strand's own group, where that has guides; a guide's is itself.
+
+    Args:
+        grid: (strand_count, cv_count, 3) [m], root first.
+        group: (strand_count,).
+        guides: (guide_count,) indices of strands.
+    """
+    features = _features(grid)
+    found = _nearest(features, features[guides])[0]
+    for name in np.unique(group[guides]):
+        own, theirs = np.flatnonzero(group == name), np.flatnonzero(group[guides] == name)
+        found[own] = theirs[_nearest(features[own], features[guides[theirs]])[0]]
+    found[guides] = np.arange(len(guides))
+    return found.astype(np.int32)
+
+
 def shared_out(count: int, sizes: Ints) -> Ints:
     """`count` split by size, one at least and no more than the size, (n,): largest remainders."""
     share = count * sizes / max(int(sizes.sum()), 1)

@@ -33,8 +33,7 @@ def draw_card_texture(layout: bpy.types.UILayout, hair: bpy.types.Object) -> Non
     """The atlas that is baked, or the texture that is made; of that one a baked atlas has only what
     breaks up the highlights."""
     groom = hair.data.hairloom
-    if groom.cards.way == "clusters":
-        layout.prop(groom.atlas, "source")
+    layout.prop(groom.atlas, "source")
     names = [p.name for p in groom.card_texture.settings.parameters()]
     if _is_baked(hair):
         draw_named(layout, groom.atlas, [p.name for p in groom.atlas.settings.parameters()][1:])
@@ -49,8 +48,7 @@ def draw_card_texture(layout: bpy.types.UILayout, hair: bpy.types.Object) -> Non
 
 
 def _is_baked(hair: bpy.types.Object) -> bool:
-    groom = hair.data.hairloom
-    return bool(groom.cards.way == "clusters" and groom.atlas.source == "baked")
+    return bool(hair.data.hairloom.atlas.source == "baked")
 
 
 def draw_card_occlusion(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

@@ -13,6 +13,7 @@ from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.build import (
     CardBuild,
     CardGroom,
+    card_of_strand,
     card_steps,
     uncut_cards,
     with_occlusion_of,
@@ -27,7 +28,7 @@ from hairloom.addon.shading.ambient import AmbientSettings
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.strands import StrandSet
 
-MADE = AtlasSettings(source="made")
+MADE, BAKED = AtlasSettings(source="made"), AtlasSettings(columns=8, rows=2)
 FEW_RAYS = CardOcclusionSettings(rays=16)
 #: as if the few strands here stood for many
 DENSE = AmbientSettings(extinction=100.0)
@@ -65,7 +66,7 @@ def built(
 def test_levels_share_one_atlas_and_all_that_is_known_of_cards(way: str, source: str) -> None:
     build = built(falling(1500), AtlasSettings(source=source, columns=8, rows=2), way=way)
     assert len(build.levels) == len(build.errors) == len(build.backs) == 3
-    assert (build.plan is None) == (way == "guides" or source == "made")
+    assert (build.plan is None) == (source == "made")
     finest = build.finest
     assert set(finest.group[np.unique(finest.card)].tolist()) == {0, 1}
     for mesh, back in zip(build.levels, build.backs, strict=True):
@@ -94,6 +95,33 @@ def test_guides_keep_their_groups() -> None:
     build = built(strands, way="guides")
     rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
     np.testing.assert_array_equal(build.finest.group, rig.strands.group[rig.guides])
+
+
+def test_guides_show_the_strands_that_lie_along_them() -> None:
+    """Where no others are, tufts that are made by chance."""
+    groom, settings = _groom(falling(1500)), CardSettings(way="guides")
+    grid, guides = groom.strands.grid, groom.guides
+    assert len(guides) < len(grid)
+    baked, plan = uncut_cards(groom, settings, BAKED)
+    made, none = uncut_cards(groom, settings, MADE)
+    assert plan is not None and none is None
+    ends = np.stack([baked.strips.frames.center[:, [0, -1]], grid[guides][:, [0, -1]]])
+    np.testing.assert_allclose(*ends, atol=1e-6)
+    widest = (each.strips.width.max(axis=1) for each in (made, baked))
+    np.testing.assert_allclose(np.divide(*widest) * plan.width_factor, 1.0, rtol=1e-5)
+    assert made.strand_count.max() == 1 and baked.strand_count.sum() == len(grid)
+    card = card_of_strand(groom, settings)
+    np.testing.assert_array_equal(card[guides], np.arange(len(guides)))
+    for tile, strip in enumerate(plan.strips.frames.center):
+        own = plan.strands[plan.tile_of_strand == tile]
+        shown = np.abs(grid[guides][:, 0] - strip[0]).sum(axis=1).argmin()
+        assert set(card[own].tolist()) == {shown}
+    alone = replace(groom, strands=groom.strands.take(guides), guides=np.arange(len(guides)))
+    parts = {name: getattr(groom, name)[guides] for name in ("radius", "root_normal")}
+    cards, plan = uncut_cards(replace(alone, **parts), settings, BAKED)
+    assert plan is None
+    np.testing.assert_array_equal(cards.strips.width, made.strips.width)
+    np.testing.assert_array_equal(cards.layer, made.layer)
 
 
 def test_the_lowest_layer_is_wider_by_choice_and_the_outermost_is_not() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairloom.addon.cards.clusters import cluster_strands, shared_out
+from hairloom.addon.cards.clusters import cluster_of_guides, cluster_strands, shared_out
 
 
 def bundles(count: int, strands: int, spread: float = 0.002) -> tuple[np.ndarray, np.ndarray]:
@@ -28,6 +28,28 @@ def test_bundles_that_lie_apart_are_found() -> None:
     label = cluster_strands(grid, np.zeros(len(grid), np.int32), 12)
     pairs = {(int(a), int(b)) for a, b in zip(label, owner, strict=True)}
     assert len(pairs) == 12 == label.max() + 1
+
+
+def test_strands_lie_along_the_nearest_guide_of_their_group() -> None:
+    grid, owner = bundles(12, 20)
+    guides = np.unique(owner, return_index=True)[1]
+    same = np.zeros(len(grid), np.int32)
+    np.testing.assert_array_equal(cluster_of_guides(grid, same, guides), owner)
+    # of two groups side by side, one of which has no guides in bundles 6 to 11
+    group = (np.arange(len(grid)) % 2).astype(np.int32)
+    group[guides[6:]], group[guides[:6]] = 0, 1
+    found = cluster_of_guides(grid, group, guides)
+    np.testing.assert_array_equal(group[guides][found], group)
+    np.testing.assert_array_equal(found[guides], np.arange(12))
+    # a group without any takes those of others
+    alone = np.where(np.isin(np.arange(len(grid)), guides), 0, 1)
+    np.testing.assert_array_equal(cluster_of_guides(grid, alone, guides), owner)
+
+
+def test_guides_that_lie_in_one_place_stay_their_own() -> None:
+    grid = np.tile(bundles(1, 1)[0], (3, 1, 1))
+    same = np.zeros(3, np.int32)
+    np.testing.assert_array_equal(cluster_of_guides(grid, same, np.array([0, 2]))[[0, 2]], [0, 1])
 
 
 def test_strands_that_part_are_kept_apart_though_their_roots_touch() -> None:
