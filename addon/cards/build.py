@@ -196,7 +196,8 @@ def uncut_cards(
     strands, guides, is_baked = groom.strands, groom.guides, atlas.source == "baked"
     grid, radius = strands.grid, strands.radius.reshape(strands.grid.shape[:2])
     cluster = card_of_strand(groom, settings)
-    _, first, count = np.unique(cluster, return_index=True, return_counts=True)
+    _, found, count = np.unique(cluster, return_index=True, return_counts=True)
+    first: Ints = found
     if settings.way == "guides":
         first = guides
         is_baked &= len(grid) > len(guides)  # guides alone stand for tufts that nobody has made
