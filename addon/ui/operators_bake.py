@@ -42,7 +42,8 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
         locks = show_in_renders(bake.objects(), context.evaluated_depsgraph_get())
         names = ", ".join(obj.name for obj in bake.objects())
         also = "; Render > Lock Interface is on, which renders of baked hair need" if locks else ""
-        self.report({"INFO"}, f"Baked {bake.frame_count:,} frames of {names}{also}")
+        count = "1 frame" if bake.frame_count == 1 else f"{bake.frame_count:,} frames"
+        self.report({"INFO"}, f"Baked {count} of {names}{also}")
 
 
 class HAIRLOOM_OT_bake_free(bpy.types.Operator):

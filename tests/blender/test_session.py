@@ -134,6 +134,23 @@ def test_edited_curves_are_read_again_and_others_left_alone(preview, evaluated):
     )
 
 
+def test_rounding_far_from_the_origin_is_no_edit(preview, evaluated):
+    hair, head, session = preview
+    rig = session.rig
+    for place in ((3.0, -2.0, 1.5), (-40.0, 7.0, 0.3)):
+        head.location, head.rotation_euler = place, (0.3, 0.2, 1.0)
+        update()
+        hair.data.update_tag()
+        update()
+        reactions.catch_up(evaluated())
+        assert session.rig is rig
+    hair.data.position_data[7].vector.x += 0.001
+    hair.data.update_tag()
+    update()
+    reactions.catch_up(evaluated())
+    assert session.rig is not rig
+
+
 def test_another_surface_begins_the_preview_anew(preview, evaluated):
     hair, head, _ = preview
     other = head.copy()

@@ -10,6 +10,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ...arrays import Floats
 from ...pipeline import Pose, Rig
 from ...strands import StrandSet
 from ..bakes.baked_rig import BakedRig, RestMatrices
@@ -96,7 +97,7 @@ class Reading:
         read = usable_curves(hair, depsgraph)
         back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
         strands = read.strands if np.allclose(back, np.eye(4)) else read.strands.transformed(back)
-        if _same(strands, before.strands):
+        if _same(strands, before.strands, back):
             strands = before.strands
         density, warning = read_density(hair, before.head, depsgraph)
         source = replace(
@@ -142,11 +143,12 @@ class Reading:
         return groom_moment(hair, head, pose, depsgraph)
 
 
-def _same(one: StrandSet, other: StrandSet) -> bool:
-    """Whether two readings give the same hair, but for rounding in the object's matrix."""
+def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
+    """Whether two readings give the same hair, but for rounding on the way `back` to rest."""
+    farthest = max(np.abs(one.points).max(initial=0.0), np.abs(back[:3, 3]).max())
     return (
         np.array_equal(one.offsets, other.offsets)
-        and np.allclose(one.points, other.points, rtol=1e-6, atol=1e-7)
+        and np.allclose(one.points, other.points, rtol=0.0, atol=1e-6 * farthest)
         and np.allclose(one.radius, other.radius, rtol=1e-5)
         and np.array_equal(one.group, other.group)
     )
