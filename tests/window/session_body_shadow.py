@@ -16,6 +16,7 @@ from artist import (
     new_head,
     open_our_sidebar,
     pixels,
+    pixels_at_rest,
     press,
     sidebar_button,
     until,
@@ -92,8 +93,10 @@ def hair_shades_the_head():
     )
     # a head that is not shown is not shaded
     bpy.data.objects["Head"].hide_set(True)
-    yield 20
-    hidden = pixels("hidden_head")
+    yield from until(
+        lambda: changed(shaded, pixels("hidden_head"), 0.05) > 0.02, "the head is not hidden"
+    )
+    hidden = yield from pixels_at_rest("hidden_head")
     volume().on_body = False
     yield 20
     assert changed(hidden, pixels("hidden_head_bare"), 0.05) < 1e-3
