@@ -10,11 +10,10 @@ from typing import Any
 
 import bpy
 
-from .host import handlers
-from .host.preview import reactions
-from .host.render_engine import engine
-from .host.settings import engine_group, groups, previews
-from .host.verbs.command_line import run
+from .blender.command_line.command_line import run
+from .blender.engine import engine
+from .blender.preview import handlers, reactions
+from .blender.properties import engine_group, groups, previews
 from .ui import (
     engine_panels,
     long_work,

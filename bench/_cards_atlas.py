@@ -8,9 +8,9 @@ import time
 import numpy as np
 from _cards_groom import SETTINGS, sintel_rig
 
+from hairloom.addon.blender.cards.card_atlas import baked_atlas
 from hairloom.addon.card_flow import card_build
 from hairloom.addon.cards.build import CardBuild
-from hairloom.addon.host.cards.card_atlas import baked_atlas
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 
 ROUNDS = 3

@@ -8,12 +8,12 @@ from pathlib import Path
 from extension_loader import REPOSITORY
 
 from hairloom.addon import pipeline
+from hairloom.addon.blender.scene.mesh_files import read_mesh_file
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.host.scene.mesh_files import read_mesh_file
 from hairloom.addon.pipeline import Rig
 
 #: 800 cards of clusters, an atlas of 2048 baked from the strands, 256 rays a vertex

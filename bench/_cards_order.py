@@ -16,6 +16,7 @@ import numpy as np
 from _cards_atlas import STRANDS
 from _cards_groom import sintel_rig
 
+from hairloom.addon.blender.cards.card_atlas import baked_atlas
 from hairloom.addon.card_flow import card_build
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.build import CardBuild
@@ -31,7 +32,6 @@ from hairloom.addon.cards.sort import (
     order_from,
     reordered,
 )
-from hairloom.addon.host.cards.card_atlas import baked_atlas
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.textures import TextureSettings, hair_textures

@@ -15,11 +15,11 @@ import gpu
 import numpy as np
 from _cards_groom import sintel_rig
 
+from hairloom.addon.blender.cards.card_builds import CardForm, built_cards
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.drawing_settings import CardDrawingSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.exchange.textures.srgb import srgb_encoded
-from hairloom.addon.host.cards.card_builds import CardForm, built_cards
 from hairloom.addon.render.accumulation import Target
 from hairloom.addon.render.camera import Camera, frame_camera
 from hairloom.addon.render.card_pass import CardPass

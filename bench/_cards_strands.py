@@ -14,11 +14,11 @@ from _cards_groom import SETTINGS, sintel_rig
 from extension_loader import REPOSITORY
 
 from hairloom.addon import pipeline
+from hairloom.addon.blender.base.images import contact_sheet, write_png
+from hairloom.addon.blender.cards.card_making import CardChoices, MadeCards, making_steps
+from hairloom.addon.blender.cards.card_maps import made_maps
+from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.cards.steps import result_of
-from hairloom.addon.host.cards.card_making import CardChoices, MadeCards, making_steps
-from hairloom.addon.host.cards.card_maps import made_maps
-from hairloom.addon.host.pictures.images import contact_sheet, write_png
-from hairloom.addon.host.settings.presets import named_preset
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.card_snapshot import CardSnapshot

@@ -15,9 +15,9 @@ import gpu
 import numpy as np
 from extension_loader import REPOSITORY
 
+from hairloom.addon.blender.base.images import contact_sheet, write_png
+from hairloom.addon.blender.scene.mesh_files import read_mesh_file
 from hairloom.addon.exchange.tressfx import read_tfx
-from hairloom.addon.host.pictures.images import contact_sheet, write_png
-from hairloom.addon.host.scene.mesh_files import read_mesh_file
 from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.mesh_pass import MeshPass

@@ -18,21 +18,21 @@ load_package()
 
 from _cards_groom import SETTINGS, sintel_rig  # noqa: E402
 
-from hairloom.addon.card_flow import card_build  # noqa: E402
-from hairloom.addon.cards.steps import result_of  # noqa: E402
-from hairloom.addon.cards.vertex_animation import motion_values  # noqa: E402
-from hairloom.addon.dynamics.colliders import DistanceField  # noqa: E402
-from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
-from hairloom.addon.exchange.cards.card_formats import GLB  # noqa: E402
-from hairloom.addon.host.bakes.take import TakeDrive, shaken_poses, simulate  # noqa: E402
-from hairloom.addon.host.cards.card_motion import (  # noqa: E402
+from hairloom.addon.blender.bakes.take import TakeDrive, shaken_poses, simulate  # noqa: E402
+from hairloom.addon.blender.base.images import read_texture  # noqa: E402
+from hairloom.addon.blender.cards.card_motion import (  # noqa: E402
     GuideMotion,
     MotionChoices,
     TextureMotion,
     joint_motion_steps,
     moved_cards,
 )
-from hairloom.addon.host.pictures.images import read_texture  # noqa: E402
+from hairloom.addon.card_flow import card_build  # noqa: E402
+from hairloom.addon.cards.steps import result_of  # noqa: E402
+from hairloom.addon.cards.vertex_animation import motion_values  # noqa: E402
+from hairloom.addon.dynamics.colliders import DistanceField  # noqa: E402
+from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
+from hairloom.addon.exchange.cards.card_formats import GLB  # noqa: E402
 from hairloom.addon.pipeline import Rig  # noqa: E402
 
 RATE = 60.0

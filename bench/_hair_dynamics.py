@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from hairloom.addon.host.scene.curves import write_curves
+from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.strands import StrandSet
 
 GROUP = "Hair Dynamics"

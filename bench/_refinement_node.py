@@ -19,8 +19,8 @@ import bpy
 import numpy as np
 from _shaken_head import RADIUS, guides_on, surface_of
 
+from hairloom.addon.blender.scene.curves import read_curves, write_curves
 from hairloom.addon.groom.weights import GuideWeights, guide_weights
-from hairloom.addon.host.scene.curves import read_curves, write_curves
 from hairloom.addon.refine.interpolate import interpolate
 from hairloom.addon.refine.smooth import smoothed_at
 from hairloom.addon.strands import StrandSet

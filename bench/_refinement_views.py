@@ -20,10 +20,10 @@ from typing import Any
 import gpu
 import numpy as np
 
+from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings
-from hairloom.addon.host.scene.built_in_head import built_in_head
 from hairloom.addon.refine.detail import PictureView, adaptive_points, stations
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.refine.thinning import even_ranks

@@ -21,7 +21,7 @@ from _shading_cycles import BLOND, Hair
 from _shading_room import DISTANCE, CyclesRoom
 from hair_ball import ball_mesh, combed_strands
 
-from hairloom.addon.host.pictures.images import contact_sheet, write_png
+from hairloom.addon.blender.base.images import contact_sheet, write_png
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.render.camera import Camera, look_at, orthographic
 from hairloom.addon.render.frame import render_image

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from hairloom.addon.blender.bakes.take import GRAVITY
+from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.dynamics.colliders import Collider, PosedCollider
 from hairloom.addon.dynamics.step import Drive
 from hairloom.addon.dynamics.way import bow
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings
-from hairloom.addon.host.bakes.take import GRAVITY
-from hairloom.addon.host.scene.surfaces import read_surface
 from hairloom.addon.strands import StrandSet, Surface
 
 RADIUS, SWAY, RATE, LENGTH = 0.1, 0.3, 1.0, 0.24  # [m], [m], [1/s], [m]

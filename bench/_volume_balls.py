@@ -15,7 +15,7 @@ import numpy as np
 from _shading_room import CyclesRoom
 from hair_ball import ball_mesh, combed_strands
 
-from hairloom.addon.host.pictures.images import contact_sheet, write_png
+from hairloom.addon.blender.base.images import contact_sheet, write_png
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 

@@ -22,10 +22,10 @@ from _shading_cycles import BLOND, USUAL
 from _shading_room import CyclesRoom
 from extension_loader import REPOSITORY
 
+from hairloom.addon.blender.base.images import contact_sheet, write_png
+from hairloom.addon.blender.scene.mesh_files import read_mesh_file
 from hairloom.addon.exchange.textures.srgb import srgb_encoded
 from hairloom.addon.exchange.tressfx import read_tfx
-from hairloom.addon.host.pictures.images import contact_sheet, write_png
-from hairloom.addon.host.scene.mesh_files import read_mesh_file
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.render.camera import Camera, frame_camera
 from hairloom.addon.render.frame import render_image

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
-from hairloom.addon.host.scene.curves import read_curves, write_curves
+from hairloom.addon.blender.scene.curves import read_curves, write_curves
 from hairloom.addon.strands import StrandSet
 
 CURVES, POINTS, ROUNDS = 100_000, 16, 9

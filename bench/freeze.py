@@ -27,9 +27,10 @@ import gpu
 import numpy as np
 
 import hairloom
-from hairloom.addon.host.colliders import fields
-from hairloom.addon.host.preview import live, making, reactions
-from hairloom.addon.host.sample_scene import add_sample_scene
+from hairloom.addon.blender.colliders import fields
+from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.sessions import making
+from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 
 RATE, FRAMES, MOVES, BEATS = 24.0, 24, 8, 2000
 #: group of settings -> a slider of it and what it is dragged to

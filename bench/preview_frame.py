@@ -22,12 +22,12 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 
 from hairloom.addon import pipeline
+from hairloom.addon.blender.bakes.take import GRAVITY, shaken_poses
+from hairloom.addon.blender.scene.built_in_head import built_in_head
+from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
-from hairloom.addon.host.bakes.take import GRAVITY, shaken_poses
-from hairloom.addon.host.preview.compute_solver import ComputeSolver
-from hairloom.addon.host.scene.built_in_head import built_in_head
 from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.render.strand_pass import StrandPass

@@ -27,8 +27,8 @@ class Shots:
 
     def __init__(self) -> None:
         settings = of_addon("parameters").ALL_SETTINGS
-        head = of_addon("host.scene.built_in_head").built_in_head()
-        grow, studio = of_addon("groom.grow"), of_addon("host.pictures.studio")
+        head = of_addon("blender.scene.built_in_head").built_in_head()
+        grow, studio = of_addon("groom.grow"), of_addon("blender.pictures.studio")
         grown = settings["grow"](strand_count=STRANDS, clump=0.4)
         strands = grow.grow(head, grown, grow.scalp_density(head))
         self.settings, self._pipeline = settings, of_addon("pipeline")
@@ -48,7 +48,7 @@ class Shots:
 
     def built(self, way: str, levels: int = 1) -> tuple[Any, Any]:
         """Cards in this way, and how they are drawn."""
-        settings, builds = self.settings, of_addon("host.cards.card_builds")
+        settings, builds = self.settings, of_addon("blender.cards.card_builds")
         form = builds.CardForm(
             settings["cards"](way=way, card_count=CARDS, levels=levels),
             settings["atlas"](),
@@ -57,7 +57,7 @@ class Shots:
             self._drawn,
             shading=self._shading,
         )
-        steps = of_addon("host.cards.card_making").making_steps(self.rig, form.choices({}))
+        steps = of_addon("blender.cards.card_making").making_steps(self.rig, form.choices({}))
         made = of_addon("cards.steps").result_of(steps)
         tied = builds.tied_cards(self.rig, form, made)
         return made.build, tied.drawn(tied.rest, (settings["card_drawing"](), self._drawn))
@@ -77,7 +77,7 @@ def of_layer(mesh: Any, layer: int) -> Any:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    images, shots = of_addon("host.pictures.images"), Shots()
+    images, shots = of_addon("blender.base.images"), Shots()
 
     def sheet(name: str, pictures: list[Any]) -> None:
         images.write_png(folder / name, images.contact_sheet(pictures, len(pictures)))

@@ -38,7 +38,7 @@ def material(name: str, color: tuple[float, float, float], roughness: float) -> 
 
 def head() -> Any:
     """The built-in head as an object."""
-    surface = of_addon("host.scene.built_in_head").built_in_head()
+    surface = of_addon("blender.scene.built_in_head").built_in_head()
     mesh = bpy.data.meshes.new("Head")
     mesh.from_pydata(surface.positions, [], surface.triangles)
     mesh.uv_layers.new().data.foreach_set("uv", surface.corner_uv.ravel())
@@ -124,7 +124,7 @@ def main() -> int:
     for number, color in MASK.items():
         mask[found["Object Index"][..., 0] == number] = color
     pictures = [opaque(found["Combined"][..., :3]), distances(found["Depth"]), opaque(mask)]
-    images = of_addon("host.pictures.images")
+    images = of_addon("blender.base.images")
     images.write_png(folder / "engine.png", images.contact_sheet(pictures, len(pictures)))
     return 0
 

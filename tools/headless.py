@@ -14,7 +14,7 @@ from extension_loader import PACKAGE, load_package
 def main(arguments: list[str]) -> int:
     gpu.init()
     load_package().register()
-    command_line = importlib.import_module(f"{PACKAGE}.addon.host.verbs.command_line")
+    command_line = importlib.import_module(f"{PACKAGE}.addon.blender.command_line.command_line")
     return int(command_line.run(arguments))
 
 

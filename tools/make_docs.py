@@ -43,9 +43,11 @@ def parameter_tables() -> str:
 def verb_tables() -> str:
     """docs/verbs.md, whole; it takes a Blender to know."""
     load_package()
-    command_line = importlib.import_module(f"{PACKAGE}.addon.host.verbs.command_line")
+    command_line = importlib.import_module(f"{PACKAGE}.addon.blender.command_line.command_line")
     return str(
-        importlib.import_module(f"{PACKAGE}.addon.host.verbs.verb_docs").page(command_line.VERBS)
+        importlib.import_module(f"{PACKAGE}.addon.blender.command_line.verb_docs").page(
+            command_line.VERBS
+        )
     )
 
 

@@ -36,12 +36,12 @@ def wig() -> Any:
     """A snapshot of shoulder-long hair on the built-in head."""
     settings, pipeline = of_addon("parameters").ALL_SETTINGS, of_addon("pipeline")
     grown = settings["grow"](strand_count=STRANDS, wave=0.006, wave_length=0.09, clump=0.25)
-    head = of_addon("host.scene.built_in_head").built_in_head()
+    head = of_addon("blender.scene.built_in_head").built_in_head()
     grow = of_addon("groom.grow")
     strands = grow.grow(head, grown, grow.scalp_density(head))
     rig = pipeline.prepare(strands, head, settings["guides"](), place="the built-in groom")
     ambient = settings["ambient"]()
-    snapshot = of_addon("host.preview.shown").snapshot_of(
+    snapshot = of_addon("blender.sessions.shown").snapshot_of(
         rig, pipeline.rest_occlusion(rig, ambient), None
     )
     shaded = pipeline.head_occlusion(rig, ambient)
@@ -63,7 +63,7 @@ def against(view: np.ndarray) -> tuple[Any, ...]:
 
 def coarse(picture: Any) -> Any:
     """The same picture in a few shades, as they are shown."""
-    shown = of_addon("host.pictures.images").display_encoded(picture)
+    shown = of_addon("blender.base.images").display_encoded(picture)
     shown = np.round(shown * (SHADES - 1)) / (SHADES - 1)
     alpha = shown[..., 3:]
     colors = of_addon("exchange.textures.srgb").srgb_decoded(shown[..., :3])
@@ -73,8 +73,8 @@ def coarse(picture: Any) -> Any:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    frame, images = of_addon("render.frame"), of_addon("host.pictures.images")
-    studio, lights = of_addon("host.pictures.studio"), of_addon("shading.lights")
+    frame, images = of_addon("render.frame"), of_addon("blender.base.images")
+    studio, lights = of_addon("blender.pictures.studio"), of_addon("shading.lights")
     shading = of_addon("parameters").ALL_SETTINGS["shading"]
     hair = wig()
     points = hair.strands.reshape(-1, 3)

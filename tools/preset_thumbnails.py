@@ -30,7 +30,7 @@ def wig() -> Any:
     """Shoulder-long hair on the built-in head, made ready to move."""
     settings, pipeline = of_addon("parameters").ALL_SETTINGS, of_addon("pipeline")
     grown = settings["grow"](strand_count=STRANDS)
-    head = of_addon("host.scene.built_in_head").built_in_head()
+    head = of_addon("blender.scene.built_in_head").built_in_head()
     grow = of_addon("groom.grow")
     strands = grow.grow(head, grown, grow.scalp_density(head))
     return pipeline.prepare(strands, head, settings["guides"](), place="the built-in groom")
@@ -59,9 +59,12 @@ def moved(rig: Any, dynamics: Any) -> tuple[Any, Any]:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    presets, pipeline = of_addon("host.settings.presets"), of_addon("pipeline")
-    settings, studio_of = of_addon("parameters").ALL_SETTINGS, of_addon("host.pictures.studio")
-    images, form_of = of_addon("host.pictures.images"), of_addon("host.cards.card_builds").CardForm
+    presets, pipeline = of_addon("blender.properties.presets"), of_addon("pipeline")
+    settings, studio_of = of_addon("parameters").ALL_SETTINGS, of_addon("blender.pictures.studio")
+    images, form_of = (
+        of_addon("blender.base.images"),
+        of_addon("blender.cards.card_builds").CardForm,
+    )
     rig, ambient = wig(), settings["ambient"]()
     shading = presets.named_preset(LOOK).settings
     plain = studio_of.Look(

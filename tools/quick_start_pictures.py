@@ -43,7 +43,7 @@ def main(folder: Path) -> None:
             pictures.append(of_addon("exchange.textures.srgb").srgb_decoded(pixels))
             bpy.data.images.remove(image)
             print(f"Drew frame {frame}", flush=True)
-    images = of_addon("host.pictures.images")
+    images = of_addon("blender.base.images")
     images.write_png(folder / "sample.png", images.contact_sheet(pictures, len(FRAMES)))
 
 

@@ -29,7 +29,7 @@ def wig(children: str) -> Any:
     """A rig of wavy guides on the built-in head, with or without children; each side is a group."""
     settings = of_addon("parameters").ALL_SETTINGS
     grown = settings["grow"](strand_count=GUIDES, wave=0.018, wave_length=0.06, clump=0.3)
-    head = of_addon("host.scene.built_in_head").built_in_head()
+    head = of_addon("blender.scene.built_in_head").built_in_head()
     grow = of_addon("groom.grow")
     strands = grow.grow(head, grown, grow.scalp_density(head))
     return of_addon("pipeline").prepare(
@@ -50,7 +50,7 @@ def picture(rig: Any, look: dict[str, Any], camera: Any = None, samples: int = S
     settings, pipeline, studio = (
         of_addon("parameters").ALL_SETTINGS,
         of_addon("pipeline"),
-        of_addon("host.pictures.studio"),
+        of_addon("blender.pictures.studio"),
     )
     ambient = settings["ambient"]()
     view = look.pop("debug_view", "none")
@@ -76,7 +76,7 @@ def close_camera(rig: Any, reach: float) -> Any:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    images = of_addon("host.pictures.images")
+    images = of_addon("blender.base.images")
 
     def write(name: str, pictures: list[Any]) -> None:
         images.write_png(folder / f"{name}.png", images.contact_sheet(pictures, len(pictures)))

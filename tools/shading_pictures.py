@@ -40,7 +40,7 @@ def alone(blond: Any, lobe: str) -> Any:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    frame, images = of_addon("render.frame"), of_addon("host.pictures.images")
+    frame, images = of_addon("render.frame"), of_addon("blender.base.images")
     shading, lights = of_addon("parameters").ALL_SETTINGS["shading"], of_addon("shading.lights")
     blond = replace(
         of_addon("params.preset").read_preset(BLOND, shading).settings,
@@ -69,7 +69,7 @@ def main(folder: Path) -> None:
             volume=volume(shadows=shadows),
             volume_center=np.zeros(3, np.float32),
         )
-        backdrop = of_addon("host.pictures.studio").BACKDROP
+        backdrop = of_addon("blender.pictures.studio").BACKDROP
         return frame.render_image(snapshot, camera, SIZE, SIZE, SAMPLES, background=backdrop)
 
     shown = [

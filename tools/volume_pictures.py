@@ -130,7 +130,7 @@ def shadow_pictures(strands: Any) -> list[Any]:
             SIZE,
             SIZE,
             SAMPLES,
-            background=of_addon("host.pictures.studio").BACKDROP,
+            background=of_addon("blender.pictures.studio").BACKDROP,
         )
         for way in ways
     ]
@@ -139,7 +139,7 @@ def shadow_pictures(strands: Any) -> list[Any]:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    images, light = of_addon("host.pictures.images"), of_addon("shading.lights").Light
+    images, light = of_addon("blender.base.images"), of_addon("shading.lights").Light
     strands = combed_strands(STRANDS)
     shown = shadow_pictures(strands)
     images.write_png(folder / "opacity_slices.png", images.contact_sheet(shown, len(shown)))

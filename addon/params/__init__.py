@@ -1,8 +1,8 @@
 """Parameters, each declared once.
 
 A room's `settings.py` declares a `Settings` subclass. From that one declaration come the
-checked value object (here), the Blender property (`host.settings.properties`), the GLSL struct and
-its bytes (`params.glsl`), the preset check (`params.preset`) and the row in the docs
+checked value object (here), the Blender property (`blender.properties.properties`), the GLSL struct
+and its bytes (`params.glsl`), the preset check (`params.preset`) and the row in the docs
 (`params.docs`).
 """
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ..host.preview.overlay import ENGINE
+from ..blender.viewport.overlay import ENGINE
 
 #: serve every engine but those with panels of their own for the same
 _UNFIT = frozenset({"VIEWLAYER_PT_filter", "RENDER_PT_freestyle"})

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import bpy
 from bpy.app.handlers import persistent
 
-from ..host.preview.redraw import redraw_panels
-from ..host.thread_work import ThreadWork
+from ..blender.base.redraw import redraw_panels
+from ..blender.base.thread_work import ThreadWork
 from .reports import reporting, waiting
 
 #: Work this long [s] between two looks at the keyboard.

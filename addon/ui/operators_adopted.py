@@ -7,17 +7,17 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ..errors import HairloomError
-from ..host.cards.adopted_cards import (
+from ..blender.cards.adopted_cards import (
     ORDERS,
     CardOcclusionSettings,
     SortChoices,
     SortedCards,
     sort_steps,
 )
-from ..host.cards.card_alpha import alpha_image
-from ..host.settings.groups import operator_properties
-from ..host.settings.properties import settings_of
+from ..blender.cards.card_alpha import alpha_image
+from ..blender.properties.groups import operator_properties
+from ..blender.properties.properties import settings_of
+from ..errors import HairloomError
 from .long_work import LongWork, Steps, shared
 from .selection import active_mesh
 

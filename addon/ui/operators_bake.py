@@ -6,11 +6,11 @@ from typing import ClassVar
 
 import bpy
 
+from ..blender.bakes import playback
+from ..blender.preview import live, timeline
+from ..blender.preview.bake import Bake, bakeable, free, show_in_renders
+from ..blender.scene.fin_modifier import fin_modifier
 from ..errors import HairloomError
-from ..host.bakes import playback
-from ..host.bakes.bake import Bake, bakeable, free, show_in_renders
-from ..host.cloth.fin_modifier import fin_modifier
-from ..host.preview import live, timeline
 from . import long_work
 from .long_work import LongWork, Steps, counted, draw_progress
 from .reports import reporting

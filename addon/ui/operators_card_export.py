@@ -10,10 +10,9 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ..errors import HairloomError
-from ..host.bakes import playback
-from ..host.bakes.stale_bakes import stale_notes
-from ..host.cards.card_choices import (
+from ..blender.bakes import playback
+from ..blender.bakes.stale_bakes import stale_notes
+from ..blender.cards.card_choices import (
     DEPTH_ITEMS,
     FORMAT_ITEMS,
     MOTION_ITEMS,
@@ -25,9 +24,10 @@ from ..host.cards.card_choices import (
     file_stem,
     suffix_of,
 )
-from ..host.cards.card_files import FileSteps
-from ..host.cards.card_out import CardExport
-from ..host.strands.groom_files import Outcome
+from ..blender.cards.card_files import FileSteps
+from ..blender.cards.card_out import CardExport
+from ..blender.strands.groom_files import Outcome
+from ..errors import HairloomError
 from .long_work import LongWork, Progress, Steps, threaded
 from .messages import draw_lines
 from .reports import tell

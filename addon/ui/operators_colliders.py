@@ -5,11 +5,11 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty
 
-from ..host.colliders import spheres
-from ..host.colliders.spheres import FittedSpheres, SphereFitSettings
-from ..host.scene.objects import head_of
-from ..host.settings.groups import operator_properties
-from ..host.settings.properties import settings_of
+from ..blender.base.objects import head_of
+from ..blender.colliders import spheres
+from ..blender.colliders.spheres import FittedSpheres, SphereFitSettings
+from ..blender.properties.groups import operator_properties
+from ..blender.properties.properties import settings_of
 from .reports import reporting, waiting
 from .selection import active_mesh, chosen_hair
 

@@ -7,10 +7,10 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty
 
-from ..host.bakes.bake import bakeable
-from ..host.strands.export_check import ExportCheck
-from ..host.strands.groom_files import Outcome
-from ..host.strands.strand_choices import ALEMBIC_ENGINES, FORMATS, USD_ENGINES, strand_output
+from ..blender.preview.bake import bakeable
+from ..blender.strands.export_check import ExportCheck
+from ..blender.strands.groom_files import Outcome
+from ..blender.strands.strand_choices import ALEMBIC_ENGINES, FORMATS, USD_ENGINES, strand_output
 from .messages import draw_lines
 from .reports import tell, waiting
 from .selection import chosen_hair, needs_hair

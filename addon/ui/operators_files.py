@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..host.strands import groom_files
+from ..blender.strands import groom_files
 from .grow_options import GROW_PROPERTIES, draw_grow
 from .reports import reporting, waiting
 from .selection import ground_mesh, make_active

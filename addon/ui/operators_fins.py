@@ -6,9 +6,15 @@ from typing import Any
 
 import bpy
 
-from ..host.cloth import fins
-from ..host.cloth.fin_modifier import add_modifier, clear, fin_modifier, is_shown, remove_modifier
-from ..host.preview import live
+from ..blender.preview import live
+from ..blender.scene.fin_modifier import (
+    add_modifier,
+    clear,
+    fin_modifier,
+    is_shown,
+    remove_modifier,
+)
+from ..blender.sessions import fins
 from .drawing import draw_named
 from .messages import draw_message
 from .reports import reporting, waiting

@@ -8,9 +8,9 @@ from typing import Any
 
 import bpy
 
+from ..blender.base.objects import head_of, objects_in
+from ..blender.preview.troubles import is_unevenly_scaled, set_surface, surface_for
 from ..errors import HairloomError
-from ..host.preview.troubles import is_unevenly_scaled, set_surface, surface_for
-from ..host.scene.objects import head_of, objects_in
 from .reports import reporting, waiting
 from .selection import chosen_hair, needs_hair
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
-from ..host.scene.principled import has_principled_hair, look_from_material
-from ..host.settings.presets import apply, delete_own, kept_settings, named_preset, save_own
-from ..host.settings.properties import settings_of
+from ..blender.properties.presets import apply, delete_own, kept_settings, named_preset, save_own
+from ..blender.properties.properties import settings_of
+from ..blender.scene.principled import has_principled_hair, look_from_material
 from .preset_chooser import KIND
 from .reports import reporting
 from .selection import chosen_hair, needs_hair

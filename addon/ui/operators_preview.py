@@ -11,12 +11,12 @@ import time
 
 import bpy
 
-from ..host.cloth import fins
-from ..host.preview import live
-from ..host.preview.fingerprints import frame_rate
-from ..host.preview.pace import Pace
-from ..host.scene.source import mute_own_dynamics, own_dynamics
-from ..host.strands.groom_files import Outcome
+from ..blender.bakes.fingerprints import frame_rate
+from ..blender.base.pace import Pace
+from ..blender.preview import live
+from ..blender.scene.source import mute_own_dynamics, own_dynamics
+from ..blender.sessions import fins
+from ..blender.strands.groom_files import Outcome
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ..host import self_test
+from ..blender.setup import self_test
 from .reports import waiting
 
 

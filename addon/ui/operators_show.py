@@ -8,12 +8,12 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
+from ..blender.bakes.fingerprints import frame_rate
+from ..blender.base.images import write_png
+from ..blender.pictures.sheet import Sheet
+from ..blender.pictures.showing import ShownGroom, file_name, shown_groom
+from ..blender.pictures.turntable import FRAMES, LIGHTS, SIDES, Turntable, TurntableSettings
 from ..errors import HairloomError
-from ..host.pictures.images import write_png
-from ..host.pictures.sheet import Sheet
-from ..host.pictures.turntable import FRAMES, LIGHTS, SIDES, Turntable, TurntableSettings
-from ..host.preview.fingerprints import frame_rate
-from ..host.preview.showing import ShownGroom, file_name, shown_groom
 from .long_work import LongWork, Steps, counted, draw_progress
 from .reports import reporting, waiting
 from .selection import chosen_hair, needs_hair

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ..host.pictures import skin_picture, slices
-from ..host.pictures.skin_picture import skin_shadow_of_view
-from ..host.pictures.slices import shown_image, slices_of_view
-from ..host.preview import live
-from ..host.preview.session import Session
+from ..blender.pictures import skin_picture, slices
+from ..blender.pictures.skin_picture import skin_shadow_of_view
+from ..blender.pictures.slices import shown_image, slices_of_view
+from ..blender.preview import live
+from ..blender.sessions.session import Session
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 

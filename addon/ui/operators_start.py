@@ -10,10 +10,10 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty
 
-from ..host.preview import live
-from ..host.sample_scene import add_sample_scene
-from ..host.starting import new_groom, take_over
-from ..host.strands.particle_hair import convert_particle_hair, hair_systems
+from ..blender.preview import live
+from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
+from ..blender.setup.sample_scene import add_sample_scene
+from ..blender.setup.starting import new_groom, take_over
 from .grow_options import GROW_PROPERTIES, draw_grow
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences

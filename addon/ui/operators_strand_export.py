@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..host.strands.strand_choices import (
+from ..blender.strands.strand_choices import (
     ALEMBIC_ENGINES,
     BASES,
     COUNTS,

@@ -7,9 +7,9 @@ from typing import Any
 
 import bpy
 
-from ..host.preview import live
-from ..host.starting import is_untouched
-from ..host.strands.particle_hair import hair_systems
+from ..blender.preview import live
+from ..blender.scene.particle_hair import hair_systems
+from ..blender.setup.starting import is_untouched
 from .drawing import Draw
 from .operators_adopted import draw_sort
 from .operators_strand_export import draw_strand_exports

@@ -8,11 +8,11 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ..host.gpu_context import gpu_in_use
-from ..host.preview.solvers import compute_problem
-from ..host.self_test import last_report
-from ..host.settings.groups import operator_properties
-from ..host.settings.presets import names
+from ..blender.base.gpu_context import gpu_in_use
+from ..blender.properties.groups import operator_properties
+from ..blender.properties.presets import names
+from ..blender.sessions.solvers import compute_problem
+from ..blender.setup.self_test import last_report
 from .messages import draw_message
 
 #: the package that Blender knows, above this one

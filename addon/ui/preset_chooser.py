@@ -9,8 +9,8 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty
 
-from ..host.scene.principled import has_principled_hair
-from ..host.settings.presets import Entry, own, shipped
+from ..blender.properties.presets import Entry, own, shipped
+from ..blender.scene.principled import has_principled_hair
 from .selection import needs_hair
 
 #: section -> what its presets are called, and what they are about

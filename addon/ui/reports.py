@@ -9,8 +9,8 @@ from typing import Any
 
 import bpy
 
+from ..blender.strands.groom_files import Outcome, dropped_phrase
 from ..errors import HairloomError
-from ..host.strands.groom_files import Outcome, dropped_phrase
 
 
 def reporting(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:

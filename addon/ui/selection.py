@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
+from ..blender.base.objects import head_of, objects_in
+from ..blender.preview import live
 from ..errors import HairloomError
-from ..host.preview import live
-from ..host.scene.objects import head_of, objects_in
 
 
 def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:

@@ -10,10 +10,10 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
+from ..blender.strands.groom_files import Outcome
+from ..blender.strands.strand_choices import FORMATS, FRAMES, SEVERAL, file_of, strand_output
+from ..blender.strands.strand_export import StrandExport
 from ..errors import HairloomError
-from ..host.strands.groom_files import Outcome
-from ..host.strands.strand_choices import FORMATS, FRAMES, SEVERAL, file_of, strand_output
-from ..host.strands.strand_export import StrandExport
 from . import operators_export_check as export_check
 from .long_work import LongWork, Progress, Steps
 from .operators_export_check import writable

@@ -3,9 +3,9 @@
 import bpy
 import numpy as np
 
+from hairloom.addon.blender.colliders.obstacles import Obstacles
 from hairloom.addon.dynamics.colliders import transform_points
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.host.colliders.obstacles import Obstacles
 
 FRAME = 1.0 / 60.0
 COARSE = DynamicsSettings(collider_resolution=16)

@@ -53,7 +53,7 @@ def hedgehog(count: int = 60, points: int = 8, length: float = 0.08, seed: int =
 @pytest.fixture
 def new_hair(extension: None) -> Callable[..., Any]:
     """Makes a hair curves object from strands (a hedgehog), on a head or on none."""
-    from hairloom.addon.host.scene.curves import write_curves
+    from hairloom.addon.blender.scene.curves import write_curves
 
     def make(head: Any = None, strands: StrandSet | None = None) -> Any:
         strands = hedgehog() if strands is None else strands

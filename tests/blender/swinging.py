@@ -14,7 +14,7 @@ STEP, FRAMES = 0.03, 4
 
 def swings(session: Any) -> bool:
     """Whether hair that plays lags behind its head, pushed from rest, while its roots do not."""
-    from hairloom.addon.host.preview import live
+    from hairloom.addon.blender.preview import live
 
     live.rest(bpy.context.evaluated_depsgraph_get(), keep_playing=True)
     head, before = session.head.found(), session.strands

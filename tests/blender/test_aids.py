@@ -7,15 +7,16 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.colliders import fields
+from hairloom.addon.blender.preview import live, previewed
+from hairloom.addon.blender.viewport import overlay
+from hairloom.addon.blender.viewport.aids import KINDS, shape_lines
 from hairloom.addon.dynamics.colliders import (
     CapsuleCollider,
     DistanceField,
     SphereCollider,
     SphereSetCollider,
 )
-from hairloom.addon.host.colliders import fields
-from hairloom.addon.host.preview import live, overlay, previewed
-from hairloom.addon.host.preview.aids import KINDS, shape_lines
 
 
 @pytest.fixture

@@ -7,13 +7,13 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.bakes.bake_settings import folder_of
+from hairloom.addon.blender.bakes.cache import FACTS, Cache
+from hairloom.addon.blender.bakes.simulated import SOLVER_VERSION, solver_part
+from hairloom.addon.blender.preview import live, reactions, timeline
+from hairloom.addon.blender.preview.bake import Bake, free
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.bakes import playback
-from hairloom.addon.host.bakes.bake import Bake, free
-from hairloom.addon.host.bakes.bake_settings import folder_of
-from hairloom.addon.host.bakes.cache import FACTS, Cache
-from hairloom.addon.host.preview import live, reactions, timeline
-from hairloom.addon.host.preview.simulated import SOLVER_VERSION, solver_part
 
 LAST = 8
 

@@ -6,10 +6,10 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host.bakes import playback
-from hairloom.addon.host.bakes.cache import Cache
-from hairloom.addon.host.pictures.images import read_texture
-from hairloom.addon.host.verbs import command_line
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.bakes.cache import Cache
+from hairloom.addon.blender.base.images import read_texture
+from hairloom.addon.blender.command_line import command_line
 
 LAST = 5
 

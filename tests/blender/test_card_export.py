@@ -23,9 +23,9 @@ from hairloom.addon.exchange.files.file_set import written_together
 
 bpy = pytest.importorskip("bpy", reason="Blender's exporters need Blender or the bpy module")
 
-from hairloom.addon.host.cards import card_export  # noqa: E402
-from hairloom.addon.host.cards.card_export import check_exporter, write_card_mesh  # noqa: E402
-from hairloom.addon.host.cards.card_scene import CardLook  # noqa: E402
+from hairloom.addon.blender.cards import card_export  # noqa: E402
+from hairloom.addon.blender.cards.card_export import check_exporter, write_card_mesh  # noqa: E402
+from hairloom.addon.blender.cards.card_scene import CardLook  # noqa: E402
 
 MESH_VIEW = Path(__file__).parent / "mesh_view.py"
 NAME, NODE = "Haar/Ä.001", "Haar_Ä_001"

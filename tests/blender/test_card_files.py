@@ -24,10 +24,10 @@ from hairloom.addon.shading.settings import ShadingSettings
 bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy module")
 jsonschema = pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
 
-from hairloom.addon.host.cards import card_files  # noqa: E402
-from hairloom.addon.host.cards.card_choices import suffix_of  # noqa: E402
-from hairloom.addon.host.cards.card_material import TABLE_SIZE  # noqa: E402
-from hairloom.addon.host.verbs import command_line  # noqa: E402
+from hairloom.addon.blender.cards import card_files  # noqa: E402
+from hairloom.addon.blender.cards.card_choices import suffix_of  # noqa: E402
+from hairloom.addon.blender.cards.card_material import TABLE_SIZE  # noqa: E402
+from hairloom.addon.blender.command_line import command_line  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("extension")
 

@@ -19,6 +19,11 @@ from test_glb_engines import validated
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
 from hairloom.addon import pipeline  # noqa: E402
+from hairloom.addon.blender.bakes.take import shaken_poses  # noqa: E402
+from hairloom.addon.blender.cards.card_builds import CardForm  # noqa: E402
+from hairloom.addon.blender.cards.card_files import CardOutput, WrittenCards, write_cards  # noqa: E402
+from hairloom.addon.blender.cards.card_motion import GuideMotion, MotionChoices  # noqa: E402
+from hairloom.addon.blender.command_line.inputs import Sources, read_inputs  # noqa: E402
 from hairloom.addon.card_flow import bound_cards, cards_at  # noqa: E402
 from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
 from hairloom.addon.cards.joints import JointChoices  # noqa: E402
@@ -26,11 +31,6 @@ from hairloom.addon.cards.settings import CardSettings  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import FBX, GLB, USD  # noqa: E402
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings  # noqa: E402
-from hairloom.addon.host.bakes.take import shaken_poses  # noqa: E402
-from hairloom.addon.host.cards.card_builds import CardForm  # noqa: E402
-from hairloom.addon.host.cards.card_files import CardOutput, WrittenCards, write_cards  # noqa: E402
-from hairloom.addon.host.cards.card_motion import GuideMotion, MotionChoices  # noqa: E402
-from hairloom.addon.host.verbs.inputs import Sources, read_inputs  # noqa: E402
 from hairloom.addon.pipeline import Pose, Rig  # noqa: E402
 from hairloom.addon.shading.textures import TextureSettings  # noqa: E402
 

@@ -11,11 +11,11 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
-from hairloom.addon.host.bakes.bake import Bake  # noqa: E402
-from hairloom.addon.host.cards.card_files import CardOutput  # noqa: E402
-from hairloom.addon.host.cards.card_motion import MotionChoices  # noqa: E402
-from hairloom.addon.host.cards.card_out import CardExport  # noqa: E402
-from hairloom.addon.host.verbs import command_line  # noqa: E402
+from hairloom.addon.blender.cards.card_files import CardOutput  # noqa: E402
+from hairloom.addon.blender.cards.card_motion import MotionChoices  # noqa: E402
+from hairloom.addon.blender.cards.card_out import CardExport  # noqa: E402
+from hairloom.addon.blender.command_line import command_line  # noqa: E402
+from hairloom.addon.blender.preview.bake import Bake  # noqa: E402
 
 
 def test_the_command_line_writes_a_take(tmp_path: Path, capfd: Any) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from hairloom.addon.blender.cards.card_object import CardObjectJob, card_objects
 from hairloom.addon.cards.steps import result_of
-from hairloom.addon.host.cards.card_object import CardObjectJob, card_objects
 from hairloom.addon.ui.long_work import threaded
 
 

@@ -8,16 +8,17 @@ import numpy as np
 import pytest
 
 from hairloom.addon import pipeline
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.cards.card_out import export_cards
+from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.preview import live, reactions, timeline
+from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.blender.strands.strand_export import StrandExport
+from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.strand_formats import TRESSFX
 from hairloom.addon.exchange.strand_output import StrandOutput
 from hairloom.addon.exchange.tressfx import read_tfx
-from hairloom.addon.host.bakes import playback
-from hairloom.addon.host.bakes.bake import Bake
-from hairloom.addon.host.cards.card_out import export_cards
-from hairloom.addon.host.preview import live, overlay, reactions, timeline
-from hairloom.addon.host.strands.strand_export import StrandExport
-from hairloom.addon.host.verbs import command_line
 
 LAST = 6
 

@@ -14,10 +14,10 @@ pytest.importorskip("bpy", reason="the command line runs inside Blender")
 
 import bpy
 
+from hairloom.addon.blender.bakes.take import scene_drive
+from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
-from hairloom.addon.host.bakes.take import scene_drive
-from hairloom.addon.host.scene.curves import write_curves
-from hairloom.addon.host.verbs import command_line
 from hairloom.addon.strands import StrandSet
 
 HEAD_OBJ = """

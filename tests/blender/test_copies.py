@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from swinging import swings
 
-from hairloom.addon.host.bakes import playback
-from hairloom.addon.host.preview import live, overlay, reactions
-from hairloom.addon.host.render_engine import engine_hair
-from hairloom.addon.host.scene.objects import head_of
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.base.objects import head_of
+from hairloom.addon.blender.engine import engine_hair
+from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.viewport import overlay
 
 LINKED = pytest.mark.parametrize("linked", [False, True], ids=["Shift-D", "Alt-D"])
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 
+from hairloom.addon.blender.scene.curves import read_curves, write_curves
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.scene.curves import read_curves, write_curves
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.clean import clean
 
@@ -197,8 +197,8 @@ def test_written_on_a_moved_head_strands_stay_where_they_are(evaluated, sphere):
 
 def test_blenders_own_surface_node_accepts_the_attachment(evaluated, sphere):
     """Deform Curves on Surface moves the strands with the mesh and finds no invalid UV."""
+    from hairloom.addon.blender.scene.surfaces import read_surface
     from hairloom.addon.groom.roots import bind_roots
-    from hairloom.addon.host.scene.surfaces import read_surface
 
     surface = read_surface(sphere, evaluated(), need_uv=True, place="head")
     corners = surface.corners.mean(axis=1)[30:60]

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.bakes import cache
+from hairloom.addon.blender.bakes.cache import Cache, CacheWriter, Facts
+from hairloom.addon.blender.bakes.take import Take, read_take, write_take
+from hairloom.addon.blender.command_line.overrides import overrides
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.bakes import cache
-from hairloom.addon.host.bakes.cache import Cache, CacheWriter, Facts
-from hairloom.addon.host.bakes.take import Take, read_take, write_take
-from hairloom.addon.host.verbs.overrides import overrides
 
 
 @pytest.fixture

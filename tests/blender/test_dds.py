@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from mip_chains import mip_chain
 
+from hairloom.addon.blender.base.images import read_image
 from hairloom.addon.exchange.textures.dds import has_compressor, write_dds
-from hairloom.addon.host.pictures.images import read_image
 
 COMPRESSED = pytest.param(
     True, marks=pytest.mark.skipif(not has_compressor(), reason="there is no etcpak")

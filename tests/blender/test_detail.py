@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hairloom.addon.host.preview import live, overlay
-from hairloom.addon.host.preview.hiders import Hiders
-from hairloom.addon.host.preview.overlay_text import counts_line, free_corner
+from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.sessions.hiders import Hiders
+from hairloom.addon.blender.viewport import overlay
+from hairloom.addon.blender.viewport.overlay_text import counts_line, free_corner
 from hairloom.addon.pipeline import Pose
 from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.strand_pass import Statistics, StrandPass

@@ -122,7 +122,7 @@ def test_the_region_of_a_view_is_that_of_the_picture(stage: Any) -> None:
     """In a camera's view the scene's, wherever the camera's frame lies in it; else the view's."""
     from types import SimpleNamespace
 
-    from hairloom.addon.host.render_engine.engine_camera import view_rectangle
+    from hairloom.addon.blender.engine.engine_camera import view_rectangle
 
     camera, render = stage.camera, stage.render
     render.resolution_x, render.resolution_y = 200, 100
@@ -238,7 +238,7 @@ def test_a_cancelled_render_keeps_what_there_is(
     stage: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two samples of 64 are a whole picture."""
-    from hairloom.addon.host.render_engine import engine
+    from hairloom.addon.blender.engine import engine
 
     add_ball()
     stage.hairloom.picture.samples = 2

@@ -13,10 +13,12 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
 from hairloom.addon import pipeline  # noqa: E402
+from hairloom.addon.blender.engine import engine_hair, engine_making  # noqa: E402
+from hairloom.addon.blender.engine.engine_scene import SceneReader  # noqa: E402
+from hairloom.addon.blender.preview import live, previewed, reactions  # noqa: E402
+from hairloom.addon.blender.sessions import making  # noqa: E402
+from hairloom.addon.blender.viewport import overlay  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
-from hairloom.addon.host.preview import live, making, overlay, previewed, reactions  # noqa: E402
-from hairloom.addon.host.render_engine import engine_hair, engine_making  # noqa: E402
-from hairloom.addon.host.render_engine.engine_scene import SceneReader  # noqa: E402
 
 COUNT = 60
 

@@ -13,7 +13,7 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 
 from engine_stage import SIZE, add_ball, picture, rendered  # noqa: E402
 
-from hairloom.addon.host.render_engine.engine_meshes import read_meshes  # noqa: E402
+from hairloom.addon.blender.engine.engine_meshes import read_meshes  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("gpu_context", "extension")
 
@@ -79,7 +79,7 @@ def test_previewed_hair_is_seen_as_its_object_is(
     stage: Any, new_hair: Callable[..., Any], sphere: Any
 ) -> None:
     """The reader leaves it out and says how it takes part, whatever a preview wrote to the copy."""
-    from hairloom.addon.host.render_engine.engine_scene import SceneReader
+    from hairloom.addon.blender.engine.engine_scene import SceneReader
 
     hair, reader = new_hair(sphere), SceneReader()
     hair.is_holdout = True
@@ -165,8 +165,8 @@ def test_hair_is_rendered_as_it_was_baked(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
     """Frames and moments between them, although the curves themselves are hidden then."""
-    from hairloom.addon.host.bakes import playback
-    from hairloom.addon.host.render_engine import engine_hair
+    from hairloom.addon.blender.bakes import playback
+    from hairloom.addon.blender.engine import engine_hair
 
     hair = new_hair(sphere)
     stage.frame_start, stage.frame_end = 1, 4
@@ -202,7 +202,7 @@ def test_a_bake_has_the_animated_settings_of_the_frame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Though renders leave out the hair that has them."""
-    from hairloom.addon.host.render_engine import engine_hair
+    from hairloom.addon.blender.engine import engine_hair
 
     hair = new_hair(sphere)
     strands = hair.data.hairloom.strands

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from strand_files import needs_usd
 
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.exchange.usd.groom_usd import write_usd
-from hairloom.addon.host.bakes import playback
-from hairloom.addon.host.bakes.bake import Bake
-from hairloom.addon.host.verbs import command_line
 from hairloom.addon.strands import StrandSet
 
 SMALL = ["--set", "guides.guide_count=12", "--set", "guides.cv_count=8"]

@@ -216,7 +216,7 @@ for _ in range(10):
 bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
 bpy.ops.hairloom.grow(strand_count=50, length=0.1)
 bpy.ops.hairloom.preview()
-live = sys.modules[NAME + ".addon.host.preview.live"]
+live = sys.modules[NAME + ".addon.blender.preview.live"]
 registration = sys.modules[NAME + ".addon.registration"]
 dds = importlib.import_module(NAME + ".addon.exchange.textures.dds")
 
@@ -224,7 +224,8 @@ def module(name):
     return importlib.import_module(NAME + ".addon." + name)
 
 groom, alembic = module("exchange.groom"), module("exchange.alembic.groom_alembic")
-reader, child = module("exchange.alembic.groom_alembic_read"), module("host.strands.child_python")
+child = module("blender.strands.child_python")
+reader = module("exchange.alembic.groom_alembic_read")
 path = pathlib.Path({resources!r}) / "a.abc"
 alembic.write_groom_alembic(path, groom.Groom(live.sessions()[0].rig.strands))
 

@@ -14,7 +14,7 @@ from typing import Any
 import bpy
 import pytest
 
-from hairloom.addon.host.pictures.images import read_texture
+from hairloom.addon.blender.base.images import read_texture
 
 pytest.importorskip("openjd.cli", reason="openjd-cli runs the template")
 yaml = pytest.importorskip("yaml", reason="openjd-cli brings it along")
@@ -101,7 +101,7 @@ def _content(file: Path) -> dict[str, Any]:
 
 def test_the_template_is_valid_and_names_verbs_and_options_that_there_are() -> None:
     assert openjd("check", str(TEMPLATE)).returncode == 0
-    from hairloom.addon.host.verbs.command_line import parser
+    from hairloom.addon.blender.command_line.command_line import parser
 
     for step in yaml.safe_load(TEMPLATE.read_text())["steps"]:
         arguments = step["script"]["actions"]["onRun"]["args"]

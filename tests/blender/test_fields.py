@@ -8,12 +8,12 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.colliders import fields
+from hairloom.addon.blender.preview import live, reactions, timeline
+from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.colliders import fields
-from hairloom.addon.host.preview import live, reactions, timeline
-from hairloom.addon.host.scene.surfaces import read_surface
 from hairloom.addon.strands import Surface
 
 COARSE = DynamicsSettings(collider_resolution=16)

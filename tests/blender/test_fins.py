@@ -6,10 +6,10 @@ import pytest
 from fin_motion import FRAME, play, rest_of, shown, started, update
 from mathutils import Matrix
 
+from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.scene.fin_modifier import POSITION, fin_modifier
+from hairloom.addon.blender.sessions import fins
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.cloth import fins
-from hairloom.addon.host.cloth.fin_modifier import POSITION, fin_modifier
-from hairloom.addon.host.preview import live
 
 
 def test_the_operator_adds_one_modifier_and_takes_the_active_group(flag):

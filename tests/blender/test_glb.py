@@ -22,9 +22,9 @@ from hairloom.addon.shading.textures import TextureSettings, hair_textures
 
 bpy = pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 
-from hairloom.addon.host.cards import card_export  # noqa: E402
-from hairloom.addon.host.cards.card_export import write_card_mesh  # noqa: E402
-from hairloom.addon.host.cards.card_scene import ROUGHNESS, CardLook  # noqa: E402
+from hairloom.addon.blender.cards import card_export  # noqa: E402
+from hairloom.addon.blender.cards.card_export import write_card_mesh  # noqa: E402
+from hairloom.addon.blender.cards.card_scene import ROUGHNESS, CardLook  # noqa: E402
 
 TEXTURE = TextureSettings(variant_width=32, height=128)
 

@@ -22,10 +22,10 @@ from hairloom.addon.shading.textures import TextureSettings, hair_textures
 
 pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 
+from hairloom.addon.blender.cards.card_export import write_card_mesh
+from hairloom.addon.blender.cards.card_scene import CardLook
 from hairloom.addon.exchange.cards.card_formats import GLB
 from hairloom.addon.exchange.files.file_set import written_together
-from hairloom.addon.host.cards.card_export import write_card_mesh
-from hairloom.addon.host.cards.card_scene import CardLook
 
 VALIDATOR_FOLDER = Path(__file__).parents[2] / "tools" / "node"
 PANDA_VIEW = Path(__file__).parent / "panda_view.py"

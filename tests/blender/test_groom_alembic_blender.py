@@ -8,11 +8,11 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 pytest.importorskip("alembic3d", reason="this Python has no alembic3d")
 
+from hairloom.addon.blender.strands.child_python import python_for  # noqa: E402
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic  # noqa: E402
 from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic  # noqa: E402
 from hairloom.addon.exchange.groom import Groom  # noqa: E402
 from hairloom.addon.exchange.groom_presets import PRESETS  # noqa: E402
-from hairloom.addon.host.strands.child_python import python_for  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
 if not bpy.app.build_options.alembic:

@@ -4,13 +4,13 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.exchange.groom import Groom
-from hairloom.addon.host.scene.curves import read_curves, write_curves
-from hairloom.addon.host.strands.groom_attributes import (
+from hairloom.addon.blender.scene.curves import read_curves, write_curves
+from hairloom.addon.blender.scene.groom_attributes import (
     store_groom,
     store_group_names,
     stored_groom,
 )
+from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.strands import StrandSet
 
 FIELDS = ("color", "strand_id", "is_guide", "closest_guides", "guide_weights")

@@ -4,10 +4,10 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.base import images
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.textures import texture_files
 from hairloom.addon.exchange.textures.srgb import srgb_encoded
-from hairloom.addon.host.pictures import images
 
 
 @pytest.fixture(autouse=True)

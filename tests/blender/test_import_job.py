@@ -12,14 +12,14 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.command_line.inputs import Sources, read_inputs
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import write_hair_file
 from hairloom.addon.exchange.tressfx import write_tfx
 from hairloom.addon.exchange.usd.groom_usd import write_usd
 from hairloom.addon.groom.settings import GrowSettings
-from hairloom.addon.host.verbs import command_line
-from hairloom.addon.host.verbs.inputs import Sources, read_inputs
 from hairloom.addon.strands import StrandSet
 
 pytestmark = pytest.mark.usefixtures("extension")

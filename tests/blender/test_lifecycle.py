@@ -5,8 +5,9 @@ import pytest
 
 import hairloom
 from hairloom.addon import registration
-from hairloom.addon.host.preview import live, overlay, reactions
-from hairloom.addon.host.settings import groups
+from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.properties import groups
+from hairloom.addon.blender.viewport import overlay
 
 
 @pytest.fixture

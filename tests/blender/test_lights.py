@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host.preview import live
-from hairloom.addon.host.preview.overlay import lit
-from hairloom.addon.host.preview.session import Session
-from hairloom.addon.host.scene.lights import light_warnings, read_lights
+from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.scene.lights import light_warnings, read_lights
+from hairloom.addon.blender.sessions.session import Session
+from hairloom.addon.blender.viewport.overlay import lit
 from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.lights import (
     LIGHT_CAPACITY,

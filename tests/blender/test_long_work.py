@@ -9,9 +9,9 @@ from typing import Any
 import bpy
 import pytest
 
+from hairloom.addon.blender.base.thread_work import GivenUpError, ThreadWork
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.thread_work import GivenUpError, ThreadWork
 from hairloom.addon.ui.long_work import LongWork, Progress, Steps, counted, shared, threaded
 
 seen: list[Any] = []

@@ -8,7 +8,9 @@ from typing import Any
 import bpy
 import pytest
 
-from hairloom.addon.host.preview import groom_picture, live, overlay, reactions
+from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.sessions import groom_picture
+from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.shading.kajiya_kay_settings import KajiyaKaySettings
 from hairloom.addon.shading.marschner.settings import MarschnerSettings
 from hairloom.addon.shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE

@@ -9,16 +9,18 @@ import numpy as np
 import pytest
 
 from hairloom.addon import pipeline
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.base.thread_work import GivenUpError
+from hairloom.addon.blender.colliders import fields
+from hairloom.addon.blender.pictures.showing import shown_groom
+from hairloom.addon.blender.preview import late, live, previewed, reactions
+from hairloom.addon.blender.preview.bake import simulated_for
+from hairloom.addon.blender.sessions import making
+from hairloom.addon.blender.sessions.making import Order, make
+from hairloom.addon.blender.sessions.reading import Reading
+from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.bakes import playback
-from hairloom.addon.host.bakes.bake import simulated_for
-from hairloom.addon.host.colliders import fields
-from hairloom.addon.host.preview import late, live, making, overlay, previewed, reactions
-from hairloom.addon.host.preview.making import Order, make
-from hairloom.addon.host.preview.reading import Reading
-from hairloom.addon.host.preview.showing import shown_groom
-from hairloom.addon.host.thread_work import GivenUpError
 
 FRAME = 1.0 / 60.0
 COUNT = 60

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from hairloom.addon.host.preview import live, measures
+from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.sessions import measures
 
 
 @pytest.fixture(autouse=True)

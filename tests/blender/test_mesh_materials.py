@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host.scene.mesh_materials import MeshMaterial, material_of
+from hairloom.addon.blender.scene.mesh_materials import MeshMaterial, material_of
 from hairloom.addon.render.snapshot import MeshPictures
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.strands import Surface
@@ -266,7 +266,7 @@ def test_blended_meshes_are_drawn_from_far_to_near() -> None:
 
 def test_the_engine_tells_what_is_missing(sphere: Any, new_hair: Any, material: Any) -> None:
     """A picture's file; and a head's UVs, once a shadow on it is to be soft."""
-    from hairloom.addon.host.render_engine.engine_scene import SceneReader
+    from hairloom.addon.blender.engine.engine_scene import SceneReader
 
     def warnings() -> str:
         sphere.data.update_tag()

@@ -8,6 +8,9 @@ import pytest
 from collider_scene import COARSE, Scene, depsgraph, distance_now, moved
 from mathutils import Matrix, Vector
 
+from hairloom.addon.blender.base.objects import Body
+from hairloom.addon.blender.colliders.obstacles import Obstacles
+from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.dynamics.colliders import (
     CapsuleCollider,
     DistanceField,
@@ -15,9 +18,6 @@ from hairloom.addon.dynamics.colliders import (
     SphereSetCollider,
 )
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.host.colliders.obstacles import Obstacles
-from hairloom.addon.host.scene.objects import Body
-from hairloom.addon.host.scene.surfaces import read_surface
 from hairloom.addon.strands import Surface
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from collider_scene import COARSE, Scene, depsgraph, distance_now, moved
 
+from hairloom.addon.blender.base.objects import Body
+from hairloom.addon.blender.colliders.obstacles import Obstacles
+from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.colliders.obstacles import Obstacles
-from hairloom.addon.host.scene.objects import Body
-from hairloom.addon.host.scene.surfaces import read_surface
 
 
 @pytest.fixture

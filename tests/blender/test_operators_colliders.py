@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from hairloom.addon.blender.colliders import spheres
+from hairloom.addon.blender.colliders.obstacles import Obstacles
 from hairloom.addon.dynamics.colliders import SphereSetCollider
 from hairloom.addon.dynamics.fitting.sphere_fit import SphereFitSettings
 from hairloom.addon.dynamics.measure import deepest_penetration
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive, advance
-from hairloom.addon.host.colliders import spheres
-from hairloom.addon.host.colliders.obstacles import Obstacles
 
 TURN = Matrix.Translation((0.1, -0.2, 0.3)) @ Matrix.Rotation(0.7, 4, (1, 2, 3))
 

@@ -4,9 +4,9 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.scene.vertex_weights import weight_names
 from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
-from hairloom.addon.host.scene.curves import read_curves
-from hairloom.addon.host.scene.vertex_weights import weight_names
 from hairloom.addon.strands import StrandSet
 
 pytestmark = pytest.mark.usefixtures("extension")

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from hairloom.addon import card_flow
+from hairloom.addon.blender.base.thread_work import GivenUpError
+from hairloom.addon.blender.cards.adopted_cards import SortChoices, sort_mesh
+from hairloom.addon.blender.cards.card_object import card_objects
+from hairloom.addon.blender.cards.other_cards import other_cards
+from hairloom.addon.blender.engine.engine_hair import read_groom
+from hairloom.addon.blender.preview import live, previewed, reactions
+from hairloom.addon.blender.strands.groom_files import card_choices
+from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
-from hairloom.addon.host.cards.adopted_cards import SortChoices, sort_mesh
-from hairloom.addon.host.cards.card_object import card_objects
-from hairloom.addon.host.cards.other_cards import other_cards
-from hairloom.addon.host.preview import live, overlay, previewed, reactions
-from hairloom.addon.host.render_engine.engine_hair import read_groom
-from hairloom.addon.host.strands.groom_files import card_choices
-from hairloom.addon.host.thread_work import GivenUpError
 
 
 @pytest.fixture

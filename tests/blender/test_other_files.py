@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from swinging import FRAME, swings
 
-from hairloom.addon.host.bakes import playback
-from hairloom.addon.host.bakes.bake import Bake
-from hairloom.addon.host.preview import live, overlay
-from hairloom.addon.host.render_engine import engine_hair
-from hairloom.addon.host.settings.choices import Choices
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.engine import engine_hair
+from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.blender.properties.choices import Choices
+from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
 #: Saved before there were shadows, cards that are shown, densities and debug views.

@@ -8,10 +8,10 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host.bakes import playback
-from hairloom.addon.host.bakes.bake import Bake, bakeable, simulated_for
-from hairloom.addon.host.cloth.fin_modifier import POSITION, add_modifier
-from hairloom.addon.host.preview import live
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.preview.bake import Bake, bakeable, simulated_for
+from hairloom.addon.blender.scene.fin_modifier import POSITION, add_modifier
 
 LAST = 6
 SIZE = 64

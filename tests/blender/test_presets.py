@@ -13,10 +13,10 @@ pytest.importorskip("bpy", reason="presets are applied inside Blender")
 
 import bpy
 
+from hairloom.addon.blender.command_line import command_line, job_options
+from hairloom.addon.blender.properties import presets
+from hairloom.addon.blender.properties.properties import settings_of
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.settings import presets
-from hairloom.addon.host.settings.properties import settings_of
-from hairloom.addon.host.verbs import command_line, job_options
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import PRESET_VERSION
 from hairloom.addon.shading.settings import ShadingSettings

@@ -7,9 +7,9 @@ from typing import Any
 import bpy
 import pytest
 
+from hairloom.addon.blender.command_line import command_line, job_options
+from hairloom.addon.blender.scene.principled import _values, has_principled_hair, look_from_material
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.scene.principled import _values, has_principled_hair, look_from_material
-from hairloom.addon.host.verbs import command_line, job_options
 from hairloom.addon.shading.marschner.principled import PrincipledHair
 
 

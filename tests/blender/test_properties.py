@@ -9,10 +9,10 @@ import bpy
 import pytest
 
 from hairloom import register, unregister
+from hairloom.addon.blender.preview import reactions
+from hairloom.addon.blender.properties import groups
+from hairloom.addon.blender.properties.properties import property_group, settings_of
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.preview import reactions
-from hairloom.addon.host.settings import groups
-from hairloom.addon.host.settings.properties import property_group, settings_of
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.curve import PLACES
 

@@ -11,12 +11,12 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host.cards.adopted_cards import SortChoices, sort_mesh
-from hairloom.addon.host.cards.adopted_writing import reorder_faces
-from hairloom.addon.host.cloth.fin_modifier import fin_modifier
-from hairloom.addon.host.colliders.spheres import fitted_collections
-from hairloom.addon.host.settings import presets
-from hairloom.addon.host.verbs import command_line
+from hairloom.addon.blender.cards.adopted_cards import SortChoices, sort_mesh
+from hairloom.addon.blender.cards.adopted_writing import reorder_faces
+from hairloom.addon.blender.colliders.spheres import fitted_collections
+from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.properties import presets
+from hairloom.addon.blender.scene.fin_modifier import fin_modifier
 
 FEW = ["--set", "grow.way=normals", "--set", "grow.strand_count=40", "--set", "grow.length=0.05"]
 

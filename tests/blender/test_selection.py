@@ -3,12 +3,12 @@
 import bpy
 import pytest
 
+from hairloom.addon.blender.base.objects import objects_in
+from hairloom.addon.blender.cards.other_cards import other_cards
+from hairloom.addon.blender.colliders.spheres import grown_on
+from hairloom.addon.blender.command_line import bake_job, mend_job, object_settings
+from hairloom.addon.blender.sessions.fins import fins_in
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
-from hairloom.addon.host.cards.other_cards import other_cards
-from hairloom.addon.host.cloth.fins import fins_in
-from hairloom.addon.host.colliders.spheres import grown_on
-from hairloom.addon.host.scene.objects import objects_in
-from hairloom.addon.host.verbs import bake_job, mend_job, object_settings
 from hairloom.addon.ui.selection import chosen_hair
 
 

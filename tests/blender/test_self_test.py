@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host import self_test
-from hairloom.addon.host.preview import solvers
+from hairloom.addon.blender.sessions import solvers
+from hairloom.addon.blender.setup import self_test
 
 pytestmark = pytest.mark.usefixtures("extension")
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hairloom.addon.host.preview import live, overlay, reactions
-from hairloom.addon.host.scene.objects import layer_key
+from hairloom.addon.blender.base.objects import layer_key
+from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.strands import StrandSet
 
 

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host.preview import live, timeline
+from hairloom.addon.blender.preview import live, timeline
 
 
 @pytest.fixture

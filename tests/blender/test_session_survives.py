@@ -4,8 +4,9 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.preview import live, previewed, reactions
+from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.preview import live, overlay, previewed, reactions
 
 
 @pytest.fixture

@@ -7,9 +7,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from hairloom.addon.host.preview import live, overlay, previewed, reactions  # noqa: E402
-from hairloom.addon.host.render_engine.engine_hair import read_groom  # noqa: E402
-from hairloom.addon.host.thread_work import GivenUpError  # noqa: E402
+from hairloom.addon.blender.base.thread_work import GivenUpError  # noqa: E402
+from hairloom.addon.blender.engine.engine_hair import read_groom  # noqa: E402
+from hairloom.addon.blender.preview import live, previewed, reactions  # noqa: E402
+from hairloom.addon.blender.viewport import overlay  # noqa: E402
 
 
 @pytest.fixture

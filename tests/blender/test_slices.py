@@ -12,12 +12,12 @@ pytest.importorskip("bpy", reason="runs inside Blender")
 
 import bpy
 
+from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.pictures.skin_picture import IMAGE as SKIN_IMAGE
+from hairloom.addon.blender.pictures.slices import IMAGE, shown_image, shown_slices
+from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.pictures.skin_picture import IMAGE as SKIN_IMAGE
-from hairloom.addon.host.pictures.slices import IMAGE, shown_image, shown_slices
-from hairloom.addon.host.preview import live
-from hairloom.addon.host.preview.session import Session
-from hairloom.addon.host.verbs import command_line
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
 pytestmark = pytest.mark.usefixtures("gpu_context")

@@ -13,15 +13,15 @@ import pytest
 from extension_loader import REPOSITORY
 
 from hairloom.addon import pipeline
+from hairloom.addon.blender.bakes.take import GRAVITY, shaken_poses
+from hairloom.addon.blender.scene.built_in_head import built_in_head
+from hairloom.addon.blender.sessions import solvers
+from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
+from hairloom.addon.blender.sessions.numpy_solver import NumpySolver
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
-from hairloom.addon.host.bakes.take import GRAVITY, shaken_poses
-from hairloom.addon.host.preview import solvers
-from hairloom.addon.host.preview.compute_solver import ComputeSolver
-from hairloom.addon.host.preview.numpy_solver import NumpySolver
-from hairloom.addon.host.scene.built_in_head import built_in_head
 from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.render.snapshot import Snapshot
 
@@ -183,7 +183,7 @@ def test_without_a_gpu_numpy_it_is() -> None:
         "from hairloom.addon import pipeline\n"
         "from hairloom.addon.errors import HairloomError\n"
         "from hairloom.addon.groom.settings import GuideSettings\n"
-        "from hairloom.addon.host.preview import solvers\n"
+        "from hairloom.addon.blender.sessions import solvers\n"
         "from hairloom.addon.strands import StrandSet\n"
         "points = numpy.linspace((0, 0, 0), (0, 0, 1), 6)\n"
         "strands = StrandSet(points, numpy.array([0, 6]), numpy.full(6, 1e-4), numpy.zeros(1))\n"

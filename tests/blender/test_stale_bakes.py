@@ -10,14 +10,14 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.bakes.stale_bakes import changed_since
+from hairloom.addon.blender.cards.card_motion import baked_motion
+from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.blender.strands.export_check import ExportCheck
+from hairloom.addon.blender.strands.strand_export import StrandExport
 from hairloom.addon.exchange.strand_formats import ALEMBIC
 from hairloom.addon.exchange.strand_output import StrandOutput
-from hairloom.addon.host.bakes import playback
-from hairloom.addon.host.bakes.bake import Bake
-from hairloom.addon.host.bakes.stale_bakes import changed_since
-from hairloom.addon.host.cards.card_motion import baked_motion
-from hairloom.addon.host.strands.export_check import ExportCheck
-from hairloom.addon.host.strands.strand_export import StrandExport
 
 LAST = 4
 

@@ -4,13 +4,14 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.properties.presets import named_preset
+from hairloom.addon.blender.scene import particle_hair
+from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.scene.source import own_dynamics
+from hairloom.addon.blender.setup import starting
+from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.groom.settings import GrowSettings
-from hairloom.addon.host import starting
-from hairloom.addon.host.preview import live, overlay, reactions
-from hairloom.addon.host.scene.curves import read_curves
-from hairloom.addon.host.scene.source import own_dynamics
-from hairloom.addon.host.settings.presets import named_preset
-from hairloom.addon.host.strands import particle_hair
 from hairloom.addon.ui import operators_start
 from hairloom.addon.ui.preferences import DYNAMICS, LOOK, preferences
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from strand_files import curves_of, hedgehog, needs_usd, push_up, stage_of, straight, to_unreal
 
+from hairloom.addon.blender.scene.curves import write_curves
+from hairloom.addon.blender.scene.groom_attributes import store_groom
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
-from hairloom.addon.host.scene.curves import write_curves
-from hairloom.addon.host.strands.groom_attributes import store_groom
 from hairloom.addon.strands import StrandSet
 
 

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from strand_files import curves_of, hedgehog, needs_usd, push_up, stage_of, straight, to_unreal
 
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.blender.scene.groom_attributes import store_groom
+from hairloom.addon.blender.strands.export_check import ExportCheck
+from hairloom.addon.blender.strands.strand_export import StrandExport
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.strand_formats import ALEMBIC, TRESSFX, USD
 from hairloom.addon.exchange.strand_output import StrandOutput
-from hairloom.addon.host.bakes import playback
-from hairloom.addon.host.bakes.bake import Bake
-from hairloom.addon.host.strands.export_check import ExportCheck
-from hairloom.addon.host.strands.groom_attributes import store_groom
-from hairloom.addon.host.strands.strand_export import StrandExport
 
 LAST = 6
 

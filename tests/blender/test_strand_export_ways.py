@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from strand_files import curves_of, hedgehog, needs_usd, straight
 
+from hairloom.addon.blender.scene.curves import write_curves
+from hairloom.addon.blender.scene.groom_attributes import store_groom
+from hairloom.addon.blender.strands.groom_out import Wishes, still_hair
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.tfxbone import read_tfxbone
 from hairloom.addon.exchange.tressfx import read_tfx
-from hairloom.addon.host.scene.curves import write_curves
-from hairloom.addon.host.strands.groom_attributes import store_groom
-from hairloom.addon.host.strands.groom_out import Wishes, still_hair
 
 
 @pytest.fixture

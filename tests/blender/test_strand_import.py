@@ -7,14 +7,14 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.scene.groom_attributes import group_names, stored_groom
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.groom_presets import BLENDER, UNITY, UNREAL
 from hairloom.addon.exchange.hair_file import write_hair_file
 from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
 from hairloom.addon.exchange.usd.groom_usd import write_usd
-from hairloom.addon.host.scene.curves import read_curves
-from hairloom.addon.host.strands.groom_attributes import group_names, stored_groom
 from hairloom.addon.strands import StrandSet
 
 pytestmark = pytest.mark.usefixtures("extension")

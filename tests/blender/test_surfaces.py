@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 
+from hairloom.addon.blender.scene.surfaces import read_positions, read_surface
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.host.scene.surfaces import read_positions, read_surface
 
 
 def volume(surface):

@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host.bakes.take import TakeDrive, scene_drive
-from hairloom.addon.host.verbs import command_line
+from hairloom.addon.blender.bakes.take import TakeDrive, scene_drive
+from hairloom.addon.blender.command_line import command_line
 
 SMALL = ["--set", "guides.guide_count=20", "--set", "dynamics.collider_resolution=8"]
 

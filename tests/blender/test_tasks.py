@@ -17,8 +17,9 @@ from typing import Any
 import bpy
 import pytest
 
-from hairloom.addon.host.bakes.cache import Cache
-from hairloom.addon.host.verbs import command_line, interruption
+from hairloom.addon.blender.bakes.cache import Cache
+from hairloom.addon.blender.base import interruption
+from hairloom.addon.blender.command_line import command_line
 
 REPOSITORY = Path(__file__).parents[2]
 QUICK = ["--set", "dynamics.form=numpy", "--set", "dynamics.collider_resolution=8"]

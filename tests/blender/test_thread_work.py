@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="what serves it runs inside Blender")
 
-from hairloom.addon.host.thread_work import GivenUpError, ThreadWork
+from hairloom.addon.blender.base.thread_work import GivenUpError, ThreadWork
 
 #: A thread that has something to do has done it by then [s].
 PATIENCE = 30.0

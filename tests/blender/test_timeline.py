@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hairloom.addon.host.bakes import playback
-from hairloom.addon.host.preview import live, timeline
-from hairloom.addon.host.preview.pace import MOST_AT_ONCE, Pace
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.base.pace import MOST_AT_ONCE, Pace
+from hairloom.addon.blender.preview import live, timeline
 
 LAST = 10
 

@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host.preview import live, troubles
-from hairloom.addon.host.scene.curves import read_curves
+from hairloom.addon.blender.preview import live, troubles
+from hairloom.addon.blender.scene.curves import read_curves
 
 
 def told(hair):
@@ -52,7 +52,7 @@ def test_a_surface_is_set_and_the_hair_stays_where_it_is(new_hair, sphere):
 
 
 def test_of_many_curves_some_are_asked(new_hair, sphere):
-    from hairloom.addon.host.scene import curves
+    from hairloom.addon.blender.scene import curves
 
     hair = new_hair()
     hair.data.add_curves([3] * 500)

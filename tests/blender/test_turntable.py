@@ -16,17 +16,17 @@ pytest.importorskip("bpy", reason="turntables are drawn inside Blender")
 
 import bpy
 
+from hairloom.addon.blender.base.images import read_texture
+from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.pictures import turntable as turntable_module
+from hairloom.addon.blender.pictures import video
+from hairloom.addon.blender.pictures.labels import labelled
+from hairloom.addon.blender.pictures.sheet import COLUMNS, VIEWS, Sheet
+from hairloom.addon.blender.pictures.showing import file_name, shown_groom
+from hairloom.addon.blender.pictures.turntable import Turntable, TurntableSettings
+from hairloom.addon.blender.properties.presets import shipped
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files import leftovers
-from hairloom.addon.host.pictures import turntable as turntable_module
-from hairloom.addon.host.pictures import video
-from hairloom.addon.host.pictures.images import read_texture
-from hairloom.addon.host.pictures.labels import labelled
-from hairloom.addon.host.pictures.sheet import COLUMNS, VIEWS, Sheet
-from hairloom.addon.host.pictures.turntable import Turntable, TurntableSettings
-from hairloom.addon.host.preview.showing import file_name, shown_groom
-from hairloom.addon.host.settings.presets import shipped
-from hairloom.addon.host.verbs import command_line
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 

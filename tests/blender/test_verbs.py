@@ -13,8 +13,8 @@ pytest.importorskip("bpy", reason="the buttons are Blender's operators")
 import bpy
 
 from hairloom.addon import registration
-from hairloom.addon.host.verbs.command_line import VERBS, parser, run
-from hairloom.addon.host.verbs.verb_docs import page
+from hairloom.addon.blender.command_line.command_line import VERBS, parser, run
+from hairloom.addon.blender.command_line.verb_docs import page
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -3,7 +3,8 @@
 import bpy
 import pytest
 
-from hairloom.addon.host.preview import layers_shown, live, reactions
+from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.viewport import layers_shown
 
 
 @pytest.fixture

@@ -12,8 +12,13 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.host.preview import view_transform
-from hairloom.addon.host.preview.view_transform import View, display_of, shown_by_blender, view_of
+from hairloom.addon.blender.viewport import view_transform
+from hairloom.addon.blender.viewport.view_transform import (
+    View,
+    display_of,
+    shown_by_blender,
+    view_of,
+)
 from hairloom.addon.render.display import Display, DisplayTable, table_radiances
 
 

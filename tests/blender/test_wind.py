@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from collider_scene import depsgraph
 
-from hairloom.addon.host.scene.wind import scene_wind
+from hairloom.addon.blender.scene.wind import scene_wind
 
 
 def test_wind_fields_add_up_along_their_own_z(extension):

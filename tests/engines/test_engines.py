@@ -20,13 +20,13 @@ from extension_loader import REPOSITORY
 pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
 from hairloom.addon import pipeline
+from hairloom.addon.blender.cards.card_files import CardOutput, WrittenCards, write_cards
+from hairloom.addon.blender.cards.card_making import CardChoices
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.exchange.textures.texture_files import read_texture
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.host.cards.card_files import CardOutput, WrittenCards, write_cards
-from hairloom.addon.host.cards.card_making import CardChoices
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.textures import TextureSettings

@@ -25,7 +25,7 @@ def cycles(gpu_context: Any, tmp_path: Path) -> Iterator[Any]:
     """A scene with a matt square seen from above; give it a light, render it, and read it."""
     import bpy
 
-    from hairloom.addon.host.scene.lights import read_lights
+    from hairloom.addon.blender.scene.lights import read_lights
 
     scene = bpy.data.scenes.new("Radiometry")
     before = {name: set(getattr(bpy.data, name)) for name in ("objects", "meshes", "lights")}

@@ -83,7 +83,7 @@ def test_the_architecture_page_names_every_room() -> None:
     rooms += [path.name for path in addon.glob("*.py") if path.name != "__init__.py"]
     rooms += [
         f"{large}/{path.name}/"
-        for large in ("host", "exchange")
+        for large in ("blender", "exchange")
         for path in (addon / large).iterdir()
         if (path / "__init__.py").exists()
     ]

@@ -44,9 +44,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "card_flow": PURE | {"pipeline"},
     "parameters": PURE,
     "render": PURE | {"gpu"},
-    "host": PURE | FLOWS | {"render", "gpu"} | BLENDER,
-    "ui": {"params", "strands", "host"} | BLENDER,
-    "registration": {"host", "ui"} | BLENDER,
+    "blender": PURE | FLOWS | {"render", "gpu"} | BLENDER,
+    "ui": {"params", "strands", "blender"} | BLENDER,
+    "registration": {"blender", "ui"} | BLENDER,
     "__init__": {"registration"},
 }
 

@@ -158,7 +158,7 @@ def pixels_at_rest(label: str) -> Iterator[int]:
 
 def hair_is_made() -> Iterator[int]:
     """Ticks until the hair of all previews is there: it is made in a thread."""
-    live = of_hairloom("host.preview.live")
+    live = of_hairloom("blender.preview.live")
     yield from until(lambda: all(each.is_made for each in live.sessions()), "no hair is made", 300)
 
 

@@ -51,7 +51,7 @@ def enable_extension() -> None:
 
 
 def of_hairloom(module: str) -> Any:
-    """A module of the enabled extension, such as "host.preview.live"."""
+    """A module of the enabled extension, such as "blender.preview.live"."""
     return sys.modules[f"{EXTENSION}.addon.{module}"]
 
 

@@ -92,7 +92,7 @@ def choose_for_an_object(dice):
 
 @action(4)
 def take_a_preset(dice):
-    presets = Path(of_hairloom("host.settings.presets").PRESET_FOLDER)
+    presets = Path(of_hairloom("blender.properties.presets").PRESET_FOLDER)
     path = dice.pick(sorted(presets.rglob("*.json")))
     name = path.relative_to(presets).with_suffix("").as_posix()
     clicked(dice, "hairloom.apply_preset", name=name)

@@ -35,7 +35,7 @@ def steps():
     yield from set_the_scene()
     yield from hair_shades_the_head()
     yield from layers_are_shown()
-    assert of_hairloom("host.preview.overlay").failure() == ""
+    assert of_hairloom("blender.viewport.overlay").failure() == ""
 
 
 def set_the_scene():
@@ -68,7 +68,7 @@ def set_the_scene():
 
 
 def has_drawn():
-    passes = of_hairloom("host.preview.overlay")._passes
+    passes = of_hairloom("blender.viewport.overlay")._passes
     return any(each.statistics.strands > 0 for each in passes.values())
 
 

@@ -35,7 +35,7 @@ failures: list[str] = []
 
 
 def live():
-    return of_hairloom("host.preview.live")
+    return of_hairloom("blender.preview.live")
 
 
 def session():
@@ -110,7 +110,7 @@ def set_the_scene():
 
 
 def are_shown():
-    drawing = of_hairloom("host.preview.overlay").drawing_of(session().uid)
+    drawing = of_hairloom("blender.viewport.overlay").drawing_of(session().uid)
     return drawing.snapshot.cards is not None and not session().cards.is_pending
 
 
@@ -238,7 +238,7 @@ def rendered_as_cards():
 
 
 def card_objects():
-    return of_hairloom("host.cards.card_object").card_objects(hair())
+    return of_hairloom("blender.cards.card_object").card_objects(hair())
 
 
 def is_making():

@@ -31,7 +31,7 @@ REACH = 150
 
 def view():
     """What draws the viewport; the newest, where Blender has not let go of an older one yet."""
-    kind = of_hairloom("host.render_engine.engine").HAIRLOOM_RE_engine
+    kind = of_hairloom("blender.engine.engine").HAIRLOOM_RE_engine
     engines = [each for each in gc.get_objects() if type(each) is kind]
     return engines[-1].view if engines else None
 
@@ -61,7 +61,7 @@ def steps():
     yield from a_region_alone_is_drawn()
     yield from it_begins_anew_at_a_change()
     yield from hair_plays_in_it()
-    assert of_hairloom("host.preview.overlay").failure() == ""
+    assert of_hairloom("blender.viewport.overlay").failure() == ""
 
 
 def set_the_scene():
@@ -169,7 +169,7 @@ def it_begins_anew_at_a_change():
 
 def hair_plays_in_it():
     yield from click(*sidebar_button("hairloom.preview"))
-    overlay = of_hairloom("host.preview.overlay")
+    overlay = of_hairloom("blender.viewport.overlay")
     yield from until(lambda: bool(overlay.drawn()), "the preview does not start")
     yield from settled()
     at_rest = pixels("previewed")

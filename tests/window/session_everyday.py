@@ -80,7 +80,7 @@ def nothing_selected():
     yield from click(*sidebar_button("hairloom.preview"))
     yield 3
     driver.screenshot("nothing-selected")
-    assert of_hairloom("host.preview.live").sessions() == ()
+    assert of_hairloom("blender.preview.live").sessions() == ()
 
 
 def set_the_scene():
@@ -104,7 +104,7 @@ def every_panel_draws():
     yield 10
     driver.screenshot("all-panels")
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
-    fin_modifier = of_hairloom("host.cloth.fin_modifier")
+    fin_modifier = of_hairloom("blender.scene.fin_modifier")
     fin_modifier.add_modifier(head)
     for obj, tab in ((head, "PHYSICS"), (hair, "DATA")):  # a mesh has panels of its own
         bpy.context.active_object.select_set(False)
@@ -120,7 +120,7 @@ def every_panel_draws():
         each.__name__ for each in of_hairloom("registration").CLASSES if "_PT_" in each.__name__
     } - drawn
     assert not missing, f"never drawn: {missing}"
-    (session,) = of_hairloom("host.preview.live").sessions()
+    (session,) = of_hairloom("blender.preview.live").sessions()
     assert session.source.dropped == {"fewer than two points": 3}
 
 
@@ -194,7 +194,7 @@ def what_acts_on_it():
 
 def duplicates_by_keys():
     """Shift-D and Alt-D while hair plays: it plays on, Blender shows the copy, Ctrl-Z takes it."""
-    live, hair = of_hairloom("host.preview.live"), bpy.data.objects["Hair"]
+    live, hair = of_hairloom("blender.preview.live"), bpy.data.objects["Hair"]
     choose(hair)
     bpy.ops.ed.undo_push(message="the scene")
     yield from click(*sidebar_button("hairloom.play"))
@@ -218,7 +218,7 @@ def duplicates_by_keys():
 
 
 def still_plays(where):
-    live = of_hairloom("host.preview.live")
+    live = of_hairloom("blender.preview.live")
     assert len(live.sessions()) == 1 and live.notice() == "", f"{where}: {live.notice()}"
     before = live.sessions()[0].strands
 
@@ -243,7 +243,7 @@ def choose(obj):
 
 def blenders_own_animation():
     """Space bar: hair that is not to be simulated goes with the head, drawn at every frame."""
-    live, head = of_hairloom("host.preview.live"), bpy.data.objects["Head"]
+    live, head = of_hairloom("blender.preview.live"), bpy.data.objects["Head"]
     bpy.data.objects["Hair"].hairloom.bake.follows = False
     for frame, x in ((1, 0.0), (40, 0.2)):
         head.location.x = x
@@ -264,7 +264,7 @@ def blenders_own_animation():
 
 def hair_without_a_surface():
     """A warning in the panel, no more."""
-    live = of_hairloom("host.preview.live")
+    live = of_hairloom("blender.preview.live")
     hair = bpy.data.objects["Hair"]
     live.stop_all()
     hair.data.surface, hair.parent = None, None
@@ -280,7 +280,7 @@ def hair_without_a_surface():
 
 
 def a_failing_shader_is_told_once():
-    overlay = of_hairloom("host.preview.overlay")
+    overlay = of_hairloom("blender.viewport.overlay")
     strand_pass = of_hairloom("render.strand_pass").StrandPass
     draw, calls = strand_pass.draw, []
 
@@ -296,12 +296,12 @@ def a_failing_shader_is_told_once():
     assert len(calls) == 1, f"it was tried {len(calls)} times"
     hair = bpy.data.objects["Hair"].evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert hair.display_type == "TEXTURED", "neither our strands nor Blender's are to be seen"
-    assert "this GPU refuses" in of_hairloom("host.preview.live").notice()
+    assert "this GPU refuses" in of_hairloom("blender.preview.live").notice()
     strand_pass.draw = draw
     for _ in range(2):  # off and on again
         yield from click(*sidebar_button("hairloom.preview"))
         yield 5
-    assert overlay.failure() == "" and of_hairloom("host.preview.live").notice() == ""
+    assert overlay.failure() == "" and of_hairloom("blender.preview.live").notice() == ""
     driver.screenshot("drawn-again")
 
 

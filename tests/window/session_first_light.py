@@ -35,11 +35,11 @@ FILE = str(Path(bpy.app.tempdir) / "first_light.blend")
 
 
 def live():
-    return of_hairloom("host.preview.live")
+    return of_hairloom("blender.preview.live")
 
 
 def overlay():
-    return of_hairloom("host.preview.overlay")
+    return of_hairloom("blender.viewport.overlay")
 
 
 def steps():

@@ -28,7 +28,7 @@ from driver import of_hairloom
 
 
 def live():
-    return of_hairloom("host.preview.live")
+    return of_hairloom("blender.preview.live")
 
 
 def in_view():
@@ -53,7 +53,7 @@ def steps():
     yield from a_warning_mends()
     yield from to_the_engine()
     yield from the_page_in_the_preferences()
-    assert of_hairloom("host.preview.overlay").failure() == "" and live().notice() == ""
+    assert of_hairloom("blender.viewport.overlay").failure() == "" and live().notice() == ""
 
 
 def nothing_selected():
@@ -112,7 +112,7 @@ def hair_on_a_mesh_of_ones_own():
     )
     yield 5
     assert changed(bare, pixels("own-mesh")) > 0.02, "no hair is seen"
-    line = of_hairloom("host.preview.measures").frame_line(session.uid)
+    line = of_hairloom("blender.sessions.measures").frame_line(session.uid)
     assert "simulation" in line and "drawing" in line, line
 
 
@@ -135,7 +135,7 @@ def undo_takes_it_away():
 
 
 def presets_have_pictures():
-    presets = of_hairloom("host.settings.presets")
+    presets = of_hairloom("blender.properties.presets")
     bpy.context.window.cursor_warp(viewport().x + 300, viewport().y + viewport().height // 2)
     for section in ("shading", "dynamics", "volume", "cards"):
         entries = presets.shipped(section)
@@ -167,7 +167,7 @@ def a_warning_mends():
     yield from until(
         lambda: live().sessions() and live().sessions()[0].head is not None, "it has no head yet"
     )
-    troubles = of_hairloom("host.preview.troubles").troubles_of(hair, live().sessions()[0])
+    troubles = of_hairloom("blender.preview.troubles").troubles_of(hair, live().sessions()[0])
     driver.screenshot("mended")
     assert [trouble.operator for trouble in troubles] in ([], ["hairloom.snap_roots"])
 
@@ -189,7 +189,7 @@ def the_page_in_the_preferences():
     bpy.ops.preferences.addon_expand(module=driver.EXTENSION)
     yield 5
     assert bpy.ops.hairloom.self_test() == {"FINISHED"}
-    checks = of_hairloom("host.self_test").last_report()
+    checks = of_hairloom("blender.setup.self_test").last_report()
     failed = [check for check in checks if check.outcome == "failed"]
     assert not failed and sum(check.outcome == "passed" for check in checks) >= 5, checks
     bpy.ops.hairloom.copy_report()

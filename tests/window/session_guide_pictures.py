@@ -104,7 +104,7 @@ def clear():
 
 def is_drawn(hair, at_least=50):
     """With its children: until they are made others stand in for them."""
-    drawn = of_hairloom("host.preview.overlay").statistics_of(hair.session_uid)
+    drawn = of_hairloom("blender.viewport.overlay").statistics_of(hair.session_uid)
     return drawn.strands >= at_least
 
 
@@ -139,7 +139,7 @@ def sidebar():
 
 def the_sidebar():
     yield from picture("preview", sidebar)
-    live = of_hairloom("host.preview.live")
+    live = of_hairloom("blender.preview.live")
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
     live.stop_all()
     hair.data.surface, hair.parent = None, None
@@ -162,7 +162,7 @@ def the_sidebar():
 def of_meshes_in_the_sidebar():
     head = bpy.data.objects["Head"]
     choose(head)
-    of_hairloom("host.cloth.fin_modifier").add_modifier(head)
+    of_hairloom("blender.scene.fin_modifier").add_modifier(head)
     yield from picture("meshes", sidebar)
 
 
@@ -175,7 +175,7 @@ def choose(obj):
 
 def popups():
     """The presets, the check before an export, and the options of sorting cards."""
-    of_hairloom("host.preview.live").stop_all()
+    of_hairloom("blender.preview.live").stop_all()
     yield from popup("sort", "sort_cards")
     choose(bpy.data.objects["Hair"])
     yield from popup("presets", "choose_preset", section="shading")
@@ -263,7 +263,7 @@ def at_the_tab():
 
 def options_of_files():
     """The right of the file browser, format by format; those of strands beside each other."""
-    of_hairloom("host.preview.live").stop_all()
+    of_hairloom("blender.preview.live").stop_all()
     pictures = {}
     for name in (*EXPORTS, "import_strands"):
         settings = {"filepath": str(Path(bpy.app.tempdir) / "hair")} if name in EXPORTS else {}

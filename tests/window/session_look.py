@@ -36,7 +36,7 @@ NO_LIGHT = 0.0
 
 
 def session():
-    (one,) = of_hairloom("host.preview.live").sessions()
+    (one,) = of_hairloom("blender.preview.live").sessions()
     return one
 
 
@@ -77,7 +77,7 @@ def agree(label, tolerance=TOLERANCE):
 
 def saved():
     """Code values of the planes' radiances in a picture that Blender saves, by this view's mode."""
-    transform = of_hairloom("host.preview.view_transform")
+    transform = of_hairloom("blender.viewport.view_transform")
     view, gain, gamma = transform.view_of(shading(), bpy.context.scene)
     nodes = [material.node_tree.nodes["Emission"] for material in bpy.data.materials]
     radiances = np.float32([node.inputs["Color"].default_value[:3] for node in nodes])
@@ -94,8 +94,8 @@ def steps():
     yield from a_slider_is_refined()
     yield from own_presets()
     yield from the_panels_of_both_models()
-    assert of_hairloom("host.preview.overlay").failure() == ""
-    assert of_hairloom("host.preview.view_transform").trouble() == ""
+    assert of_hairloom("blender.viewport.overlay").failure() == ""
+    assert of_hairloom("blender.viewport.view_transform").trouble() == ""
 
 
 def set_the_scene():
@@ -165,7 +165,7 @@ def radiance_by_view_transforms():
 
 def every_mode_has_its_transform():
     """The light that reaches the hair is fixed here, so that modes with another light compare."""
-    overlay, view, scene = of_hairloom("host.preview.overlay"), shading(), bpy.context.scene
+    overlay, view, scene = of_hairloom("blender.viewport.overlay"), shading(), bpy.context.scene
     lit, settings, (world, color, _) = overlay.lit, scene.view_settings, LIT[0]
     overlay.lit = lambda snapshot, *_: replace(snapshot, lights=(), ambient=(world,) * 3)
     shine(world, color, color)
@@ -237,7 +237,7 @@ def a_slider_is_refined():
 
 def own_presets():
     """Saved where Blender keeps what belongs to the extension, shown with a picture, deleted."""
-    presets = of_hairloom("host.settings.presets")
+    presets = of_hairloom("blender.properties.presets")
     folder = presets.own_folder()
     assert "extensions" in folder.parts and presets.own("shading") == ((), ())
     assert bpy.ops.hairloom.save_preset(title="Mine") == {"FINISHED"}

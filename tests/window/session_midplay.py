@@ -35,7 +35,7 @@ DRAGGED = 45
 
 
 def live():
-    return of_hairloom("host.preview.live")
+    return of_hairloom("blender.preview.live")
 
 
 def steps():

@@ -26,7 +26,7 @@ FOLDER = Path(bpy.app.tempdir) / "bake"
 
 
 def session():
-    (one,) = of_hairloom("host.preview.live").sessions()
+    (one,) = of_hairloom("blender.preview.live").sessions()
     return one
 
 
@@ -60,7 +60,7 @@ def play_keeps_the_scenes_rate():
     rate, durations = 24.0, []
     yield from click(*sidebar_button("hairloom.play"))
     yield 40  # the collider is made
-    assert of_hairloom("host.preview.live").is_playing(), "the Play button did nothing"
+    assert of_hairloom("blender.preview.live").is_playing(), "the Play button did nothing"
     advance = type(session()).advance
 
     def noted(self, depsgraph, duration):
@@ -80,7 +80,7 @@ def play_keeps_the_scenes_rate():
 
 
 def pause_resume_and_reset():
-    live, head = of_hairloom("host.preview.live"), bpy.data.objects["Head"]
+    live, head = of_hairloom("blender.preview.live"), bpy.data.objects["Head"]
     yield from click(*sidebar_button("hairloom.pause"))
     yield 3
     assert live.is_paused()
@@ -100,7 +100,7 @@ def pause_resume_and_reset():
 
 def playback_takes_over():
     """Space while hair plays: from now on each frame of the animation moves it."""
-    live = of_hairloom("host.preview.live")
+    live = of_hairloom("blender.preview.live")
     head, scene = bpy.data.objects["Head"], bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
     for frame, x in ((1, 0.0), (10, 0.1), (20, -0.1), (LAST, 0.0)):
@@ -143,16 +143,16 @@ def bake_in_the_window():
         yield 1
     yield 3
     assert not is_baking() and scene.frame_current == 7
-    cache = of_hairloom("host.bakes.playback").cache_of(bpy.data.objects["Hair"])
+    cache = of_hairloom("blender.bakes.playback").cache_of(bpy.data.objects["Hair"])
     assert cache.facts.frame_count == LAST
-    baked = of_hairloom("host.preview.timeline").baked(session().uid)
+    baked = of_hairloom("blender.preview.timeline").baked(session().uid)
     assert baked.is_shown and baked.changed == (), baked
     driver.screenshot("baked")
     bpy.ops.screen.animation_play()
     yield 10
     bpy.ops.screen.animation_cancel(restore_frame=False)
     yield 2
-    strands = of_hairloom("host.bakes.playback").strands_in(cache, scene.frame_current)
+    strands = of_hairloom("blender.bakes.playback").strands_in(cache, scene.frame_current)
     assert np.abs(session().strands - strands).max() < 1e-5
 
 
@@ -164,7 +164,7 @@ def escape_cancels_a_bake():
     assert is_baking()
     yield from press("ESC")
     yield 3
-    assert not is_baking() and not of_hairloom("host.preview.live").is_suspended()
+    assert not is_baking() and not of_hairloom("blender.preview.live").is_suspended()
     assert (FOLDER / "cache.json").stat().st_mtime_ns == before
     assert not FOLDER.with_name("bake.new").exists()
     bpy.context.scene.frame_end = LAST
@@ -194,10 +194,10 @@ def a_render_beside_the_window():
     curves = hair.hairloom.bake.copy.data
     points = np.empty((len(curves.position_data), 3), np.float32)
     curves.position_data.foreach_get("vector", points.ravel())
-    cache = of_hairloom("host.bakes.playback").cache_of(hair)
-    strands = of_hairloom("host.bakes.playback").strands_in(cache, 15)
+    cache = of_hairloom("blender.bakes.playback").cache_of(hair)
+    strands = of_hairloom("blender.bakes.playback").strands_in(cache, 15)
     assert np.array_equal(points, strands.reshape(-1, 3))
-    assert len(of_hairloom("host.preview.live").sessions()) == 1
+    assert len(of_hairloom("blender.preview.live").sessions()) == 1
     driver.screenshot("rendered")
 
 
@@ -208,8 +208,8 @@ def loading_in_the_middle_of_a_bake():
     assert is_baking()
     bpy.ops.wm.read_homefile(use_factory_startup=False)
     yield 10
-    assert not is_baking() and not of_hairloom("host.preview.live").is_suspended()
-    assert of_hairloom("host.preview.live").sessions() == ()
+    assert not is_baking() and not of_hairloom("blender.preview.live").is_suspended()
+    assert of_hairloom("blender.preview.live").sessions() == ()
     assert not FOLDER.with_name("bake.new").exists()
     assert (FOLDER / "cache.json").is_file()
 

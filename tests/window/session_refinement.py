@@ -27,17 +27,17 @@ GUIDES, CHILDREN = 300, 2000
 
 
 def session():
-    (one,) = of_hairloom("host.preview.live").sessions()
+    (one,) = of_hairloom("blender.preview.live").sessions()
     return one
 
 
 def statistics():
     """Of the last draw in the viewport."""
-    return of_hairloom("host.preview.overlay")._passes[session().uid].statistics
+    return of_hairloom("blender.viewport.overlay")._passes[session().uid].statistics
 
 
 def has_drawn_some():
-    passes = of_hairloom("host.preview.overlay")._passes
+    passes = of_hairloom("blender.viewport.overlay")._passes
     return session().uid in passes and statistics().strands > 0
 
 
@@ -69,7 +69,7 @@ def steps():
     yield from far_and_near()
     yield from sliders_while_it_plays()
     yield from two_grooms()
-    assert of_hairloom("host.preview.overlay").failure() == ""
+    assert of_hairloom("blender.viewport.overlay").failure() == ""
 
 
 def set_the_scene():
@@ -176,7 +176,7 @@ def far_and_near():
 
 
 def sliders_while_it_plays():
-    live, head = of_hairloom("host.preview.live"), bpy.data.objects["Head"]
+    live, head = of_hairloom("blender.preview.live"), bpy.data.objects["Head"]
     yield from click(*sidebar_button("hairloom.play"))
     yield 30
     assert live.is_playing(), "the Play button did nothing"
@@ -210,7 +210,7 @@ def two_grooms():
     twin = bpy.data.objects.new("Twin", hair().data)
     bpy.context.collection.objects.link(twin)
     twin.hairloom.show_counts = True
-    live = of_hairloom("host.preview.live")
+    live = of_hairloom("blender.preview.live")
     live.start(twin, bpy.context.evaluated_depsgraph_get())
     look_from_front(1.2)
     yield from hair_is_made()
@@ -219,7 +219,7 @@ def two_grooms():
     assert len(live.sessions()) == 2
     live.stop_all()
     yield 3
-    assert of_hairloom("host.preview.overlay")._handles == ()
+    assert of_hairloom("blender.viewport.overlay")._handles == ()
 
 
 driver.play(steps())

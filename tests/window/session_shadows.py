@@ -32,7 +32,7 @@ def steps():
     yield from set_the_scene()
     yield from shadows_appear()
     yield from they_stay_while_hair_plays()
-    assert of_hairloom("host.preview.overlay").failure() == ""
+    assert of_hairloom("blender.viewport.overlay").failure() == ""
 
 
 def set_the_scene():
@@ -50,7 +50,7 @@ def set_the_scene():
 
 
 def has_drawn():
-    passes = of_hairloom("host.preview.overlay")._passes
+    passes = of_hairloom("blender.viewport.overlay")._passes
     return any(each.statistics.strands > 0 for each in passes.values())
 
 
@@ -67,7 +67,7 @@ def shadows_appear():
     for form in ("slices", "deep"):
         volume().shadows = form
         yield from seen_to_differ(plain, f"shadows_{form}")
-        assert of_hairloom("host.preview.overlay").failure() == ""
+        assert of_hairloom("blender.viewport.overlay").failure() == ""
     yield 10
     shaded = pixels("shadows_deep")
     volume().scattering = False

@@ -93,9 +93,9 @@ def of_gpu() -> Counter[str]:
 def of_previews() -> dict[str, Any]:
     """What only a preview, Play or long work keeps; all empty when nothing of them goes on."""
     return {
-        "previews": [each.name for each in of_hairloom("host.preview.live").simulated()],
-        "draw handlers": of_hairloom("host.preview.overlay")._handles,
-        "drawn": sorted(of_hairloom("host.preview.overlay").drawn()),
+        "previews": [each.name for each in of_hairloom("blender.preview.live").simulated()],
+        "draw handlers": of_hairloom("blender.viewport.overlay")._handles,
+        "drawn": sorted(of_hairloom("blender.viewport.overlay").drawn()),
         "ticks": of_hairloom("ui.operators_preview")._timer,
         "work": of_hairloom("ui.long_work").running(),
     }

@@ -30,7 +30,7 @@ def set_the_scene():
 
 
 def live():
-    return of_hairloom("host.preview.live")
+    return of_hairloom("blender.preview.live")
 
 
 def hair():

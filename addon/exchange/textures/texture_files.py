@@ -6,7 +6,7 @@ it, which loses them where it is 0. Only EXR files hold them multiplied, as all 
 but for packed textures, whose channels are values of their own.
 
 OpenImageIO comes with official builds of Blender and lies on PyPI as `openimageio`. Where it is
-missing, host/pictures/images.py has Blender's own readers and writers in its place.
+missing, blender/base/images.py has Blender's own readers and writers in its place.
 """
 
 from __future__ import annotations

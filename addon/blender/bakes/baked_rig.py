@@ -1,0 +1,140 @@
+"""A groom's rig as the arrays of a bake, and back: enough to place all strands without the scene.
+
+Of the head's moving vertices a frame keeps only those that carry a root.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ... import pipeline
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
+from ...groom.roots import root_frames
+from ...groom.weights import GuideWeights
+from ...pipeline import Pose, Rig
+from ...strands import StrandSet, Surface
+from .simulated import Arrays
+
+
+@dataclass(frozen=True)
+class RestMatrices:
+    """(4, 4) each, matrix_world of hair and head where the rig was made; head None without one."""
+
+    hair: Floats
+    head: Floats | None
+
+
+@dataclass(frozen=True)
+class BakedRig:
+    """What all frames share.
+
+    used: (n,) the head's vertices that carry roots.
+    """
+
+    rig: Rig
+    rests: RestMatrices
+    used: Ints
+
+    def pose(self, frame: Arrays) -> Pose:
+        """Where the body was in a frame; vertices that carry nothing are at rest."""
+        if self.rig.head is None:
+            return Pose(None, frame["matrix"])
+        positions = self.rig.head.positions.copy()
+        positions[self.used] = frame["head"]
+        return Pose(positions, frame["matrix"])
+
+    def strands(self, frame: Arrays) -> Floats:
+        """All strands in a frame, (strand_count, cv_count, 3) float32 world [m]."""
+        return pipeline.strands_at(self.rig, self.pose(frame), frame["guides"])
+
+
+def used_vertices(rig: Rig) -> Ints:
+    """The head's vertices that carry roots, sorted; none without a head."""
+    if rig.head is None or rig.strands.root_triangle is None:
+        return np.zeros(0, np.int32)
+    return np.unique(rig.head.triangles[rig.strands.root_triangle])
+
+
+def frame_arrays(pose: Pose, guides: Floats, used: Ints) -> Arrays:
+    """One frame: guides (guide_count, cv_count, 3) world [m], and what carries them."""
+    arrays: Arrays = {"guides": guides, "matrix": np.asarray(pose.matrix, np.float64)}
+    if pose.head_positions is not None:
+        arrays["head"] = pose.head_positions[used]
+    return arrays
+
+
+def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
+    """All that `rig_of` needs."""
+    strands = rig.strands
+    arrays: Arrays = {
+        "strands": strands.grid,
+        "radius": strands.radius,
+        "group": strands.group,
+        "guides": rig.guides,
+        "weight_guide": rig.weights.guide,
+        "weight": rig.weights.weight,
+        "hair_rest": rests.hair,
+        "notes": np.array(rig.notes, np.str_),
+    }
+    if strands.root_uv is not None:
+        arrays["root_uv"] = strands.root_uv
+    if rig.head is not None and rests.head is not None:
+        assert strands.root_triangle is not None and strands.root_barycentric is not None
+        arrays |= {
+            "root_triangle": strands.root_triangle,
+            "root_barycentric": strands.root_barycentric,
+            "head_positions": rig.head.positions,
+            "head_triangles": rig.head.triangles,
+            "head_rest": rests.head,
+        }
+    return arrays
+
+
+def rig_of(arrays: Arrays, place: str) -> BakedRig:
+    """The rig that these arrays were made from.
+
+    Raises:
+        HairloomError: arrays are missing or do not fit together.
+    """
+    try:
+        return _rig_of(arrays)
+    except (KeyError, ValueError, IndexError, HairloomError) as error:
+        raise HairloomError(
+            f"this bake is damaged ({error})", place=place, remedy="Bake again"
+        ) from error
+
+
+def _rig_of(arrays: Arrays) -> BakedRig:
+    grid = arrays["strands"]
+    count, cv_count, _ = grid.shape
+    head, frames = None, None
+    if "head_positions" in arrays:
+        head = Surface(arrays["head_positions"], arrays["head_triangles"])
+        _check_indices(arrays["root_triangle"], len(head.triangles))
+        frames = root_frames(
+            head.positions, head.triangles, arrays["root_triangle"], arrays["root_barycentric"]
+        )
+    strands = StrandSet(
+        points=grid.reshape(-1, 3),
+        offsets=np.arange(count + 1, dtype=np.int32) * cv_count,
+        radius=arrays["radius"],
+        group=arrays["group"],
+        root_uv=arrays.get("root_uv"),
+        root_triangle=arrays.get("root_triangle"),
+        root_barycentric=arrays.get("root_barycentric"),
+    )
+    _check_indices(arrays["guides"], count)
+    _check_indices(arrays["weight_guide"], len(arrays["guides"]))
+    weights = GuideWeights(arrays["weight_guide"], arrays["weight"])
+    notes = tuple(str(note) for note in arrays.get("notes", ()))
+    rig = Rig(strands, head, arrays["guides"], weights, frames, notes)
+    rests = RestMatrices(arrays["hair_rest"], arrays.get("head_rest"))
+    return BakedRig(rig, rests, used_vertices(rig))
+
+
+def _check_indices(indices: Ints, count: int) -> None:
+    if len(indices) and not 0 <= indices.min() <= indices.max() < count:
+        raise ValueError("an index points to nothing")

@@ -1,0 +1,145 @@
+"""What a groom's bake hangs on, as hashes: the same wherever the scene's playhead stands.
+
+Taken from the original data, in object space and before modifiers: these do not change with the
+animation. What modifiers and animation do to them shows in the moment of each frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...dynamics.settings import DynamicsSettings
+from ...pipeline import Pose
+from ..base.objects import matrix_of
+from ..colliders.carriers import is_deforming
+from ..colliders.obstacles import shape_of, sources_of
+from ..properties.choices import Choices
+from ..scene.curves import GROUP_ATTRIBUTES
+from ..scene.surfaces import read_positions
+from ..scene.vertex_weights import weight_names, weights_on
+from ..scene.wind import gravity_of, scene_wind
+from .simulated import SOLVER_VERSION, Hashed, hashes
+
+#: What of the fingerprint makes the rig.
+RIG_PARTS = ("hair", "head", "guides", "children")
+
+
+def groom_fingerprint(
+    hair: bpy.types.Object,
+    head: bpy.types.Object | None,
+    choices: Choices,
+    scene: bpy.types.Scene,
+) -> str:
+    """Named hashes, see `simulated.hashes`; their names are what an artist is told has changed."""
+    grown: dict[str, tuple[Hashed, ...]] = {}
+    if choices.children.way != "none":  # bakes of older versions know of no children
+        grown["children"] = choices.children, _density_before_modifiers(head, choices)
+    return hashes(
+        hair=_curves_parts(hair),
+        head=() if head is None else mesh_parts(head),
+        guides=choices.guides,
+        **grown,
+        colliders=collider_shapes(hair, head),
+        frame_rate=frame_rate(scene),
+        solver=str(SOLVER_VERSION),
+    )
+
+
+def groom_moment(
+    hair: bpy.types.Object,
+    head: bpy.types.Object | None,
+    pose: Pose,
+    depsgraph: bpy.types.Depsgraph,
+) -> str:
+    """Named hashes of what drives a groom in the scene's frame.
+
+    Args:
+        head: that carries it. pose: where it is, see `poses.read_pose`.
+    """
+    return hashes(
+        pose=pose.matrix if pose.head_positions is None else pose.head_positions,
+        settings=_dynamics(hair),
+        colliders=collider_places(hair, head, depsgraph),
+        forces=(gravity_of(depsgraph.scene), scene_wind(depsgraph)),
+    )
+
+
+def settings_part(hair: bpy.types.Object) -> str:
+    """What such a moment says of the settings."""
+    return hashes(settings=_dynamics(hair))
+
+
+def _dynamics(hair: bpy.types.Object) -> DynamicsSettings:
+    """All forms of the solver give the same motion."""
+    return replace(Choices.of(hair).dynamics, form="automatic")
+
+
+def collider_places(
+    owner: bpy.types.Object, head: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph
+) -> tuple[Floats, ...]:
+    """Where the colliders of a groom or fin are now, but for the head: that is its pose."""
+    places = []
+    for obj in sources_of(owner, head):
+        if obj != head:
+            places.append(matrix_of(obj, depsgraph))
+            if obj.type == "MESH" and is_deforming(obj):
+                places.append(read_positions(obj, depsgraph, place=obj.name))
+    return tuple(places)
+
+
+def collider_shapes(
+    owner: bpy.types.Object, head: bpy.types.Object | None
+) -> tuple[Floats | Ints | str, ...]:
+    """What a groom or fin collides with, wherever that is."""
+    parts: list[Floats | Ints | str] = []
+    for obj in sources_of(owner, head):
+        shape = shape_of(obj)
+        parts.append(f"{shape} {obj.empty_display_size if obj.type == 'EMPTY' else ''}")
+        if obj.type == "MESH" and shape != "none":
+            parts += mesh_parts(obj)
+    return tuple(parts)
+
+
+def frame_rate(scene: bpy.types.Scene) -> float:
+    """[1/s]"""
+    return float(scene.render.fps) / float(scene.render.fps_base)
+
+
+def _density_before_modifiers(head: bpy.types.Object | None, choices: Choices) -> Hashed:
+    """What children grow by on the head; the name alone where modifiers make it."""
+    name = choices.children_density
+    if head is None or name not in weight_names(head):
+        return name
+    return weights_on(head, head.data, name)
+
+
+def _curves_parts(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
+    curves = hair.data
+    points = np.empty((len(curves.position_data), 3), np.float32)
+    curves.position_data.foreach_get("vector", points.ravel())
+    offsets = np.zeros(len(curves.curves) + 1, np.int32)
+    if len(curves.curves):
+        curves.curve_offset_data.foreach_get("value", offsets)
+    modifiers = [(each.type, each.name) for each in hair.modifiers if each.show_viewport]
+    parts: list[Floats | Ints | str] = [points, offsets, repr(modifiers)]
+    for name in GROUP_ATTRIBUTES:
+        attribute = curves.attributes.get(name)
+        if attribute is not None and attribute.data_type == "INT":
+            group = np.empty(len(attribute.data), np.int32)
+            attribute.data.foreach_get("value", group)
+            parts.append(group)
+    return tuple(parts)
+
+
+def mesh_parts(obj: bpy.types.Object) -> tuple[Floats | Ints, ...]:
+    """Vertices (vertex_count, 3) in object space, and the vertex of each polygon corner."""
+    mesh = obj.data
+    vertices = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", vertices.ravel())
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    return vertices, corners

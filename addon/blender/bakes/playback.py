@@ -1,0 +1,201 @@
+"""Bakes as they are shown again: frames for the live grooms, and curves of their own in renders.
+
+In a render nothing is evaluated and nothing simulated: strands come from the bake alone.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...pipeline import Pose
+from ..scene.fin_modifier import clear, fin_modifier, has_fins, show
+from .bake_settings import absolute, folder_of
+from .baked_rig import BakedRig, rig_of
+from .cache import FACTS, Cache
+
+#: folder -> when its bake was written, and the bake
+_caches: dict[Path, tuple[int, Cache]] = {}
+_rigs: dict[Path, tuple[Cache, BakedRig]] = {}
+#: folder -> why its bake cannot be shown in renders; told once
+_troubles: dict[Path, str] = {}
+_is_rendering = False
+
+
+def cache_in(folder: Path) -> Cache | None:
+    """The bake in a folder as it is now; None where there is none.
+
+    Raises:
+        HairloomError: it is damaged.
+    """
+    try:
+        written = (folder / FACTS).stat().st_mtime_ns
+    except OSError:
+        _caches.pop(folder, None)
+        _rigs.pop(folder, None)
+        return Cache.found(folder)  # a replacement may have been broken off
+    if folder not in _caches or _caches[folder][0] != written:
+        _caches[folder] = written, Cache(folder)
+        _troubles.pop(folder, None)
+    return _caches[folder][1]
+
+
+def cache_of(obj: bpy.types.Object) -> Cache | None:
+    """The bake of a groom or fin; None where there is none.
+
+    Raises:
+        HairloomError: it is damaged.
+    """
+    folder = folder_of(obj)
+    return None if folder is None else cache_in(folder)
+
+
+def rig_in(cache: Cache) -> BakedRig:
+    """The rig of a groom's bake.
+
+    Raises:
+        HairloomError: it is damaged.
+    """
+    known = _rigs.get(cache.folder)
+    if known is None or known[0] is not cache:
+        known = _rigs[cache.folder] = cache, rig_of(cache.constants(), str(cache.folder))
+    return known[1]
+
+
+def strands_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
+    """All strands of a groom, (strand_count, cv_count, 3) world [m].
+
+    Before the first frame and after the last one they stay as they are in these. Between two
+    frames, where motion blur looks, they go straight.
+
+    Raises:
+        HairloomError: the bake is damaged.
+    """
+    facts, rig = cache.facts, rig_in(cache)
+    here = rig.strands(cache.frame(min(max(frame, facts.first), facts.last)))
+    if not subframe or not facts.first <= frame < facts.last:
+        return here
+    there = rig.strands(cache.frame(frame + 1))
+    between: Floats = here + (there - here) * np.float32(subframe)
+    return between
+
+
+def pose_in(cache: Cache, frame: int, subframe: float = 0.0) -> Pose:
+    """Where the body of a groom was; in time as `strands_in`.
+
+    Raises:
+        HairloomError: the bake is damaged.
+    """
+    facts, rig = cache.facts, rig_in(cache)
+    here = rig.pose(cache.frame(min(max(frame, facts.first), facts.last)))
+    if not subframe or not facts.first <= frame < facts.last:
+        return here
+    there = rig.pose(cache.frame(frame + 1))
+    matrix = here.matrix + (there.matrix - here.matrix) * subframe
+    if here.head_positions is None or there.head_positions is None:
+        return Pose(None, matrix)
+    way = there.head_positions - here.head_positions
+    return Pose(here.head_positions + way * np.float32(subframe), matrix)
+
+
+def show_fins(scene: bpy.types.Scene) -> None:
+    """Write the frame that the scene goes to into all meshes of baked fins, previewed or not.
+
+    Beyond the baked frames, a fin is where the animation carries it.
+    """
+    for obj in bpy.data.objects if has_fins() else ():
+        folder = folder_of(obj) if is_baked_fin(obj) else None
+        if folder is not None:
+            try:
+                _show_fin(obj, cache_in(folder), scene.frame_current)
+            except HairloomError as error:
+                _tell(folder, str(error))
+
+
+def is_baked_fin(obj: bpy.types.Object) -> bool:
+    """Whether it is a fin whose bake is to be shown, if there is one."""
+    return bool(
+        obj.type == "MESH"
+        and obj.hairloom.bake.folder
+        and obj.hairloom.bake.is_shown
+        and fin_modifier(obj) is not None
+    )
+
+
+def _show_fin(obj: bpy.types.Object, cache: Cache | None, frame: int) -> None:
+    if cache is not None and cache.holds(frame):
+        show(obj.data, cache.frame(frame)["position"])
+    else:
+        clear(obj.data)
+
+
+def show_in_copies(scene: bpy.types.Scene) -> None:
+    """Write the frame that the scene goes to into all curves that show a bake in renders."""
+    for curves in bpy.data.hair_curves:
+        folder = absolute(curves.hairloom.baked_in, curves.library)
+        if folder is not None:
+            try:
+                _write(curves, folder, scene)
+            except HairloomError as error:
+                _tell(folder, str(error))
+
+
+def _write(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> None:
+    cache = cache_in(folder)
+    if cache is None:
+        raise HairloomError("there is no bake here", place=str(folder), remedy="Bake again")
+    points = strands_in(cache, scene.frame_current, scene.frame_subframe)
+    if len(curves.position_data) != points.shape[0] * points.shape[1]:
+        raise HairloomError(
+            "these curves are not those of the bake", place=curves.name, remedy="Bake again"
+        )
+    curves.position_data.foreach_set("vector", points.ravel())
+    curves.update_tag()
+
+
+def _tell(folder: Path, problem: str) -> None:
+    if _troubles.get(folder) != problem:
+        _troubles[folder] = problem
+        print(f"Hairloom: {problem}")
+
+
+def is_played() -> bool:
+    """Whether Blender plays its animation in a window, or its playhead is being dragged."""
+    screens = [window.screen for window in bpy.context.window_manager.windows]
+    return any(screen.is_animation_playing for screen in screens)
+
+
+def is_dragged() -> bool:
+    """Whether the artist drags the playhead."""
+    screens = [window.screen for window in bpy.context.window_manager.windows]
+    return any(screen.is_scrubbing for screen in screens)
+
+
+def rendering(begins: bool) -> None:
+    """A render begins or has ended."""
+    global _is_rendering
+    _is_rendering = begins
+
+
+def needs_copies() -> bool:
+    """Copies are for renders, and for exporters that go through the frames; while an artist
+    plays or drags in the viewport, where they are hidden, they wait."""
+    return _is_rendering or bpy.app.background or not (is_played() or is_dragged())
+
+
+def drop(folder: Path) -> None:
+    """The bake in this folder is gone, or another one."""
+    for known in (_caches, _rigs, _troubles):
+        known.pop(folder, None)
+
+
+def forget() -> None:
+    """Keep no bake in memory."""
+    global _is_rendering
+    for known in (_caches, _rigs, _troubles):
+        known.clear()
+    _is_rendering = False

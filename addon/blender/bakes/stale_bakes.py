@@ -1,0 +1,72 @@
+"""What has changed since hair was baked: a file of the bake's motion is of the hair as it was."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...errors import HairloomError
+from ..base.objects import Body, Handle, head_of
+from ..properties.choices import Choices
+from ..scene.poses import read_pose
+from . import playback
+from .cache import Cache
+from .fingerprints import groom_fingerprint, groom_moment, settings_part
+from .simulated import as_now, differences
+
+
+def changed_since(
+    hair: bpy.types.Object, cache: Cache, depsgraph: bpy.types.Depsgraph
+) -> tuple[str, ...]:
+    """What is not as it was baked, in words; nothing where the bake is up to date.
+
+    What moves the hair is compared in the scene's frame, if that was baked.
+
+    Raises:
+        HairloomError: the bake is damaged.
+    """
+    facts, head, choices = cache.facts, head_of(hair), Choices.of(hair)
+    now = groom_fingerprint(hair, head, choices, depsgraph.scene)
+    changed = differences(as_now(facts.fingerprint, facts.moments), now)
+    scene = depsgraph.scene
+    if cache.holds(scene.frame_current) and not scene.frame_subframe:
+        changed += _moved_otherwise(hair, head, cache, depsgraph)
+    elif not any(settings_part(hair) in moment.split() for moment in facts.moments):
+        changed += ("settings",)
+    return tuple(dict.fromkeys(changed))
+
+
+def stale_notes(
+    hair: bpy.types.Object, cache: Cache, depsgraph: bpy.types.Depsgraph
+) -> tuple[str, ...]:
+    """A sentence for the artist; nothing where the bake is up to date.
+
+    Raises:
+        HairloomError: the bake is damaged.
+    """
+    changed = changed_since(hair, cache, depsgraph)
+    if not changed:
+        return ()
+    return (
+        f"{hair.name}: its bake is out of date ({', '.join(changed)}), and its motion is written "
+        "as it was baked. Bake again to write it as it is now.",
+    )
+
+
+def _moved_otherwise(
+    hair: bpy.types.Object,
+    head: bpy.types.Object | None,
+    cache: Cache,
+    depsgraph: bpy.types.Depsgraph,
+) -> tuple[str, ...]:
+    """What drives the hair otherwise in this frame than it did."""
+    baked = playback.rig_in(cache)
+    carrier, count = None, None
+    if head is not None and baked.rests.head is not None and baked.rig.head is not None:
+        carrier = Body(Handle.of(head), baked.rests.head)
+        count = len(baked.rig.head.positions)
+    try:
+        pose = read_pose(Body(Handle.of(hair), baked.rests.hair), carrier, count, depsgraph)
+    except HairloomError:  # it has other vertices now, or is nowhere
+        return ("pose",)
+    now = groom_moment(hair, head if carrier else None, pose, depsgraph)
+    return differences(cache.moment(depsgraph.scene.frame_current), now)

@@ -1,0 +1,137 @@
+"""What a run did: progress lines while it works, and report.json when it is done or has failed."""
+
+from __future__ import annotations
+
+import json
+import platform
+import statistics
+import sys
+import time
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...errors import HairloomError
+from ...exchange.files.atomic import write_text_atomic
+from .gpu_context import gpu_in_use
+from .interruption import stop_if_asked
+
+_MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
+#: What progress lines are written for: a reader, or whatever runs an Open Job Description.
+STYLES = ("lines", "openjd")
+
+
+class Report:
+    """Facts and stage times of one run; written as JSON.
+
+    A stage that runs many times is reported by its median.
+
+    style: of STYLES. openjd: also lines that a farm shows as status and progress, after
+        github.com/OpenJobDescription/openjd-specifications, "Stdout/Stderr Messages".
+    inputs, outputs: files and folders that were read and written.
+    """
+
+    def __init__(self, verb: str, style: str = "lines") -> None:
+        self._times: dict[str, list[float]] = {}
+        self._style, self._stage = style, ""
+        self.inputs: list[Path] = []
+        self.outputs: list[Path] = []
+        self.facts: dict[str, Any] = {"verb": verb, "status": "begun", "dropped": {}, "outputs": []}
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time what runs inside, under this name."""
+        stop_if_asked()
+        if self._style == "openjd" and name != self._stage:
+            print(f"openjd_status: {name}", flush=True)
+        self._stage = name
+        begin = time.perf_counter()
+        yield
+        self._times.setdefault(name, []).append((time.perf_counter() - begin) * 1000.0)
+
+    def stages_ms(self) -> dict[str, float]:
+        return {name: round(statistics.median(times), 3) for name, times in self._times.items()}
+
+    def add_input(self, path: Path) -> None:
+        """A file or folder that the result hangs on, beside those that options name."""
+        self.inputs.append(path)
+
+    def add_output(self, path: Path) -> None:
+        """A file or folder that was written."""
+        self.outputs.append(path)
+        self.facts["outputs"].append(path.name)
+
+    def progress(self, name: str, total: int) -> Progress:
+        """What says how much of a long step is done."""
+        return Progress(name, total, self._style)
+
+    def end(self, status: str) -> None:
+        """The job is "done", or was "skipped" since its result was there."""
+        self.facts["status"] = status
+
+    def fail(self, error: HairloomError) -> None:
+        """Why the job was not done, for whoever reads the report."""
+        self._break_off("failed", error.problem, error.place, error.remedy)
+        if self._style == "openjd":
+            print(f"openjd_fail: {error}", flush=True)
+
+    def stop(self, signal_name: str) -> None:
+        """The job was interrupted."""
+        self._break_off("interrupted", "the job was interrupted", signal_name, "Run it again")
+
+    def _break_off(self, status: str, problem: str, place: str, remedy: str) -> None:
+        error = {"problem": problem, "place": place, "remedy": remedy}
+        self.facts.update(status=status, error=error)
+
+    def write(self, path: Path) -> None:
+        """Write report.json: facts, median milliseconds of each stage, and what it ran on."""
+        content = {**self.facts, "stages_ms": self.stages_ms(), **environment()}
+        write_text_atomic(path, json.dumps(content, indent=2) + "\n")
+
+
+def environment() -> dict[str, str]:
+    """What the run ran on; backend and renderer are empty where nothing was drawn."""
+    return {
+        "hairloom": hairloom_version(),
+        "blender": bpy.app.version_string,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        **gpu_in_use(),
+    }
+
+
+def hairloom_version() -> str:
+    manifest = tomllib.loads(_MANIFEST.read_text(encoding="utf-8"))
+    return str(manifest["version"])
+
+
+class Progress:
+    """A line that grows: rewritten in place on a terminal, every tenth of the way elsewhere; for a
+    farm every hundredth, as it reads them."""
+
+    def __init__(self, name: str, total: int, style: str = "lines") -> None:
+        self._name, self._total, self._style, self._shown = name, total, style, -1
+
+    def show(self, done: int) -> None:
+        stop_if_asked()
+        parts = 100 if self._style == "openjd" else 10
+        part = done * parts // max(self._total, 1)
+        if self._style == "openjd":
+            if part != self._shown:
+                print(f"openjd_progress: {min(part, 100)}", flush=True)
+        elif sys.stdout.isatty():
+            print(f"\r{self._name}: {done}/{self._total}", end="", flush=True)
+            if done >= self._total:
+                print()
+        elif part != self._shown:
+            print(f"{self._name}: {done}/{self._total}", flush=True)
+        self._shown = part
+
+    def show_share(self, share: float) -> None:
+        """Where nothing is counted: the share that is done, 0 to 1."""
+        self.show(int(share * self._total))

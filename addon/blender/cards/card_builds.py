@@ -1,0 +1,202 @@
+"""Building the cards that are shown, in a thread or at once, and what they hang on.
+
+The thread does what is pure numpy. An atlas is drawn on the GPU, which is the main thread's: the
+build waits there until it is served.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from ...arrays import Floats
+from ...card_flow import bound_cards, cards_at
+from ...cards.atlas_maps import AtlasMaps
+from ...cards.atlas_settings import AtlasSettings
+from ...cards.bake_strands import FlatStrands
+from ...cards.drawing_settings import CardDrawingSettings
+from ...cards.follow import CardBinding
+from ...cards.occlusion_settings import CardOcclusionSettings
+from ...cards.settings import CardSettings
+from ...cards.steps import result_of, retold
+from ...errors import HairloomError
+from ...pipeline import Pose, Rig
+from ...render.card_snapshot import CardSnapshot
+from ...render.card_textures import CardTextures, packed_textures
+from ...shading.ambient import AmbientSettings
+from ...shading.settings import ShadingSettings, StrandSettings
+from ...shading.textures import TextureSettings
+from ...shading.volume.card_opacity import StrandArea, card_shade
+from ..base.thread_work import ThreadWork
+from .card_atlas import drawing_maps, has_gpu
+from .card_making import CardChoices, MadeCards, making_steps
+from .card_maps import made_maps
+from .other_cards import OtherHair
+
+_NO_OTHERS = OtherHair()
+
+#: What acts on cards at once: how they are drawn, and how wide the strands are.
+type CardsDrawn = tuple[CardDrawingSettings, StrandSettings]
+
+
+@dataclass(frozen=True)
+class CardForm:
+    """All that cards hang on beside the rig.
+
+    picture_names: (texture, picture) of those that take the place of generated textures.
+    shading: of the strands in the atlas. Forms are the same that differ in it by colours alone,
+        since the atlas holds how strands differ from the mean, which these hardly change.
+    ambient: of the strands, whose occlusion the cards take over.
+    """
+
+    cards: CardSettings = field(default_factory=CardSettings)
+    atlas: AtlasSettings = field(default_factory=AtlasSettings)
+    occlusion: CardOcclusionSettings = field(default_factory=CardOcclusionSettings)
+    texture: TextureSettings = field(default_factory=TextureSettings)
+    strands: StrandSettings = field(default_factory=StrandSettings)
+    picture_names: tuple[tuple[str, str], ...] = ()
+    shading: ShadingSettings = field(default_factory=ShadingSettings, compare=False)
+    ambient: AmbientSettings = field(default_factory=AmbientSettings)
+    variation: tuple[str, float, float] = field(init=False)
+
+    def __post_init__(self) -> None:
+        look = self.shading
+        object.__setattr__(self, "variation", (look.model, look.color_variation, look.grey_share))
+
+    def choices(
+        self, pictures: Mapping[str, Floats], others: OtherHair = _NO_OTHERS
+    ) -> CardChoices:
+        """The same with the pictures themselves, and with the hair of other grooms."""
+        return CardChoices(
+            self.cards,
+            self.atlas,
+            self.occlusion,
+            self.texture,
+            self.shading,
+            self.strands,
+            pictures,
+            others,
+            self.ambient,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltCards:
+    """Cards at rest, tied to the guides of their rig.
+
+    wrong_share: see cards.build.CardBuild.
+    notes: what the artist should know.
+    """
+
+    rig: Rig
+    form: CardForm
+    binding: CardBinding
+    rest: CardSnapshot
+    strand_area: StrandArea
+    card_shade: float
+    wrong_share: float
+    notes: tuple[str, ...]
+
+    def at(self, pose: Pose, guides: Floats, drawn: CardsDrawn) -> CardSnapshot:
+        """The cards riding on guides (guide_count, cv_count, 3) [m, world]."""
+        mesh = cards_at(self.rig, self.binding, pose, guides)
+        return self.drawn(replace(self.rest, mesh=mesh), drawn)
+
+    def drawn(self, cards: CardSnapshot, drawn: CardsDrawn) -> CardSnapshot:
+        """The same cards by these settings."""
+        drawing, strands = drawn
+        thickness = self.strand_area.shade(strands) / max(self.card_shade, 1.0e-12)
+        return replace(cards, drawing=drawing, thickness=thickness)
+
+
+def built_cards(
+    rig: Rig,
+    form: CardForm,
+    pictures: Mapping[str, Floats],
+    others: OtherHair = _NO_OTHERS,
+) -> BuiltCards:
+    """Build the cards of a rig with their textures, here and now.
+
+    Raises:
+        HairloomError: no cards can be made.
+    """
+    return tied_cards(rig, form, result_of(making_steps(rig, form.choices(pictures, others))))
+
+
+def building_cards(
+    rig: Rig,
+    form: CardForm,
+    pictures: Mapping[str, Floats],
+    others: OtherHair = _NO_OTHERS,
+) -> ThreadWork[BuiltCards]:
+    """Build them in a thread."""
+    choices = form.choices(pictures, others)
+
+    def build(work: ThreadWork[BuiltCards]) -> BuiltCards:
+        built = tied_cards(rig, form, made_in_thread(work, rig, choices))
+        work.tell("Textures")
+        device = _uploaded(work, built.rest)
+        return replace(built, rest=replace(built.rest, device=device))
+
+    return ThreadWork(build, "hairloom cards")
+
+
+def _uploaded(work: ThreadWork[Any], cards: CardSnapshot) -> CardTextures | None:
+    """In the thread: their textures on the GPU, so that no draw waits for them; None without one.
+
+    Raises:
+        GivenUpError: nobody waits for them.
+    """
+    packed = list(packed_textures(cards.textures, cards.mesh.atlas))
+
+    def uploading() -> Generator[None, None, CardTextures | None]:
+        if not has_gpu():
+            return None
+        device = CardTextures()
+        yield from device.uploading(cards.textures, cards.mesh.atlas, packed)
+        return device
+
+    return work.asked(uploading())
+
+
+def made_in_thread(work: ThreadWork[Any], rig: Rig, choices: CardChoices) -> MadeCards:
+    """Make cards in the thread of this work; the main thread draws the atlas.
+
+    Raises:
+        HairloomError: no cards can be made.
+        GivenUpError: nobody waits for them.
+    """
+
+    def draw(flat: FlatStrands, size: int) -> AtlasMaps:
+        return work.asked(drawing_maps(flat, size))
+
+    steps = making_steps(rig, choices, lambda build: made_maps(rig, build, choices, draw))
+    return result_of(retold(steps, work.tell))
+
+
+def tied_cards(rig: Rig, form: CardForm, made: MadeCards) -> BuiltCards:
+    """Cards that are made, with all that drawing them needs."""
+    build, textures = made.build, made.maps.textures
+    mesh, strands = build.finest, rig.strands
+    return BuiltCards(
+        rig,
+        form,
+        bound_cards(rig, mesh),
+        CardSnapshot(
+            mesh,
+            textures,
+            made.maps.has_tangent_map,
+            build.backs[0],
+            is_even=made.maps.is_even,
+        ),
+        StrandArea.of(strands.grid, strands.radius.reshape(strands.strand_count, -1)),
+        card_shade(mesh.positions, mesh.triangles, mesh.uv, textures.alpha),
+        build.wrong_share,
+        made.notes,
+    )
+
+
+def told(error: HairloomError) -> str:
+    """Why there are no cards, for the artist."""
+    return f"Strands are shown, because there are no cards. {error}"

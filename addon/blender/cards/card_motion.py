@@ -1,0 +1,299 @@
+"""Cards in motion: from a take or a bake to joints or textures beside the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...card_flow import bound_cards, cards_at
+from ...cards.card_mesh import CardMesh
+from ...cards.joint_keys import between_keys, chain_keys, keys_of
+from ...cards.joint_solve import rigid_fits
+from ...cards.joints import CardTracks, FitError, JointChoices, joint_steps, keyed_error
+from ...cards.steps import result_of
+from ...cards.vertex_animation import MotionLayout, motion_layout, motion_texture, vertex_texels
+from ...errors import HairloomError
+from ...exchange.cards.card_formats import GLB, OBJ, CardFormat
+from ...exchange.cards.glb_skin import Skeleton, with_skeleton
+from ...exchange.cards.sidecar_motion import joint_motion, texture_motion
+from ...pipeline import Pose, Rig
+from ..bakes import playback
+from ..bakes.stale_bakes import stale_notes
+from ..bakes.take import read_take
+from ..base.images import write_texture
+from ..strands.groom_motion import check_frames
+
+#: Share of the error by which joints may be off between keys.
+_KEY_SHARE = 0.5
+#: Motion of one frame says nothing.
+_FEWEST_FRAMES = 2
+
+
+@dataclass(frozen=True)
+class MotionChoices:
+    """How motion is written.
+
+    kind: "none", "joints" or "texture". space: "head" leaves the head's own motion out.
+    depth: of textures, "half" or "float".
+    """
+
+    kind: str = "none"
+    space: str = "head"
+    depth: str = "half"
+    joints: JointChoices = field(default_factory=JointChoices)
+
+
+@dataclass(frozen=True, eq=False)
+class GuideMotion:
+    """Guides over a range of frames.
+
+    rig: what they belong to.
+    moment: the pose, and the guides (guide_count, cv_count, 3) [m, world], at a frame.
+    notes: what the artist should know.
+    """
+
+    rig: Rig
+    frames: range
+    frame_rate: float
+    moment: Callable[[int], tuple[Pose, Floats]]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class MovedCards:
+    """tracks, and if they are wanted the normals and the tangents, as `CardTracks.moved`."""
+
+    tracks: CardTracks
+    normals: tuple[Floats, ...] = ()
+    tangents: tuple[Floats, ...] = ()
+
+
+def take_motion(rig: Rig, path: Path, frames: range | None) -> GuideMotion:
+    """The motion of a take; its frames count from 0, None is all of them.
+
+    Raises:
+        HairloomError: not a take of this rig, or frames that it has not.
+    """
+    take = read_take(path, rig)
+    chosen = range(take.frame_count) if frames is None else frames
+    if not 0 <= chosen[0] <= chosen[-1] < take.frame_count:
+        raise HairloomError(
+            f"frames {chosen[0]} to {chosen[-1]} are not all in this take",
+            place=str(path),
+            remedy=f"Use frames from 0 to {take.frame_count - 1}",
+        )
+    return GuideMotion(
+        rig, chosen, take.frame_rate, lambda frame: (take.pose(frame), take.guides[frame])
+    )
+
+
+def baked_motion(hair: bpy.types.Object, frames: range | None) -> GuideMotion:
+    """The motion of a groom's bake; None is all of its frames.
+
+    Raises:
+        HairloomError: no bake, a damaged one, or frames that it has not.
+    """
+    cache = playback.cache_of(hair)
+    if cache is None:
+        raise HairloomError(
+            "it has no bake, so its cards cannot move",
+            place=hair.name,
+            remedy="Bake it (Hairloom > Bake), or write the cards without motion",
+        )
+    facts = cache.facts
+    chosen = range(facts.first, facts.last + 1) if frames is None else frames
+    check_frames(hair.name, chosen, cache)
+    baked = playback.rig_in(cache)
+
+    def moment(frame: int) -> tuple[Pose, Floats]:
+        arrays = cache.frame(frame)
+        return baked.pose(arrays), arrays["guides"]
+
+    notes = stale_notes(hair, cache, bpy.context.evaluated_depsgraph_get())
+    return GuideMotion(baked.rig, chosen, facts.frame_rate, moment, notes)
+
+
+def check_motion(choices: MotionChoices, motion: GuideMotion, file_format: CardFormat) -> None:
+    """Refuse what cannot be written, before any work is done.
+
+    Raises:
+        HairloomError: one frame, or a format that has no place for it.
+    """
+    if len(motion.frames) < _FEWEST_FRAMES:
+        raise HairloomError(
+            "one frame is no motion", place="frame range", remedy="Choose two frames or more"
+        )
+    if choices.kind == "joints" and file_format != GLB:
+        raise HairloomError(
+            f"joints are written to GLB, not to {file_format.title}",
+            place="motion",
+            remedy="Choose glTF (.glb), or a vertex texture",
+        )
+    if file_format == OBJ:
+        raise HairloomError(
+            "OBJ has no place for motion", place="motion", remedy="Choose glTF, FBX or USD"
+        )
+
+
+def moved_cards(
+    motion: GuideMotion, levels: Sequence[CardMesh], *, space: str, with_directions: bool
+) -> Generator[float, None, MovedCards]:
+    """The cards in all frames; yields the share that is done.
+
+    Args:
+        levels: at rest, world space.
+        space: "head" takes the head's motion out, "world" leaves it in.
+        with_directions: normals and tangents too.
+    """
+    rig, count = motion.rig, len(motion.frames)
+    bound = [bound_cards(rig, mesh) for mesh in levels]
+    names = ("positions", "normal", "tangent") if with_directions else ("positions",)
+    arrays = {
+        name: tuple(np.empty((len(mesh.positions), count, 3), np.float32) for mesh in levels)
+        for name in names
+    }
+    roots = rig.strands.grid[rig.guides, 0].astype(np.float64)
+    carrier: Floats = np.tile(np.eye(4), (count, 1, 1))
+    turn: Floats = np.eye(3)[None]
+    for number, frame in enumerate(motion.frames):
+        pose, guides = motion.moment(frame)
+        now = guides[:, :1].astype(np.float64)
+        turn, way = rigid_fits(roots, now, np.ones(len(roots)), turn)
+        carrier[number, :3, :3], carrier[number, :3, 3] = turn[0], way[0]
+        back = np.eye(4) if space == "world" else carrier[number]
+        for level, binding in enumerate(bound):
+            mesh = cards_at(rig, binding, pose, guides)
+            for name in names:
+                offset = back[:3, 3] if name == "positions" else 0.0
+                arrays[name][level][:, number] = (getattr(mesh, name) - offset) @ back[:3, :3]
+        yield (number + 1) / count
+    grid = rig.strands.grid[rig.guides]
+    length = np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1).mean()
+    tracks = CardTracks(
+        tuple(levels),
+        arrays["positions"],
+        carrier,
+        float(length),
+        roots.mean(axis=0),
+        motion.frames[0],
+        motion.frame_rate,
+    )
+    return MovedCards(tracks, arrays.get("normal", ()), arrays.get("tangent", ()))
+
+
+@dataclass(frozen=True, eq=False)
+class JointMotion:
+    """A skeleton that is ready to be written, and how near it comes."""
+
+    tracks: CardTracks
+    skeleton: Skeleton
+    error: FitError
+    choices: MotionChoices
+
+    @property
+    def share(self) -> float:
+        """The error as a share of the hair's length."""
+        return self.error.mean_square_root / self.tracks.hair_length
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the artist should know."""
+        wanted = self.choices.joints.error
+        if self.share <= wanted:
+            return ()
+        return (
+            f"Joints are off by {self.share:.1%} of the hair's length, more than the {wanted:.1%} "
+            "that are asked for. Allow more chains, or joints in each.",
+        )
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return joint_motion(self.tracks, self.skeleton, self.error, self.choices.space)
+
+    def complete(self, path: Path, nodes: Sequence[str]) -> None:
+        """Put the skeleton into the GLB that lies there."""
+        data = path.read_bytes()
+        levels = self.tracks.levels
+        path.write_bytes(with_skeleton(data, nodes, levels, self.skeleton, path.name))
+
+
+def joint_motion_steps(
+    tracks: CardTracks, choices: MotionChoices
+) -> Generator[float, None, JointMotion]:
+    """Fit joints and keys; yields the share that is done."""
+    wanted = choices.joints
+    rig = yield from joint_steps(tracks, wanted)
+    keys = result_of(chain_keys(rig, wanted.error * tracks.hair_length * _KEY_SHARE))
+    yield 0.95
+    turn, place = zip(*(between_keys(each, tracks.frame_count) for each in keys), strict=True)
+    error = keyed_error(tracks, rig, np.stack(turn), np.stack(place))
+    root_keys = None
+    if choices.space == "world":
+        carried = tracks.carrier[:, :3, :3] @ tracks.root + tracks.carrier[:, :3, 3]
+        size = np.ptp(tracks.levels[0].positions, axis=0).max()
+        near = wanted.error * tracks.hair_length * _KEY_SHARE
+        reach = np.array([float(size)])
+        # of the root joint's rest, which is no more than a place
+        root_keys = keys_of(tracks.carrier[None, :, :3, :3], carried[None], reach, near)
+    skeleton = Skeleton(rig, keys, tracks.root, root_keys, tracks.frame_rate)
+    yield 1.0
+    return JointMotion(tracks, skeleton, error, choices)
+
+
+@dataclass(frozen=True, eq=False)
+class TextureMotion:
+    """Motion that is ready to be written as textures."""
+
+    moved: MovedCards
+    layout: MotionLayout
+    choices: MotionChoices
+    file_format: CardFormat
+
+    @classmethod
+    def of(
+        cls, moved: MovedCards, choices: MotionChoices, file_format: CardFormat, place: str
+    ) -> TextureMotion:
+        tracks = moved.tracks
+        count = sum(len(mesh.positions) for mesh in tracks.levels)
+        return cls(moved, motion_layout(count, tracks.frame_count, place), choices, file_format)
+
+    @property
+    def texels(self) -> tuple[Floats, ...]:
+        """Of each level, (vertex_count, 2), the second from the top of the picture."""
+        sizes = [len(mesh.positions) for mesh in self.moved.tracks.levels]
+        return tuple(np.split(vertex_texels(self.layout), np.cumsum(sizes)[:-1]))
+
+    def write(self, path: Path) -> dict[str, str]:
+        """Write the textures beside the mesh; position, normal and tangent -> file."""
+        tracks, moved = self.moved.tracks, self.moved
+        rests = [mesh.positions[:, None] for mesh in tracks.levels]
+        offsets = [now - rest for now, rest in zip(tracks.moved, rests, strict=True)]
+        every = {"position": offsets, "normal": moved.normals, "tangent": moved.tangents}
+        files = {}
+        for name, parts in every.items():
+            values = self.file_format.placed(np.concatenate(parts))
+            if name != "position":
+                values = values / self.file_format.units_per_metre
+            files[name] = f"{path.stem}_motion_{name}.exr"
+            write_texture(
+                path.with_name(files[name]),
+                motion_texture(values, self.layout),
+                is_color=False,
+                depth=self.choices.depth,
+            )
+        return files
+
+    def facts(self, files: dict[str, str]) -> dict[str, Any]:
+        tracks = self.moved.tracks
+        low: Floats = np.stack([each.min(axis=(0, 1)) for each in tracks.moved]).min(axis=0)
+        high: Floats = np.stack([each.max(axis=(0, 1)) for each in tracks.moved]).max(axis=0)
+        bounds, choices = (low, high), self.choices
+        return texture_motion(
+            tracks, self.file_format, self.layout, files, choices.depth, bounds, choices.space
+        )

@@ -1,0 +1,200 @@
+"""Hair cards as mesh objects in the artist's scene, one a level of detail.
+
+They are made once and filled anew ever after: object, modifiers, materials and what else the artist
+has added stay. Their mesh lies in the space of the hair object, so that cards that were moved aside
+stay there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...arrays import Floats, Ints
+from ...cards.build import CardBuild
+from ...cards.card_mesh import OF_CARDS, CardMesh
+from ...errors import HairloomError
+from ..base.objects import Handle, head_of, matrix_of
+from ..base.thread_work import ThreadWork
+from ..scene.rigs import rig_of
+from ..scene.source import read_source
+from ..strands.groom_files import card_choices, notes_of
+from .card_builds import made_in_thread
+from .card_making import MadeCards, order_line
+from .card_object_material import filled_image, new_material
+
+
+class CardObjectJob:
+    """Making the cards of one groom: read at once, made in a thread, then written.
+
+    objects: those of the cards once they are written, finest first; order: how well it suits.
+    notes: what the artist should know.
+
+    Raises:
+        HairloomError: no hair that can be used, or its cards that are there cannot be changed.
+    """
+
+    def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+        for obj in card_objects(hair):
+            _check_editable(obj)
+        source = read_source(hair, depsgraph)
+        self._rig = rig_of(hair, source)
+        self._choices, warnings = card_choices(hair)
+        self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)
+        self.objects: list[bpy.types.Object] = []
+        self.order = ""
+        self.notes = (*source.warnings, *notes_of(hair, self._rig), *warnings)
+        self.dropped = source.dropped
+
+    def making(self) -> ThreadWork[MadeCards]:
+        """Make the cards in a thread, which touches nothing of Blender's."""
+        rig, choices = self._rig, self._choices
+        return ThreadWork(lambda work: made_in_thread(work, rig, choices), "hairloom card objects")
+
+    def write(self, made: MadeCards) -> None:
+        """Put them into the scene.
+
+        Raises:
+            HairloomError: the hair is gone, or its cards cannot be changed any more.
+        """
+        hair, build = self._hair.find(), made.build
+        if hair is None:
+            raise HairloomError(
+                "this object is gone", place=self._hair.name, remedy="Choose other hair"
+            )
+        for obj in card_objects(hair):
+            _check_editable(obj)
+        self.notes += tuple(f"{hair.name}: {note}." for note in made.notes)
+        color = self._choices.shading.base_color
+        self.objects = _write(hair, build, made.maps.textures.card, color, self._matrix)
+        self.order = order_line(build.wrong_share)
+
+
+def card_objects(hair: bpy.types.Object) -> list[bpy.types.Object]:
+    """The objects that hold the cards of a groom, finest first."""
+    found = [
+        obj
+        for obj in bpy.data.objects
+        if obj.type == "MESH" and obj.hairloom.card_object.groom == hair
+    ]
+    return sorted(found, key=lambda obj: (obj.hairloom.card_object.level, obj.name))
+
+
+def _check_editable(obj: bpy.types.Object) -> None:
+    """Raises:
+    HairloomError: its mesh cannot be replaced.
+    """
+    if not obj.is_editable or not obj.data.is_editable:
+        raise HairloomError(
+            "it is linked from another file", place=obj.name, remedy="Make it local first"
+        )
+    if obj.mode != "OBJECT":
+        raise HairloomError(
+            "its mesh is being edited", place=obj.name, remedy="Go back to Object Mode"
+        )
+
+
+def _write(
+    hair: bpy.types.Object,
+    build: CardBuild,
+    texture: Floats,
+    color: tuple[float, float, float],
+    matrix: Floats,
+) -> list[bpy.types.Object]:
+    """Fill the objects of this groom, make those that are missing, remove those too many."""
+    there = {obj.hairloom.card_object.level: obj for obj in reversed(card_objects(hair))}
+    for level in [level for level in there if level >= len(build.levels)]:
+        _remove(there.pop(level))
+    first = there.get(0)
+    known = None if first is None else first.hairloom.card_object.image
+    image = filled_image(known, f"{hair.name} Cards", texture)
+    objects, material = [], _first_material(first)
+    for level, cards in enumerate(build.levels):
+        obj = there.get(level)
+        if obj is None:
+            material = material or new_material(f"{hair.name} Cards", image, color)
+            obj = _new_object(hair, level, matrix)
+            obj.data.materials.append(material)
+        obj.hairloom.card_object.image = image
+        obj.hairloom.card_object.card_count = cards.card_count
+        obj.hairloom.card_object.wrong_share = build.wrong_share
+        _fill(obj.data, cards, matrix)
+        objects.append(obj)
+    return objects
+
+
+def _first_material(obj: bpy.types.Object | None) -> bpy.types.Material | None:
+    return obj.data.materials[0] if obj is not None and len(obj.data.materials) else None
+
+
+def _remove(obj: bpy.types.Object) -> None:
+    mesh = obj.data
+    bpy.data.objects.remove(obj)
+    if not mesh.users:
+        bpy.data.meshes.remove(mesh)
+
+
+def _new_object(hair: bpy.types.Object, level: int, matrix: Floats) -> bpy.types.Object:
+    """An empty one beside the hair, carried by what carries it; coarser levels are hidden."""
+    name = f"{hair.name} Cards" + (f" LOD{level}" if level else "")
+    obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+    for collection in hair.users_collection or [bpy.context.scene.collection]:
+        collection.objects.link(obj)
+    obj.hairloom.card_object.groom, obj.hairloom.card_object.level = hair, level
+    carrier = head_of(hair) or hair.parent
+    if carrier is not None:
+        obj.parent = carrier
+        obj.matrix_parent_inverse = carrier.matrix_world.inverted_safe()
+    obj.matrix_basis = Matrix(matrix.tolist())
+    if level:
+        obj.hide_viewport = obj.hide_render = True
+    return obj
+
+
+def _fill(mesh: bpy.types.Mesh, cards: CardMesh, matrix: Floats) -> None:
+    """The cards, in the space of `matrix`, in the place of what the mesh held."""
+    mesh.clear_geometry()
+    inverse = np.linalg.inv(matrix)
+    triangles: Ints = cards.triangles
+    if np.linalg.det(matrix[:3, :3]) < 0.0:  # a mirrored object turns faces around again
+        triangles = triangles[:, ::-1]
+    corners = triangles.ravel()
+    places = cards.positions @ inverse[:3, :3].T + inverse[:3, 3]
+    mesh.vertices.add(len(places))
+    mesh.vertices.foreach_set("co", places.astype(np.float32).ravel())
+    mesh.loops.add(len(corners))
+    mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(corners))
+    mesh.polygons.add(len(triangles))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, len(corners), 3, dtype=np.int32))
+    mesh.update(calc_edges=True)
+    shares = np.stack([cards.occlusion, cards.along], axis=1)
+    for name, uv in (("UVMap", cards.uv), ("Occlusion", shares)):
+        layer = mesh.uv_layers.new(name=name, do_init=False)
+        layer.uv.foreach_set("vector", np.ascontiguousarray(uv[corners], np.float32).ravel())
+    for name, domain, values in _attributes(cards, matrix):
+        _set_attribute(mesh, name, domain, values)
+
+
+def _attributes(cards: CardMesh, matrix: Floats) -> Iterator[tuple[str, str, Any]]:
+    """Name, domain and values of what else a mesh of cards holds."""
+    normal = cards.normal @ matrix[:3, :3]
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    yield "custom_normal", "POINT", normal.astype(np.float32)
+    yield "occlusion", "POINT", cards.occlusion
+    yield "along", "POINT", cards.along
+    yield "card", "FACE", cards.card
+    for name in OF_CARDS:
+        yield name, "FACE", getattr(cards, name)[cards.card]
+
+
+def _set_attribute(mesh: bpy.types.Mesh, name: str, domain: str, values: Any) -> None:
+    if values.ndim == 2:
+        kind, part = "FLOAT_VECTOR", "vector"
+    else:
+        kind, part = ("INT" if values.dtype.kind == "i" else "FLOAT"), "value"
+    attribute = mesh.attributes.new(name, kind, domain)
+    attribute.data.foreach_set(part, np.ascontiguousarray(values).ravel())

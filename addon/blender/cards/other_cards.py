@@ -1,0 +1,213 @@
+"""Hair of other grooms in the scene, as it shades the cards of one.
+
+That is every mesh that can be seen and that Make Cards or Sort Hair Cards has written, of the cards
+of a groom the finest level alone. A groom without such cards shades by its strands, of which quick
+cards are made that nobody sees. It is read at once, and made into cards wherever there is time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import bpy
+import numpy as np
+
+from ... import card_flow
+from ...arrays import Floats
+from ...cards.occlusion import CardShade
+from ...cards.occlusion_settings import CardOcclusionSettings
+from ...errors import HairloomError
+from ...shading.settings import StrandSettings
+from ...strands import Surface
+from ..base.objects import objects_in
+from ..properties.properties import settings_of
+from ..scene.rigs import RigSettings
+from ..scene.source import Source, read_source
+from ..scene.surfaces import read_surface
+from .adopted_writing import SHARES
+from .card_alpha import alpha_of
+
+#: Hair that is nearer than this to where it was has not moved [m].
+_STILL = 1.0e-5
+_NO_MOTION = np.eye(4)
+
+
+class _Read(Protocol):
+    """One object as it was read."""
+
+    def shade(self) -> CardShade:
+        """Raises:
+        HairloomError: it cannot be made into cards.
+        """
+        ...
+
+    @property
+    def state(self) -> tuple[object, ...]:
+        """All that its shade hangs on."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class OtherHair:
+    """All other hair that is to shade, read from the scene: arrays that a thread may use.
+
+    uids: session numbers of the objects, those that cannot be used too.
+    notes: what the artist should know of how they were read.
+    """
+
+    uids: frozenset[int] = frozenset()
+    notes: tuple[str, ...] = ()
+    _read: tuple[_Read, ...] = ()
+
+    def shades(self) -> tuple[tuple[CardShade, ...], tuple[str, ...]]:
+        """The hair as cards, and what the artist should know of it."""
+        found: list[CardShade] = []
+        notes = list(self.notes)
+        for each in self._read:
+            try:
+                found.append(each.shade())
+            except HairloomError as error:
+                notes.append(_shades_nothing(error))
+        return tuple(found), tuple(notes)
+
+    def is_like(self, other: OtherHair) -> bool:
+        """Whether both shade alike."""
+        if (self.uids, self.notes) != (other.uids, other.notes):
+            return False
+        pairs = zip(self._read, other._read, strict=True)
+        return all(_alike(one.state, two.state) for one, two in pairs)
+
+
+@dataclass(frozen=True, eq=False)
+class _ReadMesh:
+    surface: Surface
+    alpha: Floats | None
+
+    def shade(self) -> CardShade:
+        return CardShade.of_surface(self.surface, self.alpha)
+
+    @property
+    def state(self) -> tuple[object, ...]:
+        surface = self.surface
+        return surface.positions, surface.triangles, surface.corner_uv, self.alpha
+
+
+@dataclass(frozen=True, eq=False)
+class _ReadStrands:
+    source: Source
+    rig: RigSettings
+    drawn: StrandSettings
+
+    def shade(self) -> CardShade:
+        return card_flow.shade_of(self.rig.rig(self.source), self.drawn)
+
+    @property
+    def state(self) -> tuple[object, ...]:
+        source, strands = self.source, self.source.strands
+        head = None if source.head is None else source.head.positions
+        hair = strands.points, strands.offsets, strands.radius, strands.group
+        return *hair, head, source.density, self.rig, self.drawn
+
+
+def read_other_hair(
+    settings: CardOcclusionSettings,
+    own: bpy.types.Object | None,
+    depsgraph: bpy.types.Depsgraph | None = None,
+    motion: Floats = _NO_MOTION,
+) -> OtherHair:
+    """All other hair if it is to shade.
+
+    Args:
+        own: hair curves, or a mesh of cards; None leaves nothing out.
+        depsgraph: None is that of the window, brought up to date.
+        motion: (4, 4) of the shaded hair since rest; the others are carried back by it, so that
+            they are where they would be if all of it were at rest.
+    """
+    if not settings.others:
+        return OtherHair()
+    back = _NO_MOTION if np.array_equal(motion, _NO_MOTION) else np.linalg.pinv(motion)
+    depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
+    read: list[_Read] = []
+    notes: list[str] = []
+    objects = shading_objects(own, depsgraph.view_layer)
+    for obj in objects:
+        try:
+            if obj.type == "CURVES":
+                read.append(_read_strands(obj, depsgraph, back))
+            else:
+                mesh, problems = _read_mesh(obj, depsgraph, back)
+                read.append(mesh)
+                notes += [f"{obj.name}: {problem}" for problem in problems]
+        except HairloomError as error:
+            notes.append(_shades_nothing(error))
+    return OtherHair(frozenset(obj.session_uid for obj in objects), tuple(notes), tuple(read))
+
+
+def other_cards(
+    settings: CardOcclusionSettings,
+    own: bpy.types.Object | None,
+    depsgraph: bpy.types.Depsgraph | None = None,
+) -> tuple[tuple[CardShade, ...], tuple[str, ...]]:
+    """The same as cards, here and now, and what the artist should know of it."""
+    return read_other_hair(settings, own, depsgraph).shades()
+
+
+def _read_mesh(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Floats
+) -> tuple[_ReadMesh, list[str]]:
+    surface = read_surface(obj, depsgraph, need_uv=False, place=obj.name)
+    alpha, problems = alpha_of(obj)
+    return _ReadMesh(surface.transformed(back), alpha), problems
+
+
+def _read_strands(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Floats
+) -> _ReadStrands:
+    source = read_source(hair, depsgraph)
+    source = replace(
+        source,
+        strands=source.strands.transformed(back),
+        head=None if source.head is None else source.head.transformed(back),
+    )
+    drawn = settings_of(hair.data.hairloom.strands, StrandSettings)
+    return _ReadStrands(source, RigSettings.of(hair), drawn)
+
+
+def _shades_nothing(error: HairloomError) -> str:
+    return f"It shades nothing: {error}"
+
+
+def _alike(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
+    return all(_is_still(a, b) for a, b in zip(one, other, strict=True))
+
+
+def _is_still(one: object, other: object) -> bool:
+    if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
+        return one is other or bool(one == other)
+    return one.shape == other.shape and np.allclose(one, other, rtol=_STILL, atol=_STILL)
+
+
+def shading_objects(
+    own: bpy.types.Object | None, layer: bpy.types.ViewLayer
+) -> list[bpy.types.Object]:
+    """The meshes of cards and the hair that shade what is not their own."""
+    seen = [obj for obj in objects_in(layer) if obj.visible_get(view_layer=layer)]
+    meshes = [obj for obj in seen if _is_cards(obj)]
+    carded = {obj.hairloom.card_object.groom for obj in meshes}
+    groom = None if own is None else own.hairloom.card_object.groom
+    left_out = {own, groom} - {None}
+    cards = [each for each in meshes if not {each, each.hairloom.card_object.groom} & left_out]
+    strands = [each for each in seen if _is_groom(each) and each not in carded | left_out]
+    return [*cards, *strands]
+
+
+def _is_cards(obj: bpy.types.Object) -> bool:
+    if obj.type != "MESH" or obj.hairloom.card_object.level:
+        return False
+    return bool(len(obj.data.polygons)) and all(name in obj.data.attributes for name in SHARES)
+
+
+def _is_groom(obj: bpy.types.Object) -> bool:
+    """Hair curves; the copy of a bake stands for hair that counts already."""
+    return obj.type == "CURVES" and not obj.data.hairloom.baked_in

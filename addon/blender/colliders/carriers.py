@@ -1,0 +1,144 @@
+"""Following an object that collides: by its matrix, and by what an armature makes of its mesh.
+
+Most heads in Blender stand still as objects while an armature moves their vertices. A collider is
+rigid, so it takes the rotation, scale and translation that fit the vertices best; those near the
+hair's roots where there are any, because the rest of a body bends elsewhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...dynamics.fitting.similarity import fit_similarity
+from ...errors import HairloomError
+from ...strands import Surface
+from ...strands.affine import moved
+from ..base.objects import Body
+from ..scene.surfaces import read_positions
+
+#: Vertices that tell where a mesh has gone: more would say the same.
+_ENOUGH = 2000
+#: Rings of triangles around the roots that go with them.
+_RINGS = 2
+#: Bending by more than this share of the size of what is followed is told to the artist.
+_BENT = 0.02
+#: Modifiers that leave a mesh where it is.
+_STILL = frozenset(
+    ("SUBSURF", "MULTIRES", "TRIANGULATE", "MIRROR", "EDGE_SPLIT", "WEIGHTED_NORMAL", "BEVEL")
+    + ("NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WELD", "DECIMATE", "REMESH", "SOLIDIFY", "MASK")
+)
+
+
+@dataclass
+class Carrier:
+    """An object that carries a collider, and which of its vertices tell where it is.
+
+    rest: (n, 3) [m] world, these vertices at rest; none for an object without a mesh.
+    vertex_count: of the whole evaluated mesh.
+    bend: [m], root mean square of how its vertices differed from a rigid motion when last seen.
+    """
+
+    body: Body
+    index: Ints
+    rest: Floats
+    vertex_count: int
+    bend: float = 0.0
+
+    @classmethod
+    def of_object(cls, body: Body) -> Carrier:
+        return cls(body, np.zeros(0, np.int64), np.zeros((0, 3)), 0)
+
+    @classmethod
+    def of_mesh(cls, body: Body, surface: Surface, roots: Ints | None = None) -> Carrier:
+        """Args:
+        surface: world space, with the body at rest.
+        roots: indices of the vertices that hair grows from; None: it goes by all vertices.
+        """
+        used = np.unique(surface.triangles)
+        if roots is not None and len(roots):
+            around = _around(surface.triangles, roots, len(surface.positions))
+            if fit_similarity(surface.positions[around], surface.positions[around]) is not None:
+                used = around
+        used = used[:: max(len(used) // _ENOUGH, 1)]
+        return cls(body, used, surface.positions[used], len(surface.positions))
+
+    def moved(self, depsgraph: bpy.types.Depsgraph) -> Floats:
+        """(4, 4), world space, from where it was at rest to where it is now.
+
+        Raises:
+            HairloomError: it is gone, or its mesh is another one.
+        """
+        obj = self.body.found()
+        matrix: Floats = self.body.moved(depsgraph)
+        if not self.vertex_count:
+            return matrix
+        if not is_deforming(obj):
+            evaluated = obj.evaluated_get(depsgraph)
+            self._check(len(evaluated.data.vertices) if obj.type == "MESH" else 0)
+            self.bend = 0.0
+            return matrix
+        positions = read_positions(obj, depsgraph, place=obj.name)
+        self._check(len(positions))
+        fit = fit_similarity(moved(self.rest, matrix), positions[self.index])
+        if fit is None:
+            self.bend = 0.0
+            return matrix
+        self.bend = fit.error
+        result: Floats = fit.matrix @ matrix
+        return result
+
+    @property
+    def bends(self) -> bool:
+        """Whether it bends more than a rigid collider can be said to follow."""
+        return self.bend > _BENT * float(np.ptp(self.rest, axis=0).max())
+
+    def _check(self, vertex_count: int) -> None:
+        if vertex_count != self.vertex_count:
+            raise HairloomError(
+                f"its mesh now has {vertex_count:,} vertices instead of {self.vertex_count:,}",
+                place=self.body.handle.name,
+                remedy="Press Play again",
+            )
+
+
+def is_deforming(obj: bpy.types.Object) -> bool:
+    """Whether the mesh may change its shape from frame to frame."""
+    return (
+        any(each.show_viewport and each.type not in _STILL for each in obj.modifiers)
+        or getattr(obj.data, "shape_keys", None) is not None
+        or (obj.parent is not None and obj.parent_type in {"ARMATURE", "LATTICE", "CURVE"})
+    )
+
+
+def is_left_out(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether the artist has disabled it in viewports or excluded it from the view layer.
+
+    Blender evaluates it all the same for the hair that names it. Hiding with the eye does not
+    leave it out, so that colliders need not be in sight.
+    """
+    layer = depsgraph.view_layer
+    if obj.hide_viewport or not obj.evaluated_get(depsgraph).is_evaluated:
+        return True
+    if layer.objects.get(obj.name) != obj and obj not in layer.objects.values():
+        return True  # the first look is fast, but several libraries may use one name
+    is_seen = obj.visible_get(view_layer=layer)
+    return not is_seen and all(each.hide_viewport for each in obj.users_collection)
+
+
+def scales_of(matrix: Floats) -> Floats:
+    """(3,) lengths of a matrix's axes."""
+    lengths: Floats = np.linalg.norm(matrix[:3, :3], axis=0)
+    return lengths
+
+
+def _around(triangles: Ints, roots: Ints, vertex_count: int) -> Ints:
+    """The vertices of the triangles around the roots, some rings wide."""
+    chosen = np.zeros(vertex_count, bool)
+    chosen[np.asarray(roots)] = True
+    for _ in range(_RINGS):
+        chosen[triangles[chosen[triangles].any(axis=1)]] = True
+    return np.flatnonzero(chosen)

@@ -1,0 +1,80 @@
+"""Distance fields of meshes, each made once, beside the window's work where nobody may wait.
+
+A field hangs on nothing but the mesh and its resolution, so that it is found again by the hash of
+those: in the next preview, by the next groom on the same head, by a bake. It is the same to the bit
+in whatever thread it is made.
+"""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+from ...dynamics.colliders import DistanceField
+from ...dynamics.settings import DynamicsSettings
+from ...strands import Surface
+from ..base.thread_work import ThreadWork
+
+#: Fields that are kept though nothing may collide with them any more, 6 MB each by default.
+KEPT = 8
+
+_works: dict[str, ThreadWork[DistanceField]] = {}
+
+
+class NotMadeYetError(Exception):
+    """The field is being made; ask again when `is_made` says so."""
+
+
+def field_of(
+    surface: Surface, settings: DynamicsSettings, *, place: str, waits: bool = True
+) -> DistanceField:
+    """The field of a closed mesh, which takes a second to make for the first time.
+
+    Args:
+        place: names it in messages.
+        waits: False: have it made in a thread, and do not wait for that.
+
+    Raises:
+        HairloomError: see `DistanceField.from_surface`.
+        NotMadeYetError: it is being made, and nobody waits.
+    """
+    key = _key(surface, settings, place)
+    work = _works.pop(key, None)
+    if work is None:
+        work = ThreadWork(
+            lambda _: DistanceField.from_surface(surface, settings, place=place), "distance field"
+        )
+    _works[key] = work  # now the youngest
+    if waits:
+        work.wait()
+        trim()
+    elif not work.is_done:
+        raise NotMadeYetError
+    return work.result()
+
+
+def are_made() -> bool:
+    """Whether no field is being made."""
+    return all(work.is_done for work in _works.values())
+
+
+def trim() -> None:
+    """Keep the youngest only. Not while somebody waits for many: he could never have them all."""
+    made = [key for key, work in _works.items() if work.is_done]
+    for key in made[:-KEPT]:
+        del _works[key]
+
+
+def forget() -> None:
+    """Keep none."""
+    _works.clear()
+
+
+def _key(surface: Surface, settings: DynamicsSettings, place: str) -> str:
+    state = hashlib.blake2b(digest_size=16)
+    for array in (surface.positions, surface.triangles):
+        state.update(f"{array.dtype} {array.shape}".encode())
+        state.update(np.ascontiguousarray(array).tobytes())
+    state.update(f"{settings.collider_resolution} {place}".encode())
+    return state.hexdigest()

@@ -1,0 +1,117 @@
+"""Many balls as one collider: what empties shown as spheres become, as fitted sets do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...dynamics.colliders import Collider, SphereSetCollider
+from ...dynamics.fitting.similarity import fit_similarity
+from ...errors import HairloomError
+from ...strands.affine import mean_scale, moved
+from ..base.objects import Body, matrix_of
+from .carriers import is_left_out
+from .obstacle_parts import Track, is_solid_scale
+
+#: A set whose balls moved against each other by less than this share of the largest is the same.
+_SAME_SET = 1.0e-3
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball that stays with an object. center: (3,), radius: object space [m]."""
+
+    body: Body
+    center: Floats
+    radius: float
+
+
+@dataclass
+class BallsPart:
+    """Balls that one thing carries, as one collider.
+
+    Its matrix is the similarity that fits the balls' own motion best; what is left over, as when
+    they hang on skin that bends, makes a new set of balls, which hair meets at the next frame.
+
+    rest: (n, 4, 4) the objects' matrices at rest.
+    """
+
+    balls: list[Ball]
+    rest: Floats
+    track: Track = field(default_factory=Track)
+    warnings: dict[str, str] = field(default_factory=dict)
+    _set: SphereSetCollider | None = None
+    _members: tuple[int, ...] = ()
+
+    @classmethod
+    def new(cls, balls: list[Ball], depsgraph: bpy.types.Depsgraph) -> BallsPart:
+        return cls(balls, np.array([matrix_of(ball.body.found(), depsgraph) for ball in balls]))
+
+    @property
+    def name(self) -> str:
+        return self.balls[0].body.handle.name
+
+    @property
+    def uid(self) -> int | None:
+        return None
+
+    def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
+        chosen, matrices = self._found(depsgraph)
+        if not chosen:
+            raise HairloomError(
+                "this ball and those beside it are gone or hidden",
+                place=self.name,
+                remedy="Show them, or press Play again",
+            )
+        here = np.array(matrices)
+        center = np.array([self.balls[i].center for i in chosen])
+        radius = np.array([self.balls[i].radius for i in chosen])
+        now = _markers(center, radius, here)
+        fit = fit_similarity(_markers(center, radius, self.rest[chosen]), now)
+        matrix = np.eye(4) if fit is None else fit.matrix
+        size = np.cbrt(np.abs(np.linalg.det(here[:, :3, :3])))
+        centers = moved(now[::4].astype(np.float32), np.linalg.inv(matrix))
+        radii = radius * size / mean_scale(matrix)
+        return self._set_of(centers, radii, tuple(chosen)), matrix
+
+    def _found(self, depsgraph: bpy.types.Depsgraph) -> tuple[list[int], list[Floats]]:
+        """The balls that are there, by their number, and their matrices."""
+        self.warnings.clear()
+        chosen, matrices = [], []
+        for number, ball in enumerate(self.balls):
+            obj, name = ball.body.handle.find(), ball.body.handle.name
+            if obj is None or is_left_out(obj, depsgraph):
+                self.warnings[name] = f"{name}: it is gone or hidden, so nothing collides with it."
+            else:
+                chosen.append(number)
+                matrices.append(matrix_of(obj, depsgraph))
+        solid = is_solid_scale(np.array(matrices).reshape(-1, 4, 4))
+        for number in np.array(chosen, int)[~solid]:
+            name = self.balls[number].body.handle.name
+            self.warnings[name] = f"{name}: its scale is zero. Correct its scale."
+        kept = np.flatnonzero(solid)
+        return [chosen[i] for i in kept], [matrices[i] for i in kept]
+
+    def _set_of(
+        self, centers: Floats, radii: Floats, members: tuple[int, ...]
+    ) -> SphereSetCollider:
+        """The set as it was, if it has not changed beyond rounding: making its grid takes time."""
+        known = self._set
+        if known is not None and members == self._members:
+            tolerance = _SAME_SET * float(radii.max())
+            same = np.allclose(known.centers, centers, rtol=0.0, atol=tolerance)
+            if same and np.allclose(known.radii, radii, rtol=1.0e-3, atol=0.0):
+                return known
+        self._set, self._members = SphereSetCollider(centers, radii), members
+        return self._set
+
+
+def _markers(center: Floats, radius: Floats, matrix: Floats) -> Floats:
+    """(4 n, 3) places that go with n balls: their middles and one on each axis, so that even one
+    ball tells how it turns."""
+    local = center[:, None] + radius[:, None, None] * np.vstack([np.zeros(3), np.eye(3)])
+    world: Floats = local @ np.moveaxis(matrix[:, :3, :3], 1, 2) + matrix[:, None, :3, 3]
+    return world.reshape(-1, 3)

@@ -1,0 +1,153 @@
+"""How one object collides: read from Blender, and from the artist's choice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...dynamics.colliders import SphereCollider
+from ...dynamics.settings import DynamicsSettings
+from ...errors import HairloomError
+from ...strands import Surface
+from ...strands.affine import moved
+from ..base.objects import Body
+from ..scene.surfaces import read_surface
+from .carriers import Carrier, is_deforming, is_left_out
+from .obstacle_balls import Ball
+from .obstacle_parts import (
+    FieldPart,
+    Part,
+    ShapePart,
+    capsule_of,
+    is_round,
+    is_solid_scale,
+    used_box,
+)
+
+#: Shapes that the artist can choose from; "automatic" is what an object looks like.
+SHAPES = (
+    ("automatic", "Automatic", "Meshes collide as they are, empties shown as spheres as balls"),
+    (
+        "mesh",
+        "Mesh",
+        "As it is: the signed distance of a closed mesh, which takes a second to make",
+    ),
+    (
+        "sphere",
+        "Sphere",
+        "A ball around the middle of the bounding box, as wide as its longest side; of an empty: "
+        "of its display size",
+    ),
+    (
+        "capsule",
+        "Capsule",
+        "A rod with round ends along the longest side of the bounding box; of an empty: along Z, "
+        "a display size to either side, half as thick",
+    ),
+    ("none", "None", "Hair does not collide with it"),
+)
+#: Kinds of objects that an artist may mean to be solid, though they are no meshes.
+_SOLID = frozenset(("CURVE", "SURFACE", "META", "FONT", "VOLUME", "POINTCLOUD"))
+
+
+@dataclass
+class Reader:
+    """Makes the part of one object.
+
+    known: its field from before, if it had one. waits: for a new one; see `fields.field_of`.
+    """
+
+    obj: bpy.types.Object
+    depsgraph: bpy.types.Depsgraph
+    settings: DynamicsSettings
+    known: FieldPart | None
+    waits: bool
+
+    def part_of_head(self, head: Body, at_rest: Surface, roots: Ints | None) -> Part | Ball | None:
+        """The head was read when the session began, perhaps in another pose than it is in now."""
+        if shape_of(self.obj) != "mesh":
+            return self.part()
+        carrier = Carrier.of_mesh(head, at_rest, roots)
+        return self._field_part(carrier, at_rest, np.eye(4))
+
+    def part(self) -> Part | Ball | None:
+        """Raises:
+        HairloomError: it cannot collide as it should.
+        NotMadeYetError: its field is being made, and nobody waits.
+        """
+        shape, obj = shape_of(self.obj), self.obj
+        if shape == "none":
+            return None
+        if is_left_out(obj, self.depsgraph):
+            raise left_out(obj.name)
+        body = Body.at_rest(obj, self.depsgraph)
+        if not is_solid_scale(body.rest):
+            raise HairloomError("its scale is zero", place=obj.name, remedy="Correct its scale")
+        if obj.type == "EMPTY" and shape != "mesh":
+            return self._empty(body, shape)
+        surface = read_surface(obj, self.depsgraph, need_uv=False, place=obj.name)
+        carrier = Carrier.of_mesh(body, surface)
+        if shape != "mesh":
+            return self._boxed(carrier, surface, shape)
+        if self.known is not None and self.known.carrier.vertex_count == carrier.vertex_count:
+            matrix = self.known.carrier.moved(self.depsgraph)
+            if self.known.is_of(surface, matrix, self.settings):
+                return self._again(self.known.carrier)
+        return FieldPart.new(carrier, surface, self.settings, waits=self.waits)
+
+    def _field_part(self, carrier: Carrier, surface: Surface, matrix: Floats) -> FieldPart:
+        if self.known is not None and self.known.is_of(surface, matrix, self.settings):
+            return self._again(carrier)
+        return FieldPart.new(carrier, surface, self.settings, waits=self.waits)
+
+    def _again(self, carrier: Carrier) -> FieldPart:
+        assert self.known is not None
+        known = self.known
+        return FieldPart(carrier, known.surface, known.distance, known.resolution)
+
+    def _empty(self, body: Body, shape: str) -> Part | Ball:
+        size, middle = self.obj.empty_display_size, np.zeros(3)
+        if shape == "sphere":
+            return _ball_or_part(Carrier.of_object(body), Ball(body, middle, size))
+        corner = np.array([size / 2.0, size / 2.0, size])
+        return ShapePart(Carrier.of_object(body), *capsule_of(-corner, corner, body.rest))
+
+    def _boxed(self, carrier: Carrier, surface: Surface, shape: str) -> Part | Ball:
+        rest = carrier.body.rest
+        inverse = np.linalg.inv(rest)
+        low, high = used_box(Surface(moved(surface.positions, inverse), surface.triangles))
+        if shape == "capsule":
+            return ShapePart(carrier, *capsule_of(low, high, rest))
+        ball = Ball(carrier.body, (low + high) / 2.0, float((high - low).max()) / 2.0)
+        if is_deforming(self.obj):
+            return ShapePart(carrier, SphereCollider(ball.center, ball.radius), rest)
+        return _ball_or_part(carrier, ball)
+
+
+def shape_of(obj: bpy.types.Object) -> str:
+    """As what an object collides: "mesh", "sphere", "capsule" or "none"."""
+    chosen: str = obj.hairloom.collider_shape
+    if chosen != "automatic":
+        return chosen
+    if obj.type == "MESH" or obj.type in _SOLID:
+        return "mesh"  # of what is no mesh the artist is told so
+    return "sphere" if obj.type == "EMPTY" and obj.empty_display_type == "SPHERE" else "none"
+
+
+def _ball_or_part(carrier: Carrier, ball: Ball) -> Part | Ball:
+    """Balls that are round go together; one that its scale makes an ellipsoid stays by itself."""
+    if is_round(carrier.body.rest):
+        return ball
+    return ShapePart(carrier, SphereCollider(ball.center, ball.radius), carrier.body.rest)
+
+
+def left_out(name: str) -> HairloomError:
+    return HairloomError(
+        "it is disabled in viewports or excluded from the view layer, so hair does not collide "
+        "with it",
+        place=name,
+        remedy="Enable it, or take it out of the collider collection",
+    )

@@ -1,0 +1,184 @@
+"""What the hair of one groom, or one cloth fin, stays out of.
+
+That is the surface it grows from, or in its place the one collider that the artist has chosen, and
+every object of a collection of colliders. An object collides as its `hairloom.collider_shape`
+says: as a mesh (signed distance), as a ball or a capsule around its bounding box, or not at all.
+What cannot be used is left out with a warning, and the others go on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import bpy
+
+from ...arrays import Ints
+from ...dynamics.colliders import PosedCollider
+from ...dynamics.settings import DynamicsSettings
+from ...errors import HairloomError
+from ...strands import Surface
+from ..base.objects import Body
+from .carriers import is_left_out
+from .fields import NotMadeYetError
+from .obstacle_balls import Ball, BallsPart
+from .obstacle_parts import FieldPart, Part, ShapePart
+from .obstacle_reader import Reader, left_out, shape_of
+
+
+@dataclass
+class Obstacles:
+    """The colliders of one groom or fin, and what the artist should know about them."""
+
+    parts: list[Part]
+    head_uid: int | None
+    _unusable: dict[str, str] = field(default_factory=dict)
+    _failed: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        owner: bpy.types.Object,
+        head: Body | None,
+        head_at_rest: Surface | None,
+        settings: DynamicsSettings,
+        depsgraph: bpy.types.Depsgraph,
+        known: Obstacles | None,
+        roots: Ints | None = None,
+        *,
+        waits: bool = True,
+    ) -> Obstacles:
+        """All that collides with `owner`, at rest where it is now.
+
+        Args:
+            owner: the hair curves, or a fin.
+            head: what it grows from, and head_at_rest: its mesh in world space at rest; or None.
+            known: its distance fields are used again where nothing has changed.
+            roots: vertices of the head that hair grows from; they tell how it moves.
+            waits: False: do not wait for fields that are to be made.
+
+        Raises:
+            HairloomError: as `move`.
+            NotMadeYetError: a field is being made, and nobody waits.
+        """
+        found = cls([], None if head is None else head.handle.uid)
+        fields = {} if known is None else known._fields()
+        balls: dict[object, list[Ball]] = {}
+        is_whole = True
+        for obj in sources_of(owner, None if head is None else head.handle.find()):
+            is_head = head is not None and head.handle.uid == obj.session_uid
+            reader = Reader(obj, depsgraph, settings, fields.get(obj.session_uid), waits)
+            try:
+                if is_head and head is not None and head_at_rest is not None:
+                    made = reader.part_of_head(head, head_at_rest, roots)
+                else:
+                    made = reader.part()
+            except HairloomError as error:
+                found._unusable[obj.name] = str(_named(obj.name, error))
+                continue
+            except NotMadeYetError:  # the others are begun as well
+                is_whole = False
+                continue
+            if isinstance(made, Ball):
+                balls.setdefault(_carried_by(obj), []).append(made)
+            elif made is not None:
+                found.parts.append(made)
+        if not is_whole:
+            raise NotMadeYetError
+        found.parts += [BallsPart.new(group, depsgraph) for group in balls.values()]
+        found.rest(depsgraph)
+        return found
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is left out at the moment and why, and what is not followed well."""
+        seen = [text for part in self.parts for text in part.warnings.values()]
+        return tuple(dict.fromkeys([*self._unusable.values(), *self._failed.values(), *seen]))
+
+    def move(self, depsgraph: bpy.types.Depsgraph, duration: float) -> tuple[PosedCollider, ...]:
+        """Go to where things are now, within `duration` [s]; their ways there.
+
+        Raises:
+            HairloomError: the head is gone, or its mesh is another one.
+        """
+        posed = []
+        for part in self._there(depsgraph):
+            try:
+                posed.append(part.track.go(*part.now(depsgraph), duration))
+            except HairloomError as error:
+                self._fail(part, error)
+        return tuple(posed)
+
+    def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Be where things are now, at no speed.
+
+        Raises:
+            HairloomError: as `move`.
+        """
+        for part in self._there(depsgraph):
+            try:
+                collider, matrix = part.now(depsgraph)
+                PosedCollider(collider, matrix, matrix)
+                part.track.rest(matrix)
+            except HairloomError as error:
+                self._fail(part, error)
+
+    def _there(self, depsgraph: bpy.types.Depsgraph) -> Iterator[Part]:
+        """The parts that Blender evaluates; the others begin at rest when they come back."""
+        self._failed.clear()
+        for part in self.parts:
+            if self._is_left_out(part, depsgraph):
+                part.track.before = None
+                name = part.name
+                self._failed[name] = str(left_out(name))
+            else:
+                yield part
+
+    def _is_left_out(self, part: Part, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Balls look after themselves; a head that is hidden still wears its hair."""
+        if isinstance(part, BallsPart) or self._is_head(part):
+            return False
+        assert isinstance(part, FieldPart | ShapePart)
+        obj = part.carrier.body.handle.find()
+        return obj is not None and is_left_out(obj, depsgraph)
+
+    def _is_head(self, part: Part) -> bool:
+        return part.uid is not None and part.uid == self.head_uid
+
+    def _fail(self, part: Part, error: HairloomError) -> None:
+        if self._is_head(part):
+            raise _named(part.name, error) from error
+        part.track.before = None
+        self._failed[part.name] = str(_named(part.name, error))
+
+    def _fields(self) -> dict[int, FieldPart]:
+        made = [part for part in self.parts if isinstance(part, FieldPart)]
+        return {part.carrier.body.handle.uid: part for part in made}
+
+
+def sources_of(
+    owner: bpy.types.Object, head: bpy.types.Object | None
+) -> tuple[bpy.types.Object, ...]:
+    """The objects that may collide with `owner`, each once: the chosen collider or else the head,
+    then the collection's."""
+    chosen, collection = owner.hairloom.collider, owner.hairloom.collider_collection
+    first = chosen if chosen is not None else head
+    objects = [] if first is None else [first]
+    if collection is not None:
+        objects += collection.all_objects
+    return tuple(obj for obj in dict.fromkeys(objects) if obj != owner)
+
+
+def _carried_by(obj: bpy.types.Object) -> object:
+    """Balls with the same answer move as one: what hangs on the same mesh or bone does."""
+    if obj.parent is None:
+        return None
+    return obj.parent.session_uid, obj.parent_bone if obj.parent_type == "BONE" else ""
+
+
+def _named(name: str, error: HairloomError) -> HairloomError:
+    """The error with the object's name in place of what part of it was found bad."""
+    return HairloomError(error.problem, place=name, remedy=error.remedy)
+
+
+__all__ = ["Obstacles", "shape_of", "sources_of"]

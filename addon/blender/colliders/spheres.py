@@ -1,0 +1,172 @@
+"""Spheres fitted to a mesh: made, hung on it so that they follow it, and removed.
+
+Each is an empty shown as a sphere, whose display size is its radius in metres. It hangs on three
+vertices of the mesh, and Blender takes those as modifiers leave them, so that spheres go with a
+head that an armature turns; they hang on the object where vertices cannot carry them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...arrays import Floats, Ints
+from ...dynamics.fitting.sphere_fit import SphereFit, SphereFitSettings, fit_spheres
+from ..base.objects import head_of, objects_in
+from ..scene.surfaces import read_positions, read_surface
+
+__all__ = [
+    "FittedSpheres",
+    "SphereFitSettings",
+    "fit_spheres_to",
+    "fitted_collections",
+    "grown_on",
+    "remove_spheres",
+    "use_spheres",
+]
+
+#: Custom property of what was made here: of the collection the mesh, of each empty True.
+MARK = "hairloom_fitted"
+#: Vertices that may carry a sphere: as far from its middle as this many radii, and how many at
+#: least.
+_REACH, _LEAST = 1.3, 12
+#: Modifiers that make several vertices of one, of which Blender takes the middle.
+_COPYING = frozenset(("MIRROR", "ARRAY", "SCREW", "SKIN", "REMESH", "BOOLEAN", "BUILD", "NODES"))
+
+
+@dataclass(frozen=True)
+class FittedSpheres:
+    """What was made. hanging: number of spheres that follow the object only, not its shape."""
+
+    collection: bpy.types.Collection
+    fit: SphereFit
+    hanging: int
+
+
+def fit_spheres_to(
+    mesh: bpy.types.Object,
+    context: bpy.types.Context,
+    settings: SphereFitSettings,
+) -> FittedSpheres:
+    """Put spheres in the place of earlier ones of this mesh, as it is posed now.
+
+    Raises:
+        HairloomError: no faces, or no volume.
+    """
+    depsgraph = context.evaluated_depsgraph_get()
+    surface = read_surface(mesh, depsgraph, need_uv=False, place=mesh.name)
+    fit = fit_spheres(surface, settings, place=mesh.name)
+    carrying = _vertices_now(mesh, depsgraph)
+    collection = _emptied_collection(mesh, context.scene)
+    empties = []
+    for radius in fit.radii:
+        empty = bpy.data.objects.new(f"{mesh.name} Sphere", None)
+        empty.empty_display_type, empty.empty_display_size = "SPHERE", float(radius)
+        empty.show_in_front, empty.hide_render = True, True
+        empty[MARK] = True
+        collection.objects.link(empty)
+        empties.append(empty)
+    hanging = _hang(empties, fit, mesh, carrying, context)
+    return FittedSpheres(collection, fit, hanging)
+
+
+def fitted_collections(mesh: bpy.types.Object) -> list[bpy.types.Collection]:
+    """The collections of spheres that were fitted to a mesh."""
+    return [each for each in bpy.data.collections if each.get(MARK) == mesh]
+
+
+def use_spheres(hair: bpy.types.Object, collection: bpy.types.Collection) -> None:
+    """Let hair collide with a collection, beside the one it has."""
+    used = hair.hairloom.collider_collection
+    if used is None or used.get(MARK) is not None:
+        hair.hairloom.collider_collection = collection
+    elif collection not in used.children_recursive and collection != used:
+        used.children.link(collection)
+
+
+def remove_spheres(mesh: bpy.types.Object) -> int:
+    """Remove all spheres fitted to a mesh, which collides by itself again; how many there were."""
+    count = 0
+    for collection in fitted_collections(mesh):
+        count += _empty_out(collection)
+        if not collection.all_objects and not collection.children:
+            bpy.data.collections.remove(collection)
+    if mesh.hairloom.collider_shape == "none":
+        mesh.hairloom.collider_shape = "automatic"
+    return count
+
+
+def grown_on(mesh: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    """The hair of a mesh."""
+    return [obj for obj in objects_in(view_layer) if obj.type == "CURVES" and head_of(obj) == mesh]
+
+
+def _emptied_collection(mesh: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
+    """The collection of this mesh's spheres, without the old ones; objects of others stay."""
+    found = fitted_collections(mesh)
+    collection = found[0] if found else bpy.data.collections.new(f"{mesh.name} Spheres")
+    _empty_out(collection)
+    collection[MARK] = mesh
+    if collection not in scene.collection.children_recursive:
+        scene.collection.children.link(collection)
+    return collection
+
+
+def _empty_out(collection: bpy.types.Collection) -> int:
+    old = [obj for obj in collection.objects if obj.get(MARK) and obj.type == "EMPTY"]
+    bpy.data.batch_remove(old)
+    return len(old)
+
+
+def _vertices_now(mesh: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats | None:
+    """(vertex_count, 3) [m] world, the mesh's own vertices as they are deformed; None where they
+    cannot be told among those that modifiers add."""
+    positions = read_positions(mesh, depsgraph, place=mesh.name)
+    count = len(mesh.data.vertices)
+    copied = any(each.show_viewport and each.type in _COPYING for each in mesh.modifiers)
+    if len(positions) < count or (len(positions) > count and copied):
+        return None
+    return positions[:count]  # subdivision keeps them first
+
+
+def _hang(
+    empties: list[bpy.types.Object],
+    fit: SphereFit,
+    mesh: bpy.types.Object,
+    vertices: Floats | None,
+    context: bpy.types.Context,
+) -> int:
+    """Parent the spheres and put them in their places; how many hang on the object only."""
+    hanging = 0
+    for empty, center, radius in zip(empties, fit.centers, fit.radii, strict=True):
+        carriers = None if vertices is None else _carriers(vertices, center, radius)
+        empty.parent = mesh
+        if carriers is None:
+            hanging += 1
+        else:
+            empty.parent_type, empty.parent_vertices = "VERTEX_3", carriers.tolist()
+    context.view_layer.update()  # Blender works out the frame of each sphere's parent
+    for empty, center in zip(empties, fit.centers, strict=True):
+        empty.matrix_parent_inverse = empty.matrix_world.inverted_safe()
+        empty.matrix_basis = Matrix.Translation([float(value) for value in center])
+    context.view_layer.update()
+    return hanging
+
+
+def _carriers(vertices: Floats, center: Floats, radius: float) -> Ints | None:
+    """Three vertices near a sphere (3,), far from each other so that they tell well how it turns;
+    None where there is no triangle."""
+    distance = np.linalg.norm(vertices - center, axis=1)
+    near = np.flatnonzero(distance <= _REACH * radius)
+    if len(near) < _LEAST:
+        near = np.argsort(distance, kind="stable")[:_LEAST]
+    first = near[distance[near].argmin()]
+    way = vertices[near] - vertices[first]
+    second = near[np.linalg.norm(way, axis=1).argmax()]
+    area = np.linalg.norm(np.cross(way, vertices[second] - vertices[first]), axis=1)
+    if not len(near) or area.max() <= 1.0e-6 * float(distance.max()) ** 2:
+        return None
+    return np.array([first, second, near[area.argmax()]])

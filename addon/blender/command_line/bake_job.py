@@ -1,0 +1,126 @@
+"""The verb `bake`: what the artist's buttons Bake and Delete Bake do, for render farms."""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import closing
+from pathlib import Path
+
+import bpy
+
+from ..bakes import playback
+from ..bakes.bake_settings import folder_of
+from ..base.objects import objects_in
+from ..base.report import Report
+from ..preview.bake import Bake, bakeable, free, show_in_renders
+from .job_options import add_frames_option, add_object_option, frames_of_option
+from .job_steps import Job, tell_notes
+from .object_settings import named_objects, put_settings
+from .scene_files import save_scene
+from .verb import Verb
+
+
+def bake(job: Job) -> None:
+    """Simulate hair and fins of a scene frame by frame and keep the motion on disk."""
+    report, options = job.report, job.options
+    objects = _objects(options.object)
+    if options.delete:
+        _delete(objects, report)
+    else:
+        _bake(objects, job)
+    if options.save or options.save_as:
+        with report.stage("save scene"):
+            report.add_output(save_scene(options.save_as))
+
+
+def _bake(objects: list[bpy.types.Object], job: Job) -> None:
+    report, options = job.report, job.options
+    for obj in objects:
+        put_settings(obj, options.preset, options.set)
+    folder = None if options.output is None else options.output.resolve()
+    plan = Bake.of(
+        objects, bpy.context.scene, frames=frames_of_option(options.frames), folder=folder
+    )
+    progress, steps = report.progress("baking", plan.frame_count), plan.steps()
+    with closing(steps):  # an interrupted bake leaves the one before
+        for _ in range(plan.frame_count):
+            with report.stage("bake frame"):
+                done = next(steps)
+            progress.show(done)
+        for _ in steps:  # what is left is to put the bakes in place
+            raise AssertionError("a bake has as many steps as frames")
+    show_in_renders(objects, bpy.context.evaluated_depsgraph_get())
+    tell_notes(plan.notes, report)
+    _tell(objects, report)
+
+
+def _delete(objects: list[bpy.types.Object], report: Report) -> None:
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for obj in objects:
+        free(obj, depsgraph)
+        print(f"Deleted the bake of {obj.name}", flush=True)
+    report.facts["deleted"] = [obj.name for obj in objects]
+
+
+def _objects(names: list[str]) -> list[bpy.types.Object]:
+    """Those that were named, else all hair and fins of the view layer that are to be simulated."""
+    if names:
+        return named_objects(names, bakeable, "hair curves or a fin")
+    return [o for o in objects_in(bpy.context.view_layer) if bakeable(o) and _is_wanted(o)]
+
+
+def _is_wanted(obj: bpy.types.Object) -> bool:
+    return bool(obj.type == "CURVES" or obj.hairloom.fin.enabled)
+
+
+def _tell(objects: list[bpy.types.Object], report: Report) -> None:
+    baked = []
+    for obj in objects:
+        folder, cache = folder_of(obj), playback.cache_of(obj)
+        assert folder is not None and cache is not None, "it has just been baked"
+        facts = cache.facts
+        baked.append(
+            {
+                "object": obj.name,
+                "folder": str(folder),
+                "first": facts.first,
+                "last": facts.last,
+                "frame_rate": facts.frame_rate,
+                "form": facts.form,
+            }
+        )
+        report.add_output(folder)
+        print(f"Baked {obj.name}, frames {facts.first} to {facts.last}, into {folder}")
+    report.facts["baked"] = baked
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    what = parser.add_argument_group("what to bake")
+    add_object_option(
+        what, "hair curves or a fin; can be given again (default: all that are to be simulated)"
+    )
+    add_frames_option(what, "(default: those of the objects, else of the scene)")
+    what.add_argument(
+        "--delete", action="store_true", help="delete their bakes from disk, in place of baking"
+    )
+    saving = parser.add_mutually_exclusive_group()
+    saving.add_argument(
+        "--save", action="store_true", help="save over the scene, so that it plays what was baked"
+    )
+    saving.add_argument(
+        "--save-as",
+        type=Path,
+        metavar="FILE.blend",
+        help="save another scene that plays what was baked",
+    )
+
+
+BAKE = Verb(
+    "bake",
+    bake,
+    _add_options,
+    output="folder for the bake, of several objects one below it each (default: their own)",
+    needs_output=False,
+    takes_hair=False,
+    operators=("bake", "bake_free"),
+)

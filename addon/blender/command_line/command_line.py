@@ -1,0 +1,191 @@
+"""Hairloom without a window: `blender -b --command hairloom VERB ...`.
+
+Exit codes: 0 done, 1 bad input (one line on stderr says what, where and what to do), 2 wrong usage,
+128 and the signal's number when interrupted (130 for Ctrl-C). Every file is written whole or not at
+all.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import bpy
+
+from ...errors import HairloomError
+from ..base.interruption import Interrupted, interruptible
+from ..base.report import Report
+from .bake_job import BAKE
+from .cards_job import CARDS
+from .collider_jobs import FINS, SPHERES
+from .demo_job import DEMO
+from .export_job import EXPORT
+from .grow_job import GROW
+from .import_job import IMPORT
+from .inputs import Sources
+from .job_options import check_numbers, chosen_settings
+from .job_steps import Job
+from .mend_job import MEND
+from .mesh_jobs import MAKE_CARDS, SORT_CARDS
+from .render_job import RENDER
+from .scene_files import check_saving, open_scene, save_scene
+from .settings_jobs import PRESETS, SETTINGS
+from .show_jobs import SHEET, TURNTABLE
+from .simulate_job import SIMULATE
+from .stamp import Stamp
+from .start_jobs import SAMPLE, SELF_TEST
+from .verb import Verb
+
+VERBS: tuple[Verb, ...] = (
+    GROW,
+    IMPORT,
+    MEND,
+    SETTINGS,
+    PRESETS,
+    FINS,
+    SPHERES,
+    SIMULATE,
+    BAKE,
+    RENDER,
+    TURNTABLE,
+    SHEET,
+    EXPORT,
+    CARDS,
+    MAKE_CARDS,
+    SORT_CARDS,
+    SAMPLE,
+    DEMO,
+    SELF_TEST,
+)
+
+
+def run(arguments: list[str]) -> int:
+    """Blender calls this with what follows `--command hairloom`."""
+    try:
+        options = parser().parse_args(arguments)
+    except SystemExit as stop:  # argparse has printed its message or the help
+        return int(stop.code or 0)
+    (verb,) = (each for each in VERBS if each.name == options.verb)
+    report = Report(verb.name, options.progress)
+    if not _reported(report, options.report):
+        return 1
+    try:
+        code = _code(verb, options, report)
+    except Exception as fault:
+        report.fail(_our_fault(fault))
+        _reported(report, options.report)
+        raise  # its traceback is for whoever mends it; Blender's exit code is 1
+    return code if _reported(report, options.report) else code or 1
+
+
+def parser() -> argparse.ArgumentParser:
+    """The verbs and their options."""
+    top = argparse.ArgumentParser(
+        prog="hairloom",
+        description="Groom, simulate, render and export real-time hair.",
+        epilog="'VERB --help' lists the options of a verb. Exit codes: 0 done, 1 bad input, "
+        "2 wrong usage, 130 interrupted.",
+    )
+    verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
+    for verb in VERBS:
+        verb.add_all_options(verbs.add_parser(verb.name, help=verb.about, description=verb.about))
+    return top
+
+
+def _code(verb: Verb, options: argparse.Namespace, report: Report) -> int:
+    """Do it, and say how it went."""
+    try:
+        with interruptible():
+            _run(verb, options, report)
+    except HairloomError as error:
+        print(f"hairloom: {error}", file=sys.stderr)
+        report.fail(error)
+        return 1
+    except Interrupted as stop:
+        print(f"hairloom: interrupted ({stop.name})", file=sys.stderr)
+        report.stop(stop.name)
+        return stop.exit_code
+    return 0
+
+
+def _reported(report: Report, path: str | None) -> bool:
+    """Write the report, where one is wanted: before the work too, so that no older one is taken for
+    this one's. Whether it could be written."""
+    if path is None:
+        return True
+    try:
+        report.write(Path(path))
+    except HairloomError as error:
+        print(f"hairloom: {error}", file=sys.stderr)
+        return False
+    return True
+
+
+def _our_fault(fault: Exception) -> HairloomError:
+    return HairloomError(
+        f"{type(fault).__name__}: {fault}",
+        place="Hairloom itself",
+        remedy="Report it, with the lines above it in the log",
+    )
+
+
+def _run(verb: Verb, options: argparse.Namespace, report: Report) -> None:
+    """The job, unless it is done already."""
+    check_numbers(options)
+    stamp = Stamp(options) if getattr(options, "skip_existing", False) else None
+    if stamp is not None:
+        reason = stamp.why_not_done()
+        if not reason:
+            report.end("skipped")
+            print(f"Nothing to do: {options.output} is there, of the same inputs and options")
+            return
+        print(f"to be done: {reason}", flush=True)
+    verb.flow(_job(verb, options, report))
+    if verb.saves_scene:
+        with report.stage("save scene"):
+            saved = save_scene(options.output)
+        report.add_output(saved)
+        print(f"Wrote {saved}")
+    if stamp is not None:
+        stamp.write(report)
+    report.end("done")
+
+
+def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
+    """Open the scene, and gather what the verb needs."""
+    if verb.opens_scene and options.scene:
+        with report.stage("open scene"):
+            open_scene(Path(options.scene))
+    output = getattr(options, "output", None)
+    if verb.saves_scene:
+        check_saving(output, over=options.save)
+    return Job(
+        verb=verb.name,
+        sources=_sources(verb, options) if verb.takes_hair else Sources(),
+        settings=chosen_settings(options) if verb.takes_settings else {},
+        output=Path() if output is None else output,
+        options=options,
+        report=report,
+    )
+
+
+def _sources(verb: Verb, options: argparse.Namespace) -> Sources:
+    return Sources(
+        groom=options.groom,
+        head=options.head,
+        collider=options.collider,
+        groom_scale=options.groom_scale,
+        groom_up=options.groom_up,
+        need_head=verb.needs_head,
+        need_uv=not options.no_uv,
+        density_group=options.density_group,
+        length_group=options.length_group,
+        children_density=options.children_density or _own_density(options.groom),
+    )
+
+
+def _own_density(groom: str | None) -> str:
+    """What the artist has chosen for the hair object of this name, if it is one."""
+    hair = bpy.data.objects.get(groom or "")
+    return str(hair.hairloom.children_density) if hair is not None else ""

@@ -1,0 +1,72 @@
+"""The verb `demo`: everything once, into one folder."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ...cards.drawing_settings import CardDrawingSettings
+from ...exchange.tressfx import write_tfx
+from ...pipeline import Rig
+from ...shading.settings import StrandSettings
+from ..base.images import write_png
+from ..cards.card_builds import tied_cards
+from ..cards.card_files import WrittenCards
+from ..cards.card_images import named_pictures
+from ..cards.card_making import MadeCards
+from ..pictures.studio import Studio
+from .cards_job import written_cards
+from .job_options import add_motion_options, add_picture_options, add_texture_option
+from .job_steps import Job, card_form, open_studio, read_rig, rest_of
+from .render_job import write_sheet, write_still
+from .simulate_job import simulated_take
+from .verb import Verb
+
+
+def demo(job: Job) -> None:
+    """Do it all: simulate, stills, contact sheet, hair cards, strands and report.json."""
+    report, folder = job.report, job.output
+    pictures = named_pictures(job.options.texture)
+    rig, inputs = read_rig(job)
+    take = simulated_take(job, rig, inputs)
+    studio = open_studio(job, rig)
+    write_still(job, folder / "still.png", studio, *rest_of(rig))
+    write_sheet(job, folder / "motion.png", studio, rig, take)
+    written = written_cards(job, folder / "cards.glb", rig, pictures)
+    _write_card_still(job, folder / "cards.png", studio, rig, written)
+    with report.stage("write strands"):
+        write_tfx(folder / "strands.tfx", rig.strands)
+    report.add_output(folder / "strands.tfx")
+    report.end("done")
+    report.write(folder / "report.json")
+    print(f"Wrote {', '.join(report.facts['outputs'])} and report.json into {folder}")
+
+
+def _write_card_still(
+    job: Job, path: Path, studio: Studio, rig: Rig, written: WrittenCards
+) -> None:
+    """The cards where the strands are in the still."""
+    options = job.options
+    built = tied_cards(rig, card_form(job), MadeCards(written.build, written.maps))
+    drawn = job.set(CardDrawingSettings), job.set(StrandSettings)
+    shown = built.drawn(built.rest, drawn)
+    with job.report.stage("draw cards"):
+        picture = studio.card_picture(shown, options.width, options.height, options.samples)
+    write_png(path, picture)
+    job.report.add_output(path)
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    add_motion_options(parser)
+    add_picture_options(parser, 960, 720)
+    add_texture_option(parser)
+
+
+DEMO = Verb(
+    "demo",
+    demo,
+    _add_options,
+    output="folder to write into (default: out)",
+    default_output=Path("out"),
+    needs_head=True,
+)

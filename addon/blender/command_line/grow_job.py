@@ -1,0 +1,72 @@
+"""The verb `grow`: the artist's button Grow Hair."""
+
+from __future__ import annotations
+
+import argparse
+
+import bpy
+
+from ...groom.settings import GrowSettings
+from ..setup.starting import new_groom
+from .job_steps import Job
+from .object_settings import named_objects, put_settings
+from .verb import Verb
+
+
+def grow(job: Job) -> None:
+    """Grow hair curves on a mesh of a scene, with the settings that they are to have."""
+    options, report = job.options, job.report
+    (head,) = named_objects([options.head], lambda obj: bool(obj.type == "MESH"), "a mesh")
+    with report.stage("grow"):
+        hair = new_groom(
+            head,
+            bpy.context.evaluated_depsgraph_get(),
+            bpy.context.collection,
+            job.set(GrowSettings),
+            presets=(),
+            fits=options.fit,
+            density_group=options.density_group,
+            length_group=options.length_group,
+        )
+    hair.name = options.name or hair.name
+    put_settings(hair, options.preset, options.set)
+    if options.children_density:
+        hair.hairloom.children_density = options.children_density
+    count = len(hair.data.curves)
+    report.facts.update(object=hair.name, strands=count)
+    print(f"Grew {count:,} strands on {head.name}: {hair.name}", flush=True)
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    what = parser.add_argument_group("what to grow")
+    what.add_argument("--head", required=True, metavar="NAME", help="mesh that the hair grows from")
+    what.add_argument("--name", help="of the new object (default: after the mesh)")
+    what.add_argument(
+        "--fit",
+        action="store_true",
+        help="hair as long for this mesh as it would be on a head, and what moves it as strong, "
+        "if its size is none of a head; presets and --set go over that",
+    )
+    what.add_argument(
+        "--density-group",
+        default="",
+        metavar="NAME",
+        help="vertex group or attribute of the mesh: how densely hair grows",
+    )
+    what.add_argument(
+        "--length-group",
+        default="",
+        metavar="NAME",
+        help="the same for how long hair grows, as a share of grow.length",
+    )
+    what.add_argument(
+        "--children-density",
+        default="",
+        metavar="NAME",
+        help="the same for how densely children grow (--set children.way=multi)",
+    )
+
+
+GROW = Verb(
+    "grow", grow, _add_options, takes_hair=False, saves_scene=True, operators=("add_groom", "grow")
+)

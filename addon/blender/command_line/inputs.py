@@ -1,0 +1,169 @@
+"""A groom, its head and its collider, whatever names them: a file, an object or nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...exchange.groom import Groom
+from ...exchange.strand_formats import SUFFIXES
+from ...exchange.strand_reading import read_strands
+from ...groom.grow import grow, scalp_density
+from ...groom.settings import GrowSettings
+from ...strands import StrandSet, Surface
+from ..base.objects import head_of
+from ..scene.built_in_head import built_in_head
+from ..scene.curves import read_curves
+from ..scene.mesh_files import read_mesh_file
+from ..scene.surfaces import read_surface
+from ..scene.vertex_weights import read_weights
+from ..strands.child_python import python_for
+
+BUILT_IN = "built-in"
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What the caller asks for; each is a file, an object of the open scene, or None.
+
+    groom None: one is grown on the head. head None: the one that hair curves name as their
+    surface; the built-in one where a groom is grown. collider None: the head itself.
+    groom_scale, groom_up: of a groom's file, see `strand_reading.read_strands`.
+    need_head: whether a groom without a head is refused.
+    need_uv: whether a head without UVs is refused.
+    density_group, length_group: vertex groups or attributes of a head in the open scene, by name,
+        for hair that is grown here.
+    children_density: the same for the children between guides.
+    """
+
+    groom: str | None = None
+    head: str | None = None
+    collider: str | None = None
+    groom_scale: float = 1.0
+    groom_up: str | None = None
+    need_head: bool = True
+    need_uv: bool = True
+    density_group: str = ""
+    length_group: str = ""
+    children_density: str = ""
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What was found, in world space at rest.
+
+    groom: all that a groom's file says of the strands, or None.
+    notes: what of that file was left out or changed.
+    density: (vertex_count,) how densely children grow on the head, or None.
+    """
+
+    strands: StrandSet
+    dropped: dict[str, int]
+    groom: Groom | None
+    notes: tuple[str, ...]
+    groom_name: str
+    head: Surface | None
+    head_object: str | None
+    collider: Surface | None
+    density: Floats | None
+
+
+def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
+    """Read all three.
+
+    Raises:
+        HairloomError: naming the file or object that cannot be used, and what to do.
+    """
+    head_name = sources.head or _surface_name(sources.groom)
+    if sources.groom is not None:
+        strands, dropped, groom, notes = _read_groom(sources.groom, sources)
+        head = _read_head(head_name, sources)
+    else:
+        head, dropped, groom, notes = _read_head(head_name, sources), {}, None, ()
+        assert head is not None, "the built-in one is always there"
+        density = _weights(sources.density_group, head_name)
+        if density is None and grow_settings.way == "combed":
+            density = scalp_density(head)
+        strands = grow(head, grow_settings, density, _weights(sources.length_group, head_name))
+    collider = head
+    if sources.collider is not None:
+        collider = _read_mesh(sources.collider, need_uv=False)
+    head_object = bpy.data.objects.get(head_name or "")
+    name = sources.groom or BUILT_IN
+    children = _weights(sources.children_density, head_name)
+    found = head_object and head_object.name
+    return Inputs(strands, dropped, groom, notes, name, head, found, collider, children)
+
+
+def _read_head(name: str | None, sources: Sources) -> Surface | None:
+    """The head of this name; without one the built-in head, for hair that is grown here."""
+    if name is not None:
+        return _read_mesh(name, need_uv=sources.need_uv)
+    if sources.groom is None:
+        return built_in_head()
+    if sources.need_head:
+        raise HairloomError(
+            "it has no head to move with",
+            place=sources.groom,
+            remedy="Name the head with --head FILE_OR_OBJECT",
+        )
+    return None
+
+
+def _weights(group: str, head_name: str | None) -> Floats | None:
+    """The weights of this name on the head, (vertex_count,); None without a name."""
+    if not group:
+        return None
+    head = bpy.data.objects.get(head_name or "")
+    if head is None:
+        raise HairloomError(
+            "only a mesh object of the open scene has vertex groups",
+            place=group,
+            remedy="Name one with --head OBJECT, or leave the group out",
+        )
+    return read_weights(head, bpy.context.evaluated_depsgraph_get(), group)
+
+
+def _surface_name(groom: str | None) -> str | None:
+    """The mesh that a hair curves object of the scene says it grows on."""
+    hair = bpy.data.objects.get(groom or "")
+    surface = head_of(hair) if hair is not None and hair.type == "CURVES" else None
+    return None if surface is None else surface.name
+
+
+def _read_groom(
+    source: str, sources: Sources
+) -> tuple[StrandSet, dict[str, int], Groom | None, tuple[str, ...]]:
+    groom_object = bpy.data.objects.get(source)
+    if groom_object is not None:
+        read = read_curves(groom_object, bpy.context.evaluated_depsgraph_get())
+        return read.strands, read.dropped, None, ()
+    if source.lower().endswith(SUFFIXES):
+        path = Path(source)
+        file = read_strands(
+            path, up=sources.groom_up, scale=sources.groom_scale, python=python_for(path)
+        )
+        return file.strands, file.dropped, file.groom, file.notes
+    raise _unknown(source, "hair curves", "a groom's file such as hair.abc")
+
+
+def _read_mesh(source: str, *, need_uv: bool) -> Surface:
+    mesh_object = bpy.data.objects.get(source)
+    if mesh_object is not None:
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        return read_surface(mesh_object, depsgraph, need_uv=need_uv, place=source)
+    if Path(source).suffix:
+        return read_mesh_file(Path(source), need_uv=need_uv)
+    raise _unknown(source, "mesh", "a mesh file such as head.obj")
+
+
+def _unknown(source: str, kind: str, example: str) -> HairloomError:
+    return HairloomError(
+        f"this names neither a {kind} object of the open scene nor {example}",
+        place=source,
+        remedy="Check the name",
+    )

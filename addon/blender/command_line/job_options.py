@@ -1,0 +1,272 @@
+"""Options that several verbs of the command line have, and what they may hold."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...errors import HairloomError
+from ...exchange.strand_formats import SUFFIXES
+from ...parameters import ALL_SETTINGS
+from ...params import Settings
+from ..base.report import STYLES
+from ..properties.presets import named_preset
+from ..scene.principled import look_from_named
+from .object_settings import own_settings
+from .overrides import overrides
+
+
+def add_hair_options(parser: argparse.ArgumentParser) -> None:
+    """The hair that a verb works on, see inputs.Sources."""
+    sources = parser.add_argument_group("what to work on (files, or objects of the scene)")
+    files = ", ".join(SUFFIXES)
+    sources.add_argument("--groom", help=f"hair curves or a file, {files} (default: grown here)")
+    sources.add_argument("--head", help="mesh that the hair grows from (default: built in)")
+    sources.add_argument("--collider", help="closed mesh that hair stays out of (default: head)")
+    sources.add_argument(
+        "--groom-scale",
+        type=float,
+        default=1.0,
+        metavar="FACTOR",
+        help="scale a groom file (default: 1)",
+    )
+    sources.add_argument(
+        "--groom-up", choices=("Y", "Z"), help="up in a groom file (default: as the file says)"
+    )
+    sources.add_argument(
+        "--density-group",
+        default="",
+        metavar="NAME",
+        help="vertex group or attribute of the head: how densely hair grows",
+    )
+    sources.add_argument(
+        "--length-group",
+        default="",
+        metavar="NAME",
+        help="the same for how long hair grows, as a share of grow.length",
+    )
+    sources.add_argument(
+        "--children-density",
+        default="",
+        metavar="NAME",
+        help="the same for how densely children grow (--set children.way=multi)",
+    )
+    sources.add_argument("--no-uv", action="store_true", help="accept a head without UVs")
+    sources.add_argument(
+        "--strict", action="store_true", help="fail when a single strand must be dropped"
+    )
+
+
+def add_scene_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--scene", metavar="FILE.blend", help="scene to open first (default: the open one)"
+    )
+
+
+def add_output_option(
+    parser: argparse.ArgumentParser, about: str, default: Path | None, *, needed: bool
+) -> None:
+    parser.add_argument(
+        "--output", type=Path, required=needed, default=default, metavar="PATH", help=about
+    )
+
+
+def add_save_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--save", action="store_true", help="save over the scene, in place of --output"
+    )
+
+
+def add_object_option(parser: Any, about: str, *, needed: bool = False) -> None:
+    """--object, as often as there are objects."""
+    parser.add_argument(
+        "--object", action="append", required=needed, default=[], metavar="NAME", help=about
+    )
+
+
+def add_frames_option(parser: Any, about: str) -> None:
+    parser.add_argument("--frames", nargs=2, type=int, metavar=("FIRST", "LAST"), help=about)
+
+
+def add_at_most_option(parser: Any) -> None:
+    parser.add_argument(
+        "--at-most",
+        type=int,
+        metavar="COUNT",
+        help="so many frames from FIRST on, where LAST comes no sooner: a task of a farm",
+    )
+
+
+def frames_of_option(given: list[int] | None, at_most: int | None = None) -> range | None:
+    """The frames that --frames names, the last one too, or the first of them; None without it.
+
+    Raises:
+        HairloomError: the last frame comes before the first, or there are to be none.
+    """
+    if at_most is not None and (at_most < 1 or given is None):
+        raise HairloomError(
+            f"{at_most} frames cannot be used" if given else "there are no frames to take from",
+            place="--at-most",
+            remedy="Give --frames FIRST LAST, and 1 or more",
+        )
+    if given is None:
+        return None
+    first, last = given
+    if last < first:
+        raise HairloomError(
+            f"the last frame, {last}, comes before the first, {first}",
+            place="--frames",
+            remedy="Give the first frame, then the last",
+        )
+    frames = range(first, last + 1)
+    return frames if at_most is None else frames[:at_most]
+
+
+def add_moment_options(parser: argparse.ArgumentParser) -> None:
+    """At which moment of a take, see job_steps.moment_of."""
+    moment = parser.add_argument_group("when")
+    moment.add_argument(
+        "--take",
+        metavar="FILE.npz",
+        help="a take written by 'simulate' (default: the hair at rest)",
+    )
+    moment.add_argument(
+        "--frame", type=int, default=0, metavar="NUMBER", help="frame of the take, from 0"
+    )
+
+
+def add_picture_options(parser: argparse.ArgumentParser, width: int, height: int) -> None:
+    """The size of a picture [pixels] and its samples."""
+    picture = parser.add_argument_group("the picture")
+    for name, default, what in (
+        ("--width", width, "pixels across"),
+        ("--height", height, "pixels down"),
+        ("--samples", 3, "samples of a pixel along each side"),
+    ):
+        about = f"{what} (default: {default})"
+        picture.add_argument(name, type=int, default=default, metavar="COUNT", help=about)
+
+
+def add_motion_options(parser: argparse.ArgumentParser) -> None:
+    """What moves the hair: a shake, or the scene."""
+    motion = parser.add_argument_group("the motion")
+    motion.add_argument(
+        "--seconds",
+        type=float,
+        default=2.0,
+        metavar="COUNT",
+        help="length of the head's shake (default: 2)",
+    )
+    motion.add_argument(
+        "--frame-rate",
+        type=float,
+        default=60.0,
+        metavar="COUNT",
+        help="frames a second (default: 60)",
+    )
+    motion.add_argument(
+        "--animated",
+        action="store_true",
+        help="follow the scene's animation over its frame range, in place of the shake",
+    )
+
+
+def add_texture_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--texture",
+        action="append",
+        default=[],
+        metavar="NAME=FILE",
+        help="a picture in place of a generated texture of the cards: base, alpha, shift, "
+        "noise or tangent; can be given again",
+    )
+
+
+def add_settings_options(parser: argparse.ArgumentParser) -> None:
+    """Presets and single parameters."""
+    settings = parser.add_argument_group("settings")
+    settings.add_argument(
+        "--preset",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a preset such as looks/blond or dynamics/soft, or a preset file; can be given again",
+    )
+    settings.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="SECTION.NAME=VALUE",
+        help="change a parameter, such as dynamics.damping=2 (docs/parameters.md lists them); "
+        "can be given again, and goes over presets",
+    )
+
+
+def add_farm_options(parser: argparse.ArgumentParser, *, can_skip: bool) -> None:
+    """What whoever started the job is told, and what a second run does again."""
+    job = parser.add_argument_group("the job")
+    job.add_argument(
+        "--report",
+        metavar="FILE.json",
+        help="write a JSON report to this file: what was done, or why it could not be",
+    )
+    job.add_argument(
+        "--progress",
+        choices=STYLES,
+        default="lines",
+        help="how progress is told: for a reader (default), or for a farm that runs Open Job "
+        "Descriptions",
+    )
+    if can_skip:
+        job.add_argument(
+            "--skip-existing",
+            action="store_true",
+            help="do nothing when the output is there, whole and of the same inputs and options; "
+            "keeps OUTPUT.done.json beside it",
+        )
+
+
+def check_numbers(options: argparse.Namespace) -> None:
+    """Refuse sizes that nobody can draw before any work is done."""
+    for name, least, most in _LIMITS:
+        value = getattr(options, name, None)
+        if value is not None and not least <= value <= most:
+            raise HairloomError(
+                f"{value} cannot be used",
+                place="--" + name.replace("_", "-"),
+                remedy=f"Use a number from {least:g} to {most:g}",
+            )
+
+
+_LIMITS = (
+    ("width", 1, 4096),
+    ("height", 1, 4096),
+    ("samples", 1, 4),  # times 4096 pixels is the largest texture that every GPU has
+    ("seconds", 0.0, 3600.0),
+    ("frame_rate", 1.0, 1000.0),
+    ("groom_scale", 1e-6, 1e6),
+)
+
+
+def chosen_settings(options: argparse.Namespace) -> dict[str, Settings]:
+    """All parameter sets, the later over the earlier: the defaults, those of the hair object that
+    --groom names, --preset or a material, --set."""
+    chosen = {section: made() for section, made in ALL_SETTINGS.items()}
+    name = getattr(options, "groom", None)
+    groom = bpy.data.objects.get(name or "")
+    if groom is not None and groom.type == "CURVES":
+        chosen |= own_settings(groom)
+    for name in options.preset:
+        chosen |= {settings.section: settings for settings in named_preset(name).all}
+    if hasattr(options, "groom") and getattr(options, "look_from_material", False):
+        chosen["shading"], notes = look_from_named(name, chosen["shading"])
+        for note in notes:
+            print(f"hairloom: {name}: {note}", file=sys.stderr)
+    return {
+        section: type(values).from_dict(values.as_dict() | overrides(options.set, section), "--set")
+        for section, values in chosen.items()
+    }

@@ -1,0 +1,105 @@
+"""Settings of objects of a scene, as a job without a window finds and changes them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+
+from ...errors import HairloomError
+from ...parameters import ALL_SETTINGS
+from ...params import Settings
+from ..base.objects import objects_in
+from ..properties.presets import named_preset
+from ..properties.properties import settings_of
+from .overrides import overrides
+
+
+def named_objects(
+    names: list[str], is_wanted: Callable[[bpy.types.Object], bool], what: str
+) -> list[bpy.types.Object]:
+    """Objects of the view layer by their names.
+
+    Args:
+        what: such as "a mesh", for the message.
+
+    Raises:
+        HairloomError: there is no such object, or it is something else.
+    """
+    found = []
+    for name in names:
+        obj = bpy.context.view_layer.objects.get(name)
+        if obj is None or not is_wanted(obj):
+            raise HairloomError(
+                f"this does not name {what} of the open scene", place=name, remedy="Check the name"
+            )
+        found.append(obj)
+    return found
+
+
+def is_groom(obj: bpy.types.Object) -> bool:
+    """Whether it is hair, but no copy that shows a bake."""
+    return bool(obj.type == "CURVES" and not obj.data.hairloom.baked_in)
+
+
+def named_grooms(names: list[str]) -> list[bpy.types.Object]:
+    """Those that were named, else all of the view layer.
+
+    Raises:
+        HairloomError: there is none, or no such.
+    """
+    grooms = [obj for obj in objects_in(bpy.context.view_layer) if is_groom(obj)]
+    if not names and not grooms:
+        raise HairloomError(
+            "there is no hair in the open scene",
+            place="--object",
+            remedy="Name a scene that has some with --scene",
+        )
+    return named_objects(names, is_groom, "hair curves") if names else grooms
+
+
+def check_editable(obj: bpy.types.Object) -> None:
+    """Raises:
+    HairloomError: it cannot be changed in this file.
+    """
+    if not obj.is_editable or (obj.data is not None and not obj.data.is_editable):
+        raise HairloomError(
+            "it is linked from another file", place=obj.name, remedy="Make it local in Blender"
+        )
+
+
+def own_settings(obj: bpy.types.Object) -> dict[str, Settings]:
+    """What the artist has set for this object, by section."""
+    groups = {section: _group(obj, section) for section in ALL_SETTINGS}
+    return {
+        section: settings_of(group, ALL_SETTINGS[section])
+        for section, group in groups.items()
+        if group is not None
+    }
+
+
+def put_settings(obj: bpy.types.Object, presets: list[str], assignments: list[str]) -> None:
+    """Change the object's own settings by --preset and --set, as the artist would.
+
+    Raises:
+        HairloomError: no such preset or parameter, or a value that it cannot have.
+    """
+    chosen: dict[str, Settings] = {}
+    for name in presets:
+        chosen |= {settings.section: settings for settings in named_preset(name).all}
+    for section in ALL_SETTINGS:
+        group, values = _group(obj, section), overrides(assignments, section)
+        settings = chosen.get(section)
+        if group is None or (settings is None and not values):
+            continue
+        own = settings_of(group, ALL_SETTINGS[section]) if settings is None else settings
+        changed = type(own).from_dict(own.as_dict() | values, "--set")
+        for name, value in changed.as_dict().items():
+            setattr(group, name, value)
+
+
+def _group(obj: bpy.types.Object, section: str) -> Any:
+    """The object's properties of a section; None where it has none."""
+    owners = (obj.data.hairloom, obj.hairloom) if obj.type == "CURVES" else (obj.hairloom,)
+    return next((g for owner in owners if (g := getattr(owner, section, None)) is not None), None)

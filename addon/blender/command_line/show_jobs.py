@@ -1,0 +1,106 @@
+"""The verbs `turntable` and `sheet`: the groom from all sides."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..base.images import write_png
+from ..pictures.sheet import Sheet
+from ..pictures.turntable import LIGHTS, Turntable, TurntableSettings
+from .job_options import add_moment_options, add_picture_options
+from .job_steps import Job, finish, moment_of, open_studio, read_rig, tell_notes
+from .verb import Verb
+
+
+def turntable(job: Job) -> None:
+    """Turn the groom once before the camera: a picture a frame, and a video of them."""
+    options, report = job.options, job.report
+    chosen = TurntableSettings(
+        frames=options.frames,
+        width=options.width,
+        height=options.height,
+        samples=options.samples,
+        lights=options.lights,
+        transparent=options.transparent,
+        video=not options.no_video,
+        frame_rate=options.frame_rate,
+    )
+    rig, _ = read_rig(job)
+    studio = open_studio(job, rig)
+    pose, points = moment_of(job, rig)
+    turn = Turntable(studio, pose, points, chosen, job.output)
+    progress = report.progress("drawing the turntable", chosen.frames)
+    with report.stage("draw turntable"):
+        for done in turn.steps():
+            progress.show(done)
+    tell_notes(turn.notes, report)
+    for path in turn.files:
+        report.add_output(path)
+    finish(job, job.output)
+
+
+def sheet(job: Job) -> None:
+    """Draw a contact sheet: the groom from all sides, or in all looks."""
+    options, report = job.options, job.report
+    rig, _ = read_rig(job)
+    studio = open_studio(job, rig)
+    size = options.width, options.height
+    drawn = Sheet(studio, *moment_of(job, rig), size, options.samples, by_looks=options.looks)
+    progress = report.progress("drawing the contact sheet", drawn.count)
+    with report.stage("draw contact sheet"):
+        for done in drawn.steps():
+            progress.show(done)
+    write_png(job.output, drawn.picture)
+    finish(job, job.output)
+
+
+def _add_turntable_options(parser: argparse.ArgumentParser) -> None:
+    add_moment_options(parser)
+    add_picture_options(parser, 720, 720)
+    turn = parser.add_argument_group("the turn")
+    turn.add_argument(
+        "--frames",
+        type=int,
+        default=48,
+        metavar="COUNT",
+        help="pictures in a whole turn (default: 48)",
+    )
+    turn.add_argument(
+        "--frame-rate",
+        type=float,
+        default=24.0,
+        metavar="COUNT",
+        help="of the video, frames a second (default: 24)",
+    )
+    turn.add_argument(
+        "--lights",
+        choices=[name for name, _, _ in LIGHTS],
+        default="camera",
+        help="whether lights turn with the camera (default) or stay on the groom",
+    )
+    turn.add_argument("--transparent", action="store_true", help="without a backdrop")
+    turn.add_argument("--no-video", action="store_true", help="pictures only")
+
+
+def _add_sheet_options(parser: argparse.ArgumentParser) -> None:
+    add_moment_options(parser)
+    add_picture_options(parser, 480, 480)
+    parser.add_argument(
+        "--looks", action="store_true", help="in all looks that ship, in place of all sides"
+    )
+
+
+TURNTABLE = Verb(
+    "turntable",
+    turntable,
+    _add_turntable_options,
+    output="folder for the pictures and the video",
+    operators=("turntable",),
+)
+SHEET = Verb(
+    "sheet",
+    sheet,
+    _add_sheet_options,
+    output="picture to write (.png); --width and --height are of each picture in it",
+    operators=("contact_sheet",),
+)

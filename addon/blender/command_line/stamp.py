@@ -1,0 +1,164 @@
+"""What lets a farm run a task again and have only that done which is missing.
+
+A job that is told to skip what exists leaves a stamp beside its output: what it was asked for, and
+digests of all that it has read and written. It is done when all of these are still the same, so a
+changed scene, another option, a cut or missing file make it run again.
+
+Paths are as seen from the stamp, so that a job whose folders are moved together, or are mounted
+elsewhere on another machine, is still done.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...errors import HairloomError
+from ...exchange.files.atomic import write_text_atomic
+from ...params.preset import preset_as_dict
+from ..base.report import Report, hairloom_version
+from ..properties.presets import named_preset
+
+SUFFIX = ".done.json"
+#: options that say nothing about the result
+_NOT_ASKED = frozenset(("report", "progress", "skip_existing"))
+
+
+class Stamp:
+    """The stamp of one job, beside its output.
+
+    Raises:
+        HairloomError: the job names no output, or saves over its own input.
+    """
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        output = getattr(options, "output", None)
+        if output is None:
+            raise HairloomError(
+                "without an output nobody can tell whether it is there",
+                place="--skip-existing",
+                remedy="Name it with --output",
+            )
+        if getattr(options, "save", False):
+            raise HairloomError(
+                "saving over the scene changes what the job is made from",
+                place="--skip-existing",
+                remedy="Save another file: --save-as, or --output",
+            )
+        self.path = output.with_name(output.name + SUFFIX)
+        self._folder = Path(os.path.abspath(self.path.parent))
+        self._asked = _asked(options, self._folder)
+        self._inputs = {path: digest(Path(path)) for path in _named_files(options)}
+
+    def why_not_done(self) -> str:
+        """Why the job has to run; empty where it need not."""
+        try:
+            known = json.loads(self.path.read_text(encoding="utf-8"))
+            asked, inputs, outputs = known["asked"], known["inputs"], known["outputs"]
+            pairs = _pairs(inputs, outputs)
+            changed = [path for path, was in pairs if digest(self._folder / path) != was]
+        except FileNotFoundError:
+            return "it was never done"
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            return f"{self.path.name} cannot be read"
+        if asked != self._asked:
+            return "it is asked for otherwise than before"
+        return f"{changed[0]} is not as it was" if changed else ""
+
+    def write(self, report: Report) -> None:
+        """After the job: all that was read, and all that was written.
+
+        Raises:
+            HairloomError: the stamp cannot be written.
+        """
+        outputs = [os.path.abspath(path) for path in report.outputs]
+        found = [os.path.abspath(path) for path in report.inputs] + _files_of_scene()
+        inputs = {path: digest(Path(path)) for path in found} | self._inputs
+        content = {
+            "asked": self._asked,
+            "inputs": {
+                _seen_from(self._folder, path): was
+                for path, was in inputs.items()
+                if path not in outputs
+            },
+            "outputs": {_seen_from(self._folder, path): digest(Path(path)) for path in outputs},
+        }
+        write_text_atomic(self.path, json.dumps(content, indent=2) + "\n")
+
+
+def digest(path: Path) -> str:
+    """Of a file's content, or of all files in a folder with their names; "" for neither."""
+    if path.is_dir():
+        lines = [
+            f"{file.relative_to(path).as_posix()} {digest(file)}\n"
+            for file in sorted(path.rglob("*"))
+            if file.is_file()
+        ]
+        return hashlib.blake2b("".join(lines).encode(), digest_size=16).hexdigest()
+    if not path.is_file():
+        return ""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+
+
+def _pairs(*tables: dict[str, str]) -> Iterable[tuple[str, str]]:
+    return (pair for table in tables for pair in table.items())
+
+
+def _seen_from(folder: Path, path: str) -> str:
+    """An absolute path as seen from a folder; as it is where that is on another drive."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return path
+
+
+def _asked(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """All options as JSON has them, absolute paths in them as seen from a folder; what their
+    presets say; and which Hairloom and Blender."""
+    asked = {
+        name: _moved_with(folder, value)
+        for name, value in vars(options).items()
+        if name not in _NOT_ASKED
+    }
+    presets = [preset_as_dict(named_preset(name)) for name in getattr(options, "preset", ())]
+    asked |= {"presets": presets, "made_by": [hairloom_version(), bpy.app.version_string]}
+    plain: dict[str, Any] = json.loads(json.dumps(asked, default=str))
+    return plain
+
+
+def _moved_with(folder: Path, value: Any) -> Any:
+    """An option's value, in which absolute paths, also those of NAME=FILE, are seen from here."""
+    if isinstance(value, list):
+        return [_moved_with(folder, each) for each in value]
+    if isinstance(value, Path):
+        return _seen_from(folder, os.path.abspath(value))
+    if not isinstance(value, str):
+        return value
+    name, sign, path = value.rpartition("=")
+    return f"{name}{sign}{_seen_from(folder, path)}" if os.path.isabs(path) else value
+
+
+def _named_files(options: argparse.Namespace) -> set[str]:
+    """The files that options name, also as NAME=FILE; and the open scene's, where none is named."""
+    words = []
+    for name, value in vars(options).items():
+        if name not in _NOT_ASKED and name != "output":
+            words += [str(one) for one in (value if isinstance(value, list) else [value])]
+    words += [word.partition("=")[2] for word in words]
+    if not getattr(options, "scene", None):
+        words.append(bpy.data.filepath)
+    return {os.path.abspath(word) for word in words if word and Path(word).is_file()}
+
+
+def _files_of_scene() -> list[str]:
+    """The files that the open scene takes more from: libraries, pictures, caches."""
+    paths: list[str] = bpy.utils.blend_paths(absolute=True, packed=False, local=False)
+    return [os.path.abspath(path) for path in paths if Path(path).is_file()]

@@ -1,0 +1,111 @@
+"""The render engine Hairloom, as Blender knows it: what is behind it is in engine_still.py and
+engine_view.py."""
+
+from __future__ import annotations
+
+import traceback
+from typing import Any
+
+import bpy
+
+from ...errors import HairloomError
+from ...render import skin_layouts
+from ...render.shader_source import ShaderError
+from ..viewport.overlay import ENGINE
+from . import engine_hair
+from .engine_still import COMBINED, DEPTH_PASS, NUMBERS_PASS, Still
+from .engine_view import EngineView
+
+
+class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
+    """Draws meshes and hair on the GPU"""
+
+    bl_idname = ENGINE
+    bl_label = "Hairloom"
+    bl_use_preview = False
+    bl_use_eevee_viewport = True
+    # With it Blender makes a context before it asks us, and crashes where none can be had: in the
+    # background, where renders run in the main thread, we look first.
+    bl_use_gpu_context = not bpy.app.background
+
+    def __init__(self, *args: Any, **keywords: Any) -> None:
+        super().__init__(*args, **keywords)
+        self.view = EngineView()
+        self.failure = ""
+
+    def update_render_passes(self, scene: Any, renderlayer: Any) -> None:
+        """Tell Blender's compositor and file outputs what passes there will be."""
+        self.register_pass(scene, renderlayer, COMBINED, 4, "RGBA", "COLOR")
+        for (name, channels, ids, kind), is_wanted in _data_passes(renderlayer):
+            if is_wanted:
+                self.register_pass(scene, renderlayer, name, channels, ids, kind)
+
+    def render(self, depsgraph: Any) -> None:
+        """F12 and animations, once for each view layer; in a thread of its own in the window."""
+        layer = depsgraph.view_layer
+        for (name, channels, ids, _), is_wanted in _data_passes(layer):
+            if is_wanted:
+                self.add_pass(name, channels, ids, layer=layer.name)
+        try:
+            still = Still(self, depsgraph)
+            for name in _views(depsgraph.scene.render):
+                still.view(name)
+        except Exception as error:
+            if not isinstance(error, (HairloomError, ShaderError)):
+                traceback.print_exc()
+            # error_set() alone tells nobody in the background
+            self.report({"ERROR"}, f"Hairloom: {error}")
+            return
+        for warning in still.warnings:
+            self.report({"WARNING"}, warning)
+
+    def view_update(self, context: Any, depsgraph: Any) -> None:
+        """Blender has evaluated something anew."""
+        self.failure = ""
+        self._attempt(self.view.read, context, depsgraph)
+
+    def view_draw(self, context: Any, depsgraph: Any) -> None:
+        """Called for each redraw of a 3D view in Rendered mode."""
+        counts = self._attempt(self.view.draw, context, depsgraph)
+        if counts is None:
+            return
+        count, wanted = counts
+        warning = next(iter(self.view.warnings), "")
+        lacking = "Hair is being made. " if self.view.is_waiting else ""
+        self.update_stats(f"{lacking}Sample {count} of {wanted}", warning)
+        if count < wanted:
+            self.tag_redraw()
+
+    def _attempt(self, action: Any, context: Any, depsgraph: Any) -> Any:
+        """Do it; an error is told once, not at every redraw, until the scene is another one."""
+        if self.failure:
+            return None
+        try:
+            return action(context, depsgraph)
+        except Exception as error:
+            if not isinstance(error, (HairloomError, ShaderError)):
+                traceback.print_exc()
+            self.failure = f"Hairloom cannot draw here: {error}"
+            print(self.failure)
+            self.update_stats("Hairloom cannot draw here", str(error).splitlines()[0])
+            return None
+
+
+def _data_passes(layer: Any) -> tuple[tuple[tuple[str, int, str, str], bool], ...]:
+    return (DEPTH_PASS, layer.use_pass_z), (NUMBERS_PASS, layer.use_pass_object_index)
+
+
+def _views(render: Any) -> list[str]:
+    """The names of the views of a picture; one without a name if there is but one."""
+    if not render.use_multiview:
+        return [""]
+    return [view.name for view in render.views if view.use]
+
+
+CLASSES = (HAIRLOOM_RE_engine,)
+
+
+def unregister() -> None:
+    """Keep nothing in memory."""
+    engine_hair.forget()
+    skin_layouts.forget()

@@ -1,0 +1,286 @@
+"""A scene as the render engine draws it, read from one evaluation of Blender's.
+
+Reading writes nothing, and keeps no reference into Blender's data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...render.scene_snapshot import DrawnGroom, SceneSnapshot
+from ...render.snapshot import MeshSnapshot, Snapshot
+from ...shading.mesh_shadow_settings import MeshShadowSettings
+from ...shading.skin.notes import uv_notes
+from ..base.objects import head_of
+from ..properties.properties import settings_of
+from ..scene.lights import light_warnings, read_ambient, read_lights
+from ..scene.mesh_materials import material_notes
+from . import engine_hair, engine_making
+from .engine_making import HairNotMadeYetError
+from .engine_meshes import SOLID_TYPES, as_before, read_meshes
+
+type Key = tuple[int, ...]
+type IsShown = Callable[[bpy.types.Object], bool]
+
+
+@dataclass(frozen=True)
+class Visibility:
+    """How one instance takes part in the picture."""
+
+    is_seen: bool
+    is_holdout: bool
+    casts: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _ReadMesh:
+    """notes: on its materials; skin_notes: on its UVs, of a head on which a shadow may be soft."""
+
+    matrix: Floats
+    is_holdout: bool
+    meshes: tuple[MeshSnapshot, ...]
+    notes: tuple[str, ...] = ()
+    skin_notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _ReadGroom:
+    """state: all that it hangs on but for its curves and its head."""
+
+    state: tuple[Any, ...]
+    groom: DrawnGroom
+
+
+class SceneReader:
+    """Reads a scene again and again; what is the same stays the same object.
+
+    warnings: what the artist should know of the last reading, each with its remedy.
+    previewed: grooms that were left out because they are previewed, by session number.
+    awaited: grooms that are as they were, as other hair of them is being made.
+    """
+
+    def __init__(self) -> None:
+        self.warnings: tuple[str, ...] = ()
+        self.previewed: dict[int, Visibility] = {}
+        self.awaited: set[int] = set()
+        self._meshes: dict[Key, _ReadMesh] = {}
+        self._grooms: dict[Key, _ReadGroom] = {}
+        self._heads: frozenset[int] = frozenset()
+
+    def read(
+        self,
+        depsgraph: bpy.types.Depsgraph,
+        *,
+        changed: set[int] | None = None,
+        is_shown: IsShown = lambda _: True,
+        is_previewed: Callable[[int], bool] = lambda _: False,
+        is_expected: Callable[[int], bool] = lambda _: False,
+        waits: bool = True,
+    ) -> SceneSnapshot:
+        """The scene of this evaluation.
+
+        Args:
+            changed: session numbers of what may have another shape or material than when it was
+                read last; None: all.
+            is_shown: whether an object is seen at all.
+            is_previewed: whether a groom is left out, by its session number.
+            is_expected: whether a groom stays as it was, as its preview is about to be there.
+            waits: False: hair is made in a thread, and is as it was until then.
+        """
+        warnings: list[str] = []
+        drawn: list[MeshSnapshot] = []
+        casters: list[MeshSnapshot] = []
+        grooms: dict[Key, _ReadGroom] = {}
+        read: dict[Key, _ReadMesh] = {}
+        uids: set[int] = set()
+        self.previewed, self.awaited = {}, set()
+        self._heads = _heads(depsgraph)
+        for instance in depsgraph.object_instances:
+            obj = instance.object
+            if not instance.show_self or not is_shown(_holder(instance)):
+                continue
+            key, matrix = _key(instance), np.array(instance.matrix_world)
+            visibility = _visibility(instance, depsgraph.view_layer)
+            if obj.type in SOLID_TYPES:
+                read[key] = self._read_mesh(key, obj, matrix, visibility, changed)
+                if visibility.is_seen:
+                    drawn += read[key].meshes
+                if visibility.casts:
+                    casters += read[key].meshes
+            elif obj.type == "CURVES" and is_previewed(obj.original.session_uid):
+                uids.add(engine_hair.owner_of(obj.original).session_uid)
+                self.previewed[obj.original.session_uid] = visibility
+            elif obj.type == "CURVES" and is_expected(obj.original.session_uid):
+                uids.add(engine_hair.owner_of(obj.original).session_uid)
+                grooms |= {key: self._grooms[key]} if key in self._grooms else {}
+            elif obj.type == "CURVES" and visibility.is_seen:
+                hair = obj.original
+                uids.add(engine_hair.owner_of(hair).session_uid)
+                groom = self._read_groom(
+                    key, hair, matrix, depsgraph, changed, warnings, visibility.is_holdout, waits
+                )
+                grooms |= {} if groom is None else {key: groom}
+        self._meshes, self._grooms = read, grooms
+        engine_hair.forget_but(uids)
+        found = tuple(each.groom for each in grooms.values())
+        center = _center(found, drawn)
+        of_meshes = [note for each in read.values() for note in each.notes]
+        if any(_has_soft_shadow(each.groom.snapshot) for each in grooms.values()):
+            of_meshes += [note for each in read.values() for note in each.skin_notes]
+        self.warnings = (*warnings, *dict.fromkeys(of_meshes), *light_warnings(depsgraph))
+        return SceneSnapshot(
+            meshes=tuple(drawn),
+            casters=tuple(casters),
+            grooms=found,
+            lights=read_lights(depsgraph, center),
+            ambient=read_ambient(depsgraph.scene_eval),
+            mesh_shadows=settings_of(depsgraph.scene.hairloom.mesh_shadows, MeshShadowSettings),
+        )
+
+    def _read_mesh(
+        self,
+        key: Key,
+        obj: bpy.types.Object,
+        matrix: Floats,
+        visibility: Visibility,
+        changed: set[int] | None,
+    ) -> _ReadMesh:
+        known = self._meshes.get(key)
+        if (
+            known is not None
+            and changed is not None
+            and known.is_holdout == visibility.is_holdout
+            and np.array_equal(known.matrix, matrix)
+            and not changed & _uids(obj)
+        ):
+            return known
+        number = obj.pass_index
+        is_head = obj.original.session_uid in self._heads
+        fresh = tuple(
+            replace(mesh, number=number, is_holdout=visibility.is_holdout)
+            for mesh in read_meshes(obj, matrix, is_head=is_head)
+        )
+        if known is not None and len(known.meshes) == len(fresh):
+            pairs = zip(known.meshes, fresh, strict=True)
+            fresh = tuple(as_before(old, new) for old, new in pairs)
+        notes = material_notes(obj)
+        of_uv = _skin_notes(obj.name, fresh, known) if is_head else ()
+        return _ReadMesh(matrix, visibility.is_holdout, fresh, notes, of_uv)
+
+    def _read_groom(
+        self,
+        key: Key,
+        hair: bpy.types.Object,
+        matrix: Floats,
+        depsgraph: bpy.types.Depsgraph,
+        changed: set[int] | None,
+        warnings: list[str],
+        is_holdout: bool,
+        waits: bool,
+    ) -> _ReadGroom | None:
+        """None, and a warning, where the hair cannot be drawn."""
+        if hair.type != "CURVES":
+            warnings.append(
+                f"{hair.name}: hair that modifiers make on an object of another kind is not "
+                "drawn. Use hair curves."
+            )
+            return None
+        known, uid = self._grooms.get(key), engine_hair.owner_of(hair).session_uid
+        try:
+            state: tuple[Any, ...]
+            state = (*engine_hair.state_of(hair, depsgraph), matrix.tobytes(), is_holdout)
+            is_same = known is not None and changed is not None and known.state == state
+            if known is not None and is_same and not (changed or set()) & engine_hair.uids_of(hair):
+                return known
+            snapshot = engine_hair.read_groom(hair, depsgraph, waits=waits)
+        except HairNotMadeYetError:
+            self.awaited.add(uid)
+            return None if known is None else _ReadGroom((), known.groom)  # to be read again
+        except HairloomError as error:
+            warnings.append(str(error))
+            return None
+        if len(key) > 1:
+            own = np.array(hair.evaluated_get(depsgraph).matrix_world)
+            snapshot = engine_hair.placed(snapshot, matrix @ np.linalg.pinv(own))
+        number = engine_hair.owner_of(hair).pass_index
+        if not waits and engine_making.is_pending(uid):
+            self.awaited.add(uid)
+            state = ()
+        return _ReadGroom(state, DrawnGroom(key, snapshot, number, is_holdout))
+
+
+def _has_soft_shadow(snapshot: Snapshot) -> bool:
+    return snapshot.volume.shadows != "none" and snapshot.skin.soft_shadow
+
+
+def _skin_notes(
+    name: str, meshes: tuple[MeshSnapshot, ...], known: _ReadMesh | None
+) -> tuple[str, ...]:
+    """What is wrong with a head's UVs; looked for only where they are others than before."""
+    if not meshes:
+        return ()
+    skin = meshes[0].skin
+    if known is not None and known.meshes and skin is not None:
+        before = known.meshes[0].skin
+        if before is not None and before.surface.corner_uv is skin.surface.corner_uv:
+            return known.skin_notes
+    head = meshes[0].surface if skin is None else skin.surface
+    return tuple(f"{name}: {note}" for note in uv_notes(head))
+
+
+def _heads(depsgraph: bpy.types.Depsgraph) -> frozenset[int]:
+    """Session numbers of the meshes on which hair of this evaluation grows."""
+    hairs = (obj.original for obj in depsgraph.objects if obj.type == "CURVES")
+    heads = (head_of(engine_hair.owner_of(hair)) for hair in hairs if hair.type == "CURVES")
+    return frozenset(head.session_uid for head in heads if head is not None)
+
+
+def _holder(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:
+    """The object of the scene that an instance is there for."""
+    return (instance.parent if instance.is_instance else instance.object).original
+
+
+def _key(instance: bpy.types.DepsgraphObjectInstance) -> Key:
+    uid = instance.object.original.session_uid
+    if not instance.is_instance:
+        return (uid,)
+    return uid, instance.parent.original.session_uid, *instance.persistent_id
+
+
+def _uids(obj: bpy.types.Object) -> set[int]:
+    """Session numbers of an object, its data and its materials."""
+    found = {obj.original.session_uid}
+    if obj.original.data is not None:
+        found.add(obj.original.data.session_uid)
+    slots = (slot.material for slot in obj.material_slots)
+    return found | {material.original.session_uid for material in slots if material is not None}
+
+
+def _visibility(
+    instance: bpy.types.DepsgraphObjectInstance, layer: bpy.types.ViewLayer
+) -> Visibility:
+    """The artist's settings, not what a preview has written into the evaluated copy."""
+    obj, holder = instance.object.original, _holder(instance)
+    is_indirect = holder.indirect_only_get(view_layer=layer)
+    # a copy for renders stands for the groom, and is as that is
+    owner = engine_hair.owner_of(obj) if obj.type == "CURVES" else obj
+    marked = (each.is_holdout for each in (obj, owner, holder))
+    is_holdout = any(marked) or holder.holdout_get(view_layer=layer)
+    return Visibility(obj.visible_camera and not is_indirect, is_holdout, obj.visible_shadow)
+
+
+def _center(grooms: tuple[DrawnGroom, ...], meshes: list[MeshSnapshot]) -> Floats:
+    """The middle of what is lit, (3,) [m]: of the hair, else of the meshes."""
+    if grooms:
+        return np.mean([groom.snapshot.center for groom in grooms], axis=0)
+    if meshes:
+        bounds = [mesh.surface.bounds() for mesh in meshes]
+        return (np.min([b[0] for b in bounds], axis=0) + np.max([b[1] for b in bounds], axis=0)) / 2
+    return np.zeros(3)

@@ -1,0 +1,171 @@
+"""One picture of a render: the samples of one view layer, from one camera, with its passes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...render.accumulation import Accumulation, Target
+from ...render.camera import Camera
+from ...render.camera_window import Window, jittered
+from ...render.pixel_filter import jitters
+from ...render.scene_pass import Rgba, ScenePass
+from ...render.scene_snapshot import SceneSnapshot
+from ...shading.picture_settings import PictureSettings
+from ..properties.properties import settings_of
+from .engine_camera import border_window, camera_warnings, read_camera
+from .engine_gpu import ensure_gpu_for_render
+from .engine_scene import SceneReader
+
+COMBINED, DEPTH, NUMBERS = "Combined", "Depth", "Object Index"
+#: name, channels, their names, kind; what Blender's compositor knows each by
+DEPTH_PASS = (DEPTH, 1, "Z", "VALUE")
+NUMBERS_PASS = (NUMBERS, 1, "X", "VALUE")
+#: while it renders, the picture so far is shown this often [s]
+_SHOWN_EVERY = 1.0
+
+
+@dataclass(frozen=True)
+class Moment:
+    """When samples are taken.
+
+    time: [frames], from the frame that is rendered.
+    places: (n, 2) the samples' places [pixels].
+    """
+
+    time: float
+    places: Floats
+
+
+def moments_of(settings: PictureSettings, render: bpy.types.RenderSettings) -> tuple[Moment, ...]:
+    """How the samples are shared out in time; all at once without motion blur."""
+    places = jitters(settings.samples, render.filter_size)
+    steps = min(settings.motion_steps, settings.samples) if render.use_motion_blur else 1
+    if steps == 1:
+        return (Moment(0.0, places),)
+    opens = {"START": 0.0, "CENTER": -0.5, "END": -1.0}[render.motion_blur_position]
+    return tuple(
+        Moment(render.motion_blur_shutter * (opens + (step + 0.5) / steps), places[step::steps])
+        for step in range(steps)
+    )
+
+
+class Still:
+    """Renders view layers one after the other, in the context of one render.
+
+    Args:
+        engine: Blender's render engine, which shows progress and knows when to stop.
+
+    Raises:
+        HairloomError: no GPU, or a picture without pixels.
+    """
+
+    def __init__(self, engine: Any, depsgraph: bpy.types.Depsgraph) -> None:
+        ensure_gpu_for_render()
+        self._engine, self._depsgraph = engine, depsgraph
+        self._render = depsgraph.scene.render
+        self._settings = settings_of(depsgraph.scene.hairloom.picture, PictureSettings)
+        self._whole = engine.resolution_x, engine.resolution_y
+        self._window: Window
+        self._window, self._size = border_window(self._render, *self._whole)
+        self._reader, self._pass = SceneReader(), ScenePass()
+        self._target, self._picture = Target(), Accumulation()
+        self.warnings: tuple[str, ...] = ()
+
+    def view(self, name: str) -> None:
+        """Render the view of this name (of a camera without eyes it is empty).
+
+        Raises:
+            HairloomError: there is no camera.
+            ShaderError: a shader does not compile here.
+        """
+        engine, depsgraph = self._engine, self._depsgraph
+        engine.active_view_set(name)
+        result = engine.begin_result(0, 0, *self._size, layer=depsgraph.view_layer.name, view=name)
+        try:
+            self._fill(result)
+        finally:
+            engine.end_result(result)
+
+    def _fill(self, result: Any) -> None:
+        frame = self._depsgraph.scene.frame_current_final
+        moments = moments_of(self._settings, self._render)
+        self._picture.begin(*self._size)
+        shown = time.monotonic()
+        scene, camera = self._moment()
+        self._add_data(result, scene, camera)
+        for moment in moments:
+            if len(moments) > 1:
+                self._go_to(frame + moment.time)
+                scene, camera = self._moment()
+            for place in moment.places:
+                if self._engine.test_break():
+                    break
+                self._add_sample(scene, camera, place)
+                if time.monotonic() - shown > _SHOWN_EVERY:
+                    self._show(result)
+                    self._engine.update_result(result)
+                    shown = time.monotonic()
+        if len(moments) > 1:
+            self._go_to(frame)
+        self._show(result)
+
+    def _moment(self) -> tuple[SceneSnapshot, Camera]:
+        """Scene and camera as they are evaluated now."""
+        scene = self._reader.read(self._depsgraph)
+        found = (*self._reader.warnings, *camera_warnings(self._depsgraph))
+        self.warnings = tuple(dict.fromkeys((*self.warnings, *found, *_dark(scene))))
+        return scene, read_camera(self._engine, self._depsgraph, *self._whole, self._window)
+
+    def _go_to(self, time_: float) -> None:
+        frame = int(np.floor(time_))
+        self._engine.frame_set(frame, time_ - frame)
+
+    def _add_sample(self, scene: SceneSnapshot, camera: Camera, place: Floats) -> None:
+        moved = jittered(camera, place, *self._size, sample=self._picture.count)
+        self._pass.draw(scene, moved, self._target, self._size, sky_of(scene, self._render))
+        self._picture.add(self._target.color)
+        self._engine.update_progress(self._picture.count / self._settings.samples)
+        self._engine.update_stats("", f"Sample {self._picture.count} of {self._settings.samples}")
+
+    def _add_data(self, result: Any, scene: SceneSnapshot, camera: Camera) -> None:
+        """Depth and object numbers, of the middle of each pixel at the frame itself."""
+        wanted = {each.name: each for each in _passes(result) if each.name in (DEPTH, NUMBERS)}
+        if not wanted:
+            return
+        distances, numbers = self._pass.distances_and_numbers(
+            scene, camera, self._target, self._size
+        )
+        for name, values in ((DEPTH, distances), (NUMBERS, numbers)):
+            if name in wanted:
+                wanted[name].rect.foreach_set(np.ascontiguousarray(values, np.float32).ravel())
+
+    def _show(self, result: Any) -> None:
+        for each in _passes(result):
+            if each.name == COMBINED:
+                each.rect.foreach_set(self._picture.mean().ravel())
+
+
+def sky_of(scene: SceneSnapshot, render: bpy.types.RenderSettings) -> Rgba:
+    """What is seen where nothing is, premultiplied."""
+    return (0.0, 0.0, 0.0, 0.0) if render.film_transparent else (*scene.ambient, 1.0)
+
+
+def _passes(result: Any) -> Iterator[Any]:
+    for layer in result.layers:
+        yield from layer.passes
+
+
+def _dark(scene: SceneSnapshot) -> tuple[str, ...]:
+    if scene.lights or any(scene.ambient):
+        return ()
+    return (
+        "Lights: no light shines here and the world is black, so the picture is black. Add a "
+        "light, or give the world a colour.",
+    )

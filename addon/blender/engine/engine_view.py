@@ -1,0 +1,181 @@
+"""The viewport in Rendered mode: a picture that gets better while nothing moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import gpu
+import numpy as np
+
+from ...render.accumulation import Accumulation, Target
+from ...render.camera import Camera
+from ...render.camera_window import Window, cropped, jittered
+from ...render.pixel_filter import jitters
+from ...render.scene_pass import ScenePass
+from ...render.scene_snapshot import DrawnGroom, SceneSnapshot
+from ...render.snapshot import Snapshot
+from ...shading.lights import three_point_lights
+from ...shading.mesh_shadow_settings import MeshShadowSettings
+from ...shading.picture_settings import PictureSettings
+from ..properties.properties import settings_of
+from ..scene.lights import uses_scene_light
+from ..sessions import making
+from ..sessions.shown import with_all_strands
+from ..viewport import overlay
+from . import engine_making
+from .engine_camera import view_rectangle
+from .engine_scene import SceneReader, Visibility
+from .engine_still import sky_of
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """All that a sample hangs on; equal ones add up.
+
+    scene: with what is previewed in it.
+    marks: numbers and objects that are others as soon as the picture is another one.
+    """
+
+    scene: SceneSnapshot
+    camera: Camera
+    marks: tuple[Any, ...]
+
+    def continues(self, other: _Shown | None) -> bool:
+        return (
+            other is not None
+            and len(self.marks) == len(other.marks)
+            and all(a is b or a == b for a, b in zip(self.marks, other.marks, strict=True))
+        )
+
+
+class EngineView:
+    """One 3D view that is drawn by the engine."""
+
+    def __init__(self) -> None:
+        self._reader, self._pass = SceneReader(), ScenePass()
+        self._target, self._picture = Target(), Accumulation()
+        self._scene: SceneSnapshot | None = None
+        self._shown: _Shown | None = None
+        self._previewed: tuple[frozenset[int], ...] = ()
+        self._local: int = 0
+
+    def read(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
+        """Take over what Blender has evaluated anew."""
+        changed = {update.id.original.session_uid for update in depsgraph.updates}
+        self._read(context, depsgraph, changed if self._scene is not None else None)
+
+    def draw(self, context: Any, depsgraph: bpy.types.Depsgraph) -> tuple[int, int]:
+        """Add a sample to the picture if it is to have more, and draw it.
+
+        Returns:
+            Samples so far, and how many there are to be.
+        """
+        space, render = context.space_data, depsgraph.scene.render
+        local = space.local_view.as_pointer() if space.local_view else 0
+        is_other = self._previewed != _previewed() or self._local != local
+        if self._scene is None or is_other or self._has_arrived:
+            self._read(context, depsgraph, None if self._scene is None else set())
+        settings = settings_of(depsgraph.scene.hairloom.picture, PictureSettings)
+        left, bottom, wide, high = gpu.state.viewport_get()
+        x, y, *size = view_rectangle(context, depsgraph, wide, high)
+        if not all(size):
+            return settings.viewport_samples, settings.viewport_samples
+        window = x / wide, y / high, (x + size[0]) / wide, (y + size[1]) / high
+        shown = self._now(context, render, size, window)
+        if not shown.continues(self._shown) or self._picture.size != tuple(size):
+            self._picture.begin(*size)
+        self._shown = shown
+        if self._picture.count < settings.viewport_samples:
+            self._add_sample(shown, render)
+        # beyond its region Blender's background stays
+        gpu.state.viewport_set(left + x, bottom + y, *size)
+        self._picture.show(left + x, bottom + y)
+        gpu.state.viewport_set(left, bottom, wide, high)
+        return self._picture.count, settings.viewport_samples
+
+    def _add_sample(self, shown: _Shown, render: bpy.types.RenderSettings) -> None:
+        size, number = self._picture.size, self._picture.count
+        place = jitters(number + 1, render.filter_size)[-1]
+        camera = jittered(shown.camera, place, *size, number)
+        self._pass.draw(shown.scene, camera, self._target, size, sky_of(shown.scene, render))
+        self._picture.add(self._target.color)
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether hair is being made, and the picture is without it."""
+        return bool(self._reader.awaited or overlay.expected())
+
+    @property
+    def _has_arrived(self) -> bool:
+        return any(engine_making.is_done(uid) for uid in self._reader.awaited)
+
+    @property
+    def count(self) -> int:
+        """Samples so far of what is shown."""
+        return self._picture.count
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return self._reader.warnings
+
+    def _read(self, context: Any, depsgraph: bpy.types.Depsgraph, changed: set[int] | None) -> None:
+        space = context.space_data
+        self._local = space.local_view.as_pointer() if space.local_view else 0
+        self._previewed = drawn, expected = _previewed()
+        self._scene = self._reader.read(
+            depsgraph,
+            changed=changed,
+            is_shown=lambda obj: obj.visible_in_viewport_get(space),
+            is_previewed=drawn.__contains__,
+            is_expected=expected.__contains__,
+            waits=making.is_awaited(),
+        )
+
+    def _now(
+        self, context: Any, render: bpy.types.RenderSettings, size: list[int], window: Window
+    ) -> _Shown:
+        assert self._scene is not None
+        space, view = context.space_data, context.region_data
+        whole = Camera(np.array(view.view_matrix), np.array(view.window_matrix))
+        camera = cropped(whole, window)
+        unknown = Visibility(is_seen=True, is_holdout=False, casts=True)
+        found = (
+            (*each, self._reader.previewed.get(each[0], unknown))
+            for each in overlay.shown_in(context)
+            if each[1].is_made
+        )
+        previewed = tuple(
+            DrawnGroom((uid,), with_all_strands(drawing.snapshot), is_holdout=visibility.is_holdout)
+            for uid, drawing, visibility in found
+            if visibility.is_seen
+        )
+        shadows = settings_of(context.scene.hairloom.mesh_shadows, MeshShadowSettings)
+        grooms = (*self._scene.grooms, *previewed)
+        scene = replace(self._scene, grooms=grooms, mesh_shadows=shadows)
+        uses_lights, uses_world = uses_scene_light(space.shading)
+        if not uses_lights:
+            scene = replace(scene, lights=three_point_lights(camera.view))
+        if not uses_world:
+            scene = replace(scene, ambient=Snapshot.ambient)
+        marks = (
+            *(self._scene, shadows),
+            *(drawing.snapshot for _, drawing in overlay.shown_in(context)),
+            *(_serial(groom.snapshot) for groom in previewed),
+            *((groom.key, groom.is_holdout) for groom in previewed),
+            camera.view.tobytes(),
+            camera.projection.tobytes(),
+            (uses_lights, uses_world, render.film_transparent, render.filter_size, *size),
+        )
+        return _Shown(scene, camera, marks)
+
+
+def _previewed() -> tuple[frozenset[int], ...]:
+    """Session numbers of grooms that are previewed, and of those that are about to be."""
+    return overlay.drawn(), overlay.expected()
+
+
+def _serial(snapshot: Snapshot) -> int:
+    """Grows with every moment that the GPU computes into the same texture."""
+    return 0 if snapshot.device_points is None else snapshot.device_points.serial

@@ -1,0 +1,108 @@
+"""The contact sheet of a groom: seen from all sides, or in all looks, in one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ...arrays import Floats
+from ...pipeline import Pose
+from ...render.camera import Camera, frame_camera
+from ...shading.settings import ShadingSettings
+from ...shading.shafts_settings import ShaftSettings
+from ..base.images import contact_sheet
+from ..properties.presets import named_preset, shipped
+from .labels import labelled
+from .studio import FIELD_OF_VIEW, MARGIN, VIEW_DIRECTION, Studio
+
+#: name of a view and the way from the groom to the camera; heads face -Y
+VIEWS = (
+    ("Front", (0.0, -1.0, 0.08)),
+    ("Three-quarter", VIEW_DIRECTION),
+    ("Side", (-1.0, 0.0, 0.08)),
+    ("Back", (0.0, 1.0, 0.08)),
+    ("Top", (0.0, -0.05, 1.0)),
+)
+CLOSE_UP = "Close-up"
+COLUMNS = 3
+#: of a close-up: how much of the groom it shows, and which share of all strands is near the eye
+_CLOSE_SHARE, _NEAREST_SHARE = 0.2, 0.1
+
+
+class Sheet:
+    """A contact sheet that is drawn picture by picture.
+
+    Args:
+        pose, points: see Studio.picture.
+        size: width and height of each picture [pixels].
+        by_looks: one view in all looks that come with Hairloom, in place of all views.
+    """
+
+    def __init__(
+        self,
+        studio: Studio,
+        pose: Pose,
+        points: Floats,
+        size: tuple[int, int],
+        samples: int,
+        *,
+        by_looks: bool = False,
+    ) -> None:
+        self._studio, self._pose, self._points = studio, pose, points
+        self._size, self._samples, self._by_looks = size, samples, by_looks
+        self._bounds = studio.bounds(pose, points)
+        self._pictures: list[Floats] = []
+
+    @property
+    def count(self) -> int:
+        return len(shipped("shading")) if self._by_looks else len(VIEWS) + 1
+
+    def steps(self) -> Iterator[int]:
+        """Draw everything; after each picture comes how many are done."""
+        for name, picture in self._looks() if self._by_looks else self._views():
+            self._pictures.append(labelled(picture, name))
+            yield len(self._pictures)
+
+    @property
+    def picture(self) -> Floats:
+        """All that was drawn, (height, width, 4)."""
+        return contact_sheet(self._pictures, COLUMNS)
+
+    def _views(self) -> Iterator[tuple[str, Floats]]:
+        for name, direction in VIEWS:
+            yield name, self._seen(self._camera(direction, self._bounds))
+        yield CLOSE_UP, self._seen(self._camera(VIEW_DIRECTION, self._near_the_eye()))
+
+    def _looks(self) -> Iterator[tuple[str, Floats]]:
+        worn = self._studio.look
+        camera = self._camera(VIEW_DIRECTION, self._bounds)
+        try:
+            for entry in shipped("shading"):
+                shading, shafts = ShadingSettings(), ShaftSettings()
+                for settings in named_preset(entry.name).all:
+                    if isinstance(settings, ShadingSettings):
+                        shading = settings
+                    elif isinstance(settings, ShaftSettings):
+                        shafts = settings
+                self._studio.look = replace(worn, shading=shading, shafts=shafts)
+                yield entry.title, self._seen(camera)
+        finally:
+            self._studio.look = worn
+
+    def _seen(self, camera: Camera) -> Floats:
+        return self._studio.picture(self._pose, self._points, *self._size, self._samples, camera)
+
+    def _camera(self, direction: tuple[float, float, float], held: tuple[Floats, Floats]) -> Camera:
+        aspect = self._size[0] / self._size[1]
+        return frame_camera(held, direction, FIELD_OF_VIEW, aspect, margin=MARGIN)
+
+    def _near_the_eye(self) -> tuple[Floats, Floats]:
+        """A box around the hair that is nearest in the three-quarter view."""
+        middles = self._points[:, self._points.shape[1] // 2]
+        towards = middles @ np.array(VIEW_DIRECTION)
+        count = max(round(_NEAREST_SHARE * len(middles)), 1)
+        middle = middles[np.argsort(towards)[-count:]].mean(axis=0)
+        reach = 0.5 * _CLOSE_SHARE * float(np.max(self._bounds[1] - self._bounds[0]))
+        return middle - reach, middle + reach

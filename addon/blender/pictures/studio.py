@@ -1,0 +1,252 @@
+"""The studio of the command line: a groom on its head under three lights, before one camera."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ... import pipeline
+from ...arrays import Floats
+from ...cards.drawing_settings import CardDrawingSettings
+from ...pipeline import Pose, Rig
+from ...refine.settings import DetailSettings
+from ...render.camera import Camera, frame_camera
+from ...render.card_pass import CardPass
+from ...render.card_snapshot import CardSnapshot
+from ...render.frame import render_image
+from ...render.hair_ball import HairBall
+from ...render.mesh_pass import MeshPass
+from ...render.snapshot import MeshSnapshot, Snapshot
+from ...render.strand_pass import Statistics, StrandPass
+from ...shading.lights import Light, three_point_lights
+from ...shading.settings import ShadingSettings, StrandSettings
+from ...shading.shafts_settings import ShaftSettings
+from ...shading.skin.notes import skin_notes
+from ...shading.skin.settings import SkinSettings
+from ...shading.volume.settings import VolumeSettings
+from ...shading.volume.shadow_lights import shadow_warnings
+from ...strands import Surface
+from ..base.gpu_context import ensure_gpu
+from ..cards.card_builds import BuiltCards, CardForm, built_cards
+from ..cards.shown_cards import as_shown
+from ..sessions.hiders import Hiders
+from ..sessions.shown import snapshot_of
+from .skin_picture import shown_skin_shadow
+from .slices import shown_slices
+
+#: three-quarter view from the front; heads face -Y
+VIEW_DIRECTION = (-0.55, -1.0, 0.18)
+FIELD_OF_VIEW = np.radians(30.0)
+#: how far around the groom its head is shown, as a share of the groom's size
+HEAD_ROOM = 0.25
+#: below 1, because nothing fills the corners of the box that the camera holds
+MARGIN = 0.85
+BACKDROP = (0.045, 0.05, 0.058, 1.0)
+
+type Rgba = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Look:
+    """How hair is drawn.
+
+    debug_view: what strands are coloured by, see render.snapshot.
+    card_form, card_pictures: what cards are built by where card_drawing shows them.
+    """
+
+    shading: ShadingSettings
+    strands: StrandSettings
+    detail: DetailSettings
+    debug_view: str = "none"
+    volume: VolumeSettings = field(default_factory=VolumeSettings)
+    skin: SkinSettings = field(default_factory=SkinSettings)
+    shafts: ShaftSettings = field(default_factory=ShaftSettings)
+    card_drawing: CardDrawingSettings = field(default_factory=CardDrawingSettings)
+    card_form: CardForm = field(default_factory=CardForm)
+    card_pictures: Mapping[str, Floats] = field(default_factory=dict)
+
+
+class Studio:
+    """Draws moments of one groom, always with the same framing, so that pictures compare.
+
+    Args:
+        occlusion: (strand_count, cv_count) in [0, 1], at rest.
+        head_occlusion: (vertex_count,) in [0, 1], at rest; None without a head.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        occlusion: Floats,
+        head_occlusion: Floats | None,
+        look: Look,
+    ) -> None:
+        ensure_gpu()
+        self._rig, self._head_occlusion = rig, head_occlusion
+        self._passes, self._card_pass = (MeshPass(), StrandPass()), CardPass()
+        self._cards: BuiltCards | None = None
+        self._hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
+        self._groom = snapshot_of(rig, occlusion, pipeline.strand_ranks(rig))
+        self.look = look
+
+    @property
+    def _at_rest(self) -> Snapshot:
+        look = self.look
+        return replace(
+            self._groom,
+            shading=look.shading,
+            strand_settings=look.strands,
+            detail=look.detail,
+            volume=look.volume,
+            skin=look.skin,
+            shafts=look.shafts,
+            debug_view=look.debug_view,
+        )
+
+    def picture(
+        self,
+        pose: Pose,
+        points: Floats,
+        width: int,
+        height: int,
+        samples: int,
+        camera: Camera | None = None,
+        *,
+        lights: tuple[Light, ...] | None = None,
+        background: Rgba = BACKDROP,
+    ) -> Floats:
+        """Hair at these points on the head in this pose, (height, width, 4) scene-linear.
+
+        Args:
+            points: (strand_count, cv_count, 3) [m], world space.
+            samples: sub-pixels along each side of a pixel.
+            camera: in place of the studio's own.
+            lights: in place of three that hang on the camera.
+            background: premultiplied.
+        """
+        camera = camera or self._camera(width / height)
+        snapshot = replace(
+            self._at_rest,
+            strands=points,
+            meshes=self._meshes(pose),
+            lights=three_point_lights(camera.view) if lights is None else lights,
+            hiders=None if self._hiders is None else self._hiders.at(pose),
+            cards=self._cards_at(pose, points),
+        )
+        return render_image(
+            as_shown(snapshot),
+            camera,
+            width,
+            height,
+            samples,
+            background=background,
+            passes=self._passes,
+            card_pass=self._card_pass,
+        )
+
+    def _cards_at(self, pose: Pose, points: Floats) -> CardSnapshot | None:
+        """The cards riding on the guides among these strands, where cards are shown."""
+        look = self.look
+        if look.card_drawing.shown_as != "cards":
+            return None
+        if self._cards is None or self._cards.form != look.card_form:
+            self._cards = built_cards(self._rig, look.card_form, look.card_pictures)
+        drawn = look.card_drawing, look.strands
+        return self._cards.at(pose, points[self._rig.guides], drawn)
+
+    def slices(self, pose: Pose, points: Floats) -> Floats:
+        """The layers of the shadow maps in the studio's light, see opacity_tiles.
+
+        Raises:
+            HairloomError: there are none.
+        """
+        return shown_slices(self._in_its_light(pose, points), self._passes[1])
+
+    def skin_shadow(self, pose: Pose, points: Floats) -> Floats:
+        """The soft shadow on the head in the studio's light, see shown_skin_shadow.
+
+        Raises:
+            HairloomError: there is none.
+        """
+        snapshot = self._in_its_light(pose, points)
+        return shown_skin_shadow(snapshot, self._passes[1], place="--skin-shadow")
+
+    def _in_its_light(self, pose: Pose, points: Floats) -> Snapshot:
+        return replace(
+            self._at_rest,
+            strands=points,
+            meshes=self._meshes(pose),
+            lights=three_point_lights(self._camera(1.0).view),
+        )
+
+    def card_picture(
+        self,
+        cards: CardSnapshot,
+        width: int,
+        height: int,
+        samples: int,
+        camera: Camera | None = None,
+    ) -> Floats:
+        """These cards in place of the strands at rest; arguments as in `picture`."""
+        camera = camera or self._camera(width / height)
+        cv_count = self._at_rest.cv_count
+        snapshot = Snapshot(
+            strands=np.zeros((0, cv_count, 3), np.float32),
+            radius=np.zeros((0, cv_count), np.float32),
+            meshes=self._meshes(self._rig.rest_pose),
+            lights=three_point_lights(camera.view),
+            shading=self._at_rest.shading,
+            volume=self._at_rest.volume,
+            skin=self._at_rest.skin,
+            cards=cards,
+        )
+        return render_image(
+            snapshot,
+            camera,
+            width,
+            height,
+            samples,
+            background=BACKDROP,
+            passes=self._passes,
+            card_pass=self._card_pass,
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the artist should know about shadows, in the studio's light."""
+        lights = three_point_lights(self._camera(1.0).view)
+        snapshot = self._at_rest
+        return (
+            *shadow_warnings(lights, HairBall().of(snapshot), snapshot.volume),
+            *skin_notes(self._rig.head, snapshot.skin, snapshot.volume),
+        )
+
+    @property
+    def statistics(self) -> Statistics:
+        """What was drawn of the hair in the last picture."""
+        return self._passes[1].statistics
+
+    def bounds(self, pose: Pose, points: Floats) -> tuple[Floats, Floats]:
+        """Lowest and highest corner [m] of hair and of what of the head is near it."""
+        places = points.reshape(-1, 3)
+        low, high = places.min(axis=0), places.max(axis=0)
+        if pose.head_positions is not None:
+            room = HEAD_ROOM * float(np.max(high - low))
+            head_low, head_high = pose.head_positions.min(axis=0), pose.head_positions.max(axis=0)
+            low = np.minimum(low, np.maximum(head_low, low - room))
+            high = np.maximum(high, np.minimum(head_high, high + room))
+        return low, high
+
+    def _camera(self, aspect: float) -> Camera:
+        """Holds the groom at rest and what of the head is near it, with room for the motion."""
+        held = self.bounds(self._rig.rest_pose, self._rig.strands.grid)
+        return frame_camera(held, VIEW_DIRECTION, FIELD_OF_VIEW, aspect, margin=MARGIN)
+
+    def _meshes(self, pose: Pose) -> tuple[MeshSnapshot, ...]:
+        if self._rig.head is None or pose.head_positions is None:
+            return ()
+        head = self._rig.head
+        surface = Surface(pose.head_positions, head.triangles, head.corner_uv)
+        return (MeshSnapshot.of(surface, occlusion=self._head_occlusion, is_skin=True),)

@@ -1,0 +1,203 @@
+"""A turntable: the camera goes round a groom once, a picture a frame, and a video of them.
+
+Pictures are written into a folder beside their place and moved there when all are done, so that
+what is cancelled or fails leaves no half of a turn.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...exchange.files.leftovers import remove_leftovers, temporary_beside
+from ...pipeline import Pose
+from ...render.camera import Camera, frame_camera
+from ...shading.lights import Light, three_point_lights
+from ..base.images import write_png
+from .studio import BACKDROP, FIELD_OF_VIEW, MARGIN, Studio
+from .video import write_video
+
+#: who the lights go with: identifier, label, description
+LIGHTS = (
+    ("camera", "Turn with Camera", "As if the groom turned before a camera and lights that stand"),
+    ("groom", "Stay on Groom", "As if the camera went round a groom and lights that stand"),
+)
+#: frame count and sides of pictures [pixels], least and most
+FRAMES, SIDES = (1, 10_000), (16, 4096)
+#: from the groom to the camera, at the first frame; heads face -Y
+_FIRST_DIRECTION = (0.0, -1.0, 0.14)
+
+
+@dataclass(frozen=True)
+class TurntableSettings:
+    """How a groom is turned.
+
+    frames: in a whole turn.
+    width, height: of the pictures [pixels].
+    samples: sub-pixels along each side of a pixel.
+    lights: one of LIGHTS.
+    transparent: no backdrop.
+    video: write a video as well.
+    frame_rate: of the video [frames / s].
+
+    Raises:
+        HairloomError: no frames, or sizes or a frame rate that cannot be.
+    """
+
+    frames: int = 48
+    width: int = 720
+    height: int = 720
+    samples: int = 3
+    lights: str = "camera"
+    transparent: bool = False
+    video: bool = True
+    frame_rate: float = 24.0
+
+    def __post_init__(self) -> None:
+        limits = {"frames": FRAMES, "width": SIDES, "height": SIDES, "samples": (1, 4)}
+        for name, (least, most) in limits.items():
+            if not least <= getattr(self, name) <= most:
+                raise HairloomError(
+                    f"{name} cannot be {getattr(self, name)}",
+                    place="turntable",
+                    remedy=f"Use a number from {least} to {most}",
+                )
+        if not 0.0 < self.frame_rate < np.inf:
+            raise HairloomError(
+                f"a frame rate cannot be {self.frame_rate}",
+                place="turntable",
+                remedy="Use a number above 0, such as 24",
+            )
+
+
+@dataclass
+class Turntable:
+    """A groom on a turntable.
+
+    pose, points: see Studio.picture; what does not move while it is turned.
+    folder, name: pictures become folder/name_0001.png and so on, the video folder/name.mp4.
+    notes: what the artist should know, after the last step.
+    """
+
+    studio: Studio
+    pose: Pose
+    points: Floats
+    settings: TurntableSettings
+    folder: Path
+    name: str = "turntable"
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def has_video(self) -> bool:
+        return self.settings.video and not self.notes
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What there is after the last step: the pictures, and the video if there is one."""
+        numbers = range(1, self.settings.frames + 1)
+        pictures = [self.folder / f"{self.name}_{number:04}.png" for number in numbers]
+        return (*pictures, *([self.folder / f"{self.name}.mp4"] if self.has_video else []))
+
+    def picture(self, frame: int) -> Floats:
+        """The picture of a frame, from 0; that of a whole turn later is the same."""
+        chosen = self.settings
+        return self.studio.picture(
+            self.pose,
+            self.points,
+            chosen.width,
+            chosen.height,
+            chosen.samples,
+            self.camera(frame),
+            lights=self._lights(frame),
+            background=(0.0, 0.0, 0.0, 0.0) if chosen.transparent else BACKDROP,
+        )
+
+    def camera(self, frame: int) -> Camera:
+        """At a frame: once round the groom's middle, from its front by its right side."""
+        low, high = self.studio.bounds(self.pose, self.points)
+        middle, reach = (low + high) / 2.0, float(np.hypot(*(high - low)[:2])) / 2.0
+        # what turns about the middle fills a cylinder
+        around = np.array([reach, reach, float(high[2] - low[2]) / 2.0])
+        aspect = self.settings.width / self.settings.height
+        held = middle - around, middle + around
+        first = frame_camera(held, _FIRST_DIRECTION, FIELD_OF_VIEW, aspect, margin=MARGIN)
+        return replace(first, view=first.view @ _turned_about(middle, frame / self.settings.frames))
+
+    def steps(self) -> Generator[int]:
+        """Write everything; after each picture comes how many are done.
+
+        Raises:
+            HairloomError: nothing can be written there.
+        """
+        chosen = self.settings
+        with _moved_when_done(self.folder) as beside:
+            frames = [beside / path.name for path in self.files[: chosen.frames]]
+            for index, path in enumerate(frames):
+                write_png(path, self.picture(index))
+                yield index + 1
+            if chosen.video:
+                self._write_video(beside, frames)
+
+    def _write_video(self, beside: Path, frames: list[Path]) -> None:
+        """A video, or a note why there is none: the pictures are there all the same."""
+        chosen = self.settings
+        try:
+            size = chosen.width, chosen.height
+            write_video(beside / f"{self.name}.mp4", frames, size, chosen.frame_rate)
+        except HairloomError as error:
+            self.notes.append(f"{error.problem}. {error.remedy}")
+
+    def _lights(self, frame: int) -> tuple[Light, ...]:
+        follows = self.settings.lights == "camera"
+        return three_point_lights(self.camera(frame if follows else 0).view)
+
+
+def _turned_about(middle: Floats, turns: float) -> Floats:
+    """A turn about the vertical through a place, (4, 4), exactly 1 after whole turns."""
+    angle = 2.0 * np.pi * (turns % 1.0)
+    cos, sin = np.cos(angle), np.sin(angle)
+    turn = np.eye(4)
+    turn[:2, :2] = [[cos, -sin], [sin, cos]]
+    turn[:3, 3] = middle - turn[:3, :3] @ middle
+    return turn
+
+
+@contextmanager
+def _moved_when_done(folder: Path) -> Iterator[Path]:
+    """An empty folder, whose files go into `folder` when the block ends well; else they vanish."""
+    is_new = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        remove_leftovers(folder)
+        beside = temporary_beside(folder / "turntable")
+        beside.mkdir()
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+    is_done = False
+    try:
+        yield beside
+        for file in sorted(beside.iterdir()):
+            os.replace(file, folder / file.name)
+        is_done = True
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+        if is_new and not is_done and not any(folder.iterdir()):
+            folder.rmdir()
+
+
+def _unwritable(folder: Path, error: OSError) -> HairloomError:
+    return HairloomError(
+        f"nothing can be written into this folder ({error.strerror or error})",
+        place=str(folder),
+        remedy="Choose a folder that you may write to, with space left",
+    )

@@ -1,0 +1,255 @@
+"""Baking: all frames simulated in order, as playback does it, and written to disk.
+
+The very same steps as those of the timeline, so that a bake equals what the artist saw. A bake
+that is cancelled or fails leaves the one before as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+
+from ...errors import HairloomError
+from ..bakes import baked_copy, playback
+from ..bakes.bake_settings import choose_folder, folder_of, folders_of_others, frames_of
+from ..bakes.cache import CacheWriter, Facts, delete
+from ..bakes.fingerprints import frame_rate
+from ..bakes.simulated import Simulated
+from ..base.objects import Handle
+from ..base.report import environment
+from ..scene.fin_modifier import clear, fin_modifier
+from ..scene.source import wanted_density
+from ..sessions.fins import FinSession
+from ..sessions.session import Session
+from . import live
+
+
+@dataclass
+class _Part:
+    """One groom or fin of a bake."""
+
+    handle: Handle
+    frames: range
+    folder: Path
+    session: Simulated | None = None
+    writer: CacheWriter | None = None
+    fingerprint: str = ""
+    notes: tuple[str, ...] = ()
+
+    def go(self, frame: int, depsgraph: bpy.types.Depsgraph) -> None:
+        """Simulate and write this frame, if it is one of its own."""
+        if frame not in self.frames:
+            return
+        if self.writer is None or self.session is None:
+            session = self.session = simulated_for(self.found(), depsgraph)
+            session.play(depsgraph)
+            self.fingerprint = session.fingerprint(depsgraph)
+            self.notes = session.rig.notes if isinstance(session, Session) else ()
+            self.writer = CacheWriter(self.folder)
+            self.writer.add_constants(session.constants())
+        else:
+            session = self.session
+            if isinstance(session, Session):
+                session.take_settings()  # those that are animated
+            session.advance(depsgraph, 1.0 / frame_rate(depsgraph.scene))
+        self.writer.add(frame, session.recorded(), session.moment(depsgraph))
+
+    def finish(self, rate: float) -> None:
+        assert self.writer is not None and self.session is not None
+        self.writer.finish(
+            Facts(
+                owner=self.handle.name,
+                first=self.frames.start,
+                last=self.frames.stop - 1,
+                frame_rate=rate,
+                form=form_of_session(self.session),
+                fingerprint=self.fingerprint,
+                hairloom=environment()["hairloom"],
+            )
+        )
+        self.writer = None
+
+    def abandon(self) -> None:
+        """Leave nothing half written."""
+        if self.writer is not None:
+            self.writer.abandon()
+
+    def found(self) -> bpy.types.Object:
+        obj = self.handle.find()
+        if obj is None:
+            raise HairloomError("it is gone", place=self.handle.name, remedy="Bake again")
+        return obj
+
+
+@dataclass
+class Bake:
+    """A bake of some grooms and fins of the open scene, each over its own frames."""
+
+    parts: list[_Part] = field(default_factory=list)
+
+    @classmethod
+    def of(
+        cls,
+        objects: list[bpy.types.Object],
+        scene: bpy.types.Scene,
+        *,
+        frames: range | None = None,
+        folder: Path | None = None,
+    ) -> Bake:
+        """Plan it.
+
+        Args:
+            frames: in place of those that the objects ask for.
+            folder: in place of the objects' own folders; several objects get one below it each.
+
+        Raises:
+            HairloomError: nothing to bake, no frames, no place to write to, or no such weights as
+                children are to grow by.
+        """
+        if not objects:
+            raise HairloomError(
+                "there is nothing to bake", place=scene.name, remedy="Select hair curves or a fin"
+            )
+        parts = []
+        for obj in objects:
+            if obj.type == "CURVES":
+                wanted_density(obj, bpy.context.evaluated_depsgraph_get())
+            if folder is not None:
+                obj.hairloom.bake.folder = str(folder / obj.name if len(objects) > 1 else folder)
+            own = frames_of(obj, scene) if frames is None else frames
+            parts.append(_Part(Handle.of(obj), own, choose_folder(obj)))
+        return cls(parts)
+
+    @property
+    def frame_count(self) -> int:
+        return self._last - self._first + 1
+
+    @property
+    def _first(self) -> int:
+        return min(part.frames.start for part in self.parts)
+
+    @property
+    def _last(self) -> int:
+        return max(part.frames.stop - 1 for part in self.parts)
+
+    @property
+    def notes(self) -> list[str]:
+        """What the artist should know about what was baked so far."""
+        return [f"{part.handle.name}: {note}" for part in self.parts for note in part.notes]
+
+    def objects(self) -> list[bpy.types.Object]:
+        return [part.found() for part in self.parts]
+
+    def steps(self) -> Generator[int]:
+        """Bake, one frame at a time; gives how many are done. Closing it cancels the bake.
+
+        Leaves the scene at the frame where it was.
+
+        Raises:
+            HairloomError: a groom cannot be simulated, or a file not be written.
+        """
+        scene = bpy.context.scene
+        shown, subframe = scene.frame_current, scene.frame_subframe
+        try:
+            with live.suspended():
+                yield from self._frames(scene)
+                for part in self.parts:
+                    part.finish(frame_rate(scene))
+        finally:
+            for part in self.parts:
+                part.abandon()
+            with live.suspended():
+                scene.frame_set(shown, subframe=subframe)
+            self._show()
+
+    def _frames(self, scene: bpy.types.Scene) -> Iterator[int]:
+        for done, frame in enumerate(range(self._first, self._last + 1), start=1):
+            scene.frame_set(frame)
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            for part in self.parts:
+                try:
+                    part.go(frame, depsgraph)
+                except HairloomError as error:
+                    raise HairloomError(
+                        f"{error.problem} (in frame {frame}); nothing was baked",
+                        place=error.place,
+                        remedy=error.remedy,
+                    ) from error
+            yield done
+
+    def _show(self) -> None:
+        """Previewed grooms show the new bake, or what they showed before."""
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        for part in self.parts:
+            obj = part.handle.find()
+            if obj is not None:
+                live.bake_changed(obj, depsgraph)
+
+
+def simulated_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simulated:
+    """What simulates this object: that of its preview, where there is one.
+
+    Raises:
+        HairloomError: it cannot be simulated.
+    """
+    known = live.simulated_of(obj)
+    if known is None and obj.type == "MESH":
+        return FinSession(obj, depsgraph)
+    if known is None:
+        return Session(obj, depsgraph, is_drawn=False)
+    if isinstance(known, Session):
+        if known.is_stale:
+            known.read_again(depsgraph)
+        known.finish(depsgraph)
+    return known
+
+
+def form_of_session(session: Simulated) -> str:
+    """What computed it: "numpy" or "compute"."""
+    return session.solver.form if isinstance(session, Session) else "numpy"
+
+
+def bakeable(obj: bpy.types.Object) -> bool:
+    """Whether it is hair, but no copy that shows a bake, or a fin."""
+    if obj.type == "CURVES":
+        return not obj.data.hairloom.baked_in
+    return fin_modifier(obj) is not None
+
+
+def show_in_renders(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> bool:
+    """After a bake: hair whose artist wants it gets a copy for renders, other hair loses it.
+
+    Returns whether the window is locked during renders from now on, which it was not before.
+    """
+    was_locked = depsgraph.scene.render.use_lock_interface
+    for obj in objects:
+        if obj.type != "CURVES":
+            continue
+        cache = playback.cache_of(obj)
+        if cache is not None and obj.hairloom.bake.in_renders:
+            baked_copy.show_in_renders(obj, cache, depsgraph)
+        else:
+            baked_copy.remove(obj)
+    return bool(depsgraph.scene.render.use_lock_interface and not was_locked)
+
+
+def free(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """Delete the bake of a groom or fin from disk; renders show the object itself again.
+
+    Raises:
+        HairloomError: the files cannot be deleted.
+    """
+    folder = folder_of(obj)
+    is_shared = obj.hairloom.bake.folder in folders_of_others(obj)
+    if folder is not None and not is_shared:
+        delete(folder)
+    if obj.type == "CURVES":
+        baked_copy.remove(obj)
+    elif fin_modifier(obj) is not None:
+        clear(obj.data)
+    if is_shared:
+        obj.hairloom.bake.folder = ""
+    live.bake_changed(obj, depsgraph)

@@ -1,0 +1,104 @@
+"""Blender's events, handed on to the live grooms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..bakes import playback
+from ..properties import library_overrides
+from . import live, reactions
+
+_is_reacting = False
+
+
+@persistent
+def on_load_pre(*_: Any) -> None:
+    live.forget_all()
+
+
+@persistent
+def on_load_post(*_: Any) -> None:
+    live.forget_all()
+
+
+@persistent
+def on_save_pre(*_: Any) -> None:
+    library_overrides.make_last()
+
+
+@persistent
+def on_undo_post(*_: Any) -> None:
+    reactions.undone()
+
+
+@persistent
+def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    _react(reactions.updated, depsgraph)
+
+
+@persistent
+def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    _react(reactions.frame_changed, depsgraph)
+
+
+@persistent
+def on_frame_change_begin(scene: bpy.types.Scene, *_: Any) -> None:
+    """Runs in renders too, there in the render's thread: only what is baked is written."""
+    if live.is_suspended():
+        return
+    playback.show_fins(scene)
+    if playback.needs_copies():
+        playback.show_in_copies(scene)
+
+
+@persistent
+def on_render_begin(*_: Any) -> None:
+    playback.rendering(True)
+
+
+@persistent
+def on_render_end(*_: Any) -> None:
+    playback.rendering(False)
+
+
+def _react(reaction: Callable[[bpy.types.Depsgraph], None], depsgraph: bpy.types.Depsgraph) -> None:
+    """Once at a time, and not for a render, which has its own copy of the scene and its thread."""
+    global _is_reacting
+    if _is_reacting or live.is_suspended() or not live.simulated():
+        return
+    if depsgraph.mode != "VIEWPORT":
+        return
+    _is_reacting = True
+    try:
+        reaction(depsgraph)
+    finally:
+        _is_reacting = False
+
+
+HANDLERS = (
+    (bpy.app.handlers.load_pre, on_load_pre),
+    (bpy.app.handlers.load_post, on_load_post),
+    (bpy.app.handlers.save_pre, on_save_pre),
+    (bpy.app.handlers.undo_post, on_undo_post),
+    (bpy.app.handlers.redo_post, on_undo_post),
+    (bpy.app.handlers.depsgraph_update_post, on_depsgraph_update),
+    (bpy.app.handlers.frame_change_pre, on_frame_change_begin),
+    (bpy.app.handlers.frame_change_post, on_frame_change),
+    (bpy.app.handlers.render_init, on_render_begin),
+    (bpy.app.handlers.render_complete, on_render_end),
+    (bpy.app.handlers.render_cancel, on_render_end),
+)
+
+
+def register() -> None:
+    for handlers, handler in HANDLERS:
+        handlers.append(handler)
+
+
+def unregister() -> None:
+    for handlers, handler in reversed(HANDLERS):
+        handlers.remove(handler)

@@ -1,0 +1,164 @@
+"""What is wrong with a groom and can be mended by one button, and the mending."""
+
+from __future__ import annotations
+
+import itertools
+import weakref
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...errors import HairloomError
+from ...pipeline import Rig
+from ..base.objects import head_of, objects_in
+from ..scene.curves import read_curves
+from ..scene.source import dynamics_warnings, own_dynamics
+from ..scene.surfaces import read_positions
+from ..sessions.session import Session
+from . import timeline
+
+#: Roots farther from their surface than this part of its diagonal are not on it; those of grooms
+#: that fit lie within half of it.
+_LOOSE = 0.02
+#: Scales that differ by less are rounding.
+_UNEVEN = 1.01
+#: So many roots, evenly chosen, say which mesh they are on.
+_ASKED = 100
+#: So many instances of a scene are looked at, 1 us each, for those of a groom.
+_MOST_INSTANCES = 10_000
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """One thing that is wrong.
+
+    operator: what mends it, by its name. button: its text.
+    instead_of: the warning that says the same without a button.
+    """
+
+    text: str
+    operator: str
+    button: str
+    instead_of: str = ""
+
+
+_loose: dict[int, tuple[weakref.ref[Rig], int]] = {}
+
+
+def troubles_of(hair: bpy.types.Object, session: Session | None) -> tuple[Trouble, ...]:
+    """What is wrong with this groom, worst first; quick enough to ask at every redraw.
+
+    Args:
+        session: its preview; without one nobody knows where roots are.
+    """
+    head = head_of(hair)
+    known = "" if session is None else session.source.head_warning
+    found = []
+    if own_dynamics(hair):
+        found.append(
+            Trouble(
+                "Blender's Hair Dynamics moves this hair as well",
+                "hairloom.mute_hair_dynamics",
+                "Mute Hair Dynamics",
+                next(iter(dynamics_warnings(hair)), ""),
+            )
+        )
+    if head is None:
+        text = "No surface: it follows its own object only, and collides with nothing"
+        found.append(Trouble(text, "hairloom.set_surface", "Set Surface", known))
+    elif head.data.uv_layers.active is None:
+        text = f"{head.name} has no UVs: exported strands know no place on its texture"
+        found.append(Trouble(text, "hairloom.unwrap_surface", "Unwrap", known))
+    if head is not None and session is not None and (loose := loose_roots(session)):
+        count = f"{loose:,} roots are" if loose > 1 else "1 root is"
+        text = f"{count} not on {head.name}, and would hang in the air"
+        found.append(Trouble(text, "hairloom.snap_roots", "Snap to Surface"))
+    if is_unevenly_scaled(hair):
+        text = "Its object is scaled unevenly, so strands are as wide as the mean of the scales"
+        found.append(Trouble(text, "hairloom.apply_scale", "Apply Scale"))
+    baked = timeline.baked(hair.session_uid)
+    if baked is not None and baked.changed:
+        text = f"Its bake is out of date ({', '.join(baked.changed)})"
+        found.append(Trouble(text, "hairloom.bake", "Bake"))
+    return tuple(found)
+
+
+def instances_note(hair: bpy.types.Object) -> str:
+    """What the preview leaves out where the hair is instanced, such as by a collection or geometry
+    nodes; "" if it is not. Quick enough to ask at every redraw."""
+    layer = bpy.context.view_layer
+    if not any(_may_instance(obj) for obj in objects_in(layer) if obj != hair):
+        return ""
+    looked_at = itertools.islice(layer.depsgraph.object_instances, _MOST_INSTANCES)
+    if any(each.is_instance and each.object.original == hair for each in looked_at):
+        return "Instances of it have no hair in the preview; they have it in renders"
+    return ""
+
+
+def _may_instance(obj: bpy.types.Object) -> bool:
+    return obj.is_instancer or any(each.type == "NODES" for each in obj.modifiers)
+
+
+def loose_roots(session: Session) -> int:
+    """How many roots are too far from the surface to be on it; counted once for each rig."""
+    if not session.is_made:
+        return 0
+    rig = session.rig
+    known = _loose.get(session.uid)
+    if known is None or known[0]() is not rig:
+        known = _loose[session.uid] = weakref.ref(rig), _loose_in(rig)
+    return known[1]
+
+
+def _loose_in(rig: Rig) -> int:
+    if rig.head is None or rig.rest_frames is None:
+        return 0
+    low, high = rig.head.bounds()
+    reach = _LOOSE * float(np.linalg.norm(high - low))
+    away = np.linalg.norm(rig.strands.roots - rig.rest_frames.origin, axis=1)
+    return int((away > reach).sum())
+
+
+def is_unevenly_scaled(obj: bpy.types.Object) -> bool:
+    """Whether its axes are scaled by different factors."""
+    scales = [abs(scale) for scale in obj.matrix_world.to_scale()]
+    return max(scales) > _UNEVEN * min(scales)
+
+
+def surface_for(
+    hair: bpy.types.Object, candidates: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
+) -> bpy.types.Object:
+    """The mesh that hair grows from: the one whose vertices are closest to its roots.
+
+    Raises:
+        HairloomError: there is no mesh with faces, or no hair.
+    """
+    roots = read_curves(hair, depsgraph).strands.roots
+    roots = roots[:: max(len(roots) // _ASKED, 1)]
+    meshes = [mesh for mesh in candidates if mesh.type == "MESH" and len(mesh.data.polygons)]
+    if not meshes or not len(roots):
+        raise HairloomError(
+            "there is no mesh that it could grow from",
+            place=hair.name,
+            remedy="Add the mesh, and select it together with the hair",
+        )
+
+    def distance(mesh: bpy.types.Object) -> float:
+        positions = read_positions(mesh, depsgraph, place=mesh.name)
+        offsets = roots[:, None] - positions[None, :: max(len(positions) // 2000, 1)]
+        return float(np.median((offsets**2).sum(axis=2).min(axis=1)))
+
+    return min(meshes, key=distance)
+
+
+def set_surface(hair: bpy.types.Object, mesh: bpy.types.Object) -> None:
+    """As Blender's own tools have it; the hair stays where it is."""
+    place = hair.matrix_world.copy()
+    hair.data.surface = mesh
+    if mesh.data.uv_layers.active is not None:
+        hair.data.surface_uv_map = mesh.data.uv_layers.active.name
+    mesh.add_rest_position_attribute = True
+    hair.parent = mesh
+    hair.matrix_parent_inverse = mesh.matrix_world.inverted_safe()
+    hair.matrix_world = place

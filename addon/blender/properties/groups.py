@@ -1,0 +1,248 @@
+"""Where settings live: those of a groom on its Curves, those of a character on its Object."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
+
+from ...parameters import ALL_SETTINGS
+from ..base.objects import head_of
+from ..cards.card_images import HAIRLOOM_PG_card_images
+from ..colliders.obstacle_reader import SHAPES
+from ..preview import reactions
+from ..scene.vertex_weights import weight_names
+from ..viewport.aids import KINDS as AIDS
+from .bake_group import HAIRLOOM_PG_bake
+from .card_group import HAIRLOOM_PG_card_object
+from .fin_group import FIN_PROPERTIES
+from .properties import OVERRIDABLE, property_annotations, property_group
+
+GROOM_SECTIONS = (
+    "guides",
+    "children",
+    "detail",
+    "strands",
+    "shading",
+    "volume",
+    "skin",
+    "shafts",
+    "ambient",
+    "cards",
+    "atlas",
+    "card_occlusion",
+    "card_texture",
+    "card_drawing",
+)
+CHARACTER_SECTIONS = ("dynamics", "fin")
+
+
+_DEBUG_VIEWS = (
+    ("none", "Hair", "Hair as it is shaded"),
+    ("detail", "Detail", "Each segment by the number of pieces it is divided into"),
+    ("guide", "Guides", "Each strand by the guide that it follows most"),
+    ("group", "Groups", "Each strand by its group"),
+    ("occlusion", "Ambient Occlusion", "How much of the sky's light comes to each point, in grey"),
+)
+
+
+def _changed(owner: bpy.types.ID) -> None:
+    reactions.settings_changed(owner)
+
+
+def _pointers(sections: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        section: PointerProperty(
+            type=SECTION_GROUPS[section],
+            name=ALL_SETTINGS[section].title,
+            description=f"Settings of {ALL_SETTINGS[section].title.lower()}",
+            override=OVERRIDABLE,
+        )
+        for section in sections
+    }
+
+
+def _is_mesh(_group: Any, obj: bpy.types.Object) -> bool:
+    return obj.type == "MESH"
+
+
+def _densities(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+    """What children may grow by on the head of this hair."""
+    hair = group.id_data
+    head = head_of(hair) if hair.type == "CURVES" else None
+    names = [] if head is None else weight_names(head)
+    return [name for name in names if typed.lower() in name.lower()]
+
+
+SECTION_GROUPS = {
+    section: property_group(ALL_SETTINGS[section], _changed)
+    for section in (*GROOM_SECTIONS, *CHARACTER_SECTIONS)
+}
+SECTION_GROUPS["fin"].__annotations__ |= FIN_PROPERTIES
+
+
+def operator_properties(section: str) -> dict[str, Any]:
+    """For the `__annotations__` of an operator that works by the settings of one section."""
+    return property_annotations(ALL_SETTINGS[section])
+
+
+def _switch(section: str, parameter: str, values: tuple[str, str], name: str, text: str) -> Any:
+    """A checkbox for a choice of which one value means off, as headers of panels have it.
+
+    Args:
+        values: of the choice when off, and what it becomes when turned on.
+    """
+
+    def get(groom: Any) -> bool:
+        return bool(getattr(getattr(groom, section), parameter) != values[0])
+
+    def turn(groom: Any, on: bool) -> None:
+        if on != get(groom):
+            setattr(getattr(groom, section), parameter, values[on])
+
+    return BoolProperty(name=name, description=text, get=get, set=turn)
+
+
+_SWITCHES = {
+    "use_children": _switch(
+        "children", "way", ("none", "multi"), "Children", "Grow more hair between the guides"
+    ),
+    "use_shadows": _switch(
+        "volume", "shadows", ("none", "deep"), "Shadows", "Let hair shade itself and what is near"
+    ),
+    "use_cards": _switch(
+        "card_drawing", "shown_as", ("strands", "cards"), "Show Cards", "Show cards, not strands"
+    ),
+}
+
+
+class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
+    """Everything about one groom that goes with its curves."""
+
+    __annotations__ = {
+        **_pointers(GROOM_SECTIONS),
+        **_SWITCHES,
+        "card_images": PointerProperty(
+            type=HAIRLOOM_PG_card_images,
+            name="Card Pictures",
+            description="Pictures in the place of generated textures of hair cards",
+            override=OVERRIDABLE,
+        ),
+        "baked_in": StringProperty(
+            name="Baked In",
+            description="Folder of the bake that these curves show in renders",
+            options={"HIDDEN"},
+            override=OVERRIDABLE,
+        ),
+    }
+
+
+class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
+    """Everything about the hair of one object, of which several may share their curves."""
+
+    __annotations__ = {
+        **_pointers(CHARACTER_SECTIONS),
+        "bake": PointerProperty(
+            type=HAIRLOOM_PG_bake,
+            name="Bake",
+            description="How and where this object is baked",
+            override=OVERRIDABLE,
+        ),
+        "card_object": PointerProperty(
+            type=HAIRLOOM_PG_card_object,
+            name="Cards",
+            description="Whose cards this mesh holds, if it does",
+            override=OVERRIDABLE,
+        ),
+        "children_density": StringProperty(
+            name="Density",
+            description="Vertex group or float attribute on points of the surface that says how "
+            "densely children grow; empty: wherever guides are near",
+            search=_densities,
+            search_options={"SUGGESTION"},
+            update=lambda self, _context: reactions.settings_changed(self.id_data),
+            override=OVERRIDABLE,
+        ),
+        "debug_view": EnumProperty(
+            items=_DEBUG_VIEWS,
+            name="Show",
+            description="What the strands of the preview are coloured by",
+            update=lambda self, _context: reactions.settings_changed(self.id_data),
+            override=OVERRIDABLE,
+        ),
+        "show_counts": BoolProperty(
+            name="Counts",
+            description="Write into the viewport how many guides, strands, pieces and vertices are "
+            "drawn; with a colouring they are always there",
+            default=False,
+            update=lambda self, _context: reactions.settings_changed(self.id_data),
+            override=OVERRIDABLE,
+        ),
+        "shown_aids": EnumProperty(
+            items=AIDS,
+            options={"ENUM_FLAG"},
+            name="Overlays",
+            description="What acts on the hair, drawn into the viewport as lines",
+            default=set(),
+            update=lambda self, _context: reactions.settings_changed(self.id_data),
+            override=OVERRIDABLE,
+        ),
+        "collider": PointerProperty(
+            type=bpy.types.Object,
+            name="Collider",
+            description="Closed mesh that the hair stays out of; empty: the surface it grows from",
+            poll=_is_mesh,
+            override=OVERRIDABLE,
+        ),
+        "collider_collection": PointerProperty(
+            type=bpy.types.Collection,
+            name="Colliders",
+            description="Collection of more objects that hair stays out of; read as Play begins",
+            override=OVERRIDABLE,
+        ),
+        "collider_shape": EnumProperty(
+            items=SHAPES,
+            name="Collides As",
+            description="As what this object collides with hair and cloth",
+            override=OVERRIDABLE,
+        ),
+        "hide_original": BoolProperty(
+            name="Hide Blender's Strands",
+            description="While previewing, show Blender's own drawing of these curves as a box",
+            default=True,
+            update=lambda self, _context: reactions.display_changed(self.id_data),
+            override=OVERRIDABLE,
+        ),
+    }
+
+
+CLASSES = (
+    *SECTION_GROUPS.values(),
+    HAIRLOOM_PG_bake,
+    HAIRLOOM_PG_card_object,
+    HAIRLOOM_PG_card_images,
+    HAIRLOOM_PG_groom,
+    HAIRLOOM_PG_character,
+)
+
+
+def register() -> None:
+    """After CLASSES are registered."""
+    bpy.types.Curves.hairloom = PointerProperty(
+        type=HAIRLOOM_PG_groom,
+        name="Hairloom",
+        description="Settings of this groom",
+        override=OVERRIDABLE,
+    )
+    bpy.types.Object.hairloom = PointerProperty(
+        type=HAIRLOOM_PG_character,
+        name="Hairloom",
+        description="Settings of this object's hair",
+        override=OVERRIDABLE,
+    )
+
+
+def unregister() -> None:
+    del bpy.types.Object.hairloom
+    del bpy.types.Curves.hairloom

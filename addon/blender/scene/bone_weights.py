@@ -1,0 +1,64 @@
+"""Which bones carry a head: its vertex groups that are deforming bones of its armature."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...exchange.tfxbone import BoneWeights, bones_at_roots
+from ...strands import StrandSet
+from ..base.objects import head_of
+from .surfaces import read_surface
+
+
+def bones_of(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, strands: StrandSet
+) -> BoneWeights | None:
+    """The bones of hair on a skinned head; None where no bone moves the head.
+
+    Args:
+        strands: of the hair; bound where it has a usable head.
+    """
+    skin = head_of(hair)
+    names = () if skin is None else _bone_names(skin)
+    if skin is None or not names or not strands.is_bound:
+        return None
+    weights = _vertex_weights(skin, depsgraph, names)
+    if not weights.any():
+        return None
+    head = read_surface(skin, depsgraph, need_uv=False, place=skin.name)
+    return bones_at_roots(strands, head.triangles, names, weights)
+
+
+def has_bones(hair: bpy.types.Object) -> bool:
+    """Whether deforming bones can move its head."""
+    skin = head_of(hair)
+    return skin is not None and bool(_bone_names(skin))
+
+
+def _bone_names(skin: bpy.types.Object) -> tuple[str, ...]:
+    """Deforming bones that have a vertex group, in the order of the groups."""
+    armature = skin.find_armature()
+    if armature is None:
+        return ()
+    deforming = {bone.name for bone in armature.data.bones if bone.use_deform}
+    return tuple(group.name for group in skin.vertex_groups if group.name in deforming)
+
+
+def _vertex_weights(
+    skin: bpy.types.Object, depsgraph: bpy.types.Depsgraph, names: tuple[str, ...]
+) -> Floats:
+    """(vertex_count, bone_count) float32 of the mesh after its modifiers."""
+    column = {skin.vertex_groups[name].index: place for place, name in enumerate(names)}
+    evaluated = skin.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        weights = np.zeros((len(mesh.vertices), len(names)), np.float32)
+        for vertex in mesh.vertices:  # Blender gives the weights of groups in no faster way
+            for member in vertex.groups:
+                if member.group in column:
+                    weights[vertex.index, column[member.group]] = member.weight
+    finally:
+        evaluated.to_mesh_clear()
+    return weights

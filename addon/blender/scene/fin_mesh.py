@@ -1,0 +1,57 @@
+"""What a fin needs of its original mesh: faces, strings, and how to tell that they have changed."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...arrays import Ints
+from ...errors import HairloomError
+from ..base.objects import Handle
+from .fin_modifier import fin_modifier, other_fin_with
+
+
+def check_usable(obj: bpy.types.Object, handle: Handle) -> None:
+    """Raises:
+    HairloomError: it is no fin, is being edited, or shares its mesh with another fin.
+    """
+    if obj.type != "MESH" or fin_modifier(obj) is None:
+        raise HairloomError(
+            "it is no fin", place=obj.name, remedy="Press Make Fin in its Physics tab"
+        )
+    if obj.mode == "EDIT":
+        raise HairloomError(
+            "it is in Edit Mode", place=obj.name, remedy="Leave Edit Mode and play again"
+        )
+    other = other_fin_with(obj.data, handle)
+    if other is not None:
+        raise HairloomError(
+            f"its mesh is also that of {other.name}, which would move alike",
+            place=obj.name,
+            remedy="Use Object > Relations > Make Single User > Object & Data",
+        )
+
+
+def triangles_of(mesh: bpy.types.Mesh) -> Ints:
+    """(triangle_count, 3) int32."""
+    mesh.calc_loop_triangles()
+    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    return triangles
+
+
+def loose_edges_of(mesh: bpy.types.Mesh) -> Ints:
+    """Edges of no face, (n, 2) int32."""
+    edges, is_loose = np.empty((len(mesh.edges), 2), np.int32), np.empty(len(mesh.edges), bool)
+    mesh.edges.foreach_get("vertices", edges.ravel())
+    mesh.edges.foreach_get("is_loose", is_loose)
+    loose: Ints = edges[is_loose]
+    return loose
+
+
+def corners_of(mesh: bpy.types.Mesh) -> Ints:
+    """The vertex of each polygon corner, and last how many vertices there are; int32."""
+    corners = np.empty(len(mesh.loops) + 1, np.int32)
+    mesh.loops.foreach_get("vertex_index", corners[:-1])
+    corners[-1] = len(mesh.vertices)
+    return corners

@@ -1,0 +1,122 @@
+"""What a groom says beside its strands, as attributes of hair curves, and back.
+
+Blender shows them in Data properties > Attributes, and its modifiers carry them along. The names
+are those of Epic's "Alembic for Grooms Specification" 1.5; colours are where Blender's own
+importers put them. Closest guides are one attribute each, as Blender has none of three integers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...exchange.groom import Groom
+from ...exchange.read_groom import finite
+from .curves import curve_offsets, read_attribute, set_attribute
+
+COLOR = "color"
+STRAND_ID = "groom_id"
+GUIDE = "groom_guide"
+CLOSEST_GUIDES = ("groom_closest_guide_1", "groom_closest_guide_2", "groom_closest_guide_3")
+GUIDE_WEIGHTS = "groom_guide_weights"
+#: custom property of the Curves data-block: group as text -> its name
+GROUP_NAMES = "groom_group_names"
+
+
+def store_groom(curves: bpy.types.Curves, groom: Groom) -> None:
+    """Give new hair curves, written from the groom's strands, all else that the groom says."""
+    if groom.color is not None:
+        opaque = np.ones((len(groom.color), 4), np.float32)
+        opaque[:, :3] = groom.color
+        set_attribute(curves, COLOR, "FLOAT_COLOR", "POINT", opaque)
+    if groom.strand_id is not None:
+        set_attribute(curves, STRAND_ID, "INT", "CURVE", groom.strand_id)
+    if groom.is_guide is not None:
+        set_attribute(curves, GUIDE, "BOOLEAN", "CURVE", groom.is_guide)
+    if groom.closest_guides is not None and groom.guide_weights is not None:
+        for name, ids in zip(CLOSEST_GUIDES, groom.closest_guides.T, strict=True):
+            set_attribute(curves, name, "INT", "CURVE", ids)
+        set_attribute(curves, GUIDE_WEIGHTS, "FLOAT_VECTOR", "CURVE", groom.guide_weights)
+    if groom.group_names:
+        store_group_names(curves, groom.group_names)
+
+
+def store_group_names(curves: bpy.types.Curves, names: Mapping[int, str]) -> None:
+    """Name the groups of hair curves."""
+    curves[GROUP_NAMES] = {str(group): name for group, name in names.items()}
+
+
+def stored_groom(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, kept: Ints
+) -> dict[str, Any]:
+    """What the evaluated hair says beside its strands: arguments of `Groom`, but for strands.
+
+    IDs are left out where two curves have the same one, as copied curves do, and closest guides
+    where one of them is gone.
+
+    Args:
+        kept: (strand_count,) indices of the curves that became strands, as `read_curves` tells.
+
+    Returns:
+        color, strand_id, is_guide, closest_guides and guide_weights, as far as they are there, and
+        group_names.
+    """
+    curves = hair.evaluated_get(depsgraph).data
+    fields: dict[str, Any] = {"group_names": group_names(hair)}
+    color = _color(curves, kept)
+    if color is not None:
+        fields["color"] = finite(color)
+    guide = read_attribute(curves, GUIDE, "CURVE")
+    if guide is not None:
+        fields["is_guide"] = guide[kept] != 0
+    ids = _whole(curves, STRAND_ID, kept)
+    if ids is None or len(np.unique(ids)) < len(ids):
+        return fields
+    fields["strand_id"] = ids
+    closest = [_whole(curves, name, kept) for name in CLOSEST_GUIDES]
+    weights = read_attribute(curves, GUIDE_WEIGHTS, "CURVE", 3)
+    if weights is not None and all(each is not None for each in closest):
+        guides = np.stack(closest, axis=1)  # type: ignore[arg-type]
+        if np.isin(guides, ids).all():
+            fields |= {"closest_guides": guides, "guide_weights": finite(weights[kept])}
+    return fields
+
+
+def group_names(hair: bpy.types.Object) -> dict[int, str]:
+    """Group -> name, for those of hair curves that have one.
+
+    They are those of the original data: modifiers drop custom properties.
+    """
+    stored = hair.original.data.get(GROUP_NAMES)
+    if not hasattr(stored, "to_dict"):
+        return {}
+    named = stored.to_dict().items()
+    return {int(key): name for key, name in named if _is_number(key) and isinstance(name, str)}
+
+
+def _is_number(text: str) -> bool:
+    return text.removeprefix("-").isdecimal() and abs(int(text)) < 1 << 31
+
+
+def _color(curves: bpy.types.Curves, kept: Ints) -> Floats | None:
+    """(point_count, 3) float32 of the kept curves; painted for whole curves as well."""
+    offsets = curve_offsets(curves)
+    counts = np.diff(offsets)
+    color = read_attribute(curves, COLOR, "POINT", 4)
+    if color is None:
+        of_curves = read_attribute(curves, COLOR, "CURVE", 4)
+        return None if of_curves is None else np.repeat(of_curves[kept, :3], counts[kept], axis=0)
+    if len(kept) < len(counts):
+        is_kept = np.zeros(len(counts), bool)
+        is_kept[kept] = True
+        color = color[np.repeat(is_kept, counts)]
+    return np.ascontiguousarray(color[:, :3])
+
+
+def _whole(curves: bpy.types.Curves, name: str, kept: Ints) -> Ints | None:
+    values = read_attribute(curves, name, "CURVE")
+    return None if values is None or values.dtype.kind != "i" else values[kept]

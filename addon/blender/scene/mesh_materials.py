@@ -1,0 +1,190 @@
+"""What a mesh's material is to the renderer: its Principled BSDF, as far as that is plain.
+
+Read are the base colour, the alpha and the normal map, each as a value or as one picture: what
+other nodes do to them is left out, and said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import bpy
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...render.snapshot import MeshPictures
+from ..base.images import read_image
+
+type Color = tuple[float, float, float]
+
+#: of Blender's own default material
+_GREY: Color = (0.8, 0.8, 0.8)
+#: share of the light that Principled throws back head on, by its default index of refraction 1.5
+_SHEEN = 0.04
+
+#: pictures by image and what of it counts, kept while the image is as it was
+_pictures: dict[tuple[int, str], tuple[tuple[object, ...], Floats]] = {}
+
+
+@dataclass(frozen=True)
+class MeshMaterial:
+    """color: scene-linear albedo, of a picture its mean. sheen: share of the light thrown back as
+    it is, head on. Others as in MeshSnapshot.
+
+    notes: what could not be read of it, each with its remedy.
+    """
+
+    color: Color = _GREY
+    sheen: float = _SHEEN
+    pictures: MeshPictures | None = None
+    alpha: float = 1.0
+    transparency: str = "opaque"
+    notes: tuple[str, ...] = ()
+
+
+def material_of(material: bpy.types.Material | None) -> MeshMaterial:
+    """As MeshPass draws it; without nodes that it knows, the colour of the Solid viewport."""
+    if material is None:
+        return MeshMaterial()
+    node = _shader(material)
+    if node is None:
+        return MeshMaterial(_color(material.diffuse_color), _SHEEN)
+    reader = _Reader(material)
+    is_diffuse = node.type == "BSDF_DIFFUSE"
+    socket = node.inputs["Color" if is_diffuse else "Base Color"]
+    alpha = 1.0 if is_diffuse else reader.alpha(node.inputs["Alpha"], socket)
+    color, plain = reader.color(socket)
+    normal, bump = reader.normal(node.inputs["Normal"])
+    has_pictures = color is not None or normal is not None
+    is_opaque = alpha >= 1.0 and not (reader.uses_alpha and color is not None)
+    is_blended = material.surface_render_method == "BLENDED"
+    return MeshMaterial(
+        plain,
+        0.0 if is_diffuse else _sheen(node),
+        MeshPictures(color, normal, bump) if has_pictures else None,
+        alpha,
+        "opaque" if is_opaque else "blended" if is_blended else "hashed",
+        tuple(reader.notes),
+    )
+
+
+def material_notes(obj: bpy.types.Object) -> tuple[str, ...]:
+    """What could not be read of an object's materials, each once."""
+    found = (material_of(slot.material).notes for slot in obj.material_slots)
+    return tuple(dict.fromkeys(note for notes in found for note in notes))
+
+
+class _Reader:
+    """Reads one material; notes what it leaves out."""
+
+    def __init__(self, material: bpy.types.Material) -> None:
+        self.notes: list[str] = []
+        self.uses_alpha = False
+        self._name = material.name
+
+    def alpha(self, socket: bpy.types.NodeSocket, color: bpy.types.NodeSocket) -> float:
+        """Its value; 1 where the alpha of the colour's own picture counts."""
+        giver = _giver(socket)
+        if giver is None:
+            return float(socket.default_value)
+        node, output = giver
+        base = _giver(color)
+        if node.type == "TEX_IMAGE" and output == "Alpha" and base is not None and base[0] == node:
+            self.uses_alpha = True
+        else:
+            self._leave_out("Alpha", "the alpha of the base colour's own picture")
+        return 1.0
+
+    def color(self, socket: bpy.types.NodeSocket) -> tuple[Floats | None, Color]:
+        """The picture that gives the colour and its mean; None, and the value that counts."""
+        giver = _giver(socket)
+        own = _color(socket.default_value)
+        if giver is None:
+            return None, own
+        node, output = giver
+        if node.type == "RGB":
+            return None, _color(node.outputs[0].default_value)
+        if node.type != "TEX_IMAGE" or output != "Color":
+            self._leave_out(socket.name, "an Image Texture")
+            return None, own
+        picture = self._picture(node.image, is_color=True)
+        return picture, own if picture is None else _mean(picture)
+
+    def normal(self, socket: bpy.types.NodeSocket) -> tuple[Floats | None, float]:
+        """The normal map and its strength; None where the surface's own normals count."""
+        giver = _giver(socket)
+        if giver is None:
+            return None, 1.0
+        node, _ = giver
+        image = _giver(node.inputs["Color"]) if node.type == "NORMAL_MAP" else None
+        if image is None or image[0].type != "TEX_IMAGE" or node.space != "TANGENT":
+            self._leave_out("Normal", "a Normal Map in tangent space with an Image Texture")
+            return None, 1.0
+        return self._picture(image[0].image, is_color=False), float(
+            node.inputs["Strength"].default_value
+        )
+
+    def _picture(self, image: bpy.types.Image | None, *, is_color: bool) -> Floats | None:
+        if image is None:
+            return None
+        kind = ("color" if self.uses_alpha else "opaque") if is_color else "normal"
+        state = (*image.size, image.filepath, image.colorspace_settings.name, image.alpha_mode)
+        known = _pictures.get((image.session_uid, kind))
+        if known is not None and known[0] == state and not image.is_dirty:
+            return known[1]
+        try:
+            picture = read_image(image, is_color=is_color, place=f"Image '{image.name}'")
+        except HairloomError as error:
+            self.notes.append(f"{self._name}: {error} Until then a plain value takes its place.")
+            return None
+        if kind == "opaque":
+            picture[..., 3] = 1.0
+        state = (*image.size, image.filepath, image.colorspace_settings.name, image.alpha_mode)
+        _pictures[image.session_uid, kind] = state, picture
+        return picture
+
+    def _leave_out(self, what: str, known: str) -> None:
+        self.notes.append(
+            f"{self._name}: {what} comes from nodes that are not read; its own value was taken. "
+            f"Read are values, and {known}."
+        )
+
+
+def _shader(material: bpy.types.Material) -> bpy.types.Node | None:
+    """The shader of its surface, if it is one of those that are known."""
+    nodes = () if material.node_tree is None else material.node_tree.nodes
+    for kind in ("BSDF_PRINCIPLED", "BSDF_DIFFUSE"):
+        for node in nodes:
+            if node.type == kind and not node.mute:
+                return node
+    return None
+
+
+def _giver(socket: bpy.types.NodeSocket) -> tuple[bpy.types.Node, str] | None:
+    """The node that gives an input its value, and by which output; None: it has its own."""
+    while socket.links:
+        link = socket.links[0]
+        if link.from_node.type != "REROUTE":
+            return None if link.from_node.mute else (link.from_node, link.from_socket.name)
+        socket = link.from_node.inputs[0]
+    return None
+
+
+def _sheen(node: bpy.types.Node) -> float:
+    """A rough surface spreads its sheen until nothing of it is seen."""
+    ior = node.inputs["IOR"].default_value
+    sharp = 1.0 - node.inputs["Roughness"].default_value
+    head_on = (
+        ((ior - 1.0) / (ior + 1.0)) ** 2 * 2.0 * node.inputs["Specular IOR Level"].default_value
+    )
+    return max(0.0, min(head_on * sharp * 2.0, 1.0))
+
+
+def _mean(picture: Floats) -> Color:
+    return _color(picture[..., :3].mean(axis=(0, 1)).tolist())
+
+
+def _color(values: Iterable[float]) -> Color:
+    red, green, blue, *_ = (max(0.0, float(value)) for value in values)
+    return (red, green, blue)

@@ -1,0 +1,51 @@
+"""Where a groom's body is in Blender's current evaluation."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...pipeline import Pose
+from ..base.objects import Body
+from .surfaces import read_positions
+
+
+def read_pose(
+    hair: Body, head: Body | None, vertex_count: int | None, depsgraph: bpy.types.Depsgraph
+) -> Pose:
+    """The head's vertices and its way since rest; of hair without a head, its own way.
+
+    Args:
+        vertex_count: of the head that the hair was bound to.
+
+    Raises:
+        HairloomError: hair or head is gone, is not at a finite place, or is another mesh.
+    """
+    hair.found()
+    if head is None:
+        matrix = hair.moved(depsgraph)
+        check_finite(hair.handle.name, matrix)
+        return Pose(None, matrix)
+    obj = head.found()
+    positions = read_positions(obj, depsgraph, place=obj.name)
+    if len(positions) != vertex_count:
+        raise HairloomError(
+            f"its mesh now has {len(positions):,} vertices instead of {vertex_count or 0:,}, so "
+            "the hair has lost its hold",
+            place=obj.name,
+            remedy="Press Preview again",
+        )
+    check_finite(obj.name, positions)
+    return Pose(positions, head.moved(depsgraph))
+
+
+def check_finite(place: str, values: Floats) -> None:
+    """Raise where a driver or modifier has put something nowhere."""
+    if not np.isfinite(values).all():
+        raise HairloomError(
+            "where it is, is not a finite number",
+            place=place,
+            remedy="Mend the driver, constraint or modifier that moves it",
+        )

@@ -1,0 +1,176 @@
+"""What an artist's hair is made of: its curves, and the mesh that they grow from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
+from ...strands import StrandSet, Surface
+from ...strands.clean import Cleaned
+from ..base.objects import head_of
+from .curves import read_curves
+from .surfaces import read_surface
+from .vertex_weights import read_weights
+
+#: node group of the modifier that Blender 5.2 gives to new hair
+_OWN_DYNAMICS = "Hair Dynamics"
+
+
+@dataclass(frozen=True)
+class Source:
+    """Hair and head as Blender shows them, in world space.
+
+    dropped: reason -> number of curves that cannot be used.
+    kept: (strand_count,) indices of the curves that became strands.
+    density: (vertex_count,) how densely children grow on the head, or None.
+    head_warning, density_warning: what the artist should know, with its remedy; or empty.
+    """
+
+    strands: StrandSet
+    dropped: dict[str, int]
+    kept: Ints
+    head: Surface | None
+    density: Floats | None = None
+    head_warning: str = ""
+    density_warning: str = ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return tuple(filter(None, (self.head_warning, self.density_warning)))
+
+
+def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
+    """Read hair and head; without a usable head the hair goes on, with a warning.
+
+    Raises:
+        HairloomError: the object holds no hair curves, or none that can be used.
+    """
+    read = usable_curves(hair, depsgraph)
+    head, head_warning = _read_head(hair, depsgraph)
+    density, density_warning = read_density(hair, head, depsgraph)
+    return Source(
+        read.strands, read.dropped, read.kept, head, density, head_warning, density_warning
+    )
+
+
+def read_density(
+    hair: bpy.types.Object, head: Surface | None, depsgraph: bpy.types.Depsgraph
+) -> tuple[Floats | None, str]:
+    """How densely children grow on each vertex of the head; without usable weights they grow
+    everywhere, with a warning."""
+    try:
+        return (None if head is None else wanted_density(hair, depsgraph)), ""
+    except HairloomError as error:
+        return None, str(error)
+
+
+def wanted_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats | None:
+    """The weights that the artist wants children to grow by, (vertex_count,); None without.
+
+    Raises:
+        HairloomError: the head has no weights of this name, or none that can be used.
+    """
+    head, name = head_of(hair), hair.hairloom.children_density
+    if head is None or not name or hair.data.hairloom.children.way == "none":
+        return None
+    weights = read_weights(head, depsgraph, name)
+    if np.isfinite(weights).all() and (weights > 0.0).any():
+        return weights
+    raise HairloomError(
+        f"the weights '{name}' are above zero nowhere, or no finite numbers",
+        place=head.name,
+        remedy="Paint where children shall grow, or leave their Density empty",
+    )
+
+
+def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """The object's modifiers with Blender's own hair dynamics that are on, in viewport or render.
+
+    They would move what ours moves as well.
+    """
+    groups = [
+        (modifier, modifier.node_group) for modifier in hair.modifiers if modifier.type == "NODES"
+    ]
+    return [
+        modifier
+        for modifier, nodes in groups
+        if nodes is not None
+        and nodes.name.startswith(_OWN_DYNAMICS)
+        and (modifier.show_viewport or modifier.show_render)
+    ]
+
+
+def refuse_own_dynamics(hair: bpy.types.Object) -> None:
+    """Never simulate twice.
+
+    Raises:
+        HairloomError: Blender's own hair dynamics moves this hair already.
+    """
+    for modifier in own_dynamics(hair):
+        if modifier.show_viewport:
+            raise HairloomError(
+                f"its modifier {modifier.name} simulates it already",
+                place=hair.name,
+                remedy="Press Mute Hair Dynamics, which turns that modifier off",
+            )
+
+
+def dynamics_warnings(hair: bpy.types.Object) -> tuple[str, ...]:
+    """What the artist should know about Blender's own hair dynamics."""
+    return tuple(
+        f"{hair.name}: its modifier {modifier.name} simulates it too, so Hairloom does not. "
+        "Press Mute Hair Dynamics."
+        for modifier in own_dynamics(hair)
+        if modifier.show_viewport
+    )
+
+
+def mute_own_dynamics(hair: bpy.types.Object) -> int:
+    """Turn Blender's own hair dynamics off, in viewport and render; returns how many."""
+    modifiers = own_dynamics(hair)
+    for modifier in modifiers:
+        modifier.show_viewport = modifier.show_render = False
+    return len(modifiers)
+
+
+def usable_curves(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
+    """As `read_curves`, but nothing is an error too.
+
+    Raises:
+        HairloomError: the object holds no hair curves, or none that can be used.
+    """
+    read = read_curves(hair, depsgraph)
+    if not read.strands.strand_count:
+        reasons = ", ".join(f"{count:,} with {reason}" for reason, count in read.dropped.items())
+        raise HairloomError(
+            f"none of its curves can be used ({reasons})" if reasons else "it has no curves",
+            place=hair.name,
+            remedy="Add curves of two points or more, or undo what removed them",
+        )
+    return read
+
+
+def _read_head(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[Surface | None, str]:
+    """The head, if there is a usable one, and a warning or nothing."""
+    head = head_of(hair)
+    if head is None:
+        return None, (
+            f"{hair.name}: it has no surface, so it follows its own object only and collides with "
+            "nothing. Set Surface in its Data properties."
+        )
+    try:
+        surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    except HairloomError as error:
+        return None, str(error)
+    if surface.corner_uv is None:
+        return surface, (
+            f"{head.name}: it has no UVs, so exported strands know no place on its texture. "
+            "Unwrap it (Edit Mode, UV > Unwrap)."
+        )
+    return surface, ""

@@ -1,0 +1,270 @@
+"""The live session of one fin: a mesh of the artist's that moves as cloth.
+
+A session holds numbers and arrays, never a reference into Blender's data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...dynamics.cloth.settings import FinSettings
+from ...dynamics.cloth.state import ClothState, start_cloth
+from ...dynamics.cloth.step import advance_cloth, cloth_at_frame_end
+from ...dynamics.step import Drive
+from ...errors import HairloomError
+from ..bakes.fingerprints import collider_places, collider_shapes, frame_rate, mesh_parts
+from ..bakes.simulated import CLOTH_VERSION, Arrays, hashes
+from ..base.objects import Body, matrix_of, objects_in
+from ..colliders.obstacles import Obstacles
+from ..preview import live
+from ..properties.properties import settings_of
+from ..scene.fin_mesh import check_usable, corners_of, loose_edges_of, triangles_of
+from ..scene.fin_modifier import clear, fin_modifier, has_fins, read_carried, show
+from ..scene.vertex_weights import read_weights
+from ..scene.wind import gravity_of, scene_wind
+
+
+class FinSession:
+    """One fin, while it is previewed or baked; see `simulated.Simulated`.
+
+    Raises:
+        HairloomError: not a mesh with our modifier, or a mesh that cannot be cloth.
+    """
+
+    def __init__(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+        self.body = Body.at_rest(obj, depsgraph)
+        self.is_playing = False
+        self.is_stale = False
+        self.obstacles: Obstacles | None = None
+        self.state: ClothState | None = None
+        self._earlier: Floats | None = None
+        self._check_mesh(obj)
+        self._corners = corners_of(obj.data)
+        self.rest(depsgraph)
+
+    @property
+    def uid(self) -> int:
+        return self.body.handle.uid
+
+    @property
+    def name(self) -> str:
+        return self.body.handle.name
+
+    @property
+    def settings(self) -> FinSettings:
+        return settings_of(self.body.found().hairloom.fin, FinSettings)
+
+    def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """The mesh as the animation carries it, at no speed."""
+        obj = self._found()
+        self._shown, self._matrix = self._read(obj, depsgraph)
+        self._carried, self._earlier = self._world(), None
+        self._duration = 0.0
+        self.is_stale = False
+        clear(obj.data)
+        if self.state is not None:
+            position = np.ascontiguousarray(self._carried.T)
+            self.state = ClothState(position, position, self.state.fabric)
+        if self.is_playing and self.obstacles is not None:
+            self.obstacles.rest(depsgraph)
+
+    def play(self, depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> None:
+        """Get ready to be simulated; the mesh as it arrives now is what edges keep."""
+        obj = self._found()
+        self._corners = corners_of(obj.data)
+        self.state = None
+        self.rest(depsgraph)
+        pins = self._pins(obj, depsgraph)
+        self.state = self._named(
+            lambda: start_cloth(
+                self._carried, triangles_of(obj.data), pins, loose_edges_of(obj.data)
+            )
+        )
+        settings = self.settings.as_dynamics()
+        self.obstacles = Obstacles.of(
+            obj, None, None, settings, depsgraph, self.obstacles, waits=waits
+        )
+        self.is_playing = True
+
+    def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Back to where the animation carries it."""
+        self.is_playing = False
+        obj = self.body.handle.find()
+        if obj is not None and obj.type == "MESH":
+            clear(obj.data)
+
+    def advance(self, depsgraph: bpy.types.Depsgraph, duration: float) -> None:
+        """Simulate the time [s] in which everything moved to where it is now.
+
+        Raises:
+            HairloomError: what it is made of is gone or has changed.
+        """
+        obj, state = self._found(), self.state
+        assert state is not None and self.obstacles is not None, "play comes first"
+        earlier, before = self._earlier, self._carried
+        self._shown, self._matrix = self._read(obj, depsgraph)
+        now = self._world()
+        drive = Drive(
+            before,
+            now,
+            self.obstacles.move(depsgraph, duration),
+            gravity_of(depsgraph.scene),
+            earlier if duration else None,
+            scene_wind(depsgraph),
+            self._duration / duration if duration else 1.0,
+        )
+        self.state = self._named(lambda: advance_cloth(state, drive, self.settings, duration))
+        self._earlier, self._carried, self._duration = before, now, duration
+        self._show(obj, self._object_space(cloth_at_frame_end(self.state, drive)))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the artist should know of its colliders and pins."""
+        known = () if self.obstacles is None else self.obstacles.warnings
+        if self.state is None or self.state.fabric.pin.any():
+            return known
+        text = f"{self.name}: no vertex is pinned, so it falls. Choose a Pin Group with weights."
+        return (*known, text)
+
+    def normals(self) -> Floats:
+        """Unit vertex normals of the cloth, (vertex_count, 3) world, at the last substep."""
+        assert self.state is not None, "play comes first"
+        return self.state.normals()
+
+    def constants(self) -> Arrays:
+        """See `simulated.Simulated`."""
+        return {"corners": self._corners}
+
+    def recorded(self) -> Arrays:
+        """The vertices of this frame, (vertex_count, 3) float32, object space."""
+        return {"position": self._shown.copy()}
+
+    def show_recorded(self, frame: Arrays) -> None:
+        """See `simulated.Simulated`.
+
+        Raises:
+            HairloomError: the frame is of another mesh.
+        """
+        obj, position = self._found(), np.asarray(frame["position"], np.float32)
+        if position.shape != (len(obj.data.vertices), 3):
+            raise HairloomError(
+                f"its bake has {len(position):,} vertices, the mesh {len(obj.data.vertices):,}",
+                place=self.name,
+                remedy="Bake again",
+            )
+        self._show(obj, position)
+
+    def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """See `simulated.Simulated`."""
+        obj = self._found()
+        modifiers = [(each.type, each.name) for each in obj.modifiers if each.show_viewport]
+        return hashes(
+            mesh=(*mesh_parts(obj), repr(modifiers)),
+            pins=self._pins(obj, depsgraph),
+            colliders=collider_shapes(obj, None),
+            frame_rate=frame_rate(depsgraph.scene),
+            solver=str(CLOTH_VERSION),
+        )
+
+    def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """See `simulated.Simulated`."""
+        obj = self._found()
+        carried, matrix = self._read(obj, depsgraph)
+        return hashes(
+            pose=(carried, matrix),
+            settings=self.settings,
+            colliders=collider_places(obj, None, depsgraph),
+            forces=(gravity_of(depsgraph.scene), scene_wind(depsgraph)),
+        )
+
+    def _found(self) -> bpy.types.Object:
+        """The object, with the mesh that the session was made for.
+
+        Raises:
+            HairloomError: it is gone, in another mode, or has another mesh.
+        """
+        obj = self.body.found()
+        self._check_mesh(obj)
+        return obj
+
+    def _check_mesh(self, obj: bpy.types.Object) -> None:
+        check_usable(obj, self.body.handle)
+        if self.state is not None and not np.array_equal(corners_of(obj.data), self._corners):
+            raise HairloomError(
+                "its faces or vertices are others than before, so the cloth has lost them",
+                place=obj.name,
+                remedy="Play again",
+            )
+
+    def _read(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, Floats]:
+        """Where the animation carries the mesh: object space (vertex_count, 3), matrix (4, 4)."""
+        carried, matrix = read_carried(obj, depsgraph), matrix_of(obj, depsgraph)
+        if not np.isfinite(matrix).all() or np.linalg.cond(matrix[:3, :3]) > 1.0e6:
+            raise HairloomError(
+                "its scale is zero or not a number", place=obj.name, remedy="Correct its transform"
+            )
+        return carried, matrix
+
+    def _world(self) -> Floats:
+        """What is shown, (vertex_count, 3) float64 world [m]."""
+        shown = self._shown.astype(np.float64)
+        return shown @ self._matrix[:3, :3].T + self._matrix[:3, 3]
+
+    def _object_space(self, points: Floats) -> Floats:
+        inverse = np.linalg.inv(self._matrix)
+        return (points @ inverse[:3, :3].T + inverse[:3, 3]).astype(np.float32)
+
+    def _show(self, obj: bpy.types.Object, positions: Floats) -> None:
+        self._shown = positions
+        show(obj.data, positions)
+
+    def _pins(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+        """(vertex_count,) float32."""
+        name, count = obj.hairloom.fin.pin_group, len(obj.data.vertices)
+        if not name:
+            return np.zeros(count, np.float32)
+        return read_weights(obj, depsgraph, name)[:count]
+
+    def _named[T](self, action: Callable[[], T]) -> T:
+        """Do it; an error names this object."""
+        try:
+            return action()
+        except HairloomError as error:
+            raise HairloomError(error.problem, place=self.name, remedy=error.remedy) from error
+
+
+def start(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> FinSession:
+    """Preview this fin: Play, playback and its bake move it from now on.
+
+    Raises:
+        HairloomError: it is no fin, or cannot be cloth.
+    """
+    session = FinSession(obj, depsgraph)
+    live.add(session, depsgraph)
+    return session
+
+
+def start_enabled(depsgraph: bpy.types.Depsgraph) -> list[str]:
+    """Preview all fins of the view layer that are to be simulated; returns warnings."""
+    warnings = []
+    for obj in fins_in(bpy.context.view_layer):
+        if obj.hairloom.fin.enabled and live.simulated_of(obj) is None:
+            try:
+                start(obj, depsgraph)
+            except HairloomError as error:
+                warnings.append(str(error))
+    return warnings
+
+
+def any_enabled(layer: bpy.types.ViewLayer) -> bool:
+    """Whether a fin of this view layer is to be simulated."""
+    return has_fins() and any(obj.hairloom.fin.enabled for obj in fins_in(layer))
+
+
+def fins_in(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    """The objects of a view layer that are fins, by their modifier."""
+    return [obj for obj in objects_in(layer) if fin_modifier(obj) is not None]

@@ -1,0 +1,139 @@
+"""The hair of one groom: what was read of it, what is made of that, and what is being made."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...errors import HairloomError
+from ...pipeline import Pose, Rig
+from ..bakes.baked_rig import BakedRig, rig_arrays
+from ..bakes.simulated import Arrays
+from ..base.objects import Body
+from ..properties.choices import Choices
+from ..scene.source import Source
+from .making import Made, Making, make, stand_in
+from .reading import Reading
+
+
+class Groom:
+    """One groom as it was read and made ready to move.
+
+    Args:
+        hair: a hair curves object.
+        baked: the rig of a bake of this very groom, to be the same to the bit.
+        is_drawn: False leaves out what only drawing needs.
+        waits: False: the hair is made in a thread, and a few strands stand in for it until then.
+
+    Raises:
+        HairloomError: no hair curves, none that can be used, or of another scale than the head.
+    """
+
+    def __init__(
+        self,
+        hair: bpy.types.Object,
+        depsgraph: bpy.types.Depsgraph,
+        baked: BakedRig | None,
+        *,
+        is_drawn: bool,
+        waits: bool,
+    ) -> None:
+        self._reading = Reading(hair, depsgraph)
+        self._reading.use_bake(baked)
+        self._is_drawn = is_drawn
+        self._making: Making | None = None
+        order = self._reading.ordered
+        self.made: Made = make(order, is_drawn=is_drawn) if waits else stand_in(order)
+        if not waits:
+            self._begin()
+
+    @property
+    def uid(self) -> int:
+        return self.hair.handle.uid
+
+    @property
+    def name(self) -> str:
+        return self._reading.name
+
+    @property
+    def hair(self) -> Body:
+        return self._reading.hair
+
+    @property
+    def head(self) -> Body | None:
+        return self._reading.head
+
+    @property
+    def source(self) -> Source:
+        return self._reading.source
+
+    @property
+    def choices(self) -> Choices:
+        """What the artist has set, as far as it is taken over."""
+        return self._reading.choices
+
+    @property
+    def rig(self) -> Rig:
+        return self.made.rig
+
+    @property
+    def is_made(self) -> bool:
+        """Whether there is hair to be shown; False until the first one is made."""
+        return self.made.is_whole
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether hair is being made, the first or other hair."""
+        return self._making is not None
+
+    @property
+    def has_arrived(self) -> bool:
+        """Whether the hair that was being made can be taken over."""
+        return self._making is not None and self._making.is_done
+
+    def has_another_head(self) -> bool:
+        """Whether the artist has set another surface since the session began."""
+        return self._reading.has_another_head()
+
+    def constants(self) -> Arrays:
+        """See `baked_rig.rig_arrays`."""
+        return rig_arrays(self.rig, self._reading.rests)
+
+    def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """See `simulated.Simulated`."""
+        return self._reading.fingerprint(depsgraph)
+
+    def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """See `simulated.Simulated`."""
+        return self._reading.moment(self._pose(depsgraph), depsgraph)
+
+    def _pose(self, depsgraph: bpy.types.Depsgraph) -> Pose:
+        return self._reading.pose(self.rig, depsgraph)
+
+    def _begin(self) -> None:
+        """Have made what was ordered last, once nothing else is being made."""
+        if self._making is None:
+            self._making = Making(self._reading.ordered, self.made)
+
+    def _made_meanwhile(self) -> Made | None:
+        """What was being made, once it is done; None where it failed, and other hair is wanted.
+
+        Raises:
+            HairloomError: it cannot be made.
+        """
+        making, self._making = self._making, None
+        assert making is not None, "nothing is being made"
+        is_latest = making.order is self._reading.ordered
+        try:
+            return making.result()
+        except HairloomError:
+            if is_latest:
+                raise
+            return None
+        finally:
+            if not is_latest:
+                self._begin()
+
+    def _give_up(self) -> None:
+        if self._making is not None:
+            self._making.give_up()
+            self._making = None

@@ -1,0 +1,121 @@
+"""What is drawn of one groom while it is previewed, in step with its settings, motion and light."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+
+from ...pipeline import Pose, Rig
+from ...render.hair_ball import HairBall
+from ...render.snapshot import Snapshot
+from ...shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
+from ...shading.volume.shadow_lights import shadow_warnings
+from ...strands import Surface
+from ..cards.shown_cards import ShownCards
+from ..properties.choices import Choices
+from ..scene.lights import (
+    light_warnings,
+    no_light_warnings,
+    read_ambient,
+    read_lights,
+    scene_lights_are_shown,
+)
+from .making import Made
+from .shown import shapes_alike, snapshot_of, with_choices, with_tables
+from .solvers import Solver
+
+
+class GroomPicture:
+    """The snapshot of a groom, and the cards in it.
+
+    Args:
+        is_drawn: False leaves out what only drawing needs.
+    """
+
+    snapshot: Snapshot
+
+    def __init__(self, *, is_drawn: bool) -> None:
+        self._is_drawn = is_drawn
+        self._ball = HairBall()
+        self._made: Made | None = None
+        self._light_warnings: tuple[str, ...] = ()
+        self.cards = ShownCards()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the artist should know about the light."""
+        dark = no_light_warnings(self.snapshot.lights, self.snapshot.ambient)
+        return (*self._light_warnings, *dark, *self._shadow_warnings())
+
+    def _shadow_warnings(self) -> tuple[str, ...]:
+        snapshot = self.snapshot
+        if snapshot.volume.shadows == "none" or not snapshot.strand_count:
+            return ()
+        lights = snapshot.lights if scene_lights_are_shown() else ()
+        return shadow_warnings(lights, self._ball.of(snapshot), snapshot.volume)
+
+    def take_made(self, hair: bpy.types.Object, made: Made, choices: Choices) -> None:
+        """All that hangs on the strands; it stands at rest, without light."""
+        self._made = made
+        snapshot = snapshot_of(made.rig, made.occlusion, made.rank)
+        self.snapshot = with_choices(snapshot, choices)
+        self._want_cards(hair, made.rig, choices)
+
+    def take_choices(self, hair: bpy.types.Object, rig: Rig, was: Choices, now: Choices) -> bool:
+        """Take over what acts at once; whether hair has to be shown again where it is."""
+        self.snapshot = with_choices(self.snapshot, now)
+        if not shapes_alike(was.shading, now.shading) and not bpy.app.background:
+            self.snapshot = with_tables(self.snapshot, PREVIEW_SIZE)
+        is_other = (was.detail.culling, was.volume.shadows) != (
+            now.detail.culling,
+            now.volume.shadows,
+        )
+        return self._want_cards(hair, rig, now) or is_other
+
+    def _want_cards(self, hair: bpy.types.Object, rig: Rig, choices: Choices) -> bool:
+        """Have cards built if they are to be shown; whether what is shown of them changes now."""
+        is_whole = self._made is not None and self._made.is_whole
+        if not (self._is_drawn and is_whole and choices.shows_cards):
+            self.cards.forget()
+            return self.snapshot.cards is not None
+        self.cards.want(hair, rig, choices.card_form)
+        return True
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether a slider is being moved, so that it is shaded by tables that are quickly made."""
+        return self.snapshot.table_size < DEFAULT_SIZE
+
+    def refine(self) -> None:
+        """Shade by tables of full size again."""
+        self.snapshot = with_tables(self.snapshot, DEFAULT_SIZE)
+
+    def light(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Take over the scene's lights and world."""
+        self.snapshot = replace(
+            self.snapshot,
+            lights=read_lights(depsgraph, self.snapshot.center),
+            ambient=read_ambient(depsgraph.scene),
+        )
+        self._light_warnings = light_warnings(depsgraph)
+
+    def show(self, rig: Rig, solver: Solver, choices: Choices) -> None:
+        """The hair where the solver has it."""
+        pose, hiders = solver.pose, None
+        known = None if self._made is None else self._made.hiders
+        if known is not None and choices.detail.culling == "hidden":
+            hiders = known.at(pose)
+        self.snapshot = replace(
+            solver.shown(self.snapshot),
+            hiders=hiders,
+            casters=_casters(rig, pose, choices),
+            cards=self.cards.now(rig, pose, solver.guides, choices.cards_drawn),
+        )
+
+
+def _casters(rig: Rig, pose: Pose, choices: Choices) -> tuple[Surface, ...]:
+    """The head as it is posed, where its shadow is wanted."""
+    if rig.head is None or pose.head_positions is None or choices.volume.shadows == "none":
+        return ()
+    return (Surface(pose.head_positions, rig.head.triangles),)

@@ -1,0 +1,154 @@
+"""What is read of one groom: curves, head and settings, and where both bodies are.
+
+It holds numbers and arrays, never a reference into Blender's data.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...pipeline import Pose, Rig
+from ...strands import StrandSet
+from ..bakes.baked_rig import BakedRig, RestMatrices
+from ..bakes.fingerprints import groom_fingerprint, groom_moment
+from ..base.objects import Body, head_of, matrix_of
+from ..properties.choices import Choices
+from ..scene.poses import check_finite, read_pose
+from ..scene.source import read_density, read_source, usable_curves
+from .making import Order, rig_of
+
+
+class Reading:
+    """One groom as it was read.
+
+    source, choices: of the hair that is shown.
+    ordered: what was read last, from which hair is being made unless it is shown already.
+
+    Args:
+        hair: a hair curves object.
+
+    Raises:
+        HairloomError: no hair curves, or none that can be used.
+    """
+
+    def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+        head = head_of(hair)
+        self.hair = Body.at_rest(hair, depsgraph)
+        self.source = read_source(hair, depsgraph)
+        uses_head = self.source.head is not None and head is not None
+        self.head = Body.at_rest(head, depsgraph) if uses_head else None
+        self._head_uid = head and head.session_uid
+        self.choices = Choices.of(hair, depsgraph)
+        self.ordered = Order(self.name, self.source, self.choices)
+        check_finite(hair.name, self.hair.rest)
+
+    @property
+    def name(self) -> str:
+        return self.hair.handle.name
+
+    @property
+    def rests(self) -> RestMatrices:
+        return RestMatrices(self.hair.rest, None if self.head is None else self.head.rest)
+
+    def rig(self) -> Rig:
+        """The groom made ready to move.
+
+        Raises:
+            HairloomError: the groom is of another scale than the head.
+        """
+        return rig_of(self.ordered)
+
+    def use_bake(self, baked: BakedRig | None) -> None:
+        """Order the rig of a bake of this very groom, to be the same to the bit."""
+        if baked is not None and (baked.rests.head is None) == (self.head is None):
+            rig = self._rig_of(baked)
+            self.ordered = Order(self.name, self.source, self.choices, rig)
+
+    def _rig_of(self, baked: BakedRig) -> Rig:
+        """The rig of a bake; rest is where hair and head were then."""
+        back = baked.rests.hair @ np.linalg.pinv(self.hair.rest)
+        strands = self.source.strands.transformed(back)
+        self.source = replace(self.source, strands=strands, head=baked.rig.head)
+        self.hair.rest = baked.rests.hair
+        if self.head is not None and baked.rests.head is not None:
+            self.head.rest = baked.rests.head
+        return baked.rig
+
+    def has_another_head(self) -> bool:
+        """Whether the artist has set another surface since."""
+        head = head_of(self.hair.found())
+        return (head and head.session_uid) != self._head_uid
+
+    def read_again(self, depsgraph: bpy.types.Depsgraph) -> Order | None:
+        """Read edited curves, weights and settings; what is to be made of them, None where nothing
+        is.
+
+        The curves are taken to be in the pose in which the reading began, as edits are.
+
+        Raises:
+            HairloomError: the hair is gone, or none that can be used is left.
+        """
+        hair, known = self.hair.found(), self.ordered
+        before = known.source
+        read = usable_curves(hair, depsgraph)
+        back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
+        strands = read.strands if np.allclose(back, np.eye(4)) else read.strands.transformed(back)
+        if _same(strands, before.strands, back):
+            strands = before.strands
+        density, warning = read_density(hair, before.head, depsgraph)
+        source = replace(
+            before,
+            strands=strands,
+            dropped=read.dropped,
+            density=density,
+            density_warning=warning,
+        )
+        order = Order(self.name, source, Choices.of(hair))
+        if order.gives_rig_of(known) and order.choices.ambient == known.choices.ambient:
+            self.source = replace(self.source, dropped=read.dropped, density_warning=warning)
+            return None
+        self.ordered = order
+        return order
+
+    def accept(self, order: Order) -> None:
+        """Its hair is shown from now on; what acts at once is as it is set now."""
+        self.source = order.source
+        self.choices = Choices.of(self.hair.found()).at_once(order.choices)
+
+    def take_choices(self) -> bool:
+        """Take over what acts at once; whether there is more, for which hair is to be made anew."""
+        choices = Choices.of(self.hair.found())
+        self.choices = choices.at_once(self.choices)
+        return not choices.acts_at_once(self.ordered.choices)
+
+    def pose(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Pose:
+        """Where the body is now; see `poses.read_pose`."""
+        vertex_count = None if rig.head is None else len(rig.head.positions)
+        return read_pose(self.hair, self.head, vertex_count, depsgraph)
+
+    def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """See `simulated.Simulated`."""
+        hair = self.hair.found()
+        head = None if self.head is None else self.head.found()
+        return groom_fingerprint(hair, head, self.choices, depsgraph.scene)
+
+    def moment(self, pose: Pose, depsgraph: bpy.types.Depsgraph) -> str:
+        """See `simulated.Simulated`."""
+        hair = self.hair.found()
+        head = None if self.head is None else self.head.found()
+        return groom_moment(hair, head, pose, depsgraph)
+
+
+def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
+    """Whether two readings give the same hair, but for rounding on the way `back` to rest."""
+    farthest = max(np.abs(one.points).max(initial=0.0), np.abs(back[:3, 3]).max())
+    return (
+        np.array_equal(one.offsets, other.offsets)
+        and np.allclose(one.points, other.points, rtol=0.0, atol=1e-6 * farthest)
+        and np.allclose(one.radius, other.radius, rtol=1e-5)
+        and np.array_equal(one.group, other.group)
+    )

@@ -1,0 +1,166 @@
+"""What moves the hair of one groom from frame to frame: numpy, or the GPU's compute shaders.
+
+Both give the same motion within rounding. On the GPU the guides stay there from the simulation to
+the drawing: only the head's vertices go up, and nothing comes back unless it is asked for.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import gpu
+import numpy as np
+
+from ... import pipeline
+from ...arrays import Floats
+from ...dynamics.colliders import PosedCollider
+from ...dynamics.settings import DynamicsSettings
+from ...errors import HairloomError
+from ...groom.settings import GuideSettings
+from ...pipeline import Motion, Pose, Rig
+from ...render.snapshot import Snapshot
+from ...strands import StrandSet
+from ..base.gpu_context import gpu_in_use
+from .compute_solver import ComputeSolver
+from .numpy_solver import NumpySolver
+
+#: How far apart [m] the two may be after the frame that is tried out.
+_AGREEMENT = 1.0e-4
+#: Blender's names of what it draws and computes by -> those that artists know
+_BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal"}
+
+
+class Solver(Protocol):
+    """Moves one groom. A new one has its hair at rest, in the pose of the rig.
+
+    form: "numpy" or "compute".
+    """
+
+    form: str
+
+    @property
+    def pose(self) -> Pose:
+        """Where the body is in what is shown."""
+
+    @property
+    def motion(self) -> Motion:
+        """All that another solver needs to go on from here; read back where it must be."""
+
+    def rest(self, pose: Pose) -> None:
+        """Hair in its style, carried by the body, at no speed."""
+
+    def advance(
+        self,
+        pose: Pose,
+        colliders: tuple[PosedCollider, ...],
+        settings: DynamicsSettings,
+        gravity: Floats,
+        duration: float,
+        scene_wind: Floats = pipeline.NO_WIND,
+    ) -> None:
+        """One frame of motion, as pipeline.advance."""
+
+    def carry(self, pose: Pose, guides: Floats) -> None:
+        """Show guides (guide_count, cv_count, 3) [m, world] that come from a bake.
+
+        To advance from them is to let go of them at no speed.
+
+        Raises:
+            HairloomError: guides of another shape.
+        """
+
+    def guides(self) -> Floats:
+        """At the frame's end, (guide_count, cv_count, 3) [m, world]; read back if need be."""
+
+    def strands(self) -> Floats:
+        """At the frame's end, (strand_count, cv_count, 3) [m, world]; read back if need be."""
+
+    def shown(self, snapshot: Snapshot) -> Snapshot:
+        """The snapshot with the strands of this moment: an array, or a texture on the GPU."""
+
+
+def solver_of(rig: Rig, form: str, motion: Motion | None = None) -> Solver:
+    """A solver for this groom.
+
+    Args:
+        form: "numpy", "compute", or "automatic": compute where it works, else numpy.
+        motion: to go on from, of a solver for the same rig; None: from rest.
+
+    Raises:
+        HairloomError: "compute" where it does not work.
+    """
+    if form == "numpy" or (form == "automatic" and not compute_available()):
+        return NumpySolver(rig, motion)
+    if not compute_available():
+        raise HairloomError(
+            f"the GPU cannot compute here ({compute_problem()})",
+            place="dynamics",
+            remedy="Set Computed On to Automatic",
+        )
+    return ComputeSolver(rig, motion)
+
+
+def form_of(form: str) -> str:
+    """The form that `solver_of` chooses: "numpy" or "compute"."""
+    if form == "automatic":
+        return "compute" if compute_available() else "numpy"
+    return form
+
+
+def computed_on(form: str) -> str:
+    """What computes by a form: "CPU (numpy)", or such as "GPU (OpenGL, llvmpipe)"."""
+    if form == "numpy":
+        return "CPU (numpy)"
+    used = gpu_in_use()
+    backend = _BACKENDS.get(used["backend"], used["backend"])
+    return f"GPU ({backend}, {used['renderer'].partition(' (')[0]})"
+
+
+_problem: str | None = None
+
+
+def compute_available() -> bool:
+    """Whether the GPU can simulate here and now; the first call with a GPU tries it out."""
+    return not compute_problem()
+
+
+def compute_problem() -> str:
+    """Why the GPU cannot simulate here; empty where it can.
+
+    Blender in the background has no GPU until gpu.init(), so that is asked each time; what a GPU
+    can do is found out once.
+    """
+    global _problem
+    try:
+        gpu.platform.backend_type_get()
+    except SystemError:
+        return "Blender runs without a GPU"
+    if _problem is None:
+        _problem = _tried_out()
+    return _problem
+
+
+def _tried_out() -> str:
+    """What is wrong with a frame of a few strands on the GPU, compared with numpy."""
+    along = np.linspace(0.0, 0.2, 6)
+    points = np.zeros((3, len(along), 3))
+    points[..., 0], points[:, 0, 1] = along, (0.0, 0.1, 0.2)
+    points[:, 1:, 1] = points[:, :1, 1]
+    strands = StrandSet(
+        points=points.reshape(-1, 3),
+        offsets=np.arange(4) * len(along),
+        radius=np.full(3 * len(along), 4.0e-5),
+        group=np.zeros(3, np.int32),
+    )
+    rig = pipeline.prepare(strands, None, GuideSettings(), place="a few strands")
+    moved = np.eye(4)
+    moved[:3, 3] = 0.01
+    ends = []
+    try:
+        for solver in (NumpySolver(rig), ComputeSolver(rig)):
+            solver.advance(Pose(None, moved), (), DynamicsSettings(), np.array([0, 0, -9.81]), 0.04)
+            ends.append(solver.strands())
+    except Exception as error:  # a driver may fail at any point, each with an error of its own
+        return f"{type(error).__name__}: {error}"
+    apart = float(np.abs(ends[1] - ends[0]).max())
+    return "" if apart <= _AGREEMENT else f"it is {apart:.2g} m off after one frame"

@@ -1,0 +1,131 @@
+"""A scene to begin with: a head that turns, long hair, three lights and a camera."""
+
+from __future__ import annotations
+
+import bmesh
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ...groom.settings import GrowSettings
+from ..scene.built_in_head import HEAD_HEIGHT
+from ..viewport.overlay import ENGINE
+from .starting import new_groom
+
+NAME = "Hairloom Sample"
+_SUBDIVISIONS = 2
+_FRAMES = 96
+#: frame -> turn about the upright axis and nod [degrees]; the last is as the first
+_TURNS = ((1, 0.0, 0.0), (20, 35.0, -4.0), (34, 20.0, 8.0), (56, -35.0, -4.0), (76, -10.0, 6.0))
+_SKIN = (0.42, 0.27, 0.2, 1.0)
+#: name -> place [m], power [W], side [m], colour
+_LIGHTS = {
+    "Key": ((-0.7, -0.9, 0.8), 9.0, 0.5, (1.0, 0.96, 0.9)),
+    "Fill": ((0.9, -0.7, 0.2), 4.0, 0.9, (0.85, 0.92, 1.0)),
+    "Rim": ((0.5, 0.9, 0.6), 4.0, 0.4, (1.0, 1.0, 1.0)),
+}
+_CAMERA_AT, _LENS = (-0.34, -0.68, 0.02), 50.0
+#: below the head's middle, since hair hangs
+_LOOKED_AT = Vector((0.0, 0.0, -0.04))
+_WORLD = (0.03, 0.034, 0.04, 1.0)
+#: long enough to swing
+_HAIR = GrowSettings(strand_count=3500, length=0.26)
+
+
+def add_sample_scene(presets: tuple[str, ...]) -> tuple[bpy.types.Scene, bpy.types.Object]:
+    """A new scene, rendered by Hairloom, with its groom; the artist's own stay as they are.
+
+    Args:
+        presets: of the groom, by name.
+    """
+    scene = bpy.data.scenes.new(NAME)
+    scene.frame_start, scene.frame_end, scene.frame_current = 1, _FRAMES, 1
+    scene.render.engine = ENGINE
+    scene.render.resolution_x, scene.render.resolution_y = 800, 800
+    scene.world = _world()
+    collection = scene.collection
+    head = _head()
+    collection.objects.link(head)
+    _animate(head)
+    for name, (place, power, side, color) in _LIGHTS.items():
+        collection.objects.link(_light(name, place, power, side, color))
+    scene.camera = _camera()
+    collection.objects.link(scene.camera)
+    layer = scene.view_layers[0]
+    layer.update()
+    hair = new_groom(head, layer.depsgraph, collection, _HAIR, presets=presets, fits=False)
+    hair.hairloom.bake.follows = True
+    return scene, hair
+
+
+def _head() -> bpy.types.Object:
+    """Suzanne in the size of a human head, facing -Y, with UVs."""
+    mesh = bpy.data.meshes.new("Head")
+    shape = bmesh.new()
+    try:
+        shape.loops.layers.uv.new("UVMap")
+        bmesh.ops.create_monkey(shape, calc_uvs=True)
+        heights = [vertex.co.z for vertex in shape.verts]
+        bmesh.ops.scale(
+            shape, vec=(HEAD_HEIGHT / (max(heights) - min(heights)),) * 3, verts=shape.verts
+        )
+        shape.to_mesh(mesh)
+    finally:
+        shape.free()
+    mesh.shade_smooth()
+    mesh.materials.append(_skin())
+    head = bpy.data.objects.new("Head", mesh)
+    head.rotation_mode = "XYZ"
+    head.modifiers.new("Smooth", "SUBSURF").levels = _SUBDIVISIONS
+    return head
+
+
+def _skin() -> bpy.types.Material:
+    material = bpy.data.materials.new("Hairloom Skin")
+    shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    shader.inputs["Base Color"].default_value = _SKIN
+    shader.inputs["Roughness"].default_value = 0.55
+    material.diffuse_color = _SKIN
+    return material
+
+
+def _animate(head: bpy.types.Object) -> None:
+    """It looks to both sides, again and again."""
+    for frame, turn, nod in (*_TURNS, (_FRAMES + 1, *_TURNS[0][1:])):
+        head.rotation_euler = np.radians((nod, 0.0, turn))
+        head.keyframe_insert("rotation_euler", frame=frame)
+    head.rotation_euler = (0.0, 0.0, 0.0)
+
+
+def _light(
+    name: str,
+    place: tuple[float, ...],
+    power: float,
+    side: float,
+    color: tuple[float, ...],
+) -> bpy.types.Object:
+    data = bpy.data.lights.new(name, "AREA")
+    data.energy, data.size, data.color = power, side, color
+    return _looking_at_the_head(name, data, place)
+
+
+def _camera() -> bpy.types.Object:
+    data = bpy.data.cameras.new("Camera")
+    data.lens, data.clip_start = _LENS, 0.01
+    return _looking_at_the_head("Camera", data, _CAMERA_AT)
+
+
+def _looking_at_the_head(
+    name: str, data: bpy.types.ID, place: tuple[float, ...]
+) -> bpy.types.Object:
+    obj = bpy.data.objects.new(name, data)
+    obj.location = place
+    obj.rotation_euler = (_LOOKED_AT - Vector(place)).to_track_quat("-Z", "Y").to_euler()
+    return obj
+
+
+def _world() -> bpy.types.World:
+    world = bpy.data.worlds.new(NAME)
+    background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
+    background.inputs["Color"].default_value = _WORLD
+    return world

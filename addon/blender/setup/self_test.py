@@ -1,0 +1,180 @@
+"""A short test of all that Hairloom stands on, on this machine: for the Preferences page."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ... import pipeline
+from ...arrays import Floats
+from ...exchange.tressfx import read_tfx, write_tfx
+from ...groom.settings import GuideSettings
+from ...pipeline import Rig
+from ...refine.settings import DetailSettings
+from ...render.camera import frame_camera
+from ...render.frame import render_image
+from ...shading.ambient import AmbientSettings
+from ...shading.lights import three_point_lights
+from ...shading.settings import ShadingSettings
+from ...shading.volume.settings import VolumeSettings
+from ...strands import StrandSet
+from ..base.gpu_context import ensure_gpu
+from ..base.images import write_png
+from ..base.report import environment
+from ..sessions.shown import snapshot_of
+from ..sessions.solvers import compute_problem
+
+type Outcome = Literal["passed", "absent", "failed"]
+
+_SIDE = 96
+_DIRECTION, _FIELD_OF_VIEW = (0.0, -1.0, 0.0), 0.5
+#: package -> what is missed without it
+_PACKAGES = {
+    "OpenImageIO": "textures of 16 bits and EXR",
+    "etcpak": "textures as BC7 in DDS",
+    "pxr": "grooms as USD",
+    "alembic3d": "grooms as Alembic",
+}
+
+
+@dataclass(frozen=True)
+class Check:
+    """What one check found.
+
+    outcome: "absent" where something is missing that Hairloom goes on without.
+    """
+
+    name: str
+    outcome: Outcome
+    text: str
+
+
+_last: tuple[Check, ...] = ()
+
+
+def last_report() -> tuple[Check, ...]:
+    """What the last self-test found; nothing before the first."""
+    return _last
+
+
+def report_text() -> str:
+    """The machine and the last self-test as plain text, a line each."""
+    lines = [f"{name}: {value or 'none'}" for name, value in environment().items()]
+    return "\n".join([*lines, *(f"{c.outcome}  {c.name}: {c.text}" for c in _last)]) + "\n"
+
+
+def run() -> tuple[Check, ...]:
+    """Carry out all checks, one after the other; takes a few seconds."""
+    global _last
+    ensure_gpu()
+    _last = tuple(_checks())
+    return _last
+
+
+def _checks() -> Iterator[Check]:
+    yield _compute()
+    for name, settings in _looks().items():
+        yield _checked(f"Drawing, {name}", partial(_drawn, *settings))
+    yield _checked("Files", _files)
+    for package, use in _PACKAGES.items():
+        yield _package(package, use)
+
+
+def _checked(name: str, check: Callable[[], str]) -> Check:
+    """A failure of any kind is what a self-test is there to tell."""
+    try:
+        return Check(name, "passed", check())
+    except Exception as error:
+        return Check(name, "failed", f"{type(error).__name__}: {error}")
+
+
+def _compute() -> Check:
+    """Whether the shaders' motion is numpy's, see `solvers`; without a GPU the CPU does it."""
+    problem = compute_problem()
+    name = "Simulation on the GPU"
+    if problem:
+        return Check(name, "absent", f"{problem}; the CPU simulates")
+    return Check(name, "passed", "the same motion as by numpy")
+
+
+def _looks() -> dict[str, tuple[ShadingSettings, VolumeSettings]]:
+    """Each with shaders of its own."""
+    plain = VolumeSettings(shadows="none")
+    return {
+        "Kajiya-Kay": (ShadingSettings(model="kajiya_kay"), plain),
+        "Marschner": (ShadingSettings(model="marschner"), plain),
+        "shadows": (ShadingSettings(model="marschner"), VolumeSettings(shadows="deep")),
+    }
+
+
+def _drawn(shading: ShadingSettings, volume: VolumeSettings) -> str:
+    """A picture of a brush of hair, which must be seen, be finite and leave its corners clear."""
+    rig = _brush()
+    ambient = AmbientSettings()
+    snapshot = replace(
+        snapshot_of(rig, pipeline.rest_occlusion(rig, ambient), None),
+        shading=shading,
+        volume=volume,
+        detail=DetailSettings(full_size=0.0),
+    )
+    points = rig.strands.points
+    box = points.min(axis=0), points.max(axis=0)
+    camera = frame_camera(box, _DIRECTION, _FIELD_OF_VIEW, 1.0)
+    lit = replace(snapshot, lights=three_point_lights(camera.view))
+    return _judged(render_image(lit, camera, _SIDE, _SIDE, 1, background=(0.0, 0.0, 0.0, 0.0)))
+
+
+def _judged(picture: Floats) -> str:
+    alpha = picture[..., 3]
+    covered = float((alpha > 0.5).mean())
+    if not np.isfinite(picture).all():
+        raise RuntimeError("the picture has values that are no numbers")
+    if not 0.05 < covered < 0.95 or alpha[0, 0] > 0.0:
+        raise RuntimeError(f"hair covers {covered:.0%} of the picture")
+    if picture[..., :3].max() <= 0.0:
+        raise RuntimeError("the hair is black")
+    return f"hair covers {covered:.0%} of the picture"
+
+
+def _brush() -> Rig:
+    """Straight strands side by side, 10 cm long, as wide as a finger."""
+    across, along = np.linspace(-0.02, 0.02, 64), np.linspace(0.0, 0.1, 8)
+    points = np.zeros((len(across), len(along), 3))
+    points[..., 0], points[..., 2] = across[:, None], along
+    strands = StrandSet(
+        points=points.reshape(-1, 3),
+        offsets=np.arange(len(across) + 1) * len(along),
+        radius=np.full(points.shape[0] * points.shape[1], 4.0e-4),
+        group=np.zeros(len(across), np.int32),
+    )
+    return pipeline.prepare(strands, None, GuideSettings(), place="the self-test")
+
+
+def _files() -> str:
+    """A groom and a picture written to the folder for temporary files, and the groom read again."""
+    strands = _brush().strands
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "groom.tfx"
+        write_tfx(path, strands)
+        read = read_tfx(path).strands
+        write_png(Path(folder) / "picture.png", np.ones((4, 4, 4), np.float32))
+        if not (Path(folder) / "picture.png").stat().st_size:
+            raise RuntimeError("a picture was written that is empty")
+    apart = float(np.abs(read.points - strands.points).max())
+    if apart > 1.0e-5:
+        raise RuntimeError(f"a groom came back {apart:.2g} m off")
+    return "a groom and a picture written, the groom read again"
+
+
+def _package(name: str, use: str) -> Check:
+    """It is only looked for: two builds of one library in a process may end it."""
+    if find_spec(name) is None:
+        return Check(name, "absent", f"not here: no {use}")
+    return Check(name, "passed", use)

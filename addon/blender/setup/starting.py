@@ -1,0 +1,184 @@
+"""The first groom: as large as its mesh, in a look and a way to move, on any mesh or empty hair."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...dynamics.settings import DynamicsSettings
+from ...errors import HairloomError
+from ...groom.settings import GrowSettings
+from ...params import Settings
+from ..base.objects import head_of
+from ..properties.presets import apply, named_preset
+from ..properties.properties import settings_of
+from ..scene.curves import read_curves
+from ..scene.source import mute_own_dynamics
+from ..scene.surfaces import read_positions
+from ..strands.groom_files import grow_on
+
+#: Least extent [m] of a head of human size; lengths are declared for that.
+_HEAD_SIZE = 0.19
+#: Meshes from so much smaller to so much larger are heads of real size, or bodies: not fitted.
+_REAL = 2.5
+#: lengths that are of the whole head, not of single hairs
+_LENGTHS = ("length", "wave", "wave_length", "frizz", "clearance", "volume", "radius")
+#: settings of dynamics -> the power of the size by which they grow; swings a second stay
+_MOTION = {
+    "gravity": 1,
+    "wind_speed": 1,
+    "gust_size": 1,
+    "drag": -1,
+    "radius_root": 1,
+    "radius_tip": 1,
+}
+
+
+def fitting_factor(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
+    """How much larger than a human head a mesh is, where it cannot be one; else 1.
+
+    A cube of 2 m is thin nowhere, a body of 2 m is: so the least extent counts.
+    """
+    positions = read_positions(head, depsgraph, place=head.name)
+    if not len(positions):
+        return 1.0
+    least = float(np.ptp(positions, axis=0).min())
+    factor = least / _HEAD_SIZE
+    return factor if factor > _REAL or 0.0 < factor < 1.0 / _REAL else 1.0
+
+
+def fitted(settings: GrowSettings, factor: float) -> GrowSettings:
+    """The same hair on a head that is larger by a factor; declared limits hold."""
+    if factor == 1.0:
+        return settings
+    return replace(settings, **_grown(settings, dict.fromkeys(_LENGTHS, 1), factor))
+
+
+def fit_motion(hair: bpy.types.Object, factor: float) -> None:
+    """Let hair swing on a head that is larger by a factor as it would on a head: by the same
+    angles, in the same time. A breeze of two metres a second does not move hair of two metres.
+    """
+    if factor == 1.0:
+        return
+    group = hair.hairloom.dynamics
+    for name, value in _grown(settings_of(group, DynamicsSettings), _MOTION, factor).items():
+        setattr(group, name, value)
+
+
+def _grown(settings: Settings, powers: dict[str, int], factor: float) -> dict[str, Any]:
+    """The settings that grow, each times a power of the factor, within its declared limits."""
+    limits = {p.name: p.hard_range or (-np.inf, np.inf) for p in settings.parameters()}
+    return {
+        name: float(np.clip(getattr(settings, name) * factor**power, *limits[name]))
+        for name, power in powers.items()
+    }
+
+
+def new_groom(
+    head: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    collection: bpy.types.Collection,
+    values: Any,
+    *,
+    presets: tuple[str, ...],
+    fits: bool,
+    density_group: str = "",
+    length_group: str = "",
+) -> bpy.types.Object:
+    """Hair grown on a mesh, with these presets.
+
+    Args:
+        values: an operator, group or settings with the values of GrowSettings.
+        presets: names as in `named_preset`.
+        fits: whether lengths and motion follow the mesh's size where it is none of a head.
+
+    Raises:
+        HairloomError: as `groom_files.grow_on`, or there is no such preset.
+    """
+    settings = settings_of(values, GrowSettings)
+    factor = fitting_factor(head, depsgraph) if fits else 1.0
+    settings = fitted(settings, factor)
+    hair = grow_on(
+        head,
+        depsgraph,
+        collection,
+        settings,
+        density_group=density_group,
+        length_group=length_group,
+    )
+    dress(hair, presets)
+    fit_motion(hair, factor)
+    return hair
+
+
+def dress(hair: bpy.types.Object, presets: tuple[str, ...]) -> None:
+    """Give a groom the settings of presets, by name.
+
+    Raises:
+        HairloomError: there is no such preset.
+    """
+    for name in presets:
+        for settings in named_preset(name).all:
+            apply(settings, hair)
+
+
+def take_over(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, presets: tuple[str, ...]
+) -> tuple[bpy.types.Object, tuple[str, ...]]:
+    """Make hair curves of Blender's ready for Hairloom: a groom to preview, and what was done.
+
+    Its own Hair Dynamics is muted; on hair without a single curve a groom is grown, in its place.
+
+    Args:
+        presets: for hair whose look was never set.
+
+    Raises:
+        HairloomError: it has no curves, and no surface on which some could grow.
+    """
+    done = []
+    if mute_own_dynamics(hair):
+        done.append("turned off Blender's Hair Dynamics")
+    factor = 1.0
+    if not len(hair.data.curves) and not read_curves(hair, depsgraph).strands.strand_count:
+        hair, factor = _grown_in_place(hair, depsgraph)
+        done.append("grew hair, since there was none")
+    if is_untouched(hair):
+        dress(hair, presets)
+        fit_motion(hair, factor)
+    return hair, tuple(done)
+
+
+def is_untouched(hair: bpy.types.Object) -> bool:
+    """Whether nobody has ever set anything about its look."""
+    group = hair.data.hairloom.shading
+    return not any(group.is_property_set(p.name) for p in group.settings.parameters())
+
+
+def _grown_in_place(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[bpy.types.Object, float]:
+    """A groom with the name and in the collections of hair that has no curves, which goes; and how
+    much larger than a human head its head is.
+    """
+    head = head_of(hair)
+    if head is None:
+        raise HairloomError(
+            "it has no curves, and no surface to grow them on",
+            place=hair.name,
+            remedy="Comb some in Sculpt Mode, or select a mesh and press Add Hair",
+        )
+    factor = fitting_factor(head, depsgraph)
+    settings = fitted(GrowSettings(), factor)
+    name, collections = hair.name, list(hair.users_collection)
+    grown = grow_on(head, depsgraph, collections[0], settings)
+    for collection in collections[1:]:
+        collection.objects.link(grown)
+    curves = hair.data
+    bpy.data.objects.remove(hair)
+    if not curves.users:
+        bpy.data.hair_curves.remove(curves)
+    grown.name = name
+    return grown, factor

@@ -1,0 +1,96 @@
+"""What an engine will see of hair, while an artist still chooses how it is written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+
+from ...errors import HairloomError
+from ...exchange.groom import Groom
+from ...exchange.joined_grooms import joined_grooms
+from ...exchange.strand_check import check_lines, check_strands
+from ...exchange.strand_formats import StrandFormat
+from ...exchange.strand_output import StrandOutput
+from ..bakes import playback
+from ..bakes.stale_bakes import changed_since
+from ..base.objects import Handle
+from .groom_out import Wishes, still_hair
+from .strand_export import wishes_of
+
+
+@dataclass
+class ExportCheck:
+    """Hair that is read once, as it was when the artist began, and checked for each choice.
+
+    lines: what will be there. warnings: what the artist should know of it.
+    """
+
+    hair: list[Handle]
+    lines: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    _read: dict[Wishes, tuple[Groom, tuple[str, ...]]] = field(default_factory=dict)
+    _stale: dict[int, tuple[str, ...]] = field(default_factory=dict)
+    _checked: tuple[StrandFormat, StrandOutput] | None = None
+
+    @classmethod
+    def of(cls, hair: list[bpy.types.Object]) -> ExportCheck:
+        return cls([Handle.of(each) for each in hair])
+
+    def refresh(
+        self, depsgraph: bpy.types.Depsgraph, kind: StrandFormat, output: StrandOutput
+    ) -> bool:
+        """Check it for a format and what is asked of it; whether anything may be new since."""
+        if self._checked == (kind, output):
+            return False
+        if self._checked is None:
+            self._look_at_bakes(depsgraph)
+        try:
+            groom, notes = self._groom(depsgraph, wishes_of(kind, output))
+            facts = check_strands(groom, kind, output)
+        except HairloomError as error:
+            self.lines, self.warnings = [], [str(error)]
+        else:
+            self.lines, self.warnings = check_lines(facts), [*notes, *facts["warnings"]]
+        self._checked = kind, output
+        return True
+
+    def motion_lines(self, *, use_bake: bool) -> list[str]:
+        """What each hair goes by where frames are written."""
+        hair = filter(None, (each.find() for each in self.hair))
+        return [f"{each.name}: {self._moved_by(each, use_bake)}" for each in hair]
+
+    def _groom(
+        self, depsgraph: bpy.types.Depsgraph, wishes: Wishes
+    ) -> tuple[Groom, tuple[str, ...]]:
+        if wishes not in self._read:
+            found = [hair for hair in (each.find() for each in self.hair) if hair is not None]
+            if not found:
+                raise HairloomError("it is gone", place="hair", remedy="Export again")
+            outs = [still_hair(each, depsgraph, wishes) for each in found]
+            groom, lost = joined_grooms([out.groom for out in outs], found[0].name)
+            notes = dict.fromkeys([note for out in outs for note in out.notes])
+            self._read[wishes] = groom, (*notes, *lost)
+        return self._read[wishes]
+
+    def _moved_by(self, hair: bpy.types.Object, use_bake: bool) -> str:
+        try:
+            cache = playback.cache_of(hair) if use_bake else None
+            if cache is None:
+                return ("no bake, " if use_bake else "") + "as modifiers and animation move it"
+        except HairloomError as error:
+            return error.problem
+        facts = cache.facts
+        line = f"bake of frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps"
+        changed = self._stale.get(hair.session_uid, ())
+        return f"{line}, out of date ({', '.join(changed)})" if changed else line
+
+    def _look_at_bakes(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Once: hashing all that a bake hangs on takes too long for drawing."""
+        for hair in filter(None, (each.find() for each in self.hair)):
+            try:
+                cache = playback.cache_of(hair)
+                changed = () if cache is None else changed_since(hair, cache, depsgraph)
+            except HairloomError:  # told in the lines of its motion, and when it is written
+                changed = ()
+            self._stale[hair.session_uid] = changed

@@ -1,0 +1,190 @@
+"""Strands of files into the open scene: hair curves on a mesh, with all that the files say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...errors import HairloomError
+from ...exchange.groom import Groom
+from ...exchange.read_groom import ReadGroom
+from ...exchange.strand_formats import STRAND_FORMATS, strand_format
+from ...exchange.strand_reading import read_strands
+from ...groom.root_fit import LOOSE_DISTANCE, better_fit
+from ...groom.roots import bind_roots
+from ...strands import StrandSet, Surface
+from ...strands.closest_point import ClosestPointSearch
+from ..scene.curves import write_curves
+from ..scene.groom_attributes import store_groom
+from ..scene.surfaces import read_surface
+from .child_python import python_for
+from .groom_files import Outcome
+
+#: title of each format, and the suffixes of its files
+FILE_KINDS = tuple((each.title, each.suffixes) for each in STRAND_FORMATS)
+#: what becomes of guides beside strands: left out, hair curves of their own, among the strands
+GUIDES = ("leave", "apart", "among")
+#: Hair of an extent beyond these is no hair of a head, nor of an animal [m].
+_LEAST_EXTENT, _MOST_EXTENT = 0.005, 20.0
+
+
+@dataclass(frozen=True)
+class StrandImport:
+    """How files are read; see `strand_reading.read_strands`.
+
+    guides: one of GUIDES.
+    python: the command that starts another Python.
+    """
+
+    up: str | None = None
+    scale: float = 1.0
+    guides: str = "leave"
+    python: Sequence[str] | None = None
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The mesh that imported hair is bound to, read once for all files."""
+
+    head: bpy.types.Object
+    surface: Surface
+
+
+def read_ground(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Ground:
+    """The mesh as Blender shows it.
+
+    Raises:
+        HairloomError: it has no faces.
+    """
+    return Ground(head, read_surface(head, depsgraph, need_uv=False, place=head.name))
+
+
+def import_strands(
+    path: Path,
+    ground: Ground | None,
+    collection: bpy.types.Collection,
+    choices: StrandImport | None = None,
+) -> tuple[list[bpy.types.Object], Outcome]:
+    """Read a file into hair curves, bound to a mesh if there is one.
+
+    Returns:
+        The new objects, guides that stand apart last; what happened.
+
+    Raises:
+        HairloomError: the file cannot be read, or is of another scale or place than the mesh.
+    """
+    choices = choices or StrandImport()
+    read = _read(path, choices)
+    groom, warnings = _bound(read.groom, ground, choices, path)
+    objects = [
+        _written(each, path.stem + ending, ground, collection)
+        for each, ending in _objects(groom, choices.guides)
+    ]
+    result = f"{path.name}: {_counts(groom)}, {_format(path, read)}"
+    return objects, Outcome(result, read.dropped, (*read.notes, *warnings))
+
+
+def _read(path: Path, choices: StrandImport) -> ReadGroom:
+    return read_strands(
+        path,
+        up=choices.up,
+        scale=choices.scale,
+        parts="strands" if choices.guides == "leave" else "both",
+        python=choices.python or python_for(path),
+    )
+
+
+def _objects(groom: Groom, guides: str) -> list[tuple[Groom, str]]:
+    """What becomes an object of its own, and what its name ends in."""
+    is_guide = groom.is_guide
+    if guides != "apart" or is_guide is None or is_guide.all() or not is_guide.any():
+        return [(groom, "")]
+    untied = replace(groom, closest_guides=None, guide_weights=None)
+    return [(replace(untied.without_guides(), is_guide=None), ""), (untied.guides(), " Guides")]
+
+
+def _written(
+    groom: Groom, name: str, ground: Ground | None, collection: bpy.types.Collection
+) -> bpy.types.Object:
+    hair = write_curves(name, groom.strands, ground and ground.head, collection)
+    store_groom(hair.data, groom)
+    return hair
+
+
+def _bound(
+    groom: Groom, ground: Ground | None, choices: StrandImport, path: Path
+) -> tuple[Groom, tuple[str, ...]]:
+    """Strands with the mesh's UVs at their roots, which Blender's own hair tools go by."""
+    if ground is None:
+        return groom, _size_warning(groom.strands, path)
+    head, surface = ground.head, ground.surface
+    loose = groom.strands if surface.corner_uv is None else replace(groom.strands, root_uv=None)
+    try:
+        bound = bind_roots(loose, surface, place=path.name)
+    except HairloomError as error:
+        remedy = _remedy(loose, surface, choices, path)
+        if remedy is None:
+            raise
+        raise HairloomError(error.problem, place=path.name, remedy=remedy) from error
+    warnings = []
+    distance = float(np.median(bound.distance))
+    if distance > LOOSE_DISTANCE * float(np.linalg.norm(np.ptp(surface.positions, axis=0))):
+        remedy = _remedy(loose, surface, choices, path) or "Check the axes and the place of both"
+        warnings.append(
+            f"{path.name}: its roots lie {distance * 1e3:.3g} mm from {head.name} (median). "
+            f"{remedy}."
+        )
+    if surface.corner_uv is None:
+        warnings.append(
+            f"{head.name}: it has no UVs, so Blender's own hair tools cannot hold these strands. "
+            "Unwrap it (Edit Mode, UV > Unwrap)."
+        )
+    return replace(groom, strands=bound.strands), tuple(warnings)
+
+
+def _remedy(strands: StrandSet, surface: Surface, choices: StrandImport, path: Path) -> str | None:
+    """How the file would fit the mesh, if there is a way: it is read again to know."""
+    ways = {"": strands.roots}
+    for up in ("Y", "Z"):
+        roots = _read(path, replace(choices, up=up)).strands.roots
+        if not np.array_equal(roots, strands.roots):
+            ways[up] = roots
+    fit = better_fit(ways, ClosestPointSearch(surface))
+    if fit is None:
+        return None
+    wanted, options = [], []
+    if fit.name:
+        wanted.append(f"{fit.name} up")
+        options.append(f"--groom-up {fit.name}")
+    if fit.factor != 1.0:
+        scale = f"{fit.factor * choices.scale:.4g}"
+        wanted.append(f"a scale of {scale}")
+        options.append(f"--groom-scale {scale}")
+    return f"Import it with {' and '.join(wanted)} ({' '.join(options)})"
+
+
+def _size_warning(strands: StrandSet, path: Path) -> tuple[str, ...]:
+    low, high = strands.bounds()
+    extent = float((high - low).max())
+    if _LEAST_EXTENT <= extent <= _MOST_EXTENT:
+        return ()
+    return (f"{path.name}: its hair is {extent:.3g} m wide. Import it with another scale.",)
+
+
+def _counts(groom: Groom) -> str:
+    """Such as "1,200 strands and 60 guides in 3 groups"."""
+    guides = 0 if groom.is_guide is None else int(groom.is_guide.sum())
+    strands = groom.strands.strand_count - guides
+    counts = [f"{strands:,} strands"] if strands else []
+    counts += [f"{guides:,} guides"] if guides else []
+    groups = len(np.unique(groom.strands.group))
+    return " and ".join(counts) + (f" in {groups:,} groups" if groups > 1 else "")
+
+
+def _format(path: Path, read: ReadGroom) -> str:
+    title = strand_format(path).title
+    return f"{title} {read.version:g}" if read.version else title

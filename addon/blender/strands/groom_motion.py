@@ -1,0 +1,239 @@
+"""Hair in motion as it goes into files: from its bake, or as Blender's own animation moves it."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import bpy
+import numpy as np
+
+from ... import pipeline
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
+from ...groom.guides import choose_guides
+from ...groom.settings import GuideSettings
+from ...pipeline import Pose, Rig
+from ...strands.resample import resample
+from ..bakes import playback
+from ..bakes.cache import Cache
+from ..bakes.fingerprints import frame_rate
+from ..bakes.stale_bakes import stale_notes
+from ..base.objects import Body, Handle, head_of
+from ..preview import live
+from ..properties.properties import settings_of
+from ..scene.rigs import rig_of
+from ..scene.source import read_source, usable_curves
+from ..scene.surfaces import read_positions
+from .groom_out import HairOut, Wishes, baked_hair, still_hair
+
+
+class Moving(Protocol):
+    """One hair of a file, at all frames.
+
+    rate: frames in a second.
+    needs_scene: whether the scene goes to each frame before it is asked for.
+    """
+
+    @property
+    def out(self) -> HairOut: ...
+
+    @property
+    def rate(self) -> float: ...
+
+    @property
+    def needs_scene(self) -> bool: ...
+
+    def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
+        """The points of the strands that are seen, (point_count, 3) [m]."""
+
+
+@dataclass(frozen=True)
+class BakedMotion:
+    """Hair that goes by its bake."""
+
+    out: HairOut
+    cache: Cache
+    needs_scene: bool = False
+
+    @property
+    def rate(self) -> float:
+        return self.cache.facts.frame_rate
+
+    def at(self, frame: int, _depsgraph: bpy.types.Depsgraph) -> Floats:
+        return playback.strands_in(self.cache, frame).reshape(-1, 3)
+
+
+@dataclass(frozen=True)
+class ShownMotion:
+    """Hair that modifiers and animation move, read anew at each frame."""
+
+    out: HairOut
+    hair: Handle
+    rate: float
+    needs_scene: bool = True
+
+    def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
+        read = usable_curves(_found(self.hair), depsgraph).strands
+        if not np.array_equal(read.offsets, self.out.seen.offsets):
+            raise _other_curves(self.hair, frame)
+        return read.points
+
+
+@dataclass(frozen=True)
+class ChildrenMotion:
+    """Children between guides that modifiers and animation move.
+
+    guides: indices of the guides among the curves that are read.
+    count: of those curves.
+    body: what carries the roots.
+    """
+
+    out: HairOut
+    hair: Handle
+    rate: float
+    rig: Rig
+    guides: Ints
+    count: int
+    body: Body
+    needs_scene: bool = True
+
+    def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
+        read = usable_curves(_found(self.hair), depsgraph).strands
+        if read.strand_count != self.count:
+            raise _other_curves(self.hair, frame)
+        now = resample(read.take(self.guides), self.rig.strands.grid.shape[1]).grid
+        positions = None
+        if self.rig.head is not None:
+            name = self.body.handle.name
+            positions = read_positions(self.body.found(), depsgraph, place=name)
+        pose = Pose(positions, self.body.moved(depsgraph))
+        return pipeline.strands_at(self.rig, pose, now).reshape(-1, 3)
+
+
+def moving_hair(
+    hair: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    frames: range,
+    wishes: Wishes,
+    *,
+    use_bake: bool,
+) -> tuple[Moving, tuple[str, ...]]:
+    """The hair in motion, and what the artist should know.
+
+    Args:
+        frames: scene frames.
+        use_bake: go by its bake, if it has one.
+
+    Raises:
+        HairloomError: frames that are not in the bake, a damaged bake, or no usable hair.
+    """
+    cache = playback.cache_of(hair) if use_bake else None
+    if cache is not None:
+        check_frames(hair.name, frames, cache)
+        motion = BakedMotion(baked_hair(hair, depsgraph, cache, wishes), cache)
+        return motion, stale_notes(hair, cache, depsgraph)
+    out, rate = still_hair(hair, depsgraph, wishes), frame_rate(depsgraph.scene)
+    notes: tuple[str, ...] = ()
+    if use_bake:
+        notes = (
+            f"{hair.name}: it has no bake, so it moves as Blender's own animation and modifiers "
+            "move it. Bake it to write Hairloom's motion.",
+        )
+    if hair.data.hairloom.children.way == "none":
+        return ShownMotion(out, Handle.of(hair), rate), notes
+    return _children_motion(hair, depsgraph, out, rate), notes
+
+
+def check_frames(name: str, frames: range, cache: Cache) -> None:
+    """Refuse frames that were not baked.
+
+    Raises:
+        HairloomError: naming those that are missing.
+    """
+    first, last = cache.facts.first, cache.facts.last
+    missing = [frame for frame in (frames[0], frames[-1]) if not cache.holds(frame)]
+    if missing:
+        raise HairloomError(
+            f"its bake holds frames {first} to {last}, not all of {frames[0]} to {frames[-1]}",
+            place=name,
+            remedy=f"Bake these frames, or write {first} to {last}",
+        )
+
+
+def common_rate(parts: Sequence[Moving]) -> float:
+    """Frames in a second.
+
+    Raises:
+        HairloomError: the bakes of hair that goes into one file differ.
+    """
+    rates = {part.rate for part in parts}
+    if len(rates) > 1:
+        told = " and ".join(f"{rate:g}" for rate in sorted(rates))
+        names = ", ".join(part.out.groom.name for part in parts)
+        raise HairloomError(
+            f"this hair has different frame rates, {told}",
+            place=names,
+            remedy="Bake all of it at the scene's rate, or write a file each",
+        )
+    return rates.pop()
+
+
+def positions_of(parts: Sequence[Moving], frames: range) -> Generator[Floats]:
+    """The points of all parts, one after the other, at each frame.
+
+    Leaves the scene at the frame where it was, also when it is closed before its end.
+
+    Raises:
+        HairloomError: hair that is gone, or has other curves than in the first frame.
+    """
+    scene = bpy.context.scene
+    shown, subframe = scene.frame_current, scene.frame_subframe
+    needs_scene = any(part.needs_scene for part in parts)
+    try:
+        for frame in frames:
+            if needs_scene:
+                with live.suspended():
+                    scene.frame_set(frame)
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            yield np.concatenate([part.out.points(part.at(frame, depsgraph)) for part in parts])
+    finally:
+        if needs_scene:
+            with live.suspended():
+                scene.frame_set(shown, subframe=subframe)
+
+
+def _children_motion(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, out: HairOut, rate: float
+) -> ChildrenMotion:
+    source = read_source(hair, depsgraph)
+    settings = settings_of(hair.data.hairloom.guides, GuideSettings)
+    guides = choose_guides(resample(source.strands, settings.cv_count), settings)
+    rig = rig_of(hair, source)
+    head = head_of(hair)
+    body = hair if head is None or rig.head is None else head
+    return ChildrenMotion(
+        out,
+        Handle.of(hair),
+        rate,
+        rig,
+        guides,
+        source.strands.strand_count,
+        Body.at_rest(body, depsgraph),
+    )
+
+
+def _found(handle: Handle) -> bpy.types.Object:
+    hair = handle.find()
+    if hair is None:
+        raise HairloomError("it is gone", place=handle.name, remedy="Export again")
+    return hair
+
+
+def _other_curves(handle: Handle, frame: int) -> HairloomError:
+    return HairloomError(
+        f"in frame {frame} it has other curves than before, and a file holds the same in all",
+        place=handle.name,
+        remedy="Turn off the modifier that adds or removes curves, or write fewer frames",
+    )

@@ -1,0 +1,205 @@
+"""Hair as it goes into files: what Blender shows of it, with its guides and all that it says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...exchange.groom import Groom, points_of
+from ...exchange.guide_copies import with_guide_copies
+from ...groom.roots import bind_roots
+from ...groom.weights import guide_weights
+from ...pipeline import Rig
+from ...strands import StrandSet
+from ...strands.resample import arc_length_positions, resample
+from ..bakes import playback
+from ..bakes.cache import Cache
+from ..scene.groom_attributes import group_names, stored_groom
+from ..scene.rigs import rig_of
+from ..scene.source import Source, read_source, usable_curves
+from .groom_files import notes_of
+
+_OF_GUIDES = ("is_guide", "closest_guides", "guide_weights")
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a file asks for.
+
+    guides: curves for the guides beside the strands.
+    color: the look's colour where the hair has none of its own.
+    roots: where on the head each root is, for bones.
+    """
+
+    guides: bool = True
+    color: bool = True
+    roots: bool = False
+
+
+@dataclass(frozen=True)
+class HairOut:
+    """A hair as it goes into a file.
+
+    seen: its strands; in the groom copies of guides may come behind them.
+    copied: indices of the points of `seen` that are there once more behind them.
+    dropped: reason -> number of curves left out.
+    notes: what the artist should know.
+    """
+
+    groom: Groom
+    seen: StrandSet
+    copied: Ints
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def points(self, seen: Floats) -> Floats:
+        """The groom's points where those that are seen are at these, (point_count, 3)."""
+        return np.concatenate([seen, seen[self.copied]]) if len(self.copied) else seen
+
+
+def still_hair(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, wishes: Wishes) -> HairOut:
+    """All strands after the modifiers, with their own points; or guides and children if there are.
+
+    Guides that the hair has marked stay; else there are copies of those that Hairloom chooses.
+
+    Raises:
+        HairloomError: no hair that can be used, or one of another scale than its head.
+    """
+    source = read_source(hair, depsgraph)
+    if hair.data.hairloom.children.way != "none":
+        rig = rig_of(hair, source)
+        groom = Groom(rig.strands, hair.name, group_names=group_names(hair))
+        return _told(hair, source, _out(groom, rig, wishes, look_color(hair)), rig)
+    said = _without_empty_marks(stored_groom(hair, depsgraph, source.kept))
+    if wishes.guides and "is_guide" not in said:
+        rig = rig_of(hair, source)
+        groom = Groom(_bound_as(source.strands, rig.strands), hair.name, **said)
+        return _told(hair, source, _out(groom, rig, wishes, look_color(hair)), rig)
+    strands = source.strands
+    if source.head is not None and (wishes.roots or strands.root_uv is None):
+        strands = bind_roots(strands, source.head, place=hair.name).strands
+    groom = Groom(strands, hair.name, **said)
+    if wishes.guides and groom.closest_guides is None:
+        groom = _weighed(groom, hair.data.hairloom.guides.cv_count)
+    return _told(hair, source, _out(groom, None, wishes, look_color(hair)))
+
+
+def baked_hair(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, cache: Cache, wishes: Wishes
+) -> HairOut:
+    """The strands of a bake at rest, and what the hair says of them where they are its curves.
+
+    Raises:
+        HairloomError: the bake is damaged.
+    """
+    rig = playback.rig_in(cache).rig
+    read, said = usable_curves(hair, depsgraph), dict[str, Any]()
+    is_plain = hair.data.hairloom.children.way == "none"
+    if is_plain and rig.strands.strand_count == read.strands.strand_count:
+        said = _without_empty_marks(stored_groom(hair, depsgraph, read.kept))
+        if "color" in said:
+            said["color"] = _at_cvs(said["color"], read.strands, rig.strands.grid.shape[1])
+    notes: tuple[str, ...] = ()
+    if rig.strands.root_uv is None and rig.head is not None:
+        notes = (f"{hair.name}: its bake has no root UVs. Bake again to have them in the file.",)
+    groom = Groom(rig.strands, hair.name, **({"group_names": group_names(hair)} | said))
+    has_marks = groom.is_guide is not None
+    out = _out(groom, None if has_marks else rig, wishes, look_color(hair))
+    return replace(out, notes=notes)
+
+
+def hair_of_rig(
+    rig: Rig, groom: Groom, wishes: Wishes, color: tuple[float, float, float]
+) -> HairOut:
+    """Hair of the command line.
+
+    Args:
+        groom: the rig's strands, or the same with other points.
+        color: of the look.
+    """
+    bound = replace(groom, strands=_bound_as(groom.strands, rig.strands))
+    if groom.is_guide is not None and not groom.is_guide.any():
+        bound = replace(bound, is_guide=None, closest_guides=None, guide_weights=None)
+    return _out(bound, rig if bound.is_guide is None else None, wishes, color)
+
+
+def look_color(hair: bpy.types.Object) -> tuple[float, float, float]:
+    """The colour of the hair's look, scene-linear."""
+    red, green, blue = hair.data.hairloom.shading.base_color
+    return red, green, blue
+
+
+def _out(
+    groom: Groom, rig: Rig | None, wishes: Wishes, color: tuple[float, float, float]
+) -> HairOut:
+    """With the copies of the rig's guides, if they are wanted."""
+    if groom.color is None and wishes.color:
+        groom = replace(groom, color=np.full((groom.strands.point_count, 3), color, np.float32))
+    if rig is None or not wishes.guides:
+        return HairOut(groom, groom.strands, np.zeros(0, np.int64))
+    whole = with_guide_copies(groom, rig.guides, rig.weights.guide, rig.weights.weight)
+    return HairOut(whole, groom.strands, points_of(groom.strands, rig.guides))
+
+
+def _told(hair: bpy.types.Object, source: Source, out: HairOut, rig: Rig | None = None) -> HairOut:
+    notes = () if rig is None else notes_of(hair, rig)
+    return replace(out, dropped=source.dropped, notes=(*source.warnings, *notes))
+
+
+def _bound_as(strands: StrandSet, bound: StrandSet) -> StrandSet:
+    """Held where the same strands with other points are."""
+    return replace(
+        strands,
+        root_uv=bound.root_uv,
+        root_triangle=bound.root_triangle,
+        root_barycentric=bound.root_barycentric,
+    )
+
+
+def _without_empty_marks(said: dict[str, Any]) -> dict[str, Any]:
+    """Marks of guides count where there are guides."""
+    if "is_guide" in said and not said["is_guide"].any():
+        return {name: value for name, value in said.items() if name not in _OF_GUIDES}
+    return said
+
+
+def _weighed(groom: Groom, cv_count: int) -> Groom:
+    """With the closest of its marked guides; without where a group has no guide, as those are
+    weighed within their group."""
+    assert groom.is_guide is not None
+    guides = np.flatnonzero(groom.is_guide)
+    group = groom.strands.group
+    if not np.isin(group, group[guides]).all():
+        return groom
+    uniform = resample(groom.strands, cv_count)
+    roots, grid = uniform.roots, uniform.grid
+    weights = guide_weights(
+        roots,
+        group,
+        roots[guides],
+        group[guides],
+        strand_grid=grid,
+        guide_grid=grid[guides],
+    )
+    ids = np.arange(len(group)) if groom.strand_id is None else groom.strand_id
+    return replace(
+        groom,
+        strand_id=ids,
+        closest_guides=ids[guides][weights.guide],
+        guide_weights=weights.weight,
+    )
+
+
+def _at_cvs(values: Floats, strands: StrandSet, cv_count: int) -> Floats:
+    """Values of points (point_count, 3) at so many CVs of each strand, as `resample` has them."""
+    if (strands.point_counts == cv_count).all():
+        return values
+    left, weight = arc_length_positions(strands, cv_count)
+    weight = weight[..., None]
+    between = values[left] * (1.0 - weight) + values[left + 1] * weight
+    return between.reshape(-1, values.shape[1]).astype(np.float32)

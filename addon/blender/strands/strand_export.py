@@ -1,0 +1,221 @@
+"""Strands out of the open scene: one file of one hair or several, still or over frames."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...arrays import Floats
+from ...exchange.groom import Groom, GroomMotion
+from ...exchange.groom_presets import chosen_parts
+from ...exchange.joined_grooms import joined_bones, joined_grooms
+from ...exchange.strand_check import check_strands
+from ...exchange.strand_formats import ALEMBIC, TRESSFX, USD, StrandFormat
+from ...exchange.strand_output import StrandOutput, layout_of
+from ...exchange.strand_writing import WrittenStrands, write_strands
+from ...exchange.tfxbone import BoneWeights
+from ..base.thread_work import ThreadWork
+from ..scene.bone_weights import bones_of, has_bones
+from .groom_files import Outcome
+from .groom_motion import Moving, common_rate, moving_hair, positions_of
+from .groom_out import HairOut, Wishes, still_hair
+
+
+@dataclass
+class StrandExport:
+    """What goes into one file, read and ready.
+
+    frames: of the motion; None for a still.
+    done: how many frames were asked for so far. files: what was written.
+    """
+
+    groom: Groom
+    output: StrandOutput
+    kind: StrandFormat
+    dropped: dict[str, int] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    frames: range | None = None
+    rate: float = 0.0
+    moving: tuple[Moving, ...] = ()
+    done: int = 0
+    files: tuple[Path, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        hair: list[bpy.types.Object],
+        depsgraph: bpy.types.Depsgraph,
+        kind: StrandFormat,
+        output: StrandOutput,
+        *,
+        frames: range | None = None,
+        use_bake: bool = True,
+        with_bones: bool = True,
+    ) -> StrandExport:
+        """Read hair of the scene; several become one groom, each with groups of its own.
+
+        Args:
+            frames: scene frames; None: as it is now.
+            use_bake: for motion, go by the bake of hair that has one.
+            with_bones: for TressFX, the bones of skinned heads.
+
+        Raises:
+            HairloomError: no hair that can be used, frames that were not baked, or an engine or
+                unit that cannot be.
+        """
+        has_roots = kind is TRESSFX and with_bones and any(has_bones(each) for each in hair)
+        wishes = replace(wishes_of(kind, output), roots=has_roots)
+        if frames is None:
+            outs, moving, notes = _still(hair, depsgraph, wishes)
+        else:
+            outs, moving, notes = _moving(hair, depsgraph, wishes, frames, use_bake=use_bake)
+        groom, lost = joined_grooms([out.groom for out in outs], hair[0].name)
+        groom = _with_strands(groom, layout_of(kind, output).parts)
+        bones, missing = None, tuple[str, ...]()
+        if kind is TRESSFX and with_bones:
+            bones, missing = _bones(hair, depsgraph, outs)
+        dropped: Counter[str] = Counter()
+        for out in outs:
+            dropped.update(out.dropped)
+        told = dict.fromkeys([note for out in outs for note in out.notes])
+        return cls(
+            groom,
+            replace(output, bones=bones),
+            kind,
+            dict(dropped),
+            (*told, *notes, *lost, *missing),
+            frames,
+            common_rate(moving) if moving else 0.0,
+            moving,
+        )
+
+    @property
+    def frame_count(self) -> int:
+        return 0 if self.frames is None else len(self.frames)
+
+    def check(self) -> dict[str, Any]:
+        """What the engine will see, see `exchange.strand_check`; and frames: first, last, a second,
+        for motion."""
+        facts = check_strands(self.groom, self.kind, self.output)
+        if self.frames is not None:
+            facts["frames"] = [self.frames[0], self.frames[-1], self.rate]
+        return facts
+
+    def write(self, path: Path, positions: Iterator[Floats] | None = None) -> Outcome:
+        """Write the file, and what lies beside it.
+
+        Args:
+            positions: of the frames, where they do not come from `positions`.
+
+        Raises:
+            HairloomError: as `exchange.strand_writing.write_strands`, or a frame cannot be read.
+        """
+        motion = None
+        if self.frames is not None:
+            motion = GroomMotion(positions or self.positions(), self.rate, self.frames[0])
+        written = write_strands(path, self.groom, self.output, motion)
+        self.files = written.files
+        return self._outcome(written)
+
+    def positions(self) -> Generator[Floats]:
+        """All points of each frame, in the main thread."""
+        assert self.frames is not None
+        for points in positions_of(self.moving, self.frames):
+            yield points
+            self.done += 1
+
+    def writing(self, path: Path, positions: Generator[Floats]) -> ThreadWork[Outcome]:
+        """The same in a thread, which asks the main thread for each frame of `positions`."""
+
+        def work(thread: ThreadWork[Outcome]) -> Outcome:
+            return self.write(path, _asked(thread, positions))
+
+        return ThreadWork(work, "Hairloom strands")
+
+    def _outcome(self, written: WrittenStrands) -> Outcome:
+        chosen = chosen_parts(self.groom, layout_of(self.kind, self.output).parts)
+        guides = 0 if chosen.is_guide is None else int(chosen.is_guide.sum())
+        counts = {"strands": chosen.strands.strand_count - guides, "guides": guides}
+        what = [f"{count:,} {name}" for name, count in counts.items() if count]
+        first, *beside = (file.name for file in written.files)
+        result = f"Wrote {' and '.join(what)} to {first}"
+        if self.frames is not None:
+            result += f", frames {self.frames[0]} to {self.frames[-1]}"
+        if beside:
+            result += f", and {', '.join(beside)}"
+        return Outcome(result, self.dropped, (*self.notes, *written.notes))
+
+
+def wishes_of(kind: StrandFormat, output: StrandOutput) -> Wishes:
+    """What has to be read of hair for such a file.
+
+    Raises:
+        HairloomError: an engine that the format does not know.
+    """
+    # one colour for all points would fill a .tfx, where it says nothing
+    return Wishes(guides=layout_of(kind, output).parts != "strands", color=kind in (ALEMBIC, USD))
+
+
+def _still(
+    hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, wishes: Wishes
+) -> tuple[list[HairOut], tuple[Moving, ...], tuple[str, ...]]:
+    return [still_hair(each, depsgraph, wishes) for each in hair], (), ()
+
+
+def _moving(
+    hair: list[bpy.types.Object],
+    depsgraph: bpy.types.Depsgraph,
+    wishes: Wishes,
+    frames: range,
+    *,
+    use_bake: bool,
+) -> tuple[list[HairOut], tuple[Moving, ...], tuple[str, ...]]:
+    moving: list[Moving] = []
+    notes: list[str] = []
+    for each in hair:
+        part, told = moving_hair(each, depsgraph, frames, wishes, use_bake=use_bake)
+        moving.append(part)
+        notes += told
+    return [part.out for part in moving], tuple(moving), tuple(notes)
+
+
+def _with_strands(groom: Groom, parts: str) -> Groom:
+    """Where all curves are marked as guides and strands are asked for, they are the strands."""
+    if parts == "guides" or groom.is_guide is None or not groom.is_guide.all():
+        return groom
+    return replace(groom, is_guide=None, closest_guides=None, guide_weights=None)
+
+
+def _bones(
+    hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, outs: list[HairOut]
+) -> tuple[BoneWeights | None, tuple[str, ...]]:
+    """The bones of all strands; none where some hair has no skinned head, which is told."""
+    bones, without = [], []
+    for each, out in zip(hair, outs, strict=True):
+        own = bones_of(each, depsgraph, out.groom.strands)
+        if own is None:
+            without.append(each.name)
+        else:
+            bones.append(own)
+    if without and bones:
+        names = ", ".join(without)
+        return None, (
+            f"{names}: no bone moves its head, so no .tfxbone was written. Write it to a file of "
+            "its own.",
+        )
+    return (joined_bones(bones) if bones else None), ()
+
+
+def _asked(thread: ThreadWork[Outcome], positions: Generator[Floats]) -> Iterator[Floats]:
+    while (points := thread.asked(_next(positions))) is not None:
+        yield points
+
+
+def _next(positions: Generator[Floats]) -> Generator[None, None, Floats | None]:
+    yield
+    return next(positions, None)

@@ -1,0 +1,176 @@
+"""What acts on the hair, as lines for the 3D view: colliders, wind and lights."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...dynamics.colliders import (
+    CapsuleCollider,
+    Collider,
+    DistanceField,
+    SphereCollider,
+    SphereSetCollider,
+)
+from ...dynamics.wind import Air, air_of
+from ...errors import HairloomError
+from ...shading.lights import Light
+from ...strands.affine import moved
+from ..base.lines import Lines
+from ..scene.wind import scene_wind
+from ..sessions.session import Session
+
+#: name, label and tooltip of what can be shown
+KINDS = (
+    ("colliders", "Colliders", "Balls and capsules, and the boxes of distance fields"),
+    ("wind", "Wind", "Where the mean wind blows to: as long as the hair is wide at 10 m/s"),
+    ("lights", "Lights", "From the hair towards each light that shines on it"),
+)
+#: Linear colours with alpha.
+COLORS = {
+    "colliders": (0.1, 0.75, 0.45, 0.7),
+    "wind": (0.2, 0.55, 1.0, 0.9),
+    "lights": (1.0, 0.8, 0.25, 0.7),
+}
+#: Corners of a circle.
+_CORNERS = 32
+#: More balls of a set than these are no help to the eye.
+_MOST_BALLS = 200
+#: A wind of this speed [m/s] has an arrow as long as the hair is wide; its head is this share.
+_BRISK, _HEAD = 10.0, 0.2
+#: A light farther away than this many radii of the hair has its line cut there.
+_AWAY = 1.6
+
+
+def aids_of(
+    session: Session, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[Lines, ...]:
+    """The lines that the artist wants to see of this groom."""
+    wanted = hair.hairloom.shown_aids
+    if not wanted:
+        return ()
+    points = session.snapshot.root_center, _radius(session)
+    made = {
+        "colliders": lambda: collider_lines(session, depsgraph),
+        "wind": lambda: wind_lines(
+            air_of(session.choices.dynamics, scene_wind(depsgraph)), *points
+        ),
+        "lights": lambda: light_lines(session.snapshot.lights, *points),
+    }
+    return tuple(
+        Lines(COLORS[kind], lines.astype(np.float32))
+        for kind, _, _ in KINDS
+        if kind in wanted and len(lines := made[kind]())
+    )
+
+
+def _radius(session: Session) -> float:
+    """Of the hair at rest [m]."""
+    low, high = session.rig.strands.bounds()
+    return float(np.linalg.norm(high - low)) / 2.0
+
+
+def collider_lines(session: Session, depsgraph: bpy.types.Depsgraph) -> Floats:
+    """(2n, 3): all that the groom collides with, where it is now; none before they are made."""
+    if session.obstacles is None:
+        session.make_fields(depsgraph)
+    found: list[Floats] = [np.zeros((0, 3))]
+    for part in () if session.obstacles is None else session.obstacles.parts:
+        with suppress(HairloomError):  # Play tells it
+            collider, matrix = part.now(depsgraph)
+            found.append(moved(shape_lines(collider), matrix))
+    return np.concatenate(found)
+
+
+def shape_lines(collider: Collider) -> Floats:
+    """(2n, 3) of one collider in its own space."""
+    if isinstance(collider, SphereCollider):
+        return _ball(collider.center, collider.radius)
+    if isinstance(collider, SphereSetCollider):
+        balls = zip(collider.centers[:_MOST_BALLS], collider.radii[:_MOST_BALLS], strict=True)
+        return np.concatenate([_ball(center, float(radius)) for center, radius in balls])
+    if isinstance(collider, CapsuleCollider):
+        return _capsule(collider)
+    assert isinstance(collider, DistanceField)
+    inside = np.argwhere(collider.values < 0.0)
+    low, high = (collider.low + collider.cell * end(inside, axis=0) for end in (np.min, np.max))
+    return _box(low, high)
+
+
+def wind_lines(air: Air | None, center: Floats, radius: float) -> Floats:
+    """An arrow from the hair's middle the way the wind blows, (2n, 3); none in still air."""
+    if air is None:
+        return np.zeros((0, 3))
+    speed = float(np.linalg.norm(air.velocity))
+    along = air.velocity.astype(np.float64) / speed
+    length = 2.0 * radius * speed / _BRISK
+    tip = center + length * along
+    lines = [center, tip]
+    for side in _across(along):
+        for sign in (1.0, -1.0):
+            lines += [tip, tip + _HEAD * length * (0.5 * sign * side - along)]
+    return np.array(lines)
+
+
+def light_lines(lights: tuple[Light, ...], center: Floats, radius: float) -> Floats:
+    """A line from the hair's middle towards each light, with a star at its end, (2n, 3)."""
+    lines = [np.zeros((0, 3))]
+    for light in lights:
+        way = np.asarray(light.vector, np.float64) - (0.0 if light.kind == "sun" else center)
+        distance = float(np.linalg.norm(way))
+        if distance <= 0.0:
+            continue
+        along = way / distance
+        reach = _AWAY * radius * (1.0 if light.kind == "sun" else min(distance / radius / _AWAY, 1))
+        end = center + reach * along
+        star = 0.1 * radius * np.array([along, *_across(along)])
+        ends = np.stack([end - star, end + star], axis=1).reshape(-1, 3)
+        lines += [np.array([center, end]), ends]
+    return np.concatenate(lines)
+
+
+def _ball(center: Floats, radius: float) -> Floats:
+    axes = np.eye(3)
+    return np.concatenate(
+        [_circle(center, radius * axes[i], radius * axes[(i + 1) % 3]) for i in range(3)]
+    )
+
+
+def _capsule(capsule: CapsuleCollider) -> Floats:
+    """A ring and two half circles at either end, and four lines between."""
+    way = capsule.end - capsule.start
+    length = float(np.linalg.norm(way))
+    along = way / length if length else np.array([0.0, 0.0, 1.0])
+    sides = [capsule.radius * side for side in _across(along)]
+    lines = []
+    for end, out in ((capsule.start, -1.0), (capsule.end, 1.0)):
+        lines.append(_circle(end, sides[0], sides[1]))
+        for side in sides:
+            lines.append(_circle(end, side, out * capsule.radius * along, 0.5))
+    for side in (sides[0], -sides[0], sides[1], -sides[1]):
+        lines.append(np.array([capsule.start + side, capsule.end + side]))
+    return np.concatenate(lines)
+
+
+def _circle(center: Floats, one: Floats, other: Floats, share: float = 1.0) -> Floats:
+    """(2n, 3), from center + one by way of center + other."""
+    angle = np.linspace(0.0, 2.0 * np.pi * share, int(_CORNERS * share) + 1)[:, None]
+    corners = center + np.cos(angle) * one + np.sin(angle) * other
+    return np.stack([corners[:-1], corners[1:]], axis=1).reshape(-1, 3)
+
+
+def _box(low: Floats, high: Floats) -> Floats:
+    corners = np.array([[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
+    edges = [(i, i | 1 << axis) for i in range(8) for axis in range(3) if not i >> axis & 1]
+    return corners[np.array(edges)].reshape(-1, 3)
+
+
+def _across(along: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors across a unit vector, and across each other."""
+    least = np.eye(3)[int(np.abs(along).argmin())]
+    side = np.cross(along, least)
+    side /= np.linalg.norm(side)
+    return side, np.cross(along, side)

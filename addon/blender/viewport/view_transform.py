@@ -1,0 +1,218 @@
+"""The scene's view transform, for drawing over Blender's own picture of the same light.
+
+What Blender 5.2 applies in a 3D view (measured in its window, and so it stands in
+DRW_viewport_colormanagement_set of its source):
+
+    Wireframe, Solid                                        the transform "Standard", no more
+    Material Preview, Rendered, by the scene's light        all settings of the scene
+    the same, by neither the scene's lights nor its world   transform and look alone
+    Rendered by the engine Workbench                        all settings of the scene
+
+Blender itself tells what a transform does: it saves a picture of the colours of a table, in data
+of its own that no scene and no undo step ever sees. That takes some hundredths of a second and is
+done by a timer, once for each combination; drawing only looks up what is there.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import traceback
+from collections import OrderedDict
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...render.display import Display, DisplayTable, table_radiances
+from ..base.redraw import redraw_views
+from ..scene.lights import uses_scene_light
+
+#: tables kept, 7 MB each; a view transform more than that is asked for anew
+CAPACITY = 8
+#: white balance: temperature [K] and tint
+type WhiteBalance = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class View:
+    """What decides how colours are shown, but for exposure and gamma; equal ones need one table.
+
+    space: what scene-linear colours of this file mean.
+    curves: of RGB curves all that counts, see `_curves_of`; empty: none. Blender applies them
+        before the exposure, which then is in the table as well.
+    """
+
+    space: str = "Linear Rec.709"
+    device: str = "sRGB"
+    transform: str = "Standard"
+    look: str = "None"
+    white_balance: WhiteBalance | None = None
+    curves: tuple[Any, ...] = ()
+    exposure: float = 0.0
+
+
+_tables: OrderedDict[View, DisplayTable] = OrderedDict()
+_wanted: dict[View, None] = {}
+_failed: dict[View, str] = {}
+
+
+def display_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> Display | None:
+    """How a 3D view shows colours; None is the plain "Standard".
+
+    Only reads, so it may be called while drawing. A transform that is not known yet is asked for,
+    and the views are drawn again once it is there; until then the last one stands in, so that
+    nothing flickers while a curve is dragged.
+    """
+    view, gain, gamma = view_of(shading, scene)
+    if (view, gain, gamma) == (View(), 1.0, 1.0):
+        return None
+    if view in _failed:
+        return None
+    if view in _tables:
+        _tables.move_to_end(view)
+    else:
+        _want(view)
+    return Display(_tables[next(reversed(_tables))], gain, gamma) if _tables else None
+
+
+def view_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> tuple[View, float, float]:
+    """What this view applies: table, gain and gamma."""
+    settings, space = scene.view_settings, bpy.data.colorspace.working_space
+    device = scene.display_settings.display_device
+    if shading.type not in ("MATERIAL", "RENDERED"):
+        return View(space, device), 1.0, 1.0
+    view = View(space, device, settings.view_transform, settings.look)
+    is_workbench = shading.type == "RENDERED" and scene.render.engine == "BLENDER_WORKBENCH"
+    if not is_workbench and not any(uses_scene_light(shading)):
+        return view, 1.0, 1.0
+    balance, curves = None, ()
+    if settings.use_white_balance:
+        balance = settings.white_balance_temperature, settings.white_balance_tint
+    if settings.use_curve_mapping:
+        curves = _curves_of(settings.curve_mapping)
+    exposure = settings.exposure if curves else 0.0
+    gain = 1.0 if curves else 2.0**settings.exposure
+    view = replace(view, white_balance=balance, curves=curves, exposure=exposure)
+    return view, gain, max(settings.gamma, 1e-3)
+
+
+def prepare() -> None:
+    """Make ready what the open 3D views need, so that the first draw has it."""
+    _failed.clear()
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                display_of(area.spaces.active.shading, window.scene)
+    _make_wanted()
+
+
+def trouble() -> str:
+    """Why colours are shown by the plain "Standard" although another is set; mostly empty."""
+    return next(iter(_failed.values()), "")
+
+
+def forget() -> None:
+    """Leave no table and no timer behind."""
+    _tables.clear()
+    _wanted.clear()
+    _failed.clear()
+    if bpy.app.timers.is_registered(_make_wanted):
+        bpy.app.timers.unregister(_make_wanted)
+
+
+def _want(view: View) -> None:
+    _wanted[view] = None
+    if not bpy.app.timers.is_registered(_make_wanted):
+        bpy.app.timers.register(_make_wanted, first_interval=0.0)
+
+
+def _make_wanted() -> None:
+    """A timer of Blender's: outside of drawing, where data may be made."""
+    if not _wanted:
+        return
+    for view in tuple(_wanted):
+        try:
+            _tables[view] = DisplayTable(shown_by_blender(view, table_radiances()))
+        except Exception as error:
+            traceback.print_exc()
+            _failed[view] = (
+                f"View transform {view.transform} cannot be read ({error}), hair is shown by "
+                "Standard. Stop the preview and start it again."
+            )
+        del _wanted[view]
+    while len(_tables) > CAPACITY:
+        _tables.popitem(last=False)
+    redraw_views()
+
+
+def shown_by_blender(view: View, radiances: Floats) -> Floats:
+    """Code values of scene-linear colours (..., 3) in [0, 1], as Blender saves them; float32.
+
+    Raises:
+        OSError, RuntimeError: no picture can be written to the folder for temporary files.
+    """
+    pixels = np.ones((radiances.size // 3, 4), np.float32)
+    pixels[:, :3] = radiances.reshape(-1, 3)
+    # one row is at most as long as pictures may be
+    width = next(w for w in range(min(len(pixels), 8192), 0, -1) if len(pixels) % w == 0)
+    with (
+        tempfile.TemporaryDirectory(prefix="hairloom") as folder,
+        bpy.data.temp_data() as data,
+    ):
+        path = Path(folder) / "colors.png"
+        scene = _scene_with(view, data)
+        colors = data.images.new("Colors", width, len(pixels) // width, float_buffer=True)
+        colors.pixels.foreach_set(pixels.ravel())
+        colors.save_render(str(path), scene=scene)
+        shown = data.images.load(str(path))
+        shown.colorspace_settings.is_data = True
+        shown.pixels.foreach_get(pixels.ravel())
+    return pixels[:, :3].reshape(radiances.shape)
+
+
+def _scene_with(view: View, data: bpy.types.BlendData) -> bpy.types.Scene:
+    """A scene that shows colours like this, and saves 16 bits a channel."""
+    scene = data.scenes.new("Colors")
+    scene.display_settings.display_device = view.device
+    settings = scene.view_settings
+    settings.view_transform, settings.look = view.transform, view.look
+    settings.exposure, settings.gamma = view.exposure, 1.0
+    if view.white_balance is not None:
+        settings.use_white_balance = True
+        settings.white_balance_temperature, settings.white_balance_tint = view.white_balance
+    if view.curves:
+        settings.use_curve_mapping = True
+        _put_curves(view.curves, settings.curve_mapping)
+    picture = scene.render.image_settings
+    picture.file_format, picture.color_mode, picture.color_depth = "PNG", "RGB", "16"
+    picture.compression = 0
+    return scene
+
+
+def _curves_of(mapping: bpy.types.CurveMapping) -> tuple[Any, ...]:
+    """Levels, tone and clipping of RGB curves, then the points of each: (x, y, handle)."""
+    curves = tuple(
+        tuple((*point.location, point.handle_type) for point in curve.points)
+        for curve in mapping.curves
+    )
+    levels = tuple(mapping.black_level), tuple(mapping.white_level)
+    corners = mapping.clip_min_x, mapping.clip_min_y, mapping.clip_max_x, mapping.clip_max_y
+    return (*levels, mapping.tone, mapping.extend, mapping.use_clip, corners, *curves)
+
+
+def _put_curves(curves: tuple[Any, ...], mapping: bpy.types.CurveMapping) -> None:
+    """The other way round; new curves have two points."""
+    mapping.black_level, mapping.white_level, mapping.tone, mapping.extend = curves[:4]
+    mapping.use_clip = False
+    corners = curves[5]
+    mapping.clip_min_x, mapping.clip_min_y, mapping.clip_max_x, mapping.clip_max_y = corners
+    mapping.use_clip = curves[4]
+    for curve, points in zip(mapping.curves, curves[6:], strict=True):
+        for x, y, _ in points[len(curve.points) :]:
+            curve.points.new(x, y)
+        for point, (x, y, handle) in zip(curve.points, points, strict=True):
+            point.location, point.handle_type = (x, y), handle
+    mapping.update()
