@@ -15,7 +15,7 @@ import gpu
 import numpy as np
 from _cards_groom import sintel_rig
 
-from hairloom.addon.blender.cards.card_builds import CardForm, built_cards
+from hairloom.addon.blender.properties.card_form import CardForm, built_cards
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.drawing_settings import CardDrawingSettings
 from hairloom.addon.cards.settings import CardSettings

@@ -57,7 +57,8 @@ class Shots:
             self._drawn,
             shading=self._shading,
         )
-        steps = of_addon("blender.cards.card_making").making_steps(self.rig, form.choices({}))
+        making = of_addon("blender.cards.card_making")
+        steps = making.making_steps(self.rig, making.CardChoices.of(form, {}))
         made = of_addon("cards.steps").result_of(steps)
         tied = builds.tied_cards(self.rig, form, made)
         return made.build, tied.drawn(tied.rest, (settings["card_drawing"](), self._drawn))

@@ -63,7 +63,7 @@ def main(folder: Path) -> None:
     settings, studio_of = of_addon("parameters").ALL_SETTINGS, of_addon("blender.pictures.studio")
     images, form_of = (
         of_addon("blender.base.images"),
-        of_addon("blender.cards.card_builds").CardForm,
+        of_addon("blender.properties.card_form").CardForm,
     )
     rig, ambient = wig(), settings["ambient"]()
     shading = presets.named_preset(LOOK).settings

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..blender.cards.card_images import HAIRLOOM_PG_card_images
 from ..blender.preview import live
+from ..blender.properties.card_group import HAIRLOOM_PG_card_images
 from .drawing import Draw, draw_group, draw_named
 from .operators_cards import draw_made_cards
 from .preset_chooser import draw_preset_row

@@ -8,8 +8,8 @@ from typing import Any
 import bpy
 from bpy.props import StringProperty
 
+from ..blender.base.vertex_weights import weight_names
 from ..blender.properties.groups import operator_properties
-from ..blender.scene.vertex_weights import weight_names
 from .selection import ground_mesh
 
 #: settings that say nothing about hair that stands straight along the normals, and the other way

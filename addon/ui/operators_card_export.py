@@ -12,6 +12,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes import playback
 from ..blender.bakes.stale_bakes import stale_notes
+from ..blender.base.outcome import Outcome
 from ..blender.cards.card_choices import (
     DEPTH_ITEMS,
     FORMAT_ITEMS,
@@ -26,7 +27,6 @@ from ..blender.cards.card_choices import (
 )
 from ..blender.cards.card_files import FileSteps
 from ..blender.cards.card_out import CardExport
-from ..blender.strands.groom_files import Outcome
 from ..errors import HairloomError
 from .long_work import LongWork, Progress, Steps, threaded
 from .messages import draw_lines

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
+from ..blender.base.outcome import Outcome
 from ..blender.cards.card_making import order_line
 from ..blender.cards.card_object import CardObjectJob, card_objects
-from ..blender.strands.groom_files import Outcome
 from .long_work import LongWork, Progress, Steps, draw_progress, threaded
 from .reports import tell
 from .selection import chosen_hair, needs_hair

@@ -7,9 +7,9 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty
 
+from ..blender.base.outcome import Outcome
 from ..blender.preview.bake import bakeable
 from ..blender.strands.export_check import ExportCheck
-from ..blender.strands.groom_files import Outcome
 from ..blender.strands.strand_choices import ALEMBIC_ENGINES, FORMATS, USD_ENGINES, strand_output
 from .messages import draw_lines
 from .reports import tell, waiting

@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ..blender.preview import live
+from ..blender.preview import fins, live
 from ..blender.scene.fin_modifier import (
     add_modifier,
     clear,
@@ -14,7 +14,6 @@ from ..blender.scene.fin_modifier import (
     is_shown,
     remove_modifier,
 )
-from ..blender.sessions import fins
 from .drawing import draw_named
 from .messages import draw_message
 from .reports import reporting, waiting

@@ -12,11 +12,12 @@ import time
 import bpy
 
 from ..blender.bakes.fingerprints import frame_rate
+from ..blender.base.outcome import Outcome
 from ..blender.base.pace import Pace
-from ..blender.preview import live
+from ..blender.base.suspension import is_suspended
+from ..blender.preview import fins, live
 from ..blender.scene.source import mute_own_dynamics, own_dynamics
-from ..blender.sessions import fins
-from ..blender.strands.groom_files import Outcome
+from ..blender.sessions.fins import any_enabled
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
 
@@ -65,11 +66,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
         if bpy.app.background:
             cls.poll_message_set("Play needs a window; use the command line's simulate or bake")
             return False
-        return (
-            fins.any_enabled(context.view_layer)
-            or bool(live.simulated())
-            or needs_hair(cls, context)
-        )
+        return any_enabled(context.view_layer) or bool(live.simulated()) or needs_hair(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         return self._start_or_stop(context)
@@ -114,7 +111,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
     def _tick(self, context: bpy.types.Context) -> None:
         """Simulate the scene's frames that are due, in one go: the head has moved but once."""
         now, rate = time.perf_counter(), frame_rate(context.scene)
-        if live.is_paused() or live.is_suspended():
+        if live.is_paused() or is_suspended():
             self._pace.skip(now)
             return
         frames = self._pace.due(now, rate)

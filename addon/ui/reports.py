@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ..blender.strands.groom_files import Outcome, dropped_phrase
+from ..blender.base.outcome import Outcome, dropped_phrase
 from ..errors import HairloomError
 
 

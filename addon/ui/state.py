@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
+from ..blender.base.outcome import dropped_phrase
 from ..blender.preview import late, live, timeline
 from ..blender.preview.troubles import Trouble, instances_note, troubles_of
 from ..blender.sessions import measures
 from ..blender.sessions.session import Session
-from ..blender.strands.groom_files import dropped_phrase
 from ..blender.viewport import view_transform
 from ..blender.viewport.overlay import statistics_of
 from .messages import draw_lines, draw_message

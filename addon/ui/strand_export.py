@@ -10,7 +10,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ..blender.strands.groom_files import Outcome
+from ..blender.base.outcome import Outcome
 from ..blender.strands.strand_choices import FORMATS, FRAMES, SEVERAL, file_of, strand_output
 from ..blender.strands.strand_export import StrandExport
 from ..errors import HairloomError

@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 
-from hairloom.addon.blender.sessions import fins
+from hairloom.addon.blender.preview import fins
 
 FRAME = 1.0 / 60.0
 

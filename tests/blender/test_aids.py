@@ -9,8 +9,9 @@ import pytest
 
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.preview import live, previewed
+from hairloom.addon.blender.properties.groups import AIDS
 from hairloom.addon.blender.viewport import overlay
-from hairloom.addon.blender.viewport.aids import KINDS, shape_lines
+from hairloom.addon.blender.viewport.aids import shape_lines
 from hairloom.addon.dynamics.colliders import (
     CapsuleCollider,
     DistanceField,
@@ -77,7 +78,7 @@ def test_the_lines_of_a_shape_lie_on_its_surface(collider):
 def test_nothing_is_drawn_until_it_is_wanted(preview):
     hair, _, session = preview
     assert aids(session) == ()
-    hair.hairloom.shown_aids = {kind for kind, _, _ in KINDS}
+    hair.hairloom.shown_aids = {kind for kind, _, _ in AIDS}
     hair.hairloom.shown_aids = set()
     assert aids(session) == ()
 

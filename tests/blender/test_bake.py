@@ -11,6 +11,7 @@ from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.bake_settings import folder_of
 from hairloom.addon.blender.bakes.cache import FACTS, Cache
 from hairloom.addon.blender.bakes.simulated import SOLVER_VERSION, solver_part
+from hairloom.addon.blender.base.suspension import is_suspended
 from hairloom.addon.blender.preview import live, reactions, timeline
 from hairloom.addon.blender.preview.bake import Bake, free
 from hairloom.addon.errors import HairloomError
@@ -254,7 +255,7 @@ def test_cancelling_leaves_the_bake_before_untouched(swinging, evaluated, tmp_pa
     assert bpy.context.scene.frame_current == 6
     assert [path.name for path in tmp_path.iterdir()] == ["bake"]
     assert {path.name: path.read_bytes() for path in (tmp_path / "bake").iterdir()} == before
-    assert not live.is_suspended()
+    assert not is_suspended()
 
 
 def test_a_bake_that_fails_says_in_which_frame_and_leaves_nothing(swinging, tmp_path):

@@ -20,10 +20,11 @@ bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy 
 
 from hairloom.addon import pipeline  # noqa: E402
 from hairloom.addon.blender.bakes.take import shaken_poses  # noqa: E402
-from hairloom.addon.blender.cards.card_builds import CardForm  # noqa: E402
 from hairloom.addon.blender.cards.card_files import CardOutput, WrittenCards, write_cards  # noqa: E402
+from hairloom.addon.blender.cards.card_making import CardChoices  # noqa: E402
 from hairloom.addon.blender.cards.card_motion import GuideMotion, MotionChoices  # noqa: E402
 from hairloom.addon.blender.command_line.inputs import Sources, read_inputs  # noqa: E402
+from hairloom.addon.blender.properties.card_form import CardForm  # noqa: E402
 from hairloom.addon.card_flow import bound_cards, cards_at  # noqa: E402
 from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
 from hairloom.addon.cards.joints import JointChoices  # noqa: E402
@@ -63,7 +64,7 @@ def motion() -> GuideMotion:
 
 def write(path: Path, motion: GuideMotion, **choices: Any) -> WrittenCards:
     output = CardOutput(motion=MotionChoices(**choices))
-    return write_cards(path, motion.rig, FORM.choices({}), output, motion=motion)
+    return write_cards(path, motion.rig, CardChoices.of(FORM, {}), output, motion=motion)
 
 
 def simulated(motion: GuideMotion, written: WrittenCards, frame: int) -> list[np.ndarray]:

@@ -6,9 +6,8 @@ import pytest
 from fin_motion import FRAME, play, rest_of, shown, started, update
 from mathutils import Matrix
 
-from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.preview import fins, live
 from hairloom.addon.blender.scene.fin_modifier import POSITION, fin_modifier
-from hairloom.addon.blender.sessions import fins
 from hairloom.addon.errors import HairloomError
 
 

@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 from fin_motion import play, rest_of, shown, started, update
 
-from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.preview import fins, live, reactions
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.scene.fin_modifier import INDEX, POSITION, fin_modifier, is_shown
-from hairloom.addon.blender.sessions import fins
 
 
 def test_undo_and_redo_of_the_operator(extension, evaluated):

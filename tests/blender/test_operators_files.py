@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.base.vertex_weights import weight_names
 from hairloom.addon.blender.scene.curves import read_curves
-from hairloom.addon.blender.scene.vertex_weights import weight_names
 from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
 from hairloom.addon.strands import StrandSet
 

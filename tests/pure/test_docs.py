@@ -102,7 +102,7 @@ def test_the_pages_for_programmers_name_files_that_are_there() -> None:
     named |= {path.removeprefix("addon/") for path in files}
     for page in ("architecture.md", "development.md", "dynamics.md", "refinement.md", "shading.md"):
         text = (REPOSITORY / "docs" / page).read_text(encoding="utf-8")
-        told = re.findall(r"`([\w/]+(?:\.comp)?\.(?:py|glsl)|(?:host|exchange)/[\w/]+)`", text)
+        told = re.findall(r"`([\w/]+(?:\.comp)?\.(?:py|glsl)|(?:blender|exchange)/[\w/]+)`", text)
         gone = [name for name in told if name.rstrip("/") not in named | {"bench/x.py"}]
         # a formula's file may be named from its room on, as in `volume/dual.py`
         gone = [name for name in gone if not any(path.endswith(f"/{name}") for path in files)]

@@ -164,7 +164,7 @@ def escape_cancels_a_bake():
     assert is_baking()
     yield from press("ESC")
     yield 3
-    assert not is_baking() and not of_hairloom("blender.preview.live").is_suspended()
+    assert not is_baking() and not of_hairloom("blender.base.suspension").is_suspended()
     assert (FOLDER / "cache.json").stat().st_mtime_ns == before
     assert not FOLDER.with_name("bake.new").exists()
     bpy.context.scene.frame_end = LAST
@@ -208,7 +208,7 @@ def loading_in_the_middle_of_a_bake():
     assert is_baking()
     bpy.ops.wm.read_homefile(use_factory_startup=False)
     yield 10
-    assert not is_baking() and not of_hairloom("blender.preview.live").is_suspended()
+    assert not is_baking() and not of_hairloom("blender.base.suspension").is_suspended()
     assert of_hairloom("blender.preview.live").sessions() == ()
     assert not FOLDER.with_name("bake.new").exists()
     assert (FOLDER / "cache.json").is_file()

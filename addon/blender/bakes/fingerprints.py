@@ -15,12 +15,12 @@ from ...arrays import Floats, Ints
 from ...dynamics.settings import DynamicsSettings
 from ...pipeline import Pose
 from ..base.objects import matrix_of
+from ..base.vertex_weights import weight_names, weights_on
 from ..colliders.carriers import is_deforming
 from ..colliders.obstacles import shape_of, sources_of
 from ..properties.choices import Choices
 from ..scene.curves import GROUP_ATTRIBUTES
 from ..scene.surfaces import read_positions
-from ..scene.vertex_weights import weight_names, weights_on
 from ..scene.wind import gravity_of, scene_wind
 from .simulated import SOLVER_VERSION, Hashed, hashes
 

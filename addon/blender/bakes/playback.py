@@ -199,3 +199,19 @@ def forget() -> None:
     for known in (_caches, _rigs, _troubles):
         known.clear()
     _is_rendering = False
+
+
+def check_frames(name: str, frames: range, cache: Cache) -> None:
+    """Refuse frames that were not baked.
+
+    Raises:
+        HairloomError: naming those that are missing.
+    """
+    first, last = cache.facts.first, cache.facts.last
+    missing = [frame for frame in (frames[0], frames[-1]) if not cache.holds(frame)]
+    if missing:
+        raise HairloomError(
+            f"its bake holds frames {first} to {last}, not all of {frames[0]} to {frames[-1]}",
+            place=name,
+            remedy=f"Bake these frames, or write {first} to {last}",
+        )

@@ -24,8 +24,8 @@ from ...cards.steps import result_of, retold
 from ...cards.uv_ways import Way
 from ...errors import HairloomError
 from ...strands import Surface
+from ..base.vertex_weights import weights_on
 from ..scene.surfaces import read_corner_uv, read_surface
-from ..scene.vertex_weights import weights_on
 from .adopted_writing import face_order, reorder_faces, write_shares
 from .card_alpha import alpha_of
 from .other_cards import other_cards

@@ -7,78 +7,28 @@ build waits there until it is served.
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ...arrays import Floats
 from ...card_flow import bound_cards, cards_at
 from ...cards.atlas_maps import AtlasMaps
-from ...cards.atlas_settings import AtlasSettings
 from ...cards.bake_strands import FlatStrands
-from ...cards.drawing_settings import CardDrawingSettings
 from ...cards.follow import CardBinding
-from ...cards.occlusion_settings import CardOcclusionSettings
-from ...cards.settings import CardSettings
 from ...cards.steps import result_of, retold
 from ...errors import HairloomError
 from ...pipeline import Pose, Rig
 from ...render.card_snapshot import CardSnapshot
 from ...render.card_textures import CardTextures, packed_textures
-from ...shading.ambient import AmbientSettings
-from ...shading.settings import ShadingSettings, StrandSettings
-from ...shading.textures import TextureSettings
 from ...shading.volume.card_opacity import StrandArea, card_shade
 from ..base.thread_work import ThreadWork
+from ..properties.card_form import CardForm, CardsDrawn
 from .card_atlas import drawing_maps, has_gpu
 from .card_making import CardChoices, MadeCards, making_steps
 from .card_maps import made_maps
 from .other_cards import OtherHair
 
 _NO_OTHERS = OtherHair()
-
-#: What acts on cards at once: how they are drawn, and how wide the strands are.
-type CardsDrawn = tuple[CardDrawingSettings, StrandSettings]
-
-
-@dataclass(frozen=True)
-class CardForm:
-    """All that cards hang on beside the rig.
-
-    picture_names: (texture, picture) of those that take the place of generated textures.
-    shading: of the strands in the atlas. Forms are the same that differ in it by colours alone,
-        since the atlas holds how strands differ from the mean, which these hardly change.
-    ambient: of the strands, whose occlusion the cards take over.
-    """
-
-    cards: CardSettings = field(default_factory=CardSettings)
-    atlas: AtlasSettings = field(default_factory=AtlasSettings)
-    occlusion: CardOcclusionSettings = field(default_factory=CardOcclusionSettings)
-    texture: TextureSettings = field(default_factory=TextureSettings)
-    strands: StrandSettings = field(default_factory=StrandSettings)
-    picture_names: tuple[tuple[str, str], ...] = ()
-    shading: ShadingSettings = field(default_factory=ShadingSettings, compare=False)
-    ambient: AmbientSettings = field(default_factory=AmbientSettings)
-    variation: tuple[str, float, float] = field(init=False)
-
-    def __post_init__(self) -> None:
-        look = self.shading
-        object.__setattr__(self, "variation", (look.model, look.color_variation, look.grey_share))
-
-    def choices(
-        self, pictures: Mapping[str, Floats], others: OtherHair = _NO_OTHERS
-    ) -> CardChoices:
-        """The same with the pictures themselves, and with the hair of other grooms."""
-        return CardChoices(
-            self.cards,
-            self.atlas,
-            self.occlusion,
-            self.texture,
-            self.shading,
-            self.strands,
-            pictures,
-            others,
-            self.ambient,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +71,9 @@ def built_cards(
     Raises:
         HairloomError: no cards can be made.
     """
-    return tied_cards(rig, form, result_of(making_steps(rig, form.choices(pictures, others))))
+    return tied_cards(
+        rig, form, result_of(making_steps(rig, CardChoices.of(form, pictures, others)))
+    )
 
 
 def building_cards(
@@ -131,7 +83,7 @@ def building_cards(
     others: OtherHair = _NO_OTHERS,
 ) -> ThreadWork[BuiltCards]:
     """Build them in a thread."""
-    choices = form.choices(pictures, others)
+    choices = CardChoices.of(form, pictures, others)
 
     def build(work: ThreadWork[BuiltCards]) -> BuiltCards:
         built = tied_cards(rig, form, made_in_thread(work, rig, choices))

@@ -5,36 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import bpy
-from bpy.props import PointerProperty
-
 from ...arrays import Floats
 from ...errors import HairloomError
 from ...shading.textures import TEXTURES, picture_as
 from ..base.images import read_image, read_texture
-from ..properties.properties import OVERRIDABLE
-
-_ABOUT = {
-    "base": ("Base", "Brightness of the strands, or their colour: multiplied by the hair's"),
-    "alpha": ("Alpha", "Where there is hair: the alpha of this picture, or its red without one"),
-    "shift": ("Shift", "Where the highlights lie along each strand; middle grey leaves them"),
-    "noise": ("Noise", "What the second highlight is broken up by"),
-    "tangent": ("Tangent", "Direction of the strands in place of the shift, as in a normal map"),
-}
-
-
-class HAIRLOOM_PG_card_images(bpy.types.PropertyGroup):
-    """Pictures for hair cards; what is empty is generated"""
-
-    __annotations__ = {
-        name: PointerProperty(
-            type=bpy.types.Image,
-            name=label,
-            description=f"{about}; empty: generated",
-            override=OVERRIDABLE,
-        )
-        for name, (label, about) in _ABOUT.items()
-    }
 
 
 def chosen_pictures(group: Any) -> tuple[dict[str, Floats], tuple[str, ...]]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 
+import bpy
+
 from ...arrays import Floats
 from ...card_flow import card_build_steps
 from ...cards.atlas_settings import AtlasSettings
@@ -15,8 +17,11 @@ from ...pipeline import Rig
 from ...shading.ambient import AmbientSettings
 from ...shading.settings import ShadingSettings, StrandSettings
 from ...shading.textures import TextureSettings
+from ..properties.card_form import CardForm
+from ..properties.choices import Choices
+from .card_images import chosen_pictures
 from .card_maps import CardMaps, made_maps
-from .other_cards import OtherHair
+from .other_cards import OtherHair, read_other_hair
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,30 @@ class CardChoices:
     pictures: Mapping[str, Floats] = field(default_factory=dict)
     others: OtherHair = field(default_factory=OtherHair)
     ambient: AmbientSettings = field(default_factory=AmbientSettings)
+
+    @classmethod
+    def of(
+        cls, form: CardForm, pictures: Mapping[str, Floats], others: OtherHair | None = None
+    ) -> CardChoices:
+        """A form with the pictures themselves, and with the hair of other grooms."""
+        return cls(
+            form.cards,
+            form.atlas,
+            form.occlusion,
+            form.texture,
+            form.shading,
+            form.strands,
+            pictures,
+            OtherHair() if others is None else others,
+            form.ambient,
+        )
+
+
+def card_choices(hair: bpy.types.Object) -> tuple[CardChoices, tuple[str, ...]]:
+    """What the groom's own settings say of its cards, and warnings of pictures that are no use."""
+    pictures, warnings = chosen_pictures(hair.data.hairloom.card_images)
+    form = Choices.of(hair).card_form
+    return CardChoices.of(form, pictures, read_other_hair(form.occlusion, hair)), warnings
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,10 @@ from ...exchange.cards.glb_skin import Skeleton, with_skeleton
 from ...exchange.cards.sidecar_motion import joint_motion, texture_motion
 from ...pipeline import Pose, Rig
 from ..bakes import playback
+from ..bakes.playback import check_frames
 from ..bakes.stale_bakes import stale_notes
 from ..bakes.take import read_take
 from ..base.images import write_texture
-from ..strands.groom_motion import check_frames
 
 #: Share of the error by which joints may be off between keys.
 _KEY_SHARE = 0.5

@@ -19,12 +19,12 @@ from ...cards.build import CardBuild
 from ...cards.card_mesh import OF_CARDS, CardMesh
 from ...errors import HairloomError
 from ..base.objects import Handle, head_of, matrix_of
+from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
 from ..scene.rigs import rig_of
 from ..scene.source import read_source
-from ..strands.groom_files import card_choices, notes_of
 from .card_builds import made_in_thread
-from .card_making import MadeCards, order_line
+from .card_making import MadeCards, card_choices, order_line
 from .card_object_material import filled_image, new_material
 
 

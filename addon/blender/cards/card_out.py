@@ -8,13 +8,13 @@ from pathlib import Path
 import bpy
 
 from ...pipeline import Rig
+from ..base.outcome import Outcome, notes_of
 from ..base.thread_work import ThreadWork
 from ..scene.rigs import rig_of
 from ..scene.source import read_source
-from ..strands.groom_files import Outcome, card_choices, notes_of
 from .card_builds import made_in_thread
 from .card_files import CardOutput, FileSteps, WrittenCards, check_output, file_steps, write_cards
-from .card_making import CardChoices, MadeCards, order_line
+from .card_making import CardChoices, MadeCards, card_choices, order_line
 from .card_motion import GuideMotion, baked_motion
 
 

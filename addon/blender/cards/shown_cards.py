@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import bpy
 import numpy as np
@@ -20,16 +19,11 @@ from ...pipeline import Pose, Rig
 from ...render.card_snapshot import CardSnapshot
 from ...render.snapshot import Snapshot
 from ..base.thread_work import ThreadWork
-from .card_builds import BuiltCards, CardForm, CardsDrawn, building_cards, built_cards, told
+from ..properties.card_form import CardForm, CardsDrawn
+from .card_builds import BuiltCards, building_cards, built_cards, told
 from .card_images import chosen_pictures
 from .card_making import order_line
 from .other_cards import OtherHair, read_other_hair
-
-
-def picture_names(group: Any) -> tuple[tuple[str, str], ...]:
-    """(texture, picture) of a HAIRLOOM_PG_card_images, by name."""
-    chosen = ((name, getattr(group, name)) for name in type(group).__annotations__)
-    return tuple((name, image.name_full) for name, image in chosen if image is not None)
 
 
 def as_shown(snapshot: Snapshot) -> Snapshot:

@@ -27,28 +27,6 @@ from .obstacle_parts import (
     used_box,
 )
 
-#: Shapes that the artist can choose from; "automatic" is what an object looks like.
-SHAPES = (
-    ("automatic", "Automatic", "Meshes collide as they are, empties shown as spheres as balls"),
-    (
-        "mesh",
-        "Mesh",
-        "As it is: the signed distance of a closed mesh, which takes a second to make",
-    ),
-    (
-        "sphere",
-        "Sphere",
-        "A ball around the middle of the bounding box, as wide as its longest side; of an empty: "
-        "of its display size",
-    ),
-    (
-        "capsule",
-        "Capsule",
-        "A rod with round ends along the longest side of the bounding box; of an empty: along Z, "
-        "a display size to either side, half as thick",
-    ),
-    ("none", "None", "Hair does not collide with it"),
-)
 #: Kinds of objects that an artist may mean to be solid, though they are no meshes.
 _SOLID = frozenset(("CURVE", "SURFACE", "META", "FONT", "VOLUME", "POINTCLOUD"))
 

@@ -14,13 +14,14 @@ from ...errors import HairloomError
 from ...exchange.cards.card_formats import format_of
 from ...pipeline import Rig
 from ..bakes.bake_settings import folder_of
-from ..cards.card_choices import add_card_options, motion_choices
+from ..cards.card_choices import motion_choices
 from ..cards.card_files import CardOutput, WrittenCards, write_cards
 from ..cards.card_images import chosen_pictures, named_pictures
-from ..cards.card_making import order_line
+from ..cards.card_making import CardChoices, order_line
 from ..cards.card_motion import GuideMotion, baked_motion, take_motion
 from ..cards.card_textures import TextureFiles
 from ..cards.other_cards import read_other_hair
+from .card_options import add_card_options
 from .job_options import add_texture_option, frames_of_option
 from .job_steps import Job, card_form, finish, read_rig, tell_notes
 from .verb import Verb
@@ -68,7 +69,7 @@ def written_cards(
     if levels is not None:
         form = replace(form, cards=replace(form.cards, levels=levels))
     hair = bpy.data.objects.get(job.sources.groom or "")
-    choices = form.choices(pictures, read_other_hair(form.occlusion, hair))
+    choices = CardChoices.of(form, pictures, read_other_hair(form.occlusion, hair))
     written = write_cards(path, rig, choices, output, report.stage, motion)
     report.facts.update(
         cards=written.mesh.card_count,

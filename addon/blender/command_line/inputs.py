@@ -16,11 +16,11 @@ from ...groom.grow import grow, scalp_density
 from ...groom.settings import GrowSettings
 from ...strands import StrandSet, Surface
 from ..base.objects import head_of
+from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import built_in_head
 from ..scene.curves import read_curves
 from ..scene.mesh_files import read_mesh_file
 from ..scene.surfaces import read_surface
-from ..scene.vertex_weights import read_weights
 from ..strands.child_python import python_for
 
 BUILT_IN = "built-in"

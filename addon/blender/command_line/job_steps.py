@@ -26,8 +26,8 @@ from ...shading.textures import TextureSettings
 from ...shading.volume.settings import VolumeSettings
 from ..bakes.take import read_take
 from ..base.report import Report
-from ..cards.card_builds import CardForm
 from ..pictures.studio import Look, Studio
+from ..properties.card_form import CardForm
 from .inputs import Inputs, Sources, read_inputs
 
 

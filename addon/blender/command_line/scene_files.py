@@ -13,7 +13,7 @@ import bpy
 from ...errors import HairloomError
 from ...exchange.files.atomic import unwritable
 from ..bakes.bake_settings import absolute, folder_of
-from ..preview import live
+from ..base.suspension import suspended
 
 
 def open_scene(path: Path) -> None:
@@ -111,5 +111,5 @@ def _rename(owner: Any, name: str, bake: Path, folder: Path) -> None:
     except ValueError:  # on another drive
         seen = str(bake)
     if getattr(owner, name) != seen:
-        with live.suspended():
+        with suspended():
             setattr(owner, name, seen)

@@ -21,10 +21,11 @@ from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
 from ..bakes.cache import Cache
 from ..base.objects import head_of
-from ..cards.card_builds import BuiltCards, CardForm, built_cards
+from ..cards.card_builds import BuiltCards, built_cards
 from ..cards.card_images import chosen_pictures
 from ..cards.other_cards import OtherHair, read_other_hair
 from ..cards.shown_cards import as_shown
+from ..properties.card_form import CardForm
 from ..properties.choices import Choices
 from ..sessions.reading import Reading
 from ..sessions.shown import snapshot_of, with_all_strands, with_choices

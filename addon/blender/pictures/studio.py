@@ -29,8 +29,9 @@ from ...shading.volume.settings import VolumeSettings
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
 from ..base.gpu_context import ensure_gpu
-from ..cards.card_builds import BuiltCards, CardForm, built_cards
+from ..cards.card_builds import BuiltCards, built_cards
 from ..cards.shown_cards import as_shown
+from ..properties.card_form import CardForm
 from ..sessions.hiders import Hiders
 from ..sessions.shown import snapshot_of
 from .skin_picture import shown_skin_shadow

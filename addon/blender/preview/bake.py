@@ -20,6 +20,7 @@ from ..bakes.fingerprints import frame_rate
 from ..bakes.simulated import Simulated
 from ..base.objects import Handle
 from ..base.report import environment
+from ..base.suspension import suspended
 from ..scene.fin_modifier import clear, fin_modifier
 from ..scene.source import wanted_density
 from ..sessions.fins import FinSession
@@ -154,14 +155,14 @@ class Bake:
         scene = bpy.context.scene
         shown, subframe = scene.frame_current, scene.frame_subframe
         try:
-            with live.suspended():
+            with suspended():
                 yield from self._frames(scene)
                 for part in self.parts:
                     part.finish(frame_rate(scene))
         finally:
             for part in self.parts:
                 part.abandon()
-            with live.suspended():
+            with suspended():
                 scene.frame_set(shown, subframe=subframe)
             self._show()
 

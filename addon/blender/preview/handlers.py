@@ -9,7 +9,8 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..bakes import playback
-from ..properties import library_overrides
+from ..base import suspension
+from ..properties import changed, library_overrides
 from . import live, reactions
 
 _is_reacting = False
@@ -48,7 +49,7 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
 @persistent
 def on_frame_change_begin(scene: bpy.types.Scene, *_: Any) -> None:
     """Runs in renders too, there in the render's thread: only what is baked is written."""
-    if live.is_suspended():
+    if suspension.is_suspended():
         return
     playback.show_fins(scene)
     if playback.needs_copies():
@@ -68,7 +69,7 @@ def on_render_end(*_: Any) -> None:
 def _react(reaction: Callable[[bpy.types.Depsgraph], None], depsgraph: bpy.types.Depsgraph) -> None:
     """Once at a time, and not for a render, which has its own copy of the scene and its thread."""
     global _is_reacting
-    if _is_reacting or live.is_suspended() or not live.simulated():
+    if _is_reacting or suspension.is_suspended() or not live.simulated():
         return
     if depsgraph.mode != "VIEWPORT":
         return
@@ -94,11 +95,28 @@ HANDLERS = (
 )
 
 
+def on_bake_changed(owner: bpy.types.ID) -> None:
+    if not suspension.is_suspended():
+        live.bake_changed(owner, bpy.context.evaluated_depsgraph_get())
+
+
+#: properties that the artist changes, and what follows
+LISTENERS = (
+    ("settings", reactions.settings_changed),
+    ("display", reactions.display_changed),
+    ("bake", on_bake_changed),
+)
+
+
 def register() -> None:
     for handlers, handler in HANDLERS:
         handlers.append(handler)
+    for kind, listener in LISTENERS:
+        changed.subscribe(kind, listener)
 
 
 def unregister() -> None:
+    for kind, listener in reversed(LISTENERS):
+        changed.unsubscribe(kind, listener)
     for handlers, handler in reversed(HANDLERS):
         handlers.remove(handler)

@@ -5,8 +5,6 @@ See `reactions` for what follows from Blender's events.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 
 import bpy
@@ -45,7 +43,6 @@ from .previewed import (
 )
 
 _is_paused = False
-_is_suspended = False
 
 
 def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
@@ -186,21 +183,6 @@ def _put_back(session: Simulated, depsgraph: bpy.types.Depsgraph, keep_playing: 
         wait(session, waits=False)
         session.stop(depsgraph)
         timeline.show_frame(session, depsgraph)
-
-
-@contextmanager
-def suspended() -> Iterator[None]:
-    """React to nothing: a bake goes through the frames."""
-    global _is_suspended
-    _is_suspended = True
-    try:
-        yield
-    finally:
-        _is_suspended = False
-
-
-def is_suspended() -> bool:
-    return _is_suspended
 
 
 def bake_changed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, IntProperty, PointerProperty, StringProperty
 
-from ..preview import live
+from . import changed
 from .properties import OVERRIDABLE
 
 
-def _changed(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    if not live.is_suspended():
-        live.bake_changed(group.id_data, context.evaluated_depsgraph_get())
+def _changed(group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    changed.bake(group.id_data)
 
 
 class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):

@@ -1,6 +1,8 @@
-"""What an object of cards remembers: whose cards they are."""
+"""What an object of cards remembers, and the artist's pictures for cards."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import bpy
 from bpy.props import FloatProperty, IntProperty, PointerProperty
@@ -49,3 +51,32 @@ class HAIRLOOM_PG_card_object(bpy.types.PropertyGroup):
             override=OVERRIDABLE,
         ),
     }
+
+
+_PICTURES = {
+    "base": ("Base", "Brightness of the strands, or their colour: multiplied by the hair's"),
+    "alpha": ("Alpha", "Where there is hair: the alpha of this picture, or its red without one"),
+    "shift": ("Shift", "Where the highlights lie along each strand; middle grey leaves them"),
+    "noise": ("Noise", "What the second highlight is broken up by"),
+    "tangent": ("Tangent", "Direction of the strands in place of the shift, as in a normal map"),
+}
+
+
+class HAIRLOOM_PG_card_images(bpy.types.PropertyGroup):
+    """Pictures for hair cards; what is empty is generated"""
+
+    __annotations__ = {
+        name: PointerProperty(
+            type=bpy.types.Image,
+            name=label,
+            description=f"{about}; empty: generated",
+            override=OVERRIDABLE,
+        )
+        for name, (label, about) in _PICTURES.items()
+    }
+
+
+def picture_names(group: Any) -> tuple[tuple[str, str], ...]:
+    """(texture, picture) of a HAIRLOOM_PG_card_images, by name."""
+    chosen = ((name, getattr(group, name)) for name in type(group).__annotations__)
+    return tuple((name, image.name_full) for name, image in chosen if image is not None)

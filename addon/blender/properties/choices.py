@@ -21,8 +21,8 @@ from ...shading.shafts_settings import ShaftSettings
 from ...shading.skin.settings import SkinSettings
 from ...shading.textures import TextureSettings
 from ...shading.volume.settings import VolumeSettings
-from ..cards.card_builds import CardForm, CardsDrawn
-from ..cards.shown_cards import picture_names
+from .card_form import CardForm, CardsDrawn
+from .card_group import picture_names
 from .properties import settings_of
 
 

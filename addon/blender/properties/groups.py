@@ -9,13 +9,10 @@ from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringPropert
 
 from ...parameters import ALL_SETTINGS
 from ..base.objects import head_of
-from ..cards.card_images import HAIRLOOM_PG_card_images
-from ..colliders.obstacle_reader import SHAPES
-from ..preview import reactions
-from ..scene.vertex_weights import weight_names
-from ..viewport.aids import KINDS as AIDS
+from ..base.vertex_weights import weight_names
+from . import changed
 from .bake_group import HAIRLOOM_PG_bake
-from .card_group import HAIRLOOM_PG_card_object
+from .card_group import HAIRLOOM_PG_card_images, HAIRLOOM_PG_card_object
 from .fin_group import FIN_PROPERTIES
 from .properties import OVERRIDABLE, property_annotations, property_group
 
@@ -37,7 +34,34 @@ GROOM_SECTIONS = (
 )
 CHARACTER_SECTIONS = ("dynamics", "fin")
 
-
+#: Shapes that the artist can choose from; "automatic" is what an object looks like.
+COLLIDER_SHAPES = (
+    ("automatic", "Automatic", "Meshes collide as they are, empties shown as spheres as balls"),
+    (
+        "mesh",
+        "Mesh",
+        "As it is: the signed distance of a closed mesh, which takes a second to make",
+    ),
+    (
+        "sphere",
+        "Sphere",
+        "A ball around the middle of the bounding box, as wide as its longest side; of an empty: "
+        "of its display size",
+    ),
+    (
+        "capsule",
+        "Capsule",
+        "A rod with round ends along the longest side of the bounding box; of an empty: along Z, "
+        "a display size to either side, half as thick",
+    ),
+    ("none", "None", "Hair does not collide with it"),
+)
+#: What acts on the hair and can be shown as lines.
+AIDS = (
+    ("colliders", "Colliders", "Balls and capsules, and the boxes of distance fields"),
+    ("wind", "Wind", "Where the mean wind blows to: as long as the hair is wide at 10 m/s"),
+    ("lights", "Lights", "From the hair towards each light that shines on it"),
+)
 _DEBUG_VIEWS = (
     ("none", "Hair", "Hair as it is shaded"),
     ("detail", "Detail", "Each segment by the number of pieces it is divided into"),
@@ -45,10 +69,6 @@ _DEBUG_VIEWS = (
     ("group", "Groups", "Each strand by its group"),
     ("occlusion", "Ambient Occlusion", "How much of the sky's light comes to each point, in grey"),
 )
-
-
-def _changed(owner: bpy.types.ID) -> None:
-    reactions.settings_changed(owner)
 
 
 def _pointers(sections: tuple[str, ...]) -> dict[str, Any]:
@@ -76,7 +96,7 @@ def _densities(group: Any, _context: bpy.types.Context, typed: str) -> list[str]
 
 
 SECTION_GROUPS = {
-    section: property_group(ALL_SETTINGS[section], _changed)
+    section: property_group(ALL_SETTINGS[section], changed.settings)
     for section in (*GROOM_SECTIONS, *CHARACTER_SECTIONS)
 }
 SECTION_GROUPS["fin"].__annotations__ |= FIN_PROPERTIES
@@ -161,14 +181,14 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             "densely children grow; empty: wherever guides are near",
             search=_densities,
             search_options={"SUGGESTION"},
-            update=lambda self, _context: reactions.settings_changed(self.id_data),
+            update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
         "debug_view": EnumProperty(
             items=_DEBUG_VIEWS,
             name="Show",
             description="What the strands of the preview are coloured by",
-            update=lambda self, _context: reactions.settings_changed(self.id_data),
+            update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
         "show_counts": BoolProperty(
@@ -176,7 +196,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             description="Write into the viewport how many guides, strands, pieces and vertices are "
             "drawn; with a colouring they are always there",
             default=False,
-            update=lambda self, _context: reactions.settings_changed(self.id_data),
+            update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
         "shown_aids": EnumProperty(
@@ -185,7 +205,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             name="Overlays",
             description="What acts on the hair, drawn into the viewport as lines",
             default=set(),
-            update=lambda self, _context: reactions.settings_changed(self.id_data),
+            update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
         "collider": PointerProperty(
@@ -202,7 +222,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             override=OVERRIDABLE,
         ),
         "collider_shape": EnumProperty(
-            items=SHAPES,
+            items=COLLIDER_SHAPES,
             name="Collides As",
             description="As what this object collides with hair and cloth",
             override=OVERRIDABLE,
@@ -211,7 +231,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             name="Hide Blender's Strands",
             description="While previewing, show Blender's own drawing of these curves as a box",
             default=True,
-            update=lambda self, _context: reactions.display_changed(self.id_data),
+            update=lambda self, _context: changed.display(self.id_data),
             override=OVERRIDABLE,
         ),
     }

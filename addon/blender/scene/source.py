@@ -12,9 +12,9 @@ from ...errors import HairloomError
 from ...strands import StrandSet, Surface
 from ...strands.clean import Cleaned
 from ..base.objects import head_of
+from ..base.vertex_weights import read_weights
 from .curves import read_curves
 from .surfaces import read_surface
-from .vertex_weights import read_weights
 
 #: node group of the modifier that Blender 5.2 gives to new hair
 _OWN_DYNAMICS = "Hair Dynamics"

@@ -19,12 +19,11 @@ from ...errors import HairloomError
 from ..bakes.fingerprints import collider_places, collider_shapes, frame_rate, mesh_parts
 from ..bakes.simulated import CLOTH_VERSION, Arrays, hashes
 from ..base.objects import Body, matrix_of, objects_in
+from ..base.vertex_weights import read_weights
 from ..colliders.obstacles import Obstacles
-from ..preview import live
 from ..properties.properties import settings_of
 from ..scene.fin_mesh import check_usable, corners_of, loose_edges_of, triangles_of
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, read_carried, show
-from ..scene.vertex_weights import read_weights
 from ..scene.wind import gravity_of, scene_wind
 
 
@@ -235,29 +234,6 @@ class FinSession:
             return action()
         except HairloomError as error:
             raise HairloomError(error.problem, place=self.name, remedy=error.remedy) from error
-
-
-def start(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> FinSession:
-    """Preview this fin: Play, playback and its bake move it from now on.
-
-    Raises:
-        HairloomError: it is no fin, or cannot be cloth.
-    """
-    session = FinSession(obj, depsgraph)
-    live.add(session, depsgraph)
-    return session
-
-
-def start_enabled(depsgraph: bpy.types.Depsgraph) -> list[str]:
-    """Preview all fins of the view layer that are to be simulated; returns warnings."""
-    warnings = []
-    for obj in fins_in(bpy.context.view_layer):
-        if obj.hairloom.fin.enabled and live.simulated_of(obj) is None:
-            try:
-                start(obj, depsgraph)
-            except HairloomError as error:
-                warnings.append(str(error))
-    return warnings
 
 
 def any_enabled(layer: bpy.types.ViewLayer) -> bool:

@@ -18,11 +18,11 @@ from ...groom.root_fit import LOOSE_DISTANCE, better_fit
 from ...groom.roots import bind_roots
 from ...strands import StrandSet, Surface
 from ...strands.closest_point import ClosestPointSearch
+from ..base.outcome import Outcome
 from ..scene.curves import write_curves
 from ..scene.groom_attributes import store_groom
 from ..scene.surfaces import read_surface
 from .child_python import python_for
-from .groom_files import Outcome
 
 #: title of each format, and the suffixes of its files
 FILE_KINDS = tuple((each.title, each.suffixes) for each in STRAND_FORMATS)

@@ -19,9 +19,10 @@ from ...strands.resample import resample
 from ..bakes import playback
 from ..bakes.cache import Cache
 from ..bakes.fingerprints import frame_rate
+from ..bakes.playback import check_frames
 from ..bakes.stale_bakes import stale_notes
 from ..base.objects import Body, Handle, head_of
-from ..preview import live
+from ..base.suspension import suspended
 from ..properties.properties import settings_of
 from ..scene.rigs import rig_of
 from ..scene.source import read_source, usable_curves
@@ -146,22 +147,6 @@ def moving_hair(
     return _children_motion(hair, depsgraph, out, rate), notes
 
 
-def check_frames(name: str, frames: range, cache: Cache) -> None:
-    """Refuse frames that were not baked.
-
-    Raises:
-        HairloomError: naming those that are missing.
-    """
-    first, last = cache.facts.first, cache.facts.last
-    missing = [frame for frame in (frames[0], frames[-1]) if not cache.holds(frame)]
-    if missing:
-        raise HairloomError(
-            f"its bake holds frames {first} to {last}, not all of {frames[0]} to {frames[-1]}",
-            place=name,
-            remedy=f"Bake these frames, or write {first} to {last}",
-        )
-
-
 def common_rate(parts: Sequence[Moving]) -> float:
     """Frames in a second.
 
@@ -194,13 +179,13 @@ def positions_of(parts: Sequence[Moving], frames: range) -> Generator[Floats]:
     try:
         for frame in frames:
             if needs_scene:
-                with live.suspended():
+                with suspended():
                     scene.frame_set(frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
             yield np.concatenate([part.out.points(part.at(frame, depsgraph)) for part in parts])
     finally:
         if needs_scene:
-            with live.suspended():
+            with suspended():
                 scene.frame_set(shown, subframe=subframe)
 
 

@@ -19,10 +19,10 @@ from ...strands import StrandSet
 from ...strands.resample import arc_length_positions, resample
 from ..bakes import playback
 from ..bakes.cache import Cache
+from ..base.outcome import notes_of
 from ..scene.groom_attributes import group_names, stored_groom
 from ..scene.rigs import rig_of
 from ..scene.source import Source, read_source, usable_curves
-from .groom_files import notes_of
 
 _OF_GUIDES = ("is_guide", "closest_guides", "guide_weights")
 

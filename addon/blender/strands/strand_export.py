@@ -19,9 +19,9 @@ from ...exchange.strand_formats import ALEMBIC, TRESSFX, USD, StrandFormat
 from ...exchange.strand_output import StrandOutput, layout_of
 from ...exchange.strand_writing import WrittenStrands, write_strands
 from ...exchange.tfxbone import BoneWeights
+from ..base.outcome import Outcome
 from ..base.thread_work import ThreadWork
 from ..scene.bone_weights import bones_of, has_bones
-from .groom_files import Outcome
 from .groom_motion import Moving, common_rate, moving_hair, positions_of
 from .groom_out import HairOut, Wishes, still_hair
 

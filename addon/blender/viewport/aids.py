@@ -20,15 +20,10 @@ from ...errors import HairloomError
 from ...shading.lights import Light
 from ...strands.affine import moved
 from ..base.lines import Lines
+from ..properties.groups import AIDS
 from ..scene.wind import scene_wind
 from ..sessions.session import Session
 
-#: name, label and tooltip of what can be shown
-KINDS = (
-    ("colliders", "Colliders", "Balls and capsules, and the boxes of distance fields"),
-    ("wind", "Wind", "Where the mean wind blows to: as long as the hair is wide at 10 m/s"),
-    ("lights", "Lights", "From the hair towards each light that shines on it"),
-)
 #: Linear colours with alpha.
 COLORS = {
     "colliders": (0.1, 0.75, 0.45, 0.7),
@@ -62,7 +57,7 @@ def aids_of(
     }
     return tuple(
         Lines(COLORS[kind], lines.astype(np.float32))
-        for kind, _, _ in KINDS
+        for kind, _, _ in AIDS
         if kind in wanted and len(lines := made[kind]())
     )
 

@@ -1,0 +1,32 @@
+"""Fins that are previewed: begun by the artist, or where grooms play."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...errors import HairloomError
+from ..sessions.fins import FinSession, fins_in
+from . import live
+
+
+def start(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> FinSession:
+    """Preview this fin: Play, playback and its bake move it from now on.
+
+    Raises:
+        HairloomError: it is no fin, or cannot be cloth.
+    """
+    session = FinSession(obj, depsgraph)
+    live.add(session, depsgraph)
+    return session
+
+
+def start_enabled(depsgraph: bpy.types.Depsgraph) -> list[str]:
+    """Preview all fins of the view layer that are to be simulated; returns warnings."""
+    warnings = []
+    for obj in fins_in(bpy.context.view_layer):
+        if obj.hairloom.fin.enabled and live.simulated_of(obj) is None:
+            try:
+                start(obj, depsgraph)
+            except HairloomError as error:
+                warnings.append(str(error))
+    return warnings

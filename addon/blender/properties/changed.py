@@ -1,0 +1,41 @@
+"""What the artist changes, handed to those who subscribed: properties know nobody above them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+
+type Listener = Callable[[bpy.types.ID], None]
+
+#: what may be listened to -> who listens
+_listeners: dict[str, list[Listener]] = {"settings": [], "display": [], "bake": []}
+
+
+def subscribe(kind: str, listener: Listener) -> None:
+    """Call the listener with the data-block whose properties of this kind change."""
+    _listeners[kind].append(listener)
+
+
+def unsubscribe(kind: str, listener: Listener) -> None:
+    _listeners[kind].remove(listener)
+
+
+def settings(owner: bpy.types.ID) -> None:
+    """A setting of a groom or of its object was changed."""
+    _call("settings", owner)
+
+
+def display(owner: bpy.types.ID) -> None:
+    """Whether Blender's own strands are to be seen was changed."""
+    _call("display", owner)
+
+
+def bake(owner: bpy.types.ID) -> None:
+    """Where the bake is, or whether it is shown, was changed."""
+    _call("bake", owner)
+
+
+def _call(kind: str, owner: bpy.types.ID) -> None:
+    for listener in _listeners[kind]:
+        listener(owner)
