@@ -8,9 +8,10 @@ from pathlib import Path
 import bpy
 import pytest
 
+import hairloom
 from hairloom import register, unregister
-from hairloom.addon.blender.preview import reactions
-from hairloom.addon.blender.properties import groups
+from hairloom.addon.blender.preview import handlers
+from hairloom.addon.blender.properties import changed, groups
 from hairloom.addon.blender.properties.properties import property_group, settings_of
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
@@ -78,13 +79,29 @@ def test_a_changed_value_reaches_the_settings_as_it_was_typed(group_of):
     assert settings_of(group, ALL_SETTINGS["shading"]).primary_shift == 0.1
 
 
-def test_an_edit_names_the_data_block_at_once(new_hair, monkeypatch):
-    hair, named = new_hair(), []
-    monkeypatch.setattr(reactions, "settings_changed", named.append)
-    hair.data.hairloom.shading.ambient = 0.5
-    hair.hairloom.dynamics.damping = 2.0
-    hair.hairloom.hide_original = False
-    assert named == [hair.data, hair, hair]
+def test_an_edit_names_the_data_block_at_once(new_hair):
+    hair, named = new_hair(), {"settings": [], "display": [], "bake": []}
+    for kind, owners in named.items():
+        changed.subscribe(kind, owners.append)
+    try:
+        hair.data.hairloom.shading.ambient = 0.5
+        hair.hairloom.dynamics.damping = 2.0
+        hair.hairloom.hide_original = False
+        hair.hairloom.bake.is_shown = False
+    finally:
+        for kind, owners in named.items():
+            changed.unsubscribe(kind, owners.append)
+    assert named == {"settings": [hair.data, hair], "display": [hair], "bake": [hair]}
+
+
+def test_the_preview_listens_while_hairloom_is_enabled_and_no_longer(extension):
+    heard = {kind: list(listeners) for kind, listeners in changed._listeners.items()}
+    assert heard == {kind: [listener] for kind, listener in handlers.LISTENERS}
+    hairloom.unregister()
+    try:
+        assert not any(changed._listeners.values())
+    finally:
+        hairloom.register()
 
 
 def test_choices_and_toggles_have_properties_too(extension):

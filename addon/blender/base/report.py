@@ -21,7 +21,7 @@ from ...exchange.files.atomic import write_text_atomic
 from .gpu_context import gpu_in_use
 from .interruption import stop_if_asked
 
-_MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
+_MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 #: What progress lines are written for: a reader, or whatever runs an Open Job Description.
 STYLES = ("lines", "openjd")
 
