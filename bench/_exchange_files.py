@@ -25,7 +25,7 @@ from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
 from hairloom.addon.strands import StrandSet
 
 STRANDS, POINTS, ROUNDS = 100_000, 16, 7
-OUR_FORMATS, LIBRARIES_FORMATS = ("tfx", "tfxbone", "hair", "preset"), ("abc", "usdc", "usda")
+OUR_FORMATS, LIBRARIES_FORMATS = ("tfx", "hair", "preset"), ("abc", "usdc", "usda")
 KILLED_FORMATS = ("tfx", "tfxbone", "hair", "preset", "abc", "usdc", "glb")
 
 

@@ -18,7 +18,6 @@ from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom import Groom, GroomMotion
 from hairloom.addon.exchange.groom_presets import PRESETS
 from hairloom.addon.exchange.hair_file import HEADER, write_hair_file
-from hairloom.addon.exchange.tfxbone import strongest_bones, write_tfxbone
 from hairloom.addon.exchange.tressfx import write_tfx
 from hairloom.addon.exchange.tressfx_layout import HEADER_3, HEADER_4
 from hairloom.addon.exchange.usd.groom_usd import write_usd
@@ -108,14 +107,6 @@ def tressfx_3(strands: StrandSet, floats: bytes) -> bytes:
     return header.tobytes() + body
 
 
-def _bone_files(path: Path, strand_count: int) -> Iterator[bytes]:
-    random = np.random.default_rng(strand_count)
-    for bone_count in (1, 7):
-        names = tuple(f"bone.{'x' * index}" for index in range(bone_count))
-        write_tfxbone(path, strongest_bones(names, random.random((strand_count, bone_count))))
-        yield path.read_bytes()
-
-
 def _hair_files(path: Path, strand_count: int) -> Iterator[bytes]:
     write_hair_file(path, sample(strand_count), uv=True)
     content = path.read_bytes()
@@ -154,7 +145,6 @@ def _motion(groom: Groom) -> GroomMotion:
 
 MAKERS: dict[str, Callable[[Path, int], Iterator[bytes]]] = {
     "tfx": _tfx_files,
-    "tfxbone": _bone_files,
     "hair": _hair_files,
     "abc": _alembic_files,
     "usdc": _usd_files,

@@ -28,7 +28,6 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.read_groom import ReadGroom
-from hairloom.addon.exchange.tfxbone import ReadBones, read_tfxbone
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 from hairloom.addon.parameters import ALL_SETTINGS
@@ -49,7 +48,6 @@ def read_preset_file(path: Path) -> Preset[Any]:
 
 READERS: dict[str, Callable[[Path], Any]] = {
     "tfx": read_tfx,
-    "tfxbone": read_tfxbone,
     "hair": read_hair_file,
     "preset": read_preset_file,
     "abc": read_groom_alembic,
@@ -135,11 +133,6 @@ def unsound(found: Any) -> str:
             color is None or (np.isfinite(color).all() and (color >= 0.0).all()),
         ]
         return "" if all(sound) else f"a groom that is not sound: {sound}"
-    if isinstance(found, ReadBones):
-        weight = found.weights.weight
-        sums = weight.sum(axis=1, dtype=np.float64)
-        is_sound = (weight >= 0.0).all() and (np.abs(sums - 1.0) < 1.0e-5).all()
-        return "" if is_sound else "weights that are not sound"
     return "" if isinstance(found, Preset) else f"a {type(found).__name__}"
 
 

@@ -91,7 +91,7 @@ def main(folder: Path) -> None:
 
     sheet = []
     for path in sorted(LOOKS.glob("*.json")):
-        look = of_addon("params.preset").read_preset(path, shading).settings
+        look = of_addon("params.preset").read_any_preset(path, {shading.section: shading}).settings
         square = (THUMBNAIL, THUMBNAIL)
         thumbnail = picture(look, lights.three_point_lights, square, 0.75, NO_BACKDROP)
         images.write_png(path.with_suffix(".png"), coarse(thumbnail))

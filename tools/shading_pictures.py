@@ -43,7 +43,7 @@ def main(folder: Path) -> None:
     frame, images = of_addon("render.frame"), of_addon("blender.base.images")
     shading, lights = of_addon("parameters").ALL_SETTINGS["shading"], of_addon("shading.lights")
     blond = replace(
-        of_addon("params.preset").read_preset(BLOND, shading).settings,
+        of_addon("params.preset").read_any_preset(BLOND, {shading.section: shading}).settings,
         shift_noise=0.0,
         color_variation=0.2,
     )

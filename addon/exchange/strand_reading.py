@@ -40,7 +40,7 @@ def read_strands(
         scale: what lengths are multiplied by, beside what the file says of its unit; a .tfx or
             .hair file says nothing and is taken to be in metres.
         parts: one of PARTS. A file that holds guides alone gives those for "strands", too.
-        python: the command that starts another Python, see `apart.run_apart`.
+        python: the command that starts another Python, see `subprocess_reader.run_reader`.
 
     Returns:
         What the file's reader gives, with notes on what was left out. Closest guides are kept

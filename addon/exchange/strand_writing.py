@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,9 +13,9 @@ from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .alembic.groom_alembic import write_groom_alembic
 from .files.file_set import written_together
+from .files.names import plain_name
 from .groom import Groom, GroomMotion, points_of
 from .groom_presets import chosen_strands
-from .group_files import group_files
 from .hair_file import write_hair_file
 from .strand_formats import ALEMBIC, HAIR, TRESSFX, USD, strand_format
 from .strand_output import StrandOutput, layout_of, metres_per_unit
@@ -151,9 +152,7 @@ def _write_files(
     chosen = chosen_strands(groom, parts)
     groom = _part(groom, chosen, parts)
     bones = None if output.bones is None else output.bones.take(chosen)
-    files: dict[Path, Ints] = {path: np.arange(len(chosen))}
-    if output.by_group:
-        files = _strands_of_files(path, groom)
+    files = _group_files(path, groom) if output.by_group else {path: np.arange(len(chosen))}
     notes: list[str] = []
     with written_together(next(iter(files))) as folder:
         for file, strands in files.items():
@@ -166,16 +165,19 @@ def _write_files(
     return WrittenStrands(tuple(written), tuple(notes))
 
 
-def _strands_of_files(path: Path, groom: Groom) -> dict[Path, Ints]:
-    """The file of each group, and the indices of its strands."""
-    count = groom.strands.strand_count
-    numbered = replace(groom, strand_id=np.arange(count), closest_guides=None, guide_weights=None)
-    return {file: _numbers(part) for file, part in group_files(path, numbered).items()}
-
-
-def _numbers(groom: Groom) -> Ints:
-    assert groom.strand_id is not None
-    return groom.strand_id
+def _group_files(path: Path, groom: Groom) -> dict[Path, Ints]:
+    """The file of each group, by its name or number, and the indices of the group's strands."""
+    numbers = np.unique(groom.strands.group).tolist()
+    if len(numbers) < 2:
+        return {path: np.arange(groom.strands.strand_count)}
+    names = [plain_name(groom.group_names.get(number, f"group{number}")) for number in numbers]
+    taken = Counter(name.casefold() for name in names)
+    files: dict[Path, Ints] = {}
+    for name, number in zip(names, numbers, strict=True):
+        ending = name if taken[name.casefold()] == 1 else f"{name}_{number}"
+        file = path.with_name(f"{path.stem}_{ending}{path.suffix}")
+        files[file] = np.flatnonzero(groom.strands.group == number)
+    return files
 
 
 def _part(groom: Groom, chosen: Ints, parts: str) -> Groom:

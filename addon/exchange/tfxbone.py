@@ -17,13 +17,11 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet
-from .files.binary_file import BinaryFile, write_blocks
+from .files.binary_file import write_blocks
 
 #: Bones of one strand.
 INFLUENCES = 4
-#: More bones than any skeleton: a larger count is a damaged one.
-MOST_BONES = 65_536
-#: A sum of weights so near to 1 is 1, so that what was read is written as it was.
+#: A sum of weights so near to 1 is 1.
 _ROUNDING = 1.0e-6
 
 _STRAND = np.dtype(
@@ -66,14 +64,6 @@ class BoneWeights:
         return BoneWeights(self.names, self.bone[strands], self.weight[strands])
 
 
-@dataclass(frozen=True)
-class ReadBones:
-    """weights: of the file's strands; notes: what was mended."""
-
-    weights: BoneWeights
-    notes: tuple[str, ...]
-
-
 def strongest_bones(names: tuple[str, ...], weights: Floats) -> BoneWeights:
     """The four strongest bones of each strand.
 
@@ -85,7 +75,7 @@ def strongest_bones(names: tuple[str, ...], weights: Floats) -> BoneWeights:
     bone[:, :count] = np.argsort(-weights, axis=1, kind="stable")[:, :count]
     strongest = np.zeros(bone.shape, np.float32)
     strongest[:, :count] = np.take_along_axis(weights, bone[:, :count], axis=1)
-    carried, strongest, _ = _renormalised(bone, strongest)
+    carried, strongest = _renormalised(bone, strongest)
     return BoneWeights(names, carried, strongest)
 
 
@@ -111,32 +101,6 @@ def bones_at_roots(
     corners = vertex_weights[triangles[strands.root_triangle]]
     weights = np.einsum("sc,scb->sb", strands.root_barycentric, corners)
     return strongest_bones(names, weights)
-
-
-def read_tfxbone(path: Path) -> ReadBones:
-    """Read the bones of a groom; weights are renormalised.
-
-    Raises:
-        HairloomError: the file cannot be read, is no .tfxbone file, is cut short, or a strand
-            names a bone that is not there.
-    """
-    file = BinaryFile(path)
-    content = file.content()
-    indices, names, end = _bones(file, content)
-    file.check("strand count", end, 4)
-    (strand_count,) = struct.unpack_from("<i", content, end)
-    if strand_count <= 0 or not names:
-        what = "bones" if strand_count > 0 else "strands"
-        raise file.error(f"it holds no {what} (byte {end if names else 0})", "Export it again")
-    file.check("weights", end + 4, strand_count * _STRAND.itemsize)
-    table = np.frombuffer(content, _STRAND, strand_count, end + 4)["influence"]
-    weight = np.where(table["bone"] == -1, np.float32(0.0), table["weight"])
-    bone = _place(table["bone"], indices, weight, file)
-    bone, weight, without = _renormalised(bone, weight)
-    notes: tuple[str, ...] = ()
-    if without:
-        notes = (f"{path.name}: {without:,} strands had no weights; '{names[0]}' carries them.",)
-    return ReadBones(BoneWeights(tuple(names), bone, weight), notes)
 
 
 def write_tfxbone(path: Path, weights: BoneWeights, strand_count: int | None = None) -> None:
@@ -166,60 +130,14 @@ def write_tfxbone(path: Path, weights: BoneWeights, strand_count: int | None = N
     write_blocks(path, [bones + struct.pack("<i", count), table])
 
 
-def _bones(file: BinaryFile, content: bytes) -> tuple[Ints, list[str], int]:
-    """Indices and names of the bones, and the byte behind them."""
-    file.check("bone count", 0, 4)
-    (count,) = struct.unpack_from("<i", content)
-    if not 0 <= count <= MOST_BONES:
-        raise file.error(
-            f"this is no .tfxbone file: it would hold {count:,} bones", "Choose a .tfxbone file"
-        )
-    indices: list[int] = []
-    names: list[str] = []
-    at = 4
-    for bone in range(count):
-        file.check(f"bone {bone}", at, 8)
-        index, length = struct.unpack_from("<2i", content, at)
-        if length < 1:
-            raise file.error(
-                f"the name of bone {bone} would have {length} bytes (byte {at + 4})",
-                "The file is damaged: copy or export it again",
-            )
-        file.check(f"name of bone {bone}", at + 8, length)
-        text = content[at + 8 : at + 8 + length].partition(b"\0")[0]
-        indices.append(index)
-        names.append(text.decode("utf-8", "replace"))
-        at += 8 + length
-    if len(set(indices)) < count:
-        raise file.error("two of its bones have the same index", "Export it again")
-    return np.array(indices, np.int64), names, at
-
-
-def _place(bone: Ints, indices: Ints, weight: Floats, file: BinaryFile) -> Ints:
-    """From the file's indices of bones to places in its list."""
-    order = np.argsort(indices)
-    place = np.searchsorted(indices, bone, sorter=order)
-    place = order[np.minimum(place, len(indices) - 1)]
-    unknown = (indices[place] != bone) & (weight != 0.0)
-    if unknown.any():
-        strand, influence = (int(each[0]) for each in np.nonzero(unknown))
-        raise file.error(
-            f"strand {strand} hangs on bone {bone[strand, influence]}, and there is none",
-            "The file is damaged: copy or export it again",
-        )
-    return place
-
-
-def _renormalised(bone: Ints, weight: Floats) -> tuple[Ints, Floats, int]:
-    """Weights with a sum of 1, the bone 0 where a weight is 0, and how many strands had none."""
+def _renormalised(bone: Ints, weight: Floats) -> tuple[Ints, Floats]:
+    """Weights with a sum of 1; the first bone carries where there are none."""
     wide = np.where(np.isfinite(weight) & (weight > 0.0), weight, 0.0).astype(np.float64)
-    total = wide.sum(axis=1)
-    without = total == 0.0
+    without = wide.sum(axis=1) == 0.0
     wide[without, 0], bone = 1.0, np.where(without[:, None], 0, bone)
-    total[without] = 1.0
-    scale = np.where(np.abs(total - 1.0) > _ROUNDING, total, 1.0)
-    weight = (wide / scale[:, None]).astype(np.float32)
-    return np.where(weight == 0.0, 0, bone), weight, int(without.sum())
+    total = wide.sum(axis=1, keepdims=True)
+    weight = (wide / np.where(np.abs(total - 1.0) > _ROUNDING, total, 1.0)).astype(np.float32)
+    return np.where(weight == 0.0, 0, bone), weight
 
 
 def _broken(problem: str) -> HairloomError:

@@ -43,20 +43,11 @@ class Preset[S: Settings]:
         return (self.settings, *self.also)
 
 
-def read_preset[S: Settings](path: Path, settings: type[S]) -> Preset[S]:
-    """Read and check the preset of one section in a file.
-
-    Raises:
-        HairloomError: not JSON, of a newer version, for another section, or with a bad value.
-    """
-    return preset_from_dict(_content(path), settings, str(path))
-
-
 def read_any_preset(path: Path, kinds: Mapping[str, type[Settings]]) -> Preset[Any]:
     """Read and check a preset of any of these sections.
 
     Raises:
-        HairloomError: as `read_preset`, or of none of these sections.
+        HairloomError: not JSON, of a newer version, of none of these sections, or with a bad value.
     """
     data = _content(path)
     section = data.get("section") if isinstance(data, dict) else None
@@ -67,7 +58,7 @@ def read_any_preset(path: Path, kinds: Mapping[str, type[Settings]]) -> Preset[A
             place=str(path),
             remedy="Choose a preset of " + ", ".join(kinds),
         )
-    preset = preset_from_dict(data, kind, str(path))
+    preset = _checked(data, kind, str(path))
     return replace(preset, also=_also(data.get("also", {}), kinds, str(path)))
 
 
@@ -94,19 +85,13 @@ def _content(path: Path) -> Any:
         ) from error
 
 
-def preset_from_dict[S: Settings](data: Any, settings: type[S], place: str) -> Preset[S]:
+def _checked[S: Settings](data: Any, settings: type[S], place: str) -> Preset[S]:
     """Check plain data against the declarations; older versions are migrated step by step."""
     if not isinstance(data, dict) or not isinstance(data.get("values"), Mapping):
         raise HairloomError(
             "this is not a Hairloom preset", place=place, remedy="Choose a preset saved by Hairloom"
         )
     data = migrated(data, place)
-    if data.get("section") != settings.section:
-        raise HairloomError(
-            f"this preset is for '{data.get('section')}', not for '{settings.section}'",
-            place=place,
-            remedy="Choose a preset of the same kind",
-        )
     values = settings.from_dict(data["values"], place)
     return Preset(str(data.get("title", "")), str(data.get("source", "")), values)
 

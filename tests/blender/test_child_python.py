@@ -10,7 +10,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
 from hairloom.addon.blender.strands import child_python  # noqa: E402
-from hairloom.addon.exchange.files.apart import run_apart, same_packages, this_python  # noqa: E402
+from hairloom.addon.exchange.files.subprocess_reader import run_reader, same_packages, this_python  # noqa: E402
 
 SCRIPT = "import os, sys, numpy\nopen(sys.argv[-1], 'w').write(numpy.__file__)\nos._exit({code})\n"
 
@@ -28,7 +28,7 @@ def numpy_of(command, folder):
     script, path, result = folder / "script.py", folder / "groom.abc", folder / "result"
     script.write_text(SCRIPT.format(code=0))
     path.write_bytes(b"any")
-    run_apart(script, path, [result], library="Any", python=command)
+    run_reader(script, path, [result], library="Any", python=command)
     return result.read_text()
 
 

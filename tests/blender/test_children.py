@@ -9,7 +9,6 @@ import pytest
 
 from hairloom.addon import pipeline
 from hairloom.addon.blender.bakes import playback
-from hairloom.addon.blender.cards.card_out import export_cards
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import live, reactions, timeline
 from hairloom.addon.blender.preview.bake import Bake
@@ -291,10 +290,10 @@ def test_undo_brings_the_children_back(hair, evaluated):
     np.testing.assert_allclose(session.strands, before, atol=1e-6)
 
 
-def test_cards_are_one_a_guide_and_tressfx_holds_all(hair, evaluated, tmp_path):
+def test_cards_are_one_a_guide_and_tressfx_holds_all(hair, evaluated, tmp_path, capfd):
     hair.data.hairloom.cards.way = "guides"
-    cards = export_cards(hair, evaluated(), tmp_path / "cards.glb")
-    assert "Wrote 60 cards" in cards.result
+    assert bpy.ops.hairloom.export_cards(filepath=str(tmp_path / "cards.glb")) == {"FINISHED"}
+    assert "Wrote 60 cards" in capfd.readouterr().out
     plan = StrandExport.of([hair], evaluated(), TRESSFX, StrandOutput(up="Z"))
     assert "260 strands" in plan.write(tmp_path / "hair.tfx").result
     written = read_tfx(tmp_path / "hair.tfx", up="Z", scale=1.0).strands

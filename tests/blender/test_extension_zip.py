@@ -218,7 +218,6 @@ bpy.ops.hairloom.grow(strand_count=50, length=0.1)
 bpy.ops.hairloom.preview()
 live = sys.modules[NAME + ".addon.blender.preview.live"]
 registration = sys.modules[NAME + ".addon.registration"]
-dds = importlib.import_module(NAME + ".addon.exchange.textures.dds")
 
 def module(name):
     return importlib.import_module(NAME + ".addon." + name)
@@ -236,7 +235,8 @@ def crashes(command):
     crash = path.with_name("crash.py")
     crash.write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
     try:
-        module("exchange.files.apart").run_apart(crash, path, library="Alembic", python=command)
+        reader = module("exchange.files.subprocess_reader")
+        reader.run_reader(crash, path, library="Alembic", python=command)
     except module("errors").HairloomError as error:
         return str(error)
 
@@ -251,7 +251,7 @@ print(json.dumps(dict(
     after=sorted(after),
     strands=live.sessions()[0].rig.strands.strand_count,
     root=registration.ROOT_PACKAGE,
-    has_compressor=dds.has_compressor(),
+    has_compressor=importlib.util.find_spec("etcpak") is not None,
     installed=[p.parent.name for p in pathlib.Path({resources!r}).rglob("_etcpak_none*")],
     packages=sorted(p.name for p in pathlib.Path({resources!r}).rglob("site-packages/*.dist-info")),
 )), flush=True)

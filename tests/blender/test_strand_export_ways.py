@@ -10,13 +10,13 @@ import bpy
 import numpy as np
 import pytest
 from strand_files import curves_of, hedgehog, needs_usd, straight
+from tfxbone_reader import read_tfxbone
 
 from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.blender.scene.groom_attributes import store_groom
 from hairloom.addon.blender.strands.groom_out import Wishes, still_hair
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
-from hairloom.addon.exchange.tfxbone import read_tfxbone
 from hairloom.addon.exchange.tressfx import read_tfx
 
 
@@ -52,7 +52,7 @@ def test_bones_of_a_skinned_head_lie_beside_tressfx(
     bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "hair.tfx"), up="Z", fills_groups=True)
     read = read_tfx(tmp_path / "hair.tfx", up="Z").strands
     assert read.strand_count == 64 and set(read.point_counts) == {8}
-    bones = read_tfxbone(tmp_path / "hair.tfxbone").weights
+    bones = read_tfxbone(tmp_path / "hair.tfxbone")
     assert bones.names == ("skull", "jaw") and bones.strand_count == 64
     carrier = bones.bone[np.arange(64), bones.weight.argmax(axis=1)]
     clear = np.abs(read.roots[:, 2]) > 0.03
@@ -61,7 +61,7 @@ def test_bones_of_a_skinned_head_lie_beside_tressfx(
     bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "split.tfx"), by_group=True, up="Z")
     names = {f"split_group{g}{suffix}" for g in (0, 1) for suffix in (".tfx", ".tfxbone")}
     assert {p.name for p in tmp_path.glob("split*")} == names
-    part = read_tfxbone(tmp_path / "split_group1.tfxbone").weights
+    part = read_tfxbone(tmp_path / "split_group1.tfxbone")
     np.testing.assert_array_equal(part.bone[:30], bones.bone[1:60:2])
 
 

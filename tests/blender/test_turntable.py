@@ -26,7 +26,7 @@ from hairloom.addon.blender.pictures.showing import file_name, shown_groom
 from hairloom.addon.blender.pictures.turntable import Turntable, TurntableSettings
 from hairloom.addon.blender.properties.presets import shipped
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files import leftovers
+from hairloom.addon.exchange.files import stale_temp_files
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
@@ -158,8 +158,8 @@ def test_the_next_turn_removes_what_a_killed_one_left(
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
     with monkeypatch.context() as patched:
-        patched.setattr(leftovers.os, "getpid", lambda: ended.pid)
-        left = leftovers.temporary_beside(table.folder / "turntable")
+        patched.setattr(stale_temp_files.os, "getpid", lambda: ended.pid)
+        left = stale_temp_files.temporary_beside(table.folder / "turntable")
     left.mkdir(parents=True)
     (left / "turntable_0001.png").write_text("half")
     steps = table.steps()

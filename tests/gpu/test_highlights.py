@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from hair_ball import ball_mesh, combed_strands
 
-from hairloom.addon.params.preset import read_preset
+from hairloom.addon.parameters import ALL_SETTINGS
+from hairloom.addon.params.preset import read_any_preset
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
@@ -60,7 +61,7 @@ def draw() -> Callable[..., np.ndarray]:
 
 
 def look(name: str, model: str) -> ShadingSettings:
-    shipped = read_preset(LOOKS / f"{name}.json", ShadingSettings).settings
+    shipped = read_any_preset(LOOKS / f"{name}.json", ALL_SETTINGS).settings
     return replace(
         shipped, model=model, shift_noise=0.0, sparkle=0.0, color_variation=0.0, scattered=0.0
     )

@@ -13,7 +13,7 @@ from ..base.thread_work import ThreadWork
 from ..scene.rigs import rig_of
 from ..scene.source import read_source
 from .card_builds import made_in_thread
-from .card_files import CardOutput, FileSteps, WrittenCards, check_output, file_steps, write_cards
+from .card_files import CardOutput, FileSteps, WrittenCards, check_output, file_steps
 from .card_making import CardChoices, MadeCards, card_choices, order_line
 from .card_motion import GuideMotion, baked_motion
 
@@ -90,28 +90,6 @@ class CardExport:
         return Outcome(
             f"{result}{_motion_line(written)}", self.dropped, (*self.notes, *written.notes)
         )
-
-
-def export_cards(
-    hair: bpy.types.Object,
-    depsgraph: bpy.types.Depsgraph,
-    path: Path,
-    output: CardOutput | None = None,
-    *,
-    levels: int | None = None,
-) -> Outcome:
-    """Write the groom as hair cards: the mesh, its textures and its sidecar.
-
-    Args:
-        levels: of detail; None is what the groom's own settings say.
-
-    Raises:
-        HairloomError: no hair that can be used, or the files cannot be written.
-    """
-    output = output or CardOutput(name=hair.name)
-    plan = CardExport.of(hair, depsgraph, path, output, levels=levels)
-    written = write_cards(path, plan.rig, plan.choices, output, motion=plan.motion)
-    return plan.outcome(written)
 
 
 def _motion_line(written: WrittenCards) -> str:

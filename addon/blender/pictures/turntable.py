@@ -17,7 +17,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...exchange.files.leftovers import remove_leftovers, temporary_beside
+from ...exchange.files.stale_temp_files import remove_stale_files, temporary_beside
 from ...pipeline import Pose
 from ...render.camera import Camera, frame_camera
 from ...shading.lights import Light, three_point_lights
@@ -176,7 +176,7 @@ def _moved_when_done(folder: Path) -> Iterator[Path]:
     is_new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        remove_leftovers(folder)
+        remove_stale_files(folder)
         beside = temporary_beside(folder / "turntable")
         beside.mkdir()
     except OSError as error:

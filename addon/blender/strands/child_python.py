@@ -18,7 +18,7 @@ from pathlib import Path
 
 import bpy
 
-from ...exchange.files.apart import NO_WINDOW, python_program, same_packages
+from ...exchange.files.subprocess_reader import NO_WINDOW, python_program, same_packages
 from ...exchange.strand_formats import ALEMBIC, USD, strand_format
 
 #: Packages whose files another process reads, and what of them must load there.

@@ -10,8 +10,7 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats, Ints
-from ...exchange.groom import Groom, points_of
-from ...exchange.guide_copies import with_guide_copies
+from ...exchange.groom import Groom, points_of, with_guide_copies
 from ...groom.roots import bind_roots
 from ...groom.weights import guide_weights
 from ...pipeline import Rig

@@ -20,12 +20,11 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import StrandSet
-from ..files.atomic import atomic_write, unwritable
-from ..files.disk_room import check_room
+from ...strands.resample import arc_length_positions
+from ..files.atomic import atomic_write, check_free_space, unwritable
 from ..files.names import plain_name
 from ..groom import Groom, GroomMotion, points_of
 from ..groom_presets import LEAST_WIDTH, UNREAL, GroomPreset, chosen_strands
-from ..point_cap import PointCap, point_cap
 from .alembic_library import alembic_library, array_of, sample_of, scope_of, write_parameter
 
 VERSION = (1, 5)
@@ -165,7 +164,7 @@ def _write(
     """
     counts = [part.point_counts(groom.strands, preset.most_points) for part in parts]
     points, strands = sum(int(each.sum()) for each in counts), sum(map(len, counts))
-    check_room(path, points * _POINT_BYTES + strands * _STRAND_BYTES + _HEADER_BYTES)
+    check_free_space(path, points * _POINT_BYTES + strands * _STRAND_BYTES + _HEADER_BYTES)
     archive, time = _archive(library, path, groom, motion)
     top = library.geom.OXform(archive.getTop(), f"{plain_name(groom.name)}_groom")
     _write_version(library, top.getSchema().getUserProperties(), groom, preset)
@@ -182,7 +181,7 @@ def _write(
             moving.append((schema, moved))
     for frame in frames:
         checked = _checked(frame, groom)
-        check_room(path, points * _POINT_BYTES + _HEADER_BYTES)
+        check_free_space(path, points * _POINT_BYTES + _HEADER_BYTES)
         for schema, moved in moving:
             schema.set(_sample(library, preset, moved.of_frame(checked, preset)))
 
@@ -290,3 +289,44 @@ def _widths(part: _Taken, preset: GroomPreset) -> Floats:
     """Widths of the points that are written, in the file's unit."""
     width = np.maximum(part.capped(part.groom.strands.radius) * np.float32(2.0), LEAST_WIDTH)
     return (width * preset.space.per_metre).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class PointCap:
+    """Where the new points lie between the old ones, the same for all values and all frames.
+
+    left, right: (new_count,) indices of old points.
+    weight: (new_count,) float32, of the right one.
+    offsets: (strand_count + 1,) int32, of the new points.
+    """
+
+    left: Ints
+    right: Ints
+    weight: Floats
+    offsets: Ints
+
+    def apply(self, values: Floats) -> Floats:
+        """Values of the old points (point_count, ...) at the new ones."""
+        weight = self.weight.reshape(-1, *[1] * (values.ndim - 1))
+        return values[self.left] * (1.0 - weight) + values[self.right] * weight
+
+
+def point_cap(strands: StrandSet, most: int) -> PointCap | None:
+    """Equally spaced points, `most` of them, for each longer strand; None where none is longer."""
+    counts = strands.point_counts
+    long = np.flatnonzero(counts > most)
+    if not len(long):
+        return None
+    new_counts = np.minimum(counts, most)
+    offsets = np.concatenate([[0], np.cumsum(new_counts)]).astype(np.int32)
+    first = np.repeat(strands.offsets[:-1] - offsets[:-1], new_counts)
+    left = np.arange(offsets[-1]) + first
+    right, weight = left.copy(), np.zeros(len(left), np.float32)
+
+    own_left, own_weight = arc_length_positions(strands.take(long), most)
+    old = points_of(strands, long)
+    places = (offsets[long][:, None] + np.arange(most)).ravel()
+    left[places] = old[own_left.ravel()]
+    right[places] = left[places] + 1
+    weight[places] = own_weight.ravel()
+    return PointCap(left, right, weight, offsets)

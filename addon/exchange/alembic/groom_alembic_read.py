@@ -18,8 +18,8 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import HairloomError
 from ...strands.clean import clean
-from ..files.apart import run_apart
 from ..files.file_space import FileSpace
+from ..files.subprocess_reader import run_reader
 from ..groom import Groom
 from ..read_groom import ReadGroom, finite, kept_points
 from . import alembic_curves
@@ -50,7 +50,7 @@ def read_groom_alembic(
         up: "Y" or "Z" in place of what that says.
         factor: what lengths are multiplied by beside that.
         with_guides: whether strands that are marked as guides are kept.
-        python: the command that starts another Python, see `run_apart`.
+        python: the command that starts another Python, see `run_reader`.
 
     Raises:
         HairloomError: no such file, no Alembic, one without curves, a damaged one, no alembic3d,
@@ -101,7 +101,7 @@ def _read_apart(path: Path, python: Sequence[str] | None) -> Arrays:
     script = Path(alembic_curves.__file__)
     with tempfile.TemporaryDirectory(prefix="hairloom-") as folder:
         result = Path(folder) / "curves.npz"
-        run_apart(script, path, [result], library="Alembic", python=python)
+        run_reader(script, path, [result], library="Alembic", python=python)
         with np.load(result, allow_pickle=False) as arrays:
             return dict(arrays)
 

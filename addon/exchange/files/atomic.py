@@ -5,12 +5,13 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ...errors import HairloomError
-from .leftovers import remove_leftovers, temporary_beside
+from .stale_temp_files import remove_stale_files, temporary_beside
 
 
 @contextmanager
@@ -65,7 +66,7 @@ def _check_writable(target: Path, temporary: Path) -> None:
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, "a folder has this name")
     target.parent.mkdir(parents=True, exist_ok=True)
-    remove_leftovers(target.parent)
+    remove_stale_files(target.parent)
     temporary.touch(exist_ok=False)
     temporary.unlink()
 
@@ -96,3 +97,21 @@ def unwritable(path: Path, why: str) -> HairloomError:
         remedy="Choose a folder that you may write to, with space left, "
         "and close other programs that use the file",
     )
+
+
+def check_free_space(path: Path, size: int) -> None:
+    """Make sure that `size` more bytes fit into the folder of `path` now.
+
+    Asked before a library writes that does not survive a full disk.
+
+    Where the system can set space aside it is asked to, since quotas and limits do not show in the
+    free space of a disk.
+
+    Raises:
+        OSError: there is no room.
+    """
+    if shutil.disk_usage(path.parent).free < size:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    if hasattr(os, "posix_fallocate"):
+        with tempfile.TemporaryFile(dir=path.parent) as file:
+            os.posix_fallocate(file.fileno(), 0, size)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ...errors import HairloomError
 from .atomic import flush_to_disk, unwritable
-from .leftovers import remove_leftovers, temporary_beside
+from .stale_temp_files import remove_stale_files, temporary_beside
 
 
 @contextmanager
@@ -28,7 +28,7 @@ def written_together(path: Path) -> Iterator[Path]:
     staging = temporary_beside(path, suffix="")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        remove_leftovers(folder)
+        remove_stale_files(folder)
         staging.mkdir()
     except OSError as error:
         raise unwritable(path, error.strerror or str(error)) from error

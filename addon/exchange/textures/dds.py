@@ -38,15 +38,6 @@ _TEXTURE_2D = 3
 _STRAIGHT_ALPHA, _NO_ALPHA, _CUSTOM_ALPHA = 1, 3, 4
 
 
-def has_compressor() -> bool:
-    """Whether this Python can compress textures to BC7."""
-    try:
-        _compressor(Path())
-    except HairloomError:
-        return False
-    return True
-
-
 def write_dds(
     path: Path,
     levels: Sequence[Floats],

@@ -44,7 +44,7 @@ def read_usd(
         up: "Y" or "Z" in place of what the file says.
         scale: metres in one unit, in place of what the file says.
         factor: what lengths are multiplied by beside that.
-        python: the command that starts another Python, see `run_apart`.
+        python: the command that starts another Python, see `run_reader`.
 
     Returns:
         The groom: groups as the file has them, or one for each prim; the version of Epic's

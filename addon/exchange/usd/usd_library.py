@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Any
 
 from ...errors import HairloomError
-from ..files.apart import damaged, refusal, run_apart
+from ..files.subprocess_reader import damaged, refusal, run_reader
 from .usd_crate import CRATE, check_crate
 from .usd_probe import told
 
@@ -44,7 +44,7 @@ def usd_library(place: Path) -> ModuleType:
 def opened_stage(path: Path, python: Sequence[str] | None = None) -> Any:
     """The stage of a file, with all its payloads.
 
-    python: the command that starts another Python, see `run_apart`.
+    python: the command that starts another Python, see `run_reader`.
 
     Raises:
         HairloomError: no OpenUSD, no such file, or none that can be read as USD.
@@ -74,7 +74,7 @@ def opened_stage(path: Path, python: Sequence[str] | None = None) -> Any:
     if beginning == CRATE:
         # One thread: each further one reserves memory of its own, which would count.
         one_thread = {"PXR_WORK_THREAD_LIMIT": "1"}
-        run_apart(PROBE, path, library="USD", python=python, settings=one_thread)
+        run_reader(PROBE, path, library="USD", python=python, settings=one_thread)
     with damage_told(path):
         return usd.Usd.Stage.Open(str(path))
 

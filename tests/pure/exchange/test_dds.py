@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,12 @@ from mip_chains import mip_chain
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.textures import dds
-from hairloom.addon.exchange.textures.dds import has_compressor, write_dds
+from hairloom.addon.exchange.textures.dds import write_dds
 from hairloom.addon.exchange.textures.mip_maps import level_sizes
 from hairloom.addon.exchange.textures.srgb import srgb_decoded
 
 oiio = pytest.importorskip("OpenImageIO", reason="DDS files are read through it")
-needs_compressor = pytest.mark.skipif(not has_compressor(), reason="there is no etcpak")
+needs_compressor = pytest.mark.skipif(find_spec("etcpak") is None, reason="there is no etcpak")
 
 #: DXGI_FORMAT values of dxgiformat.h
 RGBA8, RGBA8_SRGB, BC4, BC5, BC7, BC7_SRGB = 28, 29, 80, 83, 98, 99
@@ -225,7 +226,6 @@ def test_without_a_compressor_there_is_a_plain_message(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "etcpak", None)
-    assert not has_compressor()
     path = tmp_path / "a.dds"
     with pytest.raises(HairloomError, match=r"etcpak.*cannot be loaded.*uncompressed DDS"):
         write_dds(path, levels_of(8, 8, 4))

@@ -19,7 +19,7 @@ import pytest
 from extension_loader import REPOSITORY
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files.apart import same_packages
+from hairloom.addon.exchange.files.subprocess_reader import same_packages
 
 
 def with_library(kind: str, package: str) -> Any:
@@ -27,13 +27,13 @@ def with_library(kind: str, package: str) -> Any:
     return pytest.param(kind, marks=pytest.mark.skipif(not has_it, reason=f"no {package} here"))
 
 
-FORMATS = ("tfx", "tfxbone", "hair", "preset")
+FORMATS = ("tfx", "hair", "preset")
 #: what libraries parse, in another process that takes its time
 APART = tuple(
     with_library(kind, package)
     for kind, package in (("abc", "alembic3d"), ("usdc", "pxr"), ("usda", "pxr"))
 )
-WRITTEN = (*FORMATS, "glb", *APART[:2])
+WRITTEN = (*FORMATS, "tfxbone", "glb", *APART[:2])
 FILES, FILES_APART, KILLS = 300, 12, 12
 
 

@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tfxbone_reader import read_tfxbone
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic
-from hairloom.addon.exchange.groom import Groom, GroomMotion
-from hairloom.addon.exchange.guide_copies import with_guide_copies
+from hairloom.addon.exchange.groom import Groom, GroomMotion, with_guide_copies
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.joined_grooms import joined_bones, joined_grooms
 from hairloom.addon.exchange.strand_check import check_lines, check_strands
 from hairloom.addon.exchange.strand_formats import ALEMBIC, HAIR, TRESSFX, USD
 from hairloom.addon.exchange.strand_output import StrandOutput
 from hairloom.addon.exchange.strand_writing import write_strands
-from hairloom.addon.exchange.tfxbone import read_tfxbone, strongest_bones
+from hairloom.addon.exchange.tfxbone import strongest_bones
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 from hairloom.addon.strands import StrandSet
@@ -130,7 +130,7 @@ def test_groups_go_into_files_with_the_bones_of_their_strands(tmp_path: Path) ->
     for name, own in (("crown", slice(0, 6)), ("group4", slice(6, 10))):
         read = read_tfx(tmp_path / f"hair_{name}.tfx").strands
         np.testing.assert_allclose(read.roots, groom().strands.roots[own], atol=1e-6)
-        held = read_tfxbone(tmp_path / f"hair_{name}.tfxbone").weights
+        held = read_tfxbone(tmp_path / f"hair_{name}.tfxbone")
         np.testing.assert_array_equal(held.bone, bones.bone[own])
         np.testing.assert_allclose(held.weight, bones.weight[own], atol=1e-6)
 
@@ -139,7 +139,7 @@ def test_bones_of_the_last_strand_fill_up_to_64(tmp_path: Path) -> None:
     bones = strongest_bones(("a", "b"), np.eye(2)[np.arange(COUNT) % 2])
     write_strands(tmp_path / "hair.tfx", groom(), StrandOutput(bones=bones, fills_groups=True))
     assert read_tfx(tmp_path / "hair.tfx").strands.strand_count == 64
-    held = read_tfxbone(tmp_path / "hair.tfxbone").weights
+    held = read_tfxbone(tmp_path / "hair.tfxbone")
     assert held.strand_count == 64 and (held.bone[COUNT:, 0] == 1).all()
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.groom import Groom
-from hairloom.addon.exchange.group_files import write_groups
+from hairloom.addon.exchange.strand_output import StrandOutput
+from hairloom.addon.exchange.strand_writing import write_strands
 from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.strand_set import DEFAULT_RADIUS
@@ -263,16 +264,15 @@ def test_a_file_for_each_group(tmp_path: Path) -> None:
     strands = StrandSet(strands.points, strands.offsets, strands.radius, np.arange(12) % 3)
     names = {0: "front/top", 1: "Side", 2: "side"}
     groom = Groom(strands, group_names=names)
-    files, notes = write_groups(tmp_path / "hair.tfx", groom, write_tfx)
-    assert [file.name for file in files] == [
-        "hair_front_top.tfx",
-        "hair_Side_1.tfx",
-        "hair_side_2.tfx",
-    ]
-    assert sorted(tmp_path.iterdir()) == sorted(files) and notes == ()
-    for group, file in enumerate(files):
-        np.testing.assert_array_equal(read_tfx(file).strands.grid, strands.grid[group::3])
-    one, _ = write_groups(tmp_path / "one" / "hair.tfx", Groom(grown(3, 4)), write_tfx)
+    output = StrandOutput(by_group=True, up="Z")
+    written = write_strands(tmp_path / "hair.tfx", groom, output)
+    files, notes = written.files, written.notes
+    assert sorted(tmp_path.iterdir()) == sorted(files)
+    assert notes == ()
+    for group, name in enumerate(("front_top", "Side_1", "side_2")):
+        read = read_tfx(tmp_path / f"hair_{name}.tfx", up="Z").strands
+        np.testing.assert_array_equal(read.grid, strands.grid[group::3])
+    one = write_strands(tmp_path / "one" / "hair.tfx", Groom(grown(3, 4)), output).files
     assert one == (tmp_path / "one" / "hair.tfx",) and one[0].is_file()
 
 

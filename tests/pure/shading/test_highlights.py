@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hairloom.addon.params.preset import read_preset
+from hairloom.addon.parameters import ALL_SETTINGS
+from hairloom.addon.params.preset import read_any_preset
 from hairloom.addon.shading.kajiya_kay import kajiya_kay, strand_base
 from hairloom.addon.shading.marschner.look import fibre_of, marschner_light, strand_absorption
 from hairloom.addon.shading.marschner.tables import marschner_tables, shape_of
@@ -30,7 +31,7 @@ LEAST = 0.1
 
 def look(name: str, model: str) -> ShadingSettings:
     """A look without noise and without what stands in for light from strand to strand."""
-    shipped = read_preset(LOOKS / f"{name}.json", ShadingSettings).settings
+    shipped = read_any_preset(LOOKS / f"{name}.json", ALL_SETTINGS).settings
     return replace(
         shipped, model=model, shift_noise=0.0, color_variation=0.0, grey_share=0.0, scattered=0.0
     )

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from hairloom.addon.params.preset import read_preset
+from hairloom.addon.parameters import ALL_SETTINGS
+from hairloom.addon.params.preset import read_any_preset
 from hairloom.addon.shading.settings import ShadingSettings
 
 FOLDER = Path(__file__).parents[3] / "presets" / "looks"
@@ -42,7 +43,7 @@ def test_a_look_has_a_small_square_picture(path: Path) -> None:
 
 def test_looks_differ_in_both_models() -> None:
     """Turning the model leaves a look its colour: what either model asks for is set."""
-    settings = [read_preset(path, ShadingSettings).settings for path in LOOKS]
+    settings = [read_any_preset(path, ALL_SETTINGS).settings for path in LOOKS]
     for asked in (("base_color", "primary_strength"), ("base_color", "strength_r", "width_r")):
         assert len({tuple(getattr(look, name) for name in asked) for look in settings}) == len(
             LOOKS

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from hairloom.addon.exchange.files import leftovers
+from hairloom.addon.exchange.files import stale_temp_files
 from hairloom.addon.exchange.files.atomic import write_bytes_atomic
 from hairloom.addon.exchange.files.file_set import written_together
-from hairloom.addon.exchange.files.leftovers import remove_leftovers, temporary_beside
+from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files, temporary_beside
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def ended() -> int:
 
 def left_by(process: int, path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str | None) -> Path:
     with monkeypatch.context() as patched:
-        patched.setattr(leftovers.os, "getpid", lambda: process)
+        patched.setattr(stale_temp_files.os, "getpid", lambda: process)
         return temporary_beside(path, suffix)
 
 
@@ -56,7 +56,7 @@ def test_what_others_write_or_own_stays(
     path = tmp_path / "groom.abc"
     ours = temporary_beside(path)
     another = left_by(os.getppid(), path, monkeypatch, None)
-    monkeypatch.setattr(leftovers, "_here", lambda: "0" * 8)
+    monkeypatch.setattr(stale_temp_files, "_here", lambda: "0" * 8)
     elsewhere = left_by(ended, path, monkeypatch, None)
     monkeypatch.undo()
     foreign = [tmp_path / name for name in (".groom.abc", ".hl-1-2-3", f".a.hl-{ended}", "b.hl-1")]
@@ -72,11 +72,11 @@ def test_where_no_process_can_be_asked_for_a_day_must_pass(
 ) -> None:
     left = left_by(ended, tmp_path / "groom.abc", monkeypatch, None)
     left.write_bytes(b"half")
-    monkeypatch.setattr(leftovers.os, "name", "nt")
-    monkeypatch.setattr(leftovers.os, "kill", lambda *_: pytest.fail("that would end it"))
-    remove_leftovers(tmp_path)
+    monkeypatch.setattr(stale_temp_files.os, "name", "nt")
+    monkeypatch.setattr(stale_temp_files.os, "kill", lambda *_: pytest.fail("that would end it"))
+    remove_stale_files(tmp_path)
     assert left.exists()
     a_day_ago = left.stat().st_mtime - 86_500
     os.utime(left, (a_day_ago, a_day_ago))
-    remove_leftovers(tmp_path)
+    remove_stale_files(tmp_path)
     assert not left.exists()

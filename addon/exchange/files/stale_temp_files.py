@@ -28,7 +28,7 @@ def temporary_beside(path: Path, suffix: str | None = None) -> Path:
     return path.with_name(f".{path.stem}.{mark}{path.suffix if suffix is None else suffix}")
 
 
-def remove_leftovers(folder: Path) -> None:
+def remove_stale_files(folder: Path) -> None:
     """Remove files and folders with such names whose writers were killed.
 
     Only writers of this machine are known to be gone. A process that has the number of a dead one

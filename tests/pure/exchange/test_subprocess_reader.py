@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files import apart
-from hairloom.addon.exchange.files.apart import run_apart
+from hairloom.addon.exchange.files import subprocess_reader
+from hairloom.addon.exchange.files.subprocess_reader import run_reader
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def path(tmp_path: Path) -> Path:
 def run(path: Path, script: str, **options: object) -> None:
     file = path.with_name("script.py")
     file.write_text(script)
-    run_apart(file, path, [path.with_name("result")], library="Alembic", **options)  # type: ignore
+    run_reader(file, path, [path.with_name("result")], library="Alembic", **options)  # type: ignore
 
 
 def test_a_script_has_the_file_the_result_and_all_packages(path: Path) -> None:
@@ -54,7 +54,7 @@ def test_every_bad_end_is_a_message(path: Path, script: str, message: str) -> No
 
 
 def test_a_script_without_an_end_is_ended(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(apart, "_PATIENCE", 1.0)
+    monkeypatch.setattr(subprocess_reader, "_PATIENCE", 1.0)
     number = path.with_name("number")
     script = f"import os\nopen({str(number)!r}, 'w').write(str(os.getpid()))\nwhile True: pass"
     with pytest.raises(HairloomError, match="could not read it within 1 s"):

@@ -23,7 +23,7 @@ TOLD = 3
 _PATIENCE, _BYTES_A_SECOND = 60.0, 4.0e6
 
 
-def run_apart(
+def run_reader(
     script: Path,
     path: Path,
     results: Sequence[Path] = (),
