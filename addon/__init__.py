@@ -1,4 +1,4 @@
-"""Hairloom's rooms; see docs/architecture.md for the way of the data through them.
+"""Hairloom's rooms; see docs/dev/architecture.md for the way of the data through them.
 
 Importing this package touches neither bpy nor gpu, so that every room above `render` works in
 plain Python.

@@ -6,7 +6,7 @@ extension, its shaders and presets. A retired identifier is looked for in every 
 may be a key in a file. A term that is written with a capital is looked for as it is written.
 
     python tools/words.py           all uses, by file and line
-    python tools/words.py counts    how many there are of each
+    python tools/words.py counts    how many of each: uses in prose, different names in code
 """
 
 from __future__ import annotations
@@ -50,8 +50,7 @@ class Retired:
     def lines_in(self, text: Text) -> list[int]:
         """The line of each use."""
         if self.scope == "code":
-            times = f" {_parts(text.text)} ".count(f" {_parts(self.term)} ")
-            return [text.line] * times
+            return [text.line] * (f" {_parts(self.term)} " in f" {_parts(text.text)} ")
         found = self._pattern.finditer(text.text)
         return [text.line + text.text.count("\n", 0, match.start()) for match in found]
 
@@ -80,10 +79,28 @@ def retired_terms(glossary: Path = GLOSSARY) -> list[Retired]:
     return found
 
 
-def uses(repository: Path = REPOSITORY) -> dict[Retired, list[str]]:
+@dataclass(frozen=True)
+class Use:
+    """name: the whole identifier, or nothing in prose."""
+
+    place: str
+    line: int
+    name: str
+
+    def __str__(self) -> str:
+        return f"{self.place}:{self.line} {self.name}".rstrip()
+
+
+def amount(found: list[Use]) -> int:
+    """Uses in prose; different names in code, so that code can be moved without changing it."""
+    names = {use.name for use in found if use.name}
+    return len(names) + sum(not use.name for use in found)
+
+
+def uses(repository: Path = REPOSITORY) -> dict[Retired, list[Use]]:
     """Each retired term -> the places where it is used, at best none."""
     terms = retired_terms(repository / "docs" / "glossary.md")
-    found: dict[Retired, list[str]] = {term: [] for term in terms}
+    found: dict[Retired, list[Use]] = {term: [] for term in terms}
     by_scope = {scope: [t for t in terms if t.scope == scope] for scope in ("prose", "code")}
     nowhere: set[tuple[str, str]] = set()
     for text in texts_of(repository):
@@ -94,7 +111,8 @@ def uses(repository: Path = REPOSITORY) -> dict[Retired, list[str]]:
         for term in by_scope[text.scope]:
             for line in term.lines_in(text):
                 is_used = True
-                found[term].append(f"{text.place}:{line}")
+                name = text.text if text.scope == "code" else ""
+                found[term].append(Use(text.place, line, name))
         if not is_used:
             nowhere.add(key)
     return found
@@ -182,9 +200,9 @@ def _preset(text: str) -> Found:
 
 
 if __name__ == "__main__":
-    for retired, places in uses().items():
-        if sys.argv[1:] == ["counts"] and places:
-            print(f'    ("{retired.scope}", "{retired.term}"): {len(places)},')
-        elif places:
+    for retired, found in uses().items():
+        if sys.argv[1:] == ["counts"] and found:
+            print(f'    ("{retired.scope}", "{retired.term}"): {amount(found)},')
+        elif found:
             print(f"{retired.scope}: {retired.term} (say: {retired.instead})")
-            print("".join(f"    {place}\n" for place in places), end="")
+            print("".join(f"    {use}\n" for use in found), end="")
