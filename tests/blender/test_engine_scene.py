@@ -231,7 +231,7 @@ def test_a_bake_has_the_animated_settings_of_the_frame(
 def test_bad_input_is_told(stage: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     stage.world = None
     assert picture(tmp_path)[..., :3].max() == 0.0
-    assert "Lights: no light shines here" in capfd.readouterr().out
+    assert "Lights: there is no light" in capfd.readouterr().out
     stage.camera.data.type = "PANO"
     picture(tmp_path)
     assert "panoramic cameras are not drawn" in capfd.readouterr().out

@@ -1,4 +1,4 @@
-"""The GPU that this process draws with: made where there is none yet, and its name."""
+"""The GPU context of this process, created if there is none, and the GPU's name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def ensure_gpu() -> None:
 
 
 def is_interrupted() -> bool:
-    """Whether the window's context is gone: between a window's closing and the next redraw."""
+    """Whether there is no window context, as between a window's closing and the next redraw."""
     if bpy.app.background:
         return False
     try:
@@ -31,5 +31,5 @@ def gpu_in_use() -> dict[str, str]:
             "renderer": gpu.platform.renderer_get(),
             "driver": gpu.platform.version_get(),
         }
-    except SystemError:  # what gpu raises where no context was ever made
+    except SystemError:  # what gpu raises if no context was ever created
         return {"backend": "", "renderer": "", "driver": ""}

@@ -79,10 +79,10 @@ def read_texture(path: Path, *, is_color: bool) -> Floats:
 
 
 def read_image(image: bpy.types.Image, *, is_color: bool, place: str) -> Floats:
-    """The pixels of one of Blender's images as it is, saved or not, of its own size.
+    """The pixels of one of Blender's images, saved or not, in its own size.
 
     Args:
-        is_color: as scene-linear colour; else as it is stored, whatever its colour space says.
+        is_color: convert to scene-linear colour; else values as stored, whatever its colour space.
         place: names it in error messages.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Ctrl-C, and what a farm sends to end a task, end a job in order: nothing is left half-written."""
+"""Ctrl-C, or a farm's signal to end a task, ends a job cleanly: nothing is left half-written."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _asked: list[int] = []
 
 
 class Interrupted(KeyboardInterrupt):
-    """The job has to end now. args[0]: the signal's number."""
+    """The job must end now. args[0]: the signal's number."""
 
     @property
     def number(self) -> int:
@@ -27,15 +27,15 @@ class Interrupted(KeyboardInterrupt):
 
     @property
     def exit_code(self) -> int:
-        """128 and the signal's number, as shells have it: 130 for Ctrl-C."""
+        """128 plus the signal's number, as in shells: 130 for Ctrl-C."""
         return 128 + self.number
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Signals raise Interrupted inside; Blender itself would only note them, or die at once.
+    """Signals raise Interrupted inside; by itself Blender would only note them, or exit at once.
 
-    Does nothing in a thread, where signals never arrive.
+    Has no effect in a thread, where signals never arrive.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -52,7 +52,7 @@ def interruptible() -> Iterator[None]:
 
 
 def stop_if_asked() -> None:
-    """For long work between its steps: Blender swallows what is raised inside its own handlers.
+    """Call between the steps of long work: Blender swallows exceptions inside its own handlers.
 
     Raises:
         Interrupted: a signal has come.

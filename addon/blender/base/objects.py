@@ -1,7 +1,7 @@
 """Finding objects again, and how far they have moved.
 
-A reference to a data-block does not survive undo or loading, and dies with its object; a number
-that Blender keeps for the whole session does.
+A reference to a data-block does not survive undo or loading, and dies with its object. Its session
+number survives.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ type LayerKey = tuple[int, str]
 
 @dataclass
 class Handle:
-    """An object by its session number; the name only makes finding it fast."""
+    """An object by its session number; the name only speeds up the search."""
 
     uid: int
     name: str
@@ -29,7 +29,7 @@ class Handle:
         return cls(obj.session_uid, obj.name)
 
     def find(self) -> bpy.types.Object | None:
-        """The object, also after undo and renaming; None once it is gone."""
+        """The object, also after undo and renaming; None if it no longer exists."""
         obj = bpy.data.objects.get(self.name)
         if obj is None or obj.session_uid != self.uid:
             obj = next((each for each in bpy.data.objects if each.session_uid == self.uid), None)
@@ -40,7 +40,7 @@ class Handle:
 
 @dataclass
 class Body:
-    """An object whose motion is followed since the moment that is called rest.
+    """An object whose motion is tracked from a moment called rest.
 
     rest: (4, 4) its matrix_world at rest.
     """
@@ -75,7 +75,7 @@ class Body:
 
 
 def objects_in(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
-    """The objects of a view layer, which has None in the place of one that was just removed."""
+    """The objects of a view layer, whose list holds None for one that was just removed."""
     return [obj for obj in layer.objects if obj is not None]
 
 
@@ -87,8 +87,8 @@ def matrix_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
 def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
     """The mesh that the hair grows from: its surface, else a mesh that is its parent.
 
-    Linked duplicates of hair and head share the curves, which name the first head; theirs is the
-    parent then, an object of the same mesh.
+    Linked duplicates of hair and head share the curves, which name the first head. The head of a
+    duplicate is its parent then, an object with the same mesh.
     """
     surface, parent = hair.data.surface, hair.parent
     carrier = parent if parent is not None and parent.type == "MESH" else None
@@ -98,12 +98,12 @@ def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def is_solid(obj: bpy.types.Object) -> bool:
-    """Whether the 3D views show it as something that hides what is behind it."""
+    """Whether 3D views draw it as a solid object that hides what is behind it."""
     return bool(obj.visible_get() and obj.display_type in {"SOLID", "TEXTURED"})
 
 
 def layers_with(obj: bpy.types.Object) -> frozenset[LayerKey]:
-    """The view layers of all scenes that show an object; local view is another matter."""
+    """The view layers of all scenes that show an object; local view is not considered."""
     return frozenset(
         layer_key(scene, layer)
         for scene in bpy.data.scenes
@@ -113,7 +113,7 @@ def layers_with(obj: bpy.types.Object) -> frozenset[LayerKey]:
 
 
 def layer_key(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> LayerKey:
-    """By which a view layer is known, also after undo."""
+    """Identifies a view layer, also after undo."""
     return scene.session_uid, layer.name
 
 
@@ -129,7 +129,7 @@ def spaces_without(obj: bpy.types.Object) -> frozenset[int]:
 
 
 def is_elsewhere(uid: int, name: str, scene: bpy.types.Scene) -> bool:
-    """Whether an object is in another scene alone; one that is gone is nowhere."""
+    """Whether an object is in other scenes only; one that no longer exists is in none."""
     named = scene.objects.get(name)
     if named is not None and named.session_uid == uid:
         return False

@@ -1,4 +1,4 @@
-"""What an operator or a verb has done, in words for whoever asked for it."""
+"""The result of an operator or verb, for the user."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...pipeline import Rig
 
 @dataclass(frozen=True)
 class Outcome:
-    """What happened: one line of result, what was dropped, and what the artist should know."""
+    """A result in one line, what was dropped, and warnings."""
 
     result: str
     dropped: dict[str, int]
@@ -20,11 +20,11 @@ class Outcome:
 
 
 def notes_of(hair: bpy.types.Object, rig: Rig) -> tuple[str, ...]:
-    """What the artist should know of how the hair was made ready."""
+    """Notes of the rig, with the hair's name."""
     return tuple(f"{hair.name}: {note}" for note in rig.notes)
 
 
 def dropped_phrase(dropped: dict[str, int]) -> str:
-    """Such as "dropped 3 (fewer than two points), 1 (no length)"; empty where nothing was."""
+    """Such as "dropped 3 (fewer than two points), 1 (no length)"; empty if nothing was."""
     reasons: Iterable[str] = (f"{count:,} ({reason})" for reason, count in dropped.items())
     return "dropped " + ", ".join(reasons) if dropped else ""

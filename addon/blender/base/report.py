@@ -22,7 +22,7 @@ from .gpu_context import gpu_in_use
 from .interruption import stop_if_asked
 
 _MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
-#: What progress lines are written for: a reader, or whatever runs an Open Job Description.
+#: Who progress lines are written for: a reader, or a runner of Open Job Description.
 STYLES = ("lines", "openjd")
 
 
@@ -58,7 +58,7 @@ class Report:
         return {name: round(statistics.median(times), 3) for name, times in self._times.items()}
 
     def add_input(self, path: Path) -> None:
-        """A file or folder that the result hangs on, beside those that options name."""
+        """A file or folder that the result depends on, besides those that options name."""
         self.inputs.append(path)
 
     def add_output(self, path: Path) -> None:
@@ -67,15 +67,15 @@ class Report:
         self.facts["outputs"].append(path.name)
 
     def progress(self, name: str, total: int) -> Progress:
-        """What says how much of a long step is done."""
+        """The progress of a long step."""
         return Progress(name, total, self._style)
 
     def end(self, status: str) -> None:
-        """The job is "done", or was "skipped" since its result was there."""
+        """The job is "done", or was "skipped" because its result existed."""
         self.facts["status"] = status
 
     def fail(self, error: HairloomError) -> None:
-        """Why the job was not done, for whoever reads the report."""
+        """Record why the job failed."""
         self._break_off("failed", error.problem, error.place, error.remedy)
         if self._style == "openjd":
             print(f"openjd_fail: {error}", flush=True)
@@ -111,8 +111,8 @@ def hairloom_version() -> str:
 
 
 class Progress:
-    """A line that grows: rewritten in place on a terminal, every tenth of the way elsewhere; for a
-    farm every hundredth, as it reads them."""
+    """A progress line: rewritten in place on a terminal, elsewhere printed at each tenth, and for a
+    farm at every hundredth."""
 
     def __init__(self, name: str, total: int, style: str = "lines") -> None:
         self._name, self._total, self._style, self._shown = name, total, style, -1
@@ -133,5 +133,5 @@ class Progress:
         self._shown = part
 
     def show_share(self, share: float) -> None:
-        """Where nothing is counted: the share that is done, 0 to 1."""
+        """For steps without a count: the fraction that is done, 0 to 1."""
         self.show(int(share * self._total))

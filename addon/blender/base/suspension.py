@@ -1,4 +1,4 @@
-"""Reacting to nothing while a bake or an export goes through the frames."""
+"""Suspending all reactions to Blender's events while a bake or an export steps through frames."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _is_suspended = False
 
 @contextmanager
 def suspended() -> Iterator[None]:
-    """React to none of Blender's events, nor to changed properties."""
+    """Ignore Blender's events and changed properties inside the block."""
     global _is_suspended
     _is_suspended = True
     try:

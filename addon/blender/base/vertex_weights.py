@@ -1,4 +1,4 @@
-"""Weights that an artist has painted or computed on a mesh, by the name of their group."""
+"""Weights that an artist has painted or computed on a mesh, by name."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: st
 
 
 def weights_on(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> Floats:
-    """As `read_weights`, on a mesh of this object: before its modifiers or after them."""
+    """Like `read_weights`, on a mesh of this object, before or after its modifiers."""
     group = obj.vertex_groups.get(name)
     if group is not None:
         return _group_weights(mesh, group.index)

@@ -1,8 +1,8 @@
-"""Following an object that collides: by its matrix, and by what an armature makes of its mesh.
+"""Following an object that collides: by its matrix, and by how an armature deforms its mesh.
 
-Most heads in Blender stand still as objects while an armature moves their vertices. A collider is
-rigid, so it takes the rotation, scale and translation that fit the vertices best; those near the
-hair's roots where there are any, because the rest of a body bends elsewhere.
+Most heads in Blender do not move as objects: an armature moves their vertices. A collider is rigid,
+so it takes the rotation, scale and translation that fit the vertices best. If there is hair, the
+vertices near its roots count, because the rest of a body bends independently of the head.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from ...strands.affine import moved
 from ..base.objects import Body
 from ..scene.surfaces import read_positions
 
-#: Vertices that tell where a mesh has gone: more would say the same.
+#: Number of vertices that a mesh is tracked by; more would not change the result.
 _ENOUGH = 2000
-#: Rings of triangles around the roots that go with them.
+#: Rings of triangles around the roots that count as near them.
 _RINGS = 2
-#: Bending by more than this share of the size of what is followed is told to the artist.
+#: Bending by more than this fraction of the tracked part's size is reported to the artist.
 _BENT = 0.02
-#: Modifiers that leave a mesh where it is.
+#: Modifiers that do not move a mesh.
 _STILL = frozenset(
     ("SUBSURF", "MULTIRES", "TRIANGULATE", "MIRROR", "EDGE_SPLIT", "WEIGHTED_NORMAL", "BEVEL")
     + ("NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WELD", "DECIMATE", "REMESH", "SOLIDIFY", "MASK")
@@ -35,7 +35,7 @@ _STILL = frozenset(
 
 @dataclass
 class Carrier:
-    """An object that carries a collider, and which of its vertices tell where it is.
+    """An object that carries a collider, and the vertices that it is tracked by.
 
     rest: (n, 3) [m] world, these vertices at rest; none for an object without a mesh.
     vertex_count: of the whole evaluated mesh.
@@ -56,7 +56,7 @@ class Carrier:
     def of_mesh(cls, body: Body, surface: Surface, roots: Ints | None = None) -> Carrier:
         """Args:
         surface: world space, with the body at rest.
-        roots: indices of the vertices that hair grows from; None: it goes by all vertices.
+        roots: indices of the vertices that hair grows from; None: all vertices count.
         """
         used = np.unique(surface.triangles)
         if roots is not None and len(roots):
@@ -67,10 +67,10 @@ class Carrier:
         return cls(body, used, surface.positions[used], len(surface.positions))
 
     def moved(self, depsgraph: bpy.types.Depsgraph) -> Floats:
-        """(4, 4), world space, from where it was at rest to where it is now.
+        """(4, 4), world space, from its rest to where it is now.
 
         Raises:
-            HairloomError: it is gone, or its mesh is another one.
+            HairloomError: it is gone, or it has another mesh.
         """
         obj = self.body.found()
         matrix: Floats = self.body.moved(depsgraph)
@@ -93,7 +93,7 @@ class Carrier:
 
     @property
     def bends(self) -> bool:
-        """Whether it bends more than a rigid collider can be said to follow."""
+        """Whether it bends more than a rigid collider can follow."""
         return self.bend > _BENT * float(np.ptp(self.rest, axis=0).max())
 
     def _check(self, vertex_count: int) -> None:
@@ -106,7 +106,7 @@ class Carrier:
 
 
 def is_deforming(obj: bpy.types.Object) -> bool:
-    """Whether the mesh may change its shape from frame to frame."""
+    """Whether the shape of the mesh may change from frame to frame."""
     return (
         any(each.show_viewport and each.type not in _STILL for each in obj.modifiers)
         or getattr(obj.data, "shape_keys", None) is not None
@@ -117,14 +117,14 @@ def is_deforming(obj: bpy.types.Object) -> bool:
 def is_left_out(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether the artist has disabled it in viewports or excluded it from the view layer.
 
-    Blender evaluates it all the same for the hair that names it. Hiding with the eye does not
-    leave it out, so that colliders need not be in sight.
+    Blender evaluates it anyway, because the hair refers to it. Hiding it with the eye icon does not
+    count: colliders need not be visible.
     """
     layer = depsgraph.view_layer
     if obj.hide_viewport or not obj.evaluated_get(depsgraph).is_evaluated:
         return True
     if layer.objects.get(obj.name) != obj and obj not in layer.objects.values():
-        return True  # the first look is fast, but several libraries may use one name
+        return True  # lookup by name is fast, but several libraries may use the same name
     is_seen = obj.visible_get(view_layer=layer)
     return not is_seen and all(each.hide_viewport for each in obj.users_collection)
 

@@ -1,4 +1,4 @@
-"""Many balls as one collider: what empties shown as spheres become, as fitted sets do."""
+"""Many balls as one collider: empties shown as spheres, such as fitted sets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from ..base.objects import Body, matrix_of
 from .carriers import is_left_out
 from .obstacle_parts import Track, is_solid_scale
 
-#: A set whose balls moved against each other by less than this share of the largest is the same.
+#: A set is unchanged if its balls moved relative to each other by less than this fraction of the
+#: largest.
 _SAME_SET = 1.0e-3
 
 
@@ -31,10 +32,10 @@ class Ball:
 
 @dataclass
 class BallsPart:
-    """Balls that one thing carries, as one collider.
+    """Balls that move together, as one collider.
 
-    Its matrix is the similarity that fits the balls' own motion best; what is left over, as when
-    they hang on skin that bends, makes a new set of balls, which hair meets at the next frame.
+    Its matrix is the similarity transform that fits the motion of the balls best. A remainder, as
+    when they are attached to skin that bends, creates a new set of balls for the next frame.
 
     rest: (n, 4, 4) the objects' matrices at rest.
     """
@@ -78,7 +79,7 @@ class BallsPart:
         return self._set_of(centers, radii, tuple(chosen)), matrix
 
     def _found(self, depsgraph: bpy.types.Depsgraph) -> tuple[list[int], list[Floats]]:
-        """The balls that are there, by their number, and their matrices."""
+        """The balls that exist, by index, and their matrices."""
         self.warnings.clear()
         chosen, matrices = [], []
         for number, ball in enumerate(self.balls):
@@ -98,7 +99,7 @@ class BallsPart:
     def _set_of(
         self, centers: Floats, radii: Floats, members: tuple[int, ...]
     ) -> SphereSetCollider:
-        """The set as it was, if it has not changed beyond rounding: making its grid takes time."""
+        """The previous set, if it has changed by rounding only: building its grid takes time."""
         known = self._set
         if known is not None and members == self._members:
             tolerance = _SAME_SET * float(radii.max())
@@ -110,8 +111,8 @@ class BallsPart:
 
 
 def _markers(center: Floats, radius: Floats, matrix: Floats) -> Floats:
-    """(4 n, 3) places that go with n balls: their middles and one on each axis, so that even one
-    ball tells how it turns."""
+    """(4 n, 3) points that move with n balls: the centres and one point on each axis, so that the
+    rotation of even a single ball is known."""
     local = center[:, None] + radius[:, None, None] * np.vstack([np.zeros(3), np.eye(3)])
     world: Floats = local @ np.moveaxis(matrix[:, :3, :3], 1, 2) + matrix[:, None, :3, 3]
     return world.reshape(-1, 3)

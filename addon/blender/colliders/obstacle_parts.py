@@ -1,4 +1,4 @@
-"""How one object collides: a shape, and where it is from frame to frame."""
+"""The collider of one object: a shape, and its transform in each frame."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from ...strands.affine import moved
 from .carriers import Carrier, scales_of
 from .fields import field_of
 
-#: A mesh that came back to within this of its rest is the same mesh [m].
+#: A mesh that returns to its rest within this distance is the same mesh [m].
 _SAME_SHAPE = 1.0e-5
-#: Axes whose lengths differ by less than this share are as long as each other.
+#: Axes whose lengths differ by less than this fraction count as equal.
 _EVEN = 0.01
 
 
@@ -70,7 +70,7 @@ class Track:
         self.before, self.earlier, self.duration = matrix, None, 0.0
 
     def go(self, collider: Collider, matrix: Floats, duration: float) -> PosedCollider:
-        """The way to here from the frame before, by the same formula as that of the roots."""
+        """The trajectory since the previous frame, by the same formula as the roots'."""
         if self.before is None:
             self.rest(matrix)
         assert self.before is not None
@@ -86,7 +86,7 @@ class Track:
 class FieldPart:
     """A mesh, as its signed distance in world space with the mesh at rest.
 
-    surface: world space at rest; its field takes a second to make.
+    surface: world space at rest; its field takes a second to build.
     """
 
     carrier: Carrier
@@ -137,7 +137,7 @@ class FieldPart:
 
 @dataclass
 class ShapePart:
-    """A ball or a capsule in a space of its own. base: (4, 4), from there to world at rest."""
+    """A ball or a capsule in its own space. base: (4, 4), from that space to world at rest."""
 
     carrier: Carrier
     shape: SphereCollider | CapsuleCollider
@@ -158,7 +158,7 @@ class ShapePart:
 
 
 def is_solid_scale(matrix: Floats) -> Bools:
-    """Whether each matrix (..., 4, 4) is finite and leaves things a volume."""
+    """Whether each matrix (..., 4, 4) is finite and its volume is not zero."""
     linear = matrix[..., :3, :3]
     is_finite = np.isfinite(matrix).all(axis=(-2, -1))
     linear = np.where(is_finite[..., None, None], linear, 0.0)
@@ -168,7 +168,7 @@ def is_solid_scale(matrix: Floats) -> Bools:
 
 
 def is_round(matrix: Floats) -> bool:
-    """Whether a matrix (4, 4) leaves a ball a ball."""
+    """Whether a matrix (4, 4) scales evenly, so that a ball stays a ball."""
     size = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     return bool(size[0] - size[2] <= _EVEN * size[0])
 
@@ -178,7 +178,7 @@ def capsule_of(low: Floats, high: Floats, matrix: Floats) -> tuple[CapsuleCollid
 
     Args:
         low, high: (3,) corners of the box in object space.
-        matrix: (4, 4) object to world; its scale is built in, so that round ends stay round.
+        matrix: (4, 4) object to world; its scale is applied, so that the ends stay round.
     """
     scale = scales_of(matrix)
     half, middle = (high - low) * scale / 2.0, (high + low) * scale / 2.0

@@ -1,4 +1,4 @@
-"""How one object collides: read from Blender, and from the artist's choice."""
+"""Reading how an object collides, from its shape and from the artist's choice."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from .obstacle_parts import (
     used_box,
 )
 
-#: Kinds of objects that an artist may mean to be solid, though they are no meshes.
+#: Types of objects that look solid but are not meshes.
 _SOLID = frozenset(("CURVE", "SURFACE", "META", "FONT", "VOLUME", "POINTCLOUD"))
 
 
 @dataclass
 class Reader:
-    """Makes the part of one object.
+    """Builds the part of one object.
 
     known: its field from before, if it had one. waits: for a new one; see `fields.field_of`.
     """
@@ -45,7 +45,7 @@ class Reader:
     waits: bool
 
     def part_of_head(self, head: Body, at_rest: Surface, roots: Ints | None) -> Part | Ball | None:
-        """The head was read when the session began, perhaps in another pose than it is in now."""
+        """The head was read when the session started, perhaps in another pose."""
         if shape_of(self.obj) != "mesh":
             return self.part()
         carrier = Carrier.of_mesh(head, at_rest, roots)
@@ -106,17 +106,17 @@ class Reader:
 
 
 def shape_of(obj: bpy.types.Object) -> str:
-    """As what an object collides: "mesh", "sphere", "capsule" or "none"."""
+    """The shape that an object collides as: "mesh", "sphere", "capsule" or "none"."""
     chosen: str = obj.hairloom.collider_shape
     if chosen != "automatic":
         return chosen
     if obj.type == "MESH" or obj.type in _SOLID:
-        return "mesh"  # of what is no mesh the artist is told so
+        return "mesh"  # reading it reports that it is not a mesh
     return "sphere" if obj.type == "EMPTY" and obj.empty_display_type == "SPHERE" else "none"
 
 
 def _ball_or_part(carrier: Carrier, ball: Ball) -> Part | Ball:
-    """Balls that are round go together; one that its scale makes an ellipsoid stays by itself."""
+    """Round balls form a set; a ball that its scale makes an ellipsoid is a part of its own."""
     if is_round(carrier.body.rest):
         return ball
     return ShapePart(carrier, SphereCollider(ball.center, ball.radius), carrier.body.rest)

@@ -1,9 +1,9 @@
-"""What the hair of one groom, or one cloth fin, stays out of.
+"""The colliders of one groom, or of one cloth fin.
 
-That is the surface it grows from, or in its place the one collider that the artist has chosen, and
-every object of a collection of colliders. An object collides as its `hairloom.collider_shape`
-says: as a mesh (signed distance), as a ball or a capsule around its bounding box, or not at all.
-What cannot be used is left out with a warning, and the others go on.
+They are the surface that the hair grows from, or the one collider that the artist has chosen
+instead, and every object of a collection. `hairloom.collider_shape` says how an object collides: as
+a mesh (signed distance), as a ball or a capsule around its bounding box, or not at all. What cannot
+be used is left out with a warning.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .obstacle_reader import Reader, left_out, shape_of
 
 @dataclass
 class Obstacles:
-    """The colliders of one groom or fin, and what the artist should know about them."""
+    """The colliders of one groom or fin, with warnings."""
 
     parts: list[Part]
     head_uid: int | None
@@ -48,13 +48,13 @@ class Obstacles:
         *,
         waits: bool = True,
     ) -> Obstacles:
-        """All that collides with `owner`, at rest where it is now.
+        """Everything that collides with `owner`, at rest in its present pose.
 
         Args:
             owner: the hair curves, or a fin.
             head: what it grows from, and head_at_rest: its mesh in world space at rest; or None.
-            known: its distance fields are used again where nothing has changed.
-            roots: vertices of the head that hair grows from; they tell how it moves.
+            known: its distance fields are reused if nothing has changed.
+            roots: vertices of the head that hair grows from; the head is tracked by them.
             waits: False: do not wait for fields that are to be made.
 
         Raises:
@@ -91,15 +91,15 @@ class Obstacles:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is left out at the moment and why, and what is not followed well."""
+        """What is left out and why, and what cannot be followed well."""
         seen = [text for part in self.parts for text in part.warnings.values()]
         return tuple(dict.fromkeys([*self._unusable.values(), *self._failed.values(), *seen]))
 
     def move(self, depsgraph: bpy.types.Depsgraph, duration: float) -> tuple[PosedCollider, ...]:
-        """Go to where things are now, within `duration` [s]; their ways there.
+        """Move to the present pose within `duration` [s]; returns the trajectories.
 
         Raises:
-            HairloomError: the head is gone, or its mesh is another one.
+            HairloomError: the head is gone, or it has another mesh.
         """
         posed = []
         for part in self._there(depsgraph):
@@ -110,7 +110,7 @@ class Obstacles:
         return tuple(posed)
 
     def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Be where things are now, at no speed.
+        """Jump to the present pose, at rest.
 
         Raises:
             HairloomError: as `move`.
@@ -124,7 +124,7 @@ class Obstacles:
                 self._fail(part, error)
 
     def _there(self, depsgraph: bpy.types.Depsgraph) -> Iterator[Part]:
-        """The parts that Blender evaluates; the others begin at rest when they come back."""
+        """The parts that Blender evaluates; others start at rest when they return."""
         self._failed.clear()
         for part in self.parts:
             if self._is_left_out(part, depsgraph):
@@ -135,7 +135,7 @@ class Obstacles:
                 yield part
 
     def _is_left_out(self, part: Part, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Balls look after themselves; a head that is hidden still wears its hair."""
+        """Sets of balls check this themselves; a hidden head still collides with its hair."""
         if isinstance(part, BallsPart) or self._is_head(part):
             return False
         assert isinstance(part, FieldPart | ShapePart)
@@ -159,8 +159,8 @@ class Obstacles:
 def sources_of(
     owner: bpy.types.Object, head: bpy.types.Object | None
 ) -> tuple[bpy.types.Object, ...]:
-    """The objects that may collide with `owner`, each once: the chosen collider or else the head,
-    then the collection's."""
+    """The objects that may collide with `owner`, each once: the chosen collider, or else the head,
+    then those of the collection."""
     chosen, collection = owner.hairloom.collider, owner.hairloom.collider_collection
     first = chosen if chosen is not None else head
     objects = [] if first is None else [first]
@@ -170,14 +170,14 @@ def sources_of(
 
 
 def _carried_by(obj: bpy.types.Object) -> object:
-    """Balls with the same answer move as one: what hangs on the same mesh or bone does."""
+    """Balls with the same carrier move together: those attached to one mesh or bone."""
     if obj.parent is None:
         return None
     return obj.parent.session_uid, obj.parent_bone if obj.parent_type == "BONE" else ""
 
 
 def _named(name: str, error: HairloomError) -> HairloomError:
-    """The error with the object's name in place of what part of it was found bad."""
+    """The error, with the object's name as its place."""
     return HairloomError(error.problem, place=name, remedy=error.remedy)
 
 

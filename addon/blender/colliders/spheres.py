@@ -1,8 +1,8 @@
-"""Spheres fitted to a mesh: made, hung on it so that they follow it, and removed.
+"""Spheres fitted to a mesh: created, parented to it so that they follow it, and removed.
 
-Each is an empty shown as a sphere, whose display size is its radius in metres. It hangs on three
-vertices of the mesh, and Blender takes those as modifiers leave them, so that spheres go with a
-head that an armature turns; they hang on the object where vertices cannot carry them.
+Each is an empty shown as a sphere, whose display size is its radius in metres. Its parent is three
+vertices of the mesh as modified, so it follows a head that an armature turns. Where vertices cannot
+be parents, the object is.
 """
 
 from __future__ import annotations
@@ -28,18 +28,17 @@ __all__ = [
     "use_spheres",
 ]
 
-#: Custom property of what was made here: of the collection the mesh, of each empty True.
+#: Custom property of what was created here: on the collection the mesh, on each empty True.
 MARK = "hairloom_fitted"
-#: Vertices that may carry a sphere: as far from its middle as this many radii, and how many at
-#: least.
+#: Vertices that a sphere may be parented to: their distance in radii, and their minimum number.
 _REACH, _LEAST = 1.3, 12
-#: Modifiers that make several vertices of one, of which Blender takes the middle.
+#: Modifiers that make several vertices of one; Blender uses their centre as the parent.
 _COPYING = frozenset(("MIRROR", "ARRAY", "SCREW", "SKIN", "REMESH", "BOOLEAN", "BUILD", "NODES"))
 
 
 @dataclass(frozen=True)
 class FittedSpheres:
-    """What was made. hanging: number of spheres that follow the object only, not its shape."""
+    """What was created. hanging: number of spheres that follow the object only, not its shape."""
 
     collection: bpy.types.Collection
     fit: SphereFit
@@ -51,7 +50,7 @@ def fit_spheres_to(
     context: bpy.types.Context,
     settings: SphereFitSettings,
 ) -> FittedSpheres:
-    """Put spheres in the place of earlier ones of this mesh, as it is posed now.
+    """Replace the spheres of this mesh, fitted to its present pose.
 
     Raises:
         HairloomError: no faces, or no volume.
@@ -74,12 +73,12 @@ def fit_spheres_to(
 
 
 def fitted_collections(mesh: bpy.types.Object) -> list[bpy.types.Collection]:
-    """The collections of spheres that were fitted to a mesh."""
+    """The collections of spheres fitted to a mesh."""
     return [each for each in bpy.data.collections if each.get(MARK) == mesh]
 
 
 def use_spheres(hair: bpy.types.Object, collection: bpy.types.Collection) -> None:
-    """Let hair collide with a collection, beside the one it has."""
+    """Let hair collide with a collection, in addition to the one it has."""
     used = hair.hairloom.collider_collection
     if used is None or used.get(MARK) is not None:
         hair.hairloom.collider_collection = collection
@@ -88,7 +87,7 @@ def use_spheres(hair: bpy.types.Object, collection: bpy.types.Collection) -> Non
 
 
 def remove_spheres(mesh: bpy.types.Object) -> int:
-    """Remove all spheres fitted to a mesh, which collides by itself again; how many there were."""
+    """Remove all spheres fitted to a mesh, which then collides itself; returns their number."""
     count = 0
     for collection in fitted_collections(mesh):
         count += _empty_out(collection)
@@ -105,7 +104,7 @@ def grown_on(mesh: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list[bp
 
 
 def _emptied_collection(mesh: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
-    """The collection of this mesh's spheres, without the old ones; objects of others stay."""
+    """The collection of this mesh's spheres, emptied of old ones; other objects in it are kept."""
     found = fitted_collections(mesh)
     collection = found[0] if found else bpy.data.collections.new(f"{mesh.name} Spheres")
     _empty_out(collection)
@@ -122,8 +121,8 @@ def _empty_out(collection: bpy.types.Collection) -> int:
 
 
 def _vertices_now(mesh: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats | None:
-    """(vertex_count, 3) [m] world, the mesh's own vertices as they are deformed; None where they
-    cannot be told among those that modifiers add."""
+    """(vertex_count, 3) [m] world, the mesh's own vertices as deformed; None if they cannot be
+    identified among those that modifiers add."""
     positions = read_positions(mesh, depsgraph, place=mesh.name)
     count = len(mesh.data.vertices)
     copied = any(each.show_viewport and each.type in _COPYING for each in mesh.modifiers)
@@ -139,7 +138,7 @@ def _hang(
     vertices: Floats | None,
     context: bpy.types.Context,
 ) -> int:
-    """Parent the spheres and put them in their places; how many hang on the object only."""
+    """Parent the spheres and place them; returns how many are parented to the object only."""
     hanging = 0
     for empty, center, radius in zip(empties, fit.centers, fit.radii, strict=True):
         carriers = None if vertices is None else _carriers(vertices, center, radius)
@@ -157,8 +156,8 @@ def _hang(
 
 
 def _carriers(vertices: Floats, center: Floats, radius: float) -> Ints | None:
-    """Three vertices near a sphere (3,), far from each other so that they tell well how it turns;
-    None where there is no triangle."""
+    """Three vertices near a sphere (3,), far apart so that they define its rotation well; None if
+    there is no triangle."""
     distance = np.linalg.norm(vertices - center, axis=1)
     near = np.flatnonzero(distance <= _REACH * radius)
     if len(near) < _LEAST:

@@ -1,4 +1,4 @@
-"""Words on pictures, by Blender's own font."""
+"""Text on pictures, in Blender's own font."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from ...arrays import Floats
 
 _FONT = 0
-#: height of letters, and their distance from the border, as shares of the picture's shorter side
+#: height of letters, and their distance from the border, as fractions of the shorter side
 _SIZE, _MARGIN = 0.045, 0.035
-_LEAST_SIZE = 9
+_MIN_SIZE = 9
 _BRIGHTNESS = 0.8
 
 
@@ -26,10 +26,10 @@ def labelled(picture: Floats, text: str) -> Floats:
 
 
 def _letters(width: int, height: int, text: str) -> Floats:
-    """How much of each pixel letters cover, (height, width)."""
+    """The coverage of each pixel by letters, (height, width)."""
     shorter = min(width, height)
     buffer = imbuf.new((width, height))
-    blf.size(_FONT, max(_SIZE * shorter, _LEAST_SIZE))
+    blf.size(_FONT, max(_SIZE * shorter, _MIN_SIZE))
     blf.color(_FONT, 1.0, 1.0, 1.0, 1.0)
     with blf.bind_imbuf(_FONT, buffer):
         blf.position(_FONT, _MARGIN * shorter, _MARGIN * shorter, 0.0)

@@ -1,4 +1,4 @@
-"""The contact sheet of a groom: seen from all sides, or in all looks, in one picture."""
+"""The contact sheet of a groom: all sides, or all looks, in one picture."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..properties.presets import named_preset, shipped
 from .labels import labelled
 from .studio import FIELD_OF_VIEW, MARGIN, VIEW_DIRECTION, Studio
 
-#: name of a view and the way from the groom to the camera; heads face -Y
+#: name of a view and the direction from the groom to the camera; heads face -Y
 VIEWS = (
     ("Front", (0.0, -1.0, 0.08)),
     ("Three-quarter", VIEW_DIRECTION),
@@ -32,12 +32,12 @@ _CLOSE_SHARE, _NEAREST_SHARE = 0.2, 0.1
 
 
 class Sheet:
-    """A contact sheet that is drawn picture by picture.
+    """A contact sheet, drawn one picture at a time.
 
     Args:
         pose, points: see Studio.picture.
         size: width and height of each picture [pixels].
-        by_looks: one view in all looks that come with Hairloom, in place of all views.
+        by_looks: one view in all looks that come with Hairloom, instead of all views.
     """
 
     def __init__(
@@ -60,14 +60,14 @@ class Sheet:
         return len(shipped("shading")) if self._by_looks else len(VIEWS) + 1
 
     def steps(self) -> Iterator[int]:
-        """Draw everything; after each picture comes how many are done."""
+        """Draw everything; yields the number of finished pictures."""
         for name, picture in self._looks() if self._by_looks else self._views():
             self._pictures.append(labelled(picture, name))
             yield len(self._pictures)
 
     @property
     def picture(self) -> Floats:
-        """All that was drawn, (height, width, 4)."""
+        """The whole sheet, (height, width, 4)."""
         return contact_sheet(self._pictures, COLUMNS)
 
     def _views(self) -> Iterator[tuple[str, Floats]]:
@@ -99,7 +99,7 @@ class Sheet:
         return frame_camera(held, direction, FIELD_OF_VIEW, aspect, margin=MARGIN)
 
     def _near_the_eye(self) -> tuple[Floats, Floats]:
-        """A box around the hair that is nearest in the three-quarter view."""
+        """A box around the nearest hair in the three-quarter view."""
         middles = self._points[:, self._points.shape[1] // 2]
         towards = middles @ np.array(VIEW_DIRECTION)
         count = max(round(_NEAREST_SHARE * len(middles)), 1)

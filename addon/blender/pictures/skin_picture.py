@@ -19,19 +19,19 @@ from ...shading.skin.diffusion import SKIN_LIGHTS
 from ...strands import Surface
 from .slices import lit_as_in
 
-#: the image in which it is shown; each time the same
+#: the image that it is shown in, always the same
 IMAGE = "Skin Shadow"
 
 
 def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str) -> Floats:
-    """How much of each light reaches the skin, (rows, columns, 4) scene-linear, row 0 at v = 0.
+    """The transmittance of light to the skin, (rows, columns, 4) scene-linear, row 0 at v = 0.
 
-    White where all light is left, transparent where the map shows no skin. The maps of several
-    lights lie side by side, in the order of the lights, four at most.
+    White is full light, transparent is no skin. The maps of up to four lights are side by side, in
+    the order of the lights.
 
     Args:
         snapshot: its meshes are the head.
-        place: of what was asked for, for errors.
+        place: for errors.
 
     Raises:
         HairloomError: there is no such shadow; says why.
@@ -39,14 +39,14 @@ def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str
     maps = strand_pass.opacity(snapshot)
     if maps is None or not snapshot.skin.soft_shadow or not snapshot.skin.softness:
         raise HairloomError(
-            "there is no soft shadow on skin that could be shown",
+            "there is no soft shadow on skin to show",
             place=place,
             remedy="Set Shadows to Deep Opacity or Opacity Slices, and Soft Shadow on Skin with a "
             "Softness above 0",
         )
     if not maps.size.map_count:
         raise HairloomError(
-            "no light throws a shadow of hair here",
+            "no light casts a shadow of the hair",
             place=place,
             remedy="Add a light outside of the hair, and raise Lights in Shadows if it is 0",
         )
@@ -64,7 +64,7 @@ def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str
 def skin_shadow_of_view(
     snapshot: Snapshot, rig: Rig, pose: Pose, context: bpy.types.Context, *, place: str
 ) -> Floats:
-    """The same of previewed hair on its head, in the light in which a 3D view shows it.
+    """The same for previewed hair on its head, in the light of the 3D view.
 
     Raises:
         HairloomError: as `shown_skin_shadow`.
@@ -84,7 +84,7 @@ def _on_its_head(snapshot: Snapshot, rig: Rig, pose: Pose) -> Snapshot:
 
 
 def _side_by_side(shadow: SkinShadow, count: int) -> Floats:
-    """The first `count` channels of a map, each as a picture of its own."""
+    """The first `count` channels of a map, each as its own picture."""
     is_skin = shadow.layout.island >= 0
     values = np.where(is_skin[..., None], shadow.picture(), 0.0)
     pictures = [

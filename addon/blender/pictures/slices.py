@@ -14,7 +14,7 @@ from ...shading.lights import three_point_lights
 from ...shading.volume.opacity import layer_ends
 from ..viewport.overlay import lit
 
-#: the image in which they are shown; each time the same
+#: the image that they are shown in, always the same
 IMAGE = "Hair Slices"
 
 
@@ -35,7 +35,7 @@ def shown_slices(snapshot: Snapshot, strand_pass: StrandPass) -> Floats:
 
 
 def slices_of_view(snapshot: Snapshot, context: bpy.types.Context) -> Floats:
-    """The same in the light in which a 3D view shows the hair; elsewhere in the scene's.
+    """The same in the light of the 3D view; without one, in the scene's light.
 
     Raises:
         HairloomError: as `shown_slices`.
@@ -44,7 +44,7 @@ def slices_of_view(snapshot: Snapshot, context: bpy.types.Context) -> Floats:
 
 
 def lit_as_in(context: bpy.types.Context, snapshot: Snapshot) -> Snapshot:
-    """In the light in which a 3D view shows the hair; elsewhere in the scene's."""
+    """In the light of the 3D view; without one, in the scene's light."""
     space = context.space_data
     if not isinstance(space, bpy.types.SpaceView3D):
         return snapshot
@@ -53,7 +53,7 @@ def lit_as_in(context: bpy.types.Context, snapshot: Snapshot) -> Snapshot:
 
 
 def shown_image(name: str, picture: Floats) -> bpy.types.Image:
-    """The image of this name with this picture in it, scene-linear.
+    """The image of this name, filled with a scene-linear picture.
 
     Args:
         picture: (height, width, 4), row 0 at the bottom.

@@ -1,7 +1,7 @@
-"""A turntable: the camera goes round a groom once, a picture a frame, and a video of them.
+"""A turntable: the camera circles a groom once, one picture a frame, and a video of them.
 
-Pictures are written into a folder beside their place and moved there when all are done, so that
-what is cancelled or fails leaves no half of a turn.
+Pictures are written into a temporary folder and moved when all are done, so that a cancelled or
+failed turntable leaves nothing half-finished.
 """
 
 from __future__ import annotations
@@ -25,12 +25,16 @@ from ..base.images import write_png
 from .studio import BACKDROP, FIELD_OF_VIEW, MARGIN, Studio
 from .video import write_video
 
-#: who the lights go with: identifier, label, description
+#: what the lights move with: identifier, label, description
 LIGHTS = (
-    ("camera", "Turn with Camera", "As if the groom turned before a camera and lights that stand"),
-    ("groom", "Stay on Groom", "As if the camera went round a groom and lights that stand"),
+    (
+        "camera",
+        "Turn with Camera",
+        "As if the groom turned in front of a fixed camera and fixed lights",
+    ),
+    ("groom", "Stay on Groom", "As if the camera circled a fixed groom with fixed lights"),
 )
-#: frame count and sides of pictures [pixels], least and most
+#: frame count and sides of pictures [pixels], min and max
 FRAMES, SIDES = (1, 10_000), (16, 4096)
 #: from the groom to the camera, at the first frame; heads face -Y
 _FIRST_DIRECTION = (0.0, -1.0, 0.14)
@@ -38,7 +42,7 @@ _FIRST_DIRECTION = (0.0, -1.0, 0.14)
 
 @dataclass(frozen=True)
 class TurntableSettings:
-    """How a groom is turned.
+    """Settings of a turntable.
 
     frames: in a whole turn.
     width, height: of the pictures [pixels].
@@ -49,7 +53,7 @@ class TurntableSettings:
     frame_rate: of the video [frames / s].
 
     Raises:
-        HairloomError: no frames, or sizes or a frame rate that cannot be.
+        HairloomError: no frames, or sizes or a frame rate out of range.
     """
 
     frames: int = 48
@@ -82,9 +86,9 @@ class TurntableSettings:
 class Turntable:
     """A groom on a turntable.
 
-    pose, points: see Studio.picture; what does not move while it is turned.
+    pose, points: see Studio.picture; the groom does not move while the camera circles it.
     folder, name: pictures become folder/name_0001.png and so on, the video folder/name.mp4.
-    notes: what the artist should know, after the last step.
+    notes: warnings, complete after the last step.
     """
 
     studio: Studio
@@ -101,13 +105,13 @@ class Turntable:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """What there is after the last step: the pictures, and the video if there is one."""
+        """The files after the last step: the pictures, and the video if there is one."""
         numbers = range(1, self.settings.frames + 1)
         pictures = [self.folder / f"{self.name}_{number:04}.png" for number in numbers]
         return (*pictures, *([self.folder / f"{self.name}.mp4"] if self.has_video else []))
 
     def picture(self, frame: int) -> Floats:
-        """The picture of a frame, from 0; that of a whole turn later is the same."""
+        """The picture of a frame, from 0; a whole turn later it is the same."""
         chosen = self.settings
         return self.studio.picture(
             self.pose,
@@ -121,10 +125,10 @@ class Turntable:
         )
 
     def camera(self, frame: int) -> Camera:
-        """At a frame: once round the groom's middle, from its front by its right side."""
+        """The camera of a frame, on a circle around the groom, from its front to its right."""
         low, high = self.studio.bounds(self.pose, self.points)
         middle, reach = (low + high) / 2.0, float(np.hypot(*(high - low)[:2])) / 2.0
-        # what turns about the middle fills a cylinder
+        # turning about the centre, the groom fills a cylinder
         around = np.array([reach, reach, float(high[2] - low[2]) / 2.0])
         aspect = self.settings.width / self.settings.height
         held = middle - around, middle + around
@@ -132,7 +136,7 @@ class Turntable:
         return replace(first, view=first.view @ _turned_about(middle, frame / self.settings.frames))
 
     def steps(self) -> Generator[int]:
-        """Write everything; after each picture comes how many are done.
+        """Write everything; yields the number of finished pictures.
 
         Raises:
             HairloomError: nothing can be written there.
@@ -147,7 +151,7 @@ class Turntable:
                 self._write_video(beside, frames)
 
     def _write_video(self, beside: Path, frames: list[Path]) -> None:
-        """A video, or a note why there is none: the pictures are there all the same."""
+        """A video, or a note why there is none; the pictures are written in any case."""
         chosen = self.settings
         try:
             size = chosen.width, chosen.height
@@ -161,7 +165,7 @@ class Turntable:
 
 
 def _turned_about(middle: Floats, turns: float) -> Floats:
-    """A turn about the vertical through a place, (4, 4), exactly 1 after whole turns."""
+    """A rotation about the vertical through a point, (4, 4), exactly 1 after whole turns."""
     angle = 2.0 * np.pi * (turns % 1.0)
     cos, sin = np.cos(angle), np.sin(angle)
     turn = np.eye(4)
@@ -172,7 +176,7 @@ def _turned_about(middle: Floats, turns: float) -> Floats:
 
 @contextmanager
 def _moved_when_done(folder: Path) -> Iterator[Path]:
-    """An empty folder, whose files go into `folder` when the block ends well; else they vanish."""
+    """An empty folder. Its files move to `folder` if the block succeeds, else they are deleted."""
     is_new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
-"""Pictures as a video, by Blender's own writer: no other program is asked.
+"""Pictures as a video, written by Blender itself; no other program is needed.
 
-Blender writes videos of what a scene's sequencer holds, so there is one for as long as it takes.
+Blender writes the video of a scene's sequencer, so a temporary scene is created for it.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ import bpy
 from ...errors import HairloomError
 from ...exchange.files.atomic import atomic_write
 
-#: those that the writer may have been built with, the one that more players know first
+#: codecs that Blender may have been built with, the most widely supported first
 _CODECS = ("H264", "MPEG4")
 
 
 def can_write_video() -> bool:
-    """Whether this Blender was built with a writer of videos."""
+    """Whether this Blender can write videos."""
     return bool(bpy.app.build_options.codec_ffmpeg)
 
 
 def write_video(
     path: Path, frames: Sequence[Path], size: tuple[int, int], frame_rate: float
 ) -> None:
-    """Write pictures as an .mp4. Sides are made even, as the codecs want them.
+    """Write pictures as an .mp4. Sides are made even, as codecs require.
 
     Args:
         frames: pictures of one folder and one size, in order.
@@ -34,7 +34,7 @@ def write_video(
         frame_rate: [frames / s].
 
     Raises:
-        HairloomError: this Blender writes no videos, or the file cannot be written.
+        HairloomError: this Blender cannot write videos, or the file cannot be written.
     """
     if not can_write_video():
         raise _failed(path, "this Blender was built without FFmpeg")
@@ -56,7 +56,7 @@ def write_video(
 def _sequence_of(
     frames: Sequence[Path], size: tuple[int, int], frame_rate: float
 ) -> Iterator[bpy.types.Scene]:
-    """A scene that renders to these pictures, colours as they are."""
+    """A scene that renders to these pictures without changing their colours."""
     scene = bpy.data.scenes.new("Hairloom Video")
     try:
         strip = scene.sequence_editor_create().strips.new_image(
@@ -87,5 +87,5 @@ def _failed(path: Path, why: str) -> HairloomError:
     return HairloomError(
         f"no video was written ({why})",
         place=str(path),
-        remedy="The pictures are there: make a video of them with an official build of Blender",
+        remedy="The pictures are complete: make a video of them with an official build of Blender",
     )

@@ -1,4 +1,4 @@
-"""What the artist changes, handed to those who subscribed: properties know nobody above them."""
+"""Notifies subscribers of changed properties, so that properties need not import what uses them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import bpy
 
 type Listener = Callable[[bpy.types.ID], None]
 
-#: what may be listened to -> who listens
+#: kind of change -> its subscribers
 _listeners: dict[str, list[Listener]] = {"settings": [], "display": [], "bake": []}
 
 

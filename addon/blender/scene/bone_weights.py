@@ -1,4 +1,4 @@
-"""Which bones carry a head: its vertex groups that are deforming bones of its armature."""
+"""The bones that move a head: vertex groups that belong to deforming bones of its armature."""
 
 from __future__ import annotations
 

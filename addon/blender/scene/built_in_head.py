@@ -1,4 +1,4 @@
-"""The head for whoever has none at hand: Suzanne, which every Blender brings along."""
+"""A head that is always available: Suzanne, which comes with every Blender."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ from ...strands import StrandSet
 from ...strands.affine import mean_scale, moved
 from ...strands.clean import Cleaned, clean
 
-#: Attributes of the curve domain that hold a strand's group, the first that is there wins; Unreal
-#: and USD know the first by this name.
+#: Curve attributes that may hold a strand's group. The first one found wins; its name is the one
+#: that Unreal and USD use.
 GROUP_ATTRIBUTES = ("groom_group_id", "group")
 _REMEDIES = {
     "CURVE": "Convert them: Object > Convert > Curves (hair)",
@@ -23,9 +23,9 @@ _REMEDIES = {
 
 
 def read_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
-    """The hair that Blender shows after all modifiers, in world space; unusable curves dropped.
+    """The hair as Blender shows it after all modifiers, in world space, without unusable curves.
 
-    100,000 curves of 16 points take a few milliseconds: whole attributes are copied at once.
+    Whole attributes are copied at once, so 100,000 curves of 16 points take a few milliseconds.
 
     Raises:
         HairloomError: the object holds no hair curves.
@@ -61,7 +61,7 @@ def write_curves(
     """A new hair curves object that holds these strands, attached to a surface if there is one.
 
     Args:
-        strands: world space; the object stands at the origin, so it is object space as well.
+        strands: world space, which is also object space: the object is at the origin.
     """
     curves = bpy.data.hair_curves.new(name)
     if strands.strand_count:
@@ -80,7 +80,7 @@ def write_curves(
 
 
 def _attach(obj: bpy.types.Object, surface: bpy.types.Object) -> None:
-    """What Blender's own hair tools and nodes expect of hair on a surface."""
+    """Set what Blender's own hair tools and nodes expect of hair on a surface."""
     obj.data.surface = surface
     if surface.data.uv_layers.active is not None:
         obj.data.surface_uv_map = surface.data.uv_layers.active.name
@@ -99,7 +99,7 @@ def _positions(curves: bpy.types.Curves) -> Floats:
 def curve_offsets(curves: bpy.types.Curves) -> Ints:
     """(curve_count + 1,) int32; [0] where there are no curves."""
     offsets = np.zeros(len(curves.curves) + 1, np.int32)
-    if len(curves.curves):  # without curves the array has length 1 and yet holds nothing
+    if len(curves.curves):  # without curves the array has length 1 but holds nothing
         curves.curve_offset_data.foreach_get("value", offsets)
     return offsets
 
@@ -138,7 +138,7 @@ def set_attribute(
     domain: str,
     values: Floats | Ints | Bools,
 ) -> None:
-    """Give the curves an attribute of whole values, (count,) or (count, width)."""
+    """Add an attribute to the curves, (count,) or (count, width)."""
     attribute = curves.attributes.new(name, data_type, domain)
     if len(values):
         attribute.data.foreach_set(_LAYOUTS[data_type][0], np.ascontiguousarray(values).ravel())

@@ -1,4 +1,4 @@
-"""What a fin needs of its original mesh: faces, strings, and how to tell that they have changed."""
+"""What the simulation of a fin reads from its original mesh: triangles and loose edges."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .fin_modifier import fin_modifier, other_fin_with
 
 def check_usable(obj: bpy.types.Object, handle: Handle) -> None:
     """Raises:
-    HairloomError: it is no fin, is being edited, or shares its mesh with another fin.
+    HairloomError: it is not a fin, is being edited, or shares its mesh with another fin.
     """
     if obj.type != "MESH" or fin_modifier(obj) is None:
         raise HairloomError(
-            "it is no fin", place=obj.name, remedy="Press Make Fin in its Physics tab"
+            "it is not a fin", place=obj.name, remedy="Press Make Fin in its Physics tab"
         )
     if obj.mode == "EDIT":
         raise HairloomError(
@@ -26,7 +26,7 @@ def check_usable(obj: bpy.types.Object, handle: Handle) -> None:
     other = other_fin_with(obj.data, handle)
     if other is not None:
         raise HairloomError(
-            f"its mesh is also that of {other.name}, which would move alike",
+            f"it shares its mesh with {other.name}, which would move the same way",
             place=obj.name,
             remedy="Use Object > Relations > Make Single User > Object & Data",
         )
@@ -50,7 +50,7 @@ def loose_edges_of(mesh: bpy.types.Mesh) -> Ints:
 
 
 def corners_of(mesh: bpy.types.Mesh) -> Ints:
-    """The vertex of each polygon corner, and last how many vertices there are; int32."""
+    """The vertex of each polygon corner, then the number of vertices; int32."""
     corners = np.empty(len(mesh.loops) + 1, np.int32)
     mesh.loops.foreach_get("vertex_index", corners[:-1])
     corners[-1] = len(mesh.vertices)

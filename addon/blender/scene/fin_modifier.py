@@ -1,12 +1,12 @@
 """How a fin shows in Blender: a Geometry Nodes modifier, fed by an attribute of the mesh.
 
-    Store `hairloom_carried`   where modifiers above and the animation put each vertex
-    Store `hairloom_index`     which vertex it is, to find it again below subdivisions and mirrors
-    Set Position               to `hairloom_position`, where the mesh has that attribute
+    Store `hairloom_carried`   where the modifiers above and the animation put each vertex
+    Store `hairloom_index`     the vertex's index, to find it again below subdivisions and mirrors
+    Set Position               to `hairloom_position`, if the mesh has that attribute
 
-The simulation writes `hairloom_position` into the original mesh and takes it away again, so that
-nothing of the artist's is touched, modifiers below go on from the cloth, and what is shown renders,
-saves and opens where there is no Hairloom.
+The simulation adds `hairloom_position` to the original mesh and removes it again. The artist's data
+stays untouched, modifiers below work on the cloth, and the result renders, saves and opens without
+Hairloom.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NAME = "Hairloom Fin"
 POSITION = "hairloom_position"
 CARRIED = "hairloom_carried"
 INDEX = "hairloom_index"
-#: marks our node group, whatever it is called, with the version of its nodes
+#: marks our node group, whatever its name, with the version of its nodes
 _MARK = "hairloom_fin"
 _VERSION = 1
 
@@ -44,7 +44,7 @@ def has_fins() -> bool:
 
 
 def add_modifier(obj: bpy.types.Object) -> bpy.types.Modifier:
-    """Make this mesh a fin, with the modifier at the end; the one that is there stays."""
+    """Make this mesh a fin, with the modifier last in the stack; an existing one is kept."""
     modifier = fin_modifier(obj)
     if modifier is None:
         modifier = obj.modifiers.new(NAME, "NODES")
@@ -54,7 +54,7 @@ def add_modifier(obj: bpy.types.Object) -> bpy.types.Modifier:
 
 
 def remove_modifier(obj: bpy.types.Object) -> None:
-    """Make it a plain mesh again, as it was."""
+    """Make it a plain mesh again."""
     clear(obj.data)
     modifier = fin_modifier(obj)
     if modifier is None:
@@ -66,12 +66,12 @@ def remove_modifier(obj: bpy.types.Object) -> None:
 
 
 def is_shown(obj: bpy.types.Object) -> bool:
-    """Whether the mesh holds a moment of a simulation."""
+    """Whether the mesh holds a simulated frame."""
     return obj.type == "MESH" and obj.data.attributes.get(POSITION) is not None
 
 
 def show(mesh: bpy.types.Mesh, positions: Floats) -> None:
-    """Put the vertices to (vertex_count, 3) float32, object space, for all modifiers from ours on.
+    """Move the vertices to (vertex_count, 3) float32, object space, from our modifier onwards.
 
     Raises:
         HairloomError: the mesh is being edited, or has another attribute of this name.
@@ -90,7 +90,7 @@ def show(mesh: bpy.types.Mesh, positions: Floats) -> None:
 
 
 def clear(mesh: bpy.types.Mesh) -> None:
-    """Take the simulation away: the mesh is bit for bit as it was."""
+    """Remove the simulation: the mesh is bit for bit what it was before."""
     attribute = mesh.attributes.get(POSITION)
     if attribute is not None:
         mesh.attributes.remove(attribute)
@@ -98,11 +98,11 @@ def clear(mesh: bpy.types.Mesh) -> None:
 
 
 def read_carried(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
-    """Where the mesh arrives at our modifier, (vertex_count, 3) float32, object space.
+    """The vertices that reach our modifier, (vertex_count, 3) float32, object space.
 
     Raises:
-        HairloomError: the modifier is missing or off, or the vertices there or below are not those
-            of the mesh itself.
+        HairloomError: the modifier is missing or off, or modifiers above or below it change the
+            number or the order of vertices.
     """
     mesh = obj.evaluated_get(depsgraph).data
     carried, index = mesh.attributes.get(CARRIED), mesh.attributes.get(INDEX)
@@ -150,7 +150,7 @@ def _not_evaluated(obj: bpy.types.Object) -> HairloomError:
     )
 
 
-#: modifiers that make other vertices
+#: modifiers that create vertices
 _GENERATE = frozenset(
     ("ARRAY", "BEVEL", "BOOLEAN", "BUILD", "DECIMATE", "EDGE_SPLIT", "MASK", "MIRROR", "MULTIRES")
     + ("NODES", "REMESH", "SCREW", "SKIN", "SOLIDIFY", "SUBSURF", "WELD", "WIREFRAME")
@@ -158,7 +158,7 @@ _GENERATE = frozenset(
 
 
 def _suspects(obj: bpy.types.Object, *, above: bool) -> str:
-    """Which modifiers it may be, for a message."""
+    """The modifiers that may be the cause, for a message."""
     own = fin_modifier(obj)
     place = len(obj.modifiers) if own is None else list(obj.modifiers).index(own)
     stack = obj.modifiers[:place] if above else obj.modifiers[place + 1 :]

@@ -1,8 +1,8 @@
-"""What a groom says beside its strands, as attributes of hair curves, and back.
+"""What a groom holds besides its strands, as attributes of hair curves, in both directions.
 
-Blender shows them in Data properties > Attributes, and its modifiers carry them along. The names
-are those of Epic's "Alembic for Grooms Specification" 1.5; colours are where Blender's own
-importers put them. Closest guides are one attribute each, as Blender has none of three integers.
+Blender shows them in Data properties > Attributes, and its modifiers pass them on. Names follow
+Epic's "Alembic for Grooms Specification" 1.5; colours use the attribute of Blender's own
+importers. Each closest guide has its own attribute, because Blender has no type of three integers.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ GROUP_NAMES = "groom_group_names"
 
 
 def store_groom(curves: bpy.types.Curves, groom: Groom) -> None:
-    """Give new hair curves, written from the groom's strands, all else that the groom says."""
+    """Write everything but the strands of a groom to hair curves made from its strands."""
     if groom.color is not None:
         opaque = np.ones((len(groom.color), 4), np.float32)
         opaque[:, :3] = groom.color
@@ -53,17 +53,17 @@ def store_group_names(curves: bpy.types.Curves, names: Mapping[int, str]) -> Non
 def stored_groom(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, kept: Ints
 ) -> dict[str, Any]:
-    """What the evaluated hair says beside its strands: arguments of `Groom`, but for strands.
+    """What the evaluated hair holds besides its strands: the other arguments of `Groom`.
 
-    IDs are left out where two curves have the same one, as copied curves do, and closest guides
-    where one of them is gone.
+    IDs are left out if two curves have the same one, as copied curves do; closest guides are left
+    out if one of them no longer exists.
 
     Args:
-        kept: (strand_count,) indices of the curves that became strands, as `read_curves` tells.
+        kept: (strand_count,) indices of the curves that became strands, from `read_curves`.
 
     Returns:
-        color, strand_id, is_guide, closest_guides and guide_weights, as far as they are there, and
-        group_names.
+        group_names, and those of color, strand_id, is_guide, closest_guides and guide_weights that
+        the hair has.
     """
     curves = hair.evaluated_get(depsgraph).data
     fields: dict[str, Any] = {"group_names": group_names(hair)}
@@ -87,9 +87,9 @@ def stored_groom(
 
 
 def group_names(hair: bpy.types.Object) -> dict[int, str]:
-    """Group -> name, for those of hair curves that have one.
+    """Group -> name, for named groups of hair curves.
 
-    They are those of the original data: modifiers drop custom properties.
+    Read from the original data, since modifiers drop custom properties.
     """
     stored = hair.original.data.get(GROUP_NAMES)
     if not hasattr(stored, "to_dict"):
@@ -103,7 +103,7 @@ def _is_number(text: str) -> bool:
 
 
 def _color(curves: bpy.types.Curves, kept: Ints) -> Floats | None:
-    """(point_count, 3) float32 of the kept curves; painted for whole curves as well."""
+    """(point_count, 3) float32 of the kept curves, whether painted per point or per curve."""
     offsets = curve_offsets(curves)
     counts = np.diff(offsets)
     color = read_attribute(curves, COLOR, "POINT", 4)

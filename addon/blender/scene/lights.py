@@ -1,4 +1,4 @@
-"""The scene's lights and world, as the renderer knows them."""
+"""The scene's lights and world, in the renderer's terms."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ type Color = tuple[float, float, float]
 
 
 def read_lights(depsgraph: bpy.types.Depsgraph, center: Floats) -> tuple[Light, ...]:
-    """The visible lights that shine most strongly on a place, strongest first, at most eight.
+    """The up to eight visible lights that are brightest at a point, brightest first.
 
-    As Cycles takes them, but for what is left out: shadows, light linking, lights that are
-    instanced, textures and other nodes of a light than its plain Emission, and the factors by
-    which EEVEE weighs diffuse light and highlights.
+    Read as Cycles does, except for shadows, light linking, instanced lights, nodes other than a
+    plain Emission, and EEVEE's diffuse and specular factors.
 
     Args:
         center: (3,) [m], world space.
@@ -31,7 +30,7 @@ def read_lights(depsgraph: bpy.types.Depsgraph, center: Floats) -> tuple[Light, 
 
 
 def light_warnings(depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
-    """What the artist should know about the scene's lights, each with its remedy; mostly none."""
+    """Warnings about the scene's lights, each with its remedy; usually none."""
     count = sum(1 for _ in _lights(depsgraph))
     if count <= LIGHT_CAPACITY:
         return ()
@@ -42,7 +41,7 @@ def light_warnings(depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
 
 
 def no_light_warnings(lights: Sequence[Light], ambient: Color) -> tuple[str, ...]:
-    """What the artist should know where nothing shines although a view goes by the scene's lights.
+    """A warning if a view uses the scene's lights but there are none.
 
     Such a view shows hair by the world alone, or, if that is black, by a studio's lights; see
     `overlay.lit`.
@@ -51,22 +50,22 @@ def no_light_warnings(lights: Sequence[Light], ambient: Color) -> tuple[str, ...
         return ()
     if any(ambient):
         return (
-            "Lights: no light shines here, so where views go by the scene's lights, hair has only "
-            "the world's colour. Add a light, or turn Scene Lights off in Viewport Shading.",
+            "Lights: there is no light, so views with Scene Lights on show hair in the world's "
+            "colour only. Add a light, or turn Scene Lights off in Viewport Shading.",
         )
     return (
-        "Lights: no light shines here and the world is black, so hair is shown by the lights of a "
-        "studio. Add a light, or give the world a colour.",
+        "Lights: there is no light and the world is black, so studio lights are used. "
+        "Add a light, or give the world a colour.",
     )
 
 
 def scene_lights_are_shown() -> bool:
-    """Whether a view goes by the scene's lights."""
+    """Whether any view uses the scene's lights."""
     return any(uses_scene_light(each)[0] for each in _open_shadings())
 
 
 def uses_scene_light(shading: bpy.types.View3DShading) -> tuple[bool, bool]:
-    """Whether a 3D view shows things by the scene's lights, and by its world."""
+    """Whether a 3D view uses the scene's lights, and whether it uses the scene's world."""
     if shading.type == "MATERIAL":
         return shading.use_scene_lights, shading.use_scene_world
     if shading.type == "RENDERED":
@@ -75,7 +74,7 @@ def uses_scene_light(shading: bpy.types.View3DShading) -> tuple[bool, bool]:
 
 
 def _open_shadings() -> Iterator[bpy.types.View3DShading]:
-    """Of all 3D views that are open."""
+    """The shading of all open 3D views."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
@@ -83,7 +82,7 @@ def _open_shadings() -> Iterator[bpy.types.View3DShading]:
 
 
 def read_ambient(scene: bpy.types.Scene) -> Color:
-    """The world's plain colour [W/(m^2 sr)]; of an image or a sky the background's own colour."""
+    """The world's plain colour [W/(m^2 sr)]; for an image or a sky, the Background's own colour."""
     world = scene.world
     if world is None:
         return (0.0, 0.0, 0.0)
@@ -103,7 +102,7 @@ def _lights(depsgraph: bpy.types.Depsgraph) -> Iterator[Light]:
 
 
 def _light(instance: bpy.types.Object) -> Light | None:
-    """None: it sends out no light of its own, or has no direction, being scaled to nothing."""
+    """None: it emits no light of its own, or its scale is zero, so that it has no direction."""
     data, matrix = instance.data, instance.matrix_world
     color = _emission(data) * np.array(data.color) * data.energy * 2.0**data.exposure
     if data.use_temperature:
@@ -133,12 +132,12 @@ def _sun_disk(angle: float) -> float:
 
 
 def _panel(data: bpy.types.AreaLight, matrix: Matrix) -> Panel:
-    """The object's scale makes a panel larger, but not a spread wider."""
+    """Scaling the object enlarges an area light, but does not widen its spread."""
     right, up, back = (np.array(matrix.col[axis][:3]) for axis in range(3))
     height = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
     along = -back / np.linalg.norm(back)
     width_scale, height_scale = float(np.linalg.norm(right)), float(np.linalg.norm(up))
-    # whatever the axes are, a panel's are right across each other
+    # the axes of an area light are perpendicular, whatever those of its matrix are
     up = np.cross(along, right)
     if not up.any():
         right = np.cross(along, np.eye(3)[np.abs(along).argmin()])
@@ -162,20 +161,20 @@ def _panel_size(panel: Panel) -> float:
 
 
 def _is_portal(data: bpy.types.AreaLight) -> bool:
-    """Whether it only guides Cycles to the world's light; Cycles may be switched off."""
+    """Whether it is a portal, which only guides Cycles' sampling; Cycles may be disabled."""
     cycles = getattr(data, "cycles", None)
     return cycles is not None and cycles.is_portal
 
 
 def _inverse(matrix: Matrix) -> tuple[Color, Color, Color]:
-    """Rows that turn directions into an object's own axes, to a common factor."""
+    """Rows that turn directions into an object's own axes, up to a common factor."""
     rows = np.array(matrix.to_3x3().inverted_safe())
     x, y, z = rows / np.abs(rows).max()
     return _triple(x), _triple(y), _triple(z)
 
 
 def _emission(data: bpy.types.Light) -> Floats:
-    """By what a light's nodes multiply it, as far as that is one plain Emission."""
+    """The factor from a light's nodes, if they are one plain Emission."""
     node = _node(data.node_tree, "EMISSION")
     if node is None:
         return np.ones(3)

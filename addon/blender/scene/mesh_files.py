@@ -1,4 +1,4 @@
-"""Meshes from files, through Blender's own importers, to read them or to have them in the scene."""
+"""Meshes from files, through Blender's own importers: as data, or as objects of the scene."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _PURGED = ("objects", "meshes", "materials", "images", "collections", "cameras",
 
 
 def read_mesh_file(path: Path, *, need_uv: bool) -> Surface:
-    """All meshes of a file as one Surface, in metres, Blender's Z up; the scene stays as it is.
+    """All meshes of a file as one Surface, in metres, Blender's Z up; the scene is not changed.
 
     Raises:
         HairloomError: no such file, a format that Blender does not read, no faces, or no UVs
@@ -46,7 +46,7 @@ def read_mesh_file(path: Path, *, need_uv: bool) -> Surface:
 
 
 def import_mesh_file(path: Path) -> bpy.types.Object:
-    """The one mesh of a file, in the open scene.
+    """The only mesh of a file, added to the open scene.
 
     Raises:
         HairloomError: no such file, a format that Blender does not read, or not one mesh.
@@ -62,7 +62,7 @@ def import_mesh_file(path: Path) -> bpy.types.Object:
 
 
 def _imported(path: Path) -> list[bpy.types.Object]:
-    """The file's mesh objects, new in the scene, by name; one or more."""
+    """The file's mesh objects, added to the scene, sorted by name; at least one."""
     importer = _IMPORTERS.get(path.suffix.lower())
     if importer is None:
         raise HairloomError(
@@ -84,7 +84,7 @@ def _imported(path: Path) -> list[bpy.types.Object]:
 
 
 def merged(parts: list[Surface]) -> Surface:
-    """Several surfaces as one; UVs survive only where every part has them."""
+    """Several surfaces as one; it has UVs only if every part has them."""
     starts = np.cumsum([0, *(len(part.positions) for part in parts[:-1])])
     has_uv = all(part.corner_uv is not None for part in parts)
     return Surface(

@@ -1,7 +1,7 @@
-"""What a mesh's material is to the renderer: its Principled BSDF, as far as that is plain.
+"""What the renderer uses of a mesh's material: its Principled BSDF, if that is simple.
 
-Read are the base colour, the alpha and the normal map, each as a value or as one picture: what
-other nodes do to them is left out, and said.
+Base colour, alpha and normal map are read, each as a value or as one image. What other nodes do to
+them is ignored, and reported.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from ..base.images import read_image
 
 type Color = tuple[float, float, float]
 
-#: of Blender's own default material
+#: roughness of Blender's default material
 _GREY: Color = (0.8, 0.8, 0.8)
-#: share of the light that Principled throws back head on, by its default index of refraction 1.5
+#: fraction of light that Principled reflects at normal incidence, at its default IOR of 1.5
 _SHEEN = 0.04
 
-#: pictures by image and what of it counts, kept while the image is as it was
+#: pictures by image and channel, kept until the image changes
 _pictures: dict[tuple[int, str], tuple[tuple[object, ...], Floats]] = {}
 
 
 @dataclass(frozen=True)
 class MeshMaterial:
-    """color: scene-linear albedo, of a picture its mean. sheen: share of the light thrown back as
-    it is, head on. Others as in MeshSnapshot.
+    """color: scene-linear albedo; for an image, its mean. sheen: fraction of light reflected at
+    normal incidence. The others: see MeshSnapshot.
 
-    notes: what could not be read of it, each with its remedy.
+    notes: what could not be read, each with its remedy.
     """
 
     color: Color = _GREY
@@ -44,7 +44,7 @@ class MeshMaterial:
 
 
 def material_of(material: bpy.types.Material | None) -> MeshMaterial:
-    """As MeshPass draws it; without nodes that it knows, the colour of the Solid viewport."""
+    """The material for MeshPass; without known nodes, the colour of the Solid viewport."""
     if material is None:
         return MeshMaterial()
     node = _shader(material)
@@ -70,13 +70,13 @@ def material_of(material: bpy.types.Material | None) -> MeshMaterial:
 
 
 def material_notes(obj: bpy.types.Object) -> tuple[str, ...]:
-    """What could not be read of an object's materials, each once."""
+    """What could not be read of an object's materials, each reported once."""
     found = (material_of(slot.material).notes for slot in obj.material_slots)
     return tuple(dict.fromkeys(note for notes in found for note in notes))
 
 
 class _Reader:
-    """Reads one material; notes what it leaves out."""
+    """Reads one material and notes what it leaves out."""
 
     def __init__(self, material: bpy.types.Material) -> None:
         self.notes: list[str] = []
@@ -84,7 +84,7 @@ class _Reader:
         self._name = material.name
 
     def alpha(self, socket: bpy.types.NodeSocket, color: bpy.types.NodeSocket) -> float:
-        """Its value; 1 where the alpha of the colour's own picture counts."""
+        """Its value; 1 if the alpha comes from the colour's own image."""
         giver = _giver(socket)
         if giver is None:
             return float(socket.default_value)
@@ -97,7 +97,7 @@ class _Reader:
         return 1.0
 
     def color(self, socket: bpy.types.NodeSocket) -> tuple[Floats | None, Color]:
-        """The picture that gives the colour and its mean; None, and the value that counts."""
+        """The colour's image and its mean; without one, None and the value."""
         giver = _giver(socket)
         own = _color(socket.default_value)
         if giver is None:
@@ -112,7 +112,7 @@ class _Reader:
         return picture, own if picture is None else _mean(picture)
 
     def normal(self, socket: bpy.types.NodeSocket) -> tuple[Floats | None, float]:
-        """The normal map and its strength; None where the surface's own normals count."""
+        """The normal map and its strength; None if the surface's own normals are used."""
         giver = _giver(socket)
         if giver is None:
             return None, 1.0
@@ -152,7 +152,7 @@ class _Reader:
 
 
 def _shader(material: bpy.types.Material) -> bpy.types.Node | None:
-    """The shader of its surface, if it is one of those that are known."""
+    """The surface shader, if it is a known one."""
     nodes = () if material.node_tree is None else material.node_tree.nodes
     for kind in ("BSDF_PRINCIPLED", "BSDF_DIFFUSE"):
         for node in nodes:
@@ -162,7 +162,7 @@ def _shader(material: bpy.types.Material) -> bpy.types.Node | None:
 
 
 def _giver(socket: bpy.types.NodeSocket) -> tuple[bpy.types.Node, str] | None:
-    """The node that gives an input its value, and by which output; None: it has its own."""
+    """The node that is linked to an input, and its output; None: the input has its own value."""
     while socket.links:
         link = socket.links[0]
         if link.from_node.type != "REROUTE":
@@ -172,7 +172,7 @@ def _giver(socket: bpy.types.NodeSocket) -> tuple[bpy.types.Node, str] | None:
 
 
 def _sheen(node: bpy.types.Node) -> float:
-    """A rough surface spreads its sheen until nothing of it is seen."""
+    """The rougher a surface, the wider its sheen is spread, until it cannot be seen."""
     ior = node.inputs["IOR"].default_value
     sharp = 1.0 - node.inputs["Roughness"].default_value
     head_on = (

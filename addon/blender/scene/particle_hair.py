@@ -1,6 +1,6 @@
-"""Particle hair as hair curves that know their surface.
+"""Particle hair to hair curves that are attached to their surface.
 
-Blender's own conversion gives the positions alone: no surface, no parent, no UVs at the roots.
+Blender's own conversion copies positions only: no surface, no parent, no root UVs.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ def hair_systems(mesh: bpy.types.Object) -> list[bpy.types.ParticleSystem]:
 def convert_particle_hair(
     context: bpy.types.Context, mesh: bpy.types.Object
 ) -> list[bpy.types.Object]:
-    """Hair curves on a mesh in the place of its particle hair, which is hidden, not deleted.
+    """Hair curves that replace a mesh's particle hair, which is hidden, not deleted.
 
     Raises:
-        HairloomError: it has no particle hair, or none that Blender converts.
+        HairloomError: it has no particle hair, or none that Blender can convert.
     """
     systems, made = hair_systems(mesh), []
     for system in systems:
@@ -56,7 +56,7 @@ def _on_its_mesh(
     mesh: bpy.types.Object,
     name: str,
 ) -> bpy.types.Object:
-    """The same strands, bound to the mesh; the conversion's own object goes."""
+    """The same strands, attached to the mesh; the object that Blender made is removed."""
     depsgraph = context.evaluated_depsgraph_get()
     strands = read_curves(converted, depsgraph).strands
     surface = read_surface(mesh, depsgraph, need_uv=False, place=mesh.name)

@@ -1,4 +1,4 @@
-"""Where a groom's body is in Blender's current evaluation."""
+"""Where a groom's surface is in Blender's current evaluation."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .surfaces import read_positions
 def read_pose(
     hair: Body, head: Body | None, vertex_count: int | None, depsgraph: bpy.types.Depsgraph
 ) -> Pose:
-    """The head's vertices and its way since rest; of hair without a head, its own way.
+    """The head's vertices and its transform since rest; without a head, the hair object's.
 
     Args:
         vertex_count: of the head that the hair was bound to.
 
     Raises:
-        HairloomError: hair or head is gone, is not at a finite place, or is another mesh.
+        HairloomError: hair or head is gone, its position is not finite, or it is another mesh.
     """
     hair.found()
     if head is None:
@@ -42,10 +42,10 @@ def read_pose(
 
 
 def check_finite(place: str, values: Floats) -> None:
-    """Raise where a driver or modifier has put something nowhere."""
+    """Refuse positions that a driver or modifier has made infinite or NaN."""
     if not np.isfinite(values).all():
         raise HairloomError(
-            "where it is, is not a finite number",
+            "its position is not a finite number",
             place=place,
-            remedy="Mend the driver, constraint or modifier that moves it",
+            remedy="Fix the driver, constraint or modifier that moves it",
         )

@@ -1,4 +1,4 @@
-"""The Principled Hair of a hair's material, read as a starting point for our look."""
+"""A material's Principled Hair BSDF, read as a starting point for a look."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...shading.marschner.principled import PrincipledHair, settings_from
 from ...shading.settings import ShadingSettings
 
 _NODE = "BSDF_HAIR_PRINCIPLED"
-#: name of an input -> what it is called here; inputs that a node's choices hide are not read
+#: input of the node -> our name for it; inputs that the node's options hide are not read
 _INPUTS = {
     "Color": "color",
     "Melanin": "melanin",
@@ -35,7 +35,7 @@ _INPUTS = {
 
 
 def has_principled_hair(hair: bpy.types.Object) -> bool:
-    """Whether its material has such a node; quick enough for a panel."""
+    """Whether its material has such a node; fast enough for a panel."""
     material = hair.active_material
     return material is not None and _node_of(material) is not None
 
@@ -43,10 +43,10 @@ def has_principled_hair(hair: bpy.types.Object) -> bool:
 def look_from_material(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, before: ShadingSettings | None = None
 ) -> tuple[ShadingSettings, tuple[str, ...]]:
-    """Settings that answer light as its material does, and notes on what could not be read.
+    """Settings that look like its material, and notes on what could not be read.
 
     Args:
-        before: gives what a material does not speak of.
+        before: settings that a material has no equivalent of are kept from these.
 
     Raises:
         HairloomError: there is no material with a Principled Hair.
@@ -65,10 +65,10 @@ def look_from_material(
 
 
 def look_from_named(name: str | None, before: Settings) -> tuple[ShadingSettings, tuple[str, ...]]:
-    """The same for a hair object of the open scene, by its name.
+    """The same for a hair object of the open scene, by name.
 
     Raises:
-        HairloomError: there is no such hair object, or as `look_from_material`.
+        HairloomError: there is no such hair object, or see `look_from_material`.
     """
     hair = None if name is None else bpy.data.objects.get(name)
     if hair is None or hair.type != "CURVES":
@@ -82,7 +82,7 @@ def look_from_named(name: str | None, before: Settings) -> tuple[ShadingSettings
 
 
 def _node_of(material: bpy.types.Material) -> bpy.types.Node | None:
-    """The one that is nearest to the output, through mixing nodes and groups."""
+    """The node nearest to the output, through mix nodes and groups."""
     tree = material.node_tree
     output = None if tree is None else tree.get_output_node("ALL")
     if output is None:
@@ -94,7 +94,7 @@ def _node_of(material: bpy.types.Material) -> bpy.types.Node | None:
 def _behind(
     ends: list[bpy.types.Node], entered: set[bpy.types.NodeTree]
 ) -> Iterator[bpy.types.Node]:
-    """These nodes and all that they hang on, the nearest first, those inside groups as well."""
+    """These nodes and all nodes linked to them, nearest first, also those inside groups."""
     waiting, seen = list(ends), set()
     while waiting:
         found = waiting.pop(0)
@@ -115,7 +115,7 @@ def _givers(node: bpy.types.Node) -> list[bpy.types.Node]:
 
 
 def _values(node: bpy.types.Node) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Its own numbers, and notes on those that other nodes give."""
+    """The node's own values, and notes on inputs that other nodes drive."""
     values: dict[str, Any] = {"model": node.model, "parametrization": node.parametrization}
     notes = []
     for socket in node.inputs:
@@ -131,7 +131,7 @@ def _values(node: bpy.types.Node) -> tuple[dict[str, Any], tuple[str, ...]]:
 
 
 def _constant(socket: bpy.types.NodeSocket) -> Any:
-    """The input's value where it is one: its own, or that of a Value or RGB node; else None."""
+    """The input's own value, or that of a linked Value or RGB node; else None."""
     if not socket.links:
         return socket.default_value
     giver = socket.links[0].from_node

@@ -1,4 +1,4 @@
-"""What an artist's hair is made of: its curves, and the mesh that they grow from."""
+"""Reading a groom from the scene: its curves, and the mesh that they grow from."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _OWN_DYNAMICS = "Hair Dynamics"
 
 @dataclass(frozen=True)
 class Source:
-    """Hair and head as Blender shows them, in world space.
+    """Hair and head as Blender evaluates them, in world space.
 
     dropped: reason -> number of curves that cannot be used.
     kept: (strand_count,) indices of the curves that became strands.
     density: (vertex_count,) how densely children grow on the head, or None.
-    head_warning, density_warning: what the artist should know, with its remedy; or empty.
+    head_warning, density_warning: a warning with its remedy, or empty.
     """
 
     strands: StrandSet
@@ -44,7 +44,7 @@ class Source:
 
 
 def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
-    """Read hair and head; without a usable head the hair goes on, with a warning.
+    """Read hair and head; without a usable head, the hair alone, with a warning.
 
     Raises:
         HairloomError: the object holds no hair curves, or none that can be used.
@@ -60,7 +60,7 @@ def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sourc
 def read_density(
     hair: bpy.types.Object, head: Surface | None, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Floats | None, str]:
-    """How densely children grow on each vertex of the head; without usable weights they grow
+    """The density of children at each vertex of the head; without usable weights children grow
     everywhere, with a warning."""
     try:
         return (None if head is None else wanted_density(hair, depsgraph)), ""
@@ -81,16 +81,16 @@ def wanted_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Fl
     if np.isfinite(weights).all() and (weights > 0.0).any():
         return weights
     raise HairloomError(
-        f"the weights '{name}' are above zero nowhere, or no finite numbers",
+        f"the weights '{name}' are zero everywhere, or not finite numbers",
         place=head.name,
-        remedy="Paint where children shall grow, or leave their Density empty",
+        remedy="Paint where children should grow, or clear their Density field",
     )
 
 
 def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """The object's modifiers with Blender's own hair dynamics that are on, in viewport or render.
+    """The object's enabled modifiers with Blender's own hair dynamics, in viewport or render.
 
-    They would move what ours moves as well.
+    They would move the hair a second time.
     """
     groups = [
         (modifier, modifier.node_group) for modifier in hair.modifiers if modifier.type == "NODES"
@@ -105,7 +105,7 @@ def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 
 def refuse_own_dynamics(hair: bpy.types.Object) -> None:
-    """Never simulate twice.
+    """Refuse to simulate twice.
 
     Raises:
         HairloomError: Blender's own hair dynamics moves this hair already.
@@ -120,7 +120,7 @@ def refuse_own_dynamics(hair: bpy.types.Object) -> None:
 
 
 def dynamics_warnings(hair: bpy.types.Object) -> tuple[str, ...]:
-    """What the artist should know about Blender's own hair dynamics."""
+    """A warning about Blender's own hair dynamics, if it is on."""
     return tuple(
         f"{hair.name}: its modifier {modifier.name} simulates it too, so Hairloom does not. "
         "Press Mute Hair Dynamics."
@@ -138,7 +138,7 @@ def mute_own_dynamics(hair: bpy.types.Object) -> int:
 
 
 def usable_curves(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
-    """As `read_curves`, but nothing is an error too.
+    """Like `read_curves`, but no usable curve is an error.
 
     Raises:
         HairloomError: the object holds no hair curves, or none that can be used.
@@ -157,11 +157,11 @@ def usable_curves(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cle
 def _read_head(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Surface | None, str]:
-    """The head, if there is a usable one, and a warning or nothing."""
+    """The head, if it is usable, and a warning or an empty string."""
     head = head_of(hair)
     if head is None:
         return None, (
-            f"{hair.name}: it has no surface, so it follows its own object only and collides with "
+            f"{hair.name}: it has no surface, so it only follows its own object and collides with "
             "nothing. Set Surface in its Data properties."
         )
     try:
@@ -170,7 +170,7 @@ def _read_head(
         return None, str(error)
     if surface.corner_uv is None:
         return surface, (
-            f"{head.name}: it has no UVs, so exported strands know no place on its texture. "
+            f"{head.name}: it has no UVs, so exported strands have no root UVs. "
             "Unwrap it (Edit Mode, UV > Unwrap)."
         )
     return surface, ""

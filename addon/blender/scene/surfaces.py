@@ -38,7 +38,7 @@ def read_surface(
             raise HairloomError(
                 "this mesh has no UVs, so hair cannot be placed on its texture",
                 place=place,
-                remedy="Unwrap it (Edit Mode, UV > Unwrap), or go on without with --no-uv",
+                remedy="Unwrap it (Edit Mode, UV > Unwrap), or continue without UVs by --no-uv",
             )
         surface = Surface(_positions(mesh), triangles, corner_uv)
     return surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world))
@@ -60,7 +60,7 @@ def read_positions(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, pla
 def _evaluated_mesh(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, place: str
 ) -> Iterator[bpy.types.Mesh]:
-    """The evaluated mesh, also of an object in edit mode; gone when the block ends."""
+    """The evaluated mesh, even in Edit Mode; it is freed at the end of the block."""
     if obj.type != "MESH":
         raise HairloomError(
             f"it is a {obj.type.lower()} object, not a mesh",

@@ -16,11 +16,11 @@ def gravity_of(scene: bpy.types.Scene) -> Floats:
 def scene_wind(depsgraph: bpy.types.Depsgraph) -> Floats:
     """The sum of the scene's Wind force fields, (3,) float64 [m/s], world space.
 
-    Each blows along its object's local +Z everywhere alike, and a strength of 1 is 1 m/s, so that
-    Blender's default is a breath and 10 a fresh breeze; a negative one blows backwards. The
-    object's place and scale do not matter. As in Blender, fields that are hidden or excluded from
-    the view layer do not blow. Other kinds of fields, falloff and the field's noise are left out:
-    gusts are set with the hair's own wind.
+    Each blows along its object's local +Z with the same speed everywhere. A strength of 1 is 1 m/s:
+    Blender's default is a breath, 10 a fresh breeze, and negative values blow backwards. The
+    object's position and scale do not matter. As in Blender, fields that are hidden or excluded
+    from the view layer have no effect. Other kinds of fields, falloff and the field's noise are
+    ignored; gusts are part of the hair's own wind settings.
     """
     total = np.zeros(3)
     for instance in depsgraph.objects:

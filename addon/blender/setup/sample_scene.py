@@ -1,4 +1,4 @@
-"""A scene to begin with: a head that turns, long hair, three lights and a camera."""
+"""The sample scene: a head that turns, long hair, three lights and a camera."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from .starting import new_groom
 NAME = "Hairloom Sample"
 _SUBDIVISIONS = 2
 _FRAMES = 96
-#: frame -> turn about the upright axis and nod [degrees]; the last is as the first
+#: frame -> turn about the vertical axis and nod [degrees]; the last equals the first
 _TURNS = ((1, 0.0, 0.0), (20, 35.0, -4.0), (34, 20.0, 8.0), (56, -35.0, -4.0), (76, -10.0, 6.0))
 _SKIN = (0.42, 0.27, 0.2, 1.0)
-#: name -> place [m], power [W], side [m], colour
+#: name -> position [m], power [W], side [m], colour
 _LIGHTS = {
     "Key": ((-0.7, -0.9, 0.8), 9.0, 0.5, (1.0, 0.96, 0.9)),
     "Fill": ((0.9, -0.7, 0.2), 4.0, 0.9, (0.85, 0.92, 1.0)),
     "Rim": ((0.5, 0.9, 0.6), 4.0, 0.4, (1.0, 1.0, 1.0)),
 }
 _CAMERA_AT, _LENS = (-0.34, -0.68, 0.02), 50.0
-#: below the head's middle, since hair hangs
+#: below the centre of the head, since hair hangs down
 _LOOKED_AT = Vector((0.0, 0.0, -0.04))
 _WORLD = (0.03, 0.034, 0.04, 1.0)
 #: long enough to swing
@@ -33,7 +33,7 @@ _HAIR = GrowSettings(strand_count=3500, length=0.26)
 
 
 def add_sample_scene(presets: tuple[str, ...]) -> tuple[bpy.types.Scene, bpy.types.Object]:
-    """A new scene, rendered by Hairloom, with its groom; the artist's own stay as they are.
+    """A new scene, rendered by Hairloom, with its groom; existing scenes are not changed.
 
     Args:
         presets: of the groom, by name.
@@ -59,7 +59,7 @@ def add_sample_scene(presets: tuple[str, ...]) -> tuple[bpy.types.Scene, bpy.typ
 
 
 def _head() -> bpy.types.Object:
-    """Suzanne in the size of a human head, facing -Y, with UVs."""
+    """Suzanne at the size of a human head, facing -Y, with UVs."""
     mesh = bpy.data.meshes.new("Head")
     shape = bmesh.new()
     try:
@@ -90,7 +90,7 @@ def _skin() -> bpy.types.Material:
 
 
 def _animate(head: bpy.types.Object) -> None:
-    """It looks to both sides, again and again."""
+    """Animate the head: it looks to both sides, in a loop."""
     for frame, turn, nod in (*_TURNS, (_FRAMES + 1, *_TURNS[0][1:])):
         head.rotation_euler = np.radians((nod, 0.0, turn))
         head.keyframe_insert("rotation_euler", frame=frame)

@@ -1,4 +1,4 @@
-"""A short test of all that Hairloom stands on, on this machine: for the Preferences page."""
+"""A short test of everything Hairloom needs of this machine, for the Preferences page."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ type Outcome = Literal["passed", "absent", "failed"]
 
 _SIDE = 96
 _DIRECTION, _FIELD_OF_VIEW = (0.0, -1.0, 0.0), 0.5
-#: package -> what is missed without it
+#: package -> what it is needed for
 _PACKAGES = {
     "OpenImageIO": "textures of 16 bits and EXR",
     "etcpak": "textures as BC7 in DDS",
@@ -48,7 +48,7 @@ _PACKAGES = {
 class Check:
     """What one check found.
 
-    outcome: "absent" where something is missing that Hairloom goes on without.
+    outcome: "absent" if something is missing that Hairloom can do without.
     """
 
     name: str
@@ -60,18 +60,18 @@ _last: tuple[Check, ...] = ()
 
 
 def last_report() -> tuple[Check, ...]:
-    """What the last self-test found; nothing before the first."""
+    """The results of the last self-test; empty before the first."""
     return _last
 
 
 def report_text() -> str:
-    """The machine and the last self-test as plain text, a line each."""
+    """The machine and the results of the last self-test as plain text."""
     lines = [f"{name}: {value or 'none'}" for name, value in environment().items()]
     return "\n".join([*lines, *(f"{c.outcome}  {c.name}: {c.text}" for c in _last)]) + "\n"
 
 
 def run() -> tuple[Check, ...]:
-    """Carry out all checks, one after the other; takes a few seconds."""
+    """Run all checks one after the other; takes a few seconds."""
     global _last
     ensure_gpu()
     _last = tuple(_checks())
@@ -88,7 +88,7 @@ def _checks() -> Iterator[Check]:
 
 
 def _checked(name: str, check: Callable[[], str]) -> Check:
-    """A failure of any kind is what a self-test is there to tell."""
+    """Run a check; an exception of any kind is its failure."""
     try:
         return Check(name, "passed", check())
     except Exception as error:
@@ -96,7 +96,7 @@ def _checked(name: str, check: Callable[[], str]) -> Check:
 
 
 def _compute() -> Check:
-    """Whether the shaders' motion is numpy's, see `solvers`; without a GPU the CPU does it."""
+    """Whether the shaders' motion equals numpy's, see `solvers`; without a GPU, the CPU is used."""
     problem = compute_problem()
     name = "Simulation on the GPU"
     if problem:
@@ -105,7 +105,7 @@ def _compute() -> Check:
 
 
 def _looks() -> dict[str, tuple[ShadingSettings, VolumeSettings]]:
-    """Each with shaders of its own."""
+    """Transparency methods, each with its own shaders."""
     plain = VolumeSettings(shadows="none")
     return {
         "Kajiya-Kay": (ShadingSettings(model="kajiya_kay"), plain),
@@ -115,7 +115,7 @@ def _looks() -> dict[str, tuple[ShadingSettings, VolumeSettings]]:
 
 
 def _drawn(shading: ShadingSettings, volume: VolumeSettings) -> str:
-    """A picture of a brush of hair, which must be seen, be finite and leave its corners clear."""
+    """Draw a brush of hair: it must be visible and finite, and leave the corners clear."""
     rig = _brush()
     ambient = AmbientSettings()
     snapshot = replace(
@@ -135,7 +135,7 @@ def _judged(picture: Floats) -> str:
     alpha = picture[..., 3]
     covered = float((alpha > 0.5).mean())
     if not np.isfinite(picture).all():
-        raise RuntimeError("the picture has values that are no numbers")
+        raise RuntimeError("the picture has values that are not numbers")
     if not 0.05 < covered < 0.95 or alpha[0, 0] > 0.0:
         raise RuntimeError(f"hair covers {covered:.0%} of the picture")
     if picture[..., :3].max() <= 0.0:
@@ -144,7 +144,7 @@ def _judged(picture: Floats) -> str:
 
 
 def _brush() -> Rig:
-    """Straight strands side by side, 10 cm long, as wide as a finger."""
+    """Straight strands side by side, 10 cm long, in a bundle as wide as a finger."""
     across, along = np.linspace(-0.02, 0.02, 64), np.linspace(0.0, 0.1, 8)
     points = np.zeros((len(across), len(along), 3))
     points[..., 0], points[..., 2] = across[:, None], along
@@ -166,7 +166,7 @@ def _files() -> str:
         read = read_tfx(path).strands
         write_png(Path(folder) / "picture.png", np.ones((4, 4, 4), np.float32))
         if not (Path(folder) / "picture.png").stat().st_size:
-            raise RuntimeError("a picture was written that is empty")
+            raise RuntimeError("the picture that was written is empty")
     apart = float(np.abs(read.points - strands.points).max())
     if apart > 1.0e-5:
         raise RuntimeError(f"a groom came back {apart:.2g} m off")
@@ -174,7 +174,7 @@ def _files() -> str:
 
 
 def _package(name: str, use: str) -> Check:
-    """It is only looked for: two builds of one library in a process may end it."""
+    """Only look for it: loading a second build of a library may crash the process."""
     if find_spec(name) is None:
         return Check(name, "absent", f"not here: no {use}")
     return Check(name, "passed", use)

@@ -1,4 +1,4 @@
-"""The first groom: as large as its mesh, in a look and a way to move, on any mesh or empty hair."""
+"""The first groom, on any mesh or empty hair: sized to its mesh, with a look and motion."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from ..scene.source import mute_own_dynamics
 from ..scene.surfaces import read_positions
 from ..strands.groom_files import grow_on
 
-#: Least extent [m] of a head of human size; lengths are declared for that.
+#: Smallest extent [m] of a head of human size; lengths are declared for it.
 _HEAD_SIZE = 0.19
-#: Meshes from so much smaller to so much larger are heads of real size, or bodies: not fitted.
+#: Meshes within these factors are heads or bodies of real size, and are not fitted.
 _REAL = 2.5
-#: lengths that are of the whole head, not of single hairs
+#: lengths that belong to the whole head, not to single hairs
 _LENGTHS = ("length", "wave", "wave_length", "frizz", "clearance", "volume", "radius")
-#: settings of dynamics -> the power of the size by which they grow; swings a second stay
+#: settings of dynamics -> the power of the size that they scale with; frequencies are kept
 _MOTION = {
     "gravity": 1,
     "wind_speed": 1,
@@ -38,9 +38,9 @@ _MOTION = {
 
 
 def fitting_factor(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
-    """How much larger than a human head a mesh is, where it cannot be one; else 1.
+    """How much larger than a human head a mesh is; 1 if it may be a head or a body.
 
-    A cube of 2 m is thin nowhere, a body of 2 m is: so the least extent counts.
+    The smallest extent counts: a body of 2 m is thin somewhere, a cube of 2 m is not.
     """
     positions = read_positions(head, depsgraph, place=head.name)
     if not len(positions):
@@ -51,15 +51,15 @@ def fitting_factor(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> fl
 
 
 def fitted(settings: GrowSettings, factor: float) -> GrowSettings:
-    """The same hair on a head that is larger by a factor; declared limits hold."""
+    """The same hair on a head that is larger by a factor, within the declared limits."""
     if factor == 1.0:
         return settings
     return replace(settings, **_grown(settings, dict.fromkeys(_LENGTHS, 1), factor))
 
 
 def fit_motion(hair: bpy.types.Object, factor: float) -> None:
-    """Let hair swing on a head that is larger by a factor as it would on a head: by the same
-    angles, in the same time. A breeze of two metres a second does not move hair of two metres.
+    """Let hair swing on a larger head as it would on a human one: by the same angles, in the same
+    time. Without this, a breeze of two metres a second would not move hair of two metres.
     """
     if factor == 1.0:
         return
@@ -69,7 +69,7 @@ def fit_motion(hair: bpy.types.Object, factor: float) -> None:
 
 
 def _grown(settings: Settings, powers: dict[str, int], factor: float) -> dict[str, Any]:
-    """The settings that grow, each times a power of the factor, within its declared limits."""
+    """The settings that scale, each times a power of the factor, within its declared limits."""
     limits = {p.name: p.hard_range or (-np.inf, np.inf) for p in settings.parameters()}
     return {
         name: float(np.clip(getattr(settings, name) * factor**power, *limits[name]))
@@ -93,10 +93,10 @@ def new_groom(
     Args:
         values: an operator, group or settings with the values of GrowSettings.
         presets: names as in `named_preset`.
-        fits: whether lengths and motion follow the mesh's size where it is none of a head.
+        fits: whether lengths and motion follow the mesh's size if it is not a head's.
 
     Raises:
-        HairloomError: as `groom_files.grow_on`, or there is no such preset.
+        HairloomError: see `groom_files.grow_on`; or there is no such preset.
     """
     settings = settings_of(values, GrowSettings)
     factor = fitting_factor(head, depsgraph) if fits else 1.0
@@ -115,7 +115,7 @@ def new_groom(
 
 
 def dress(hair: bpy.types.Object, presets: tuple[str, ...]) -> None:
-    """Give a groom the settings of presets, by name.
+    """Apply presets to a groom, by name.
 
     Raises:
         HairloomError: there is no such preset.
@@ -128,9 +128,9 @@ def dress(hair: bpy.types.Object, presets: tuple[str, ...]) -> None:
 def take_over(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, presets: tuple[str, ...]
 ) -> tuple[bpy.types.Object, tuple[str, ...]]:
-    """Make hair curves of Blender's ready for Hairloom: a groom to preview, and what was done.
+    """Prepare Blender's hair curves for Hairloom; returns the groom, and what was done.
 
-    Its own Hair Dynamics is muted; on hair without a single curve a groom is grown, in its place.
+    Blender's Hair Dynamics is muted. Empty hair is replaced by a groom that is grown.
 
     Args:
         presets: for hair whose look was never set.
@@ -152,7 +152,7 @@ def take_over(
 
 
 def is_untouched(hair: bpy.types.Object) -> bool:
-    """Whether nobody has ever set anything about its look."""
+    """Whether its look has never been changed."""
     group = hair.data.hairloom.shading
     return not any(group.is_property_set(p.name) for p in group.settings.parameters())
 
@@ -160,8 +160,8 @@ def is_untouched(hair: bpy.types.Object) -> bool:
 def _grown_in_place(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[bpy.types.Object, float]:
-    """A groom with the name and in the collections of hair that has no curves, which goes; and how
-    much larger than a human head its head is.
+    """A groom with the name and the collections of empty hair, which it replaces; and how much
+    larger than a human head its head is.
     """
     head = head_of(hair)
     if head is None:
