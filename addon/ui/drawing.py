@@ -1,4 +1,4 @@
-"""Parameters in a panel: a group of them, those of some names, a curve as sliders."""
+"""Drawing parameters in a panel: a group of them, some by name, a curve as sliders."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import bpy
 
 from ..params import Parameter
 
-#: Draws a section of the panels about some hair.
+#: Draws one section of the panels of a groom.
 type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
 
-#: places of a curve's five values
+#: positions of a curve's five values
 _PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
 
 
@@ -26,7 +26,7 @@ def draw_group(layout: bpy.types.UILayout, group: Any) -> None:
 
 
 def draw_named(layout: bpy.types.UILayout, group: Any, names: Sequence[str]) -> None:
-    """The parameters of these names; a curve as one slider a place, from root to tip."""
+    """Draw the parameters of these names; a curve as five sliders, from root to tip."""
     column = layout.column()
     for parameter in group.settings.parameters():
         if parameter.name not in names:

@@ -1,4 +1,4 @@
-"""Panels of the render engine Hairloom, and Blender's own that serve it."""
+"""Panels of the render engine Hairloom, and Blender's own panels that work with it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import bpy
 
 from ..blender.viewport.overlay import ENGINE
 
-#: serve every engine but those with panels of their own for the same
+#: panels for every engine that does not bring its own
 _UNFIT = frozenset({"VIEWLAYER_PT_filter", "RENDER_PT_freestyle"})
-#: serve EEVEE alone, and what they show means the same here
+#: EEVEE's panels whose settings mean the same here
 _FIT = frozenset(
     {
         "EEVEE_MATERIAL_PT_context_material",
@@ -34,7 +34,7 @@ class _RenderPanel(bpy.types.Panel):
 
 
 class HAIRLOOM_PT_engine_sampling(_RenderPanel):
-    """How many samples make one picture."""
+    """Number of samples per pixel"""
 
     bl_label = "Sampling"
 
@@ -48,7 +48,7 @@ class HAIRLOOM_PT_engine_sampling(_RenderPanel):
 
 
 class HAIRLOOM_PT_engine_mesh_shadows(_RenderPanel):
-    """Which shadows meshes throw."""
+    """Shadows that meshes cast"""
 
     bl_label = "Mesh Shadows"
     bl_options = {"DEFAULT_CLOSED"}
@@ -64,7 +64,7 @@ class HAIRLOOM_PT_engine_mesh_shadows(_RenderPanel):
 
 
 class HAIRLOOM_PT_engine_motion_blur(_RenderPanel):
-    """How long the shutter is open."""
+    """How long the shutter is open"""
 
     bl_label = "Motion Blur"
     bl_options = {"DEFAULT_CLOSED"}
@@ -83,7 +83,7 @@ class HAIRLOOM_PT_engine_motion_blur(_RenderPanel):
 
 
 class HAIRLOOM_PT_engine_film(_RenderPanel):
-    """What lies behind the scene, and how sharp a pixel is."""
+    """Background, and pixel filter"""
 
     bl_label = "Film"
     bl_options = {"DEFAULT_CLOSED"}
@@ -97,7 +97,7 @@ class HAIRLOOM_PT_engine_film(_RenderPanel):
 
 
 class HAIRLOOM_PT_engine_passes(bpy.types.Panel):
-    """What is rendered beside the picture."""
+    """Passes rendered besides the image"""
 
     bl_label = "Data"
     bl_space_type = "PROPERTIES"
@@ -128,7 +128,7 @@ CLASSES = (
 
 
 def register() -> None:
-    """Let Blender's panels show themselves with our engine, as its documentation has it."""
+    """Show Blender's panels with our engine, as its documentation suggests."""
     for panel in _panels(bpy.types.Panel):
         engines = getattr(panel, "COMPAT_ENGINES", None)
         name = panel.__name__
@@ -146,7 +146,7 @@ def unregister() -> None:
 
 
 def _panels(parent: type[Any]) -> list[type[Any]]:
-    """All panels there are, also those that are made from others."""
+    """All registered panels, also those derived from others."""
     found = []
     for each in parent.__subclasses__():
         found += [each, *_panels(each)]

@@ -1,4 +1,4 @@
-"""What growing hair asks for, shared by the operators that grow some."""
+"""Options of growing hair, shared by the operators that do."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ GROW_PROPERTIES: dict[str, Any] = {
     **operator_properties("grow"),
     "density_group": StringProperty(
         name="Density",
-        description="Vertex group or float attribute on points that says how densely hair "
-        "grows; empty: on the scalp if combed, else everywhere",
+        description="Vertex group or float attribute on points that sets how densely hair "
+        "grows. If empty, combed hair grows on the scalp, other hair everywhere",
         search=_weight_names,
         search_options={"SUGGESTION"},
     ),
     "length_group": StringProperty(
         name="Length Factor",
         description="Vertex group or float attribute on points that the length is multiplied "
-        "by; empty: all as long as said",
+        "by. If empty, all hair has the same length",
         search=_weight_names,
         search_options={"SUGGESTION"},
     ),
@@ -58,7 +58,7 @@ GROW_PROPERTIES: dict[str, Any] = {
 def draw_grow(
     layout: bpy.types.UILayout, operator: Any, names: Iterable[str] = GROW_PROPERTIES
 ) -> None:
-    """Only what acts in the way that is chosen."""
+    """Draw only the options of the chosen method."""
     hidden = _NORMALS_ONLY if operator.way == "combed" else _COMBED_ONLY
     if operator.way == "normals" and operator.per_vertex:
         hidden += ("strand_count",)

@@ -1,7 +1,7 @@
-"""Operators whose work is long: in steps, with progress, and cancelled by Esc.
+"""Operators that take long: they work in steps, show progress, and Esc cancels them.
 
-An artist's click runs the steps in spells on a timer, so that the window lives. Scripts, the
-background and Adjust Last Operation take the same steps all at once.
+After a click, a timer runs the steps in short slices, so that the window stays responsive. Scripts,
+background mode and Adjust Last Operation run the same steps at once.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from ..blender.base.redraw import redraw_panels
 from ..blender.base.thread_work import ThreadWork
 from .reports import reporting, waiting
 
-#: Work this long [s] between two looks at the keyboard.
+#: Length [s] of a slice of work between two looks at the keyboard.
 _SPELL = 0.1
-#: Time between two spells [s], and between two looks at a thread where there is no window.
+#: Time [s] between two slices, and between two looks at a thread if there is no window.
 _PAUSE = 0.01
 
 
 class Progress(NamedTuple):
-    """How far work is.
+    """How far the work has come.
 
     share: of all, 0 to 1; None where nobody knows.
     waits: there is nothing to do just now, since a thread works.
@@ -42,27 +42,27 @@ type Steps[Result] = Generator[Progress, None, Result]
 class LongWork:
     """Base of an operator, before bpy.types.Operator.
 
-    `steps` is the work and what is told of it. An operator's poll begins with `is_free`.
+    `steps` does the work and reports it. An operator's poll starts with `is_free`.
 
-    unharmed: what the artist is told after Esc.
+    unharmed: what is true after Esc, for the report.
     """
 
     unharmed = "nothing has changed"
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        """All of the work, up to its reports.
+        """The whole work, including its reports.
 
-        The first step comes at once and may raise what is wrong with the input; closing the steps
+        The first step runs immediately and may raise errors of the input. Closing the generator
         leaves nothing half done.
 
         Raises:
-            HairloomError: it cannot be done, which becomes a report.
+            HairloomError: it cannot be done; becomes a report.
         """
         raise NotImplementedError
 
     @classmethod
     def is_free(cls: Any) -> bool:
-        """For `poll`: whether no other long work goes on; says which on the greyed-out button."""
+        """For `poll`: whether no other long operator runs; the greyed button says which does."""
         if _running is None:
             return True
         cls.poll_message_set(f"{_running.label} goes on; Esc cancels it")
@@ -72,7 +72,7 @@ class LongWork:
     def execute(self: Any, context: bpy.types.Context) -> set[str]:
         global _running
         steps = self.steps(context)
-        # a repeated operator is not Blender's to keep, so it cannot stay in the window
+        # Blender does not keep a repeated operator, so it cannot run modally
         how = self.options
         is_repeated = how.is_repeat or how.is_repeat_last
         if bpy.app.background or not how.is_invoke or is_repeated:
@@ -89,7 +89,7 @@ class LongWork:
         return {"RUNNING_MODAL"}
 
     def modal(self: Any, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Everything else waits: what is edited meanwhile would be in half of the work."""
+        """Block all other events: edits in between would affect only part of the work."""
         if _running is None:
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS":
@@ -125,9 +125,9 @@ class LongWork:
 
 
 class _Running:
-    """The work that goes on in the window; Blender does not tell an operator that it is disabled.
+    """The work that runs in the window; Blender does not notify an operator of being disabled.
 
-    progress: the last that was told.
+    progress: as last reported.
     """
 
     def __init__(self, operator: Any, steps: Steps[None], window: bpy.types.Window) -> None:
@@ -140,7 +140,7 @@ class _Running:
             each.append(_on_undo)
 
     def tell(self, progress: Progress) -> None:
-        """In the status bar, at the mouse pointer and in panels."""
+        """Show the progress in the status bar, at the mouse pointer and in panels."""
         if progress == self.progress:
             return
         self.progress = progress
@@ -155,7 +155,7 @@ class _Running:
         redraw_panels()
 
     def end(self) -> None:
-        """Leave no timer, no handler and no text."""
+        """Remove the timer, the handlers and the text."""
         for each in _undoing():
             each.remove(_on_undo)
         manager = bpy.context.window_manager  # another than before, when a file is loaded
@@ -173,7 +173,7 @@ def _undoing() -> tuple[list[Any], ...]:
 
 @persistent  # it goes when the work ends, which may be after a file is loaded
 def _on_undo(*_: Any) -> None:
-    """Keys cannot undo meanwhile, but scripts can, and what the work holds on to would be gone."""
+    """Keys cannot undo during the work, but scripts can; its references would then be invalid."""
     stop()
 
 
@@ -181,12 +181,12 @@ _running: _Running | None = None
 
 
 def running() -> str:
-    """The label of the work that goes on in the window; "" when there is none."""
+    """The label of the operator that runs in the window; "" if there is none."""
     return "" if _running is None else _running.label
 
 
 def draw_progress(layout: bpy.types.UILayout, operator: type[LongWork]) -> bool:
-    """In a panel, in the place of the button: how far this work is. False: it does not go on."""
+    """Draw the progress instead of the operator's button. Returns False if it does not run."""
     if _running is None or _running.operator is not operator:
         return False
     text, share, _ = _running.progress
@@ -198,14 +198,14 @@ def draw_progress(layout: bpy.types.UILayout, operator: type[LongWork]) -> bool:
 
 
 def counted(steps: Generator[int], total: int, things: str) -> Steps[None]:
-    """Work that tells how many things are done; things: what they are, such as "frames"."""
+    """Work that reports how many things are done; things: their name, such as "frames"."""
     with closing(steps):
         for done in steps:
             yield Progress(f"{done:,} of {total:,} {things}", done / total)
 
 
 def shared[Result](steps: Generator[float, None, Result]) -> Steps[Result]:
-    """Work that tells the share that is done."""
+    """Work that reports the fraction that is done."""
     with closing(steps):
         while True:
             try:
@@ -217,7 +217,7 @@ def shared[Result](steps: Generator[float, None, Result]) -> Steps[Result]:
 
 
 def threaded[Result](work: ThreadWork[Result]) -> Steps[Result]:
-    """Work in a thread, which tells what it does; closing it gives the work up."""
+    """Work in a thread, which reports its progress; closing the generator abandons it."""
     try:
         while not work.serve():
             yield Progress(work.stage, waits=not work.asks)
@@ -227,7 +227,7 @@ def threaded[Result](work: ThreadWork[Result]) -> Steps[Result]:
 
 
 def stop() -> None:
-    """End the work, if some goes on: leave no timer, no text and nothing half written."""
+    """Cancel the running work, if any: no timer, no text and no half-written file remains."""
     global _running
     if _running is None:
         return

@@ -1,4 +1,4 @@
-"""Texts in panels, in as many lines as the region needs."""
+"""Text in panels, wrapped to the width of the region."""
 
 from __future__ import annotations
 

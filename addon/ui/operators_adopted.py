@@ -1,4 +1,4 @@
-"""The artist's own hair cards: sorted, and shaded, by one button."""
+"""Sort Hair Cards: the artist's own cards, sorted and given ambient occlusion."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .long_work import LongWork, Steps, shared
 from .selection import active_mesh
 
 _WAYS = (
-    ("auto", "Automatic", "Found by which end of the UVs is nearer to the head"),
+    ("auto", "Automatic", "Detect by the end of the UVs that is nearer to the head"),
     ("down", "Down", "Roots are at the top of the texture"),
     ("up", "Up", "Roots are at the bottom of the texture"),
     ("right", "Right", "Roots are at the left of the texture"),
@@ -31,8 +31,8 @@ _WAYS = (
 
 
 class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
-    """Put the faces of the active mesh of hair cards into the order in which engines have to draw
-    them, from the inside to the outside, and store ambient occlusion. Esc cancels"""
+    """Sort the faces of the active mesh of hair cards from the inside to the outside, the order in
+    which engines must draw them, and store ambient occlusion. Esc cancels"""
 
     bl_idname = "hairloom.sort_cards"
     bl_label = "Sort Hair Cards"
@@ -41,7 +41,7 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
     __annotations__ = {
         "head": StringProperty(
             name="Head",
-            description="The mesh that the hair grows from, which shades it as well",
+            description="The mesh that the hair grows from; it also occludes the cards",
         ),
         "by": EnumProperty(name="Order By", description="What is sorted", items=ORDERS),
         "dangling": StringProperty(
@@ -51,7 +51,7 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
         ),
         "way": EnumProperty(
             name="Root to Tip",
-            description="Which way hair runs on the texture",
+            description="Direction of the hair on the texture",
             items=_WAYS,
         ),
         "use_occlusion": BoolProperty(
@@ -61,7 +61,7 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
         ),
         "alpha": StringProperty(
             name="Alpha",
-            description="Picture that says where cards are clear; empty: that of their material",
+            description="Image whose alpha makes cards transparent. If empty: the material's",
         ),
         **operator_properties("card_occlusion"),
     }
@@ -145,7 +145,7 @@ def _named_head(name: str, cards: bpy.types.Object) -> bpy.types.Object | None:
     head = bpy.data.objects.get(name)
     if head is None or head.type != "MESH" or head == cards:
         raise HairloomError(
-            "it is no mesh that hair could grow from" if head else "there is no such object",
+            "it is not a mesh that hair could grow from" if head else "there is no such object",
             place=f"Head '{name}'",
             remedy="Choose the mesh of the head, or none",
         )

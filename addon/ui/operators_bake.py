@@ -1,4 +1,4 @@
-"""Bake and Delete Bake: the motion of hair and fins on disk, for the viewport and for renders."""
+"""Bake and Delete Bake: the motion of hair and fins, on disk, for the viewport and renders."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
     bl_idname = "hairloom.bake"
     bl_label = "Bake"
     bl_options = {"REGISTER", "UNDO"}
-    unharmed = "what was baked before stays"
+    unharmed = "the previous bake is kept"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -57,7 +57,7 @@ class HAIRLOOM_OT_bake_free(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not long_work.running() and any(has_bake(obj) for obj in chosen(context)):
             return True
-        cls.poll_message_set("Nothing that is selected has a bake")
+        cls.poll_message_set("Nothing selected has a bake")
         return False
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -71,12 +71,12 @@ class HAIRLOOM_OT_bake_free(bpy.types.Operator):
 
 
 def chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """What the bake's buttons are about: hair as elsewhere, and selected fins."""
+    """The objects that the buttons apply to: hair, as for other buttons, and selected fins."""
     return list(dict.fromkeys(filter(bakeable, (*chosen_hair(context), *context.selected_objects))))
 
 
 def has_bake(obj: bpy.types.Object) -> bool:
-    """Whether there is a bake, be it damaged."""
+    """Whether there is a bake, even a damaged one."""
     try:
         return playback.cache_of(obj) is not None
     except HairloomError:
@@ -84,7 +84,7 @@ def has_bake(obj: bpy.types.Object) -> bool:
 
 
 def draw_bake(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
-    """The settings of the bake of hair or a fin, its buttons, and what there is on disk."""
+    """Draw the bake settings of hair or a fin, the buttons, and what is on disk."""
     bake = obj.hairloom.bake
     layout.prop(bake, "folder")
     layout.prop(bake, "use_own_range")

@@ -1,4 +1,4 @@
-"""What hair stays out of: spheres fitted to a mesh, and what the panels show of colliders."""
+"""Colliders: Fit Spheres and Remove Spheres, and the panels."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _MILLIMETRES = 1000.0
 
 
 class HAIRLOOM_OT_fit_spheres(bpy.types.Operator):
-    """Fit spheres to the active mesh, or to the mesh that the active hair grows on. They follow it,
-    also when an armature deforms it, and hair collides with them faster than with a mesh"""
+    """Fit spheres to the active mesh, or to the mesh that the active hair grows on. They follow it
+    even if an armature deforms it, and are faster to collide with than a mesh"""
 
     bl_idname = "hairloom.fit_spheres"
     bl_label = "Fit Spheres"
@@ -27,8 +27,8 @@ class HAIRLOOM_OT_fit_spheres(bpy.types.Operator):
     __annotations__ = {
         **operator_properties("sphere_fit"),
         "replace_mesh": BoolProperty(
-            name="In Place of the Mesh",
-            description="The mesh itself collides no longer, so that Play need not prepare it",
+            name="Replace Mesh",
+            description="Stop colliding with the mesh itself, so that Play need not prepare it",
             default=True,
         ),
     }
@@ -69,8 +69,8 @@ class HAIRLOOM_OT_fit_spheres(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_remove_spheres(bpy.types.Operator):
-    """Remove the spheres that were fitted to the active mesh, or to the mesh that the active hair
-    grows on, which then collides by itself again"""
+    """Remove the spheres fitted to the active mesh, or to the mesh that the active hair grows on.
+    The mesh itself collides again"""
 
     bl_idname = "hairloom.remove_spheres"
     bl_label = "Remove Spheres"
@@ -94,7 +94,7 @@ class HAIRLOOM_OT_remove_spheres(bpy.types.Operator):
 
 
 def draw_colliders(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """What these hair curves, or this fin, collide with."""
+    """Draw what hair curves, or a fin, collide with."""
     column = layout.column()
     column.prop(hair.hairloom, "collider")
     column.prop(hair.hairloom, "collider_collection")
@@ -107,7 +107,7 @@ def draw_colliders(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 class HAIRLOOM_PT_collider(bpy.types.Panel):
-    """How this object collides with hair whose colliders it is among"""
+    """How this object collides with hair that has it among its colliders"""
 
     bl_label = "Hairloom Collider"
     bl_space_type = "PROPERTIES"
@@ -132,7 +132,7 @@ def _mesh(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def _has_mesh(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """For `poll`: whether there is one; says what to do on the greyed-out button."""
+    """For `poll`: whether there is one; the greyed-out button says what to do."""
     if context.mode != "OBJECT":
         operator.poll_message_set("Go to Object Mode first")
         return False

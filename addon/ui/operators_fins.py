@@ -1,4 +1,4 @@
-"""Fins: a mesh that becomes cloth; its buttons, and its panels (Physics, and the sidebar)."""
+"""Fins, meshes that move as cloth: their buttons, and their panels in Physics and the sidebar."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .selection import active_mesh
 
 
 class HAIRLOOM_OT_fin_add(bpy.types.Operator):
-    """Let the active mesh move as cloth, pinned by a vertex group"""
+    """Make the active mesh move as cloth, pinned by a vertex group"""
 
     bl_idname = "hairloom.fin_add"
     bl_label = "Make Fin"
@@ -40,12 +40,14 @@ class HAIRLOOM_OT_fin_add(bpy.types.Operator):
             fin.pin_group = obj.vertex_groups.active.name
             self.report({"INFO"}, f"Pinned by the vertex group {fin.pin_group}")
         elif not fin.pin_group:
-            self.report({"WARNING"}, "Nothing is pinned yet: choose a Pin Group, or it will fall")
+            self.report(
+                {"WARNING"}, "Nothing is pinned yet: choose a Pin Group, or the mesh will fall"
+            )
         return {"FINISHED"}
 
 
 class HAIRLOOM_OT_fin_remove(bpy.types.Operator):
-    """Make the active fin a plain mesh again; its shape is as it was"""
+    """Make the active fin a plain mesh again, in its original shape"""
 
     bl_idname = "hairloom.fin_remove"
     bl_label = "Remove Fin"
@@ -66,7 +68,7 @@ class HAIRLOOM_OT_fin_remove(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_fin_preview(bpy.types.Operator):
-    """Let Play and Blender's playback move the active fin, or no longer"""
+    """Toggle whether Play and Blender's playback move the active fin"""
 
     bl_idname = "hairloom.fin_preview"
     bl_label = "Preview Fin"
@@ -90,7 +92,7 @@ class HAIRLOOM_OT_fin_preview(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_fin_reset(bpy.types.Operator):
-    """Put the active fin back to where the animation carries it"""
+    """Move the active fin back to its animated shape"""
 
     bl_idname = "hairloom.fin_reset"
     bl_label = "Reset Fin"
@@ -129,7 +131,7 @@ FIN: dict[str, tuple[str, ...]] = {
 
 
 def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
-    """Buttons and settings of a mesh that is, or may become, a fin."""
+    """Draw the buttons and settings of a mesh that is, or may become, a fin."""
     if fin_modifier(obj) is None:
         layout.operator("hairloom.fin_add", icon="MOD_CLOTH")
         return
@@ -156,7 +158,7 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
 
 
 def draw_switch(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
-    """Whether the fin moves, in the header of its panel."""
+    """Draw whether the fin moves, in the header of its panel."""
     if fin_modifier(obj) is not None:
         layout.prop(obj.hairloom.fin, "enabled", text="")
 
@@ -207,7 +209,7 @@ class HAIRLOOM_PT_sidebar_fin(bpy.types.Panel):
 
 
 def _can_change(operator: type[Any], context: bpy.types.Context) -> bool:
-    """Whether there is an active mesh that may get or lose modifiers; says so on the button."""
+    """For `poll`: whether the active mesh can get or lose modifiers; the button says why not."""
     obj = active_mesh(context)
     if obj is None:
         operator.poll_message_set("Select a mesh")

@@ -1,4 +1,4 @@
-"""The buttons beside warnings: each mends what is wrong with the active hair."""
+"""The buttons beside warnings: each fixes a problem of the active hair."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ..errors import HairloomError
 from .reports import reporting, waiting
 from .selection import chosen_hair, needs_hair
 
-#: for Smart UV Project: the steepest turn within an island [rad], the room between islands
-_STEEPEST, _ROOM = 1.15, 0.02
+#: for Smart UV Project: the largest angle within an island [rad], the margin between islands
+_ANGLE_LIMIT, _ISLAND_MARGIN = 1.15, 0.02
 
 
 class HAIRLOOM_OT_set_surface(bpy.types.Operator):
-    """Let the active hair grow from the selected mesh; else from the mesh that is closest to it"""
+    """Attach the active hair to the selected mesh; if none is selected, to the closest mesh"""
 
     bl_idname = "hairloom.set_surface"
     bl_label = "Set Surface"
@@ -41,7 +41,7 @@ class HAIRLOOM_OT_set_surface(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_snap_roots(bpy.types.Operator):
-    """Move each strand of the active hair so that its root lies on the surface"""
+    """Move the strands of the active hair so that their roots lie on the surface"""
 
     bl_idname = "hairloom.snap_roots"
     bl_label = "Snap Roots to Surface"
@@ -92,7 +92,7 @@ class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
             bpy.ops.object.mode_set(mode="EDIT")
             try:
                 bpy.ops.mesh.select_all(action="SELECT")
-                bpy.ops.uv.smart_project(angle_limit=_STEEPEST, island_margin=_ROOM)
+                bpy.ops.uv.smart_project(angle_limit=_ANGLE_LIMIT, island_margin=_ISLAND_MARGIN)
             finally:
                 bpy.ops.object.mode_set(mode="OBJECT")
         set_surface(hair, head)
@@ -100,7 +100,7 @@ class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_apply_scale(bpy.types.Operator):
-    """Put the scale of the active hair's object into its curves; nothing moves"""
+    """Apply the scale of the active hair's object to its curves. The hair does not move"""
 
     bl_idname = "hairloom.apply_scale"
     bl_label = "Apply Scale"
@@ -128,14 +128,14 @@ class HAIRLOOM_OT_apply_scale(bpy.types.Operator):
             raise HairloomError(
                 "its parent is scaled unevenly too",
                 place=hair.name,
-                remedy="Apply the scale of the parent (Ctrl A); until then only widths are a mean",
+                remedy="Apply the scale of the parent (Ctrl A); until then widths are averaged",
             )
         return {"FINISHED"}
 
 
 @contextmanager
 def _alone(context: bpy.types.Context, obj: bpy.types.Object) -> Iterator[None]:
-    """Only this object is selected and active, for Blender's operators; then all is as before."""
+    """Select this object alone, for Blender's operators; then restore the selection."""
     selected, active = context.selected_objects, context.view_layer.objects.active
     for other in selected:
         other.select_set(False)

@@ -1,4 +1,4 @@
-"""Presets: taking one over, saving and deleting the artist's own; and the look of a material."""
+"""Presets: applying, saving and deleting them; and Look from Material."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .selection import chosen_hair, needs_hair
 
 
 class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
-    """Take over these settings for the selected hair"""
+    """Apply these settings to the selected hair"""
 
     bl_idname = "hairloom.apply_preset"
     bl_label = "Apply Preset"
@@ -38,14 +38,16 @@ class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_save_preset(bpy.types.Operator):
-    """Keep these settings of the selected hair as a preset of your own, in all files"""
+    """Save these settings of the selected hair as your own preset, available in all files"""
 
     bl_idname = "hairloom.save_preset"
     bl_label = "Save as Preset"
 
     section: KIND
     title: StringProperty(
-        name="Name", description="A preset of yours that has this name is replaced", maxlen=40
+        name="Name",
+        description="Name of the preset. Your own preset of this name is replaced",
+        maxlen=40,
     )
 
     @classmethod
@@ -67,7 +69,7 @@ class HAIRLOOM_OT_save_preset(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_delete_preset(bpy.types.Operator):
-    """Delete this preset of your own for good"""
+    """Delete this preset of yours permanently"""
 
     bl_idname = "hairloom.delete_preset"
     bl_label = "Delete Preset"
@@ -84,7 +86,7 @@ class HAIRLOOM_OT_delete_preset(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_look_from_material(bpy.types.Operator):
-    """Take the Principled Hair of the hair's material as the look to start from"""
+    """Derive the look from the Principled Hair BSDF of the hair's material"""
 
     bl_idname = "hairloom.look_from_material"
     bl_label = "Look from Material"

@@ -1,8 +1,8 @@
 """Preview, Play, Pause and Reset: hair in the 3D viewport. None of them changes the file.
 
-Play is free of the timeline: hair swings by the clock, at the scene's rate, while the artist moves
-the head or the sliders. Blender's own playback moves hair too, frame by frame; when it starts while
-hair plays, it takes over. No key is taken but Esc, which stops: Space stays Blender's.
+Play is independent of the timeline: hair moves in real time, at the scene's frame rate, while the
+artist moves the head or the sliders. Blender's own playback also moves hair, frame by frame, and
+takes over if it starts during Play. Only Esc is used as a key, to stop; Space remains Blender's.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from ..blender.sessions.fins import any_enabled
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
 
-#: Ticks are at least this often [1/s], so that a frame is late by a fraction of itself.
+#: Minimum rate of ticks [1/s], so that a frame is delayed by a fraction of its length only.
 TICKS_PER_SECOND = 120.0
 STATUS = "Hairloom plays. Move the head or the sliders. Esc: stop, the hair returns to its style"
 PAUSED = "Hairloom is paused: press Resume in its panel. Esc: stop"
 
 
-#: ticks while hair plays; kept here because Blender does not tell an operator that it is disabled
+#: ticks while hair plays; kept here because Blender does not notify an operator of being disabled
 _timer: bpy.types.Timer | None = None
 
 
 class HAIRLOOM_OT_preview(bpy.types.Operator):
-    """Draw the selected hair in the 3D viewport as it will look in an engine"""
+    """Draw the selected hair in the 3D viewport as it will look in a game engine"""
 
     bl_idname = "hairloom.preview"
     bl_label = "Preview"
@@ -53,7 +53,7 @@ class HAIRLOOM_OT_preview(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_play(bpy.types.Operator):
-    """Let previewed hair and fins move by the clock: they follow, fall and swing. Esc stops them"""
+    """Simulate previewed hair and fins in real time. Esc stops them"""
 
     bl_idname = "hairloom.play"
     bl_label = "Play"
@@ -109,7 +109,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
         stop_ticking()
 
     def _tick(self, context: bpy.types.Context) -> None:
-        """Simulate the scene's frames that are due, in one go: the head has moved but once."""
+        """Simulate the scene's frames that are due, in one step: the head has moved only once."""
         now, rate = time.perf_counter(), frame_rate(context.scene)
         if live.is_paused() or is_suspended():
             self._pace.skip(now)
@@ -120,7 +120,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_pause(bpy.types.Operator):
-    """Hold hair that plays where it is, or let it go on from there"""
+    """Pause the simulation of hair that plays, or resume it"""
 
     bl_idname = "hairloom.pause"
     bl_label = "Pause"
@@ -129,7 +129,7 @@ class HAIRLOOM_OT_pause(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if live.is_playing():
             return True
-        cls.poll_message_set("No hair plays: press Play first")
+        cls.poll_message_set("No hair is playing: press Play first")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -162,7 +162,7 @@ class HAIRLOOM_OT_mute_hair_dynamics(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_reset(bpy.types.Operator):
-    """Put previewed hair back into its style, where the head is now"""
+    """Return previewed hair to its style, at the head's present position"""
 
     bl_idname = "hairloom.reset"
     bl_label = "Reset"
@@ -188,7 +188,7 @@ def start_ticking(context: bpy.types.Context) -> bpy.types.Timer:
 
 
 def stop_ticking() -> None:
-    """Leave no timer and no text in the status bar, however Play ends."""
+    """Remove the timer and the text in the status bar, however Play ends."""
     global _timer
     if _timer is None:
         return
@@ -201,7 +201,7 @@ def stop_ticking() -> None:
 def start_preview(
     operator: bpy.types.Operator, context: bpy.types.Context, hair: list[bpy.types.Object]
 ) -> None:
-    """Preview what is not yet previewed, and say what was read."""
+    """Preview what is not yet previewed, and report what was read."""
     depsgraph = context.evaluated_depsgraph_get()
     for each in hair:
         if live.session_of(each) is None:

@@ -11,8 +11,8 @@ from .reports import waiting
 
 
 class HAIRLOOM_OT_self_test(bpy.types.Operator):
-    """Try out on this machine what Hairloom stands on: shaders, simulation, drawing and files.
-    Takes a few seconds and changes nothing"""
+    """Test shaders, simulation, drawing and files on this machine. Takes a few seconds and changes
+    nothing"""
 
     bl_idname = "hairloom.self_test"
     bl_label = "Self-Test"
@@ -24,12 +24,12 @@ class HAIRLOOM_OT_self_test(bpy.types.Operator):
         for check in failed:
             self.report({"WARNING"}, f"{check.name}: {check.text}")
         if not failed:
-            self.report({"INFO"}, f"All {len(checks)} checks are done; none failed")
+            self.report({"INFO"}, f"All {len(checks)} checks done, none failed")
         return {"FINISHED"}
 
 
 class HAIRLOOM_OT_copy_report(bpy.types.Operator):
-    """Copy what the self-test found, and what this machine is, as text"""
+    """Copy the results of the self-test and the system information as text"""
 
     bl_idname = "hairloom.copy_report"
     bl_label = "Copy Report"

@@ -1,4 +1,4 @@
-"""Showing a groom to others: a turntable, and a contact sheet."""
+"""Turntable and Contact Sheet, to show a groom to others."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SAMPLES = IntProperty(
 
 
 class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
-    """Turn the active hair once before a camera: pictures, and a video of them. Esc cancels"""
+    """Render a turntable of the active hair, as pictures and as a video. Esc cancels"""
 
     bl_idname = "hairloom.turntable"
     bl_label = "Turntable"
@@ -33,7 +33,7 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
 
     directory: StringProperty(
         name="Folder",
-        description="Where the pictures and the video go",
+        description="Folder for the pictures and the video",
         subtype="DIR_PATH",
         options={"SKIP_SAVE", "HIDDEN"},
     )
@@ -44,7 +44,7 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
     )
     frames: IntProperty(
         name="Frames",
-        description="Pictures in a whole turn",
+        description="Number of pictures in a full turn",
         default=48,
         min=FRAMES[0],
         max=FRAMES[1],
@@ -60,13 +60,13 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
         subtype="PIXEL",
     )
     samples: _SAMPLES
-    lights: EnumProperty(name="Lights", description="What the lights go with", items=LIGHTS)
+    lights: EnumProperty(name="Lights", description="What the lights move with", items=LIGHTS)
     transparent: BoolProperty(
         name="Transparent", description="Pictures without a backdrop", default=False
     )
     video: BoolProperty(
         name="Video",
-        description="Write a video of the pictures as well, with the scene's frame rate",
+        description="Also write a video of the pictures, at the scene's frame rate",
         default=True,
     )
 
@@ -111,7 +111,7 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
 
 
 class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
-    """Draw the active hair from all sides, or in all looks, as one picture"""
+    """Draw the active hair from all sides, or in all looks, in one picture"""
 
     bl_idname = "hairloom.contact_sheet"
     bl_label = "Contact Sheet"
@@ -121,7 +121,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
     filter_glob: StringProperty(default="*.png", options={"HIDDEN"})
     shows: EnumProperty(
         name="Shows",
-        description="What the pictures of the sheet differ in",
+        description="What differs between the pictures of the sheet",
         items=(
             ("sides", "All Sides", "Front, three-quarter, side, back, top, and a close-up"),
             ("looks", "All Looks", "One view in all looks that come with Hairloom"),
@@ -166,7 +166,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
 
 
 def _shown(operator: bpy.types.Operator, context: bpy.types.Context) -> ShownGroom:
-    """The active hair as it is now, after what the artist should know of it."""
+    """The active hair in its present state; reports its warnings first."""
     hair = chosen_hair(context)[0]
     shown = shown_groom(hair, context.evaluated_depsgraph_get())
     for note in shown.notes:

@@ -1,5 +1,5 @@
-"""The first five minutes: a groom on a mesh, on hair of Blender's, or in a sample scene; it moves
-and shines at once.
+"""The first five minutes: a groom on a mesh, on Blender's hair, or in a sample scene, shaded and
+moving at once.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _NO_MESH = "Select the mesh to grow hair on, or add a sample: Add > Curve > Hair
 
 
 class HAIRLOOM_OT_add_groom(bpy.types.Operator):
-    """Grow a groom on the active mesh, with a look, and let it move"""
+    """Grow a groom with a look on the active mesh, and simulate it"""
 
     bl_idname = "hairloom.add_groom"
     bl_label = "Hairloom Groom"
@@ -34,8 +34,8 @@ class HAIRLOOM_OT_add_groom(bpy.types.Operator):
         **NEW_GROOM,
         "fits": BoolProperty(
             name="Fit to Mesh",
-            description="Hair as long for this mesh as it would be on a head, and wind as strong, "
-            "if its size is none of a head or body",
+            description="Scale lengths and motion to the mesh, unless it has the size of a human "
+            "head or body",
             default=True,
         ),
         **GROW_PROPERTIES,
@@ -72,8 +72,8 @@ class HAIRLOOM_OT_add_groom(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_sample_scene(bpy.types.Operator):
-    """Add a scene with a head that turns, long hair, lights and a camera, and play it. Your own
-    scenes stay as they are"""
+    """Add and play a scene with a turning head, long hair, lights and a camera. Your own scenes are
+    not changed"""
 
     bl_idname = "hairloom.sample_scene"
     bl_label = "Hairloom Sample Scene"
@@ -106,8 +106,8 @@ class HAIRLOOM_OT_sample_scene(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_use_groom(bpy.types.Operator):
-    """Preview the selected hair with Hairloom: Blender's own Hair Dynamics is turned off, hair
-    without curves is grown, and a look is given to what has none"""
+    """Preview the selected hair with Hairloom. Turns off Blender's Hair Dynamics, grows hair if
+    there are no curves, and adds a look if there is none"""
 
     bl_idname = "hairloom.use_groom"
     bl_label = "Use Hairloom"
@@ -137,8 +137,8 @@ class HAIRLOOM_OT_use_groom(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
-    """Make hair curves of the particle hair of the active mesh, bound to it, and preview them. The
-    particles are hidden, not deleted"""
+    """Convert the particle hair of the active mesh to hair curves attached to it, and preview them.
+    The particles are hidden, not deleted"""
 
     bl_idname = "hairloom.convert_particles"
     bl_label = "Convert Particle Hair"
@@ -168,7 +168,7 @@ class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_show_settings(bpy.types.Operator):
-    """Make the hair active and show all of its settings, in Properties > Data"""
+    """Make the hair active and show all its settings in Properties > Data"""
 
     bl_idname = "hairloom.show_settings"
     bl_label = "All Settings"

@@ -1,4 +1,4 @@
-"""The add-on's page in Blender's Preferences: defaults, the GPU, and a self-test."""
+"""The add-on's Preferences page: defaults, the GPU, and a self-test."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ def _ways(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
 NEW_GROOM: dict[str, Any] = {
     "look": StringProperty(
         name="Look",
-        description="Preset of the look that a new groom has; empty: the plain defaults",
+        description="Look preset of new grooms. If empty, the plain defaults are used",
         default=LOOK,
         search=_looks,
         search_options={"SUGGESTION"},
     ),
     "motion": StringProperty(
         name="Dynamics",
-        description="Preset of the way in which a new groom moves; empty: the plain defaults",
+        description="Motion preset of new grooms. If empty, the plain defaults are used",
         default=DYNAMICS,
         search=_ways,
         search_options={"SUGGESTION"},
     ),
     "plays": BoolProperty(
         name="Play at Once",
-        description="Let a new groom move as soon as it is there; off: it is previewed at rest",
+        description="Simulate new grooms as soon as they are created. If off, they are at rest",
         default=True,
     ),
 }
@@ -54,7 +54,7 @@ _FORM = operator_properties("dynamics")["form"]
 
 
 class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
-    """What new grooms begin with, and whether all works on this machine"""
+    """Defaults of new grooms, and a test of this machine"""
 
     bl_idname = ROOT_PACKAGE
 
@@ -63,12 +63,12 @@ class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
         "form": _FORM,
         "follows": BoolProperty(
             name="Simulate on Playback",
-            description="Simulate new grooms while Blender plays its animation; off: only by Play",
+            description="Simulate new grooms during Blender's playback. If off, only Play does",
             default=True,
         ),
         "show_counts": BoolProperty(
             name="Counts in the Viewport",
-            description="Write counts and times of new grooms into the viewport",
+            description="Show counts and times of new grooms in the viewport",
             default=False,
         ),
     }

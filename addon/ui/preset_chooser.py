@@ -1,5 +1,5 @@
-"""Presets in the panels: one button that opens all of a section with their pictures, one that
-saves."""
+"""Presets in the panels: a button that shows all presets of a section with their pictures, and one
+that saves."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KINDS: dict[str, tuple[str, str]] = {
 #: for the operators that are about presets of one kind
 KIND = EnumProperty(
     name="Kind",
-    description="What the presets are about",
+    description="Section that the presets belong to",
     items=[(section, *texts) for section, texts in KINDS.items()],
     options={"SKIP_SAVE"},
 )
@@ -35,7 +35,7 @@ _ACROSS, _PICTURE_SCALE, _WIDTH, _LETTERS = 3, 5.0, 330, 42
 def draw_preset_row(
     layout: bpy.types.UILayout, hair: bpy.types.Object, section: str = "shading", text: str = ""
 ) -> None:
-    """The two buttons; for looks also the material's, where there is one."""
+    """Draw the two buttons; for looks also Look from Material, if there is a material."""
     row = layout.row(align=True)
     chooser = row.operator("hairloom.choose_preset", text=text or "Presets", icon="PRESET")
     chooser.section = section
@@ -45,7 +45,7 @@ def draw_preset_row(
 
 
 class HAIRLOOM_OT_choose_preset(bpy.types.Operator):
-    """Choose among the presets that come with Hairloom, and your own"""
+    """Choose one of Hairloom's presets, or of your own"""
 
     bl_idname = "hairloom.choose_preset"
     bl_label = "Presets"
@@ -78,7 +78,7 @@ class HAIRLOOM_OT_choose_preset(bpy.types.Operator):
 
 
 def _draw_grid(layout: bpy.types.UILayout, entries: tuple[Entry, ...]) -> None:
-    """A button a preset, below its picture where it has one."""
+    """Draw a button for each preset, below its picture if it has one."""
     grid = layout.grid_flow(row_major=True, columns=_ACROSS, even_columns=True, align=False)
     for entry in entries:
         cell = grid.column(align=True)

@@ -1,4 +1,4 @@
-"""How operators tell the artist what happened."""
+"""Operator reports."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..errors import HairloomError
 
 
 def reporting(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
-    """For an operator's `execute`: bad input becomes an error report, not a traceback."""
+    """Decorator of an operator's `execute`: bad input becomes an error report, not a traceback."""
 
     @functools.wraps(execute)
     def reported(self: Any, context: bpy.types.Context) -> set[str]:
@@ -28,7 +28,7 @@ def reporting(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
 
 
 def tell(operator: bpy.types.Operator, outcome: Outcome) -> None:
-    """The result, with what was dropped, after the warnings."""
+    """Report the warnings, then the result with what was dropped."""
     for warning in outcome.warnings:
         operator.report({"WARNING"}, warning)
     parts = filter(None, (outcome.result, dropped_phrase(outcome.dropped)))

@@ -1,4 +1,4 @@
-"""What the artist's selection means to Hairloom."""
+"""The hair and meshes that the artist's selection refers to."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ..errors import HairloomError
 
 
 def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The hair that buttons and panels are about, the active first.
+    """The hair that buttons and panels apply to, the active first.
 
-    That is the selected hair curves; else those whose cards are selected; else those on the
-    selected meshes, as when the head is being moved; else those that are previewed.
+    These are the selected hair curves; else the hair whose cards are selected; else the hair on
+    selected meshes, as when the head is being moved; else previewed hair.
     """
     candidates = [context.active_object, *context.selected_objects]
     selected = list(dict.fromkeys(obj for obj in candidates if obj is not None))
@@ -22,7 +22,7 @@ def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 
 def _made_into(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """The hair of which these are the cards."""
+    """The hair that these cards were made from."""
     hair = [obj.hairloom.card_object.groom for obj in objects if obj.type == "MESH"]
     return list(dict.fromkeys(obj for obj in hair if obj is not None))
 
@@ -45,10 +45,10 @@ def active_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def ground_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The mesh to grow hair on: the active one, or that of the active hair.
+    """The mesh to grow hair on: the active one, or the active hair's.
 
-    New hair is active once it has grown, and Blender offers to adjust only what could be done again
-    as things are then.
+    Newly grown hair is active, and Blender offers Adjust Last Operation only if the operator could
+    run again with that.
     """
     active = context.active_object
     if active is not None and active.type == "CURVES" and active.select_get():
@@ -57,7 +57,7 @@ def ground_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def needs_hair(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """For `poll`: whether hair curves are selected; says so on the greyed-out button."""
+    """For `poll`: whether hair curves are selected; the greyed-out button says so."""
     if chosen_hair(context):
         return True
     operator.poll_message_set("Select hair curves first (Add > Curve > Empty Hair, or import some)")
@@ -68,7 +68,7 @@ def make_active(context: bpy.types.Context, objects: list[bpy.types.Object]) -> 
     """Select these alone; the last is active.
 
     Raises:
-        HairloomError: one is not in this view layer, as hair that is previewed elsewhere.
+        HairloomError: one is not in this view layer, such as hair previewed in another scene.
     """
     for selected in context.selected_objects:
         selected.select_set(False)
@@ -79,6 +79,6 @@ def make_active(context: bpy.types.Context, objects: list[bpy.types.Object]) -> 
             raise HairloomError(
                 "it is not in this view layer",
                 place=obj.name,
-                remedy="Go to its scene, or do not exclude its collection",
+                remedy="Switch to its scene, or include its collection",
             ) from error
         context.view_layer.objects.active = obj

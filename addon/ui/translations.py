@@ -1,7 +1,7 @@
-"""Translations of what the artist reads: one file a language, which a translator fills.
+"""Translations of the interface, one file per language.
 
-translations/template.json holds all texts, {context: {text: ""}}; tools/make_docs.py writes it. A
-copy of it as translations/de_DE.json, with some texts filled in, is all that a language needs.
+translations/template.json holds all texts, {context: {text: ""}}; tools/make_docs.py writes it. To
+add a language, copy it, for example to translations/de_DE.json, and fill in texts.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ type Table = dict[tuple[str, str], str]
 
 
 def tables() -> dict[str, Table]:
-    """language -> (context, text) -> its translation, of all files that are there."""
+    """language -> (context, text) -> translation, from all files."""
     found = {}
     for path in sorted(FOLDER.glob("*.json")):
         if path.stem != TEMPLATE:
@@ -31,7 +31,7 @@ def tables() -> dict[str, Table]:
 
 
 def table_of(content: dict[str, dict[str, str]]) -> Table:
-    """As Blender wants it; texts that nobody has filled in stay English."""
+    """In Blender's form; texts without a translation stay English."""
     return {
         (context, text): translated
         for context, texts in content.items()
@@ -41,7 +41,7 @@ def table_of(content: dict[str, dict[str, str]]) -> Table:
 
 
 def texts(classes: Iterable[type[Any]]) -> dict[str, dict[str, str]]:
-    """All texts that Blender shows of registered classes: context -> text -> "", in order."""
+    """All texts of registered classes that Blender shows: context -> text -> "", in order."""
     found: set[tuple[str, str]] = set()
     for each in classes:
         found |= _of_class(each)
