@@ -144,3 +144,20 @@ def test_a_file_is_named_by_its_whole_path() -> None:
     named = files_named_in(text) + folders_named_in(text)
     assert named == ["step.py", "dynamics/step.py", "lib_dual.glsl", "addon/dynamics/"]
     assert [is_there(name, page) for name in named] == [False, True, False, True]
+
+
+def test_decisions_have_a_number_a_day_and_a_status() -> None:
+    text = (REPOSITORY / "docs" / "dev" / "decisions.md").read_text(encoding="utf-8")
+    entries = re.split(r"^## ", text, flags=re.M)[1:]
+    status = r"\n\n\d{4}-\d\d-\d\d · (accepted|superseded by ((?:\d+(?: and )?)+))\n\n\*\*"
+
+    for number, entry in enumerate(entries, 1):
+        title = entry.partition("\n")[0]
+        assert title.startswith(f"{number}. "), title
+        found = re.search(status, entry)
+        assert found, title
+        later = [int(other) for other in re.findall(r"\d+", found.group(2) or "")]
+        assert all(number < other <= len(entries) for other in later), title
+        assert "**Decision.** " in entry, title
+
+    assert len(entries) > 50
