@@ -7,14 +7,14 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ..blender.cards.adopted_cards import (
+from ..blender.cards.adopt import (
     ORDERS,
     CardOcclusionSettings,
     SortChoices,
     SortedCards,
     sort_steps,
 )
-from ..blender.cards.card_alpha import alpha_image
+from ..blender.cards.material import alpha_image
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..errors import HairloomError

@@ -6,7 +6,7 @@ import bpy
 
 from ..blender.base.outcome import Outcome
 from ..blender.cards.card_making import order_line
-from ..blender.cards.card_object import CardObjectJob, card_objects
+from ..blender.cards.object import CardObjectJob, card_objects
 from .long_work import LongWork, Progress, Steps, draw_progress, threaded
 from .reports import tell
 from .selection import chosen_hair, needs_hair

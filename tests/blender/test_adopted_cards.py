@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.blender.cards.adopted_cards import SortChoices, read_cards, sort_mesh
-from hairloom.addon.blender.cards.adopted_writing import reorder_faces
+from hairloom.addon.blender.cards.adopt import SortChoices, read_cards, sort_mesh
+from hairloom.addon.blender.cards.mesh import reorder_faces
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.errors import HairloomError
 

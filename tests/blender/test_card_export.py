@@ -23,9 +23,12 @@ from hairloom.addon.exchange.files.file_set import written_together
 
 bpy = pytest.importorskip("bpy", reason="Blender's exporters need Blender or the bpy module")
 
-from hairloom.addon.blender.cards import card_export  # noqa: E402
-from hairloom.addon.blender.cards.card_export import check_exporter, write_card_mesh  # noqa: E402
-from hairloom.addon.blender.cards.card_scene import CardLook  # noqa: E402
+from hairloom.addon.blender.cards import exporters  # noqa: E402
+from hairloom.addon.blender.cards.exporters import (  # noqa: E402
+    CardLook,
+    check_exporter,
+    write_card_mesh,
+)
 
 MESH_VIEW = Path(__file__).parent / "mesh_view.py"
 NAME, NODE = "Haar/Ä.001", "Haar_Ä_001"
@@ -228,7 +231,7 @@ def test_an_exporter_that_is_missing_is_told_and_nothing_is_written(
 ) -> None:
     """As in a Blender that was built without it."""
     monkeypatch.setitem(
-        card_export._OPERATORS, file_format.name, lambda: bpy.ops.wm.hairloom_no_such_export
+        exporters._OPERATORS, file_format.name, lambda: bpy.ops.wm.hairloom_no_such_export
     )
     with pytest.raises(HairloomError, match="exporter of"):
         check_exporter(file_format, "hair")

@@ -22,9 +22,12 @@ from hairloom.addon.shading.textures import TextureSettings, hair_textures
 
 bpy = pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 
-from hairloom.addon.blender.cards import card_export  # noqa: E402
-from hairloom.addon.blender.cards.card_export import write_card_mesh  # noqa: E402
-from hairloom.addon.blender.cards.card_scene import ROUGHNESS, CardLook  # noqa: E402
+from hairloom.addon.blender.cards import exporters  # noqa: E402
+from hairloom.addon.blender.cards.exporters import (  # noqa: E402
+    CardLook,
+    write_card_mesh,
+)
+from hairloom.addon.blender.cards.material import ROUGHNESS  # noqa: E402
 
 TEXTURE = TextureSettings(variant_width=32, height=128)
 
@@ -254,7 +257,7 @@ def test_a_failing_exporter_leaves_the_old_file_and_no_data(
         temporary.write_bytes(b"half")
         raise KeyboardInterrupt
 
-    monkeypatch.setitem(card_export._EXPORTERS, "glb", half)
+    monkeypatch.setitem(exporters._EXPORTERS, "glb", half)
     with pytest.raises(KeyboardInterrupt):
         write_glb(path, sorted_hair, None)
     assert path.read_bytes() == b"old"

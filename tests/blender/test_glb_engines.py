@@ -22,8 +22,7 @@ from hairloom.addon.shading.textures import TextureSettings, hair_textures
 
 pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 
-from hairloom.addon.blender.cards.card_export import write_card_mesh
-from hairloom.addon.blender.cards.card_scene import CardLook
+from hairloom.addon.blender.cards.exporters import CardLook, write_card_mesh
 from hairloom.addon.exchange.cards.card_formats import GLB
 from hairloom.addon.exchange.files.file_set import written_together
 

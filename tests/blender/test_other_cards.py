@@ -10,10 +10,10 @@ import pytest
 
 from hairloom.addon import card_flow
 from hairloom.addon.blender.base.thread_work import GivenUpError
-from hairloom.addon.blender.cards.adopted_cards import SortChoices, sort_mesh
+from hairloom.addon.blender.cards.adopt import SortChoices, sort_mesh
 from hairloom.addon.blender.cards.card_making import card_choices
-from hairloom.addon.blender.cards.card_object import card_objects
-from hairloom.addon.blender.cards.other_cards import other_cards
+from hairloom.addon.blender.cards.object import card_objects
+from hairloom.addon.blender.cards.occluders import other_cards
 from hairloom.addon.blender.engine.engine_hair import read_groom
 from hairloom.addon.blender.preview import live, previewed, reactions
 from hairloom.addon.blender.viewport import overlay

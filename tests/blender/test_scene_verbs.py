@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.blender.cards.adopted_cards import SortChoices, sort_mesh
-from hairloom.addon.blender.cards.adopted_writing import reorder_faces
+from hairloom.addon.blender.cards.adopt import SortChoices, sort_mesh
+from hairloom.addon.blender.cards.mesh import reorder_faces
 from hairloom.addon.blender.colliders.spheres import fitted_collections
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.properties import presets

@@ -4,7 +4,7 @@ import bpy
 import pytest
 
 from hairloom.addon.blender.base.objects import objects_in
-from hairloom.addon.blender.cards.other_cards import other_cards
+from hairloom.addon.blender.cards.occluders import other_cards
 from hairloom.addon.blender.colliders.spheres import grown_on
 from hairloom.addon.blender.command_line import bake_job, mend_job, object_settings
 from hairloom.addon.blender.sessions.fins import fins_in

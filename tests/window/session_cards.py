@@ -238,7 +238,7 @@ def rendered_as_cards():
 
 
 def card_objects():
-    return of_hairloom("blender.cards.card_object").card_objects(hair())
+    return of_hairloom("blender.cards.object").card_objects(hair())
 
 
 def is_making():

@@ -5,24 +5,13 @@ Renders leave out the artist's own curves while there is such a copy, and the vi
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
-import numpy as np
 
+from ..base.attributes import read_attribute, set_attribute
 from . import playback
 from .baked_rig import BakedRig
 from .cache import Cache
 
-#: data types of attributes that go over to the copy -> (name of the value, width, dtype)
-_LAYOUTS: dict[str, tuple[str, int, Any]] = {
-    "FLOAT": ("value", 1, np.float32),
-    "INT": ("value", 1, np.int32),
-    "BOOLEAN": ("value", 1, np.bool_),
-    "FLOAT2": ("vector", 2, np.float32),
-    "FLOAT_VECTOR": ("vector", 3, np.float32),
-    "FLOAT_COLOR": ("color", 4, np.float32),
-}
 _POLY = 1  # in Blender's attribute curve_type
 
 
@@ -101,7 +90,7 @@ def _fill(
         curves.set_types(type="CATMULL_ROM")
     else:
         curves.set_types(type="POLY")
-    _write(curves, "radius", "FLOAT", "POINT", strands.radius)
+    set_attribute(curves, "radius", "POINT", strands.radius)
     shown = hair.evaluated_get(depsgraph).data
     if len(shown.curves) == len(grid):  # else it is not known which strand is which
         _take_attributes(curves, shown)
@@ -111,33 +100,15 @@ def _fill(
 
 
 def _are_poly(curves: bpy.types.Curves) -> bool:
-    attribute = curves.attributes.get("curve_type")
-    if attribute is None or not len(attribute.data):
-        return False
-    types = np.empty(len(attribute.data), np.int32)
-    attribute.data.foreach_get("value", types)
-    return bool((types == _POLY).all())
+    types = read_attribute(curves, "curve_type", "CURVE")
+    return types is not None and len(types) > 0 and bool((types == _POLY).all())
 
 
 def _take_attributes(curves: bpy.types.Curves, shown: bpy.types.Curves) -> None:
     """What a material may ask of a strand: UVs of the root, groups, colours."""
     for attribute in shown.attributes:
-        layout = _LAYOUTS.get(attribute.data_type)
-        is_internal = attribute.name.startswith(".") or attribute.is_internal
-        if attribute.domain == "CURVE" and layout is not None and not is_internal:
-            value, width, dtype = layout
-            values = np.empty(len(attribute.data) * width, dtype)
-            attribute.data.foreach_get(value, values)
-            _write(curves, attribute.name, attribute.data_type, "CURVE", values)
-
-
-def _write(
-    curves: bpy.types.Curves, name: str, data_type: str, domain: str, values: np.ndarray
-) -> None:
-    attribute = curves.attributes.get(name)
-    if attribute is not None and (attribute.data_type, attribute.domain) != (data_type, domain):
-        curves.attributes.remove(attribute)
-        attribute = None
-    if attribute is None:
-        attribute = curves.attributes.new(name, data_type, domain)
-    attribute.data.foreach_set(_LAYOUTS[data_type][0], values.ravel())
+        # Blender's own are of INT8, such as the type of each curve, or have a dot before the name
+        is_own = attribute.data_type == "INT8" or attribute.name.startswith(".")
+        values = read_attribute(shown, attribute.name, "CURVE", width=None)
+        if values is not None and not is_own:
+            set_attribute(curves, attribute.name, "CURVE", values)

@@ -26,7 +26,7 @@ from ..properties.card_form import CardForm, CardsDrawn
 from .card_atlas import drawing_maps, has_gpu
 from .card_making import CardChoices, MadeCards, making_steps
 from .card_maps import made_maps
-from .other_cards import OtherHair
+from .occluders import OtherHair
 
 _NO_OTHERS = OtherHair()
 

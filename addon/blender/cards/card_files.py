@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
@@ -21,7 +20,7 @@ from ...exchange.files.file_set import written_together
 from ...pipeline import Rig
 from ...shading.card_look import EVEN_ALPHA
 from ...shading.settings import ShadingSettings
-from .card_export import check_cards, check_exporter, write_card_mesh
+from ..base.report import hairloom_version
 from .card_making import CardChoices, MadeCards, making_steps
 from .card_maps import CardMaps, made_maps
 from .card_material import material_of, write_tables
@@ -34,10 +33,8 @@ from .card_motion import (
     joint_motion_steps,
     moved_cards,
 )
-from .card_scene import CardLook, level_names, without_loose
 from .card_textures import TextureFiles, texture_channels, texture_roles, write_textures
-
-_MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
+from .exporters import CardLook, check_cards, check_exporter, level_names, write_card_mesh
 
 type Stage = Callable[[str], AbstractContextManager[None]]
 #: Tells what is being done, and which share of it is done; None where nobody knows.
@@ -175,7 +172,7 @@ class _Writer:
     def steps(self, motion: GuideMotion | None) -> FileSteps[tuple[str, ...]]:
         """Gives back what the artist should know."""
         build = self.made.build
-        parts = map(without_loose, build.levels, build.backs)
+        parts = map(CardMesh.without_loose, build.levels, build.backs)
         levels, backs = zip(*parts, strict=True)
         if motion is None or self.output.motion.kind == "none":
             yield "Writing", None
@@ -266,7 +263,7 @@ class _Writer:
             material=material_of(shading, tables),
             indices=indices,
             motion=self.motion,
-            generator=tomllib.loads(_MANIFEST.read_text(encoding="utf-8"))["version"],
+            generator=hairloom_version(),
         )
         path.with_name(path.stem + SUFFIX).write_text(sidecar_text(sidecar), encoding="utf-8")
 

@@ -21,7 +21,7 @@ from ..properties.card_form import CardForm
 from ..properties.choices import Choices
 from .card_images import chosen_pictures
 from .card_maps import CardMaps, made_maps
-from .other_cards import OtherHair, read_other_hair
+from .occluders import OtherHair, read_other_hair
 
 
 @dataclass(frozen=True)

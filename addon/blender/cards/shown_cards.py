@@ -23,7 +23,7 @@ from ..properties.card_form import CardForm, CardsDrawn
 from .card_builds import BuiltCards, building_cards, built_cards, told
 from .card_images import chosen_pictures
 from .card_making import order_line
-from .other_cards import OtherHair, read_other_hair
+from .occluders import OtherHair, read_other_hair
 
 
 def as_shown(snapshot: Snapshot) -> Snapshot:

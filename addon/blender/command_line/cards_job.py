@@ -20,7 +20,7 @@ from ..cards.card_images import chosen_pictures, named_pictures
 from ..cards.card_making import CardChoices, order_line
 from ..cards.card_motion import GuideMotion, baked_motion, take_motion
 from ..cards.card_textures import TextureFiles
-from ..cards.other_cards import read_other_hair
+from ..cards.occluders import read_other_hair
 from .card_options import add_card_options
 from .job_options import add_texture_option, frames_of_option
 from .job_steps import Job, card_form, finish, read_rig, tell_notes

@@ -13,8 +13,8 @@ from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.steps import result_of, retold
 from ...cards.uv_ways import Way
 from ...errors import HairloomError
-from ..cards.adopted_cards import ORDERS, SortChoices, sort_steps
-from ..cards.card_object import CardObjectJob
+from ..cards.adopt import ORDERS, SortChoices, sort_steps
+from ..cards.object import CardObjectJob
 from .job_options import add_object_option
 from .job_steps import Job, tell_notes
 from .object_settings import check_editable, named_grooms, named_objects, put_settings

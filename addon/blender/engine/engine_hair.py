@@ -23,7 +23,7 @@ from ..bakes.cache import Cache
 from ..base.objects import head_of
 from ..cards.card_builds import BuiltCards, built_cards
 from ..cards.card_images import chosen_pictures
-from ..cards.other_cards import OtherHair, read_other_hair
+from ..cards.occluders import OtherHair, read_other_hair
 from ..cards.shown_cards import as_shown
 from ..properties.card_form import CardForm
 from ..properties.choices import Choices

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..cards.other_cards import shading_objects
+from ..cards.occluders import shading_objects
 from ..sessions.session import Session
 
 #: what may light hair anew; a light that was hidden or deleted is told of as its scene's change

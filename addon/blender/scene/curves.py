@@ -7,11 +7,12 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...arrays import Bools, Floats, Ints
+from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import StrandSet
 from ...strands.affine import mean_scale, moved
 from ...strands.clean import Cleaned, clean
+from ..base.attributes import read_attribute, set_attribute
 
 #: Curve attributes that may hold a strand's group. The first one found wins; its name is the one
 #: that Unreal and USD use.
@@ -24,8 +25,6 @@ _REMEDIES = {
 
 def read_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
     """The hair as Blender shows it after all modifiers, in world space, without unusable curves.
-
-    Whole attributes are copied at once, so 100,000 curves of 16 points take a few milliseconds.
 
     Raises:
         HairloomError: the object holds no hair curves.
@@ -67,11 +66,11 @@ def write_curves(
     if strands.strand_count:
         curves.add_curves(strands.point_counts.tolist())
         curves.position_data.foreach_set("vector", strands.points.ravel())
-    set_attribute(curves, "radius", "FLOAT", "POINT", strands.radius)
+    set_attribute(curves, "radius", "POINT", strands.radius)
     if strands.group.any():
-        set_attribute(curves, GROUP_ATTRIBUTES[0], "INT", "CURVE", strands.group)
+        set_attribute(curves, GROUP_ATTRIBUTES[0], "CURVE", strands.group)
     if strands.root_uv is not None:
-        set_attribute(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", strands.root_uv)
+        set_attribute(curves, "surface_uv_coordinate", "CURVE", strands.root_uv)
     obj = bpy.data.objects.new(name, curves)
     collection.objects.link(obj)
     if surface is not None:
@@ -102,46 +101,6 @@ def curve_offsets(curves: bpy.types.Curves) -> Ints:
     if len(curves.curves):  # without curves the array has length 1 but holds nothing
         curves.curve_offset_data.foreach_get("value", offsets)
     return offsets
-
-
-#: data type of an attribute -> (name of the value, width, dtype)
-_LAYOUTS: dict[str, tuple[str, int, Any]] = {
-    "BOOLEAN": ("value", 1, np.bool_),
-    "FLOAT": ("value", 1, np.float32),
-    "FLOAT2": ("vector", 2, np.float32),
-    "FLOAT_VECTOR": ("vector", 3, np.float32),
-    "FLOAT_COLOR": ("color", 4, np.float32),
-    "BYTE_COLOR": ("color", 4, np.float32),
-    "INT": ("value", 1, np.int32),
-    "INT8": ("value", 1, np.int32),
-}
-
-
-def read_attribute(curves: bpy.types.Curves, name: str, domain: str, width: int = 1) -> Any:
-    """The values of an attribute, (count,) or (count, width); None where it is absent, of another
-    domain or of another width. Colours are scene-linear."""
-    attribute = curves.attributes.get(name)
-    if attribute is None or attribute.domain != domain or attribute.data_type not in _LAYOUTS:
-        return None
-    value, own_width, dtype = _LAYOUTS[attribute.data_type]
-    if own_width != width:
-        return None
-    values = np.empty(len(attribute.data) * width, dtype)
-    attribute.data.foreach_get(value, values)
-    return values if width == 1 else values.reshape(-1, width)
-
-
-def set_attribute(
-    curves: bpy.types.Curves,
-    name: str,
-    data_type: str,
-    domain: str,
-    values: Floats | Ints | Bools,
-) -> None:
-    """Add an attribute to the curves, (count,) or (count, width)."""
-    attribute = curves.attributes.new(name, data_type, domain)
-    if len(values):
-        attribute.data.foreach_set(_LAYOUTS[data_type][0], np.ascontiguousarray(values).ravel())
 
 
 def _is_there(values: Any) -> bool:

@@ -16,7 +16,8 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...exchange.groom import Groom
 from ...exchange.read_groom import finite
-from .curves import curve_offsets, read_attribute, set_attribute
+from ..base.attributes import read_attribute, set_attribute
+from .curves import curve_offsets
 
 COLOR = "color"
 STRAND_ID = "groom_id"
@@ -32,15 +33,15 @@ def store_groom(curves: bpy.types.Curves, groom: Groom) -> None:
     if groom.color is not None:
         opaque = np.ones((len(groom.color), 4), np.float32)
         opaque[:, :3] = groom.color
-        set_attribute(curves, COLOR, "FLOAT_COLOR", "POINT", opaque)
+        set_attribute(curves, COLOR, "POINT", opaque)
     if groom.strand_id is not None:
-        set_attribute(curves, STRAND_ID, "INT", "CURVE", groom.strand_id)
+        set_attribute(curves, STRAND_ID, "CURVE", groom.strand_id)
     if groom.is_guide is not None:
-        set_attribute(curves, GUIDE, "BOOLEAN", "CURVE", groom.is_guide)
+        set_attribute(curves, GUIDE, "CURVE", groom.is_guide)
     if groom.closest_guides is not None and groom.guide_weights is not None:
         for name, ids in zip(CLOSEST_GUIDES, groom.closest_guides.T, strict=True):
-            set_attribute(curves, name, "INT", "CURVE", ids)
-        set_attribute(curves, GUIDE_WEIGHTS, "FLOAT_VECTOR", "CURVE", groom.guide_weights)
+            set_attribute(curves, name, "CURVE", ids)
+        set_attribute(curves, GUIDE_WEIGHTS, "CURVE", groom.guide_weights)
     if groom.group_names:
         store_group_names(curves, groom.group_names)
 

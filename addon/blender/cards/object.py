@@ -7,14 +7,11 @@ stay there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
-
 import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats
 from ...cards.build import CardBuild
 from ...cards.card_mesh import OF_CARDS, CardMesh
 from ...errors import HairloomError
@@ -25,7 +22,8 @@ from ..scene.rigs import rig_of
 from ..scene.source import read_source
 from .card_builds import made_in_thread
 from .card_making import MadeCards, card_choices, order_line
-from .card_object_material import filled_image, new_material
+from .material import Color, fill_image, new_material
+from .mesh import OCCLUSION_LAYER, fill_mesh
 
 
 class CardObjectJob:
@@ -102,7 +100,7 @@ def _write(
     hair: bpy.types.Object,
     build: CardBuild,
     texture: Floats,
-    color: tuple[float, float, float],
+    color: Color,
     matrix: Floats,
 ) -> list[bpy.types.Object]:
     """Fill the objects of this groom, make those that are missing, remove those too many."""
@@ -111,12 +109,12 @@ def _write(
         _remove(there.pop(level))
     first = there.get(0)
     known = None if first is None else first.hairloom.card_object.image
-    image = filled_image(known, f"{hair.name} Cards", texture)
+    image = _filled_image(known, f"{hair.name} Cards", texture)
     objects, material = [], _first_material(first)
     for level, cards in enumerate(build.levels):
         obj = there.get(level)
         if obj is None:
-            material = material or new_material(f"{hair.name} Cards", image, color)
+            material = material or _new_material(f"{hair.name} Cards", image, color)
             obj = _new_object(hair, level, matrix)
             obj.data.materials.append(material)
         obj.hairloom.card_object.image = image
@@ -125,6 +123,11 @@ def _write(
         _fill(obj.data, cards, matrix)
         objects.append(obj)
     return objects
+
+
+def _new_material(name: str, image: bpy.types.Image, color: Color) -> bpy.types.Material:
+    """The one that cards start with; afterwards it is the artist's."""
+    return new_material(name, color, image, image, blending="DITHERED", occlusion="occlusion")
 
 
 def _first_material(obj: bpy.types.Object | None) -> bpy.types.Material | None:
@@ -156,45 +159,30 @@ def _new_object(hair: bpy.types.Object, level: int, matrix: Floats) -> bpy.types
 
 
 def _fill(mesh: bpy.types.Mesh, cards: CardMesh, matrix: Floats) -> None:
-    """The cards, in the space of `matrix`, in the place of what the mesh held."""
-    mesh.clear_geometry()
-    inverse = np.linalg.inv(matrix)
-    triangles: Ints = cards.triangles
-    if np.linalg.det(matrix[:3, :3]) < 0.0:  # a mirrored object turns faces around again
-        triangles = triangles[:, ::-1]
-    corners = triangles.ravel()
-    places = cards.positions @ inverse[:3, :3].T + inverse[:3, 3]
-    mesh.vertices.add(len(places))
-    mesh.vertices.foreach_set("co", places.astype(np.float32).ravel())
-    mesh.loops.add(len(corners))
-    mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(corners))
-    mesh.polygons.add(len(triangles))
-    mesh.polygons.foreach_set("loop_start", np.arange(0, len(corners), 3, dtype=np.int32))
-    mesh.update(calc_edges=True)
-    shares = np.stack([cards.occlusion, cards.along], axis=1)
-    for name, uv in (("UVMap", cards.uv), ("Occlusion", shares)):
-        layer = mesh.uv_layers.new(name=name, do_init=False)
-        layer.uv.foreach_set("vector", np.ascontiguousarray(uv[corners], np.float32).ravel())
-    for name, domain, values in _attributes(cards, matrix):
-        _set_attribute(mesh, name, domain, values)
+    fill_mesh(
+        mesh,
+        cards,
+        uv_maps={"UVMap": cards.uv, OCCLUSION_LAYER: np.stack([cards.occlusion, cards.along], 1)},
+        points={"occlusion": cards.occlusion, "along": cards.along},
+        faces={"card": cards.card} | {name: getattr(cards, name)[cards.card] for name in OF_CARDS},
+        matrix=matrix,
+    )
 
 
-def _attributes(cards: CardMesh, matrix: Floats) -> Iterator[tuple[str, str, Any]]:
-    """Name, domain and values of what else a mesh of cards holds."""
-    normal = cards.normal @ matrix[:3, :3]
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    yield "custom_normal", "POINT", normal.astype(np.float32)
-    yield "occlusion", "POINT", cards.occlusion
-    yield "along", "POINT", cards.along
-    yield "card", "FACE", cards.card
-    for name in OF_CARDS:
-        yield name, "FACE", getattr(cards, name)[cards.card]
+def _filled_image(image: bpy.types.Image | None, name: str, texture: Floats) -> bpy.types.Image:
+    """This picture in an image of the file, packed into it.
 
-
-def _set_attribute(mesh: bpy.types.Mesh, name: str, domain: str, values: Any) -> None:
-    if values.ndim == 2:
-        kind, part = "FLOAT_VECTOR", "vector"
-    else:
-        kind, part = ("INT" if values.dtype.kind == "i" else "FLOAT"), "value"
-    attribute = mesh.attributes.new(name, kind, domain)
-    attribute.data.foreach_set(part, np.ascontiguousarray(values).ravel())
+    Args:
+        image: to be drawn again, or None for a new one.
+        texture: (height, width, 4) linear with straight alpha, row 0 the lowest.
+    """
+    height, width = texture.shape[:2]
+    if image is None or image.library is not None:
+        image = bpy.data.images.new(name, width, height, alpha=True)
+    elif tuple(image.size) != (width, height):
+        image.scale(width, height)
+    image.alpha_mode = "CHANNEL_PACKED"
+    fill_image(image, texture)
+    image.update()
+    image.pack()
+    return image

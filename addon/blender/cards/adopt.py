@@ -24,11 +24,12 @@ from ...cards.steps import result_of, retold
 from ...cards.uv_ways import Way
 from ...errors import HairloomError
 from ...strands import Surface
+from ..base.attributes import set_attribute
 from ..base.vertex_weights import weights_on
 from ..scene.surfaces import read_corner_uv, read_surface
-from .adopted_writing import face_order, reorder_faces, write_shares
-from .card_alpha import alpha_of
-from .other_cards import other_cards
+from .material import alpha_of
+from .mesh import CARD_ATTRIBUTES, OCCLUSION_LAYER, reorder_faces, set_uv_map
+from .occluders import other_cards
 
 __all__ = [
     "ORDERS",
@@ -122,9 +123,9 @@ def sort_steps(
         openness = yield from retold(shading, lambda share: (1.0 + share) / 2.0)
         corner = np.zeros(len(obj.data.loops), np.int32)
         corner[source.corner] = source.cards.corner
-        problems += write_shares(obj.data, source.cards.vertex, corner, openness, mesh.along)
+        problems += _write_occlusion(obj.data, source.cards.vertex, corner, openness, mesh.along)
     notes += problems
-    moved = reorder_faces(obj.data, face_order(source.polygon[order]))
+    moved = reorder_faces(obj.data, _face_order(source.polygon[order]))
     return SortedCards(mesh.card_count, len(obj.data.polygons), moved, tuple(notes))
 
 
@@ -227,3 +228,36 @@ def _shared(mesh: bpy.types.Mesh) -> list[str]:
     if mesh.users < 2:
         return []
     return [f"{mesh.users} objects share the mesh '{mesh.name}' and have been sorted together"]
+
+
+def _write_occlusion(
+    mesh: bpy.types.Mesh, vertex: Ints, corner: Ints, openness: Floats, along: Floats
+) -> list[str]:
+    """Occlusion and way into attributes, where a vertex on a seam has the mean of its copies, and
+    into a UV map; gives what could not be done.
+
+    Args:
+        vertex: (n,) the vertex of the mesh that each value belongs to.
+        corner: (loop_count,) the value of each corner of a face.
+        openness, along: (n,).
+    """
+    for name, values in zip(CARD_ATTRIBUTES, (openness, along), strict=True):
+        set_attribute(mesh, name, "POINT", _at_source(values, vertex, len(mesh.vertices)))
+    if not set_uv_map(mesh, OCCLUSION_LAYER, np.stack([openness, along], axis=1)[corner]):
+        return ["It has as many UV maps as a mesh can have, so occlusion is an attribute only"]
+    mesh.update_tag()
+    return []
+
+
+def _at_source(values: Floats, vertex: Ints, count: int) -> Floats:
+    """Means over the copies of each of `count` vertices; 1 for a vertex of no face."""
+    copies = np.bincount(vertex, minlength=count)
+    total = np.bincount(vertex, values, minlength=count)
+    return np.divide(total, copies, out=np.ones(count), where=copies > 0).astype(np.float32)
+
+
+def _face_order(polygon: Ints) -> Ints:
+    """Faces by the first of their triangles that is drawn, (face_count,)."""
+    faces, first = np.unique(polygon, return_index=True)
+    order: Ints = faces[np.argsort(first, kind="stable")]
+    return order

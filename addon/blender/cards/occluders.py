@@ -25,8 +25,8 @@ from ..properties.properties import settings_of
 from ..scene.rigs import RigSettings
 from ..scene.source import Source, read_source
 from ..scene.surfaces import read_surface
-from .adopted_writing import SHARES
-from .card_alpha import alpha_of
+from .material import alpha_of
+from .mesh import CARD_ATTRIBUTES
 
 #: Hair that is nearer than this to where it was has not moved [m].
 _STILL = 1.0e-5
@@ -205,7 +205,9 @@ def shading_objects(
 def _is_cards(obj: bpy.types.Object) -> bool:
     if obj.type != "MESH" or obj.hairloom.card_object.level:
         return False
-    return bool(len(obj.data.polygons)) and all(name in obj.data.attributes for name in SHARES)
+    return bool(len(obj.data.polygons)) and all(
+        name in obj.data.attributes for name in CARD_ATTRIBUTES
+    )
 
 
 def _is_groom(obj: bpy.types.Object) -> bool:

@@ -1,0 +1,74 @@
+"""Attributes of meshes and of hair curves: whole arrays in and out.
+
+100,000 curves of 16 points take a few milliseconds, because whole attributes are copied at once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...arrays import Bools, Floats, Ints
+
+#: data type of an attribute -> (name of the value, width, dtype)
+_LAYOUTS: dict[str, tuple[str, int, Any]] = {
+    "BOOLEAN": ("value", 1, np.bool_),
+    "FLOAT": ("value", 1, np.float32),
+    "FLOAT2": ("vector", 2, np.float32),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
+    "INT": ("value", 1, np.int32),
+    "INT8": ("value", 1, np.int32),
+}
+_FLOATS = {1: "FLOAT", 2: "FLOAT2", 3: "FLOAT_VECTOR", 4: "FLOAT_COLOR"}
+
+
+def read_attribute(
+    data: bpy.types.Mesh | bpy.types.Curves, name: str, domain: str, width: int | None = 1
+) -> Any:
+    """The values of an attribute, (count,) or (count, width); None where it is absent, of another
+    domain or of another width. Colours are scene-linear.
+
+    Args:
+        width: None takes any.
+    """
+    attribute = data.attributes.get(name)
+    if attribute is None or attribute.domain != domain or attribute.data_type not in _LAYOUTS:
+        return None
+    value, own_width, dtype = _LAYOUTS[attribute.data_type]
+    if width not in (None, own_width):
+        return None
+    values = np.empty(len(attribute.data) * own_width, dtype)
+    attribute.data.foreach_get(value, values)
+    return values if own_width == 1 else values.reshape(-1, own_width)
+
+
+def set_attribute(
+    data: bpy.types.Mesh | bpy.types.Curves,
+    name: str,
+    domain: str,
+    values: Floats | Ints | Bools,
+) -> None:
+    """Write an attribute, (count,) or (count, width); its type is that of the values.
+
+    An attribute of this name and of another domain or type is replaced.
+    """
+    kind = _data_type(values)
+    attribute = data.attributes.get(name)
+    if attribute is not None and (attribute.domain, attribute.data_type) != (domain, kind):
+        data.attributes.remove(attribute)
+        attribute = None
+    if attribute is None:
+        attribute = data.attributes.new(name, kind, domain)
+    part, _, dtype = _LAYOUTS[kind]
+    if len(values):
+        attribute.data.foreach_set(part, np.ascontiguousarray(values, dtype).ravel())
+
+
+def _data_type(values: Floats | Ints | Bools) -> str:
+    if values.dtype.kind == "f":
+        return _FLOATS[1 if values.ndim == 1 else values.shape[1]]
+    return "BOOLEAN" if values.dtype.kind == "b" else "INT"

@@ -1,0 +1,346 @@
+"""Hair cards into a GLB, FBX, USD or OBJ, through Blender's own exporters.
+
+Cards become a scene for the time of one export. Exporters keep the order of the triangles as long
+as they are not asked to triangulate, which they need not: cards are triangles already.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...cards.card_mesh import CardMesh
+from ...cards.segments import unit
+from ...errors import HairloomError
+from ...exchange.cards.card_formats import FBX, GLB, OBJ, USD, CardFormat
+from ...exchange.files.names import plain_name
+from ...exchange.textures.srgb import srgb_decoded
+from .material import Color, fill_image, named_image, new_material
+from .mesh import OCCLUSION_LAYER, fill_mesh
+
+_MADE_IN = ("objects", "meshes", "materials", "images", "scenes")
+#: the attribute of OBJ that holds occlusion and along
+_COLORS = "Occlusion color"
+
+
+@dataclass(frozen=True)
+class CardLook:
+    """The plain material of the file: what its textures and its colour are.
+
+    card: (height, width, 4) linear with straight alpha, row 0 the lowest, to be packed into the
+        file; or None.
+    base, alpha: files beside it, for formats that name files. alpha is read from the channel "a" of
+        the same file, else from the red of its own.
+    color: scene-linear, multiplies the texture.
+    """
+
+    card: Floats | None = None
+    base: str | None = None
+    alpha: str | None = None
+    color: Color = (1.0, 1.0, 1.0)
+
+
+def level_names(name: str, count: int) -> tuple[str, ...]:
+    """What the objects of `count` levels of detail are called, finest first."""
+    plain = plain_name(name)
+    return (plain,) if count == 1 else tuple(f"{plain}_LOD{level}" for level in range(count))
+
+
+def write_card_mesh(
+    path: Path,
+    levels: Sequence[CardMesh],
+    file_format: CardFormat,
+    look: CardLook,
+    *,
+    name: str,
+    portable: bool = True,
+    texels: Sequence[Floats] = (),
+) -> None:
+    """Write each level as one object whose order of triangles is that of `triangles`.
+
+    Args:
+        path: in a folder of its own, for exporters that write more than one file; see
+            `exchange.files.file_set.written_together`.
+        name: of the hair in the file.
+        portable: without custom attributes, which some engines refuse.
+        texels: of each level, (vertex_count, 2) for a third UV map, see `card_scene`.
+
+    Raises:
+        HairloomError: no cards, or Blender's exporter is missing or fails.
+    """
+    check_cards(levels, str(path))
+    check_exporter(file_format, str(path))
+    scene_of_cards = card_scene(levels, name, look, file_format, portable=portable, texels=texels)
+    with scene_of_cards as scene, shown(scene):
+        try:
+            with redirect_stdout(StringIO()):  # running commentary; errors go to stderr
+                _EXPORTERS[file_format.name](path, portable)
+        except RuntimeError as error:
+            raise HairloomError(
+                f"Blender's exporter of {file_format.title} failed ({_reason(error)})",
+                place=path.name,
+                remedy="Try another file name or folder",
+            ) from error
+
+
+def check_cards(levels: Sequence[CardMesh], place: str) -> None:
+    """Refuse to write nothing.
+
+    Raises:
+        HairloomError: a level has no cards.
+    """
+    if not levels or not all(len(mesh.triangles) for mesh in levels):
+        raise HairloomError(
+            "there are no cards to write", place=place, remedy="Choose hair that has strands"
+        )
+
+
+def check_exporter(file_format: CardFormat, place: str) -> None:
+    """Refuse a format that this Blender cannot write, before any work is done.
+
+    Raises:
+        HairloomError: its exporter was left out of this Blender, or is switched off.
+    """
+    try:
+        _OPERATORS[file_format.name]().get_rna_type()
+    except (AttributeError, KeyError) as error:
+        is_add_on = file_format in (GLB, FBX)
+        raise HairloomError(
+            f"Blender's exporter of {file_format.title} is "
+            + ("switched off" if is_add_on else "not in this build of Blender"),
+            place="Preferences > Add-ons" if is_add_on else place,
+            remedy=f"Switch on '{_ADD_ONS[file_format.name]}'"
+            if is_add_on
+            else "Use an official build of Blender, or another format",
+        ) from error
+
+
+#: format -> its operator, which is looked up anew: add-ons come and go
+_OPERATORS: dict[str, Callable[[], Any]] = {
+    GLB.name: lambda: bpy.ops.export_scene.gltf,
+    FBX.name: lambda: bpy.ops.export_scene.fbx,
+    USD.name: lambda: bpy.ops.wm.usd_export,
+    OBJ.name: lambda: bpy.ops.wm.obj_export,
+}
+_ADD_ONS = {GLB.name: "glTF 2.0 format", FBX.name: "FBX format"}
+
+
+def _export_glb(path: Path, portable: bool) -> None:
+    bpy.ops.export_scene.gltf(
+        filepath=str(path),
+        export_format="GLB",
+        use_active_scene=True,
+        export_yup=True,
+        export_apply=False,
+        export_animations=False,
+        export_current_frame=True,
+        export_tangents=True,
+        export_attributes=not portable,
+    )
+
+
+def _export_fbx(path: Path, _portable: bool) -> None:
+    """In centimetres and with Y up in the vertices themselves, so that no object is scaled or
+    turned. It names textures by their folder too, so it is written where it will lie.
+    """
+    beside = path.parent.parent / f"{path.parent.name}.fbx"
+    try:
+        bpy.ops.export_scene.fbx(
+            filepath=str(beside),
+            axis_forward="-Z",
+            axis_up="Y",
+            bake_space_transform=True,
+            apply_scale_options="FBX_SCALE_NONE",
+            object_types={"MESH", "EMPTY"},
+            use_mesh_modifiers=False,
+            use_triangles=False,
+            use_tspace=True,
+            bake_anim=False,
+            path_mode="STRIP",
+        )
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _export_usd(path: Path, _portable: bool) -> None:
+    bpy.ops.wm.usd_export(
+        filepath=str(path),
+        root_prim_path="",
+        export_animation=False,
+        triangulate_meshes=False,
+        rename_uvmaps=False,
+        export_custom_properties=False,
+        export_textures_mode="KEEP",
+        relative_paths=True,
+        convert_world_material=False,
+    )
+
+
+def _export_obj(path: Path, _portable: bool) -> None:
+    bpy.ops.wm.obj_export(
+        filepath=str(path),
+        forward_axis="NEGATIVE_Z",
+        up_axis="Y",
+        export_triangulated_mesh=False,
+        export_colors=True,
+        path_mode="STRIP",
+    )
+
+
+_EXPORTERS: dict[str, Callable[[Path, bool], None]] = {
+    GLB.name: _export_glb,
+    FBX.name: _export_fbx,
+    USD.name: _export_usd,
+    OBJ.name: _export_obj,
+}
+
+
+def _reason(error: RuntimeError) -> str:
+    """The last line of a report that may hold a whole traceback."""
+    lines = [line for line in str(error).splitlines() if line.strip()]
+    return [line for line in lines if not line.startswith("Location:")][-1].strip()
+
+
+@contextmanager
+def card_scene(
+    levels: Sequence[CardMesh],
+    name: str,
+    look: CardLook,
+    file_format: CardFormat,
+    *,
+    portable: bool,
+    texels: Sequence[Floats] = (),
+) -> Iterator[bpy.types.Scene]:
+    """A scene with one object a level, below an empty where there are several.
+
+    It vanishes afterwards with every data-block made in the meantime. Blocks of the user that have
+    the names of ours are called otherwise for the time.
+
+    Args:
+        texels: of each level, (vertex_count, 2): a third UV map, its second component from the top.
+    """
+    names = level_names(name, len(levels))
+    before = _data_blocks()
+    with _free_names({plain_name(name), *names}):
+        try:
+            scene = bpy.data.scenes.new(plain_name(name))
+            material = _new_material(look, plain_name(name), file_format)
+            parent = _new_parent(scene, plain_name(name)) if len(levels) > 1 else None
+            for number, (level, level_name) in enumerate(zip(levels, names, strict=True)):
+                mesh = bpy.data.meshes.new(level_name)
+                uv_maps = _uv_maps(level, texels[number] if len(texels) else None, file_format)
+                points = _attributes(level, file_format, portable=portable)
+                fill_mesh(mesh, level, uv_maps=uv_maps, points=points)
+                if file_format == OBJ:
+                    mesh.color_attributes.active_color = mesh.color_attributes[_COLORS]
+                mesh.materials.append(material)
+                obj = bpy.data.objects.new(level_name, mesh)
+                obj.parent = parent
+                scene.collection.objects.link(obj)
+            yield scene
+        finally:
+            bpy.data.batch_remove(_data_blocks() - before)
+
+
+@contextmanager
+def shown(scene: bpy.types.Scene) -> Iterator[None]:
+    """The window shows this scene, as exporters want it, and then what it showed before.
+
+    Blender runs the frame change handlers at both changes.
+    """
+    window = bpy.context.window or bpy.context.window_manager.windows[0]
+    user_scene, user_layer = window.scene, window.view_layer
+    with bpy.context.temp_override(window=window):
+        try:
+            window.scene = scene
+            yield
+        finally:
+            window.scene = user_scene
+            window.view_layer = user_layer
+
+
+def _data_blocks() -> set[bpy.types.ID]:
+    return {block for kind in _MADE_IN for block in getattr(bpy.data, kind)}
+
+
+@contextmanager
+def _free_names(names: Iterable[str]) -> Iterator[None]:
+    """Nothing of the file has these names while the block runs: Blender would number ours."""
+    taken = [
+        (block, block.name)
+        for kind in _MADE_IN
+        for name in names
+        if (block := getattr(bpy.data, kind).get(name)) is not None and block.library is None
+    ]
+    try:
+        for block, name in taken:
+            block.name = f"{name} (while exporting)"
+        yield
+    finally:
+        for block, name in taken:
+            block.name = name
+
+
+def _new_parent(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
+    parent = bpy.data.objects.new(name, None)
+    parent["fbx_type"] = "LodGroup"  # Blender's FBX exporter asks for it
+    scene.collection.objects.link(parent)
+    return parent
+
+
+def _uv_maps(cards: CardMesh, texels: Floats | None, file_format: CardFormat) -> dict[str, Floats]:
+    """USD's importers go by the names of UV maps."""
+    is_usd = file_format == USD
+    # The exporter of glTF flips v.
+    along = 1.0 - cards.along if file_format == GLB else cards.along
+    maps = {
+        "st" if is_usd else "UVMap": cards.uv,
+        "st1" if is_usd else OCCLUSION_LAYER: np.stack([cards.occlusion, along], axis=1),
+    }
+    if texels is not None:  # Blender, and all files but glTF's, count v from the bottom
+        maps["st2" if is_usd else "Motion"] = texels * [1.0, -1.0] + [0.0, 1.0]
+    return maps
+
+
+def _attributes(cards: CardMesh, file_format: CardFormat, *, portable: bool) -> dict[str, Floats]:
+    """What a format carries beside UV maps and normals."""
+    values: dict[str, Floats] = {}
+    if not portable and file_format.extra:
+        values["_AO"] = cards.occlusion
+    if file_format == OBJ:
+        # It knows one UV map alone, so colours take the rest; its exporter codes them as sRGB.
+        rest = np.stack([cards.occlusion, cards.along, np.zeros_like(cards.along)], axis=1)
+        opaque = np.ones((len(rest), 1))
+        values[_COLORS] = np.concatenate([srgb_decoded(rest), opaque], axis=1)
+    if file_format == USD:
+        values["tangents"] = unit(np.cross(cards.tangent, cards.normal))
+    return values
+
+
+def _new_material(look: CardLook, name: str, file_format: CardFormat) -> bpy.types.Material:
+    """glTF's file holds its picture; the other exporters name those that are linked straight."""
+    if file_format == GLB:
+        packed = None if look.card is None else _packed_image(look.card, name)
+        return new_material(name, look.color, packed, packed, blending="BLENDED")
+    base = None if look.base is None else named_image(look.base, "sRGB")
+    alpha = base
+    if look.alpha != look.base:
+        alpha = None if look.alpha is None else named_image(look.alpha, "Non-Color")
+    return new_material(name, look.color, base, alpha, blending="BLENDED", is_tinted=False)
+
+
+def _packed_image(texture: Floats, name: str) -> bpy.types.Image:
+    height, width = texture.shape[:2]
+    image = bpy.data.images.new(name, width, height, alpha=True)
+    fill_image(image, texture)
+    return image

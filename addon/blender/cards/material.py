@@ -1,0 +1,143 @@
+"""The material of hair cards: its nodes, its pictures, and where cards are clear."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...exchange.textures.srgb import srgb_encoded
+from ...shading.textures import picture_as
+from ..base.images import read_image
+
+ROUGHNESS = 0.5
+#: glTF elongates the highlight along u, across the strands, as hair does.
+ANISOTROPY = 0.5
+
+type Color = tuple[float, float, float]
+
+
+def new_material(
+    name: str,
+    color: Color,
+    base: bpy.types.Image | None,
+    alpha: bpy.types.Image | None,
+    *,
+    blending: str,
+    is_tinted: bool = True,
+    occlusion: str = "",
+) -> bpy.types.Material:
+    """A material that is seen from both sides.
+
+    Args:
+        color: scene-linear; alone where there is no picture.
+        base: its colour.
+        alpha: the alpha of `base` where it is the same picture, else the red of its own.
+        blending: "BLENDED", which exporters of glTF read as such, or "DITHERED".
+        is_tinted: whether `base` is multiplied by the colour. Exporters but that of glTF know
+            those pictures alone that are linked straight.
+        occlusion: an attribute that `base` is multiplied by; "" for none.
+    """
+    material = bpy.data.materials.new(name)
+    material.use_backface_culling = False
+    material.surface_render_method = blending
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    surface = nodes.new("ShaderNodeBsdfPrincipled")
+    surface.inputs["Base Color"].default_value = (*color, 1.0)
+    surface.inputs["Roughness"].default_value = ROUGHNESS
+    surface.inputs["Anisotropic"].default_value = ANISOTROPY
+    links.new(surface.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    picture = None
+    if base is not None:
+        picture = _new_picture(material, base)
+        shown = picture.outputs["Color"]
+        if is_tinted:  # exporters of glTF make it baseColorFactor
+            shown, factor = _product(material, shown)
+            factor.default_value = (*color, 1.0)
+        if occlusion:
+            shown, factor = _product(material, shown)
+            attribute = nodes.new("ShaderNodeAttribute")
+            attribute.attribute_name = occlusion
+            links.new(attribute.outputs["Fac"], factor)
+        links.new(shown, surface.inputs["Base Color"])
+    if picture is not None and alpha == base:
+        links.new(picture.outputs["Alpha"], surface.inputs["Alpha"])
+    elif alpha is not None:
+        links.new(_new_picture(material, alpha).outputs["Color"], surface.inputs["Alpha"])
+    _arrange(material)
+    return material
+
+
+def _new_picture(material: bpy.types.Material, image: bpy.types.Image) -> bpy.types.Node:
+    picture = material.node_tree.nodes.new("ShaderNodeTexImage")
+    picture.image = image
+    picture.extension = "EXTEND"  # else the root's opaque row wraps around to the tip
+    return picture
+
+
+def _product(
+    material: bpy.types.Material, first: bpy.types.NodeSocket
+) -> tuple[bpy.types.NodeSocket, bpy.types.NodeSocket]:
+    """This colour times that of another socket: their product, and the other socket."""
+    node = material.node_tree.nodes.new("ShaderNodeMix")
+    node.data_type, node.blend_type = "RGBA", "MULTIPLY"
+    node.inputs[0].default_value = 1.0
+    material.node_tree.links.new(first, node.inputs[6])
+    return node.outputs[2], node.inputs[7]
+
+
+def _arrange(material: bpy.types.Material) -> None:
+    """Nodes from left to right, attributes below them."""
+    surface, output, *before = material.node_tree.nodes
+    row = [node for node in before if node.type != "ATTRIBUTE"]
+    for place, node in enumerate((*row, surface, output)):
+        node.location = 260.0 * place, 0.0
+    for node in set(before) - set(row):
+        node.location = 260.0, -260.0
+
+
+def named_image(file: str, space: str) -> bpy.types.Image:
+    """An image of which exporters want the file's name alone; it need not be there yet."""
+    image = bpy.data.images.new(file, 1, 1, alpha=True)
+    image.source = "FILE"
+    image.filepath = file
+    image.colorspace_settings.name = space
+    return image
+
+
+def fill_image(image: bpy.types.Image, texture: Floats) -> None:
+    """Draw (height, width, 4), linear with straight alpha, row 0 the lowest; colour goes on where
+    alpha is 0."""
+    coded = np.array(texture, np.float32)
+    coded[..., :3] = srgb_encoded(np.clip(coded[..., :3], 0.0, 1.0))
+    image.pixels.foreach_set(coded.ravel())
+
+
+def alpha_of(
+    obj: bpy.types.Object, chosen: bpy.types.Image | None = None
+) -> tuple[Floats | None, list[str]]:
+    """Where cards are clear, (height, width), and why not; None where they cover all over."""
+    image = chosen or alpha_image(obj)
+    if image is None:
+        problem = "No material has a picture for its alpha"
+        return None, [f"{problem}, so cards counted as covered all over"]
+    place = f"Image '{image.name}'"
+    try:
+        picture = read_image(image, is_color=False, place=place)
+        return picture_as("alpha", picture, place=place), []
+    except HairloomError as error:
+        return None, [f"{error} Until then cards counted as covered all over"]
+
+
+def alpha_image(obj: bpy.types.Object) -> bpy.types.Image | None:
+    """The picture that is linked to the alpha of a Principled BSDF of the object's materials."""
+    for slot in obj.material_slots:
+        tree = None if slot.material is None else slot.material.node_tree
+        for node in tree.nodes if tree is not None else ():
+            if node.type == "BSDF_PRINCIPLED":
+                for link in node.inputs["Alpha"].links:
+                    if link.from_node.type == "TEX_IMAGE" and link.from_node.image is not None:
+                        return link.from_node.image
+    return None
