@@ -16,8 +16,6 @@ PAGES = [
 ]
 #: pages for programmers, and the shaders that are handed to them; all others are for artists
 FOR_PROGRAMMERS = ("CONTRIBUTING.md", "docs/dev/", "docs/engines/", "gpu_shaders/")
-#: pages whose parts for programmers are still to move to docs/dev/
-NOT_YET_APART = ("dynamics.md", "refinement.md", "shading.md", "light_shafts.md")
 #: folders that are not in the repository but made in it
 MADE = ("out/", "out/window/", "dist/")
 #: of a picture of the user guide, so that a page of them loads at once
@@ -119,8 +117,6 @@ def is_for_programmers(page: Path) -> bool:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(REPOSITORY)))
 def test_a_page_names_files_that_are_there(page: Path) -> None:
-    if page.name in NOT_YET_APART:
-        return
     named = files_named_in(texts_of(page))
     if is_for_programmers(page):
         named += [name for name in folders_named_in(texts_of(page)) if name not in MADE]
@@ -129,7 +125,7 @@ def test_a_page_names_files_that_are_there(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(REPOSITORY)))
 def test_pages_for_artists_name_no_sources(page: Path) -> None:
-    if is_for_programmers(page) or page.name in NOT_YET_APART:
+    if is_for_programmers(page):
         return
     named = files_named_in(texts_of(page))
     assert [name for name in named if name.endswith((".py", ".glsl"))] == []
