@@ -27,9 +27,9 @@ import gpu
 import numpy as np
 
 import hairloom
+from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.preview import live, reactions
-from hairloom.addon.blender.sessions import making
 from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 
 RATE, FRAMES, MOVES, BEATS = 24.0, 24, 8, 2000
@@ -75,14 +75,14 @@ def main() -> None:
     gpu.init()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     hairloom.register()
-    making.is_awaited = lambda: False  # as in a window
+    latest_job.is_blocking = lambda: False  # as in a window
     scene, hair = add_sample_scene(())
     hair.hairloom.dynamics.form = given.form
     depsgraph = scene.view_layers[0].depsgraph
     stops = Stops()
     session = stops.timed("preview", lambda: live.start(hair, depsgraph))
     stops.timed("fields are begun", lambda: session.make_fields(depsgraph))
-    stops.timed("play", lambda: live.play(depsgraph, waits=False))
+    stops.timed("play", lambda: live.play(depsgraph, blocking=False))
 
     def tick() -> None:
         live.advance(depsgraph, 1.0 / RATE)

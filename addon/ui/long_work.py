@@ -219,8 +219,8 @@ def shared[Result](steps: Generator[float, None, Result]) -> Steps[Result]:
 def threaded[Result](work: ThreadWork[Result]) -> Steps[Result]:
     """Work in a thread, which reports its progress; closing the generator abandons it."""
     try:
-        while not work.serve():
-            yield Progress(work.stage, waits=not work.asks)
+        while not work.run_main_thread_steps():
+            yield Progress(work.stage, waits=not work.wants_main_thread)
         return work.result()
     finally:
         work.give_up()

@@ -81,7 +81,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
                 start_preview(self, context, chosen_hair(context))
             depsgraph = context.evaluated_depsgraph_get()
             fin_warnings = fins.start_enabled(depsgraph)
-            for warning in (*fin_warnings, *live.play(depsgraph, waits=False)):
+            for warning in (*fin_warnings, *live.play(depsgraph, blocking=False)):
                 self.report({"WARNING"}, warning)
         if not live.is_playing():
             return {"CANCELLED"}

@@ -217,7 +217,7 @@ def _begin(
     if live.is_playing():
         depsgraph = context.evaluated_depsgraph_get()
         for session in filter(None, map(live.session_of, grooms)):
-            live.begin(session, depsgraph, waits=False)
+            live.begin(session, depsgraph, blocking=False)
     else:
         bpy.ops.hairloom.play("INVOKE_DEFAULT")
 

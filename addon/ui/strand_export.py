@@ -180,9 +180,9 @@ def _in_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:
     with closing(plan.positions()) as positions:
         work = plan.writing(path, positions)
         try:
-            while not work.serve():
+            while not work.run_main_thread_steps():
                 text = f"{plan.done:,} of {total:,} frames"
-                yield Progress(text, plan.done / total, waits=not work.asks)
+                yield Progress(text, plan.done / total, waits=not work.wants_main_thread)
             return work.result()
         finally:
             work.give_up()

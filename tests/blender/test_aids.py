@@ -7,8 +7,9 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
-from hairloom.addon.blender.preview import live, previewed
+from hairloom.addon.blender.preview import live
 from hairloom.addon.blender.properties.groups import AIDS
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.blender.viewport.aids import shape_lines
@@ -51,11 +52,11 @@ def test_lines_of_a_collider_that_is_being_made_come_when_it_is_there(preview, m
     fields.forget()
     monkeypatch.setattr(DistanceField, "from_surface", late)
     hair.hairloom.shown_aids = {"colliders"}
-    assert aids(session) == () and previewed.take_arrivals() == previewed.ARRIVAL_TIME
+    assert aids(session) == () and latest_job.take_steps() == latest_job.ARRIVAL_TIME
     is_made.set()
     while not fields.are_made():
         time.sleep(0.001)
-    assert previewed.take_arrivals() is None
+    assert latest_job.take_steps() is None
     assert len(aids(session)) == 1
 
 

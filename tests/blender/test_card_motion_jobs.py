@@ -110,7 +110,7 @@ def test_cancelled_in_its_midst_it_leaves_the_old_files(
         CardOutput(motion=MotionChoices(kind)),
     )
     making = plan.making()
-    while not making.serve():
+    while not making.run_main_thread_steps():
         time.sleep(0.001)
     writing = plan.writing(making.result())
     for text, _ in writing:

@@ -13,10 +13,10 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
 from hairloom.addon import pipeline  # noqa: E402
-from hairloom.addon.blender.engine import engine_hair, engine_making  # noqa: E402
+from hairloom.addon.blender.base import latest_job  # noqa: E402
+from hairloom.addon.blender.engine import engine_hair  # noqa: E402
 from hairloom.addon.blender.engine.engine_scene import SceneReader  # noqa: E402
-from hairloom.addon.blender.preview import live, previewed, reactions  # noqa: E402
-from hairloom.addon.blender.sessions import making  # noqa: E402
+from hairloom.addon.blender.preview import live, reactions  # noqa: E402
 from hairloom.addon.blender.viewport import overlay  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
 
@@ -61,7 +61,7 @@ class View:
     def read(self, changed: set[int] | None = None, **named: Any) -> tuple[Any, ...]:
         known = None if self._is_first else changed or set()
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        scene = self.reader.read(depsgraph, changed=known, waits=False, **named)
+        scene = self.reader.read(depsgraph, changed=known, blocking=False, **named)
         self._is_first = False
         return tuple(groom.snapshot for groom in scene.grooms)
 
@@ -69,7 +69,8 @@ class View:
         end, found = time.monotonic() + 60.0, ()
         while self.reader.awaited:
             assert time.monotonic() < end, "it is never made"
-            if any(engine_making.is_done(uid) for uid in self.reader.awaited):
+            latest_job.take_steps()
+            if not all(engine_hair.is_pending(uid) for uid in self.reader.awaited):
                 found = self.read()
             time.sleep(0.005)
         return found
@@ -79,7 +80,7 @@ def test_the_first_picture_is_without_hair_until_it_is_made(hair: Any, gate: Gat
     view = View()
     assert view.read() == () and view.reader.awaited == {hair.session_uid}
     assert view.read() == (), "nor does the next picture wait"
-    assert bpy.app.timers.is_registered(engine_making._tell)
+    assert bpy.app.timers.is_registered(latest_job.take_steps)
     gate.opened.set()
     (shown,) = view.arrive()
     assert shown.strand_count == COUNT and gate.makers == ["hair in Rendered mode"]
@@ -135,13 +136,15 @@ def test_hair_that_cannot_be_made_is_told(
 def test_hair_that_nobody_sees_any_more_is_not_waited_for(hair: Any, gate: Gate) -> None:
     view = View()
     view.read()
-    work = engine_making._makings[hair.session_uid].work
+    uid = hair.session_uid
+    assert engine_hair.is_pending(uid)
     bpy.data.objects.remove(hair)
     bpy.context.view_layer.update()
     assert view.read() == () and not view.reader.awaited
-    assert work._is_given_up and not engine_making._makings
-    engine_hair.forget()
-    assert not bpy.app.timers.is_registered(engine_making._tell)
+    assert not engine_hair.is_pending(uid)
+    assert latest_job.take_steps() is None
+    latest_job.unwatch_all()
+    assert not bpy.app.timers.is_registered(latest_job.take_steps)
 
 
 def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
@@ -151,7 +154,7 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
     view = View()
     view.read()
     (before,) = view.arrive()
-    monkeypatch.setattr(making, "is_awaited", lambda: False)
+    monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     gate.opened.clear()
     session = live.start(hair, bpy.context.evaluated_depsgraph_get())
     assert overlay.expected() == {hair.session_uid} and not overlay.drawn()
@@ -169,7 +172,7 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
     end = time.monotonic() + 60.0
     while session.is_pending:
         assert time.monotonic() < end
-        previewed.take_arrivals()
+        latest_job.take_steps()
         time.sleep(0.005)
     assert overlay.drawn() == {hair.session_uid} and not overlay.expected()
     assert read() == (), "the preview draws it from now on"

@@ -217,8 +217,8 @@ def test_a_bake_has_the_animated_settings_of_the_frame(
     widths = []
     read_groom = engine_hair.read_groom
 
-    def seen(obj: Any, depsgraph: Any, *, waits: bool) -> Any:
-        assert waits, "a render does not show what was made before"
+    def seen(obj: Any, depsgraph: Any, *, blocking: bool) -> Any:
+        assert blocking, "a render does not show what was made before"
         widths.append(read_groom(obj, depsgraph).strand_settings.width_scale)
         return read_groom(obj, depsgraph)
 

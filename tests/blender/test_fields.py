@@ -55,12 +55,12 @@ def surface_of(obj, evaluated):
 def test_a_field_is_the_same_whoever_makes_it_and_is_made_once(sphere, evaluated, extension):
     surface = surface_of(sphere, evaluated)
     with pytest.raises(fields.NotMadeYetError):
-        fields.field_of(surface, COARSE, place="Head", waits=False)
+        fields.field_of(surface, COARSE, place="Head", blocking=False)
     beside = fields.field_of(surface, COARSE, place="Head")
     alone = DistanceField.from_surface(surface, COARSE)
     assert np.array_equal(beside.values, alone.values) and beside.cell == alone.cell
     again = surface_of(sphere, evaluated)
-    assert fields.field_of(again, COARSE, place="Head", waits=False) is beside
+    assert fields.field_of(again, COARSE, place="Head", blocking=False) is beside
     finer = DynamicsSettings(collider_resolution=17)
     assert fields.field_of(again, finer, place="Head") is not beside
 
@@ -85,9 +85,9 @@ def made_beside(surface):
     names = [str(number) for number in range(fields.KEPT + 1)]
     for name in names:
         with pytest.raises(fields.NotMadeYetError):
-            fields.field_of(surface, COARSE, place=name, waits=False)
+            fields.field_of(surface, COARSE, place=name, blocking=False)
     until_made()
-    made = [fields.field_of(surface, COARSE, place=name, waits=False) for name in names]
+    made = [fields.field_of(surface, COARSE, place=name, blocking=False) for name in names]
     return weakref.ref(made[0])
 
 
@@ -99,7 +99,7 @@ def test_previews_keep_the_youngest_fields_only(new_hair, sphere, evaluated, ext
 
 def test_a_preview_takes_no_field_from_hair_that_waits_for_it(new_hair, sphere, evaluated, gate):
     waiting = live.start(new_hair(sphere), evaluated())
-    live.play(evaluated(), waits=False)
+    live.play(evaluated(), blocking=False)
     gate.set()
     oldest = made_beside(surface_of(sphere, evaluated))
     assert live.is_waiting(waiting)
@@ -113,7 +113,7 @@ def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(
     hair = new_hair(sphere)
     session = live.start(hair, evaluated())
     at_rest = session.strands
-    assert live.play(evaluated(), waits=False) == []
+    assert live.play(evaluated(), blocking=False) == []
     assert live.is_playing() and live.is_waiting(session) and not session.is_playing
     sphere.location.x = 0.05
     evaluated()
@@ -134,7 +134,7 @@ def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(
 
 def test_stop_while_hair_waits_ends_the_waiting(new_hair, sphere, evaluated, gate):
     session = live.start(new_hair(sphere), evaluated())
-    live.play(evaluated(), waits=False)
+    live.play(evaluated(), blocking=False)
     live.rest(evaluated(), keep_playing=False)
     assert not live.is_playing()
     gate.set()
@@ -150,7 +150,7 @@ def test_a_collider_that_cannot_be_made_is_left_out_with_a_warning_as_ever(
     bpy.ops.mesh.primitive_plane_add(size=0.1)
     hair.hairloom.collider = bpy.context.object
     session = live.start(hair, evaluated())
-    live.play(evaluated(), waits=False)
+    live.play(evaluated(), blocking=False)
     until_made()
     live.advance(evaluated(), FRAME)
     assert session.is_playing
@@ -167,7 +167,7 @@ def test_more_meshes_than_are_kept_are_all_waited_for(new_hair, sphere, evaluate
         colliders.objects.link(bpy.context.object)
     hair.hairloom.collider_collection = colliders
     session = live.start(hair, evaluated())
-    live.play(evaluated(), waits=False)
+    live.play(evaluated(), blocking=False)
     for _ in range(2):
         until_made()
         live.advance(evaluated(), FRAME)
@@ -178,7 +178,7 @@ def test_blenders_playback_waits_and_takes_over(new_hair, sphere, evaluated, ext
     hair = new_hair(sphere)
     hair.hairloom.bake.follows = True
     session = live.start(hair, evaluated())
-    live.play(evaluated(), waits=False)
+    live.play(evaluated(), blocking=False)
     bpy.context.scene.frame_set(bpy.context.scene.frame_start)
     timeline.follow(session, evaluated())
     assert session.is_playing and not live.is_waiting(session)

@@ -89,7 +89,7 @@ def test_a_thread_is_waited_for_and_its_stages_are_told() -> None:
     may_end = threading.Event()
 
     def work(thread: ThreadWork[str]) -> str:
-        thread.tell("Sorting")
+        thread.report("Sorting")
         assert may_end.wait(30.0)
         return "sorted"
 
@@ -107,7 +107,7 @@ def test_closing_gives_the_thread_up() -> None:
     def work(thread: ThreadWork[None]) -> None:
         begun.set()
         assert may_go_on.wait(30.0)
-        thread.tell("More")
+        thread.report("More")
 
     thread = ThreadWork(work, "test")
     steps = threaded(thread)
@@ -115,7 +115,7 @@ def test_closing_gives_the_thread_up() -> None:
     next(steps)
     steps.close()
     may_go_on.set()
-    while not thread.serve():
+    while not thread.run_main_thread_steps():
         pass
     with pytest.raises(GivenUpError):
         thread.result()

@@ -10,10 +10,10 @@ import pytest
 
 from hairloom.addon import pipeline
 from hairloom.addon.blender.bakes import playback
-from hairloom.addon.blender.base.thread_work import GivenUpError
+from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.pictures.showing import shown_groom
-from hairloom.addon.blender.preview import late, live, previewed, reactions
+from hairloom.addon.blender.preview import late, live, reactions
 from hairloom.addon.blender.preview.bake import simulated_for
 from hairloom.addon.blender.sessions import making
 from hairloom.addon.blender.sessions.making import Order, make
@@ -28,7 +28,7 @@ COUNT = 60
 
 @pytest.fixture
 def in_window(monkeypatch):
-    monkeypatch.setattr(making, "is_awaited", lambda: False)
+    monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     yield
     reactions.clear()
 
@@ -59,7 +59,7 @@ def arrive(session):
     end = time.monotonic() + 60.0
     while session.is_pending and live.sessions():
         assert time.monotonic() < end, "it is never made"
-        previewed.take_arrivals()
+        latest_job.take_steps()
         time.sleep(0.005)
 
 
@@ -76,7 +76,7 @@ def test_a_preview_shows_blenders_strands_until_its_own_are_made(hair, evaluated
     assert not session.is_made and session.is_pending
     assert shown(session).snapshot.strand_count == 0 and "is being made" in shown(session).note
     assert not is_box(hair, evaluated)
-    assert bpy.app.timers.is_registered(previewed.take_arrivals)
+    assert bpy.app.timers.is_registered(latest_job.take_steps)
     gate.set()
     arrive(session)
     assert session.is_made and shown(session).note == ""
@@ -97,13 +97,13 @@ def test_what_a_thread_makes_is_the_same_to_the_bit(hair, evaluated, in_window):
 
 def test_play_waits_for_the_hair(hair, evaluated, gate):
     session = live.start(hair, evaluated())
-    assert live.play(evaluated(), waits=False) == []
+    assert live.play(evaluated(), blocking=False) == []
     while not fields.are_made():
         time.sleep(0.005)
     live.advance(evaluated(), FRAME)
     assert live.is_waiting(session) and not session.is_playing
     with pytest.raises(fields.NotMadeYetError):
-        session.play(evaluated(), waits=False)
+        session.play(evaluated(), blocking=False)
     gate.set()
     arrive(session)
     live.advance(evaluated(), FRAME)
@@ -220,7 +220,6 @@ def test_ambient_light_needs_no_other_strands(playing, hair, evaluated, monkeypa
 @pytest.mark.parametrize("end", ["stop", "delete", "load"])
 def test_an_end_in_the_middle_leaves_nothing(end, hair, evaluated, gate):
     session = live.start(hair, evaluated())
-    work = session._making._work
     if end == "stop":
         live.stop(session)
     elif end == "delete":
@@ -228,11 +227,8 @@ def test_an_end_in_the_middle_leaves_nothing(end, hair, evaluated, gate):
         bpy.context.view_layer.update()
     else:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert live.sessions() == () and previewed.take_arrivals() is None
-    gate.set()
-    work.wait()
-    with pytest.raises(GivenUpError):
-        work.result()
+    assert live.sessions() == () and latest_job.take_steps() is None
+    assert not session.is_pending, "nobody waits for it any more"
 
 
 def test_hair_that_cannot_be_made_ends_the_preview_with_a_notice(playing, hair, monkeypatch):
@@ -323,7 +319,7 @@ def test_playback_goes_on_before_the_hair_is_made(hair, moving, evaluated, gate,
     second = rounds(session, *range(1, 8))
     live.stop(session)
     bpy.context.scene.frame_set(1)  # where the first preview has begun, too
-    monkeypatch.setattr(making, "is_awaited", lambda: True)
+    monkeypatch.setattr(latest_job, "is_blocking", lambda: True)
     again = live.start(hair, evaluated())
     np.testing.assert_array_equal(second, rounds(again, *range(1, 8)))
 
@@ -337,7 +333,7 @@ def test_playback_goes_on_before_a_collider_is_made(hair, moving, evaluated, mon
 
     monkeypatch.setattr(DistanceField, "from_surface", wait_and_make)
     session = live.start(hair, evaluated())
-    monkeypatch.setattr(making, "is_awaited", lambda: False)
+    monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     monkeypatch.setattr(playback, "is_played", lambda: True)
     rounds(session, 1, 2, 3)
     assert session.is_made and not session.is_playing and late.is_late(session)
@@ -383,7 +379,7 @@ def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, evaluate
         return bind(strands, surface, place=place)
 
     monkeypatch.setattr(pipeline, "bind_roots", noted)
-    made = making.stand_in(order)
+    made = making.placeholder(order)
     assert len(searched) == 1 and searched[0] < len(head.triangles) / 10
     assert made.rig.head is head and not made.is_whole
     wanted = bind(made.rig.strands, head, place="Hair").strands
@@ -398,7 +394,7 @@ def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, evalu
     large = order.source.strands.transformed(np.diag([1000.0, 1000.0, 1000.0, 1.0]))
     order = replace(order, source=replace(order.source, strands=large))
     told = []
-    for make_it in (making.stand_in, making.rig_of):
+    for make_it in (making.placeholder, making.rig_of):
         with pytest.raises(HairloomError) as error:
             make_it(order)
         told.append(str(error.value))

@@ -7,9 +7,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from hairloom.addon.blender.base.thread_work import GivenUpError  # noqa: E402
+from hairloom.addon.blender.base import latest_job  # noqa: E402
 from hairloom.addon.blender.engine.engine_hair import read_groom  # noqa: E402
-from hairloom.addon.blender.preview import live, previewed, reactions  # noqa: E402
+from hairloom.addon.blender.preview import live, reactions  # noqa: E402
 from hairloom.addon.blender.viewport import overlay  # noqa: E402
 
 
@@ -28,7 +28,7 @@ def preview(new_hair, sphere, evaluated):
 @pytest.fixture
 def in_window(preview, monkeypatch):
     """The same preview, where cards are built beside the window."""
-    monkeypatch.setattr(preview[2].cards, "_is_awaited", lambda: False)
+    monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     return preview
 
 
@@ -39,7 +39,7 @@ def drawn(session):
 def served(session):
     """The cards that are shown once all that is on its way is built."""
     while session.cards.is_pending:
-        previewed.take_arrivals()
+        latest_job.take_steps()
     return drawn(session).cards
 
 
@@ -129,12 +129,9 @@ def test_a_render_shows_the_same_cards(preview, evaluated):
 def test_in_a_window_old_cards_stay_until_others_are_built(in_window):
     hair, _, session = in_window
     before = drawn(session).cards.mesh
-    first = None
     for count in (4, 6, 7):  # a slider is dragged
         hair.data.hairloom.cards.segment_count = count
         assert len(drawn(session).cards.mesh.triangles) == len(before.triangles)
-        first = first or session.cards._build
-        assert session.cards._build is first, "one build at a time"
     mesh = served(session).mesh
     assert len(mesh.triangles) == len(before.triangles) * 7 // 12
 
@@ -153,13 +150,10 @@ def test_in_a_window_textures_are_on_the_gpu_before_cards_are_shown(in_window, g
 def test_strands_again_give_up_what_is_being_built(in_window):
     hair, _, session = in_window
     hair.data.hairloom.cards.segment_count = 5
-    work = session.cards._build.work
+    assert session.cards.is_pending
     hair.data.hairloom.card_drawing.shown_as = "strands"
     assert not session.cards.is_pending and drawn(session).cards is None
-    work._thread.join(timeout=60.0)
-    assert work.is_done, "it goes on and asks for more"
-    with pytest.raises(GivenUpError):
-        work.result()
+    assert latest_job.take_steps() is None, "it is waited for"
 
 
 def test_cards_throw_the_shadow_of_their_strands(preview):
@@ -208,8 +202,11 @@ def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_win
     bpy.context.view_layer.update()
     reactions.updated(evaluated())
     reactions.catch_up(evaluated())
+    while session.is_pending:
+        latest_job.take_steps()
     assert session.cards.is_pending
-    assert drawn(session).cards.mesh is before.mesh
+    assert np.array_equal(drawn(session).cards.mesh.positions, before.mesh.positions)
+    before = drawn(session).cards
     hair.data.hairloom.card_drawing.passes = "three"
     hair.data.hairloom.strands.tip_width = 0.9
     assert drawn(session).cards.drawing.passes == "three"

@@ -200,10 +200,10 @@ def test_a_cancelled_export_leaves_the_old_file(swinging: Any, tmp_path: Path) -
         work = plan.writing(path, positions)
         limit = time.monotonic() + 20.0
         while plan.done < 3 and time.monotonic() < limit:
-            assert not work.serve()
+            assert not work.run_main_thread_steps()
         work.give_up()
         positions.close()
-        while time.monotonic() < limit and not work.serve():
+        while time.monotonic() < limit and not work.run_main_thread_steps():
             time.sleep(0.01)
         assert plan.done >= 3
         assert path.read_bytes() == b"old"
@@ -222,7 +222,7 @@ def test_in_steps_the_same_file_is_written_as_at_once(swinging: Any, tmp_path: P
             plan.write(path)
         else:
             work = plan.writing(path, plan.positions())
-            while not work.serve():
+            while not work.run_main_thread_steps():
                 time.sleep(0.001)
             assert "frames 1 to 6" in work.result().result
     once, steps = (curves_of(tmp_path / name) for name in ("once.abc", "steps.abc"))

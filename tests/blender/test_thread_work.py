@@ -37,14 +37,14 @@ def counting(seen: list[Any], last: int) -> Generator[None, None, int]:
 
 def test_what_is_asked_is_done_by_who_serves_and_a_part_at_a_time() -> None:
     seen: list[Any] = []
-    work = ThreadWork(lambda work: 10 * work.asked(counting(seen, 3)), "test")
-    until(lambda: work.asks)
+    work = ThreadWork(lambda work: 10 * work.on_main_thread(counting(seen, 3)), "test")
+    until(lambda: work.wants_main_thread)
     assert not seen, "it did it by itself"
     for done in (1, 2, 3):
-        assert not work.serve(duration=0.0)
+        assert not work.run_main_thread_steps(duration=0.0)
         assert seen == [threading.main_thread()] * done
-    until(lambda: work.serve(duration=0.0))
-    assert work.result() == 30 and not work.asks
+    until(lambda: work.run_main_thread_steps(duration=0.0))
+    assert work.result() == 30 and not work.wants_main_thread
     assert seen[-1] == "closed"
 
 
@@ -57,14 +57,14 @@ def test_what_fails_is_raised_in_the_thread_and_told_by_the_result() -> None:
 
     def try_it(work: ThreadWork[str]) -> str:
         try:
-            work.asked(refusing())
+            work.on_main_thread(refusing())
         except OSError as error:
             caught.append(error)
-        work.tell("another try")
+        work.report("another try")
         raise ValueError("in vain")
 
     work = ThreadWork(try_it, "test")
-    until(work.serve)
+    until(work.run_main_thread_steps)
     assert [str(each) for each in caught] == ["no more memory"]
     assert work.stage == "another try"
     with pytest.raises(ValueError, match="in vain"):
@@ -73,12 +73,12 @@ def test_what_fails_is_raised_in_the_thread_and_told_by_the_result() -> None:
 
 def test_who_gives_up_closes_what_was_begun_and_ends_the_thread() -> None:
     seen: list[Any] = []
-    work = ThreadWork(lambda work: work.asked(counting(seen, 1000)), "test")
-    until(lambda: work.asks)
-    work.serve(duration=0.0)
+    work = ThreadWork(lambda work: work.on_main_thread(counting(seen, 1000)), "test")
+    until(lambda: work.wants_main_thread)
+    work.run_main_thread_steps(duration=0.0)
     work.give_up()
     assert seen[-1] == "closed", "what it holds is freed by the thread"
-    until(work.serve)
+    until(work.run_main_thread_steps)
     with pytest.raises(GivenUpError):
         work.result()
 
@@ -88,7 +88,7 @@ def test_work_that_was_given_up_asks_and_goes_on_no_more() -> None:
 
     def go_on(work: ThreadWork[None]) -> None:
         given_up.wait(PATIENCE)
-        for goes_on in (lambda: work.tell("next"), lambda: work.asked(counting([], 1))):
+        for goes_on in (lambda: work.report("next"), lambda: work.on_main_thread(counting([], 1))):
             try:
                 goes_on()
             except GivenUpError:
@@ -97,5 +97,5 @@ def test_work_that_was_given_up_asks_and_goes_on_no_more() -> None:
     work = ThreadWork(go_on, "test")
     work.give_up()
     given_up.set()
-    until(work.serve)
+    until(work.run_main_thread_steps)
     assert ended == [True, True]

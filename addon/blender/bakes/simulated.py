@@ -49,11 +49,11 @@ class Simulated(Protocol):
     def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
         """In its style, where its body is now, at no speed."""
 
-    def play(self, depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> None:
+    def play(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> None:
         """Get ready to be simulated, from rest.
 
         Args:
-            waits: False: do not wait for the fields of colliders that are to be made.
+            blocking: False: do not wait for the fields of colliders that are to be made.
 
         Raises:
             NotMadeYetError: a field is being made, and nobody waits; it is as at rest until then.

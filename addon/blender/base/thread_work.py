@@ -46,7 +46,7 @@ class ThreadWork[T]:
         self._thread = threading.Thread(target=self._run, daemon=True, name=name)
         self._thread.start()
 
-    def tell(self, stage: str) -> None:
+    def report(self, stage: str) -> None:
         """In the thread: say what is done next.
 
         Raises:
@@ -56,7 +56,7 @@ class ThreadWork[T]:
             raise GivenUpError
         self.stage = stage
 
-    def asked[R](self, steps: Generator[None, None, R]) -> R:
+    def on_main_thread[R](self, steps: Generator[None, None, R]) -> R:
         """In the thread: the result of steps that the main thread does.
 
         Raises:
@@ -71,11 +71,11 @@ class ThreadWork[T]:
         return result
 
     @property
-    def asks(self) -> bool:
-        """Whether the thread waits for `serve`."""
+    def wants_main_thread(self) -> bool:
+        """Whether the thread waits for `run_main_thread_steps`."""
         return self._request is not None
 
-    def serve(self, duration: float = SERVING_TIME) -> bool:
+    def run_main_thread_steps(self, duration: float = SERVING_TIME) -> bool:
         """In the main thread: do what is asked for, for about this long [s]; whether the work is
         done."""
         request, end = self._request, time.perf_counter() + duration
@@ -87,7 +87,7 @@ class ThreadWork[T]:
             except StopIteration as last:
                 self._request = None
                 request.answer.set_result(last.value)
-            except Exception as error:  # it is raised where the thread waits, and told of there
+            except Exception as error:  # it is raised where the thread waits, which reports it
                 self._request = None
                 request.answer.set_exception(error)
         return not self._thread.is_alive()

@@ -76,22 +76,18 @@ def built_cards(
     )
 
 
-def building_cards(
+def cards_built_in_thread(
+    work: ThreadWork[BuiltCards],
     rig: Rig,
     form: CardForm,
     pictures: Mapping[str, Floats],
     others: OtherHair = _NO_OTHERS,
-) -> ThreadWork[BuiltCards]:
-    """Build them in a thread."""
-    choices = CardChoices.of(form, pictures, others)
-
-    def build(work: ThreadWork[BuiltCards]) -> BuiltCards:
-        built = tied_cards(rig, form, made_in_thread(work, rig, choices))
-        work.tell("Textures")
-        device = _uploaded(work, built.rest)
-        return replace(built, rest=replace(built.rest, device=device))
-
-    return ThreadWork(build, "hairloom cards")
+) -> BuiltCards:
+    """As `built_cards` in the thread of this work, with their textures on the GPU."""
+    built = tied_cards(rig, form, made_in_thread(work, rig, CardChoices.of(form, pictures, others)))
+    work.report("Textures")
+    device = _uploaded(work, built.rest)
+    return replace(built, rest=replace(built.rest, device=device))
 
 
 def _uploaded(work: ThreadWork[Any], cards: CardSnapshot) -> CardTextures | None:
@@ -109,7 +105,7 @@ def _uploaded(work: ThreadWork[Any], cards: CardSnapshot) -> CardTextures | None
         yield from device.uploading(cards.textures, cards.mesh.atlas, packed)
         return device
 
-    return work.asked(uploading())
+    return work.on_main_thread(uploading())
 
 
 def made_in_thread(work: ThreadWork[Any], rig: Rig, choices: CardChoices) -> MadeCards:
@@ -121,10 +117,10 @@ def made_in_thread(work: ThreadWork[Any], rig: Rig, choices: CardChoices) -> Mad
     """
 
     def draw(flat: FlatStrands, size: int) -> AtlasMaps:
-        return work.asked(drawing_maps(flat, size))
+        return work.on_main_thread(drawing_maps(flat, size))
 
     steps = making_steps(rig, choices, lambda build: made_maps(rig, build, choices, draw))
-    return result_of(retold(steps, work.tell))
+    return result_of(retold(steps, work.report))
 
 
 def tied_cards(rig: Rig, form: CardForm, made: MadeCards) -> BuiltCards:

@@ -1,14 +1,14 @@
 """The cards that are shown in place of a groom's strands.
 
 A build takes seconds, so that in a window it goes on beside everything else. What was shown before
-stays until it is done; of the settings that change meanwhile the last ones count. In the
-background, where nobody waits before a window, cards are built at once.
+stays until it is done. In the background they are built at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 
 import bpy
 import numpy as np
@@ -18,9 +18,10 @@ from ...errors import HairloomError
 from ...pipeline import Pose, Rig
 from ...render.card_snapshot import CardSnapshot
 from ...render.snapshot import Snapshot
-from ..base.thread_work import ThreadWork
+from ..base import latest_job
+from ..base.latest_job import LatestJob, Work
 from ..properties.card_form import CardForm, CardsDrawn
-from .card_builds import BuiltCards, building_cards, built_cards, told
+from .card_builds import BuiltCards, built_cards, cards_built_in_thread, told
 from .card_images import chosen_pictures
 from .card_making import order_line
 from .occluders import OtherHair, read_other_hair
@@ -54,25 +55,22 @@ def without_strands(snapshot: Snapshot) -> Snapshot:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Building:
-    """Cards on their way."""
-
-    rig: Rig
-    form: CardForm
-    work: ThreadWork[BuiltCards]
-
-
 class ShownCards:
     """The cards of one groom: those that are shown, and those that are being built.
 
     warnings: what the artist should know of them, or why there are none.
+
+    Args:
+        hair: finds the object. arrived: is called when `collect` has something to take over.
     """
 
-    def __init__(self) -> None:
+    def __init__(
+        self, hair: Callable[[], bpy.types.Object], arrived: Callable[[], None] = lambda: None
+    ) -> None:
+        self._hair = hair
+        self._job = LatestJob[tuple[Rig, CardForm], BuiltCards]("hairloom cards", arrived, _same)
         self._built: BuiltCards | None = None
         self._wanted: tuple[Rig, CardForm] | None = None
-        self._build: _Building | None = None
         self._shown: CardSnapshot | None = None
         self._others = OtherHair()
         self._motion: Floats = np.eye(4)
@@ -81,12 +79,12 @@ class ShownCards:
     @property
     def is_pending(self) -> bool:
         """Whether other cards are on their way."""
-        return self._build is not None
+        return self._job.is_pending
 
     @property
-    def asks(self) -> bool:
-        """Whether what is on its way waits for `serve`."""
-        return self._build is not None and self._build.work.asks
+    def has_arrived(self) -> bool:
+        """Whether `collect` has something to take over."""
+        return self._job.has_arrived
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -104,13 +102,11 @@ class ShownCards:
         cards, triangles, _ = self.counts
         return f"{cards:,} cards, {triangles:,} triangles", order_line(self._built.wrong_share)
 
-    def want(self, hair: bpy.types.Object, rig: Rig, form: CardForm) -> None:
+    def want(self, rig: Rig, form: CardForm) -> None:
         """Cards of this rig and form from now on; nothing is built twice."""
-        if self._is_wanted(rig, form):
-            return
-        self._wanted = rig, form
-        if self._build is None:
-            self._begin(hair)
+        if self._wanted is None or not _same(self._wanted, (rig, form)):
+            self._wanted = rig, form
+            self._build()
 
     @property
     def is_shaded_by_others(self) -> bool:
@@ -122,29 +118,18 @@ class ShownCards:
         """Session numbers of the other hair that shades what is shown, or what is being built."""
         return self._others.uids
 
-    def shade_again(self, hair: bpy.types.Object) -> None:
+    def shade_again(self) -> None:
         """The same cards once more if other hair is elsewhere or other hair now."""
         if self._wanted is None:
             return
-        others = self._read_others(hair)
-        if others.is_like(self._others):
-            return
-        if self._build is not None:
-            self._build.work.give_up()
-            self._build = None
-        self._begin(hair, others)
+        others = self._read_others(self._wanted[1])
+        if not others.is_like(self._others):
+            self._job.cancel()
+            self._build(others)
 
-    def serve(self) -> bool:
-        """Do a part of what only the main thread may; whether there is something to collect."""
-        return self._build is not None and self._build.work.serve()
-
-    def collect(self, hair: bpy.types.Object) -> None:
+    def collect(self) -> None:
         """Take over what was built meanwhile."""
-        build, self._build = self._build, None
-        assert build is not None
-        self._take(build.work.result)
-        if not self._is_wanted(build.rig, build.form):
-            self._begin(hair)
+        self._take(self._job.take)
 
     def now(
         self, rig: Rig, pose: Pose, guides: Callable[[], Floats], drawn: CardsDrawn
@@ -167,41 +152,45 @@ class ShownCards:
 
     def forget(self) -> None:
         """Strands are shown; cards that are on their way are not waited for."""
-        if self._build is not None:
-            self._build.work.give_up()
-        self._built = self._wanted = self._build = self._shown = None
+        self._job.cancel()
+        self._built = self._wanted = self._shown = None
         self._others = OtherHair()
         self.warnings = ()
 
-    def _begin(self, hair: bpy.types.Object, others: OtherHair | None = None) -> None:
+    def _build(self, others: OtherHair | None = None) -> None:
+        """Have what is wanted built; at once where nothing goes on until then."""
         assert self._wanted is not None
         rig, form = self._wanted
-        pictures = self._pictures(hair)
-        self._others = others = others or self._read_others(hair)
-        if self._is_awaited():
-            self._take(lambda: built_cards(rig, form, pictures, others))
-        else:
-            self._build = _Building(rig, form, building_cards(rig, form, pictures, others))
+        if not latest_job.is_blocking():
+            self._job.want(self._wanted, lambda: self._begun(rig, form, others))
+            return
+        pictures, others = self._read(form, others)
+        self._take(lambda: built_cards(rig, form, pictures, others))
 
-    def _read_others(self, hair: bpy.types.Object) -> OtherHair:
-        assert self._wanted is not None
+    def _begun(self, rig: Rig, form: CardForm, others: OtherHair | None) -> Work[BuiltCards]:
+        pictures, others = self._read(form, others)
+        return partial(cards_built_in_thread, rig=rig, form=form, pictures=pictures, others=others)
+
+    def _read(
+        self, form: CardForm, others: OtherHair | None
+    ) -> tuple[Mapping[str, Floats], OtherHair]:
+        """The chosen pictures and the other hair as they are now."""
+        self._others = others or self._read_others(form)
+        return chosen_pictures(self._hair().data.hairloom.card_images)[0], self._others
+
+    def _read_others(self, form: CardForm) -> OtherHair:
         depsgraph = bpy.context.view_layer.depsgraph
-        return read_other_hair(self._wanted[1].occlusion, hair, depsgraph, self._motion)
+        return read_other_hair(form.occlusion, self._hair(), depsgraph, self._motion)
 
-    def _take(self, result: Callable[[], BuiltCards]) -> None:
+    def _take(self, result: Callable[[], BuiltCards | None]) -> None:
         try:
-            self._built = result()
-            self.warnings = self._built.notes
+            built = result()
         except HairloomError as error:
             self._built, self._shown, self.warnings = None, None, (told(error),)
+            return
+        if built is not None:
+            self._built, self.warnings = built, built.notes
 
-    def _is_wanted(self, rig: Rig, form: CardForm) -> bool:
-        wanted = self._wanted
-        return wanted is not None and wanted[0] is rig and wanted[1] == form
 
-    def _is_awaited(self) -> bool:
-        """Whether nothing goes on until cards are built."""
-        return bool(bpy.app.background)
-
-    def _pictures(self, hair: bpy.types.Object) -> Mapping[str, Floats]:
-        return chosen_pictures(hair.data.hairloom.card_images)[0]
+def _same(one: tuple[Rig, CardForm], other: tuple[Rig, CardForm]) -> bool:
+    return one[0] is other[0] and one[1] == other[1]

@@ -27,13 +27,13 @@ class NotMadeYetError(Exception):
 
 
 def field_of(
-    surface: Surface, settings: DynamicsSettings, *, place: str, waits: bool = True
+    surface: Surface, settings: DynamicsSettings, *, place: str, blocking: bool = True
 ) -> DistanceField:
     """The field of a closed mesh, which takes a second to make for the first time.
 
     Args:
         place: names it in messages.
-        waits: False: have it made in a thread, and do not wait for that.
+        blocking: False: have it made in a thread, and do not wait for that.
 
     Raises:
         HairloomError: see `DistanceField.from_surface`.
@@ -46,7 +46,7 @@ def field_of(
             lambda _: DistanceField.from_surface(surface, settings, place=place), "distance field"
         )
     _works[key] = work  # now the youngest
-    if waits:
+    if blocking:
         work.wait()
         trim()
     elif not work.is_done:

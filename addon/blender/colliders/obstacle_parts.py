@@ -98,10 +98,10 @@ class FieldPart:
 
     @classmethod
     def new(
-        cls, carrier: Carrier, surface: Surface, settings: DynamicsSettings, *, waits: bool
+        cls, carrier: Carrier, surface: Surface, settings: DynamicsSettings, *, blocking: bool
     ) -> FieldPart:
         """As `fields.field_of`."""
-        made = field_of(surface, settings, place=carrier.body.handle.name, waits=waits)
+        made = field_of(surface, settings, place=carrier.body.handle.name, blocking=blocking)
         return cls(carrier, surface, made, settings.collider_resolution)
 
     @property

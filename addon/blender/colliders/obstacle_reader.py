@@ -35,14 +35,14 @@ _SOLID = frozenset(("CURVE", "SURFACE", "META", "FONT", "VOLUME", "POINTCLOUD"))
 class Reader:
     """Builds the part of one object.
 
-    known: its field from before, if it had one. waits: for a new one; see `fields.field_of`.
+    known: its field from before, if it had one. blocking: for a new one; see `fields.field_of`.
     """
 
     obj: bpy.types.Object
     depsgraph: bpy.types.Depsgraph
     settings: DynamicsSettings
     known: FieldPart | None
-    waits: bool
+    blocking: bool
 
     def part_of_head(self, head: Body, at_rest: Surface, roots: Ints | None) -> Part | Ball | None:
         """The head was read when the session started, perhaps in another pose."""
@@ -74,12 +74,12 @@ class Reader:
             matrix = self.known.carrier.moved(self.depsgraph)
             if self.known.is_of(surface, matrix, self.settings):
                 return self._again(self.known.carrier)
-        return FieldPart.new(carrier, surface, self.settings, waits=self.waits)
+        return FieldPart.new(carrier, surface, self.settings, blocking=self.blocking)
 
     def _field_part(self, carrier: Carrier, surface: Surface, matrix: Floats) -> FieldPart:
         if self.known is not None and self.known.is_of(surface, matrix, self.settings):
             return self._again(carrier)
-        return FieldPart.new(carrier, surface, self.settings, waits=self.waits)
+        return FieldPart.new(carrier, surface, self.settings, blocking=self.blocking)
 
     def _again(self, carrier: Carrier) -> FieldPart:
         assert self.known is not None

@@ -46,7 +46,7 @@ class Obstacles:
         known: Obstacles | None,
         roots: Ints | None = None,
         *,
-        waits: bool = True,
+        blocking: bool = True,
     ) -> Obstacles:
         """Everything that collides with `owner`, at rest in its present pose.
 
@@ -55,7 +55,7 @@ class Obstacles:
             head: what it grows from, and head_at_rest: its mesh in world space at rest; or None.
             known: its distance fields are reused if nothing has changed.
             roots: vertices of the head that hair grows from; the head is tracked by them.
-            waits: False: do not wait for fields that are to be made.
+            blocking: False: do not wait for fields that are to be made.
 
         Raises:
             HairloomError: as `move`.
@@ -67,7 +67,7 @@ class Obstacles:
         is_whole = True
         for obj in sources_of(owner, None if head is None else head.handle.find()):
             is_head = head is not None and head.handle.uid == obj.session_uid
-            reader = Reader(obj, depsgraph, settings, fields.get(obj.session_uid), waits)
+            reader = Reader(obj, depsgraph, settings, fields.get(obj.session_uid), blocking)
             try:
                 if is_head and head is not None and head_at_rest is not None:
                     made = reader.part_of_head(head, head_at_rest, roots)

@@ -45,7 +45,7 @@ def _made(hair: bpy.types.Object) -> CardObjectJob:
     cards = CardObjectJob(hair, bpy.context.evaluated_depsgraph_get())
     work = cards.making()
     try:
-        while not work.serve():
+        while not work.run_main_thread_steps():
             time.sleep(_PAUSE)
         cards.write(work.result())
     finally:

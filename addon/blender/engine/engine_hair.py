@@ -1,15 +1,18 @@
 """The grooms of a render: as they were baked, or else as Blender has evaluated their curves.
 
 What costs time and seldom changes, such as children and ambient occlusion, is kept from frame to
-frame as long as curves, head and settings are the same.
+frame as long as curves, head and settings are the same. For Rendered mode it is made beside the
+window's work: until it is there the picture has what was drawn before, or none. Renders wait.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ... import pipeline
 from ...arrays import Floats
@@ -20,7 +23,9 @@ from ...strands.affine import moved
 from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
 from ..bakes.cache import Cache
+from ..base.latest_job import LatestJob
 from ..base.objects import head_of
+from ..base.redraw import redraw_views
 from ..cards.card_builds import BuiltCards, built_cards
 from ..cards.card_images import chosen_pictures
 from ..cards.occluders import OtherHair, read_other_hair
@@ -29,12 +34,14 @@ from ..properties.card_form import CardForm
 from ..properties.choices import Choices
 from ..sessions.reading import Reading
 from ..sessions.shown import snapshot_of, with_all_strands, with_choices
-from . import engine_making
-from .engine_making import HairNotMadeYetError
+
+
+class HairNotMadeYetError(Exception):
+    """There is nothing to be shown; ask again once it is no longer pending."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Kept:
+class _Made:
     """A groom at rest, and the values it was made from."""
 
     made_from: tuple[Any, ...]
@@ -47,7 +54,7 @@ class _Kept:
         """Its cards; those of the last form and other hair are kept, to the last colour.
 
         Baked hair stays at rest, whatever other hair does in the frames: its cards are not built
-        anew for each of them.
+        again for each of them.
         """
         for built, before in self._cards:
             is_same = built.form == form and built.form.shading == form.shading
@@ -58,6 +65,59 @@ class _Kept:
         built = built_cards(self.rig, form, pictures, others)
         self._cards[:] = [(built, others)]
         return built
+
+
+class _Kept:
+    """What is made of one groom, and what is being made of it for Rendered mode."""
+
+    def __init__(self) -> None:
+        self.made: _Made | None = None
+        self._job = LatestJob[tuple[Any, ...], _Made](
+            "hair in Rendered mode", self._take, is_same=_alike
+        )
+        self._error: Exception | None = None
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether other hair is on its way."""
+        return self._job.is_pending
+
+    def is_of(self, made_from: tuple[Any, ...]) -> bool:
+        return self.made is not None and _alike(self.made.made_from, made_from)
+
+    def have(
+        self, made_from: tuple[Any, ...], make: Callable[[], _Made], *, blocking: bool
+    ) -> _Made | None:
+        """What was made last, None if nothing was; blocking, it is made of these values.
+
+        Raises:
+            HairloomError: it cannot be made of these values.
+        """
+        if self.is_of(made_from):
+            if not blocking:
+                self.cancel()
+        elif blocking:
+            self.made = make()
+        else:
+            if not self._job.wants(made_from):
+                self._error = None
+                self._job.want(made_from, lambda: lambda _: make())
+            if self._error is not None:
+                raise self._error
+        return self.made
+
+    def cancel(self) -> None:
+        """Nobody waits any more for other hair of this groom."""
+        self._job.cancel()
+        self._error = None
+
+    def _take(self) -> None:
+        """What was made meanwhile; views that are drawn again show it, or report why not."""
+        try:
+            self.made = self._job.take() or self.made
+        except Exception as error:
+            self._error = error
+        redraw_views()
 
 
 _kept: dict[int, _Kept] = {}
@@ -76,13 +136,13 @@ def owner_of(hair: bpy.types.Object) -> bpy.types.Object:
 
 
 def read_groom(
-    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, waits: bool = True
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True
 ) -> Snapshot:
     """One groom as a render shows it, in world space, without light.
 
     Args:
         hair: not the evaluated copy; hair curves, or the copy of a bake.
-        waits: False: it is made in a thread, and what was made last is shown until then.
+        blocking: False: it is made in a thread, and what was made last is shown until then.
 
     Raises:
         HairNotMadeYetError: it is being made for the first time, and nobody waits.
@@ -94,17 +154,17 @@ def read_groom(
     # A copy stays as it is beyond the baked frames; curves of the artist's go on by themselves.
     if cache is not None and (owner != hair or _shows_bake(owner, cache, scene.frame_current)):
         strands = playback.strands_in(cache, scene.frame_current, scene.frame_subframe)
-        kept = _of_bake(owner, playback.rig_in(cache), choices, waits=waits)
+        made = _of_bake(owner, playback.rig_in(cache), choices, blocking=blocking)
         pose = playback.pose_in(cache, scene.frame_current, scene.frame_subframe)
     else:
-        kept = _of_curves(owner, choices, depsgraph, waits=waits)
-        strands, pose = kept.snapshot.strands, kept.rig.rest_pose
-    snapshot = replace(kept.snapshot, strands=strands)
+        made = _of_curves(owner, choices, depsgraph, blocking=blocking)
+        strands, pose = made.snapshot.strands, made.rig.rest_pose
+    snapshot = replace(made.snapshot, strands=strands)
     if choices.shows_cards:
         form = choices.card_form
         others = read_other_hair(form.occlusion, owner, depsgraph, pose.matrix)
-        built = kept.cards(owner, form, others)
-        cards = built.at(pose, strands[kept.rig.guides], choices.cards_drawn)
+        built = made.cards(owner, form, others)
+        cards = built.at(pose, strands[made.rig.guides], choices.cards_drawn)
         snapshot = as_shown(replace(snapshot, cards=cards))
     return with_all_strands(with_choices(snapshot, choices))
 
@@ -139,31 +199,36 @@ def placed(snapshot: Snapshot, motion: Floats) -> Snapshot:
     return replace(snapshot, strands=strands, cards=cards, volume_center=center)
 
 
+def is_pending(uid: int) -> bool:
+    """Whether other hair than what is shown is on its way, by session number."""
+    return uid in _kept and _kept[uid].is_pending
+
+
 def forget() -> None:
-    """Keep no groom in memory."""
-    _kept.clear()
-    engine_making.forget()
+    """Keep no groom in memory, and wait for none."""
+    forget_but(set())
 
 
 def forget_but(uids: set[int]) -> None:
     """Keep these alone, by session number of their objects."""
     for uid in set(_kept) - uids:
-        del _kept[uid]
-    engine_making.forget_but(uids)
+        _kept.pop(uid).cancel()
 
 
 def _shows_bake(hair: bpy.types.Object, cache: Cache, frame: int) -> bool:
     return bool(hair.hairloom.bake.is_shown and cache.holds(frame))
 
 
-def _of_bake(owner: bpy.types.Object, baked: BakedRig, choices: Choices, *, waits: bool) -> _Kept:
+def _of_bake(
+    owner: bpy.types.Object, baked: BakedRig, choices: Choices, *, blocking: bool
+) -> _Made:
     made_from = baked.rig.strands.points, choices.ambient
-    return _made(owner, made_from, choices, lambda: baked.rig, is_baked=True, waits=waits)
+    return _made(owner, made_from, choices, lambda: baked.rig, is_baked=True, blocking=blocking)
 
 
 def _of_curves(
-    hair: bpy.types.Object, choices: Choices, depsgraph: bpy.types.Depsgraph, *, waits: bool
-) -> _Kept:
+    hair: bpy.types.Object, choices: Choices, depsgraph: bpy.types.Depsgraph, *, blocking: bool
+) -> _Made:
     reading = Reading(hair, depsgraph)
     source = reading.source
     made_from = (
@@ -176,7 +241,7 @@ def _of_curves(
         choices.of_rig,
         choices.ambient,
     )
-    return _made(hair, made_from, choices, reading.rig, is_baked=False, waits=waits)
+    return _made(hair, made_from, choices, reading.rig, is_baked=False, blocking=blocking)
 
 
 def _made(
@@ -186,24 +251,27 @@ def _made(
     rig: Any,
     *,
     is_baked: bool,
-    waits: bool,
-) -> _Kept:
-    def make() -> _Kept:
+    blocking: bool,
+) -> _Made:
+    def make() -> _Made:
         made = rig()
         occlusion = pipeline.rest_occlusion(made, choices.ambient)
         snapshot = snapshot_of(made, occlusion, pipeline.strand_ranks(made))
-        return _Kept(made_from, made, snapshot, is_baked)
+        return _Made(made_from, made, snapshot, is_baked)
 
-    uid = owner.session_uid
-    kept = _kept.get(uid)
-    if kept is not None and engine_making.alike(kept.made_from, made_from):
-        if not waits:
-            engine_making.drop(uid)
-        return kept
-    found = make() if waits else engine_making.made(uid, made_from, make)
-    if found is not None:
-        kept = _kept[uid] = found
+    kept = _kept.setdefault(owner.session_uid, _Kept())
+    made = kept.have(made_from, make, blocking=blocking)
     # of a bake no other hair is shown, as the strands of each frame belong to its own
-    if kept is None or (is_baked and not engine_making.alike(kept.made_from, made_from)):
+    if made is None or (is_baked and not kept.is_of(made_from)):
         raise HairNotMadeYetError
-    return kept
+    return made
+
+
+def _alike(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
+    """Whether two lists of values, arrays among them, are the same."""
+    return len(one) == len(other) and all(
+        np.array_equal(a, b)
+        if isinstance(a, np.ndarray) and isinstance(b, np.ndarray)
+        else not isinstance(a, np.ndarray) and not isinstance(b, np.ndarray) and a == b
+        for a, b in zip(one, other, strict=True)
+    )

@@ -22,8 +22,8 @@ from ..base.objects import head_of
 from ..properties.properties import settings_of
 from ..scene.lights import light_warnings, read_ambient, read_lights
 from ..scene.mesh_materials import material_notes
-from . import engine_hair, engine_making
-from .engine_making import HairNotMadeYetError
+from . import engine_hair
+from .engine_hair import HairNotMadeYetError
 from .engine_meshes import SOLID_TYPES, as_before, read_meshes
 
 type Key = tuple[int, ...]
@@ -82,7 +82,7 @@ class SceneReader:
         is_shown: IsShown = lambda _: True,
         is_previewed: Callable[[int], bool] = lambda _: False,
         is_expected: Callable[[int], bool] = lambda _: False,
-        waits: bool = True,
+        blocking: bool = True,
     ) -> SceneSnapshot:
         """The scene of this evaluation.
 
@@ -92,7 +92,7 @@ class SceneReader:
             is_shown: whether an object is seen at all.
             is_previewed: whether a groom is left out, by its session number.
             is_expected: whether a groom stays as it was, as its preview is about to be there.
-            waits: False: hair is made in a thread, and is as it was until then.
+            blocking: False: hair is made in a thread, and is as it was until then.
         """
         warnings: list[str] = []
         drawn: list[MeshSnapshot] = []
@@ -124,7 +124,7 @@ class SceneReader:
                 hair = obj.original
                 uids.add(engine_hair.owner_of(hair).session_uid)
                 groom = self._read_groom(
-                    key, hair, matrix, depsgraph, changed, warnings, visibility.is_holdout, waits
+                    key, hair, matrix, depsgraph, changed, warnings, visibility.is_holdout, blocking
                 )
                 grooms |= {} if groom is None else {key: groom}
         self._meshes, self._grooms = read, grooms
@@ -183,7 +183,7 @@ class SceneReader:
         changed: set[int] | None,
         warnings: list[str],
         is_holdout: bool,
-        waits: bool,
+        blocking: bool,
     ) -> _ReadGroom | None:
         """None, and a warning, where the hair cannot be drawn."""
         if hair.type != "CURVES":
@@ -199,7 +199,7 @@ class SceneReader:
             is_same = known is not None and changed is not None and known.state == state
             if known is not None and is_same and not (changed or set()) & engine_hair.uids_of(hair):
                 return known
-            snapshot = engine_hair.read_groom(hair, depsgraph, waits=waits)
+            snapshot = engine_hair.read_groom(hair, depsgraph, blocking=blocking)
         except HairNotMadeYetError:
             self.awaited.add(uid)
             return None if known is None else _ReadGroom((), known.groom)  # to be read again
@@ -210,7 +210,7 @@ class SceneReader:
             own = np.array(hair.evaluated_get(depsgraph).matrix_world)
             snapshot = engine_hair.placed(snapshot, matrix @ np.linalg.pinv(own))
         number = engine_hair.owner_of(hair).pass_index
-        if not waits and engine_making.is_pending(uid):
+        if not blocking and engine_hair.is_pending(uid):
             self.awaited.add(uid)
             state = ()
         return _ReadGroom(state, DrawnGroom(key, snapshot, number, is_holdout))

@@ -19,12 +19,12 @@ from ...render.snapshot import Snapshot
 from ...shading.lights import three_point_lights
 from ...shading.mesh_shadow_settings import MeshShadowSettings
 from ...shading.picture_settings import PictureSettings
+from ..base import latest_job
 from ..properties.properties import settings_of
 from ..scene.lights import uses_scene_light
-from ..sessions import making
 from ..sessions.shown import with_all_strands
 from ..viewport import overlay
-from . import engine_making
+from . import engine_hair
 from .engine_camera import view_rectangle
 from .engine_scene import SceneReader, Visibility
 from .engine_still import sky_of
@@ -109,7 +109,7 @@ class EngineView:
 
     @property
     def _has_arrived(self) -> bool:
-        return any(engine_making.is_done(uid) for uid in self._reader.awaited)
+        return not all(engine_hair.is_pending(uid) for uid in self._reader.awaited)
 
     @property
     def count(self) -> int:
@@ -130,7 +130,7 @@ class EngineView:
             is_shown=lambda obj: obj.visible_in_viewport_get(space),
             is_previewed=drawn.__contains__,
             is_expected=expected.__contains__,
-            waits=making.is_awaited(),
+            blocking=latest_job.is_blocking(),
         )
 
     def _now(

@@ -18,9 +18,9 @@ import bpy
 
 from ..bakes import playback
 from ..bakes.simulated import Simulated
+from ..base import latest_job
 from ..colliders import fields
 from ..colliders.fields import NotMadeYetError
-from ..sessions import making
 from ..sessions.session import Session
 
 #: uids of what stands at rest while Blender plays
@@ -45,7 +45,7 @@ def begin(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     try:
         if not fields.are_made():
             raise NotMadeYetError
-        session.play(depsgraph, waits=False)
+        session.play(depsgraph, blocking=False)
     except NotMadeYetError:
         go_without(session, depsgraph)
 
@@ -72,4 +72,4 @@ def forget(uid: int) -> None:
 
 def _waits() -> bool:
     """Whether a frame is not left before all of its hair is there."""
-    return making.is_awaited() or not playback.is_played()
+    return latest_job.is_blocking() or not playback.is_played()

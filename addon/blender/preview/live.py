@@ -12,11 +12,11 @@ import bpy
 from ...errors import HairloomError
 from ..bakes import playback
 from ..bakes.simulated import Simulated
+from ..base import latest_job
 from ..base.originals import refresh_views
 from ..base.redraw import redraw_panels
 from ..colliders import fields
 from ..colliders.fields import NotMadeYetError
-from ..sessions import making
 from ..sessions.session import Session
 from ..viewport import overlay
 from . import timeline
@@ -37,6 +37,7 @@ from .previewed import (
     simulated_of,
     stop,
     stop_all,
+    take_arrivals,
     take_bake,
     wait,
     waiting,
@@ -48,13 +49,15 @@ _is_paused = False
 def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
     """Preview this groom; where the scene's frame is baked, as it was baked.
 
-    In a window its hair is made in a thread: see `making`.
+    In a window its hair is made in a thread: see `latest_job`.
 
     Raises:
         HairloomError: it cannot be previewed; says why and what to do.
     """
     baked = timeline.rig_for(hair, depsgraph.scene)
-    session = Session(hair, depsgraph, baked=baked, waits=making.is_awaited())
+    session = Session(
+        hair, depsgraph, baked=baked, blocking=latest_job.is_blocking(), arrived=take_arrivals
+    )
     overlay.retry()
     add(session, depsgraph)
     if not waiting():
@@ -109,11 +112,12 @@ def pause(is_paused: bool) -> None:
     redraw_panels()
 
 
-def play(depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> list[str]:
+def play(depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> list[str]:
     """Let all previewed grooms and fins play freely, from rest; returns warnings.
 
     Args:
-        waits: False: what lacks hair or a collider that is being made begins later, in `advance`.
+        blocking: False: what lacks hair or a collider that is being made begins later, in
+            `advance`.
     """
     pause(False)
     fields.trim()
@@ -121,13 +125,13 @@ def play(depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> list[str]:
     for session in simulated():
         timeline.release(session)
         try:
-            begin(session, depsgraph, waits=waits)
+            begin(session, depsgraph, blocking=blocking)
         except HairloomError as error:
             warnings.append(str(error))
     return warnings
 
 
-def begin(session: Simulated, depsgraph: bpy.types.Depsgraph, *, waits: bool) -> None:
+def begin(session: Simulated, depsgraph: bpy.types.Depsgraph, *, blocking: bool) -> None:
     """Let one play freely, now or as soon as its hair and its colliders are made; see `play`.
 
     Raises:
@@ -135,7 +139,7 @@ def begin(session: Simulated, depsgraph: bpy.types.Depsgraph, *, waits: bool) ->
     """
     wait(session, waits=False)
     try:
-        session.play(depsgraph, waits=waits)
+        session.play(depsgraph, blocking=blocking)
     except NotMadeYetError:
         wait(session, waits=True)
         publish(session, depsgraph)
@@ -153,7 +157,7 @@ def _begin_waiting(depsgraph: bpy.types.Depsgraph) -> None:
 
 
 def _begin(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
-    action = partial(begin, session, depsgraph, waits=False)
+    action = partial(begin, session, depsgraph, blocking=False)
     timeline.attempt(session, depsgraph, action)
 
 

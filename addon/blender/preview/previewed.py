@@ -14,6 +14,7 @@ import bpy
 from ...errors import HairloomError
 from ..bakes.simulated import Simulated
 from ..base.gpu_context import is_interrupted
+from ..base.latest_job import ARRIVAL_TIME, unwatch, watch
 from ..base.objects import is_elsewhere, is_on_screen
 from ..base.originals import all_depsgraphs, refresh_views, show_originals
 from ..base.redraw import redraw_panels, redraw_views, refresh_panels
@@ -25,14 +26,10 @@ from . import timeline
 
 #: What is told of hair that is about to play, and of hair that is not there yet.
 WAITING, MAKING = "plays as soon as its collider is made", "is being made"
-#: What is being made is looked for this often [s], or where it waits for this thread.
-ARRIVAL_TIME, ASKING_TIME = 0.1, 0.01
 
 _sessions: dict[int, Simulated] = {}
 #: uids of what is to play once its hair and its colliders are made
 _waiting: set[int] = set()
-#: uids of what is shown without the lines of colliders that are being made
-_without_lines: set[int] = set()
 _notice = ""
 
 
@@ -88,7 +85,7 @@ def forget(session: Simulated) -> None:
     """As `stop` when its object is about to go: touches nothing of it."""
     _sessions.pop(session.uid, None)
     _waiting.discard(session.uid)
-    _without_lines.discard(session.uid)
+    unwatch((session.uid, "lines"))
     if isinstance(session, Session):
         session.forget()
     timeline.forget(session.uid)
@@ -178,9 +175,7 @@ def publish(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     overlay.show(session.uid, drawing_of(session, hair, depsgraph, note))
     lacks_lines = session.obstacles is None and "colliders" in hair.hairloom.shown_aids
     if lacks_lines and not fields.are_made():
-        _without_lines.add(session.uid)
-    if _is_awaited(session):
-        _await_arrivals()
+        watch((session.uid, "lines"), partial(_show_lines, session))
     refresh_panels()
     is_replaced = hair.mode == "OBJECT" and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original and session.is_made
@@ -195,35 +190,24 @@ def _note(session: Session) -> str:
     return WAITING if is_waiting(session) else ""
 
 
-def _await_arrivals() -> None:
-    """Show hair when it is made, and cards when they are built."""
-    if not bpy.app.timers.is_registered(take_arrivals):
-        bpy.app.timers.register(take_arrivals, first_interval=ARRIVAL_TIME)
+def take_arrivals(session: Session) -> None:
+    """Show hair and cards that were made beside the window's work."""
+    if session.has_arrived:
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        attempt(session, depsgraph, partial(_take_made, depsgraph=depsgraph))
+        refresh_views()  # Blender's own strands, which were shown until now
+    elif session.cards.has_arrived:
+        attempt(session, bpy.context.view_layer.depsgraph, Session.take_cards)
+    redraw_panels()
 
 
-def take_arrivals() -> float | None:
-    """A timer of Blender's: hair and cards that were made beside the window's work."""
-    for session in sessions():
-        if session.has_arrived:
-            depsgraph = bpy.context.evaluated_depsgraph_get()
-            attempt(session, depsgraph, partial(_take_made, depsgraph=depsgraph))
-            refresh_views()  # Blender's own strands, which were shown until now
-        elif session.cards.is_pending and session.cards.serve():
-            attempt(session, bpy.context.view_layer.depsgraph, Session.take_cards)
-        elif session.uid in _without_lines and fields.are_made():
-            _without_lines.discard(session.uid)
-            attempt(session, bpy.context.evaluated_depsgraph_get(), lambda _: None)
-        else:
-            continue
-        redraw_panels()
-    if any(session.cards.asks for session in sessions()):
-        return ASKING_TIME
-    return ARRIVAL_TIME if any(map(_is_awaited, sessions())) else None
-
-
-def _is_awaited(session: Session) -> bool:
-    """Whether something that is shown of it is being made."""
-    return session.is_pending or session.cards.is_pending or session.uid in _without_lines
+def _show_lines(session: Session) -> float | None:
+    """A step of `latest_job`: the lines of colliders, once they are made."""
+    if not fields.are_made():
+        return ARRIVAL_TIME
+    attempt(session, bpy.context.evaluated_depsgraph_get(), lambda _: None)
+    redraw_panels()
+    return None
 
 
 def finish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:

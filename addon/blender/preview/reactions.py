@@ -15,14 +15,13 @@ import bpy
 
 from ..bakes import playback
 from ..bakes.simulated import Simulated
+from ..base import latest_job
 from ..base.originals import refresh_views
 from ..base.redraw import redraw_panels
-from ..sessions import making
 from ..sessions.session import Session
 from ..viewport import view_transform
 from . import live, timeline
 from .changes import changes, is_among, is_edited, is_shaded_anew, is_weighted_anew
-from .previewed import take_arrivals
 
 #: Edits come in bursts, as brush strokes do: read again when this long [s] nothing came.
 SETTLING_TIME = 0.2
@@ -182,7 +181,7 @@ def _read(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
         live.start(session.hair.found(), depsgraph)
         return
     else:
-        session.read_again(depsgraph, waits=making.is_awaited())
+        session.read_again(depsgraph, blocking=latest_job.is_blocking())
         timeline.check(session, depsgraph)
 
 
@@ -191,6 +190,7 @@ def clear() -> None:
     live.end()
     _shaded_anew.clear()
     view_transform.forget()
-    for timer in (_read_again, _refine, take_arrivals):
+    latest_job.unwatch_all()
+    for timer in (_read_again, _refine):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)

@@ -71,7 +71,7 @@ class FinSession:
         if self.is_playing and self.obstacles is not None:
             self.obstacles.rest(depsgraph)
 
-    def play(self, depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> None:
+    def play(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> None:
         """Get ready to be simulated; the mesh as it arrives now is what edges keep."""
         obj = self._found()
         self._corners = corners_of(obj.data)
@@ -85,7 +85,7 @@ class FinSession:
         )
         settings = self.settings.as_dynamics()
         self.obstacles = Obstacles.of(
-            obj, None, None, settings, depsgraph, self.obstacles, waits=waits
+            obj, None, None, settings, depsgraph, self.obstacles, blocking=blocking
         )
         self.is_playing = True
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import bpy
 
-from ...errors import HairloomError
 from ...pipeline import Pose, Rig
 from ..bakes.baked_rig import BakedRig, rig_arrays
 from ..bakes.simulated import Arrays
+from ..base.latest_job import LatestJob
 from ..base.objects import Body
+from ..base.thread_work import ThreadWork
 from ..properties.choices import Choices
 from ..scene.source import Source
-from .making import Made, Making, make, stand_in
+from .making import Made, Order, make, placeholder
 from .reading import Reading
 
 
@@ -22,7 +26,8 @@ class Groom:
         hair: a hair curves object.
         baked: the rig of a bake of this very groom, to be the same to the bit.
         is_drawn: False leaves out what only drawing needs.
-        waits: False: the hair is made in a thread, and a few strands stand in for it until then.
+        blocking: False: the hair is made in a thread, with a few strands as its placeholder.
+        arrived: is called when hair can be taken over that was made in a thread.
 
     Raises:
         HairloomError: no hair curves, none that can be used, or of another scale than the head.
@@ -35,15 +40,16 @@ class Groom:
         baked: BakedRig | None,
         *,
         is_drawn: bool,
-        waits: bool,
+        blocking: bool,
+        arrived: Callable[[], None],
     ) -> None:
         self._reading = Reading(hair, depsgraph)
         self._reading.use_bake(baked)
         self._is_drawn = is_drawn
-        self._making: Making | None = None
+        self._job = LatestJob[Order, Made]("hair", arrived)
         order = self._reading.ordered
-        self.made: Made = make(order, is_drawn=is_drawn) if waits else stand_in(order)
-        if not waits:
+        self.made: Made = make(order, is_drawn=is_drawn) if blocking else placeholder(order)
+        if not blocking:
             self._begin()
 
     @property
@@ -83,12 +89,12 @@ class Groom:
     @property
     def is_pending(self) -> bool:
         """Whether hair is being made, the first or other hair."""
-        return self._making is not None
+        return self._job.is_pending
 
     @property
     def has_arrived(self) -> bool:
         """Whether the hair that was being made can be taken over."""
-        return self._making is not None and self._making.is_done
+        return self._job.has_arrived
 
     def has_another_head(self) -> bool:
         """Whether the artist has set another surface since the session began."""
@@ -111,29 +117,9 @@ class Groom:
 
     def _begin(self) -> None:
         """Have made what was ordered last, once nothing else is being made."""
-        if self._making is None:
-            self._making = Making(self._reading.ordered, self.made)
+        order = self._reading.ordered
+        self._job.want(order, lambda: partial(_made_in_thread, order=order, before=self.made))
 
-    def _made_meanwhile(self) -> Made | None:
-        """What was being made, once it is done; None where it failed, and other hair is wanted.
 
-        Raises:
-            HairloomError: it cannot be made.
-        """
-        making, self._making = self._making, None
-        assert making is not None, "nothing is being made"
-        is_latest = making.order is self._reading.ordered
-        try:
-            return making.result()
-        except HairloomError:
-            if is_latest:
-                raise
-            return None
-        finally:
-            if not is_latest:
-                self._begin()
-
-    def _give_up(self) -> None:
-        if self._making is not None:
-            self._making.give_up()
-            self._making = None
+def _made_in_thread(work: ThreadWork[Made], order: Order, before: Made) -> Made:
+    return make(order, before, is_drawn=True, report=work.report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import bpy
@@ -30,17 +31,25 @@ class GroomPicture:
     """The snapshot of a groom, and the cards in it.
 
     Args:
+        hair: finds the object.
         is_drawn: False leaves out what only drawing needs.
+        arrived: see `ShownCards`.
     """
 
     snapshot: Snapshot
 
-    def __init__(self, *, is_drawn: bool) -> None:
+    def __init__(
+        self,
+        hair: Callable[[], bpy.types.Object],
+        *,
+        is_drawn: bool,
+        arrived: Callable[[], None],
+    ) -> None:
         self._is_drawn = is_drawn
         self._ball = HairBall()
         self._made: Made | None = None
         self._light_warnings: tuple[str, ...] = ()
-        self.cards = ShownCards()
+        self.cards = ShownCards(hair, arrived)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -55,14 +64,14 @@ class GroomPicture:
         lights = snapshot.lights if scene_lights_are_shown() else ()
         return shadow_warnings(lights, self._ball.of(snapshot), snapshot.volume)
 
-    def take_made(self, hair: bpy.types.Object, made: Made, choices: Choices) -> None:
+    def take_made(self, made: Made, choices: Choices) -> None:
         """All that hangs on the strands; it stands at rest, without light."""
         self._made = made
         snapshot = snapshot_of(made.rig, made.occlusion, made.rank)
         self.snapshot = with_choices(snapshot, choices)
-        self._want_cards(hair, made.rig, choices)
+        self._want_cards(made.rig, choices)
 
-    def take_choices(self, hair: bpy.types.Object, rig: Rig, was: Choices, now: Choices) -> bool:
+    def take_choices(self, rig: Rig, was: Choices, now: Choices) -> bool:
         """Take over what acts at once; whether hair has to be shown again where it is."""
         self.snapshot = with_choices(self.snapshot, now)
         if not shapes_alike(was.shading, now.shading) and not bpy.app.background:
@@ -71,15 +80,15 @@ class GroomPicture:
             now.detail.culling,
             now.volume.shadows,
         )
-        return self._want_cards(hair, rig, now) or is_other
+        return self._want_cards(rig, now) or is_other
 
-    def _want_cards(self, hair: bpy.types.Object, rig: Rig, choices: Choices) -> bool:
+    def _want_cards(self, rig: Rig, choices: Choices) -> bool:
         """Have cards built if they are to be shown; whether what is shown of them changes now."""
         is_whole = self._made is not None and self._made.is_whole
         if not (self._is_drawn and is_whole and choices.shows_cards):
             self.cards.forget()
             return self.snapshot.cards is not None
-        self.cards.want(hair, rig, choices.card_form)
+        self.cards.want(rig, choices.card_form)
         return True
 
     @property

@@ -2,7 +2,7 @@
 
 That takes a second, and with many children ten. In a window it goes on beside everything else: what
 was shown before stays until the new hair is there, and before the first one Blender's own strands
-do. In the background, where nobody waits before a window, it is made at once.
+do. In the background it is made at once.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-import bpy
 import numpy as np
 
 from ... import pipeline
@@ -20,12 +19,11 @@ from ...errors import HairloomError
 from ...pipeline import Rig
 from ...strands import StrandSet, Surface
 from ..bakes.baked_rig import used_vertices
-from ..base.thread_work import ThreadWork
 from ..properties.choices import Choices
 from ..scene.source import Source
 from .hiders import Hiders
 
-#: Strands that stand in for a groom until it is made.
+#: Strands of the placeholder of a groom that is being made.
 _FEW = 32
 #: Heads of more triangles take longer to search than an artist waits.
 _LARGE = 4000
@@ -62,7 +60,7 @@ class Made:
     occlusion: (strand_count, cv_count) in [0, 1], at rest.
     rank: (strand_count,), see `pipeline.strand_ranks`.
     hiders: what of the head hides hair.
-    is_whole: whether this is all the hair; else it stands in for it, unseen.
+    is_whole: whether this is all the hair, not its placeholder, which is not seen.
     Without what only drawing needs, the last three before are None.
     """
 
@@ -73,11 +71,6 @@ class Made:
     rank: Floats | None = None
     hiders: Hiders | None = None
     is_whole: bool = True
-
-
-def is_awaited() -> bool:
-    """Whether nothing goes on until a groom is made."""
-    return bool(bpy.app.background)
 
 
 def rig_of(order: Order) -> Rig:
@@ -103,24 +96,24 @@ def make(
     before: Made | None = None,
     *,
     is_drawn: bool,
-    tell: Callable[[str], None] = lambda stage: None,
+    report: Callable[[str], None] = lambda stage: None,
 ) -> Made:
     """Make a groom; what nothing changes is taken from before.
 
     Args:
         is_drawn: False leaves out what only drawing needs.
-        tell: is called before each stage with its name; may end it all by an exception.
+        report: is called before each stage with its name; may end it all by an exception.
 
     Raises:
         HairloomError: as `rig_of`.
     """
-    tell("strands")
+    report("strands")
     is_same_rig = before is not None and before.is_whole and order.gives_rig_of(before.order)
     rig = before.rig if before is not None and is_same_rig else rig_of(order)
     used = used_vertices(rig)
     if not is_drawn:
         return Made(order, rig, used)
-    tell("ambient occlusion")
+    report("ambient occlusion")
     # other guides on the same hair leave its shade and its head as they are
     known = before if before is not None and _same_hair(before.rig, rig) else None
     ambient = order.choices.ambient
@@ -128,7 +121,7 @@ def make(
         occlusion = known.occlusion
     else:
         occlusion = pipeline.rest_occlusion(rig, ambient)
-    tell("what the head hides")
+    report("what the head hides")
     if known is not None and known.hiders is not None:
         hiders: Hiders | None = known.hiders
     else:
@@ -136,8 +129,8 @@ def make(
     return Made(order, rig, used, occlusion, pipeline.strand_ranks(rig), hiders)
 
 
-def stand_in(order: Order) -> Made:
-    """What carries a session until its groom is made: a few of its strands.
+def placeholder(order: Order) -> Made:
+    """What a session moves until its groom is made: a few of its strands.
 
     Raises:
         HairloomError: as `rig_of`.
@@ -176,36 +169,6 @@ def _triangles_near(points: Floats, surface: Surface) -> Ints:
     is_near = np.zeros(len(vertices), bool)
     is_near[away.argmin(axis=0)] = True
     return np.flatnonzero(is_near[surface.triangles].any(axis=1))
-
-
-class Making:
-    """A groom on its way, in a thread."""
-
-    def __init__(self, order: Order, before: Made | None) -> None:
-        self.order = order
-
-        def work(work: ThreadWork[Made]) -> Made:
-            return make(order, before, is_drawn=True, tell=work.tell)
-
-        self._work = ThreadWork(work, "hair")
-
-    @property
-    def is_done(self) -> bool:
-        """Whether there is a result, or an error."""
-        return self._work.is_done
-
-    def result(self) -> Made:
-        """The groom; waits for it.
-
-        Raises:
-            HairloomError: as `rig_of`.
-        """
-        self._work.wait()
-        return self._work.result()
-
-    def give_up(self) -> None:
-        """Nobody waits for it any more."""
-        self._work.give_up()
 
 
 def _same_hair(one: Rig, other: Rig) -> bool:

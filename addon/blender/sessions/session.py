@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 
 import bpy
 import numpy as np
@@ -38,13 +40,15 @@ class Session(Groom):
         *,
         baked: BakedRig | None = None,
         is_drawn: bool = True,
-        waits: bool = True,
+        blocking: bool = True,
+        arrived: Callable[[Session], None] = lambda session: None,
     ) -> None:
-        super().__init__(hair, depsgraph, baked, is_drawn=is_drawn, waits=waits)
+        tell = partial(arrived, self)
+        super().__init__(hair, depsgraph, baked, is_drawn=is_drawn, blocking=blocking, arrived=tell)
         self.obstacles: Obstacles | None = None
         self.is_playing = False
         self.is_stale = False
-        self.picture = GroomPicture(is_drawn=is_drawn)
+        self.picture = GroomPicture(self.hair.found, is_drawn=is_drawn, arrived=tell)
         self._take(self.made, None, depsgraph)
 
     @property
@@ -88,7 +92,7 @@ class Session(Groom):
         if not is_same:
             motion = self.solver.motion if goes_on else None
             self.solver: Solver = solver_of(made.rig, self.choices.dynamics.form, motion)
-        self.picture.take_made(self.hair.found(), made, self.choices)
+        self.picture.take_made(made, self.choices)
         self.light(depsgraph)
         if is_same or goes_on:
             self._show()
@@ -101,7 +105,7 @@ class Session(Groom):
         Raises:
             HairloomError: it cannot be made.
         """
-        made = self._made_meanwhile()
+        made = self._job.take()
         if made is not None:
             self._take(made, self.made, depsgraph)
 
@@ -116,25 +120,25 @@ class Session(Groom):
 
     def forget(self) -> None:
         """Nobody waits any more for hair and cards that are on their way."""
-        self._give_up()
+        self._job.cancel()
         self.cards.forget()
 
-    def read_again(self, depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> None:
+    def read_again(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> None:
         """Take over edited curves and settings of the rig; what did not change stays as it is.
 
         Args:
-            waits: False: other hair is made in a thread, and what was shown is shown until then.
+            blocking: False: other hair is made in a thread, and what was shown is shown until then.
         """
         order = self._reading.read_again(depsgraph)
         self.is_stale = False
-        if order is not None and waits and not self.is_pending:
+        if order is not None and blocking and not self.is_pending:
             made = make(order, self.made, is_drawn=self._is_drawn)
             self._take(made, self.made, depsgraph)
             return
         self.take_settings()
         if order is not None:
             self._begin()
-        if waits:
+        if blocking:
             self.finish(depsgraph)
 
     def take_settings(self) -> None:
@@ -146,19 +150,19 @@ class Session(Groom):
         """
         before = self.choices
         self.is_stale |= self._reading.take_choices()
-        if self.picture.take_choices(self.hair.found(), self.rig, before, self.choices):
+        if self.picture.take_choices(self.rig, before, self.choices):
             self._show()
         if self.choices.dynamics.form != before.dynamics.form:
             self._change_form(self.choices.dynamics.form)
 
     def take_cards(self) -> None:
         """Show the cards that were built meanwhile."""
-        self.cards.collect(self.hair.found())
+        self.cards.collect()
         self._show()
 
     def shade_cards_again(self) -> None:
         """Other hair that shades its cards may be elsewhere now, or other hair."""
-        self.cards.shade_again(self.hair.found())
+        self.cards.shade_again()
         self._show()
 
     @property
@@ -202,11 +206,11 @@ class Session(Groom):
             return not np.array_equal(now.matrix, shown.matrix)
         return not np.array_equal(now.head_positions, shown.head_positions)
 
-    def play(self, depsgraph: bpy.types.Depsgraph, *, waits: bool = True) -> None:
+    def play(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> None:
         """Get ready to simulate from the style on; makes the colliders, which can take a second.
 
         Args:
-            waits: False: do not wait for the fields of colliders that are to be made.
+            blocking: False: do not wait for the fields of colliders that are to be made.
 
         Raises:
             HairloomError: as `rest`, or Blender's own hair dynamics is on.
@@ -215,9 +219,9 @@ class Session(Groom):
         self.is_playing = False
         refuse_own_dynamics(self.hair.found())
         self.take_settings()
-        if waits:
+        if blocking:
             self.finish(depsgraph)
-        self._read_obstacles(depsgraph, waits=waits)
+        self._read_obstacles(depsgraph, blocking=blocking)
         if not self.is_made:
             raise NotMadeYetError
         self.is_playing = True
@@ -229,9 +233,9 @@ class Session(Groom):
         What is wrong with a collider is told by Play.
         """
         with suppress(HairloomError, NotMadeYetError):
-            self._read_obstacles(depsgraph, waits=False)
+            self._read_obstacles(depsgraph, blocking=False)
 
-    def _read_obstacles(self, depsgraph: bpy.types.Depsgraph, *, waits: bool) -> None:
+    def _read_obstacles(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool) -> None:
         self.obstacles = Obstacles.of(
             self.hair.found(),
             self.head,
@@ -240,7 +244,7 @@ class Session(Groom):
             depsgraph,
             self.obstacles,
             self.made.used,
-            waits=waits,
+            blocking=blocking,
         )
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:

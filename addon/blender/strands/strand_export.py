@@ -212,7 +212,7 @@ def _bones(
 
 
 def _asked(thread: ThreadWork[Outcome], positions: Generator[Floats]) -> Iterator[Floats]:
-    while (points := thread.asked(_next(positions))) is not None:
+    while (points := thread.on_main_thread(_next(positions))) is not None:
         yield points
 
 

@@ -1,0 +1,214 @@
+"""Work beside the window: what is wanted last is made, and nothing twice."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Generator, Iterator
+from typing import Any
+
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="its timer is Blender's")
+
+from hairloom.addon.blender.base import latest_job  # noqa: E402
+from hairloom.addon.blender.base.latest_job import LatestJob, Work  # noqa: E402
+from hairloom.addon.blender.base.thread_work import ThreadWork  # noqa: E402
+from hairloom.addon.errors import HairloomError  # noqa: E402
+
+#: A thread that may go on is done by then [s].
+PATIENCE = 30.0
+
+
+class Workshop:
+    """Makes upper case of keys, each once its gate is open; what is asked for fails.
+
+    begun: keys, in order. taken: what arrived, None for what came to nothing.
+    """
+
+    def __init__(self) -> None:
+        self.gates: dict[str, threading.Event] = {}
+        self.begun: list[str] = []
+        self.taken: list[str | None] = []
+        self.ended: list[str] = []
+        self.errors: list[HairloomError] = []
+        self.job = LatestJob[str, str]("test", self._take)
+
+    def want(self, key: str, *, fails: bool = False) -> None:
+        self.gates.setdefault(key, threading.Event())
+        self.job.want(key, lambda: self._begin(key, fails))
+
+    def _begin(self, key: str, fails: bool) -> Work[str]:
+        assert threading.current_thread() is threading.main_thread()
+        self.begun.append(key)
+
+        def work(thread: ThreadWork[str]) -> str:
+            assert self.gates[key].wait(PATIENCE)
+            try:
+                thread.report("last part")
+            finally:
+                self.ended.append(key)
+            if fails:
+                raise HairloomError("it cannot be", place=key, remedy="Undo")
+            return key.upper()
+
+        return work
+
+    def open(self, *keys: str) -> None:
+        for key in keys:
+            self.gates.setdefault(key, threading.Event()).set()
+
+    def _take(self) -> None:
+        try:
+            self.taken.append(self.job.take())
+        except HairloomError as error:
+            self.errors.append(error)
+
+
+@pytest.fixture
+def shop() -> Iterator[Workshop]:
+    shop = Workshop()
+    yield shop
+    shop.job.cancel()
+    shop.open(*shop.gates)
+    latest_job.unwatch_all()
+
+
+def until(is_so: Callable[[], bool]) -> None:
+    """Take steps as Blender's timer does, until this is so."""
+    end = time.monotonic() + PATIENCE
+    while not is_so():
+        assert time.monotonic() < end, "it does not come"
+        latest_job.take_steps()
+        time.sleep(0.001)
+
+
+def test_it_arrives_by_blenders_timer_and_is_not_made_twice(shop: Workshop) -> None:
+    shop.want("a")
+    assert bpy.app.timers.is_registered(latest_job.take_steps)
+    assert shop.job.is_pending and not shop.job.has_arrived
+    assert latest_job.take_steps() == latest_job.ARRIVAL_TIME and shop.taken == []
+    shop.want("a")
+    shop.open("a")
+    until(lambda: shop.taken == ["A"])
+    shop.want("a")
+    assert shop.begun == ["a"] and not shop.job.is_pending
+    assert latest_job.take_steps() is None, "the timer ends with the last work"
+
+
+def test_what_runs_is_finished_and_then_the_last_one_wanted_begins(shop: Workshop) -> None:
+    for key in "abcd":
+        shop.want(key)
+    assert shop.begun == ["a"]
+    shop.open("a", "d")
+    until(lambda: shop.taken == ["A", "D"])
+    assert shop.begun == ["a", "d"], "what is in between is left out"
+
+
+def test_who_wants_again_what_runs_gets_it_alone(shop: Workshop) -> None:
+    for key in "aba":
+        shop.want(key)
+    shop.open("a", "b")
+    until(lambda: shop.taken == ["A"])
+    assert shop.begun == ["a"] and not shop.job.is_pending
+
+
+def test_a_failure_counts_only_of_what_is_still_wanted(shop: Workshop) -> None:
+    shop.want("a", fails=True)
+    shop.want("b", fails=True)
+    shop.open("a", "b")
+    until(lambda: bool(shop.errors))
+    assert shop.taken == [None] and [error.place for error in shop.errors] == ["b"]
+    shop.want("b")
+    assert not shop.job.is_pending, "it fails once"
+    shop.want("c")
+    shop.open("c")
+    until(lambda: shop.taken == [None, "C"])
+
+
+def test_cancelled_work_ends_by_itself_and_is_not_wanted_any_more(shop: Workshop) -> None:
+    shop.want("a")
+    shop.want("b")
+    shop.job.cancel()
+    assert not shop.job.is_pending and latest_job.take_steps() is None
+    shop.open("a", "b")
+    until(lambda: shop.ended == ["a"])
+    assert shop.taken == [] and shop.begun == ["a"]
+    shop.want("a")
+    until(lambda: shop.taken == ["A"])
+
+
+def test_who_takes_too_early_waits(shop: Workshop) -> None:
+    shop.want("a")
+    threading.Timer(0.05, lambda: shop.open("a")).start()
+    assert shop.job.take() == "A"
+
+
+def test_it_is_offered_until_it_is_taken(shop: Workshop) -> None:
+    offers: list[bool] = []
+    job = LatestJob[str, str]("test", lambda: offers.append(job.has_arrived))
+    job.want("a", lambda: lambda _: "A")
+    until(lambda: len(offers) >= 3)
+    assert all(offers) and job.take() == "A"
+    assert latest_job.take_steps() is None
+
+
+def test_keys_may_be_compared_by_another_measure(shop: Workshop) -> None:
+    job = LatestJob[str, str]("test", lambda: None, lambda one, other: one[0] == other[0])
+    job.want("apple", lambda: lambda _: "A")
+    assert job.wants("almond") and not job.wants("birch")
+    job.cancel()
+
+
+def test_work_that_needs_this_thread_is_served_by_the_timer(shop: Workshop) -> None:
+    seen: list[Any] = []
+
+    def steps() -> Generator[None, None, str]:
+        for _ in range(3):
+            seen.append(threading.current_thread())
+            yield
+        return "A"
+
+    job = LatestJob[str, str]("test", lambda: shop.taken.append(job.take()))
+    job.want("a", lambda: lambda work: work.on_main_thread(steps()))
+    until(lambda: shop.taken == ["A"])
+    assert seen == 3 * [threading.main_thread()]
+
+
+def test_a_step_that_fails_is_reported_and_the_others_go_on(
+    shop: Workshop, capsys: pytest.CaptureFixture[str]
+) -> None:
+    taken: list[str] = []
+
+    def fail() -> float | None:
+        raise ValueError("a defect")
+
+    def count() -> float | None:
+        taken.append("step")
+        return 0.5
+
+    latest_job.watch("bad", fail)
+    latest_job.watch("good", count)
+    assert latest_job.take_steps() == 0.5 and latest_job.take_steps() == 0.5
+    assert len(taken) == 2 and capsys.readouterr().err.count("ValueError: a defect") == 1
+    latest_job.unwatch("good")
+    assert latest_job.take_steps() is None
+
+
+def test_a_step_may_end_others_and_begin_new_ones(shop: Workshop) -> None:
+    taken: list[str] = []
+
+    def last() -> float | None:
+        taken.append("last")
+        return None
+
+    def first() -> float | None:
+        taken.append("first")
+        latest_job.unwatch("second")
+        latest_job.watch("third", last)
+        return None
+
+    latest_job.watch("first", first)
+    latest_job.watch("second", lambda: taken.append("second"))
+    assert latest_job.take_steps() == latest_job.ARRIVAL_TIME, "the third is still to come"
+    assert latest_job.take_steps() is None and taken == ["first", "last"]
