@@ -24,7 +24,7 @@ from .groom.guides import choose_guides
 from .groom.roots import RootFrames, bind_roots, follow, root_frames
 from .groom.settings import GuideSettings
 from .groom.weights import GUIDES_PER_STRAND, GuideWeights, guide_weights
-from .refine.interpolate import ride
+from .refine.ride import ride
 from .refine.thinning import even_ranks
 from .shading.ambient import AmbientSettings, ambient_occlusion, skin_occlusion
 from .strands import StrandSet, Surface

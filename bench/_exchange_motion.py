@@ -29,7 +29,6 @@ from hairloom.addon.blender.cards.card_motion import (  # noqa: E402
 )
 from hairloom.addon.card_flow import card_build  # noqa: E402
 from hairloom.addon.cards.steps import result_of  # noqa: E402
-from hairloom.addon.cards.vertex_animation import motion_values  # noqa: E402
 from hairloom.addon.dynamics.colliders import DistanceField  # noqa: E402
 from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import GLB  # noqa: E402
@@ -72,7 +71,9 @@ def motion_figures(seconds: float) -> dict[str, float]:
         paths = [Path(folder) / name for name in files.values()]
         figures["vat_megabytes"] = sum(path.stat().st_size for path in paths) / 1e6
         stored = read_texture(Path(folder) / files["position"], is_color=False)
-    found = motion_values(stored, texture.layout)
+    layout = texture.layout
+    texels = stored[::-1].reshape(layout.frame_count, -1, 3)[:, : layout.vertex_count]
+    found = texels.transpose(1, 0, 2)
     pairs = zip(moved.tracks.moved, levels, strict=True)
     offsets = np.concatenate([now - mesh.positions[:, None] for now, mesh in pairs])
     miss = np.linalg.norm(found - GLB.placed(offsets), axis=-1)

@@ -1,10 +1,11 @@
-"""Interpolation on the CPU beside Blender's node "Interpolate Hair Curves" and plain numpy.
+"""Strands carried on the CPU, beside Blender's node "Interpolate Hair Curves" and plain numpy.
 
-762 guides on a ball, combed, become 4,095, 20,000 and 100,000 strands of 30 points. The node gets
-guides of 30 points, and three of them for a strand; a frame of it is an evaluation of the
-depsgraph after the guides were tagged. It finds roots and weights anew in each, which cannot be
-turned off; ours has them since the groom was made, smooths 762 guides from 16 CVs to 30 points and
-mixes them, with the weights of the roots that the node chose. The forms of plain numpy only mix.
+762 guides on a ball, combed, carry 4,095, 20,000 and 100,000 strands of 30 points. The node gets
+the same guides of 30 points, and three of them for a strand; a frame of it is an evaluation of the
+depsgraph after the guides were tagged. It finds roots and weights again in each, which cannot be
+turned off. Ours is `ride`, which a frame of the preview without compute shaders goes through: it
+has the weights since the groom was built, those of the roots that the node chose, and the strands'
+rest shapes. The forms of plain numpy do the same sum.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import time
 import tracemalloc
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +23,8 @@ from _shaken_head import RADIUS, guides_on, surface_of
 
 from hairloom.addon.blender.scene.curves import read_curves, write_curves
 from hairloom.addon.groom.weights import GuideWeights, guide_weights
-from hairloom.addon.refine.interpolate import interpolate
-from hairloom.addon.refine.smooth import smoothed_at
+from hairloom.addon.refine.ride import ride
+from hairloom.addon.refine.smooth import points_at
 from hairloom.addon.strands import StrandSet
 
 GUIDES, POINTS, COUNTS = 762, 30, (4095, 20_000, 100_000)
@@ -30,7 +32,7 @@ GROUP = "Interpolate Hair Curves"
 ASSETS = "assets/nodes/procedural_hair_node_assets.blend"
 NODE_ROUNDS, ROUNDS, CHUNK = 5, 25, 512
 
-Mix = Callable[[np.ndarray, GuideWeights], np.ndarray]
+Mix = Callable[[np.ndarray, np.ndarray, GuideWeights], np.ndarray]
 
 
 class InterpolatedHair:
@@ -72,27 +74,27 @@ class InterpolatedHair:
         return read_curves(self._hair, bpy.context.evaluated_depsgraph_get()).strands
 
 
-def gathered(guides: np.ndarray, weights: GuideWeights) -> np.ndarray:
+def gathered(rest: np.ndarray, motion: np.ndarray, weights: GuideWeights) -> np.ndarray:
     """Three takes and their sum."""
-    one, two, three = (guides[index] for index in weights.guide.T)
+    one, two, three = (motion[index] for index in weights.guide.T)
     w = weights.weight[:, :, None, None]
-    return one * w[:, 0] + two * w[:, 1] + three * w[:, 2]
+    return rest + one * w[:, 0] + two * w[:, 1] + three * w[:, 2]
 
 
-def summed(guides: np.ndarray, weights: GuideWeights) -> np.ndarray:
+def summed(rest: np.ndarray, motion: np.ndarray, weights: GuideWeights) -> np.ndarray:
     """One einsum over all."""
-    return np.einsum("nk,nkpj->npj", weights.weight, guides[weights.guide])
+    return rest + np.einsum("nk,nkpj->npj", weights.weight, motion[weights.guide])
 
 
-def summed_in_chunks(guides: np.ndarray, weights: GuideWeights) -> np.ndarray:
+def summed_in_chunks(rest: np.ndarray, motion: np.ndarray, weights: GuideWeights) -> np.ndarray:
     """The same in pieces that fit into the cache."""
-    flat = guides.reshape(len(guides), -1)
-    result = np.empty((len(weights.guide), flat.shape[1]), np.float32)
+    flat = motion.reshape(len(motion), -1)
+    result = rest.reshape(len(rest), -1).copy()
     for start in range(0, len(result), CHUNK):
         part = slice(start, start + CHUNK)
         taken = flat[weights.guide[part]]
-        np.einsum("nk,nkj->nj", weights.weight[part], taken, out=result[part])
-    return result.reshape(-1, *guides.shape[1:])
+        result[part] += np.einsum("nk,nkj->nj", weights.weight[part], taken)
+    return result.reshape(rest.shape)
 
 
 PLAIN: tuple[Mix, ...] = (gathered, summed, summed_in_chunks)
@@ -101,15 +103,17 @@ PLAIN: tuple[Mix, ...] = (gathered, summed, summed_in_chunks)
 def node_figures() -> dict[str, float]:
     """Milliseconds (the least of some rounds) and ratios, see bench/refinement.py.
 
-    node_ratio_N: times faster than the node. numpy_ratio_N: mixing, as a factor of the fastest
-    plain form. peak_memory_ratio: the most memory that was taken, over that of the result.
+    node_ratio_N: times faster than the node. numpy_ratio_N: the time as a factor of the fastest
+    plain form's. peak_memory_ratio: the most memory that was taken, over that of the result.
     """
     bpy.ops.mesh.primitive_uv_sphere_add(radius=RADIUS, segments=48, ring_count=24)
     head = bpy.context.object
     guides = guides_on(surface_of(head), GUIDES)
-    along = np.linspace(0.0, 1.0, POINTS)
-    smooth = smoothed_at(guides.grid, along)
-    node = InterpolatedHair(head, _strand_set(smooth, guides))
+    guide_rest = _with_points(guides.grid)
+    guide_now = guide_rest + np.random.default_rng(1).normal(0.0, 0.01, guide_rest.shape)
+    guide_now = guide_now.astype(np.float32)
+    motion = guide_now - guide_rest
+    node = InterpolatedHair(head, _strand_set(guide_rest, guides))
     figures: dict[str, float] = {}
     peaks = []
     for count in COUNTS:
@@ -119,28 +123,24 @@ def node_figures() -> dict[str, float]:
         node_ms = min(node.milliseconds() for _ in range(NODE_ROUNDS))
         node_ms *= count / made.strand_count
         weights = _weights(made.grid[:, 0], guides, count)
-        whole, mixing, plain = _least(
-            [
-                lambda w=weights: interpolate(smoothed_at(guides.grid, along), w),
-                lambda w=weights: interpolate(smooth, w),
-                *(lambda m=mix, w=weights: m(smooth, w) for mix in PLAIN),
-            ]
-        )
+        rest = summed_in_chunks(np.zeros((count, POINTS, 3), np.float32), guide_rest, weights)
+        carry = partial(ride, rest, guide_rest, guide_now, weights)
+        ours, plain = _least([carry, *(partial(mix, rest, motion, weights) for mix in PLAIN)])
         figures |= {
             f"node_ms_{count}": round(node_ms, 2),
-            f"interpolate_ms_{count}": round(whole, 3),
+            f"ride_ms_{count}": round(ours, 3),
             f"numpy_ms_{count}": round(plain, 3),
-            f"node_ratio_{count}": round(node_ms / whole, 1),
-            f"numpy_ratio_{count}": round(mixing / plain, 2),
+            f"node_ratio_{count}": round(node_ms / ours, 1),
+            f"numpy_ratio_{count}": round(ours / plain, 2),
         }
-        peaks.append(_peak_ratio(lambda w=weights: interpolate(smoothed_at(guides.grid, along), w)))
+        peaks.append(_peak_ratio(carry))
     node.remove()
     bpy.data.objects.remove(head)
     return figures | {"peak_memory_ratio": round(max(peaks), 2)}
 
 
-def _least(works: list[Callable[[], np.ndarray]]) -> tuple[float, float, float]:
-    """Milliseconds of the first, of the second, and of the fastest of the others.
+def _least(works: list[Callable[[], np.ndarray]]) -> tuple[float, float]:
+    """Milliseconds of the first, and of the fastest of the others.
 
     In turns, so that a busy moment of the machine meets all of them.
     """
@@ -150,8 +150,20 @@ def _least(works: list[Callable[[], np.ndarray]]) -> tuple[float, float, float]:
             begin = time.perf_counter()
             work()
             round_times[index] = (time.perf_counter() - begin) * 1000.0
-    whole, mixing, *plain = times.min(axis=0)
-    return float(whole), float(mixing), float(min(plain))
+    ours, *plain = times.min(axis=0)
+    return float(ours), float(min(plain))
+
+
+def _with_points(grid: np.ndarray) -> np.ndarray:
+    """Strands as POINTS points of their curves, (strand_count, POINTS, 3)."""
+    strand_count, cv_count, _ = grid.shape
+    place = np.linspace(0.0, cv_count - 1, POINTS)
+    segment = np.minimum(place.astype(int), cv_count - 2)
+    strand = np.repeat(np.arange(strand_count), POINTS)
+    points = points_at(
+        grid, strand, np.tile(segment, strand_count), np.tile(place - segment, strand_count)
+    )
+    return points.reshape(strand_count, POINTS, 3).astype(np.float32)
 
 
 def _peak_ratio(work: Callable[[], np.ndarray]) -> float:

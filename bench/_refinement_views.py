@@ -19,17 +19,18 @@ from typing import Any
 
 import gpu
 import numpy as np
+from refinement_probes import adaptive_points, read_factors
 
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings
-from hairloom.addon.refine.detail import PictureView, adaptive_points, stations
+from hairloom.addon.refine.detail import PictureView, stations
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.refine.thinning import even_ranks
 from hairloom.addon.render.camera import Camera, frame_camera, look_at, perspective
-from hairloom.addon.render.detail_pass import DetailPass, read_factors
-from hairloom.addon.render.frame import render_coverage
+from hairloom.addon.render.detail_pass import DetailPass
+from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.shader_program import ShaderRecipe, program
 from hairloom.addon.render.shader_source import SHADER_FOLDER
 from hairloom.addon.render.snapshot import Snapshot
@@ -242,7 +243,7 @@ def coverage_eighth_difference(shown: Groom) -> float:
             ("eighth", replace(BARE, full_size=1.0e5, least_share=0.125)),
         ):
             snapshot = shown.snapshot(detail, rank=rank)
-            covered[name] = float(render_coverage(snapshot, shown.camera(), *size, 4).mean())
+            covered[name] = float(render_image(snapshot, shown.camera(), *size, 4)[..., 3].mean())
         worst = max(worst, abs(covered["eighth"] / covered["all"] - 1.0))
     return worst
 

@@ -12,12 +12,12 @@ import time
 from dataclasses import replace
 
 import numpy as np
+from fibre_oracles import lobe_errors, scattered_energy, traced_lobes
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.shading.marschner.fibre import Fibre
 from hairloom.addon.shading.marschner.pigment import melanin_absorption
-from hairloom.addon.shading.marschner.rays import lobe_errors, traced_lobes
-from hairloom.addon.shading.marschner.scattering import marschner, scattered_energy
+from hairloom.addon.shading.marschner.scattering import marschner
 from hairloom.addon.shading.marschner.tables import (
     DEFAULT_SIZE,
     PREVIEW_SIZE,

@@ -1,4 +1,4 @@
-"""Refinement: children on the CPU against Blender's node, detail in the picture against fixed.
+"""Refinement: strands carried on the CPU beside Blender's node, detail in the picture or fixed.
 
 See `_refinement_node` and `_refinement_views` for what is compared with what.
 

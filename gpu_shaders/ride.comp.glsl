@@ -1,5 +1,5 @@
 // Strands that ride on guides: carried by their own roots, they take on the guides' motion.
-// Twin of ride in addon/refine/interpolate.py, behind follow in addon/groom/roots.py. One
+// Twin of ride in addon/refine/ride.py, behind follow in addon/groom/roots.py. One
 // invocation a strand: on a software driver that takes a quarter less time than one a CV.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"

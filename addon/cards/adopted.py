@@ -19,6 +19,7 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import Surface
 from ..strands.closest_point import closest_point
+from ..strands.vectors import unit_or
 from .card_mesh import CardMesh
 from .sort import connected_components
 from .uv_ways import UvWays, Way, coordinate_gradients, island_bounds, uv_ways
@@ -27,6 +28,8 @@ from .uv_ways import UvWays, Way, coordinate_gradients, island_bounds, uv_ways
 _FLAT = 1.0e-7
 #: A card looks away from the head, or towards it, when its mean cosine is at least this.
 _LEAST_FACING = 0.25
+#: the normal where nothing says another, and vectors too short to say it
+_DOWN, _SHORTEST = (0.0, 0.0, -1.0), 1.0e-20
 
 
 @dataclass(frozen=True)
@@ -126,7 +129,7 @@ def _away_from(positions: Floats, head: Surface | None) -> _Away:
     if head is None or not len(head.triangles):
         middle = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
         outward = positions - middle
-        return _Away(_unit(outward, outward), np.zeros(len(positions)))
+        return _Away(unit_or(outward, _DOWN, _SHORTEST), np.zeros(len(positions)))
     nearest = closest_point(positions, head)
     return _Away(head.triangle_normals()[nearest.triangle], nearest.distance)
 
@@ -149,7 +152,7 @@ def _facing(source: Surface, card: Ints, away: Floats) -> tuple[Floats, Bools, B
     total = np.zeros((len(source.positions), 3))
     for corner in range(3):
         np.add.at(total, source.triangles[:, corner], outward)
-    return _unit(total, away), is_turned, is_mixed
+    return unit_or(total, unit_or(away, _DOWN, _SHORTEST), _SHORTEST), is_turned, is_mixed
 
 
 def _looks_inwards(centers: Floats, outward: Floats, ahead: Floats, card: Ints) -> Bools:
@@ -196,7 +199,7 @@ def _tangents(
     chosen *= np.where(ways.is_down[island], -1.0, 1.0)[:, None]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = np.linalg.norm(np.cross(one, two), axis=1)
-    chosen = _unit(chosen, np.zeros_like(chosen)) * area[:, None]
+    chosen = unit_or(chosen, _DOWN, _SHORTEST) * area[:, None]
     total = np.zeros((len(uv), 3))
     for corner in range(3):
         np.add.at(total, triangles[:, corner], chosen)
@@ -204,17 +207,7 @@ def _tangents(
     whole = np.stack([np.bincount(island, part) for part in from_root.T], axis=1)
     fallback = np.zeros_like(total)
     fallback[triangles] = whole[island][:, None]
-    return _unit(total, fallback)
-
-
-def _unit(vectors: Floats, other: Floats) -> Floats:
-    """Unit vectors; where there is none those of `other`, and where there is none either, down."""
-    found = np.tile(np.array([0.0, 0.0, -1.0]), (len(vectors), 1))
-    for candidates in (other, vectors):
-        length = np.linalg.norm(candidates, axis=1)
-        usable = length > 1e-20
-        found[usable] = candidates[usable] / length[usable, None]
-    return found
+    return unit_or(total, unit_or(fallback, _DOWN, _SHORTEST), _SHORTEST)
 
 
 def _at_vertices(triangles: Ints, values: Floats, vertex_count: int) -> Floats:

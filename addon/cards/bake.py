@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from ..strands.vectors import unit_or
 from .atlas_maps import AtlasMaps
 from .bake_strands import FlatStrands
 
@@ -78,7 +79,7 @@ def fibre_normal(tangent: Floats, side: Floats) -> Floats:
         side: (...) where across the strand, from -1 to 1.
     """
     right = np.stack([tangent[..., 1], -tangent[..., 0], np.zeros_like(side)], axis=-1)
-    right = _unit(right, (1.0, 0.0, 0.0))
+    right = unit_or(right, (1.0, 0.0, 0.0))
     front = np.cross(right, tangent)
     up = np.sqrt(np.maximum(1.0 - side * side, 0.0))
     normal: Floats = right * side[..., None] + front * up[..., None]
@@ -153,7 +154,7 @@ def _sampled_block(
             counts &= seen[:, 4] >= nearest[row, column]
             row, column, seen = row[counts], column[counts], seen[counts]
             nearest[row, column] = seen[:, 4]
-            tangent = _unit(seen[:, 6:9], (0.0, 1.0, 0.0))
+            tangent = unit_or(seen[:, 6:9], (0.0, 1.0, 0.0))
             values[row, column] = np.concatenate([seen[:, 2:6], tangent, seen[:, 9:]], axis=1)
             normal[row, column] = fibre_normal(tangent, seen[:, 1])
     return _filtered(*(_upright(image, block) for image in (nearest, values, normal)))
@@ -228,11 +229,5 @@ def _filtered(nearest: Floats, values: Floats, normal: Floats) -> dict[str, Any]
     return {name: value.astype(np.float32) for name, value in maps.items()}
 
 
-def _encoded(vectors: Floats, fallback: tuple[float, ...], is_hair: Bools) -> Floats:
-    return (0.5 * _unit(vectors, fallback) + 0.5) * is_hair[..., None]
-
-
-def _unit(vectors: Floats, fallback: tuple[float, ...]) -> Floats:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    unit: Floats = np.where(length > 1e-6, vectors / np.maximum(length, 1e-6), fallback)
-    return unit
+def _encoded(vectors: Floats, fallback: tuple[float, float, float], is_hair: Bools) -> Floats:
+    return (0.5 * unit_or(vectors, fallback) + 0.5) * is_hair[..., None]

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands.affine import moved
+from ..strands.vectors import cross_rows, dot_rows, unit_rows
 from .card_mesh import CardMesh
 from .sort import card_of_vertex
 
@@ -137,7 +138,7 @@ def follow_guides(binding: CardBinding, guides: Floats, turn: Floats) -> CardMes
     bone = _mixed(guides, binding.guide, binding.weight)
     bone += np.einsum("nij,jn->in", first, binding.root)[:, None]
     ways = _ways(bone)
-    was = _unit(np.einsum("nij,jn->in", first, binding.way))
+    was = unit_rows(np.einsum("nij,jn->in", first, binding.way))
     side = np.einsum("nij,jn->in", first, binding.side)
     side = _perpendicular(_turned(side, was, ways[:, 0]), ways[:, 0])
     places, frame = _rows(binding, bone, ways, side, np.sign(volume))
@@ -162,8 +163,8 @@ def moved_mesh(mesh: CardMesh, matrix: Floats) -> CardMesh:
     return replace(
         mesh,
         positions=moved(mesh.positions, matrix),
-        normal=_unit(normal).T,
-        tangent=_unit(tangent).T,
+        normal=unit_rows(normal).T,
+        tangent=unit_rows(tangent).T,
         triangles=mesh.triangles[:, ::-1] if is_mirrored else mesh.triangles,
     )
 
@@ -187,9 +188,9 @@ def _rows(
     Args:
         bone, ways: (3, cv_count, n). side: (3, n) at the root. hand: (n,) -1 for mirrored cards.
     """
-    way = _unit(_on_rows(ways, binding))
+    way = unit_rows(_on_rows(ways, binding))
     across = _perpendicular(_on_rows(_transported(ways, side), binding), way)
-    up = _cross(way, across) * hand[binding.row_card].astype(np.float32)
+    up = cross_rows(way, across) * hand[binding.row_card].astype(np.float32)
     return _on_rows(bone, binding), np.stack([way, across, up])
 
 
@@ -222,7 +223,7 @@ def _turned(vector: Floats, one: Floats, other: Floats) -> Floats:
     """Vectors across `one`, by the least turn that takes `one` to `other`: v - (v . b)(a + b) /
     (1 + a . b), which is Rodrigues' formula for them; (3, n) each.
     """
-    share = _dot(vector, other) / (1.0 + _dot(one, other) + np.float32(_REVERSED))
+    share = dot_rows(vector, other) / (1.0 + dot_rows(one, other) + np.float32(_REVERSED))
     return vector - (one + other) * share
 
 
@@ -239,7 +240,7 @@ def _ways(bone: Floats) -> Floats:
     """Unit directions from root to tip at the CVs, (3, cv_count, n): those of strands.frames."""
     step = bone[:, 1:] - bone[:, :-1]
     ways = np.concatenate([step[:, :1], step[:, 1:] + step[:, :-1], step[:, -1:]], axis=1)
-    length = np.sqrt(_dot(ways, ways))
+    length = np.sqrt(dot_rows(ways, ways))
     is_short = length < _SHORTEST
     ways /= np.maximum(length, np.float32(_SHORTEST))
     if is_short.any():
@@ -251,8 +252,8 @@ def _ways(bone: Floats) -> Floats:
 
 def _perpendicular(vector: Floats, way: Floats) -> Floats:
     """The unit part across unit vectors, (3, n); any one across where they are parallel."""
-    across = vector - way * _dot(vector, way)
-    length = np.sqrt(_dot(across, across))
+    across = vector - way * dot_rows(vector, way)
+    length = np.sqrt(dot_rows(across, across))
     is_short = length < np.float32(1.0e-5)
     across /= np.maximum(length, np.float32(1.0e-5))
     if is_short.any():
@@ -264,22 +265,4 @@ def _across(way: Floats) -> Floats:
     """Unit vectors across unit vectors, (3, n)."""
     axis = np.zeros_like(way)
     axis[np.abs(way).argmin(axis=0), np.arange(way.shape[1])] = 1.0
-    return _unit(axis - way * _dot(axis, way))
-
-
-def _unit(vectors: Floats) -> Floats:
-    return vectors / np.maximum(np.sqrt(_dot(vectors, vectors)), np.float32(_SHORTEST))
-
-
-def _dot(one: Floats, other: Floats) -> Floats:
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
-
-
-def _cross(one: Floats, other: Floats) -> Floats:
-    return np.stack(
-        [
-            one[1] * other[2] - one[2] * other[1],
-            one[2] * other[0] - one[0] * other[2],
-            one[0] * other[1] - one[1] * other[0],
-        ]
-    )
+    return unit_rows(axis - way * dot_rows(axis, way))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands.frames import tangents
-from .segments import unit
+from ..strands.vectors import unit
 from .strip import CardFrames, Strips
 
 #: Places along a card that are compared.

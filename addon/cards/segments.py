@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..strands.vectors import unit
 from .strip import CardFrames, Strips
 
 #: Numbers of segments that are tried.
@@ -71,8 +72,3 @@ def interpolated(rows: Floats, along: Floats) -> Floats:
     share = (place - left).astype(np.float32).reshape(1, -1, *[1] * (rows.ndim - 2))
     mixed: Floats = rows[:, left] * (1.0 - share) + rows[:, left + 1] * share
     return mixed
-
-
-def unit(vectors: Floats) -> Floats:
-    """Vectors of length 1; those of no length stay 0."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

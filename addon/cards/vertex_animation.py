@@ -75,9 +75,3 @@ def motion_texture(values: Floats, layout: MotionLayout) -> Floats:
     texels = np.zeros((layout.frame_count, layout.rows * layout.width, 3), np.float32)
     texels[:, : layout.vertex_count] = values.transpose(1, 0, 2)
     return texels.reshape(layout.height, layout.width, 3)[::-1]
-
-
-def motion_values(texture: Floats, layout: MotionLayout) -> Floats:
-    """What `motion_texture` was made from, (vertex_count, frame_count, 3)."""
-    texels = texture[::-1].reshape(layout.frame_count, -1, 3)
-    return texels[:, : layout.vertex_count].transpose(1, 0, 2)

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..strands.vectors import dot_rows
 from .banded import solve_tridiagonal
 
 #: CVs of each guide that the head carries: the second gives the root's direction (TressFX).
@@ -75,7 +76,7 @@ def pin(position: Floats, carried: Floats, length: Floats, tip_held: Floats | No
         root = carried[:, PINNED - 1]
         way = carried[:, -1] - root
         reach = length[PINNED - 1 :].sum(axis=0)
-        way *= np.minimum(reach / np.maximum(np.sqrt(dot(way, way)), TINY), np.float32(1.0))
+        way *= np.minimum(reach / np.maximum(np.sqrt(dot_rows(way, way)), TINY), np.float32(1.0))
         np.copyto(position[:, -1], root + way, where=tip_held > 0.0)
 
 
@@ -103,7 +104,7 @@ def relax_lengths(position: Floats, length: Floats, tip_held: Floats | None, swe
     for _ in range(sweeps):
         for cv in range(PINNED, last + 1):
             segment = position[:, cv] - position[:, cv - 1]
-            now = np.sqrt(dot(segment, segment))
+            now = np.sqrt(dot_rows(segment, segment))
             segment *= (now - length[cv - 1]) / np.maximum(now, TINY)
             lower = np.float32(0.0 if cv == PINNED else 0.5)
             upper: Floats | np.float32 = np.float32(1.0) - lower
@@ -121,7 +122,7 @@ def hold_within_reach(position: Floats, length: Floats) -> None:
     root = position[:, PINNED - 1 : PINNED]
     way = position[:, PINNED:] - root
     reach = np.cumsum(length[PINNED - 1 :], axis=0)
-    way *= np.minimum(reach / np.maximum(np.sqrt(dot(way, way)), TINY), np.float32(1.0))
+    way *= np.minimum(reach / np.maximum(np.sqrt(dot_rows(way, way)), TINY), np.float32(1.0))
     way += root
     position[:, PINNED:] = way
 
@@ -176,7 +177,7 @@ def _laid_out(position: Floats, length: Floats, tip_held: Floats | None) -> Floa
 def _off_length(position: Floats, length: Floats, tolerance: float) -> Ints:
     """Guides of which a segment is off by more than this share of its length."""
     segment = position[:, PINNED:] - position[:, PINNED - 1 : -1]
-    error = dot(segment, segment)
+    error = dot_rows(segment, segment)
     np.sqrt(error, out=error)
     error -= length[PINNED - 1 :]
     np.abs(error, out=error)
@@ -218,8 +219,8 @@ def _solve_and_slide(
     upper = touched.index - PINNED * guide_count  # the segment that ends at the CV
     count = upper.searchsorted(beside.size)  # of all but tips, where no segment begins
     inner, lower = upper[:count], upper[:count] + guide_count  # and the one that begins there
-    along_upper = dot(normal, chosen(rows, upper))
-    along_lower = dot(normal[:, :count], chosen(rows, lower))
+    along_upper = dot_rows(normal, chosen(rows, upper))
+    along_lower = dot_rows(normal[:, :count], chosen(rows, lower))
     heavy_upper, heavy_lower = CONTACT_WEIGHT * along_upper, CONTACT_WEIGHT * along_lower
     diagonal[upper] -= heavy_upper * along_upper
     diagonal[lower] -= heavy_lower * along_lower
@@ -234,7 +235,7 @@ def _solve_and_slide(
 def segments(position: Floats) -> tuple[Floats, Floats]:
     """Segments (3, n - 1, guide_count) [m] and their squared length, never zero [m^2]."""
     segment = position[:, 1:] - position[:, :-1]
-    squared = dot(segment, segment)
+    squared = dot_rows(segment, segment)
     squared += _TINY_SQUARED
     return segment, squared
 
@@ -247,7 +248,7 @@ def chain_matrix(segment: Floats, squared: Floats) -> tuple[Floats, Floats]:
     """
     diagonal = squared + squared
     diagonal[0] = squared[0]  # the last pinned CV does not move
-    beside = dot(segment[:, 1:], segment[:, :-1])
+    beside = dot_rows(segment[:, 1:], segment[:, :-1])
     return diagonal, np.negative(beside, out=beside)
 
 
@@ -269,25 +270,16 @@ def directions(position: Floats) -> tuple[Floats, Floats]:
 
 def _length(vector: Floats) -> Floats:
     """Length over the first axis, never zero; what is added is lost to rounding above 1e-5 m."""
-    squared = dot(vector, vector)
+    squared = dot_rows(vector, vector)
     squared += _TINY_SQUARED
     length: Floats = np.sqrt(squared, out=squared)
     return length
 
 
 def unit(vector: Floats) -> Floats:
-    """Unit vectors over the first axis; zero where the vector is."""
+    """As `vectors.unit_rows`, in fewer steps, for each substep: see `_length`."""
     result: Floats = vector / _length(vector)
     return result
-
-
-def dot(one: Floats, two: Floats) -> Floats:
-    """Dot products over the first axis, which is x, y, z."""
-    product = one * two
-    total: Floats = product[0]
-    total += product[1]
-    total += product[2]
-    return total
 
 
 def chosen(rows: Floats, index: Ints) -> Floats:

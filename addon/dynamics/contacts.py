@@ -21,8 +21,9 @@ from functools import lru_cache
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from ..strands.vectors import dot_rows
 from .colliders import Pose, transform_points
-from .constraints import PINNED, TINY, Touched, chosen, dot
+from .constraints import PINNED, TINY, Touched, chosen
 from .settings import DynamicsSettings
 
 #: How far a CV may be brought by the length solve after contacts were found [m].
@@ -52,7 +53,7 @@ class Contacts:
     def push_out(self, position: Floats, friction: float) -> Bools:
         """Bring points (3, n) back to their planes, in place; returns which ones touch, (m,)."""
         here = chosen(position, self.index)
-        gap = dot(self.normal, here)
+        gap = dot_rows(self.normal, here)
         np.subtract(self.offset, gap, out=gap)
         push = np.maximum(gap, np.float32(0.0))
         self.push[:] += push
@@ -65,8 +66,8 @@ class Contacts:
 
     def _friction(self, here: Floats, push: Floats, friction: float) -> Floats:
         slip = here - self.origin
-        slip -= self.normal * dot(self.normal, slip)
-        length = np.maximum(np.sqrt(dot(slip, slip)), TINY)
+        slip -= self.normal * dot_rows(self.normal, slip)
+        length = np.maximum(np.sqrt(dot_rows(slip, slip)), TINY)
         slip *= np.minimum(push * np.float32(friction) / length, np.float32(1.0))
         return slip
 
@@ -77,7 +78,7 @@ class Contacts:
         """
         moved = chosen(position, self.index)
         moved -= self.origin
-        away = np.maximum(dot(self.normal, moved), np.float32(0.0))
+        away = np.maximum(dot_rows(self.normal, moved), np.float32(0.0))
         away *= self.push > 0.0
         for row, value in zip(previous, self.normal * away, strict=True):
             row[self.index] += value
@@ -142,7 +143,7 @@ def _contacts_with(
     # distance and normal in the world: the gradient transforms by the inverse transposed, and its
     # length says how much the distance is scaled along it
     normal = np.einsum("ji,jn->in", pose.inverse[:3, :3], gradient)
-    scale = np.maximum(np.sqrt(dot(normal, normal)), TINY)
+    scale = np.maximum(np.sqrt(dot_rows(normal, normal)), TINY)
     normal /= scale
     distance /= scale
 
@@ -151,10 +152,10 @@ def _contacts_with(
     local, normal = chosen(local, close), chosen(normal, close)
     here, origin = chosen(position, index), chosen(previous, index)
     origin += transform_points(pose.way, local)
-    reached = distance - dot(normal, here - origin)
+    reached = distance - dot_rows(normal, here - origin)
     reached += np.float32(led_out)
     own_radius = radius.take(index)
-    offset = dot(normal, here)
+    offset = dot_rows(normal, here)
     offset -= distance
     offset += np.minimum(own_radius, reached)
     is_out = reached >= own_radius
@@ -169,7 +170,7 @@ def _near(pose: Pose, position: Floats, radius: Floats) -> tuple[Ints, Floats, F
     """
     offset = position - pose.center[:, None]
     farthest = pose.radius + float(radius.max()) + REACH
-    index = (dot(offset, offset) < np.float32(farthest * farthest)).nonzero()[0]
+    index = (dot_rows(offset, offset) < np.float32(farthest * farthest)).nonzero()[0]
     reach = radius.take(index)
     reach += np.float32(REACH)
     local = transform_points(pose.inverse, chosen(position, index))

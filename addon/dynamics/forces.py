@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from ..arrays import Floats
+from ..strands.vectors import dot_rows
 from .banded import solve_tridiagonal
-from .constraints import PINNED, chain_matrix, dot, less_next, segments
+from .constraints import PINNED, chain_matrix, less_next, segments
 from .settings import DynamicsSettings
 
 
@@ -44,7 +45,7 @@ def brake(position: Floats, previous: Floats, drag: float, air_way: Floats | Non
     way = position - previous
     if air_way is not None:
         way -= air_way[:, None]
-    length = np.sqrt(dot(way, way))
+    length = np.sqrt(dot_rows(way, way))
     length *= np.float32(drag)
     length += np.float32(1.0)
     way /= length
@@ -100,7 +101,7 @@ def weight_on_style(gravity: Floats, carried: Floats) -> Floats:
     segment, squared = segments(carried[:, PINNED - 1 :])
     diagonal, beside = chain_matrix(segment, squared)
     tension = np.zeros_like(diagonal)  # J g: only the segment at the pinned CV feels a difference
-    tension[0] = dot(segment[:, 0], gravity[:, None])
+    tension[0] = dot_rows(segment[:, 0], gravity[:, None])
     solve_tridiagonal(diagonal, beside, tension)
     segment *= tension
     return gravity[:, None, None] - less_next(segment)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..strands.vectors import dot_rows
 from .colliders import PosedCollider, transform_points
-from .constraints import PINNED, TINY, directions, dot
+from .constraints import PINNED, TINY, directions
 from .state import DynamicsState
 
 
@@ -22,22 +23,6 @@ def max_stretch(state: DynamicsState) -> float:
     return float(change.max())
 
 
-def farthest_reach(state: DynamicsState) -> float:
-    """Largest distance of a CV from its guide's root, over the length along the strand to there.
-
-    At rest at most 1. The segment of the pinned CVs counts with the length that the head gives it.
-    """
-    length = state.rest.length.copy()
-    if not length.size:
-        return 0.0
-    length[: PINNED - 1] = directions(state.position[:, :PINNED])[1]
-    along = np.cumsum(length, axis=0)
-    away = state.position[:, 1:] - state.position[:, :1]
-    away = np.sqrt(dot(away, away))
-    share = np.divide(away, along, out=np.zeros_like(along), where=along > TINY)
-    return float(share.max())
-
-
 def deepest_penetration(state: DynamicsState, colliders: tuple[PosedCollider, ...]) -> float:
     """How deep [m] the center of any free CV lies in a collider at the frame's end; 0 if none."""
     points = state.position[:, PINNED:].reshape(3, -1)
@@ -47,9 +32,9 @@ def deepest_penetration(state: DynamicsState, colliders: tuple[PosedCollider, ..
         distance, gradient = posed.collider.distance(transform_points(inverse, points))
         # in the collider's space a step outwards is as long as the inverse makes it; the gradient
         # gives the direction only, because a sampled one is short where two sides are as near
-        gradient /= np.maximum(np.sqrt(dot(gradient, gradient)), TINY)
+        gradient /= np.maximum(np.sqrt(dot_rows(gradient, gradient)), TINY)
         steepness = inverse[:3, :3].T.astype(np.float32)
         outward = sum(steepness[:, axis, None] * gradient[axis] for axis in range(3))
-        scale = np.maximum(np.sqrt(dot(outward, outward)), TINY)
+        scale = np.maximum(np.sqrt(dot_rows(outward, outward)), TINY)
         deepest = max(deepest, float(-(distance / scale).min()))
     return deepest

@@ -36,8 +36,9 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..params.curve import along as curve_along
+from ..strands.vectors import cross_rows, dot_rows
 from .banded import SharedBand
-from .constraints import PINNED, TINY, dot, less_next, unit
+from .constraints import PINNED, TINY, less_next, unit
 from .settings import DynamicsSettings
 
 #: A cantilever's first mode: omega = 1.8751^2 sqrt(EI / (rho A)) / L^2 (Euler-Bernoulli).
@@ -157,7 +158,7 @@ def rest_curvature(position: Floats, twist_cv: Ints) -> Floats:
     segment = position[:, 1:] - position[:, :-1]
     tangent, normal = frames(segment, twist)
     second = segment[:, 1:] - segment[:, :-1]
-    axes = (tangent, normal, _cross(tangent, normal))
+    axes = (tangent, normal, cross_rows(tangent, normal))
     return np.stack([(second * axis[:, :-1]).sum(axis=0) for axis in axes])
 
 
@@ -173,7 +174,7 @@ def frames(segment: Floats, twist: Floats) -> tuple[Floats, Floats]:
     tangent = unit(segment)
     first = unit(_across(twist, tangent[:, 0]))
     middle = tangent[:, 1:] + tangent[:, :-1]
-    scale = dot(tangent[:, 1:], middle)  # 1 + t.t' = t'.(t + t')
+    scale = dot_rows(tangent[:, 1:], middle)  # 1 + t.t' = t'.(t + t')
     scale += np.float32(1.0e-6)
     middle /= scale
     return tangent, _carried_on(first, tangent, middle)
@@ -206,7 +207,7 @@ def _curvature_residual(position: Floats, style: Floats, shape: LocalShape) -> F
     twist -= style[:, 0]
     tangent, normal = frames(segment[:, :-1], twist)
     curvature = shape.turning
-    residual = _cross(tangent, normal)
+    residual = cross_rows(tangent, normal)
     residual *= curvature[2]
     normal *= curvature[1]
     residual += normal
@@ -223,14 +224,4 @@ def _curvature_residual(position: Floats, style: Floats, shape: LocalShape) -> F
 
 
 def _across(vector: Floats, unit: Floats) -> Floats:
-    return vector - unit * dot(vector, unit)
-
-
-def _cross(one: Floats, two: Floats) -> Floats:
-    result = np.empty_like(one)
-    scratch = np.empty_like(one[0])
-    for axis, (y, z) in enumerate(((1, 2), (2, 0), (0, 1))):
-        np.multiply(one[y], two[z], out=result[axis])
-        np.multiply(one[z], two[y], out=scratch)
-        result[axis] -= scratch
-    return result
+    return vector - unit * dot_rows(vector, unit)

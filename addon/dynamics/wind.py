@@ -17,6 +17,7 @@ from math import factorial
 import numpy as np
 
 from ..arrays import Floats
+from ..strands.vectors import unit
 from .wind_settings import WindSettings
 
 #: Modes in the sum.
@@ -81,9 +82,9 @@ def air_of(settings: WindSettings, scene_wind: Floats) -> Air | None:
 def _modes(size: float, seed: int) -> tuple[Floats, Floats, Floats]:
     """Wave vectors, unit vectors across them, phases; wave lengths within an octave of `size`."""
     random = np.random.default_rng(seed)
-    direction = _unit(random.normal(size=(MODES, 3)))
+    direction = unit(random.normal(size=(MODES, 3)))
     length = size * 2.0 ** random.uniform(-0.5, 0.5, (MODES, 1))
-    across = _unit(np.cross(direction, _unit(random.normal(size=(MODES, 3)))))
+    across = unit(np.cross(direction, unit(random.normal(size=(MODES, 3)))))
     return 2.0 * np.pi / length * direction, across, random.uniform(0.0, 2.0 * np.pi, MODES)
 
 
@@ -102,7 +103,3 @@ def sine(angle: Floats) -> Floats:
         result *= square
         result += factor
     return result * x
-
-
-def _unit(vectors: Floats) -> Floats:
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)

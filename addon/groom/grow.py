@@ -15,12 +15,13 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands import StrandSet, Surface
+from ..strands.vectors import unit
 from .grown import at_roots, bound_strands, checked_weights, segment_shares
 from .locks import assign_locks, style_locks
 from .normal_growth import grow_along_normals, somewhere
 from .scalp import find_cranium, sample_roots, scalp_density
 from .settings import GrowSettings
-from .skin import Skin, unit
+from .skin import Skin
 
 __all__ = ["grow", "scalp_density"]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
-from .skin import unit
+from ..strands.vectors import unit
 
 #: The four quarters of a triangle: for each the barycentric coordinates of its corners.
 _QUARTERS = np.array(

@@ -7,6 +7,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import Surface
 from ..strands.closest_point import ClosestPointSearch
+from ..strands.vectors import unit
 
 
 class Skin:
@@ -41,9 +42,3 @@ class Skin:
         """Where hair arrives that goes this way from here, around the surface, (n, 3)."""
         there = self.outside(start + unit(direction) * length[:, None], clearance)
         return start + unit(there - start) * length[:, None]
-
-
-def unit(vectors: Floats) -> Floats:
-    """Unit vectors (n, 3); zero stays zero."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)

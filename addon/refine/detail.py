@@ -40,7 +40,6 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from .settings import DetailSettings
-from .smooth import points_at
 
 #: The side planes stand this much farther out, for the width of what is drawn (0.1: 5 % of it).
 MARGIN = 0.1
@@ -103,40 +102,6 @@ def stations(factors: Ints) -> Ints:
     starts = np.zeros((len(factors), factors.shape[1] + 1), np.int32)
     np.cumsum(factors, axis=1, out=starts[:, 1:])
     return starts
-
-
-def adaptive_points(points: Floats, factors: Ints) -> tuple[Floats, Ints]:
-    """The corners of what is drawn: (point_count, 3) float32 and offsets (strand_count + 1,).
-
-    Args:
-        points: (strand_count, cv_count, 3).
-        factors: (strand_count, cv_count - 1), each at least 1.
-    """
-    starts = stations(factors)
-    offsets = np.zeros(len(factors) + 1, np.int64)
-    np.cumsum(starts[:, -1] + 1, out=offsets[1:])
-    corners = np.empty((offsets[-1], 3), np.float32)
-    for start in range(0, len(points), _CHUNK):
-        chunk = slice(start, start + _CHUNK)
-        begin, end = offsets[start], offsets[min(start + _CHUNK, len(points))]
-        corners[begin:end] = points_at(
-            np.asarray(points[chunk], np.float32), *_places(factors[chunk])
-        )
-    return corners, offsets
-
-
-def _places(factors: Ints) -> tuple[Ints, Ints, Floats]:
-    """Strand, segment and u of every station of these strands, each (n,)."""
-    strand_count, segment_count = factors.shape
-    # the tip is a place of its own at the end of the last segment
-    counts = factors.astype(np.int64)
-    counts[:, -1] += 1
-    strand = np.repeat(np.arange(strand_count), counts.sum(axis=1))
-    segment = np.repeat(np.tile(np.arange(segment_count), strand_count), counts.ravel())
-    first = np.repeat(np.cumsum(counts.ravel()) - counts.ravel(), counts.ravel())
-    u: Floats = (np.arange(len(segment)) - first).astype(np.float32)
-    u /= factors[strand, segment]
-    return strand, segment, u
 
 
 def _factors(cvs: Floats, view: PictureView, settings: DetailSettings) -> Ints:

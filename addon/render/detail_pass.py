@@ -19,7 +19,7 @@ from typing import Any
 import gpu
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from ..params.glsl import struct_values
 from ..refine.culling import shades_of
 from ..refine.detail import PictureView
@@ -200,15 +200,6 @@ class GroomExtent:
             view,
             snapshot.detail,
         )
-
-
-def read_factors(order: DetailOrder, strand_count: int, cv_count: int) -> Ints:
-    """The factors of an uneven order, read back, (strand_count, cv_count - 1)."""
-    texels = from_strand_rows(
-        texture_to_array(order.factors), strand_count, factor_texels(cv_count)
-    )
-    factors = np.ascontiguousarray(texels).view(np.uint8).reshape(strand_count, -1)
-    return factors[:, : cv_count - 1].astype(np.int32)
 
 
 def factor_texels(cv_count: int) -> int:

@@ -26,7 +26,6 @@ __all__ = [
     "look_at",
     "orthographic",
     "perspective",
-    "render_coverage",
     "render_image",
 ]
 
@@ -93,13 +92,6 @@ def render_image(
         add_shafts(picture, color, depth, camera, snapshot.lights, snapshot.shafts)
         put_under(picture, background)
     return texture_to_array(picture)
-
-
-def render_coverage(
-    snapshot: Snapshot, camera: Camera, width: int, height: int, samples: int = 1
-) -> Floats:
-    """How much of each pixel strands and meshes cover, (height, width) in [0, 1]."""
-    return render_image(snapshot, camera, width, height, samples)[..., 3]
 
 
 def _averaged(color: Any, samples: int) -> Any:

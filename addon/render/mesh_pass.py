@@ -108,10 +108,6 @@ class MeshPass:
                 batch.draw(shader.shader)
         self._pictures.forget_but(snapshot.meshes)
 
-    def skin_shadows(self) -> tuple[SkinShadow, ...]:
-        """The soft shadows on heads as they were drawn last."""
-        return self.skin.drawn
-
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
         self._blocks = {name: UniformBlock() for name in ("view", "lights", "opacity")}

@@ -27,7 +27,7 @@ import gpu
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..refine.interpolate import Weights
+from ..refine.ride import Weights
 from ..strands import StrandSet, Surface
 from .root_holds import RootHolds, matrix_motion
 from .shader_program import ShaderRecipe, program, released_with_shaders

@@ -20,6 +20,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..strands.frames import volume_normals
+from ..strands.vectors import dot, unit_or
 from .settings import ShadingSettings
 from .tint import tip_share
 
@@ -35,17 +36,17 @@ def strand_normal(point: Floats, tangent: Floats, center: Floats) -> Floats:
 
 def diffuse_bias(normal: Floats, to_light: Floats) -> Floats:
     """max(0, 0.75 N.L + 0.25): light creeps around the hair, which is never quite opaque."""
-    return np.maximum(0.0, 0.75 * _dot(normal, to_light) + 0.25)
+    return np.maximum(0.0, 0.75 * dot(normal, to_light) + 0.25)
 
 
 def shifted_tangent(tangent: Floats, normal: Floats, shift: Floats | float) -> Floats:
     """normalize(T + s N); `shift` is (...)."""
-    return _unit_or(tangent + np.asarray(shift)[..., None] * normal, tangent)
+    return unit_or(tangent + np.asarray(shift)[..., None] * normal, tangent)
 
 
 def strand_specular(tangent: Floats, half_vector: Floats, exponent: float) -> Floats:
     """smoothstep(-1, 0, T.H) sin(T, H)^p: a highlight where the strand is across H."""
-    along = _dot(tangent, half_vector)
+    along = dot(tangent, half_vector)
     across_squared = np.maximum(0.0, 1.0 - along * along)
     rise = np.clip(along + 1.0, 0.0, 1.0)
     return rise * rise * (3.0 - 2.0 * rise) * across_squared ** (0.5 * exponent)
@@ -65,7 +66,7 @@ def kajiya_kay(
     Times irradiance / pi, base colour and occlusion it is radiance. Noises are in [0, 1].
     """
     diffuse = diffuse_bias(normal, to_light)[..., None]
-    half_vector = _unit_or(to_light + to_eye, normal)
+    half_vector = unit_or(to_light + to_eye, normal)
     shift = shading.shift_noise * (shift_noise - 0.5)
     primary_tangent = shifted_tangent(tangent, normal, shading.primary_shift + shift)
     secondary_tangent = shifted_tangent(tangent, normal, shading.secondary_shift + shift)
@@ -96,12 +97,3 @@ def strand_base(
     color = np.where((grey_noise < shading.grey_share)[..., None], GREY_COLOR, color)
     brightness = 1.0 + shading.color_variation * (2.0 * color_noise - 1.0)
     return color * brightness[..., None]
-
-
-def _dot(one: Floats, other: Floats) -> Floats:
-    return np.sum(one * other, axis=-1)
-
-
-def _unit_or(vector: Floats, fallback: Floats) -> Floats:
-    length = np.linalg.norm(vector, axis=-1, keepdims=True)
-    return np.where(length > _SMALLEST, vector / np.maximum(length, _SMALLEST), fallback)

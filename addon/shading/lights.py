@@ -182,11 +182,6 @@ def light_at(light: Light, points: Floats) -> tuple[Floats, Floats]:
     return to_light, evenly * _cone_share(light.cone, away, width)
 
 
-def light_direction(light: Light, points: Floats) -> Floats:
-    """The first of light_at."""
-    return light_at(light, points)[0]
-
-
 def light_irradiance(light: Light, points: Floats) -> Floats:
     """The second of light_at."""
     return light_at(light, points)[1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
+from .vectors import unit_or
 
 _SMALLEST = 1.0e-6
 
@@ -58,16 +59,11 @@ def volume_normals(point: Floats, tangent: Floats, center: Floats) -> Floats:
     Args:
         point: (..., 3) [m]. tangent: (..., 3) unit vectors. center: (3,) [m].
     """
-    outward = _unit_or(point - center, np.array([0.0, 0.0, 1.0]))
+    outward = unit_or(point - center, np.array([0.0, 0.0, 1.0]))
     across = outward - tangent * np.sum(outward * tangent, axis=-1, keepdims=True)
     axis = np.eye(3)[np.abs(tangent).argmin(axis=-1)]
     is_long = np.sum(across * across, axis=-1, keepdims=True) > _SMALLEST
-    return _unit_or(np.where(is_long, across, np.cross(tangent, axis)), axis)
-
-
-def _unit_or(vector: Floats, otherwise: Floats) -> Floats:
-    length = np.linalg.norm(vector, axis=-1, keepdims=True)
-    return np.where(length > _SMALLEST, vector / np.maximum(length, _SMALLEST), otherwise)
+    return unit_or(np.where(is_long, across, np.cross(tangent, axis)), axis)
 
 
 def _perpendicular(vector: Floats, tangent: Floats) -> Floats:

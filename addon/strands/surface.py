@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .affine import moved
+from .vectors import unit
 
 
 @dataclass(frozen=True)
@@ -51,18 +52,18 @@ class Surface:
     def triangle_normals(self) -> Floats:
         """Unit normals, (triangle_count, 3); zero for a triangle without area."""
         a, b, c = np.moveaxis(self.corners, 1, 0)
-        return _unit(np.cross(b - a, c - a))
+        return unit(np.cross(b - a, c - a))
 
     def vertex_normals(self) -> Floats:
         """Unit normals, (vertex_count, 3), weighted by angle (Thuermer and Wuethrich 1998)."""
         corners, normals = self.corners, self.triangle_normals()
         total = np.zeros_like(self.positions)
         for corner in range(3):
-            one = _unit(corners[:, (corner + 1) % 3] - corners[:, corner])
-            two = _unit(corners[:, (corner + 2) % 3] - corners[:, corner])
+            one = unit(corners[:, (corner + 1) % 3] - corners[:, corner])
+            two = unit(corners[:, (corner + 2) % 3] - corners[:, corner])
             angle = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1.0, 1.0))
             np.add.at(total, self.triangles[:, corner], normals * angle[:, None])
-        return _unit(total)
+        return unit(total)
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner, each (3,) [m]."""
@@ -75,11 +76,6 @@ class Surface:
             return replace(self, positions=positions)
         uv = None if self.corner_uv is None else self.corner_uv[:, ::-1]
         return replace(self, positions=positions, triangles=self.triangles[:, ::-1], corner_uv=uv)
-
-
-def _unit(vectors: Floats) -> Floats:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
 
 
 def _broken(problem: str) -> HairloomError:

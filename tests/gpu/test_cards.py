@@ -11,7 +11,7 @@ import pytest
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.shading.card_look import card_base, mapped_tangent
 from hairloom.addon.shading.kajiya_kay import kajiya_kay
-from hairloom.addon.shading.lights import Light, light_direction, light_irradiance
+from hairloom.addon.shading.lights import Light, light_at, light_irradiance
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.textures import HairTextures, TextureSettings, hair_textures
 from hairloom.addon.shading.volume.settings import VolumeSettings
@@ -156,7 +156,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
     light = np.broadcast_to(np.array(AMBIENT), point.shape)
     to_eye = np.broadcast_to([0.0, -1.0, 0.0], point.shape)
     for lamp in LIGHTS:
-        lit = kajiya_kay(tangent, normal, light_direction(lamp, point), to_eye, shift, noise, LOOK)
+        lit = kajiya_kay(tangent, normal, light_at(lamp, point)[0], to_eye, shift, noise, LOOK)
         light = light + light_irradiance(lamp, point) / np.pi * lit
     occlusion = 0.4 + 0.2 * u + 0.4 * v
     base = card_base(v, LOOK) * sampled(textures.base, u, v, repeats=False)
@@ -212,7 +212,7 @@ def test_marschner_shades_cards_as_strands(frame: Any, front: Any, color_noise: 
                 tables,
                 tangent,
                 normal,
-                light_direction(lamp, point),
+                light_at(lamp, point)[0],
                 np.array([0.0, -1.0, 0.0]),
                 np.array(0.7),
                 np.array(0.3),
@@ -334,7 +334,7 @@ def test_equal_depth_loses_no_pixel(frame: Any) -> None:
     mesh = snapshot.cards.mesh
     plain = frame.MeshSnapshot.of(Surface(mesh.positions, mesh.triangles))
     as_mesh = dataclasses.replace(snapshot, cards=None, meshes=(plain,))
-    covered = frame.render_coverage(as_mesh, camera, 300, 300) > 0.0
+    covered = frame.render_image(as_mesh, camera, 300, 300, 1)[..., 3] > 0.0
     assert 0.2 < covered.mean() < 0.9
     np.testing.assert_allclose(picture[covered], 1.0, atol=1.0e-6)
     assert (picture[~covered] == 0.0).all()

@@ -125,7 +125,7 @@ def test_coverage_is_that_of_the_definition(
     camera = frame.frame_camera(
         (strands.min((0, 1)), strands.max((0, 1))), (-0.5, -1.0, 0.4), np.radians(35.0), 1.2
     )
-    drawn = frame.render_coverage(snapshot, camera, 360, 300, samples)
+    drawn = frame.render_image(snapshot, camera, 360, 300, samples)[..., 3]
     size = 360 * samples, 300 * samples
     expected = covered(snapshot, camera, *size, samples).reshape(300, samples, 360, samples)
     expected = expected.mean(axis=(1, 3))
@@ -148,7 +148,7 @@ def test_coverage_of_the_real_groom(frame: Any, shared_data: Path) -> None:
         strand_settings=StrandSettings(transparency="none"),
     )
     camera = frame.frame_camera(groom.strands.bounds(), (-0.55, -1, 0.18), np.radians(30), 4 / 3)
-    drawn = frame.render_coverage(snapshot, camera, 480, 360)
+    drawn = frame.render_image(snapshot, camera, 480, 360, 1)[..., 3]
     expected = covered(snapshot, camera, 480, 360)
     assert expected.mean() > 0.15
     assert np.abs(drawn - expected).mean() < 0.005

@@ -12,7 +12,7 @@ import pytest
 
 from hairloom.addon.refine.detail import PictureView, detail_factors
 from hairloom.addon.refine.settings import DetailSettings
-from hairloom.addon.refine.smooth import smoothed
+from hairloom.addon.refine.smooth import points_at
 from hairloom.addon.shading.settings import StrandSettings
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -89,7 +89,7 @@ def test_the_detail_view_colours_each_segment_by_its_own_factor(frame: Any, fron
     factors = detail_factors(strand, view, detail)[0]
     assert factors[:18].max() == 1 and factors[20:].min() > 2
     for segment, pieces in enumerate(factors):
-        middle = smoothed(strand, 2)[0, 2 * segment + 1]
+        middle = points_at(strand, [0], [segment], [0.5])[0]
         row, column = ((middle[[2, 0]] + 0.5) * 480).astype(int)
         hue = 0.66 * (1.0 - np.log2(pieces) / 6.0)
         expected = np.array(colorsys.hsv_to_rgb(hue, 1.0, 1.0))

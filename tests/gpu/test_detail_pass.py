@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refinement_probes import adaptive_points, read_factors
 
 from hairloom.addon.refine.culling import faces_away, hidden, shades_of
-from hairloom.addon.refine.detail import PictureView, adaptive_points, detail_factors
+from hairloom.addon.refine.detail import PictureView, detail_factors
 from hairloom.addon.refine.detail import stations as stations_of
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.refine.thinning import even_ranks
@@ -77,7 +78,7 @@ def computed(
 ) -> tuple[np.ndarray, Any]:
     """Factors (strand_count, cv_count - 1) as the GPU finds them, and the order."""
     from hairloom.addon.render import frame
-    from hairloom.addon.render.detail_pass import DetailPass, read_factors
+    from hairloom.addon.render.detail_pass import DetailPass
     from hairloom.addon.render.textures import strand_rows, texture_from
 
     snapshot = snapshot_of(frame, strands, detail, **more)
@@ -190,7 +191,7 @@ def test_the_picture_is_that_of_sixty_four_pieces(frame: Any, seen: str) -> None
     """
     strands, camera = curly(150, 16), cameras(frame)[seen]
     fine, adaptive, finer = (
-        frame.render_coverage(snapshot_of(frame, strands, detail), camera, WIDTH, HEIGHT, 4)
+        frame.render_image(snapshot_of(frame, strands, detail), camera, WIDTH, HEIGHT, 4)[..., 3]
         for detail in (FIXED_64, BARE, dataclasses.replace(BARE, error=0.02))
     )
     assert fine.mean() > 0.05
@@ -217,9 +218,9 @@ def test_a_bent_ribbon_has_no_hole(frame: Any) -> None:
         frame.look_at((0, -1, 0), (0, 0, 0)), frame.orthographic(1.2, WIDTH / HEIGHT, 0.1, 3.0)
     )
     fine, adaptive = (
-        frame.render_coverage(
+        frame.render_image(
             snapshot_of(frame, strands, detail, strand_settings=settings), camera, WIDTH, HEIGHT, 4
-        )
+        )[..., 3]
         for detail in (FIXED_64, BARE)
     )
     assert fine.sum() > 2000.0

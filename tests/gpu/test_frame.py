@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.shading.kajiya_kay import kajiya_kay, strand_base, strand_normal
-from hairloom.addon.shading.lights import Light, light_direction, light_irradiance
+from hairloom.addon.shading.lights import Light, light_at, light_irradiance
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
@@ -88,9 +88,7 @@ def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
         noises = [strand_noise(seed, c, np.array(along * 7.0)) for c in range(2)]
         light = np.array(ambient)
         for lamp in lights:
-            lit = kajiya_kay(
-                tangent, normal, light_direction(lamp, point), to_eye, *noises, shading
-            )
+            lit = kajiya_kay(tangent, normal, light_at(lamp, point)[0], to_eye, *noises, shading)
             light = light + light_irradiance(lamp, point) / np.pi * lit
         own = [strand_noise(seed, c, np.array(0.0)) for c in (2, 3)]
         base = strand_base(np.array(along), *own, shading)
@@ -284,16 +282,16 @@ def test_thin_opaque_strands_get_the_minimum_width(frame: Any, front: Any) -> No
     for samples, width in ((1, 2.0), (4, 0.5), (4, 1.0)):
         settings = dataclasses.replace(RIBBON, minimum_width=width, transparency="none")
         snapshot = frame.Snapshot(strands, radius, strand_settings=settings)
-        drawn = frame.render_coverage(snapshot, front, 40, 40, samples)
+        drawn = frame.render_image(snapshot, front, 40, 40, samples)[..., 3]
         assert drawn.sum(axis=1) == pytest.approx(np.full(40, 2.0 * width))
 
 
 def test_radius_scale_and_taper(frame: Any, front: Any) -> None:
     strands, radius = uprights(np.array([0.5]), 0.05)
     settings = dataclasses.replace(RIBBON, width_scale=2.0, tip_width=0.25)
-    drawn = frame.render_coverage(
+    drawn = frame.render_image(
         frame.Snapshot(strands, radius, strand_settings=settings), front, 100, 100, 4
-    )
+    )[..., 3]
     width = drawn.sum(axis=1) / 100.0
     height = (np.arange(100) + 0.5) / 100.0
     assert width == pytest.approx(0.2 * (1.0 - 0.75 * height), abs=0.003)
@@ -335,6 +333,6 @@ def test_strands_around_and_behind_the_eye(frame: Any) -> None:
     camera = frame.Camera(
         frame.look_at((0, 0, 0), (0, 1, 0)), frame.perspective(1.0, 1.0, 0.01, 10)
     )
-    drawn = frame.render_coverage(snapshot, camera, 100, 100)
+    drawn = frame.render_image(snapshot, camera, 100, 100, 1)[..., 3]
     assert drawn.any() and drawn[:, :49].sum() == 0.0
     assert drawn[:44].sum() == 0.0 and drawn[56:].sum() == 0.0

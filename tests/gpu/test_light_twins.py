@@ -12,7 +12,7 @@ from hairloom.addon.shading.area_lights import Panel
 from hairloom.addon.shading.lights import (
     Cone,
     Light,
-    light_direction,
+    light_at,
     light_irradiance,
     pack_lights,
 )
@@ -79,7 +79,7 @@ def test_twins(compute: Callable[..., np.ndarray], light: Light) -> None:
     assert (np.abs(irradiance - expected) <= 1e-4 * np.maximum(expected, least)).all()
     # edge-on to a panel little light arrives, and rounding turns its direction
     edge_on = np.maximum(1.0, 30.0 * (least / np.maximum(expected, least)).max(axis=1))
-    turned = np.abs(direction - light_direction(light, exact)).max(axis=1)
+    turned = np.abs(direction - light_at(light, exact)[0]).max(axis=1)
     assert (turned <= 1e-4 * edge_on)[is_lit].all()
 
 
@@ -108,7 +108,7 @@ def test_nothing_is_infinite(compute: Callable[..., np.ndarray], light: Light) -
     row = np.array([*steps, *(-step for step in steps[1:])])
     points = np.stack(np.meshgrid(row, row, row), axis=-1).reshape(-1, 3).astype(np.float32)
     with np.errstate(all="raise", under="ignore"):
-        expected = light_direction(light, points), light_irradiance(light, points)
+        expected = light_at(light, points)[0], light_irradiance(light, points)
     for direction, irradiance in (expected, computed(compute, light, points)):
         assert np.isfinite(direction).all() and np.isfinite(irradiance).all()
         assert np.linalg.norm(direction, axis=1).max() < 1.0 + 1e-5

@@ -15,7 +15,6 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.shading.volume.transparency import (
     LAYERS,
     layer_shares,
-    over_layers,
     strip_coverage,
 )
 from hairloom.addon.strands import Surface
@@ -176,6 +175,12 @@ def test_crossing_strands_are_those_sorted_in_numpy(
     assert np.abs(found[:, 3] - exact[:, 3]).mean() < 1e-3
     same = over_layers(depth, alpha, colors)
     assert np.abs(found - same).mean() < 0.002
+
+
+def over_layers(depth, alpha, colors, **limits):
+    """Layers of pixels one over the other, premultiplied (pixel_count, 4)."""
+    light = np.einsum("pn,pnc->pc", layer_shares(depth, alpha, **limits), colors)
+    return np.column_stack([light, 1.0 - np.prod(1.0 - alpha, axis=-1)])
 
 
 def seen_at_points(strands: np.ndarray, width: float, brightness: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from hairloom.addon.dynamics.colliders import CapsuleCollider, DistanceField, Sp
 from hairloom.addon.params import Settings, choice, color, integer, number, toggle
 from hairloom.addon.params.glsl import struct_values
 from hairloom.addon.shading.kajiya_kay import kajiya_kay, strand_base, strand_normal
-from hairloom.addon.shading.lights import Light, light_direction, light_irradiance, pack_lights
+from hairloom.addon.shading.lights import Light, light_at, light_irradiance, pack_lights
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.strand_noise import hash_integer, hash_unit, strand_noise
 
@@ -138,7 +138,7 @@ def test_lights(compute: Callable[..., np.ndarray]) -> None:
         vectors = packed[1:4, :3]
         row = int(np.abs(vectors - np.array(light.vector, np.float32)).sum(axis=1).argmin())
         direction, irradiance = found[2 * row, :, :3], found[2 * row + 1, :, :3]
-        assert np.abs(direction - light_direction(light, points[0])).max() < 1e-5
+        assert np.abs(direction - light_at(light, points[0])[0]).max() < 1e-5
         assert irradiance == pytest.approx(light_irradiance(light, points[0]), rel=1e-4)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ...arrays import Floats
 from ..constraints import TINY
 from .settings import FinSettings
-from .state import ClothState, Color, Fabric, distances
+from .state import Color, Fabric
 
 #: Gravity [m/s^2] and height [m] of the hanging sheet that the `stretch` parameter speaks of.
 _HANGING = 9.81 * 1.0
@@ -55,14 +55,6 @@ def hold_in_reach(position: Floats, fabric: Fabric) -> None:
     np.divide(fabric.reach, part, out=part)
     way *= part
     np.add(anchor, way, out=position)
-
-
-def max_cloth_stretch(state: ClothState) -> float:
-    """Largest growth of an edge, as a share of its rest length; those of no length cannot."""
-    fabric = state.fabric
-    growth = distances(state.position, fabric.pairs) - fabric.length
-    has_length = fabric.length > TINY
-    return float((growth[has_length] / fabric.length[has_length]).max(initial=0.0))
 
 
 def pull_of(fabric: Fabric, settings: FinSettings, small: float) -> Floats:

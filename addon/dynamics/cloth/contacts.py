@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import Floats
+from ...strands.vectors import dot_rows
 from ..colliders import Pose, PosedCollider
-from ..constraints import dot
 from ..contacts import Contacts, find_contacts
 
 
@@ -37,8 +37,8 @@ class MovingPlanes:
         """before: (3, n) world [m], vertices at the substep's begin."""
         here = before.take(contacts.index, axis=1)
         way = contacts.origin - here
-        begin = contacts.offset - dot(contacts.normal, way)
-        return cls(contacts, np.minimum(begin, dot(contacts.normal, here)), way)
+        begin = contacts.offset - dot_rows(contacts.normal, way)
+        return cls(contacts, np.minimum(begin, dot_rows(contacts.normal, here)), way)
 
     def press(
         self, position: Floats, previous: Floats, number: int, steps: int, friction: float

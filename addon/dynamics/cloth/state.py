@@ -16,6 +16,7 @@ import numpy as np
 
 from ...arrays import Bools, Floats, Ints
 from ...errors import HairloomError
+from ...strands.vectors import cross_rows, unit_rows
 from .coloring import greedy_colors, opposite_pairs, unique_edges, ways_along_edges
 
 #: From this pin weight on a vertex has infinite mass; Blender's weights are rounded.
@@ -173,18 +174,18 @@ def vertex_normals(position: Floats, triangles: Ints) -> Floats:
     The same as `Surface.vertex_normals`, on rows; zero where there is no area.
     """
     corner = position[:, triangles.T]  # (3, corner, triangle)
-    side = _unit(corner[:, [1, 2, 0]] - corner)
+    side = unit_rows(corner[:, [1, 2, 0]] - corner)
     cosine = -np.einsum("ijk,ijk->jk", side, side[:, [2, 0, 1]])
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
-    face = _unit(_cross(side[:, 0], side[:, 1]))
-    return _unit(_gathered(face[:, None] * angle, triangles, position))
+    face = unit_rows(cross_rows(side[:, 0], side[:, 1]))
+    return unit_rows(_gathered(face[:, None] * angle, triangles, position))
 
 
 def broadside_normals(position: Floats, triangles: Ints) -> Floats:
     """Unit normals (3, vertex_count) float32, weighted by the area that faces show to the air."""
     corner = position[:, triangles.T]
-    area = _cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    return _unit(_gathered(np.repeat(area[:, None], 3, axis=1), triangles, position))
+    area = cross_rows(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return unit_rows(_gathered(np.repeat(area[:, None], 3, axis=1), triangles, position))
 
 
 def _gathered(corners: Floats, triangles: Ints, position: Floats) -> Floats:
@@ -193,20 +194,6 @@ def _gathered(corners: Floats, triangles: Ints, position: Floats) -> Floats:
     for row, out in zip(corners.reshape(3, -1), total, strict=True):
         out[:] = np.bincount(index, row, minlength=len(out))
     return total
-
-
-def _cross(one: Floats, other: Floats) -> Floats:
-    """Cross products of rows (3, n)."""
-    result = np.empty_like(one)
-    for axis in range(3):
-        after, last = (axis + 1) % 3, (axis + 2) % 3
-        np.subtract(one[after] * other[last], one[last] * other[after], out=result[axis])
-    return result
-
-
-def _unit(rows: Floats) -> Floats:
-    length = np.sqrt(np.einsum("i...,i...->...", rows, rows))
-    return np.divide(rows, length, out=np.zeros_like(rows), where=length > 0.0)
 
 
 def _colors(position: Floats, pairs: Ints) -> tuple[Color, ...]:

@@ -31,8 +31,8 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
+from ...strands.vectors import dot_rows
 from ..colliders import PosedCollider, poses_through
-from ..constraints import dot
 from ..contacts import find_contacts
 from ..schedule import due_substeps
 from ..step import Drive
@@ -143,11 +143,11 @@ def _feel_air(
         )
         way -= air_way
     normal = broadside_normals(position, fabric.triangles)
-    across = dot(normal, way)
+    across = dot_rows(normal, way)
     broadside = normal * across
     way -= broadside
     per_step = np.float32(settings.drag * frame.dt / frame.small)
-    along = np.sqrt(dot(way, way))
+    along = np.sqrt(dot_rows(way, way))
     broadside *= math.exp(-settings.damping * frame.dt) / (1.0 + per_step * np.abs(across))
     slip = np.float32(settings.edgewise)
     way *= math.exp(-settings.damping * settings.edgewise * frame.dt) / (

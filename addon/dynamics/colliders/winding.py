@@ -18,6 +18,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...strands import Surface
 from ...strands.triangle_tree import TriangleTree, build_tree
+from ...strands.vectors import dot
 
 #: A group of triangles is far at this many times its own radius from its centre.
 FAR = 2.5
@@ -82,9 +83,9 @@ def triangle_angle(points: Floats, corners: Floats) -> Floats:
     (Van Oosterom and Strackee 1983)
     """
     a, b, c = np.moveaxis(corners - points[:, None], 1, 0)
-    la, lb, lc = (np.sqrt(_dot(v, v)) for v in (a, b, c))
-    below = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
-    return 2.0 * np.arctan2(_dot(a, np.cross(b, c)), below)
+    la, lb, lc = (np.sqrt(dot(v, v)) for v in (a, b, c))
+    below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb
+    return 2.0 * np.arctan2(dot(a, np.cross(b, c)), below)
 
 
 def _without_repeats(leaves: Ints) -> Ints:
@@ -112,7 +113,3 @@ def _dipoles(tree: TriangleTree, leaves: Ints, corners: Floats) -> list[_Dipoles
         radius = np.linalg.norm(reach, axis=1)
         levels.append(_Dipoles(middle, moment[members].sum(axis=1), radius))
     return levels
-
-
-def _dot(one: Floats, two: Floats) -> Floats:
-    return np.einsum("ij,ij->i", one, two)

@@ -22,6 +22,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...cards.atlas_grid import AtlasGrid
+from ...strands.vectors import unit_or
 
 #: Maps that hold directions as 0.5 d + 0.5.
 DIRECTIONS = ("normal", "tangent")
@@ -169,16 +170,10 @@ def _as_shown(name: str, values: Floats, weight: Floats) -> Floats:
     by_weight = weight if values.ndim == 2 else weight[..., None]
     mean = values / (by_weight + np.float32(_LEAST_WEIGHT))
     if name in DIRECTIONS:
-        return np.asarray(0.5 * _unit(mean) + 0.5, np.float32)
+        return np.asarray(
+            0.5 * unit_or(mean, np.array([0.0, 0.0, 1.0], mean.dtype), _NOTHING) + 0.5, np.float32
+        )
     return np.clip(mean, 0.0, 1.0)
-
-
-def _unit(vectors: Floats) -> Floats:
-    """(..., 3); directions that cancel each other out become the card's normal."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    unit: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > _NOTHING)
-    unit[..., 2][length[..., 0] <= _NOTHING] = 1.0
-    return unit
 
 
 def _tiles(shape: tuple[int, ...], grid: AtlasGrid) -> list[tuple[slice, slice]]:

@@ -88,11 +88,6 @@ def longitudinal_lobes(fibre: Fibre) -> tuple[LongitudinalLobe, ...]:
     return tuple(replace(lobe, balance=balance) for lobe in lobes)
 
 
-def marschner_gaussian(theta_h: Floats, width: float, shift: float) -> Floats:
-    """Half of the unit Gaussian of theta_h: Marschner's M_p, the narrow limit of ours."""
-    return np.exp(-0.5 * ((theta_h + shift) / width) ** 2) / (2.0 * np.sqrt(2.0 * np.pi) * width)
-
-
 def _balance(lobes: list[LongitudinalLobe], index: float) -> Floats:
     """Factor of all lobes, by even steps of theta, from what a clear fibre would send out.
 

@@ -52,28 +52,6 @@ def azimuthal_lobes(cos_d: Floats, phi: Floats, fibre: Fibre) -> Floats:
     return lobes
 
 
-def scattered_energy(fibre: Fibre, theta_i: Floats) -> Floats:
-    """All that S sends out for unit light from theta_i, (n,), of a channel each, (n, 3).
-
-    S cos^2 theta_r summed over the sphere. Around the fibre S hangs on theta_d alone, so that each
-    cone's circle is summed once.
-    """
-    theta_r = ((np.arange(720) + 0.5) / 720 - 0.5) * np.pi
-    phi = (np.arange(180) + 0.5) / 180 * np.pi
-    theta_d = np.linspace(0.0, 0.5 * np.pi, 129)
-    around = 2.0 * np.pi * azimuthal_lobes(np.cos(theta_d)[:, None], phi, fibre).mean(axis=1)
-    turned = 0.5 * (theta_r - theta_i[:, None])
-    measure = np.cos(theta_r) ** 2 / np.cos(turned) ** 2 * (np.pi / len(theta_r))
-    lobes = longitudinal_lobes(fibre)
-    total = np.zeros((len(theta_i), 3))
-    for order, lobe in enumerate((*lobes, lobes[2])):
-        along = fibre.strengths[order] * lobe(theta_i[:, None], theta_r) * measure
-        for channel in range(3):
-            energy = np.interp(np.abs(turned), theta_d, around[:, order, channel])
-            total[:, channel] += (along * energy).sum(axis=1)
-    return total
-
-
 def _smooth_lobes(cos_d: Floats, phi: Floats, fibre: Fibre) -> Floats:
     """The same for azimuthal_width 0."""
     lobes = np.empty((*np.broadcast_shapes(np.shape(cos_d), np.shape(phi)), 4, 3))

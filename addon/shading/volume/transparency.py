@@ -54,24 +54,6 @@ def strip_coverage(distance: Floats, half_width: Floats, normal: Floats) -> Floa
     return above - share_below(distance - half_width, normal)
 
 
-def over_layers(
-    depths: Floats,
-    alphas: Floats,
-    colors: Floats,
-    layers: int = LAYERS,
-    unseen_share: float = UNSEEN_SHARE,
-) -> Floats:
-    """Layers of pixels one over the other, premultiplied (pixel_count, 4).
-
-    Args:
-        depths, alphas, layers, unseen_share: as in layer_shares.
-        colors: (pixel_count, n, 3).
-    """
-    shares = layer_shares(depths, alphas, layers, unseen_share)
-    light = np.einsum("pn,pnc->pc", shares, colors)
-    return np.column_stack([light, 1.0 - np.prod(1.0 - alphas, axis=-1)])
-
-
 def layer_shares(
     depths: Floats,
     alphas: Floats,

@@ -8,7 +8,6 @@ import pytest
 from hairloom.addon.cards.vertex_animation import (
     motion_layout,
     motion_texture,
-    motion_values,
     vertex_texels,
 )
 from hairloom.addon.errors import HairloomError
@@ -28,7 +27,6 @@ def test_a_shader_finds_what_was_put_in(vertices: int, frames: int) -> None:
         row, column = np.floor(v * layout.height), np.floor(u * layout.width)
         found = picture[row.astype(int), column.astype(int)]
         np.testing.assert_array_equal(found, values[:, frame])
-    np.testing.assert_array_equal(motion_values(texture, layout), values)
 
 
 def test_texels_are_exact_enough_as_float32() -> None:

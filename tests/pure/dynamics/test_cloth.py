@@ -11,10 +11,9 @@ from hairloom.addon.dynamics.cloth.coloring import (
     unique_edges,
     ways_along_edges,
 )
-from hairloom.addon.dynamics.cloth.constraints import max_cloth_stretch
 from hairloom.addon.dynamics.cloth.reference import advance_cloth_slowly
 from hairloom.addon.dynamics.cloth.settings import FinSettings
-from hairloom.addon.dynamics.cloth.state import start_cloth, vertex_normals
+from hairloom.addon.dynamics.cloth.state import distances, start_cloth, vertex_normals
 from hairloom.addon.dynamics.cloth.step import advance_cloth, cloth_at_frame_end
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.step import Drive
@@ -24,6 +23,13 @@ from hairloom.addon.strands import Surface
 EARTH = np.array([0.0, 0.0, -9.81])
 #: nothing but inertia, gravity and edges
 BARE = {"damping": 0.0, "bend": 0.0}
+
+
+def max_cloth_stretch(state):
+    """Largest growth of an edge, as a fraction of its rest length; those of no length cannot."""
+    rest = state.fabric.length
+    growth = (distances(state.position, state.fabric.pairs) - rest)[rest > 1e-9]
+    return float((growth / rest[rest > 1e-9]).max(initial=0.0))
 
 
 def sheet(rows, columns, size):

@@ -5,8 +5,9 @@ import pytest
 
 from hairloom.addon.dynamics import step
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
+from hairloom.addon.dynamics.constraints import PINNED, TINY, directions
 from hairloom.addon.dynamics.forces import weight_on_style
-from hairloom.addon.dynamics.measure import farthest_reach, max_stretch
+from hairloom.addon.dynamics.measure import max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import rows_of, start
 from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
@@ -102,6 +103,17 @@ def test_best_rotation_of_one_straight_guide_is_the_smallest(kit):
 
 
 # --- time ----------------------------------------------------------------------------------------
+
+
+def farthest_reach(state):
+    """Largest distance of a CV from its guide's root, over the length along the strand to there.
+
+    At rest at most 1. The segment of the pinned CVs counts with the length that the head gives it.
+    """
+    length = state.rest.length.copy()
+    length[: PINNED - 1] = directions(state.position[:, :PINNED])[1]
+    away = np.linalg.norm(state.position[:, 1:] - state.position[:, :1], axis=0)
+    return float((away / np.maximum(np.cumsum(length, axis=0), TINY)).max())
 
 
 def end_at(kit, motion, fps, seconds=1.0):

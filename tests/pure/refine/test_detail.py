@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refinement_probes import adaptive_points
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.refine.detail import (
     PictureView,
-    adaptive_points,
     detail_factors,
     stations,
 )

@@ -11,7 +11,7 @@ from hairloom.addon.shading.lights import (
     LIGHT_CAPACITY,
     Cone,
     Light,
-    light_direction,
+    light_at,
     light_irradiance,
     pack_lights,
     three_point_lights,
@@ -28,13 +28,13 @@ def test_point_light_sends_its_whole_power_through_any_sphere() -> None:
         points = np.array(light.vector) + radius * directions
         received = light_irradiance(light, points).mean(axis=0) * 4.0 * np.pi * radius**2
         assert received == pytest.approx([40.0, 20.0, 0.0])
-        assert light_direction(light, points) == pytest.approx(-directions)
+        assert light_at(light, points)[0] == pytest.approx(-directions)
 
 
 def test_sun_is_the_same_everywhere() -> None:
     sun = Light.sun((0.0, 0.0, -2.0), (1.0, 1.0, 0.5), 3.0)
     points = np.array([[0.0, 0.0, 0.0], [100.0, -5.0, 3.0]])
-    assert light_direction(sun, points).tolist() == [[0.0, 0.0, 1.0]] * 2
+    assert light_at(sun, points)[0].tolist() == [[0.0, 0.0, 1.0]] * 2
     assert light_irradiance(sun, points).tolist() == [[3.0, 3.0, 1.5]] * 2
 
 
@@ -46,7 +46,7 @@ def test_sun_without_direction_is_refused() -> None:
 def test_a_point_at_the_light_is_finite() -> None:
     light = Light.point((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 10.0)
     assert np.isfinite(light_irradiance(light, np.zeros(3))).all()
-    assert np.isfinite(light_direction(light, np.zeros(3))).all()
+    assert np.isfinite(light_at(light, np.zeros(3))[0]).all()
 
 
 X, Y, DOWN = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)
@@ -98,7 +98,7 @@ def test_area_light_sends_its_whole_power_to_its_front(light: Light) -> None:
     x, y = np.meshgrid(stretched, stretched)
     area = np.outer(np.gradient(stretched), np.gradient(stretched))
     plane = np.stack([x, y, np.full_like(x, -0.3)], axis=-1)
-    facing = light_direction(light, plane)[..., 2]
+    facing = light_at(light, plane)[0][..., 2]
     assert (light_irradiance(light, plane)[..., 0] * facing * area).sum() == pytest.approx(
         5.0, rel=0.012
     )
@@ -108,7 +108,7 @@ def test_area_light_sends_its_whole_power_to_its_front(light: Light) -> None:
     total = light_irradiance(light, far)[..., 0].mean() * 2.0 * np.pi * 200.0**2
     assert total == pytest.approx(5.0, rel=0.005)
     assert (light_irradiance(light, far * [1.0, 1.0, -1.0]) == 0.0).all()
-    assert light_direction(light, far) == pytest.approx(-far / 200.0, abs=2e-3)
+    assert light_at(light, far)[0] == pytest.approx(-far / 200.0, abs=2e-3)
 
 
 @pytest.mark.parametrize("name", PANELS)
@@ -130,9 +130,7 @@ def test_area_light_against_the_sum_over_its_points(name: str) -> None:
         shade = np.maximum(panel.tangent - tangent, 0.0) * panel.normalizer
         arriving = (shade * height / squared**2)[:, None] * away / np.pi
         expected = 5.0 * arriving.mean(axis=0)
-        found = light_irradiance(light, np.array(point))[0] * light_direction(
-            light, np.array(point)
-        )
+        found = light_irradiance(light, np.array(point))[0] * light_at(light, np.array(point))[0]
         assert np.abs(found - expected).max() < 0.008 * np.linalg.norm(expected) + 1e-12
 
 

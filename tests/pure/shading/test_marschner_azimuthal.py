@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fibre_oracles import lobe_errors, traced_lobes
 
 from hairloom.addon.shading.marschner.azimuthal import (
     azimuthal_r,
@@ -22,7 +23,6 @@ from hairloom.addon.shading.marschner.interface import (
     lobe_energy,
     rest_energy,
 )
-from hairloom.addon.shading.marschner.rays import lobe_errors, traced_lobes
 from hairloom.addon.shading.marschner.scattering import azimuthal_lobes
 
 CLEAR = Fibre(absorption=(0.0, 0.0, 0.0))

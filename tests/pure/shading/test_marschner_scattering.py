@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fibre_oracles import scattered_energy
 
 from hairloom.addon.shading.marschner.fibre import Fibre
-from hairloom.addon.shading.marschner.scattering import marschner, scattered_energy
+from hairloom.addon.shading.marschner.scattering import marschner
 
 CLEAR = Fibre(absorption=(0.0, 0.0, 0.0))
 

@@ -1,4 +1,7 @@
-"""Rays traced in space through a glass cylinder: the truth that N_p is measured by.
+"""Brute force by which Marschner's lobes are measured, for tests and benchmarks.
+
+`traced_lobes` are rays in space through a glass cylinder, the truth for N_p; `scattered_energy`
+sums S over the sphere.
 
 Nothing of the plane across the fibre is used here, no Bravais index and no closed form: hit points,
 normals, reflection and refraction are vectors, and Fresnel's formulas are those in space.
@@ -10,10 +13,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...arrays import Floats
-from .azimuthal import azimuthal_r, azimuthal_trt, azimuthal_tt, trt_caustic
-from .fibre import Fibre
-from .interface import bravais_index
+from hairloom.addon.arrays import Floats
+from hairloom.addon.shading.marschner.azimuthal import (
+    azimuthal_r,
+    azimuthal_trt,
+    azimuthal_tt,
+    trt_caustic,
+)
+from hairloom.addon.shading.marschner.fibre import Fibre
+from hairloom.addon.shading.marschner.interface import bravais_index
+from hairloom.addon.shading.marschner.longitudinal import longitudinal_lobes
+from hairloom.addon.shading.marschner.scattering import azimuthal_lobes
 
 BIN_COUNT = 360
 
@@ -77,6 +87,28 @@ def lobe_errors(traced: Floats, theta: float, fibre: Fibre) -> tuple[float, floa
         difference = np.abs(expected - traced[order])[kept].max(axis=0)
         errors.append(float((difference / traced[order][kept].max(axis=0)).max()))
     return (errors[0], errors[1], errors[2])
+
+
+def scattered_energy(fibre: Fibre, theta_i: Floats) -> Floats:
+    """All that S sends out for unit light from theta_i, (n,), of a channel each, (n, 3).
+
+    S cos^2 theta_r summed over the sphere. Around the fibre S depends on theta_d alone, so that
+    each cone's circle is summed once.
+    """
+    theta_r = ((np.arange(720) + 0.5) / 720 - 0.5) * np.pi
+    phi = (np.arange(180) + 0.5) / 180 * np.pi
+    theta_d = np.linspace(0.0, 0.5 * np.pi, 129)
+    around = 2.0 * np.pi * azimuthal_lobes(np.cos(theta_d)[:, None], phi, fibre).mean(axis=1)
+    turned = 0.5 * (theta_r - theta_i[:, None])
+    measure = np.cos(theta_r) ** 2 / np.cos(turned) ** 2 * (np.pi / len(theta_r))
+    lobes = longitudinal_lobes(fibre)
+    total = np.zeros((len(theta_i), 3))
+    for order, lobe in enumerate((*lobes, lobes[2])):
+        along = fibre.strengths[order] * lobe(theta_i[:, None], theta_r) * measure
+        for channel in range(3):
+            energy = np.interp(np.abs(turned), theta_d, around[:, order, channel])
+            total[:, channel] += (along * energy).sum(axis=1)
+    return total
 
 
 def _bin_means(

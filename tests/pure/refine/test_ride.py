@@ -1,4 +1,4 @@
-"""Mixing guides and riding on them: against the sum written out, exact where it can be."""
+"""Riding on guides: against the sum written out, exact where it can be."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.groom.weights import GuideWeights
-from hairloom.addon.refine.interpolate import interpolate, ride
+from hairloom.addon.refine.ride import ride
 
 
 def scene(strand_count: int, guide_count: int = 20) -> tuple[Floats, Floats, GuideWeights]:
@@ -61,31 +61,12 @@ def test_a_strand_that_is_a_guide_goes_where_the_guide_goes() -> None:
     assert ride(guide_rest, guide_rest, guide_now, alone) == pytest.approx(guide_now, abs=1e-6)
 
 
-@pytest.mark.parametrize("strand_count", [0, 1, 511, 512, 513, 1500])
-def test_mixtures_agree_with_the_sum_written_out(strand_count: int) -> None:
-    _, guides, weights = scene(strand_count)
-    found = interpolate(guides, weights)
-    assert found.dtype == np.float32
-    assert found.shape == (strand_count, 7, 3)
-    expected = np.zeros((strand_count, 7, 3))
-    for strand in range(strand_count):
-        for guide, weight in zip(weights.guide[strand], weights.weight[strand], strict=True):
-            expected[strand] += np.float64(weight) * guides[guide]
-    assert found == pytest.approx(expected, abs=1e-6)
-
-
-def test_a_mixture_of_one_guide_is_that_guide() -> None:
-    _, guides, _ = scene(1)
-    alone = GuideWeights(np.array([[4, 4, 4], [9, 2, 2]]), np.array([[1.0, 0, 0], [0, 1.0, 0]]))
-    assert (interpolate(guides, alone) == guides[[4, 2]]).all()
-
-
-def test_mixing_takes_little_more_memory_than_its_result() -> None:
+def test_riding_takes_little_more_memory_than_its_result() -> None:
     """The most that is taken at once grows with the strands, not with three times the strands."""
     for strand_count in (20_000, 60_000):
-        _, guides, weights = scene(strand_count)
+        rest, guides, weights = scene(strand_count)
         tracemalloc.start()
-        size = interpolate(guides, weights).nbytes
+        size = ride(rest, guides, guides, weights).nbytes
         _, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
         assert peak < 1.2 * size

@@ -1,8 +1,4 @@
-"""Strands between guides: mixtures of three of them, or strands that ride on them.
-
-`interpolate` mixes whole curves (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23, multi strand).
-A strand that rides keeps its own rest shape and takes on the guides' motion.
-"""
+"""Strands that ride on their guides: each keeps its rest shape and takes on the guides' motion."""
 
 from __future__ import annotations
 
@@ -52,30 +48,3 @@ def ride(rest: Floats, guide_rest: Floats, guide_now: Floats, weights: Weights) 
             taken *= weight[:, None]
             chunk += taken
     return moved
-
-
-def interpolate(smoothed_guides: Floats, weights: Weights) -> Floats:
-    """sum over k of w_k smoothed_guides[guide_k], (strand_count, point_count, 3) float32.
-
-    Args:
-        smoothed_guides: (guide_count, point_count, 3) [m], see smooth.smoothed_at.
-    """
-    guide_count, point_count, _ = smoothed_guides.shape
-    width = point_count * 3
-    guides = np.ascontiguousarray(smoothed_guides, np.float32).reshape(guide_count, width)
-    weight = np.asarray(weights.weight, np.float32)
-    strand_count, mixed = weight.shape
-    strands = np.empty((strand_count, width), np.float32)
-    taken = np.empty((min(_CHUNK, strand_count) * mixed, width), np.float32)
-    for start in range(0, strand_count, _CHUNK):
-        chunk = weight[start : start + _CHUNK]
-        part = taken[: chunk.size]
-        guide = weights.guide[start : start + _CHUNK].ravel()
-        np.take(guides, guide, axis=0, out=part, mode="clip")
-        np.einsum(
-            "nk,nkj->nj",
-            chunk,
-            part.reshape(len(chunk), mixed, width),
-            out=strands[start : start + _CHUNK],
-        )
-    return strands.reshape(strand_count, point_count, 3)

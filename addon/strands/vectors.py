@@ -1,0 +1,56 @@
+"""Unit vectors, dot and cross products.
+
+Those of *rows* take (3, n): x, y and z each lie in a row, as in the loops of dynamics and of cards
+that move, where that is several times faster.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats
+
+
+def unit(vectors: Floats) -> Floats:
+    """Vectors (..., 3) of length 1; zero stays zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+
+
+def unit_or(
+    vectors: Floats, fallback: Floats | tuple[float, float, float], shortest: float = 1.0e-6
+) -> Floats:
+    """Vectors (..., 3) of length 1; `fallback` where they are no longer than `shortest`."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.where(length > shortest, vectors / np.maximum(length, shortest), fallback)
+
+
+def dot(one: Floats, two: Floats) -> Floats:
+    """Of vectors (..., 3)."""
+    return np.asarray(np.einsum("...i,...i->...", one, two))
+
+
+def unit_rows(rows: Floats) -> Floats:
+    """Rows (3, ...) of length 1; zero stays zero."""
+    length = np.sqrt(dot_rows(rows, rows))
+    return np.divide(rows, length, out=np.zeros_like(rows), where=length > 0.0)
+
+
+def dot_rows(one: Floats, two: Floats) -> Floats:
+    """Of rows (3, ...)."""
+    product = one * two
+    total: Floats = product[0]
+    total += product[1]
+    total += product[2]
+    return total
+
+
+def cross_rows(one: Floats, two: Floats) -> Floats:
+    """Cross products of rows (3, ...) of one dtype."""
+    result = np.empty_like(one)
+    scratch = np.empty_like(one[0])
+    for axis, (y, z) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.multiply(one[y], two[z], out=result[axis])
+        np.multiply(one[z], two[y], out=scratch)
+        result[axis] -= scratch
+    return result
