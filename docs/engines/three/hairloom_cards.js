@@ -1,16 +1,16 @@
-// Draws hair cards that Hairloom exported, in three.js (r160 or later), as Hairloom draws them.
+// Draws hair cards exported by Hairloom in three.js (r160 or later).
 //
 //     const hair = await loadHairloomCards('hair.glb');
 //     scene.add(hair);
 //
-// Reads NAME.glb, NAME.hairloom.json and the textures beside them. Lights are those of the scene:
-// the ambient one, suns (DirectionalLight) and lamps (PointLight); shadows are left to you.
+// Reads NAME.glb, NAME.hairloom.json and the textures next to them. Uses the lights of the scene:
+// ambient light, suns (DirectionalLight) and lamps (PointLight). Shadows are left to you.
 import * as THREE from 'three';
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
 const SHADING = new URL('../hair_shading.gdshaderinc', import.meta.url);
-// name -> what stands in for a texture that the sidecar does not have
+// name -> value used if the sidecar has no such texture
 const TEXTURES = { base: 255, alpha: 255, shift: 128, noise: 255, tangent: 128, normal: 128 };
 const TABLES = ['longitudinal', 'azimuthal', 'paths'];
 const REPEATED = ['shift', 'noise'];
@@ -30,7 +30,7 @@ export async function loadHairloomCards(url, { level = 0, shading = SHADING } = 
   const hair = new THREE.Group();
   gltf.scene.updateMatrixWorld(true);
   gltf.scene.traverse((node) => {
-    const name = node.userData.name ?? node.name; // three.js takes spaces and dots out of names
+    const name = node.userData.name ?? node.name; // three.js removes spaces and dots from names
     if (node.isMesh && name === sidecar.levels[level].node) {
       hair.add(...passesOf(node, sidecar, backIndex, formulas, uniforms));
     }
@@ -38,15 +38,15 @@ export async function loadHairloomCards(url, { level = 0, shading = SHADING } = 
   return hair;
 }
 
-// The same triangles once for each pass of the sidecar, in its order. Each has its own states, and
-// back faces have an order of their own where the sidecar holds one.
+// The same triangles once for each pass of the sidecar, in its order. Each pass has its own states, and
+// back faces have their own order if the sidecar contains one.
 function passesOf(node, sidecar, backIndex, formulas, uniforms) {
   return sidecar.passes.map((pass, number) => {
     const isBack = backIndex && pass.cull === 'front';
     const geometry = isBack ? node.geometry.clone().setIndex(backIndex) : node.geometry;
     const mesh = new THREE.Mesh(geometry, materialOf(pass, sidecar, formulas, uniforms));
     mesh.applyMatrix4(node.matrixWorld);
-    mesh.renderOrder = 1 + number; // behind all opaque meshes, the head included
+    mesh.renderOrder = 1 + number; // after all opaque meshes, including the head
     return mesh;
   });
 }
@@ -85,10 +85,10 @@ function materialOf(pass, sidecar, formulas, uniforms) {
     depthWrite: pass.depth_write,
     depthFunc: DEPTH[pass.depth_test],
     side: SIDE[pass.cull],
-    transparent: true, // so that renderOrder alone decides, for opaque pixels as well
+    transparent: true, // so that only renderOrder decides, for opaque pixels too
     forceSinglePass: true,
     blending: blended ? THREE.CustomBlending : THREE.NoBlending,
-    blendSrc: THREE.OneFactor, // the shader multiplies with alpha
+    blendSrc: THREE.OneFactor, // the shader premultiplies alpha
     blendDst: THREE.OneMinusSrcAlphaFactor,
   });
 }
@@ -128,7 +128,7 @@ async function uniformsOf(sidecar, address) {
   return uniforms;
 }
 
-// Which channel holds what is one number, such as alpha in the fourth one of another picture.
+// Selects the channel of a single value, such as alpha in the fourth channel of another image.
 function maskOf(entry) {
   const channel = 'rgba'.indexOf(entry?.channels?.[0] ?? 'r');
   return new THREE.Vector4(...[0, 1, 2, 3].map((lane) => (lane === channel ? 1 : 0)));
@@ -165,7 +165,7 @@ out vec2 occlusion_and_along;
 out vec3 card_point;
 out vec3 card_normal;
 out vec3 card_tangent;
-invariant gl_Position; // the second pass meets the depths of the first
+invariant gl_Position; // so that the second pass gets exactly the depths of the first
 
 void main() {
   card_uv = uv;
