@@ -2,8 +2,9 @@
 
 A retired word of prose is looked for in the pages, and in the comments, docstrings and texts of the
 extension, its shaders and presets. A retired identifier is looked for in every name: `late` is in
-`is_late`, `LateHair` and `late.py`, not in `later`. A text without spaces counts as a name, as it
-may be a key in a file. A term that is written with a capital is looked for as it is written.
+`is_late`, `LateHair` and `late.py`, not in `later`; `most_` only where another word follows. A text
+without spaces counts as a name, as it may be a key in a file. A term that is written with a capital
+is looked for as it is written.
 
     python tools/words.py           all uses, by file and line
     python tools/words.py counts    how many of each: uses in prose, different names in code
@@ -50,7 +51,8 @@ class Retired:
     def lines_in(self, text: Text) -> list[int]:
         """The line of each use."""
         if self.scope == "code":
-            return [text.line] * (f" {_parts(self.term)} " in f" {_parts(text.text)} ")
+            end = "" if self.term.endswith("_") else " "
+            return [text.line] * (f" {_parts(self.term)} " in f" {_parts(text.text)}{end}")
         found = self._pattern.finditer(text.text)
         return [text.line + text.text.count("\n", 0, match.start()) for match in found]
 

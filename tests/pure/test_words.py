@@ -10,29 +10,28 @@ import words
 #: left, `.venv/bin/python tools/words.py counts` prints the table to put here. Empty is the aim;
 #: after that this table goes away.
 LEFT: dict[tuple[str, str], int] = {
-    ("prose", "hangs on"): 32,
-    ("prose", "hang on"): 15,
+    ("prose", "hangs on"): 30,
+    ("prose", "hang on"): 11,
     ("prose", "hung on"): 1,
-    ("prose", "anew"): 35,
-    ("prose", "told"): 52,
-    ("prose", "in the place of"): 9,
+    ("prose", "anew"): 31,
+    ("prose", "told"): 49,
+    ("prose", "in the place of"): 8,
     ("prose", "stand-in"): 2,
-    ("prose", "stands in for"): 6,
-    ("prose", "stand in for"): 3,
+    ("prose", "stands in for"): 5,
     ("prose", "mend"): 7,
     ("prose", "mends"): 3,
-    ("prose", "mended"): 3,
-    ("prose", "share of"): 167,
+    ("prose", "mended"): 2,
+    ("prose", "share of"): 163,
     ("prose", "shares of"): 15,
     ("prose", "fingerprint"): 4,
     ("prose", "fingerprints"): 1,
     ("prose", "hiders"): 4,
     ("prose", "aids"): 1,
-    ("prose", "so many"): 51,
-    ("prose", "Way"): 2,
+    ("prose", "so many"): 50,
+    ("prose", "Way"): 3,
     ("prose", "Most Pieces"): 3,
     ("prose", "Leave Out"): 4,
-    ("prose", "Least Share"): 3,
+    ("prose", "Least Share"): 4,
     ("prose", "Wind Rise"): 3,
     ("prose", "Swing Damping"): 3,
     ("prose", "Push-out Speed"): 6,
@@ -49,13 +48,9 @@ LEFT: dict[tuple[str, str], int] = {
     ("code", "retold"): 1,
     ("code", "late"): 3,
     ("code", "lacks"): 2,
-    ("code", "awaited"): 3,
+    ("code", "awaited"): 1,
     ("code", "waits"): 2,
-    ("code", "asks"): 1,
-    ("code", "serve"): 1,
-    ("code", "stand_in"): 1,
-    ("code", "making"): 8,
-    ("code", "makings"): 1,
+    ("code", "making"): 4,
     ("code", "trouble"): 3,
     ("code", "troubles"): 5,
     ("code", "mend"): 5,
@@ -83,10 +78,12 @@ LEFT: dict[tuple[str, str], int] = {
     ("code", "ways"): 9,
     ("code", "bow"): 7,
     ("code", "share"): 33,
-    ("code", "shares"): 15,
+    ("code", "shares"): 13,
     ("code", "groom_moment"): 1,
-    ("code", "most"): 49,
-    ("code", "least"): 51,
+    ("code", "most_"): 43,
+    ("code", "at_most"): 3,
+    ("code", "least_"): 47,
+    ("code", "at_least"): 1,
     ("code", "pace"): 3,
     ("code", "read_apart"): 1,
 }
@@ -101,7 +98,7 @@ GLOSSARY = """\
 ## Retired as identifiers
 | Do not write | Write |
 | --- | --- |
-| `late`, `stand_in` | `deferred`, `placeholder` |
+| `late`, `stand_in`, `most_` | `deferred`, `placeholder`, `max_` |
 """
 
 
@@ -132,7 +129,7 @@ def test_each_kind_of_use_is_seen(tmp_path: Path) -> None:
             "def is_late(stand_in, standing): ...\n"
         ),
         "gpu_shaders/lib_x.glsl": "// one\n// anew\nfloat late = 1.0; // anew\n",
-        "presets/x.json": '{"late": "all anew"}',
+        "presets/x.json": '{"late": "all anew", "most": 1, "MOST_ROWS": 2}',
     }
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -156,5 +153,6 @@ def test_each_kind_of_use_is_seen(tmp_path: Path) -> None:
             "presets/x.json:1 late",
         ],
         "stand_in": ["addon/late.py:6 stand_in"],
+        "most_": ["presets/x.json:1 MOST_ROWS"],
     }
-    assert [words.amount(places) for places in uses.values()] == [2, 4, 1, 3, 1]
+    assert [words.amount(places) for places in uses.values()] == [2, 4, 1, 3, 1, 1]
