@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import bpy
 from bpy.app.handlers import persistent
 
+from ..blender.base.outcome import report
 from ..blender.base.redraw import redraw_panels
 from ..blender.base.thread_work import ThreadWork
 from .reports import reporting, waiting
@@ -94,7 +95,7 @@ class LongWork:
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS":
             stop()
-            self.report({"INFO"}, f"{self.bl_label} was cancelled; {self.unharmed}")
+            report(self, "INFO", f"{self.bl_label} was cancelled; {self.unharmed}")
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}

@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
+from ..blender.base.outcome import report
 from ..blender.cards.adopt import (
     ORDERS,
     CardOcclusionSettings,
@@ -112,10 +113,10 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
 
     def _tell(self, obj: bpy.types.Object, done: SortedCards) -> None:
         for note in done.notes:
-            self.report({"WARNING"}, f"{obj.name}: {note}")
+            report(self, "WARNING", f"{obj.name}: {note}")
         moved = f"{done.moved} of {done.face_count} faces moved"
         count = "1 card" if done.card_count == 1 else f"{done.card_count} cards"
-        self.report({"INFO"}, f"Sorted {count}; {moved}")
+        report(self, "INFO", f"Sorted {count}; {moved}")
 
 
 def _can_sort(operator: type[Any], context: bpy.types.Context) -> bool:

@@ -7,6 +7,7 @@ from typing import ClassVar
 import bpy
 
 from ..blender.bakes import playback
+from ..blender.base.outcome import report
 from ..blender.preview import live, timeline
 from ..blender.preview.bake import Bake, bakeable, free, show_in_renders
 from ..blender.scene.fin_modifier import fin_modifier
@@ -43,7 +44,7 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
         names = ", ".join(obj.name for obj in bake.objects())
         also = "; Render > Lock Interface is on, which renders of baked hair need" if locks else ""
         count = "1 frame" if bake.frame_count == 1 else f"{bake.frame_count:,} frames"
-        self.report({"INFO"}, f"Baked {count} of {names}{also}")
+        report(self, "INFO", f"Baked {count} of {names}{also}")
 
 
 class HAIRLOOM_OT_bake_free(bpy.types.Operator):

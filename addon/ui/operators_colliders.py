@@ -6,6 +6,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..blender.base.objects import head_of
+from ..blender.base.outcome import report
 from ..blender.colliders import spheres
 from ..blender.colliders.spheres import FittedSpheres, SphereFitSettings
 from ..blender.properties.groups import operator_properties
@@ -53,13 +54,15 @@ class HAIRLOOM_OT_fit_spheres(bpy.types.Operator):
     def _tell(self, mesh: bpy.types.Object, fitted: FittedSpheres) -> None:
         error, count = fitted.fit.error, len(fitted.fit.radii)
         if fitted.hanging and mesh.modifiers:
-            self.report(
-                {"WARNING"},
+            report(
+                self,
+                "WARNING",
                 f"{fitted.hanging} of {count} spheres follow {mesh.name} as an object but not its "
                 "shape: apply the modifiers that copy vertices, and fit again",
             )
-        self.report(
-            {"INFO"},
+        report(
+            self,
+            "INFO",
             f"{count} spheres in {fitted.collection.name}: "
             f"{error.gap_mean * _MILLIMETRES:.1f} mm of the mesh stick out of them on average "
             f"({error.gap_max * _MILLIMETRES:.1f} mm at most), they stick out of the mesh by "
@@ -89,7 +92,7 @@ class HAIRLOOM_OT_remove_spheres(bpy.types.Operator):
         mesh = _mesh(context)
         assert mesh is not None
         count = spheres.remove_spheres(mesh)
-        self.report({"INFO"}, f"{count} spheres removed; {mesh.name} collides by itself again")
+        report(self, "INFO", f"{count} spheres removed; {mesh.name} collides by itself again")
         return {"FINISHED"}
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 
+from ..blender.base.outcome import report
 from ..blender.preview import fins, live
 from ..blender.scene.fin_modifier import (
     add_modifier,
@@ -38,10 +39,10 @@ class HAIRLOOM_OT_fin_add(bpy.types.Operator):
         fin = obj.hairloom.fin
         if not fin.pin_group and obj.vertex_groups.active is not None:
             fin.pin_group = obj.vertex_groups.active.name
-            self.report({"INFO"}, f"Pinned by the vertex group {fin.pin_group}")
+            report(self, "INFO", f"Pinned by the vertex group {fin.pin_group}")
         elif not fin.pin_group:
-            self.report(
-                {"WARNING"}, "Nothing is pinned yet: choose a Pin Group, or the mesh will fall"
+            report(
+                self, "WARNING", "Nothing is pinned yet: choose a Pin Group, or the mesh will fall"
             )
         return {"FINISHED"}
 

@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 
 from ..blender.base.objects import head_of, objects_in
+from ..blender.base.outcome import report
 from ..blender.preview.troubles import is_unevenly_scaled, set_surface, surface_for
 from ..errors import HairloomError
 from .reports import reporting, waiting
@@ -36,7 +37,7 @@ class HAIRLOOM_OT_set_surface(bpy.types.Operator):
         visible = [obj for obj in objects_in(context.view_layer) if obj.visible_get()]
         mesh = surface_for(hair, selected or visible, depsgraph)
         set_surface(hair, mesh)
-        self.report({"INFO"}, f"{hair.name} grows from {mesh.name} now")
+        report(self, "INFO", f"{hair.name} grows from {mesh.name} now")
         return {"FINISHED"}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
+from ..blender.base.outcome import report
 from ..blender.properties.presets import apply, delete_own, kept_settings, named_preset, save_own
 from ..blender.properties.properties import settings_of
 from ..blender.scene.principled import has_principled_hair, look_from_material
@@ -61,7 +62,7 @@ class HAIRLOOM_OT_save_preset(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         path = save_own(self.title, *kept_settings(chosen_hair(context)[0], self.section))
-        self.report({"INFO"}, f"Saved to {path}")
+        report(self, "INFO", f"Saved to {path}")
         return {"FINISHED"}
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -110,7 +111,7 @@ class HAIRLOOM_OT_look_from_material(bpy.types.Operator):
             settings, notes = look_from_material(hair, depsgraph, before)
             apply(settings, hair)
             for note in notes:
-                self.report({"WARNING"}, f"{hair.name}: {note}")
+                report(self, "WARNING", f"{hair.name}: {note}")
         return {"FINISHED"}
 
 

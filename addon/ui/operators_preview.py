@@ -12,7 +12,7 @@ import time
 import bpy
 
 from ..blender.bakes.fingerprints import frame_rate
-from ..blender.base.outcome import Outcome
+from ..blender.base.outcome import Outcome, report
 from ..blender.base.pace import Pace
 from ..blender.base.suspension import is_suspended
 from ..blender.preview import fins, live
@@ -82,7 +82,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
             depsgraph = context.evaluated_depsgraph_get()
             fin_warnings = fins.start_enabled(depsgraph)
             for warning in (*fin_warnings, *live.play(depsgraph, blocking=False)):
-                self.report({"WARNING"}, warning)
+                report(self, "WARNING", warning)
         if not live.is_playing():
             return {"CANCELLED"}
         self._ticks = start_ticking(context)
@@ -157,7 +157,7 @@ class HAIRLOOM_OT_mute_hair_dynamics(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         count = sum(mute_own_dynamics(hair) for hair in chosen_hair(context))
-        self.report({"INFO"}, f"Turned off {count} Hair Dynamics modifiers")
+        report(self, "INFO", f"Turned off {count} Hair Dynamics modifiers")
         return {"FINISHED"}
 
 

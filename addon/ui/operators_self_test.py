@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 
+from ..blender.base.outcome import report
 from ..blender.setup import self_test
 from .reports import waiting
 
@@ -22,9 +23,9 @@ class HAIRLOOM_OT_self_test(bpy.types.Operator):
             checks = self_test.run()
         failed = [check for check in checks if check.outcome == "failed"]
         for check in failed:
-            self.report({"WARNING"}, f"{check.name}: {check.text}")
+            report(self, "WARNING", f"{check.name}: {check.text}")
         if not failed:
-            self.report({"INFO"}, f"All {len(checks)} checks done, none failed")
+            report(self, "INFO", f"All {len(checks)} checks done, none failed")
         return {"FINISHED"}
 
 
@@ -43,7 +44,7 @@ class HAIRLOOM_OT_copy_report(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         context.window_manager.clipboard = self_test.report_text()
-        self.report({"INFO"}, "The report is copied")
+        report(self, "INFO", "The report is copied")
         return {"FINISHED"}
 
 

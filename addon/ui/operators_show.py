@@ -10,6 +10,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes.fingerprints import frame_rate
 from ..blender.base.images import write_png
+from ..blender.base.outcome import report
 from ..blender.pictures.sheet import Sheet
 from ..blender.pictures.showing import ShownGroom, file_name, shown_groom
 from ..blender.pictures.turntable import FRAMES, LIGHTS, SIDES, Turntable, TurntableSettings
@@ -89,9 +90,9 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
         count = table.settings.frames
         yield from counted(table.steps(), count, "pictures")
         for note in table.notes:
-            self.report({"WARNING"}, note)
+            report(self, "WARNING", note)
         video = " and a video" if table.has_video else ""
-        self.report({"INFO"}, f"Wrote {count:,} pictures{video} to {table.folder}")
+        report(self, "INFO", f"Wrote {count:,} pictures{video} to {table.folder}")
 
     def _table(self, context: bpy.types.Context) -> Turntable:
         shown = _shown(self, context)
@@ -161,7 +162,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
             finally:
                 manager.progress_end()
             write_png(Path(self.filepath), sheet.picture)
-        self.report({"INFO"}, f"Wrote {sheet.count} pictures to {self.filepath}")
+        report(self, "INFO", f"Wrote {sheet.count} pictures to {self.filepath}")
         return {"FINISHED"}
 
 
@@ -170,7 +171,7 @@ def _shown(operator: bpy.types.Operator, context: bpy.types.Context) -> ShownGro
     hair = chosen_hair(context)[0]
     shown = shown_groom(hair, context.evaluated_depsgraph_get())
     for note in shown.notes:
-        operator.report({"WARNING"}, f"{hair.name}: {note}")
+        report(operator, "WARNING", f"{hair.name}: {note}")
     return shown
 
 

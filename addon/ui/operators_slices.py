@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..blender.base.outcome import report
 from ..blender.pictures import skin_picture, slices
 from ..blender.pictures.skin_picture import skin_shadow_of_view
 from ..blender.pictures.slices import shown_image, slices_of_view
@@ -27,7 +28,7 @@ class HAIRLOOM_OT_show_slices(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         picture = slices_of_view(_previewed(context).snapshot, context)
         _show(context, shown_image(slices.IMAGE, picture))
-        self.report({"INFO"}, "White: all light is left. Layers from the light on, from top left")
+        report(self, "INFO", "White: all light is left. Layers from the light on, from top left")
         return {"FINISHED"}
 
 
@@ -48,7 +49,7 @@ class HAIRLOOM_OT_show_skin_shadow(bpy.types.Operator):
         hair = session.snapshot, session.rig, session.solver.pose
         picture = skin_shadow_of_view(*hair, context, place=self.bl_label)
         _show(context, shown_image(skin_picture.IMAGE, picture))
-        self.report({"INFO"}, "White: all light reaches the skin. One map for each light")
+        report(self, "INFO", "White: all light reaches the skin. One map for each light")
         return {"FINISHED"}
 
 

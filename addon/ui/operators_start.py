@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty
 
+from ..blender.base.outcome import report
 from ..blender.preview import live
 from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
 from ..blender.setup.sample_scene import add_sample_scene
@@ -130,7 +131,7 @@ class HAIRLOOM_OT_use_groom(bpy.types.Operator):
                 name, depsgraph = hair.name, context.evaluated_depsgraph_get()
                 ready, done = take_over(hair, depsgraph, chosen_presets(chosen))
                 for one in done:
-                    self.report({"INFO"}, f"{name}: {one}")
+                    report(self, "INFO", f"{name}: {one}")
                 taken.append(ready)
             _begin(self, context, taken, plays=chosen.plays)
         return {"FINISHED"}
@@ -163,7 +164,7 @@ class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
             for hair in made:
                 take_over(hair, context.evaluated_depsgraph_get(), chosen_presets(chosen))
             _begin(self, context, made, plays=chosen.plays)
-        self.report({"INFO"}, f"{mesh.name}: its particle hair is hidden, curves took its place")
+        report(self, "INFO", f"{mesh.name}: its particle hair is hidden, curves took its place")
         return {"FINISHED"}
 
 

@@ -15,6 +15,7 @@ from bpy.props import (
 )
 from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
 
+from ..blender.base.outcome import report
 from ..blender.strands.groom_in import FILE_KINDS, Ground, StrandImport, import_strands, read_ground
 from ..errors import HairloomError
 from .reports import reporting, tell, waiting
@@ -95,7 +96,7 @@ class HAIRLOOM_OT_import_strands(bpy.types.Operator, ImportHelper):
         try:
             hair, outcome = import_strands(path, ground, context.collection, choices)
         except HairloomError as error:
-            self.report({"ERROR"}, str(error))
+            report(self, "ERROR", error)
             return []
         tell(self, outcome)
         return hair

@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ..blender.base.outcome import Outcome, dropped_phrase
+from ..blender.base.outcome import Outcome, dropped_phrase, report
 from ..errors import HairloomError
 
 
@@ -21,7 +21,7 @@ def reporting(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
         try:
             return execute(self, context)
         except HairloomError as error:
-            self.report({"ERROR"}, str(error))
+            report(self, "ERROR", error)
             return {"CANCELLED"}
 
     return reported
@@ -30,9 +30,9 @@ def reporting(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
 def tell(operator: bpy.types.Operator, outcome: Outcome) -> None:
     """Report the warnings, then the result with what was dropped."""
     for warning in outcome.warnings:
-        operator.report({"WARNING"}, warning)
+        report(operator, "WARNING", warning)
     parts = filter(None, (outcome.result, dropped_phrase(outcome.dropped)))
-    operator.report({"WARNING" if outcome.dropped else "INFO"}, "; ".join(parts))
+    report(operator, "WARNING" if outcome.dropped else "INFO", "; ".join(parts))
 
 
 @contextmanager

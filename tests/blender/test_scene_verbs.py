@@ -15,6 +15,7 @@ from hairloom.addon.blender.cards.adopt import SortChoices, sort_mesh
 from hairloom.addon.blender.cards.mesh import reorder_faces
 from hairloom.addon.blender.colliders.spheres import fitted_collections
 from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.command_line.run_job import OPERATORS
 from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.scene.fin_modifier import fin_modifier
 
@@ -67,16 +68,7 @@ def test_hair_grows_where_a_group_says(scene: Path) -> None:
 
 
 def test_settings_go_onto_the_hair_that_is_named(scene: Path) -> None:
-    run(
-        scene,
-        "settings",
-        "--object",
-        "Hair",
-        "--preset",
-        "dynamics/soft",
-        "--set",
-        "cards.levels=2",
-    )
+    run(scene, "run", "--object", "Hair", "--preset", "dynamics/soft", "--set", "cards.levels=2")
     hair = bpy.data.objects["Hair"]
     soft = presets.named_preset("dynamics/soft").settings.as_dict()
     assert hair.hairloom.dynamics.damping == pytest.approx(soft["damping"])
@@ -93,69 +85,81 @@ def test_the_look_of_a_material_is_taken_over(scene: Path) -> None:
     node.inputs["IOR"].default_value = 1.3
     bpy.data.objects["Hair"].data.materials.append(material)
     bpy.ops.wm.save_mainfile()
-    run(scene, "settings", "--look-from-material")
+    run(scene, "run", "look_from_material", "--object", "Hair")
     assert bpy.data.objects["Hair"].data.hairloom.shading.index_of_refraction == pytest.approx(1.3)
 
 
-def test_presets_are_listed_kept_and_deleted(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_a_preset_of_a_file_is_taken_over(scene: Path) -> None:
+    facts = run(scene, "run", "apply_preset", "--object", "Hair", "--set", "name=looks/blond")
+    assert facts["operator"] == "apply_preset"
+    blond = presets.named_preset("looks/blond").settings.as_dict()
+    shading = bpy.data.objects["Hair"].data.hairloom.shading
+    assert list(shading.base_color) == pytest.approx(blond["base_color"])
+
+
+def test_presets_are_kept_and_deleted_without_saving_a_scene(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(presets, "own_folder", lambda: tmp_path / "own")
-    report = tmp_path / "report.json"
+    keep = ["--object", "Hair", "--set", "section=shading", "--set", "title=Mine"]
+    assert command_line.run(["run", "save_preset", "--scene", str(scene), *keep]) == 0
+    assert [path.name for path in (tmp_path / "own").iterdir()] == ["mine.json"]
+    assert command_line.run(["run", "delete_preset", "--set", "name=own/mine"]) == 0
+    assert not list((tmp_path / "own").iterdir())
+    assert command_line.run(["run", "delete_preset", "--set", "name=looks/blond"]) == 1
 
-    def listed(*arguments: str) -> list[str]:
-        assert command_line.run(["presets", *arguments, "--report", str(report)]) == 0
-        return [one["name"] for one in json.loads(report.read_text())["presets"]]
 
-    assert "looks/blond" in listed() and "own/mine" not in listed()
-    assert "own/mine" in listed("--scene", str(scene), "--keep", "Mine")
-    assert "own/mine" in capsys.readouterr().out
-    assert "own/mine" not in listed("--delete", "own/mine")
-    assert command_line.run(["presets", "--delete", "looks/blond"]) == 1
+def test_operators_are_listed_with_their_properties(
+    extension: None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command_line.run(["run"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    for name in OPERATORS:
+        about = getattr(bpy.ops.hairloom, name).get_rna_type().description
+        assert f"{name}: {' '.join(about.split())}." in lines
+    assert any(line.startswith("    sphere_count: ") for line in lines)
 
 
 def test_a_mesh_becomes_a_fin_and_a_mesh_again(scene: Path) -> None:
-    stiff = ["--set", "fin.damping=5"]
-    run(scene, "fins", "--object", "Head", "--pin-group", "Top", *stiff)
+    facts = run(scene, "run", "fin_add", "--object", "Head", "--set", "fin.damping=5")
     head = bpy.data.objects["Head"]
     assert fin_modifier(head) is not None and head.hairloom.fin.pin_group == "Top"
     assert head.hairloom.fin.damping == 5.0
-    run(
-        scene.with_name("out.blend").rename(scene.with_name("fin.blend")),
-        "fins",
-        "--object",
-        "Head",
-        "--remove",
-    )
+    assert facts["messages"] == ["Pinned by the vertex group Top"]
+    other = scene.with_name("out.blend").rename(scene.with_name("fin.blend"))
+    run(other, "run", "fin_remove", "--object", "Head")
     assert fin_modifier(bpy.data.objects["Head"]) is None
 
 
 def test_spheres_are_fitted_and_removed(scene: Path) -> None:
-    facts = run(scene, "spheres", "--object", "Head", "--set", "sphere_fit.sphere_count=6")
+    facts = run(scene, "run", "fit_spheres", "--object", "Head", "--set", "sphere_count=6")
     head, hair = bpy.data.objects["Head"], bpy.data.objects["Hair"]
     (collection,) = fitted_collections(head)
-    assert len(collection.objects) == facts["spheres"][0]["count"] == 6
+    count = len(collection.objects)
+    assert 1 <= count <= 6 and facts["messages"][0].startswith(f"{count} spheres in ")
     assert hair.hairloom.collider_collection == collection
     assert head.hairloom.collider_shape == "none"
     other = scene.with_name("out.blend").rename(scene.with_name("fitted.blend"))
-    facts = run(other, "spheres", "--object", "Head", "--remove")
-    assert facts["spheres"] == [{"object": "Head", "removed": 6}]
+    facts = run(other, "run", "remove_spheres", "--object", "Head")
+    assert facts["messages"] == [f"{count} spheres removed; Head collides by itself again"]
     assert not fitted_collections(bpy.data.objects["Head"])
 
 
 def test_cards_are_made_as_objects_and_sorted(scene: Path, gpu_context: object) -> None:
     small = ["--set", "cards.way=clusters", "--set", "atlas.size=512", "--set", "cards.levels=1"]
-    facts = run(scene, "make-cards", *small)
-    (made,) = facts["made"]
-    cards = bpy.data.objects[made["object"]]
-    assert len(cards.data.polygons) == made["triangles"] > 0
-    name, count = cards.name, made["triangles"]
+    facts = run(scene, "run", "make_cards", "--object", "Hair", *small)
+    (cards,) = [obj for obj in bpy.data.objects if obj.hairloom.card_object.groom]
+    count = len(cards.data.polygons)
+    assert f"{count:,} triangles" in facts["messages"][0]
+    name = cards.name
     reorder_faces(cards.data, np.arange(count)[::-1])
     shuffled = scene.with_name("shuffled.blend")
     bpy.ops.wm.save_as_mainfile(filepath=str(shuffled))
-    facts = run(shuffled, "sort-cards", "--object", name, "--head", "Head", "--no-occlusion")
-    (done,) = facts["sorted"]
-    assert done["cards"] == made["cards"] and done["moved"] > count / 2
+    sort = ["--set", "head=Head", "--set", "use_occlusion=false"]
+    facts = run(shuffled, "run", "sort_cards", "--object", name, *sort)
+    (told,) = facts["messages"]
+    moved = int(told.partition("; ")[2].split()[0])
+    assert told.startswith("Sorted ") and moved > count / 2
     order = vertices_of(name)
     bpy.ops.wm.open_mainfile(filepath=str(shuffled))
     assert vertices_of(name) != order
@@ -171,18 +175,30 @@ def vertices_of(name: str) -> list[tuple[int, ...]]:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["settings"], "--output"),
-        (["settings", "--save", "--output", "x.blend"], "twice"),
-        (["settings", "--output", "x.png"], ".blend"),
-        (["settings", "--object", "Nobody", "--output", "x.blend"], "Nobody"),
-        (["settings", "--set", "shading.nothing=1", "--output", "x.blend"], "nothing"),
+        (["run", "fin_add"], "--output"),
+        (["run", "fin_add", "--save", "--output", "x.blend"], "twice"),
+        (["run", "fin_add", "--output", "x.png"], ".blend"),
+        (["run", "fin_add", "--object", "Nobody", "--output", "x.blend"], "Nobody"),
+        (["run", "--object", "Hair", "--set", "shading.no=1", "--output", "x.blend"], "'no'"),
+        (["run", "--object", "Hair", "--set", "no=1", "--output", "x.blend"], "'no=1'"),
+        (["run", "--object", "Cube", "--set", "cards.levels=1", "--output", "x.blend"], "Cube"),
+        (["run", "fit_sphere", "--output", "x.blend"], "fit_spheres"),
+        (["run", "play", "--output", "x.blend"], "no operator 'play'"),
+        (["run", "fit_spheres", "--set", "sphere_cont=6", "--output", "x.blend"], "sphere_count"),
+        (["run", "fit_spheres", "--set", "sphere_count=0", "--output", "x.blend"], "from 1 to"),
+        (["run", "fit_spheres", "--set", "sphere_count=six", "--output", "x.blend"], "whole"),
+        (["run", "fit_spheres", "--set", "replace_mesh=1", "--output", "x.blend"], "true or false"),
+        (["run", "sort_cards", "--set", "by=peaces", "--output", "x.blend"], "pieces"),
         (["grow", "--head", "Hair", "--output", "x.blend"], "Hair"),
-        (["fins", "--object", "Head", "--pin-group", "None", "--output", "x.blend"], "None"),
-        (["fins", "--object", "Head", "--remove", "--output", "x.blend"], "no fin"),
-        (["spheres", "--object", "Hair", "--output", "x.blend"], "Hair"),
-        (["make-cards", "--object", "Head", "--output", "x.blend"], "Head"),
-        (["sort-cards", "--object", "Head", "--alpha", "No", "--output", "x.blend"], "No"),
-        (["sort-cards", "--object", "Head", "--head", "No", "--output", "x.blend"], "No"),
+        (["run", "fin_remove", "--object", "Head", "--output", "x.blend"], "Select a fin"),
+        (["run", "sort_cards", "--object", "Hair", "--output", "x.blend"], "Select a mesh"),
+        (
+            [
+                *("run", "sort_cards", "--object", "Head", "--set", "alpha=No"),
+                *("--output", "x.blend"),
+            ],
+            "No",
+        ),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
@@ -224,8 +240,11 @@ def test_hair_is_made_ready(scene: Path) -> None:
     hair.scale = (1.0, 1.0, 1.2)
     head.data.uv_layers.remove(head.data.uv_layers[0])
     bpy.ops.wm.save_mainfile()
-    facts = run(scene, "mend", "--surface", "--unwrap", "--snap-roots", "--apply-scale")
-    assert len(facts["mended"]) == 4
+    steps = ("set_surface", "unwrap_surface", "snap_roots", "apply_scale")
+    for number, operator in enumerate(steps):
+        facts = run(scene, "run", operator, "--object", "Hair")
+        assert facts["operator"] == operator
+        scene = scene.with_name("out.blend").rename(scene.with_name(f"step_{number}.blend"))
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
     assert hair.data.surface == head and len(head.data.uv_layers) == 1
     assert list(hair.scale) == pytest.approx([1.0, 1.0, 1.0])
@@ -239,9 +258,9 @@ def test_hair_is_made_ready(scene: Path) -> None:
 def test_a_button_that_would_be_grey_is_an_error(
     scene: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["--scene", str(scene), "--unwrap", "--output", str(tmp_path / "x.blend")]
-    assert command_line.run(["mend", *arguments]) == 1
-    assert "hairloom: Hair: The surface has UVs already. " in capfd.readouterr().err
+    arguments = ["--scene", str(scene), "--object", "Hair", "--output", str(tmp_path / "x.blend")]
+    assert command_line.run(["run", "unwrap_surface", *arguments]) == 1
+    assert "hairloom: unwrap_surface: The surface has UVs already. " in capfd.readouterr().err
 
 
 def test_particle_hair_becomes_curves(scene: Path) -> None:
@@ -252,14 +271,14 @@ def test_particle_hair_becomes_curves(scene: Path) -> None:
     settings = head.particle_systems[0].settings
     settings.type, settings.count, settings.hair_length = "HAIR", 30, 0.05
     bpy.ops.wm.save_mainfile()
-    run(scene, "mend", "--convert-particles", "Head", "--preset", "looks/blond")
+    run(scene, "run", "convert_particles", "--object", "Head")
     (made,) = [o for o in bpy.data.objects if o.type == "CURVES" and o.name != "Hair"]
     assert len(made.data.curves) == 30 and made.data.surface == bpy.data.objects["Head"]
 
 
 def test_a_sample_scene_is_shown_when_its_file_is_opened(extension: None, tmp_path: Path) -> None:
     path = tmp_path / "sample.blend"
-    assert command_line.run(["sample", "--output", str(path)]) == 0
+    assert command_line.run(["run", "sample_scene", "--output", str(path)]) == 0
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert bpy.context.scene.name == "Hairloom Sample" and bpy.context.scene.camera
     assert any(obj.type == "CURVES" for obj in bpy.context.scene.objects)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 
 import bpy
 
+from ...errors import HairloomError
 from ...pipeline import Rig
 
 
@@ -28,3 +30,41 @@ def dropped_phrase(dropped: dict[str, int]) -> str:
     """Such as "dropped 3 (fewer than two points), 1 (no length)"; empty if nothing was."""
     reasons: Iterable[str] = (f"{count:,} ({reason})" for reason, count in dropped.items())
     return "dropped " + ", ".join(reasons) if dropped else ""
+
+
+@dataclass
+class Reports:
+    """What an operator has reported. error: what stopped it."""
+
+    messages: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    error: HairloomError | None = None
+
+
+#: where reports go while a job without a window runs an operator; None: to Blender
+_collected: Reports | None = None
+
+
+@contextmanager
+def collected_reports() -> Iterator[Reports]:
+    """All reports of operators come here; Blender would make text of errors."""
+    global _collected
+    reports = _collected = Reports()
+    try:
+        yield reports
+    finally:
+        _collected = None
+
+
+def report(operator: bpy.types.Operator, kind: str, message: str | HairloomError) -> None:
+    """Report to whoever has run the operator.
+
+    Args:
+        kind: "INFO", "WARNING" or "ERROR"; the message of an error is the error itself.
+    """
+    if _collected is None:
+        operator.report({kind}, str(message))
+    elif isinstance(message, HairloomError):
+        _collected.error = message
+    else:
+        (_collected.messages if kind == "INFO" else _collected.warnings).append(message)

@@ -131,7 +131,3 @@ class Progress:
         elif part != self._shown:
             print(f"{self._name}: {done}/{self._total}", flush=True)
         self._shown = part
-
-    def show_share(self, share: float) -> None:
-        """For steps without a count: the fraction that is done, 0 to 1."""
-        self.show(int(share * self._total))

@@ -18,7 +18,6 @@ from ..base.interruption import Interrupted, interruptible
 from ..base.report import Report
 from .bake_job import BAKE
 from .cards_job import CARDS
-from .collider_jobs import FINS, SPHERES
 from .demo_job import DEMO
 from .export_job import EXPORT
 from .grow_job import GROW
@@ -26,25 +25,19 @@ from .import_job import IMPORT
 from .inputs import Sources
 from .job_options import check_numbers, chosen_settings
 from .job_steps import Job
-from .mend_job import MEND
-from .mesh_jobs import MAKE_CARDS, SORT_CARDS
 from .render_job import RENDER
+from .run_job import RUN
 from .scene_files import check_saving, open_scene, save_scene
-from .settings_jobs import PRESETS, SETTINGS
+from .self_test_job import SELF_TEST
 from .show_jobs import SHEET, TURNTABLE
 from .simulate_job import SIMULATE
 from .stamp import Stamp
-from .start_jobs import SAMPLE, SELF_TEST
 from .verb import Verb
 
 VERBS: tuple[Verb, ...] = (
     GROW,
     IMPORT,
-    MEND,
-    SETTINGS,
-    PRESETS,
-    FINS,
-    SPHERES,
+    RUN,
     SIMULATE,
     BAKE,
     RENDER,
@@ -52,9 +45,6 @@ VERBS: tuple[Verb, ...] = (
     SHEET,
     EXPORT,
     CARDS,
-    MAKE_CARDS,
-    SORT_CARDS,
-    SAMPLE,
     DEMO,
     SELF_TEST,
 )

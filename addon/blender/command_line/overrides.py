@@ -23,11 +23,11 @@ def overrides(assignments: list[str], section: str) -> dict[str, Any]:
                 remedy="Write SECTION.NAME=VALUE with a section of " + ", ".join(ALL_SETTINGS),
             )
         if owner == section:
-            values[parameter] = text if parameter in choices else _value(text)
+            values[parameter] = text if parameter in choices else plain_value(text)
     return values
 
 
-def _value(text: str) -> Any:
+def plain_value(text: str) -> Any:
     """A JSON value, several with commas (a colour or a curve), or the text itself (a choice)."""
     for content in (text, f"[{text}]"):
         try:

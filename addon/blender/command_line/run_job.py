@@ -1,0 +1,282 @@
+"""The verb `run`: what the artist's buttons do to a scene, one operator at a time."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+import bpy
+
+from ...errors import HairloomError
+from ..base.outcome import Reports, collected_reports
+from .job_options import add_object_option, add_save_option
+from .job_steps import Job, tell_notes
+from .object_settings import check_editable, named_objects, put_settings
+from .overrides import plain_value
+from .scene_files import check_saving, save_scene
+from .verb import SCENE_OUTPUT, Verb
+
+#: operators that change a scene
+_OF_SCENES = (
+    "use_groom",
+    "convert_particles",
+    "set_surface",
+    "unwrap_surface",
+    "snap_roots",
+    "apply_scale",
+    "mute_hair_dynamics",
+    "apply_preset",
+    "look_from_material",
+    "fin_add",
+    "fin_remove",
+    "fit_spheres",
+    "remove_spheres",
+    "make_cards",
+    "sort_cards",
+    "sample_scene",
+)
+#: operators that change the artist's own presets instead
+_OF_PRESETS = ("save_preset", "delete_preset")
+OPERATORS = (*_OF_SCENES, *_OF_PRESETS)
+
+
+def run_operator(job: Job) -> None:
+    """Run one of Hairloom's operators on objects of a scene, with settings; without one, list them.
+
+    Each works as its button does. --preset and --set SECTION.NAME=VALUE change the settings of the
+    objects first, --set NAME=VALUE is a property of the operator.
+    """
+    options = job.options
+    if not (options.operator or options.set or options.preset):
+        _list_operators()
+        return
+    is_of_scene = options.operator not in _OF_PRESETS
+    if is_of_scene:
+        check_saving(options.output, over=options.save)
+    operator = _Operator.named(options.operator) if options.operator else None
+    own = [each for each in options.set if "." not in each.partition("=")[0]]
+    values = operator.values(own) if operator is not None else _refuse_properties(own)
+    _select(named_objects(options.object, lambda _: True, "an object"))
+    settings = [each for each in options.set if each not in own]
+    if options.preset or settings:
+        _change_settings(job, settings)
+    if operator is not None:
+        with job.report.stage(operator.name):
+            reports = operator.run(values)
+        job.report.facts["operator"] = operator.name
+        job.report.facts["messages"] = reports.messages
+        for message in reports.messages:
+            print(message, flush=True)
+        tell_notes(reports.warnings, job.report)
+    if is_of_scene:
+        with job.report.stage("save scene"):
+            saved = save_scene(options.output)
+        job.report.add_output(saved)
+        print(f"Wrote {saved}")
+
+
+@dataclass(frozen=True)
+class _Operator:
+    """One that may run, and its class as it is registered."""
+
+    name: str
+    kind: type[Any]
+
+    @classmethod
+    def named(cls, name: str) -> _Operator:
+        """Raises:
+        HairloomError: no operator of this name runs without a window.
+        """
+        if name not in OPERATORS:
+            raise _unknown(f"no operator '{name}' changes a scene", name, OPERATORS)
+        return cls(name, getattr(bpy.types, f"HAIRLOOM_OT_{name}"))
+
+    @property
+    def rna(self) -> Any:
+        return getattr(bpy.ops.hairloom, self.name).get_rna_type()
+
+    @property
+    def properties(self) -> dict[str, bpy.types.Property]:
+        properties = self.rna.properties
+        return {each.identifier: each for each in properties if each.identifier != "rna_type"}
+
+    def values(self, assignments: list[str]) -> dict[str, Any]:
+        """The properties that NAME=VALUE set.
+
+        Raises:
+            HairloomError: it has no such property, or one that takes no such value.
+        """
+        known, values = self.properties, dict[str, Any]()
+        for assignment in assignments:
+            name, equals, text = assignment.partition("=")
+            if name not in known or not equals:
+                raise _unknown(f"{self.name} has no property '{name}'", "--set", known)
+            values[name] = _value(known[name], text)
+        return values
+
+    def run(self, values: dict[str, Any]) -> Reports:
+        """Press the button.
+
+        Raises:
+            HairloomError: it would be grey, or it has failed.
+        """
+        reason = self._why_grey()
+        if reason:
+            raise HairloomError(
+                reason.rstrip("."), place=self.name, remedy="Name what it needs with --object"
+            )
+        with collected_reports() as reports:
+            result = getattr(bpy.ops.hairloom, self.name)(**values)
+        if reports.error is not None:
+            raise reports.error
+        assert result == {"FINISHED"}, f"{self.name} has not finished and does not say why"
+        return reports
+
+    def _why_grey(self) -> str:
+        """What the button would say of why it is grey; empty where it is not."""
+        said: list[str] = []
+
+        class Asked(self.kind):  # type: ignore[name-defined]
+            poll_message_set = classmethod(lambda _cls, message: said.append(message))
+
+        if not hasattr(Asked, "poll") or Asked.poll(bpy.context):
+            return ""
+        return said[-1] if said else "it cannot run here"
+
+
+def _value(known: Any, text: str) -> Any:
+    """What is meant for this property."""
+    if known.type == "STRING":
+        return text
+    if known.type == "ENUM":
+        choices = [item.identifier for item in known.enum_items]
+        if text not in choices:
+            raise _unknown(f"{known.identifier} cannot be '{text}'", "--set", choices)
+        return text
+    value = plain_value(text)
+    values = value if isinstance(value, list) else [value]
+    kinds: tuple[type, ...] = {"BOOLEAN": (bool,), "INT": (int,)}.get(known.type, (int, float))
+    is_number = all(
+        isinstance(each, kinds) and (bool in kinds or not isinstance(each, bool)) for each in values
+    )
+    if not is_number or len(values) != max(known.array_length, 1):
+        raise HairloomError(
+            f"{known.identifier} cannot be '{text}'",
+            place="--set",
+            remedy=f"Use {_KINDS[known.type]}",
+        )
+    if known.type != "BOOLEAN" and not all(
+        known.hard_min <= each <= known.hard_max for each in values
+    ):
+        raise HairloomError(
+            f"{known.identifier} cannot be {text}",
+            place="--set",
+            remedy=f"Use a value from {known.hard_min:g} to {known.hard_max:g}",
+        )
+    return value
+
+
+_KINDS = {"BOOLEAN": "true or false", "INT": "a whole number", "FLOAT": "a number"}
+
+
+def _refuse_properties(assignments: list[str]) -> dict[str, Any]:
+    """Without an operator there are no properties."""
+    if assignments:
+        raise HairloomError(
+            f"'{assignments[0]}' does not name a parameter",
+            place="--set",
+            remedy="Write SECTION.NAME=VALUE, or name an operator that has this property",
+        )
+    return {}
+
+
+def _select(objects: list[bpy.types.Object]) -> None:
+    """Select these alone, the last is active; without any all stays as it was saved."""
+    if not objects:
+        return
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    for obj in objects:
+        obj.select_set(True)
+        bpy.context.view_layer.objects.active = obj
+
+
+def _change_settings(job: Job, assignments: list[str]) -> None:
+    """--preset and --set SECTION.NAME=VALUE on the selected hair and meshes."""
+    chosen = [obj for obj in bpy.context.selected_objects if obj.type in {"CURVES", "MESH"}]
+    if not chosen:
+        raise HairloomError(
+            "there is nothing whose settings could change",
+            place="--object",
+            remedy="Name hair curves or a mesh of the scene",
+        )
+    for obj in chosen:
+        check_editable(obj)
+        put_settings(obj, job.options.preset, assignments)
+    job.report.facts["objects"] = [obj.name for obj in chosen]
+
+
+def _unknown(problem: str, place: str, known: Any) -> HairloomError:
+    """With the names that were meant, or all that there are."""
+    wrong = problem.split("'")[1]
+    meant = get_close_matches(wrong, known) or list(known)
+    remedy = "Use one of " + ", ".join(meant) if meant else "Leave it out"
+    return HairloomError(problem, place=place, remedy=remedy)
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _list_operators() -> None:
+    """Each operator with what it does and its properties."""
+    for name in OPERATORS:
+        operator = _Operator.named(name)
+        print(f"{name}: {_line(operator.rna.description)}.")
+        for each in operator.properties.values():
+            print(f"    {each.identifier}: {each.description}")
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "operator",
+        nargs="?",
+        metavar="OPERATOR",
+        help=f"one of {', '.join(OPERATORS)} (default: change settings alone; without settings, "
+        "list the operators and their properties)",
+    )
+    add_save_option(parser)
+    add_object_option(
+        parser,
+        "what it works on; can be given again, the last one is active (default: what was "
+        "selected when the scene was saved)",
+    )
+    parser.add_argument(
+        "--preset",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a preset such as looks/blond, or a preset file, for the objects; can be given again",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a property of the operator, such as sphere_count=8, or a setting of the objects, "
+        "such as dynamics.damping=2 (docs/parameters.md lists them); can be given again",
+    )
+
+
+RUN = Verb(
+    "run",
+    run_operator,
+    _add_options,
+    output=SCENE_OUTPUT,
+    needs_output=False,
+    takes_hair=False,
+    takes_settings=False,
+    operators=OPERATORS,
+)
