@@ -19,7 +19,7 @@ from .cards.steps import result_of
 from .cards.strand_shade import strand_shade
 from .groom.weights import guide_weights
 from .pipeline import Pose, Rig, rest_occlusion, root_normals, root_turns
-from .shading.ambient import AmbientSettings
+from .shading.ambient_settings import AmbientSettings
 from .shading.drawn_strands import drawn_radius
 from .shading.settings import StrandSettings
 

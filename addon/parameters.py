@@ -1,49 +1,44 @@
-"""Every parameter set of Hairloom in one table: for the command line, the docs and the tests."""
+"""Every parameter set of Hairloom in one table: for properties, presets, command line and docs.
+
+A set is found by where it is declared: in a module of a pure room that is named settings or
+something_settings. To declare it there is all that a new section takes.
+"""
 
 from __future__ import annotations
 
-from .cards.atlas_settings import AtlasSettings
-from .cards.drawing_settings import CardDrawingSettings
-from .cards.occlusion_settings import CardOcclusionSettings
-from .cards.settings import CardSettings
-from .dynamics.cloth.settings import FinSettings
-from .dynamics.fitting.sphere_fit import SphereFitSettings
-from .dynamics.settings import DynamicsSettings
-from .groom.children_settings import ChildrenSettings
-from .groom.settings import GrowSettings, GuideSettings
-from .params import Settings
-from .refine.settings import DetailSettings
-from .shading.ambient import AmbientSettings
-from .shading.mesh_shadow_settings import MeshShadowSettings
-from .shading.picture_settings import PictureSettings
-from .shading.settings import ShadingSettings, StrandSettings
-from .shading.shafts_settings import ShaftSettings
-from .shading.skin.settings import SkinSettings
-from .shading.textures import TextureSettings
-from .shading.volume.settings import VolumeSettings
+import pkgutil
+from collections.abc import Iterator
+from importlib import import_module
+from inspect import isclass
 
-ALL_SETTINGS: dict[str, type[Settings]] = {
-    settings.section: settings
-    for settings in (
-        GrowSettings,
-        GuideSettings,
-        ChildrenSettings,
-        DynamicsSettings,
-        FinSettings,
-        SphereFitSettings,
-        DetailSettings,
-        StrandSettings,
-        ShadingSettings,
-        VolumeSettings,
-        SkinSettings,
-        ShaftSettings,
-        AmbientSettings,
-        CardSettings,
-        AtlasSettings,
-        CardOcclusionSettings,
-        CardDrawingSettings,
-        TextureSettings,
-        PictureSettings,
-        MeshShadowSettings,
-    )
-}
+from . import cards, dynamics, exchange, groom, refine, shading
+from .params import Owner, Settings
+
+#: in the order of the docs
+_ROOMS = (groom, dynamics, refine, shading, cards, exchange)
+
+
+def _declared() -> Iterator[type[Settings]]:
+    for room in _ROOMS:
+        modules = [each.name for each in pkgutil.walk_packages(room.__path__, f"{room.__name__}.")]
+        # of a folder, settings.py comes before others
+        for name in sorted(modules, key=lambda name: name.replace(".settings", ".")):
+            if name.endswith(("settings", "_settings")):
+                module = import_module(name)
+                yield from (
+                    each
+                    for each in vars(module).values()
+                    if isclass(each)
+                    and issubclass(each, Settings)
+                    and each.section
+                    and each.__module__ == name
+                )
+
+
+#: section -> its class
+ALL_SETTINGS: dict[str, type[Settings]] = {each.section: each for each in _declared()}
+
+
+def sections_of(owner: Owner) -> tuple[str, ...]:
+    """The sections that this owner keeps."""
+    return tuple(section for section, kind in ALL_SETTINGS.items() if kind.owner == owner)

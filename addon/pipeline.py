@@ -26,7 +26,8 @@ from .groom.settings import GuideSettings
 from .groom.weights import GUIDES_PER_STRAND, GuideWeights, guide_weights
 from .refine.ride import ride
 from .refine.thinning import even_ranks
-from .shading.ambient import AmbientSettings, ambient_occlusion, skin_occlusion
+from .shading.ambient import ambient_occlusion, skin_occlusion
+from .shading.ambient_settings import AmbientSettings
 from .strands import StrandSet, Surface
 from .strands.resample import resample
 

@@ -13,7 +13,7 @@ import bpy
 from .blender.command_line.command_line import run
 from .blender.engine import engine
 from .blender.preview import handlers, reactions
-from .blender.properties import engine_group, groups, previews
+from .blender.properties import groups, previews
 from .ui import (
     engine_panels,
     long_work,
@@ -46,7 +46,6 @@ COMMAND = "hairloom"
 
 CLASSES: tuple[type[Any], ...] = (
     *groups.CLASSES,
-    *engine_group.CLASSES,
     *engine.CLASSES,
     *operators_preview.CLASSES,
     *operators_bake.CLASSES,
@@ -105,7 +104,6 @@ def _steps() -> tuple[Step, ...]:
     return (
         *(_class_step(each) for each in CLASSES),
         (groups.register, groups.unregister),
-        (engine_group.register, engine_group.unregister),
         (engine_panels.register, engine_panels.unregister),
         (previews.register, previews.unregister),
         (panels.register, panels.unregister),

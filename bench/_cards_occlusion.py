@@ -19,7 +19,8 @@ from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.occlusion import CardShade, vertex_occlusion
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.shading.textures import TextureSettings, hair_textures
+from hairloom.addon.shading.texture_settings import TextureSettings
+from hairloom.addon.shading.textures import hair_textures
 from hairloom.addon.strands import Surface
 
 VERTICES, ROUNDS = 20_000, 3

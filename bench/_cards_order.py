@@ -34,7 +34,8 @@ from hairloom.addon.cards.sort import (
 )
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.shading.settings import ShadingSettings
-from hairloom.addon.shading.textures import TextureSettings, hair_textures
+from hairloom.addon.shading.texture_settings import TextureSettings
+from hairloom.addon.shading.textures import hair_textures
 from hairloom.addon.strands import Surface
 
 VIEW_COUNT, SIZE = 200, 128

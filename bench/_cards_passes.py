@@ -15,11 +15,13 @@ import gpu
 import numpy as np
 from _cards_groom import sintel_rig
 
-from hairloom.addon.blender.properties.card_form import CardForm, built_cards
+from hairloom.addon.blender.cards.card_builds import built_cards
+from hairloom.addon.blender.cards.card_making import CardInputs
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.drawing_settings import CardDrawingSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.exchange.textures.srgb import srgb_encoded
+from hairloom.addon.params import SettingsMap
 from hairloom.addon.render.accumulation import Target
 from hairloom.addon.render.camera import Camera, frame_camera
 from hairloom.addon.render.card_pass import CardPass
@@ -29,7 +31,7 @@ from hairloom.addon.render.opacity_maps import OpacityMaps
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.render.textures import texture_to_array
 from hairloom.addon.shading.lights import three_point_lights
-from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
 SIZE, COST_SIZE = 288, 720
@@ -113,9 +115,9 @@ def sintel_cards() -> tuple[CardSnapshot, MeshSnapshot]:
     if not _kept:
         rig = sintel_rig()
         assert rig.head is not None
-        form = CardForm(cards=CARDS, atlas=AtlasSettings(source="made"))
-        built = built_cards(rig, form, {})
-        cards = built.drawn(built.rest, (CardDrawingSettings(), StrandSettings()))
+        settings = SettingsMap(CARDS, AtlasSettings(source="made"))
+        built = built_cards(rig, CardInputs(settings))
+        cards = built.drawn(built.rest, settings)
         _kept.append((cards, MeshSnapshot.of(rig.head)))
     return _kept[0]
 

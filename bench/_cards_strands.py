@@ -15,19 +15,19 @@ from extension_loader import REPOSITORY
 
 from hairloom.addon import pipeline
 from hairloom.addon.blender.base.images import contact_sheet, write_png
-from hairloom.addon.blender.cards.card_making import CardChoices, MadeCards, making_steps
+from hairloom.addon.blender.cards.card_making import CardInputs, MadeCards, making_steps
 from hairloom.addon.blender.cards.card_maps import made_maps
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.cards.steps import result_of
+from hairloom.addon.params import SettingsMap
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.card_snapshot import CardSnapshot
 from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
-from hairloom.addon.shading.ambient import AmbientSettings
+from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
-from hairloom.addon.shading.textures import TextureSettings
 from hairloom.addon.shading.volume.card_opacity import StrandArea, card_shade
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
@@ -71,18 +71,18 @@ def strands_figures() -> dict[str, float]:
     return found
 
 
-def _choices(look: str, width: float) -> CardChoices:
-    return CardChoices(*SETTINGS, TextureSettings(), _look(look), StrandSettings(width_scale=width))
+def _settings(look: str, width: float) -> SettingsMap:
+    return SettingsMap(*SETTINGS, _look(look), StrandSettings(width_scale=width))
 
 
 def _made(rig: Rig, width: float) -> MadeCards:
-    return result_of(making_steps(rig, _choices(LOOKS[0], width)))
+    return result_of(making_steps(rig, CardInputs(_settings(LOOKS[0], width))))
 
 
 def _cards(rig: Rig, made: MadeCards, look: str, width: float) -> CardSnapshot:
     """The cards in a look, which changes nothing but their maps."""
-    choices, build, grid = _choices(look, width), made.build, rig.strands.grid
-    maps, mesh = made_maps(rig, build, choices), build.finest
+    settings, build, grid = _settings(look, width), made.build, rig.strands.grid
+    maps, mesh = made_maps(rig, build, settings, {}), build.finest
     area = StrandArea.of(grid, rig.strands.radius.reshape(grid.shape[:2]))
     shade = card_shade(mesh.positions, mesh.triangles, mesh.uv, maps.textures.alpha)
     return CardSnapshot(
@@ -90,7 +90,7 @@ def _cards(rig: Rig, made: MadeCards, look: str, width: float) -> CardSnapshot:
         maps.textures,
         maps.has_tangent_map,
         build.backs[0],
-        thickness=area.shade(choices.strands) / shade,
+        thickness=area.shade(settings[StrandSettings]) / shade,
         is_even=maps.is_even,
     )
 

@@ -35,12 +35,11 @@ class Shots:
         self.rig = self._pipeline.prepare(
             strands, head, settings["guides"](guide_count=CARDS), place="the built-in groom"
         )
-        self._shading, self._drawn = settings["shading"](), settings["strands"]()
-        look = studio.Look(self._shading, self._drawn, settings["detail"]())
+        groom = of_addon("blender.properties.groom_settings").GroomSettings()
         ambient = settings["ambient"]()
         occlusion = self._pipeline.rest_occlusion(self.rig, ambient)
         under = self._pipeline.head_occlusion(self.rig, ambient)
-        self._studio = studio.Studio(self.rig, occlusion, under, look)
+        self._studio = studio.Studio(self.rig, occlusion, under, groom)
 
     def strands(self) -> Any:
         rig = self.rig
@@ -49,19 +48,15 @@ class Shots:
     def built(self, way: str, levels: int = 1) -> tuple[Any, Any]:
         """Cards in this way, and how they are drawn."""
         settings, builds = self.settings, of_addon("blender.cards.card_builds")
-        form = builds.CardForm(
+        chosen = of_addon("params").SettingsMap(
             settings["cards"](way=way, card_count=CARDS, levels=levels),
-            settings["atlas"](),
             settings["card_occlusion"](rays=64),
-            settings["card_texture"](),
-            self._drawn,
-            shading=self._shading,
         )
         making = of_addon("blender.cards.card_making")
-        steps = making.making_steps(self.rig, making.CardChoices.of(form, {}))
+        steps = making.making_steps(self.rig, making.CardInputs(chosen))
         made = of_addon("cards.steps").result_of(steps)
-        tied = builds.tied_cards(self.rig, form, made)
-        return made.build, tied.drawn(tied.rest, (settings["card_drawing"](), self._drawn))
+        tied = builds.tied_cards(self.rig, made)
+        return made.build, tied.drawn(tied.rest, chosen)
 
     def cards(self, mesh: Any, drawn: Any, back: Any = None) -> Any:
         """These cards of those that are drawn, with the order of their back faces."""

@@ -61,16 +61,15 @@ def main(folder: Path) -> None:
     load_package().register()
     presets, pipeline = of_addon("blender.properties.presets"), of_addon("pipeline")
     settings, studio_of = of_addon("parameters").ALL_SETTINGS, of_addon("blender.pictures.studio")
-    images, form_of = (
-        of_addon("blender.base.images"),
-        of_addon("blender.properties.card_form").CardForm,
-    )
+    images = of_addon("blender.base.images")
     rig, ambient = wig(), settings["ambient"]()
     shading = presets.named_preset(LOOK).settings
-    plain = studio_of.Look(
-        shading=shading,
-        strands=settings["strands"](width_scale=THICKER),
-        detail=settings["detail"](full_size=0.0),
+    plain = of_addon("blender.properties.groom_settings").GroomSettings(
+        of_addon("params").SettingsMap(
+            shading,
+            settings["strands"](width_scale=THICKER),
+            settings["detail"](full_size=0.0),
+        )
     )
     occlusion = pipeline.rest_occlusion(rig, ambient), pipeline.head_occlusion(rig, ambient)
     studio = studio_of.Studio(rig, *occlusion, plain)
@@ -81,16 +80,15 @@ def main(folder: Path) -> None:
         if "dynamics" in chosen:
             return plain, moved(rig, chosen["dynamics"])
         if "volume" in chosen:
-            return replace(plain, volume=chosen["volume"]), at_rest
+            return plain.with_settings(chosen["volume"]), at_rest
         atlas = replace(chosen["atlas"], size=ATLAS)
-        form = form_of(cards=chosen["cards"], atlas=atlas, shading=shading)
         shown = settings["card_drawing"](shown_as="cards")
-        return replace(plain, card_form=form, card_drawing=shown), at_rest
+        return plain.with_settings(chosen["cards"], atlas, shown), at_rest
 
     sheet = []
     for section in ("dynamics", "volume", "cards"):
         for entry in presets.shipped(section):
-            studio.look, (pose, points) = look_and_motion(presets.named_preset(entry.name))
+            studio.settings, (pose, points) = look_and_motion(presets.named_preset(entry.name))
             size = THUMBNAIL, THUMBNAIL, SAMPLES
             picture = studio.picture(pose, points, *size, background=NO_BACKDROP)
             images.write_png(entry.path.with_suffix(".png"), coarse(picture))

@@ -54,9 +54,9 @@ def picture(rig: Any, look: dict[str, Any], camera: Any = None, samples: int = S
     )
     ambient = settings["ambient"]()
     view = look.pop("debug_view", "none")
-    chosen = studio.Look(
-        settings["shading"](), settings["strands"](), settings["detail"](**look), view
-    )
+    sections = of_addon("params").SettingsMap(settings["detail"](**look))
+    groom_settings = of_addon("blender.properties.groom_settings")
+    chosen = groom_settings.GroomSettings(sections, debug_view=view)
     occlusion = pipeline.rest_occlusion(rig, ambient)
     made = studio.Studio(rig, occlusion, pipeline.head_occlusion(rig, ambient), chosen)
     return made.picture(rig.rest_pose, rig.strands.grid, WIDTH, HEIGHT, samples, camera)

@@ -20,6 +20,7 @@ class AtlasSettings(Settings):
 
     section = "atlas"
     title = "Atlas"
+    owner = "groom"
 
     source: str = choice(
         "baked",

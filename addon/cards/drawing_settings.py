@@ -13,6 +13,7 @@ class CardDrawingSettings(Settings):
 
     section = "card_drawing"
     title = "Card Drawing"
+    owner = "groom"
 
     shown_as: str = choice(
         "strands",

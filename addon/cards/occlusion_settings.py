@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ..params import Settings, integer, number, toggle
 
@@ -12,8 +11,9 @@ from ..params import Settings, integer, number, toggle
 class CardOcclusionSettings(Settings):
     """How hair and the body shade the vertices of cards from the light of all sides."""
 
-    section: ClassVar[str] = "card_occlusion"
-    title: ClassVar[str] = "Card Occlusion"
+    section = "card_occlusion"
+    title = "Card Occlusion"
+    owner = "groom"
 
     strength: float = number(
         1.0,

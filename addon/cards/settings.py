@@ -13,6 +13,7 @@ class CardSettings(Settings):
 
     section = "cards"
     title = "Hair Cards"
+    owner = "groom"
 
     way: str = choice(
         "clusters",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ..params import choice, curve, integer, number, toggle
 from .wind_settings import WindSettings
@@ -17,8 +16,9 @@ class DynamicsSettings(WindSettings):
     alone brought it back: it does not depend on the substep, the CV count or the strand's length.
     """
 
-    section: ClassVar[str] = "dynamics"
-    title: ClassVar[str] = "Dynamics"
+    section = "dynamics"
+    title = "Dynamics"
+    owner = "character"
 
     form: str = choice(
         "automatic",

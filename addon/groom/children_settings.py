@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ..params import Settings, choice, curve, integer, number
 
@@ -16,8 +15,9 @@ _TARIQ = "Tariq 2008, Real-time hair rendering on the GPU"
 class ChildrenSettings(Settings):
     """Strands between the artist's own, which all become guides or are chosen from."""
 
-    section: ClassVar[str] = "children"
-    title: ClassVar[str] = "Children"
+    section = "children"
+    title = "Children"
+    owner = "groom"
 
     way: str = choice(
         "none",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ..params import Settings, choice, integer, number, toggle
 
@@ -14,8 +13,8 @@ _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
 class GrowSettings(Settings):
     """Hair grown from a mesh: where it leaves the scalp, how it is combed and how it falls."""
 
-    section: ClassVar[str] = "grow"
-    title: ClassVar[str] = "Grow"
+    section = "grow"
+    title = "Grow"
 
     way: str = choice(
         "combed",
@@ -189,8 +188,9 @@ class GrowSettings(Settings):
 class GuideSettings(Settings):
     """Which strands are simulated, so that all others can follow them."""
 
-    section: ClassVar[str] = "guides"
-    title: ClassVar[str] = "Guides"
+    section = "guides"
+    title = "Guides"
+    owner = "groom"
 
     guide_count: int = integer(
         762,

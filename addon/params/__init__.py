@@ -6,6 +6,18 @@ and its bytes (`params.glsl`), the preset check (`params.preset`) and the row in
 (`params.docs`).
 """
 
-from .field import Parameter, Settings, choice, color, curve, integer, number, toggle
+from .field import Owner, Parameter, Settings, choice, color, curve, integer, number, toggle
+from .settings_map import SettingsMap
 
-__all__ = ["Parameter", "Settings", "choice", "color", "curve", "integer", "number", "toggle"]
+__all__ = [
+    "Owner",
+    "Parameter",
+    "Settings",
+    "SettingsMap",
+    "choice",
+    "color",
+    "curve",
+    "integer",
+    "number",
+    "toggle",
+]

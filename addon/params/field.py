@@ -17,6 +17,9 @@ Unit = Literal[
     "none", "length", "angle", "time", "rate", "speed", "factor", "acceleration", "pixels"
 ]
 Range = tuple[float, float]
+#: What keeps a set of parameters: the groom (Blender's Curves), the character (the Object), the
+#: scene, or nothing: a job's are those of one operator or one call of a verb.
+Owner = Literal["groom", "character", "scene", "job"]
 
 _METADATA_KEY = "parameter"
 
@@ -106,6 +109,7 @@ class Settings:
     #: short name, as in preset files, property groups and the docs
     section: ClassVar[str] = ""
     title: ClassVar[str] = ""
+    owner: ClassVar[Owner] = "job"
 
     def __post_init__(self) -> None:
         for parameter in self.parameters():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ..params import Settings, choice, integer, number
 
@@ -15,8 +14,9 @@ _WANG = "Wang 1984, subdivision depth of Bezier curves"
 class DetailSettings(Settings):
     """How finely each segment of a strand is divided in the picture, and what is left out."""
 
-    section: ClassVar[str] = "detail"
-    title: ClassVar[str] = "Detail"
+    section = "detail"
+    title = "Detail"
+    owner = "groom"
 
     mode: str = choice(
         "adaptive",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ..params import Settings, integer, toggle
 
@@ -12,8 +11,9 @@ from ..params import Settings, integer, toggle
 class MeshShadowSettings(Settings):
     """Shadows of meshes on meshes, beside those of hair."""
 
-    section: ClassVar[str] = "mesh_shadows"
-    title: ClassVar[str] = "Mesh Shadows"
+    section = "mesh_shadows"
+    title = "Mesh Shadows"
+    owner = "scene"
 
     mesh_shadows: bool = toggle(
         True,

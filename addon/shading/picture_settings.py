@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ..params import Settings, integer
 
@@ -12,8 +11,9 @@ from ..params import Settings, integer
 class PictureSettings(Settings):
     """How many samples make one picture."""
 
-    section: ClassVar[str] = "picture"
-    title: ClassVar[str] = "Sampling"
+    section = "picture"
+    title = "Sampling"
+    owner = "scene"
 
     samples: int = integer(
         32,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 from ..params import Settings, choice, color, number
 from .kajiya_kay_settings import KajiyaKaySettings
@@ -118,16 +117,18 @@ class SharedSettings(Settings):
 class ShadingSettings(MarschnerSettings, KajiyaKaySettings, SharedSettings):
     """How hair answers light: what both models share, then the parameters of each."""
 
-    section: ClassVar[str] = "shading"
-    title: ClassVar[str] = "Shading"
+    section = "shading"
+    title = "Shading"
+    owner = "groom"
 
 
 @dataclass(frozen=True, kw_only=True)
 class StrandSettings(Settings):
     """How wide strands are drawn, and how much they hide."""
 
-    section: ClassVar[str] = "strands"
-    title: ClassVar[str] = "Strands"
+    section = "strands"
+    title = "Strands"
+    owner = "groom"
 
     width_scale: float = number(
         1.0,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ..params import Settings, color, integer, number, toggle
 
@@ -15,8 +14,9 @@ _NGUYEN = "Nguyen and Donnelly 2005, hair of Nalu"
 class ShaftSettings(Settings):
     """Light that haze or water scatters around a light, cut into shafts by what stands in it."""
 
-    section: ClassVar[str] = "shafts"
-    title: ClassVar[str] = "Light Shafts"
+    section = "shafts"
+    title = "Light Shafts"
+    owner = "groom"
 
     use_shafts: bool = toggle(
         False,

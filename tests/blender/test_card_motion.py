@@ -21,10 +21,9 @@ bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy 
 from hairloom.addon import pipeline  # noqa: E402
 from hairloom.addon.blender.bakes.take import shaken_poses  # noqa: E402
 from hairloom.addon.blender.cards.card_files import CardOutput, WrittenCards, write_cards  # noqa: E402
-from hairloom.addon.blender.cards.card_making import CardChoices  # noqa: E402
+from hairloom.addon.blender.cards.card_making import CardInputs  # noqa: E402
 from hairloom.addon.blender.cards.card_motion import GuideMotion, MotionChoices  # noqa: E402
 from hairloom.addon.blender.command_line.inputs import Sources, read_inputs  # noqa: E402
-from hairloom.addon.blender.properties.card_form import CardForm  # noqa: E402
 from hairloom.addon.card_flow import bound_cards, cards_at  # noqa: E402
 from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
 from hairloom.addon.cards.joints import JointChoices  # noqa: E402
@@ -32,15 +31,18 @@ from hairloom.addon.cards.settings import CardSettings  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import FBX, GLB, USD  # noqa: E402
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings  # noqa: E402
+from hairloom.addon.params import SettingsMap  # noqa: E402
 from hairloom.addon.pipeline import Pose, Rig  # noqa: E402
-from hairloom.addon.shading.textures import TextureSettings  # noqa: E402
+from hairloom.addon.shading.texture_settings import TextureSettings  # noqa: E402
 
 FRAMES, RATE = 31, 30.0
 PANDA_MOTION = Path(__file__).parent / "panda_motion.py"
-FORM = CardForm(
-    cards=CardSettings(way="guides", levels=2),
-    atlas=AtlasSettings(source="made"),
-    texture=TextureSettings(variant_width=32, height=64),
+INPUTS = CardInputs(
+    SettingsMap(
+        CardSettings(way="guides", levels=2),
+        AtlasSettings(source="made"),
+        TextureSettings(variant_width=32, height=64),
+    )
 )
 
 
@@ -64,7 +66,7 @@ def motion() -> GuideMotion:
 
 def write(path: Path, motion: GuideMotion, **choices: Any) -> WrittenCards:
     output = CardOutput(motion=MotionChoices(**choices))
-    return write_cards(path, motion.rig, CardChoices.of(FORM, {}), output, motion=motion)
+    return write_cards(path, motion.rig, INPUTS, output, motion=motion)
 
 
 def simulated(motion: GuideMotion, written: WrittenCards, frame: int) -> list[np.ndarray]:

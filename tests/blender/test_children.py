@@ -18,6 +18,8 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.strand_formats import TRESSFX
 from hairloom.addon.exchange.strand_output import StrandOutput
 from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.groom.children_settings import ChildrenSettings
+from hairloom.addon.groom.settings import GuideSettings
 
 LAST = 6
 
@@ -91,9 +93,8 @@ def test_none_is_the_artists_own_hair(new_hair, sphere, evaluated):
     hair = new_hair(sphere)
     hair.data.hairloom.children.strand_count = 17
     session = live.start(hair, evaluated())
-    choices = session.choices
     plain = pipeline.prepare(
-        session.source.strands, session.source.head, choices.guides, place="Hair"
+        session.source.strands, session.source.head, session.settings[GuideSettings], place="Hair"
     )
     np.testing.assert_array_equal(session.rig.strands.points, plain.strands.points)
     np.testing.assert_array_equal(session.rig.weights.weight, plain.weights.weight)
@@ -124,9 +125,9 @@ def test_a_hundred_thousand_children_are_made(hair, evaluated):
     rig = pipeline.prepare(
         session.source.strands,
         session.source.head,
-        session.choices.guides,
+        session.settings[GuideSettings],
         place="Hair",
-        children=replace(session.choices.children, strand_count=100_000),
+        children=replace(session.settings[ChildrenSettings], strand_count=100_000),
     )
     assert rig.strands.strand_count == 100_060
     np.testing.assert_array_equal(rig.strands.grid[:260], session.rig.strands.grid)

@@ -18,7 +18,8 @@ from hairloom.addon.cards.sort import card_orders, in_order
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.cards.card_formats import GLB
 from hairloom.addon.exchange.files.file_set import written_together
-from hairloom.addon.shading.textures import TextureSettings, hair_textures
+from hairloom.addon.shading.texture_settings import TextureSettings
+from hairloom.addon.shading.textures import hair_textures
 
 bpy = pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 

@@ -18,7 +18,8 @@ from guide_cards import build_cards
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import card_orders, in_order
-from hairloom.addon.shading.textures import TextureSettings, hair_textures
+from hairloom.addon.shading.texture_settings import TextureSettings
+from hairloom.addon.shading.textures import hair_textures
 
 pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 

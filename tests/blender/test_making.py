@@ -20,7 +20,9 @@ from hairloom.addon.blender.sessions.making import Order, make
 from hairloom.addon.blender.sessions.reading import Reading
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.dynamics.colliders import DistanceField
+from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.groom.settings import GuideSettings
 
 FRAME = 1.0 / 60.0
 COUNT = 60
@@ -175,7 +177,7 @@ def test_of_many_settings_the_last_one_counts(playing, hair, evaluated, monkeypa
     opened.set()
     arrive(playing)
     assert made == [10, 12], "what is in between is left out"
-    assert playing.choices.guides.guide_count == 12 and not playing.is_stale
+    assert playing.settings[GuideSettings].guide_count == 12 and not playing.is_stale
 
 
 def test_what_acts_at_once_meanwhile_is_kept(playing, hair, evaluated, monkeypatch):
@@ -274,9 +276,9 @@ def test_orders_tell_whether_they_give_the_same_rig(hair, evaluated, extension):
     hair.data.hairloom.guides.guide_count = 5
     other = reading.read_again(evaluated())
     assert isinstance(other, Order) and not other.gives_rig_of(order)
-    assert reading.choices.guides.guide_count != 5, "it is not shown yet"
+    assert reading.settings[GuideSettings].guide_count != 5, "it is not shown yet"
     reading.accept(other)
-    assert reading.choices.guides.guide_count == 5
+    assert reading.settings[GuideSettings].guide_count == 5
 
 
 @pytest.fixture
@@ -302,7 +304,7 @@ def rounds(session, *frames):
 def test_playback_goes_on_before_the_hair_is_made(hair, moving, evaluated, gate, monkeypatch):
     hair.hairloom.dynamics.form = "numpy"
     session = live.start(hair, evaluated())
-    fields.field_of(session.source.head, session.choices.dynamics, place="Head")
+    fields.field_of(session.source.head, session.settings[DynamicsSettings], place="Head")
     monkeypatch.setattr(playback, "is_played", lambda: True)
     before = rounds(session, 1, 2, 3, 4)  # would wait for the gate for ever
     assert not session.is_made and not session.is_playing and late.is_late(session)

@@ -10,7 +10,7 @@ from mathutils import Matrix
 from hairloom.addon.blender.colliders import spheres
 from hairloom.addon.blender.colliders.obstacles import Obstacles
 from hairloom.addon.dynamics.colliders import SphereSetCollider
-from hairloom.addon.dynamics.fitting.sphere_fit import SphereFitSettings
+from hairloom.addon.dynamics.fitting.settings import SphereFitSettings
 from hairloom.addon.dynamics.measure import deepest_penetration
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start

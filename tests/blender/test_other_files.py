@@ -11,8 +11,10 @@ from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.engine import engine_hair
 from hairloom.addon.blender.preview import live
 from hairloom.addon.blender.preview.bake import Bake
-from hairloom.addon.blender.properties.choices import Choices
+from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.viewport import overlay
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
 #: Saved before there were shadows, cards that are shown, densities and debug views.
@@ -43,8 +45,8 @@ def brought(file, *, link):
 
 
 def settings(hair):
-    choices = Choices.of(hair)
-    return choices.dynamics.damping, choices.shading.ambient
+    found = GroomSettings.of(hair)
+    return found[DynamicsSettings].damping, found[ShadingSettings].ambient
 
 
 def plays(hair):
@@ -142,9 +144,10 @@ def test_saving_leaves_the_file_of_the_library_as_it_is(override, library, tmp_p
 def test_a_file_of_an_old_version_has_what_was_set_and_defaults_for_the_rest(extension):
     bpy.ops.wm.open_mainfile(filepath=str(OLD))
     hair = bpy.data.objects["Hair"]
-    choices = Choices.of(hair)
-    assert choices.shading.base_color == (0.5, 0.25, 0.125) and choices.dynamics.damping == 2.0
-    assert choices.volume == VolumeSettings() and choices.debug_view == "none"
+    found = GroomSettings.of(hair)
+    assert found[ShadingSettings].base_color == (0.5, 0.25, 0.125)
+    assert found[DynamicsSettings].damping == 2.0
+    assert found[VolumeSettings] == VolumeSettings() and found.debug_view == "none"
     assert hair.hairloom.shown_aids == set()
     assert plays(hair)
 

@@ -11,6 +11,7 @@ from hairloom.addon.blender.command_line import command_line, job_options
 from hairloom.addon.blender.scene.principled import _values, has_principled_hair, look_from_material
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.shading.marschner.principled import PrincipledHair
+from hairloom.addon.shading.settings import ShadingSettings
 
 
 @pytest.fixture
@@ -136,7 +137,7 @@ def test_a_node_that_is_muted_or_not_linked_does_not_count(hair: Any) -> None:
 def settings_by(*arguments: str) -> Any:
     parser = command_line.parser()
     options = parser.parse_args(["render", "--output", "x.png", *arguments])
-    return job_options.chosen_settings(options)["shading"]
+    return job_options.chosen_settings(options)[ShadingSettings]
 
 
 def test_the_command_line_starts_from_the_material_and_single_values_go_over_it(

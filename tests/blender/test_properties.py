@@ -17,7 +17,7 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.curve import PLACES
 
-SECTIONS = [*groups.GROOM_SECTIONS, *groups.CHARACTER_SECTIONS]
+SECTIONS = list(groups.SECTION_GROUPS)
 PARAMETERS = [
     pytest.param(section, parameter, id=f"{section}.{parameter.name}")
     for section in SECTIONS
@@ -31,8 +31,8 @@ def group_of(new_hair):
     hair = new_hair()
 
     def get(section):
-        owner = hair.data if section in groups.GROOM_SECTIONS else hair
-        return getattr(owner.hairloom, section)
+        owners = {"groom": hair.data, "character": hair, "scene": bpy.context.scene}
+        return getattr(owners[ALL_SETTINGS[section].owner].hairloom, section)
 
     return get
 

@@ -14,6 +14,7 @@ from mathutils import Matrix
 from hairloom.addon.blender.base.objects import layer_key
 from hairloom.addon.blender.preview import live, reactions
 from hairloom.addon.blender.viewport import overlay
+from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.strands import StrandSet
 
 
@@ -44,7 +45,7 @@ def update():
 def test_the_preview_begins_with_the_hair_as_it_is(preview):
     hair, _, session = preview
     positions = np.array([point.position for point in hair.data.points])
-    assert drawn(session).shape == (60, session.choices.guides.cv_count, 3)
+    assert drawn(session).shape == (60, session.settings[GuideSettings].cv_count, 3)
     # roots and tips stay where they are when strands are resampled
     assert drawn(session)[:, 0] == pytest.approx(positions[0::8], abs=1e-6)
     assert drawn(session)[:, -1] == pytest.approx(positions[7::8], abs=1e-6)

@@ -239,10 +239,10 @@ def test_a_contact_sheet_shows_all_sides(hair: bpy.types.Object, tmp_path: Path)
 
 
 def test_a_contact_sheet_of_all_looks_leaves_the_groom_its_own(table: Turntable) -> None:
-    studio, look = table.studio, table.studio.look
+    studio, worn = table.studio, table.studio.settings
     sheet = Sheet(studio, table.pose, table.points, (48, 48), 1, by_looks=True)
     assert list(sheet.steps()) == list(range(1, len(shipped("shading")) + 1))
-    assert studio.look is look
+    assert studio.settings is worn
     rows = -(-len(shipped("shading")) // COLUMNS)
     assert sheet.picture.shape == (48 * rows, 48 * COLUMNS, 4)
     top = sheet.picture[-48:]

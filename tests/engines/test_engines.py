@@ -21,15 +21,15 @@ pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module
 
 from hairloom.addon import pipeline
 from hairloom.addon.blender.cards.card_files import CardOutput, WrittenCards, write_cards
-from hairloom.addon.blender.cards.card_making import CardChoices
+from hairloom.addon.blender.cards.card_making import CardInputs
 from hairloom.addon.cards.atlas_settings import AtlasSettings
-from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.exchange.textures.texture_files import read_texture
 from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.params import SettingsMap
 from hairloom.addon.shading.lights import Light
-from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
-from hairloom.addon.shading.textures import TextureSettings
+from hairloom.addon.shading.settings import ShadingSettings
+from hairloom.addon.shading.texture_settings import TextureSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import StrandSet
 
@@ -99,15 +99,15 @@ def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
         highlights="shift" if model == "kajiya_kay" else "tangent",
     )
     rig = pipeline.prepare(curtain(), None, GuideSettings(), place="curtain")
-    choices = CardChoices(
+    settings = SettingsMap(
         CardSettings(way="clusters" if is_baked else "guides", width_factor=1.5, card_count=40),
         AtlasSettings(source="baked" if is_baked else "made", size="512", columns=8),
-        CardOcclusionSettings(),
         texture,
         look,
-        StrandSettings(),
     )
-    written = write_cards(folder / "cards.glb", rig, choices, CardOutput(index_buffer=True))
+    written = write_cards(
+        folder / "cards.glb", rig, CardInputs(settings), CardOutput(index_buffer=True)
+    )
     view = {
         "eye": glb_axes(EYE),
         "target": glb_axes(TARGET),

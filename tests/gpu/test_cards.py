@@ -13,7 +13,8 @@ from hairloom.addon.shading.card_look import card_base, mapped_tangent
 from hairloom.addon.shading.kajiya_kay import kajiya_kay
 from hairloom.addon.shading.lights import Light, light_at, light_irradiance
 from hairloom.addon.shading.settings import ShadingSettings
-from hairloom.addon.shading.textures import HairTextures, TextureSettings, hair_textures
+from hairloom.addon.shading.texture_settings import TextureSettings
+from hairloom.addon.shading.textures import HairTextures, hair_textures
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 

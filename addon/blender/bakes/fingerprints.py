@@ -13,12 +13,14 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...dynamics.settings import DynamicsSettings
+from ...groom.children_settings import ChildrenSettings
+from ...groom.settings import GuideSettings
 from ...pipeline import Pose
 from ..base.objects import matrix_of
 from ..base.vertex_weights import weight_names, weights_on
 from ..colliders.carriers import is_deforming
 from ..colliders.obstacles import shape_of, sources_of
-from ..properties.choices import Choices
+from ..properties.groom_settings import GroomSettings
 from ..scene.curves import GROUP_ATTRIBUTES
 from ..scene.surfaces import read_positions
 from ..scene.wind import gravity_of, scene_wind
@@ -31,17 +33,20 @@ RIG_PARTS = ("hair", "head", "guides", "children")
 def groom_fingerprint(
     hair: bpy.types.Object,
     head: bpy.types.Object | None,
-    choices: Choices,
+    settings: GroomSettings,
     scene: bpy.types.Scene,
 ) -> str:
     """Named hashes, see `simulated.hashes`; their names are what an artist is told has changed."""
     grown: dict[str, tuple[Hashed, ...]] = {}
-    if choices.children.way != "none":  # bakes of older versions know of no children
-        grown["children"] = choices.children, _density_before_modifiers(head, choices)
+    if settings[ChildrenSettings].way != "none":  # bakes of older versions know of no children
+        grown["children"] = (
+            settings[ChildrenSettings],
+            _density_before_modifiers(head, settings),
+        )
     return hashes(
         hair=_curves_parts(hair),
         head=() if head is None else mesh_parts(head),
-        guides=choices.guides,
+        guides=settings[GuideSettings],
         **grown,
         colliders=collider_shapes(hair, head),
         frame_rate=frame_rate(scene),
@@ -75,7 +80,7 @@ def settings_part(hair: bpy.types.Object) -> str:
 
 def _dynamics(hair: bpy.types.Object) -> DynamicsSettings:
     """All forms of the solver give the same motion."""
-    return replace(Choices.of(hair).dynamics, form="automatic")
+    return replace(GroomSettings.of(hair)[DynamicsSettings], form="automatic")
 
 
 def collider_places(
@@ -109,9 +114,9 @@ def frame_rate(scene: bpy.types.Scene) -> float:
     return float(scene.render.fps) / float(scene.render.fps_base)
 
 
-def _density_before_modifiers(head: bpy.types.Object | None, choices: Choices) -> Hashed:
+def _density_before_modifiers(head: bpy.types.Object | None, settings: GroomSettings) -> Hashed:
     """What children grow by on the head; the name alone where modifiers make it."""
-    name = choices.children_density
+    name = settings.children_density
     if head is None or name not in weight_names(head):
         return name
     return weights_on(head, head.data, name)

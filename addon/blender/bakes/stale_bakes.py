@@ -6,7 +6,7 @@ import bpy
 
 from ...errors import HairloomError
 from ..base.objects import Body, Handle, head_of
-from ..properties.choices import Choices
+from ..properties.groom_settings import GroomSettings
 from ..scene.poses import read_pose
 from . import playback
 from .cache import Cache
@@ -24,8 +24,8 @@ def changed_since(
     Raises:
         HairloomError: the bake is damaged.
     """
-    facts, head, choices = cache.facts, head_of(hair), Choices.of(hair)
-    now = groom_fingerprint(hair, head, choices, depsgraph.scene)
+    facts, head, settings = cache.facts, head_of(hair), GroomSettings.of(hair)
+    now = groom_fingerprint(hair, head, settings, depsgraph.scene)
     changed = differences(as_now(facts.fingerprint, facts.moments), now)
     scene = depsgraph.scene
     if cache.holds(scene.frame_current) and not scene.frame_subframe:

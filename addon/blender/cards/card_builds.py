@@ -6,29 +6,29 @@ build waits there until it is served.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from ...arrays import Floats
 from ...card_flow import bound_cards, cards_at
 from ...cards.atlas_maps import AtlasMaps
 from ...cards.bake_strands import FlatStrands
+from ...cards.drawing_settings import CardDrawingSettings
 from ...cards.follow import CardBinding
 from ...cards.steps import result_of, retold
 from ...errors import HairloomError
+from ...params import SettingsMap
 from ...pipeline import Pose, Rig
 from ...render.card_snapshot import CardSnapshot
 from ...render.card_textures import CardTextures, packed_textures
+from ...shading.settings import StrandSettings
 from ...shading.volume.card_opacity import StrandArea, card_shade
 from ..base.thread_work import ThreadWork
-from ..properties.card_form import CardForm, CardsDrawn
 from .card_atlas import drawing_maps, has_gpu
-from .card_making import CardChoices, MadeCards, making_steps
+from .card_making import CardInputs, MadeCards, making_steps
 from .card_maps import made_maps
-from .occluders import OtherHair
-
-_NO_OTHERS = OtherHair()
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,6 @@ class BuiltCards:
     """
 
     rig: Rig
-    form: CardForm
     binding: CardBinding
     rest: CardSnapshot
     strand_area: StrandArea
@@ -48,43 +47,30 @@ class BuiltCards:
     wrong_share: float
     notes: tuple[str, ...]
 
-    def at(self, pose: Pose, guides: Floats, drawn: CardsDrawn) -> CardSnapshot:
+    def at(self, pose: Pose, guides: Floats, settings: SettingsMap) -> CardSnapshot:
         """The cards riding on guides (guide_count, cv_count, 3) [m, world]."""
         mesh = cards_at(self.rig, self.binding, pose, guides)
-        return self.drawn(replace(self.rest, mesh=mesh), drawn)
+        return self.drawn(replace(self.rest, mesh=mesh), settings)
 
-    def drawn(self, cards: CardSnapshot, drawn: CardsDrawn) -> CardSnapshot:
+    def drawn(self, cards: CardSnapshot, settings: SettingsMap) -> CardSnapshot:
         """The same cards by these settings."""
-        drawing, strands = drawn
-        thickness = self.strand_area.shade(strands) / max(self.card_shade, 1.0e-12)
-        return replace(cards, drawing=drawing, thickness=thickness)
+        shade = self.strand_area.shade(settings[StrandSettings])
+        thickness = shade / max(self.card_shade, 1.0e-12)
+        return replace(cards, drawing=settings[CardDrawingSettings], thickness=thickness)
 
 
-def built_cards(
-    rig: Rig,
-    form: CardForm,
-    pictures: Mapping[str, Floats],
-    others: OtherHair = _NO_OTHERS,
-) -> BuiltCards:
+def built_cards(rig: Rig, inputs: CardInputs) -> BuiltCards:
     """Build the cards of a rig with their textures, here and now.
 
     Raises:
         HairloomError: no cards can be made.
     """
-    return tied_cards(
-        rig, form, result_of(making_steps(rig, CardChoices.of(form, pictures, others)))
-    )
+    return tied_cards(rig, result_of(making_steps(rig, inputs)))
 
 
-def cards_built_in_thread(
-    work: ThreadWork[BuiltCards],
-    rig: Rig,
-    form: CardForm,
-    pictures: Mapping[str, Floats],
-    others: OtherHair = _NO_OTHERS,
-) -> BuiltCards:
+def cards_built_in_thread(work: ThreadWork[BuiltCards], rig: Rig, inputs: CardInputs) -> BuiltCards:
     """As `built_cards` in the thread of this work, with their textures on the GPU."""
-    built = tied_cards(rig, form, made_in_thread(work, rig, CardChoices.of(form, pictures, others)))
+    built = tied_cards(rig, made_in_thread(work, rig, inputs))
     work.report("Textures")
     device = _uploaded(work, built.rest)
     return replace(built, rest=replace(built.rest, device=device))
@@ -108,7 +94,7 @@ def _uploaded(work: ThreadWork[Any], cards: CardSnapshot) -> CardTextures | None
     return work.on_main_thread(uploading())
 
 
-def made_in_thread(work: ThreadWork[Any], rig: Rig, choices: CardChoices) -> MadeCards:
+def made_in_thread(work: ThreadWork[Any], rig: Rig, inputs: CardInputs) -> MadeCards:
     """Make cards in the thread of this work; the main thread draws the atlas.
 
     Raises:
@@ -119,17 +105,17 @@ def made_in_thread(work: ThreadWork[Any], rig: Rig, choices: CardChoices) -> Mad
     def draw(flat: FlatStrands, size: int) -> AtlasMaps:
         return work.on_main_thread(drawing_maps(flat, size))
 
-    steps = making_steps(rig, choices, lambda build: made_maps(rig, build, choices, draw))
+    maps_of = partial(made_maps, rig, settings=inputs.settings, pictures=inputs.pictures, draw=draw)
+    steps = making_steps(rig, inputs, maps_of)
     return result_of(retold(steps, work.report))
 
 
-def tied_cards(rig: Rig, form: CardForm, made: MadeCards) -> BuiltCards:
+def tied_cards(rig: Rig, made: MadeCards) -> BuiltCards:
     """Cards that are made, with all that drawing them needs."""
     build, textures = made.build, made.maps.textures
     mesh, strands = build.finest, rig.strands
     return BuiltCards(
         rig,
-        form,
         bound_cards(rig, mesh),
         CardSnapshot(
             mesh,

@@ -17,11 +17,12 @@ from ...exchange.cards.card_formats import CardFormat, format_of
 from ...exchange.cards.index_buffer import index_buffer
 from ...exchange.cards.sidecar import SUFFIX, CardFile, sidecar_text
 from ...exchange.files.file_set import written_together
+from ...params import SettingsMap
 from ...pipeline import Rig
 from ...shading.card_look import EVEN_ALPHA
 from ...shading.settings import ShadingSettings
 from ..base.report import hairloom_version
-from .card_making import CardChoices, MadeCards, making_steps
+from .card_making import CardInputs, MadeCards, making_steps
 from .card_maps import CardMaps, made_maps
 from .card_material import material_of, write_tables
 from .card_motion import (
@@ -91,7 +92,7 @@ def _untimed(_name: str) -> AbstractContextManager[None]:
 def write_cards(
     path: Path,
     rig: Rig,
-    choices: CardChoices,
+    inputs: CardInputs,
     output: CardOutput | None = None,
     stage: Stage = _untimed,
     motion: GuideMotion | None = None,
@@ -112,11 +113,11 @@ def write_cards(
 
     def maps_of(build: CardBuild) -> CardMaps:
         with stage("card texture"):
-            return made_maps(rig, build, choices)
+            return made_maps(rig, build, inputs.settings, inputs.pictures)
 
     with stage("build cards"):
-        made = result_of(making_steps(rig, choices, maps_of))
-    return result_of(file_steps(path, made, choices, output, stage, motion))
+        made = result_of(making_steps(rig, inputs, maps_of))
+    return result_of(file_steps(path, made, inputs.settings, output, stage, motion))
 
 
 def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> None:
@@ -134,7 +135,7 @@ def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> 
 def file_steps(
     path: Path,
     made: MadeCards,
-    choices: CardChoices,
+    settings: SettingsMap,
     output: CardOutput,
     stage: Stage = _untimed,
     motion: GuideMotion | None = None,
@@ -147,7 +148,7 @@ def file_steps(
     path, file_format = format_of(path, output.format)
     check_cards(made.build.levels, str(path))
     with written_together(path) as folder:
-        writer = _Writer(folder / path.name, made, choices, output, file_format, stage)
+        writer = _Writer(folder / path.name, made, settings, output, file_format, stage)
         told = yield from writer.steps(motion)
         names = {file.name for file in folder.iterdir() if file.is_file()}
     beside = sorted(names - {path.name, path.stem + SUFFIX})
@@ -163,7 +164,7 @@ class _Writer:
 
     path: Path
     made: MadeCards
-    choices: CardChoices
+    settings: SettingsMap
     output: CardOutput
     file_format: CardFormat
     stage: Stage
@@ -227,7 +228,7 @@ class _Writer:
     ) -> None:
         """Textures, mesh, indices, and the sidecar last."""
         path, build, maps, output = self.path, self.made.build, self.made.maps, self.output
-        shading = self.choices.shading
+        shading = self.settings[ShadingSettings]
         with self.stage("write textures"):
             grid = build.finest.atlas
             written = write_textures(path.parent, path.stem, maps.by_name, grid, output.textures)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Hashable, Mapping
 from dataclasses import dataclass, field
 
 import bpy
@@ -13,59 +13,51 @@ from ...cards.atlas_settings import AtlasSettings
 from ...cards.build import CardBuild
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
+from ...params import SettingsMap
 from ...pipeline import Rig
-from ...shading.ambient import AmbientSettings
+from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings, StrandSettings
-from ...shading.textures import TextureSettings
-from ..properties.card_form import CardForm
-from ..properties.choices import Choices
+from ...shading.texture_settings import TextureSettings
+from ..properties.groom_settings import GroomSettings
 from .card_images import chosen_pictures
 from .card_maps import CardMaps, made_maps
 from .occluders import OtherHair, read_other_hair
 
 
-@dataclass(frozen=True)
-class CardChoices:
-    """All that cards hang on.
+@dataclass(frozen=True, eq=False)
+class CardInputs:
+    """All that cards are built from, beside the rig.
 
     pictures: what takes the place of generated textures, see `textures.picture_as`.
     others: hair of other grooms, which shades these, where it is while these are at rest.
-    ambient: of the strands, whose occlusion the cards take over.
     """
 
-    cards: CardSettings
-    atlas: AtlasSettings
-    occlusion: CardOcclusionSettings
-    texture: TextureSettings
-    shading: ShadingSettings
-    strands: StrandSettings
+    settings: SettingsMap
     pictures: Mapping[str, Floats] = field(default_factory=dict)
     others: OtherHair = field(default_factory=OtherHair)
-    ambient: AmbientSettings = field(default_factory=AmbientSettings)
-
-    @classmethod
-    def of(
-        cls, form: CardForm, pictures: Mapping[str, Floats], others: OtherHair | None = None
-    ) -> CardChoices:
-        """A form with the pictures themselves, and with the hair of other grooms."""
-        return cls(
-            form.cards,
-            form.atlas,
-            form.occlusion,
-            form.texture,
-            form.shading,
-            form.strands,
-            pictures,
-            OtherHair() if others is None else others,
-            form.ambient,
-        )
 
 
-def card_choices(hair: bpy.types.Object) -> tuple[CardChoices, tuple[str, ...]]:
+def cards_key(groom: GroomSettings) -> Hashable:
+    """The same for settings that give the same cards.
+
+    Of the strands in the atlas a change of colours alone counts as none, since the atlas holds how
+    strands differ from the mean, which colours hardly change.
+    """
+    kinds = CardSettings, AtlasSettings, CardOcclusionSettings, TextureSettings
+    look = groom[ShadingSettings]
+    return (
+        groom.sections.only(*kinds, StrandSettings, AmbientSettings),
+        (look.model, look.color_variation, look.grey_share),
+        groom.card_pictures,
+    )
+
+
+def card_inputs(hair: bpy.types.Object) -> tuple[CardInputs, tuple[str, ...]]:
     """What the groom's own settings say of its cards, and warnings of pictures that are no use."""
     pictures, warnings = chosen_pictures(hair.data.hairloom.card_images)
-    form = Choices.of(hair).card_form
-    return CardChoices.of(form, pictures, read_other_hair(form.occlusion, hair)), warnings
+    settings = GroomSettings.of(hair).sections
+    others = read_other_hair(settings[CardOcclusionSettings], hair)
+    return CardInputs(settings, pictures, others), warnings
 
 
 @dataclass(frozen=True)
@@ -82,7 +74,7 @@ type MapsOf = Callable[[CardBuild], CardMaps]
 
 
 def making_steps(
-    rig: Rig, choices: CardChoices, maps_of: MapsOf | None = None
+    rig: Rig, inputs: CardInputs, maps_of: MapsOf | None = None
 ) -> Generator[str, None, MadeCards]:
     """Cards with their maps; each step tells what comes next.
 
@@ -95,20 +87,25 @@ def making_steps(
     made: list[CardMaps] = []
 
     def alpha_of(build: CardBuild) -> Floats:
-        made.append(made_maps(rig, build, choices) if maps_of is None else maps_of(build))
+        made.append(
+            made_maps(rig, build, inputs.settings, inputs.pictures)
+            if maps_of is None
+            else maps_of(build)
+        )
         return made[-1].textures.alpha
 
     yield "Other hair"
-    others, notes = choices.others.shades()
+    others, notes = inputs.others.shades()
+    settings = inputs.settings
     build = yield from card_build_steps(
         rig,
-        choices.cards,
-        choices.atlas,
-        choices.occlusion,
+        settings[CardSettings],
+        settings[AtlasSettings],
+        settings[CardOcclusionSettings],
         alpha_of,
-        choices.strands,
+        settings[StrandSettings],
         others,
-        choices.ambient,
+        settings[AmbientSettings],
     )
     return MadeCards(build, made[-1], (*build.notes, *notes))
 

@@ -4,29 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
 from ...arrays import Floats
 from ...cards.build import CardBuild
+from ...params import SettingsMap
 from ...pipeline import Rig
 from ...shading.settings import ShadingSettings, StrandSettings
-from ...shading.textures import TEXTURES, HairTextures, TextureSettings, hair_textures
+from ...shading.texture_settings import TextureSettings
+from ...shading.textures import TEXTURES, HairTextures, hair_textures
 from .card_atlas import AtlasDraw, baked_atlas, drawn_maps
-
-
-class MapChoices(Protocol):
-    """What maps hang on, beside the cards."""
-
-    @property
-    def texture(self) -> TextureSettings: ...
-    @property
-    def shading(self) -> ShadingSettings: ...
-    @property
-    def strands(self) -> StrandSettings: ...
-    @property
-    def pictures(self) -> Mapping[str, Floats]: ...
 
 
 @dataclass(frozen=True)
@@ -57,27 +45,33 @@ class CardMaps:
 
 
 def made_maps(
-    rig: Rig, build: CardBuild, choices: MapChoices, draw: AtlasDraw = drawn_maps
+    rig: Rig,
+    build: CardBuild,
+    settings: SettingsMap,
+    pictures: Mapping[str, Floats],
+    draw: AtlasDraw = drawn_maps,
 ) -> CardMaps:
     """The maps of these cards.
 
     Shift and noise break up highlights from strand to strand and are made by chance in any case.
 
     Args:
+        pictures: that take the place of maps, by name.
         draw: see `card_atlas.baked_atlas`.
     """
-    made = hair_textures(choices.texture, build.finest.atlas.columns)
+    texture = settings[TextureSettings]
+    made = hair_textures(texture, build.finest.atlas.columns)
     if build.plan is None:
-        textures = made.with_pictures(choices.pictures)
+        textures = made.with_pictures(pictures)
         by_name = {name: getattr(textures, name) for name in TEXTURES}
-        return CardMaps(by_name, textures, choices.texture.highlights)
-    maps = baked_atlas(rig, build.plan, choices.shading, choices.strands, draw)
+        return CardMaps(by_name, textures, texture.highlights)
+    maps = baked_atlas(rig, build.plan, settings[ShadingSettings], settings[StrandSettings], draw)
     # as many strips above each other as the atlas has rows
     rows = (build.plan.grid.rows, 1)
     noises = {"shift": np.tile(made.shift, rows), "noise": np.tile(made.noise, rows)}
-    by_name = {**maps.by_name, **noises, **choices.pictures}
-    gain = 1.0 if "base" in choices.pictures else maps.base_gain
+    by_name = {**maps.by_name, **noises, **pictures}
+    gain = 1.0 if "base" in pictures else maps.base_gain
     names = ("alpha", "shift", "noise", "tangent", "normal")
     shown = {name: by_name[name] for name in names}
     textures = HairTextures(base=by_name["base"] * gain, **shown)
-    return CardMaps(by_name, textures, "tangent", gain, is_even="alpha" not in choices.pictures)
+    return CardMaps(by_name, textures, "tangent", gain, is_even="alpha" not in pictures)

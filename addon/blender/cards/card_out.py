@@ -7,6 +7,7 @@ from pathlib import Path
 
 import bpy
 
+from ...cards.settings import CardSettings
 from ...pipeline import Rig
 from ..base.outcome import Outcome, notes_of
 from ..base.thread_work import ThreadWork
@@ -14,7 +15,7 @@ from ..scene.rigs import rig_of
 from ..scene.source import read_source
 from .card_builds import made_in_thread
 from .card_files import CardOutput, FileSteps, WrittenCards, check_output, file_steps
-from .card_making import CardChoices, MadeCards, card_choices, order_line
+from .card_making import CardInputs, MadeCards, card_inputs, order_line
 from .card_motion import GuideMotion, baked_motion
 
 
@@ -25,7 +26,7 @@ class CardExport:
     path: Path
     output: CardOutput
     rig: Rig
-    choices: CardChoices
+    inputs: CardInputs
     motion: GuideMotion | None
     dropped: dict[str, int]
     notes: tuple[str, ...]
@@ -50,29 +51,30 @@ class CardExport:
         Raises:
             HairloomError: no hair that can be used, no bake, or a format that cannot be written.
         """
-        choices, warnings = card_choices(hair)
+        inputs, warnings = card_inputs(hair)
         if levels is not None:
-            choices = replace(choices, cards=replace(choices.cards, levels=levels))
+            cards = replace(inputs.settings[CardSettings], levels=levels)
+            inputs = replace(inputs, settings=inputs.settings.with_settings(cards))
         if output.motion.kind != "none":
             motion = baked_motion(hair, frames)
             check_output(path, output, motion)
             notes = (*notes_of(hair, motion.rig), *motion.notes, *warnings)
-            return cls(path, output, motion.rig, choices, motion, {}, notes)
+            return cls(path, output, motion.rig, inputs, motion, {}, notes)
         check_output(path, output, None)
         source = read_source(hair, depsgraph)
         rig = rig_of(hair, source)
         notes = (*source.warnings, *notes_of(hair, rig), *warnings)
-        return cls(path, output, rig, choices, None, source.dropped, notes)
+        return cls(path, output, rig, inputs, None, source.dropped, notes)
 
     def making(self) -> ThreadWork[MadeCards]:
         """Build the cards in a thread."""
         return ThreadWork(
-            lambda work: made_in_thread(work, self.rig, self.choices), "hairloom card files"
+            lambda work: made_in_thread(work, self.rig, self.inputs), "hairloom card files"
         )
 
     def writing(self, made: MadeCards) -> FileSteps[Outcome]:
         """Write the cards that were made; closing it leaves old files as they were."""
-        steps = file_steps(self.path, made, self.choices, self.output, motion=self.motion)
+        steps = file_steps(self.path, made, self.inputs.settings, self.output, motion=self.motion)
         return self._told(steps)
 
     def _told(self, steps: FileSteps[WrittenCards]) -> FileSteps[Outcome]:

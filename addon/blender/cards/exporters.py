@@ -19,11 +19,11 @@ import numpy as np
 
 from ...arrays import Floats
 from ...cards.card_mesh import CardMesh
-from ...cards.segments import unit
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import FBX, GLB, OBJ, USD, CardFormat
 from ...exchange.files.names import plain_name
 from ...exchange.textures.srgb import srgb_decoded
+from ...strands.vectors import unit
 from .material import Color, fill_image, named_image, new_material
 from .mesh import OCCLUSION_LAYER, fill_mesh
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...cards.card_mesh import CardMesh
-from ...cards.segments import unit
+from ...strands.vectors import unit
 from ..base.attributes import set_attribute
 
 #: the UV map that holds occlusion and along

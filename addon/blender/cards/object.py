@@ -15,13 +15,14 @@ from ...arrays import Floats
 from ...cards.build import CardBuild
 from ...cards.card_mesh import OF_CARDS, CardMesh
 from ...errors import HairloomError
+from ...shading.settings import ShadingSettings
 from ..base.objects import Handle, head_of, matrix_of
 from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
 from ..scene.rigs import rig_of
 from ..scene.source import read_source
 from .card_builds import made_in_thread
-from .card_making import MadeCards, card_choices, order_line
+from .card_making import MadeCards, card_inputs, order_line
 from .material import Color, fill_image, new_material
 from .mesh import OCCLUSION_LAYER, fill_mesh
 
@@ -41,7 +42,7 @@ class CardObjectJob:
             _check_editable(obj)
         source = read_source(hair, depsgraph)
         self._rig = rig_of(hair, source)
-        self._choices, warnings = card_choices(hair)
+        self._inputs, warnings = card_inputs(hair)
         self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)
         self.objects: list[bpy.types.Object] = []
         self.order = ""
@@ -50,8 +51,8 @@ class CardObjectJob:
 
     def making(self) -> ThreadWork[MadeCards]:
         """Make the cards in a thread, which touches nothing of Blender's."""
-        rig, choices = self._rig, self._choices
-        return ThreadWork(lambda work: made_in_thread(work, rig, choices), "hairloom card objects")
+        rig, inputs = self._rig, self._inputs
+        return ThreadWork(lambda work: made_in_thread(work, rig, inputs), "hairloom card objects")
 
     def write(self, made: MadeCards) -> None:
         """Put them into the scene.
@@ -67,7 +68,7 @@ class CardObjectJob:
         for obj in card_objects(hair):
             _check_editable(obj)
         self.notes += tuple(f"{hair.name}: {note}." for note in made.notes)
-        color = self._choices.shading.base_color
+        color = self._inputs.settings[ShadingSettings].base_color
         self.objects = _write(hair, build, made.maps.textures.card, color, self._matrix)
         self.order = order_line(build.wrong_share)
 

@@ -18,11 +18,14 @@ from ...arrays import Floats
 from ...cards.occlusion import CardShade
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...errors import HairloomError
+from ...groom.children_settings import ChildrenSettings
+from ...groom.settings import GuideSettings
+from ...params import SettingsMap
 from ...shading.settings import StrandSettings
 from ...strands import Surface
 from ..base.objects import objects_in
-from ..properties.properties import settings_of
-from ..scene.rigs import RigSettings
+from ..properties.groom_settings import GroomSettings
+from ..scene.rigs import rig_from
 from ..scene.source import Source, read_source
 from ..scene.surfaces import read_surface
 from .material import alpha_of
@@ -96,18 +99,19 @@ class _ReadMesh:
 @dataclass(frozen=True, eq=False)
 class _ReadStrands:
     source: Source
-    rig: RigSettings
-    drawn: StrandSettings
+    settings: SettingsMap
+    name: str
 
     def shade(self) -> CardShade:
-        return card_flow.shade_of(self.rig.rig(self.source), self.drawn)
+        rig = rig_from(self.source, self.settings, place=self.name)
+        return card_flow.shade_of(rig, self.settings[StrandSettings])
 
     @property
     def state(self) -> tuple[object, ...]:
         source, strands = self.source, self.source.strands
         head = None if source.head is None else source.head.positions
         hair = strands.points, strands.offsets, strands.radius, strands.group
-        return *hair, head, source.density, self.rig, self.drawn
+        return *hair, head, source.density, self.name, self.settings
 
 
 def read_other_hair(
@@ -170,8 +174,9 @@ def _read_strands(
         strands=source.strands.transformed(back),
         head=None if source.head is None else source.head.transformed(back),
     )
-    drawn = settings_of(hair.data.hairloom.strands, StrandSettings)
-    return _ReadStrands(source, RigSettings.of(hair), drawn)
+    settings = GroomSettings.of(hair).sections
+    of_shade = settings.only(GuideSettings, ChildrenSettings, StrandSettings)
+    return _ReadStrands(source, of_shade, hair.name)
 
 
 def _shades_nothing(error: HairloomError) -> str:

@@ -6,7 +6,7 @@ stays until it is done. In the background they are built at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -14,16 +14,18 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
+from ...cards.occlusion_settings import CardOcclusionSettings
 from ...errors import HairloomError
+from ...params import SettingsMap
 from ...pipeline import Pose, Rig
 from ...render.card_snapshot import CardSnapshot
 from ...render.snapshot import Snapshot
 from ..base import latest_job
 from ..base.latest_job import LatestJob, Work
-from ..properties.card_form import CardForm, CardsDrawn
+from ..properties.groom_settings import GroomSettings
 from .card_builds import BuiltCards, built_cards, cards_built_in_thread, told
 from .card_images import chosen_pictures
-from .card_making import order_line
+from .card_making import CardInputs, cards_key, order_line
 from .occluders import OtherHair, read_other_hair
 
 
@@ -68,9 +70,11 @@ class ShownCards:
         self, hair: Callable[[], bpy.types.Object], arrived: Callable[[], None] = lambda: None
     ) -> None:
         self._hair = hair
-        self._job = LatestJob[tuple[Rig, CardForm], BuiltCards]("hairloom cards", arrived, _same)
+        self._job = LatestJob[tuple[Rig, GroomSettings], BuiltCards](
+            "hairloom cards", arrived, _same
+        )
         self._built: BuiltCards | None = None
-        self._wanted: tuple[Rig, CardForm] | None = None
+        self._wanted: tuple[Rig, GroomSettings] | None = None
         self._shown: CardSnapshot | None = None
         self._others = OtherHair()
         self._motion: Floats = np.eye(4)
@@ -102,16 +106,16 @@ class ShownCards:
         cards, triangles, _ = self.counts
         return f"{cards:,} cards, {triangles:,} triangles", order_line(self._built.wrong_share)
 
-    def want(self, rig: Rig, form: CardForm) -> None:
-        """Cards of this rig and form from now on; nothing is built twice."""
-        if self._wanted is None or not _same(self._wanted, (rig, form)):
-            self._wanted = rig, form
+    def want(self, rig: Rig, settings: GroomSettings) -> None:
+        """Cards of this rig by these settings from now on; nothing is built twice."""
+        if self._wanted is None or not _same(self._wanted, (rig, settings)):
+            self._wanted = rig, settings
             self._build()
 
     @property
     def is_shaded_by_others(self) -> bool:
         """Whether other hair shades what is shown."""
-        return self._wanted is not None and self._wanted[1].occlusion.others
+        return self._wanted is not None and self._wanted[1][CardOcclusionSettings].others
 
     @property
     def shaded_by(self) -> frozenset[int]:
@@ -132,7 +136,7 @@ class ShownCards:
         self._take(self._job.take)
 
     def now(
-        self, rig: Rig, pose: Pose, guides: Callable[[], Floats], drawn: CardsDrawn
+        self, rig: Rig, pose: Pose, guides: Callable[[], Floats], settings: SettingsMap
     ) -> CardSnapshot | None:
         """The cards as they are now; where the rig is another one, as they were, until those of
         this one are built. None without any.
@@ -145,9 +149,9 @@ class ShownCards:
         if built is None:
             return None
         if built.rig is rig:
-            self._shown = built.at(pose, guides(), drawn)
+            self._shown = built.at(pose, guides(), settings)
         elif self._shown is not None:
-            self._shown = built.drawn(self._shown, drawn)
+            self._shown = built.drawn(self._shown, settings)
         return self._shown
 
     def forget(self) -> None:
@@ -160,27 +164,28 @@ class ShownCards:
     def _build(self, others: OtherHair | None = None) -> None:
         """Have what is wanted built; at once where nothing goes on until then."""
         assert self._wanted is not None
-        rig, form = self._wanted
-        if not latest_job.is_blocking():
-            self._job.want(self._wanted, lambda: self._begun(rig, form, others))
-            return
-        pictures, others = self._read(form, others)
-        self._take(lambda: built_cards(rig, form, pictures, others))
+        rig, settings = self._wanted
+        if latest_job.is_blocking():
+            self._take(lambda: built_cards(rig, self._read(settings, others)))
+        else:
+            self._job.want(self._wanted, lambda: self._begun(rig, settings, others))
 
-    def _begun(self, rig: Rig, form: CardForm, others: OtherHair | None) -> Work[BuiltCards]:
-        pictures, others = self._read(form, others)
-        return partial(cards_built_in_thread, rig=rig, form=form, pictures=pictures, others=others)
+    def _begun(
+        self, rig: Rig, settings: GroomSettings, others: OtherHair | None
+    ) -> Work[BuiltCards]:
+        return partial(cards_built_in_thread, rig=rig, inputs=self._read(settings, others))
 
-    def _read(
-        self, form: CardForm, others: OtherHair | None
-    ) -> tuple[Mapping[str, Floats], OtherHair]:
-        """The chosen pictures and the other hair as they are now."""
-        self._others = others or self._read_others(form)
-        return chosen_pictures(self._hair().data.hairloom.card_images)[0], self._others
+    def _read(self, settings: GroomSettings, others: OtherHair | None) -> CardInputs:
+        """With the chosen pictures and the other hair as they are now."""
+        self._others = others or self._read_others(settings)
+        pictures, _ = chosen_pictures(self._hair().data.hairloom.card_images)
+        return CardInputs(settings.sections, pictures, self._others)
 
-    def _read_others(self, form: CardForm) -> OtherHair:
+    def _read_others(self, settings: GroomSettings) -> OtherHair:
         depsgraph = bpy.context.view_layer.depsgraph
-        return read_other_hair(form.occlusion, self._hair(), depsgraph, self._motion)
+        return read_other_hair(
+            settings[CardOcclusionSettings], self._hair(), depsgraph, self._motion
+        )
 
     def _take(self, result: Callable[[], BuiltCards | None]) -> None:
         try:
@@ -192,5 +197,5 @@ class ShownCards:
             self._built, self.warnings = built, built.notes
 
 
-def _same(one: tuple[Rig, CardForm], other: tuple[Rig, CardForm]) -> bool:
-    return one[0] is other[0] and one[1] == other[1]
+def _same(one: tuple[Rig, GroomSettings], other: tuple[Rig, GroomSettings]) -> bool:
+    return one[0] is other[0] and cards_key(one[1]) == cards_key(other[1])

@@ -14,7 +14,8 @@ import numpy as np
 from mathutils import Matrix
 
 from ...arrays import Floats, Ints
-from ...dynamics.fitting.sphere_fit import SphereFit, SphereFitSettings, fit_spheres
+from ...dynamics.fitting.settings import SphereFitSettings
+from ...dynamics.fitting.sphere_fit import SphereFit, fit_spheres
 from ..base.objects import head_of, objects_in
 from ..scene.surfaces import read_positions, read_surface
 

@@ -10,6 +10,8 @@ from pathlib import Path
 import bpy
 
 from ...arrays import Floats
+from ...cards.occlusion_settings import CardOcclusionSettings
+from ...cards.settings import CardSettings
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import format_of
 from ...pipeline import Rig
@@ -17,13 +19,13 @@ from ..bakes.bake_settings import folder_of
 from ..cards.card_choices import motion_choices
 from ..cards.card_files import CardOutput, WrittenCards, write_cards
 from ..cards.card_images import chosen_pictures, named_pictures
-from ..cards.card_making import CardChoices, order_line
+from ..cards.card_making import CardInputs, order_line
 from ..cards.card_motion import GuideMotion, baked_motion, take_motion
 from ..cards.card_textures import TextureFiles
 from ..cards.occluders import read_other_hair
 from .card_options import add_card_options
 from .job_options import add_texture_option, frames_of_option
-from .job_steps import Job, card_form, finish, read_rig, tell_notes
+from .job_steps import Job, finish, read_rig, tell_notes
 from .verb import Verb
 
 
@@ -65,12 +67,13 @@ def written_cards(
     """Build and write the cards, and say what they are."""
     print("building hair cards", flush=True)
     levels = getattr(job.options, "levels", None)
-    form, report = card_form(job), job.report
+    settings, report = job.settings, job.report
     if levels is not None:
-        form = replace(form, cards=replace(form.cards, levels=levels))
+        settings = settings.with_settings(replace(settings[CardSettings], levels=levels))
     hair = bpy.data.objects.get(job.sources.groom or "")
-    choices = CardChoices.of(form, pictures, read_other_hair(form.occlusion, hair))
-    written = write_cards(path, rig, choices, output, report.stage, motion)
+    others = read_other_hair(settings[CardOcclusionSettings], hair)
+    inputs = CardInputs(settings, pictures, others)
+    written = write_cards(path, rig, inputs, output, report.stage, motion)
     report.facts.update(
         cards=written.mesh.card_count,
         card_triangles=len(written.mesh.triangles),

@@ -14,6 +14,7 @@ from pathlib import Path
 import bpy
 
 from ...errors import HairloomError
+from ...params import SettingsMap
 from ..base.interruption import Interrupted, interruptible
 from ..base.report import Report
 from .bake_job import BAKE
@@ -153,7 +154,7 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
     return Job(
         verb=verb.name,
         sources=_sources(verb, options) if verb.takes_hair else Sources(),
-        settings=chosen_settings(options) if verb.takes_settings else {},
+        settings=chosen_settings(options) if verb.takes_settings else SettingsMap(),
         output=Path() if output is None else output,
         options=options,
         report=report,

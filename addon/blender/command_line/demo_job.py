@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ...cards.drawing_settings import CardDrawingSettings
 from ...exchange.tressfx import write_tfx
 from ...pipeline import Rig
-from ...shading.settings import StrandSettings
 from ..base.images import write_png
 from ..cards.card_builds import tied_cards
 from ..cards.card_files import WrittenCards
@@ -17,7 +15,7 @@ from ..cards.card_making import MadeCards
 from ..pictures.studio import Studio
 from .cards_job import written_cards
 from .job_options import add_motion_options, add_picture_options, add_texture_option
-from .job_steps import Job, card_form, open_studio, read_rig, rest_of
+from .job_steps import Job, open_studio, read_rig, rest_of
 from .render_job import write_sheet, write_still
 from .simulate_job import simulated_take
 from .verb import Verb
@@ -47,9 +45,8 @@ def _write_card_still(
 ) -> None:
     """The cards where the strands are in the still."""
     options = job.options
-    built = tied_cards(rig, card_form(job), MadeCards(written.build, written.maps))
-    drawn = job.set(CardDrawingSettings), job.set(StrandSettings)
-    shown = built.drawn(built.rest, drawn)
+    built = tied_cards(rig, MadeCards(written.build, written.maps))
+    shown = built.drawn(built.rest, job.settings)
     with job.report.stage("draw cards"):
         picture = studio.card_picture(shown, options.width, options.height, options.samples)
     write_png(path, picture)

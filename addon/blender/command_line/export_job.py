@@ -119,7 +119,7 @@ def _of_rig(
 ) -> StrandExport:
     """Hair of --groom, or hair that is grown here."""
     rig, inputs = read_rig(job)
-    wishes, color = wishes_of(kind, output), job.set(ShadingSettings).base_color
+    wishes, color = wishes_of(kind, output), job.settings[ShadingSettings].base_color
     groom = _groom(job, rig, inputs)
     plan = StrandExport(groom, output, kind, inputs.dropped, frames=frames)
     if frames is None:

@@ -22,7 +22,7 @@ def grow(job: Job) -> None:
             head,
             bpy.context.evaluated_depsgraph_get(),
             bpy.context.collection,
-            job.set(GrowSettings),
+            job.settings[GrowSettings],
             presets=(),
             fits=options.fit,
             density_group=options.density_group,

@@ -12,7 +12,7 @@ import bpy
 from ...errors import HairloomError
 from ...exchange.strand_formats import SUFFIXES
 from ...parameters import ALL_SETTINGS
-from ...params import Settings
+from ...params import Settings, SettingsMap
 from ..base.report import STYLES
 from ..properties.presets import named_preset
 from ..scene.principled import look_from_named
@@ -252,10 +252,10 @@ _LIMITS = (
 )
 
 
-def chosen_settings(options: argparse.Namespace) -> dict[str, Settings]:
+def chosen_settings(options: argparse.Namespace) -> SettingsMap:
     """All parameter sets, the later over the earlier: the defaults, those of the hair object that
     --groom names, --preset or a material, --set."""
-    chosen = {section: made() for section, made in ALL_SETTINGS.items()}
+    chosen: dict[str, Settings] = {section: made() for section, made in ALL_SETTINGS.items()}
     name = getattr(options, "groom", None)
     groom = bpy.data.objects.get(name or "")
     if groom is not None and groom.type == "CURVES":
@@ -266,7 +266,9 @@ def chosen_settings(options: argparse.Namespace) -> dict[str, Settings]:
         chosen["shading"], notes = look_from_named(name, chosen["shading"])
         for note in notes:
             print(f"hairloom: {name}: {note}", file=sys.stderr)
-    return {
-        section: type(values).from_dict(values.as_dict() | overrides(options.set, section), "--set")
-        for section, values in chosen.items()
-    }
+    return SettingsMap(
+        *(
+            type(values).from_dict(values.as_dict() | overrides(options.set, section), "--set")
+            for section, values in chosen.items()
+        )
+    )

@@ -8,26 +8,16 @@ from pathlib import Path
 
 from ... import pipeline
 from ...arrays import Floats
-from ...cards.atlas_settings import AtlasSettings
-from ...cards.drawing_settings import CardDrawingSettings
-from ...cards.occlusion_settings import CardOcclusionSettings
-from ...cards.settings import CardSettings
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GrowSettings, GuideSettings
-from ...params import Settings
+from ...params import SettingsMap
 from ...pipeline import Pose, Rig
-from ...refine.settings import DetailSettings
-from ...shading.ambient import AmbientSettings
-from ...shading.settings import ShadingSettings, StrandSettings
-from ...shading.shafts_settings import ShaftSettings
-from ...shading.skin.settings import SkinSettings
-from ...shading.textures import TextureSettings
-from ...shading.volume.settings import VolumeSettings
+from ...shading.ambient_settings import AmbientSettings
 from ..bakes.take import read_take
 from ..base.report import Report
-from ..pictures.studio import Look, Studio
-from ..properties.card_form import CardForm
+from ..pictures.studio import Studio
+from ..properties.groom_settings import GroomSettings
 from .inputs import Inputs, Sources, read_inputs
 
 
@@ -37,16 +27,10 @@ class Job:
 
     verb: str
     sources: Sources
-    settings: dict[str, Settings]
+    settings: SettingsMap
     output: Path
     options: argparse.Namespace
     report: Report
-
-    def set[S: Settings](self, kind: type[S]) -> S:
-        """This job's values of one parameter set."""
-        values = self.settings[kind.section]
-        assert isinstance(values, kind)
-        return values
 
 
 def read_rig(job: Job) -> tuple[Rig, Inputs]:
@@ -54,16 +38,16 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
     report = job.report
     print("reading", job.sources.groom or "(a groom grown here)", flush=True)
     with report.stage("read inputs"):
-        inputs = read_inputs(job.sources, job.set(GrowSettings))
+        inputs = read_inputs(job.sources, job.settings[GrowSettings])
     _tell_drops(job, inputs)
     tell_notes(list(inputs.notes), report)
     with report.stage("bind roots, choose guides"):
         rig = pipeline.prepare(
             inputs.strands,
             inputs.head,
-            job.set(GuideSettings),
+            job.settings[GuideSettings],
             place=inputs.groom_name,
-            children=job.set(ChildrenSettings),
+            children=job.settings[ChildrenSettings],
             density=inputs.density,
         )
     tell_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
@@ -128,34 +112,11 @@ def moment_of(job: Job, rig: Rig) -> tuple[Pose, Floats]:
 def open_studio(job: Job, rig: Rig) -> Studio:
     """What draws this job's hair in its look."""
     with job.report.stage("ambient occlusion"):
-        occlusion = pipeline.rest_occlusion(rig, job.set(AmbientSettings))
-        head_occlusion = pipeline.head_occlusion(rig, job.set(AmbientSettings))
-    look = Look(
-        job.set(ShadingSettings),
-        job.set(StrandSettings),
-        job.set(DetailSettings),
-        volume=job.set(VolumeSettings),
-        skin=job.set(SkinSettings),
-        shafts=job.set(ShaftSettings),
-        card_drawing=job.set(CardDrawingSettings),
-        card_form=card_form(job),
-    )
-    studio = Studio(rig, occlusion, head_occlusion, look)
+        occlusion = pipeline.rest_occlusion(rig, job.settings[AmbientSettings])
+        head_occlusion = pipeline.head_occlusion(rig, job.settings[AmbientSettings])
+    studio = Studio(rig, occlusion, head_occlusion, GroomSettings(job.settings))
     tell_notes(list(studio.warnings), job.report)
     return studio
-
-
-def card_form(job: Job) -> CardForm:
-    """What cards are built by."""
-    return CardForm(
-        job.set(CardSettings),
-        job.set(AtlasSettings),
-        job.set(CardOcclusionSettings),
-        job.set(TextureSettings),
-        job.set(StrandSettings),
-        shading=job.set(ShadingSettings),
-        ambient=job.set(AmbientSettings),
-    )
 
 
 def finish(job: Job, output: Path) -> None:

@@ -87,7 +87,7 @@ def _check(job: Job) -> None:
         raise HairloomError(
             "a contact sheet needs motion", place="--sheet", remedy="Give a take with --take"
         )
-    if job.set(VolumeSettings).shadows != "none":
+    if job.settings[VolumeSettings].shadows != "none":
         return
     if job.options.slices:
         raise HairloomError(

@@ -29,12 +29,12 @@ def simulated_take(job: Job, rig: Rig, inputs: Inputs) -> Take:
         assert inputs.collider is not None, "simulate and demo refuse a groom without a head"
         name = job.sources.collider or job.sources.head or "built-in head"
         collider = DistanceField.from_surface(
-            inputs.collider, job.set(DynamicsSettings), place=name
+            inputs.collider, job.settings[DynamicsSettings], place=name
         )
     drive = _drive(job, rig, inputs)
     progress = job.report.progress("simulating", len(drive.poses) - 1)
     take, worst = simulate_take(
-        rig, collider, drive, job.set(DynamicsSettings), job.report.stage, progress.show
+        rig, collider, drive, job.settings[DynamicsSettings], job.report.stage, progress.show
     )
     job.report.facts.update(
         frames=len(drive.poses),

@@ -7,7 +7,7 @@ window's work: until it is there the picture has what was drawn before, or none.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,8 +17,11 @@ import numpy as np
 from ... import pipeline
 from ...arrays import Floats
 from ...cards.follow import moved_mesh
+from ...cards.occlusion_settings import CardOcclusionSettings
 from ...pipeline import Rig
 from ...render.snapshot import Snapshot
+from ...shading.ambient_settings import AmbientSettings
+from ...shading.settings import ShadingSettings
 from ...strands.affine import moved
 from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
@@ -28,12 +31,12 @@ from ..base.objects import head_of
 from ..base.redraw import redraw_views
 from ..cards.card_builds import BuiltCards, built_cards
 from ..cards.card_images import chosen_pictures
+from ..cards.card_making import CardInputs, cards_key
 from ..cards.occluders import OtherHair, read_other_hair
 from ..cards.shown_cards import as_shown
-from ..properties.card_form import CardForm
-from ..properties.choices import Choices
+from ..properties.groom_settings import GroomSettings
 from ..sessions.reading import Reading
-from ..sessions.shown import snapshot_of, with_all_strands, with_choices
+from ..sessions.shown import snapshot_of, with_all_strands, with_settings
 
 
 class HairNotMadeYetError(Exception):
@@ -48,22 +51,24 @@ class _Made:
     rig: Rig
     snapshot: Snapshot
     is_baked: bool
-    _cards: list[tuple[BuiltCards, OtherHair]] = field(default_factory=list)
+    _cards: list[tuple[Hashable, BuiltCards, OtherHair]] = field(default_factory=list)
 
-    def cards(self, owner: bpy.types.Object, form: CardForm, others: OtherHair) -> BuiltCards:
-        """Its cards; those of the last form and other hair are kept, to the last colour.
+    def cards(
+        self, owner: bpy.types.Object, settings: GroomSettings, others: OtherHair
+    ) -> BuiltCards:
+        """Its cards; those of the last settings and other hair are kept, to the last colour.
 
         Baked hair stays at rest, whatever other hair does in the frames: its cards are not built
         again for each of them.
         """
-        for built, before in self._cards:
-            is_same = built.form == form and built.form.shading == form.shading
+        key = cards_key(settings), settings[ShadingSettings]
+        for known, built, before in self._cards:
             is_lit_alike = others.uids == before.uids if self.is_baked else others.is_like(before)
-            if is_same and is_lit_alike:
+            if known == key and is_lit_alike:
                 return built
         pictures, _ = chosen_pictures(owner.data.hairloom.card_images)
-        built = built_cards(self.rig, form, pictures, others)
-        self._cards[:] = [(built, others)]
+        built = built_cards(self.rig, CardInputs(settings.sections, pictures, others))
+        self._cards[:] = [(key, built, others)]
         return built
 
 
@@ -149,24 +154,23 @@ def read_groom(
         HairloomError: none of its curves can be used, or its bake is damaged.
     """
     owner = owner_of(hair)
-    choices = Choices.of(owner, depsgraph)
+    settings = GroomSettings.of(owner, depsgraph)
     cache, scene = playback.cache_of(owner), depsgraph.scene
     # A copy stays as it is beyond the baked frames; curves of the artist's go on by themselves.
     if cache is not None and (owner != hair or _shows_bake(owner, cache, scene.frame_current)):
         strands = playback.strands_in(cache, scene.frame_current, scene.frame_subframe)
-        made = _of_bake(owner, playback.rig_in(cache), choices, blocking=blocking)
+        made = _of_bake(owner, playback.rig_in(cache), settings, blocking=blocking)
         pose = playback.pose_in(cache, scene.frame_current, scene.frame_subframe)
     else:
-        made = _of_curves(owner, choices, depsgraph, blocking=blocking)
+        made = _of_curves(owner, settings, depsgraph, blocking=blocking)
         strands, pose = made.snapshot.strands, made.rig.rest_pose
     snapshot = replace(made.snapshot, strands=strands)
-    if choices.shows_cards:
-        form = choices.card_form
-        others = read_other_hair(form.occlusion, owner, depsgraph, pose.matrix)
-        built = made.cards(owner, form, others)
-        cards = built.at(pose, strands[made.rig.guides], choices.cards_drawn)
+    if settings.shows_cards:
+        others = read_other_hair(settings[CardOcclusionSettings], owner, depsgraph, pose.matrix)
+        built = made.cards(owner, settings, others)
+        cards = built.at(pose, strands[made.rig.guides], settings.sections)
         snapshot = as_shown(replace(snapshot, cards=cards))
-    return with_all_strands(with_choices(snapshot, choices))
+    return with_all_strands(with_settings(snapshot, settings))
 
 
 def state_of(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Any, ...]:
@@ -179,7 +183,7 @@ def state_of(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[An
     cache = playback.cache_of(owner)
     # where a bake is shown, it moves from frame to frame
     frame = 0.0 if cache is None else scene.frame_current_final
-    return Choices.of(owner, depsgraph), cache, owner.hairloom.bake.is_shown, frame
+    return GroomSettings.of(owner, depsgraph), cache, owner.hairloom.bake.is_shown, frame
 
 
 def uids_of(hair: bpy.types.Object) -> set[int]:
@@ -220,14 +224,18 @@ def _shows_bake(hair: bpy.types.Object, cache: Cache, frame: int) -> bool:
 
 
 def _of_bake(
-    owner: bpy.types.Object, baked: BakedRig, choices: Choices, *, blocking: bool
+    owner: bpy.types.Object, baked: BakedRig, settings: GroomSettings, *, blocking: bool
 ) -> _Made:
-    made_from = baked.rig.strands.points, choices.ambient
-    return _made(owner, made_from, choices, lambda: baked.rig, is_baked=True, blocking=blocking)
+    made_from = baked.rig.strands.points, settings[AmbientSettings]
+    return _made(owner, made_from, settings, lambda: baked.rig, is_baked=True, blocking=blocking)
 
 
 def _of_curves(
-    hair: bpy.types.Object, choices: Choices, depsgraph: bpy.types.Depsgraph, *, blocking: bool
+    hair: bpy.types.Object,
+    settings: GroomSettings,
+    depsgraph: bpy.types.Depsgraph,
+    *,
+    blocking: bool,
 ) -> _Made:
     reading = Reading(hair, depsgraph)
     source = reading.source
@@ -238,16 +246,16 @@ def _of_curves(
         source.strands.group,
         None if source.head is None else source.head.positions,
         source.density,
-        choices.of_rig,
-        choices.ambient,
+        settings.of_rig,
+        settings[AmbientSettings],
     )
-    return _made(hair, made_from, choices, reading.rig, is_baked=False, blocking=blocking)
+    return _made(hair, made_from, settings, reading.rig, is_baked=False, blocking=blocking)
 
 
 def _made(
     owner: bpy.types.Object,
     made_from: tuple[Any, ...],
-    choices: Choices,
+    settings: GroomSettings,
     rig: Any,
     *,
     is_baked: bool,
@@ -255,7 +263,7 @@ def _made(
 ) -> _Made:
     def make() -> _Made:
         made = rig()
-        occlusion = pipeline.rest_occlusion(made, choices.ambient)
+        occlusion = pipeline.rest_occlusion(made, settings[AmbientSettings])
         snapshot = snapshot_of(made, occlusion, pipeline.strand_ranks(made))
         return _Made(made_from, made, snapshot, is_baked)
 

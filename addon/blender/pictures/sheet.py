@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
 from ...arrays import Floats
+from ...params import SettingsMap
 from ...pipeline import Pose
 from ...render.camera import Camera, frame_camera
 from ...shading.settings import ShadingSettings
@@ -76,20 +76,16 @@ class Sheet:
         yield CLOSE_UP, self._seen(self._camera(VIEW_DIRECTION, self._near_the_eye()))
 
     def _looks(self) -> Iterator[tuple[str, Floats]]:
-        worn = self._studio.look
+        worn = self._studio.settings
         camera = self._camera(VIEW_DIRECTION, self._bounds)
         try:
             for entry in shipped("shading"):
-                shading, shafts = ShadingSettings(), ShaftSettings()
-                for settings in named_preset(entry.name).all:
-                    if isinstance(settings, ShadingSettings):
-                        shading = settings
-                    elif isinstance(settings, ShaftSettings):
-                        shafts = settings
-                self._studio.look = replace(worn, shading=shading, shafts=shafts)
+                look = SettingsMap(*named_preset(entry.name).all)
+                parts = look[ShadingSettings], look[ShaftSettings]
+                self._studio.settings = worn.with_settings(*parts)
                 yield entry.title, self._seen(camera)
         finally:
-            self._studio.look = worn
+            self._studio.settings = worn
 
     def _seen(self, camera: Camera) -> Floats:
         return self._studio.picture(self._pose, self._points, *self._size, self._samples, camera)

@@ -10,12 +10,13 @@ import bpy
 from ... import pipeline
 from ...arrays import Floats
 from ...pipeline import Pose, Rig
+from ...shading.ambient_settings import AmbientSettings
 from ..cards.card_images import chosen_pictures
 from ..preview import live
-from ..properties.choices import Choices
+from ..properties.groom_settings import GroomSettings
 from ..sessions.reading import Reading
 from ..sessions.session import Session
-from .studio import Look, Studio
+from .studio import Studio
 
 
 @dataclass(frozen=True)
@@ -43,11 +44,11 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
         live.finish(session, depsgraph)
         session = live.session_of(hair)
     if isinstance(session, Session):
-        studio = _studio(hair, session.rig, session.choices)
+        studio = _studio(hair, session.rig, session.settings)
         return ShownGroom(studio, session.solver.pose, session.strands, studio.warnings)
     reading = Reading(hair, depsgraph)
     rig = reading.rig()
-    studio = _studio(hair, rig, reading.choices)
+    studio = _studio(hair, rig, reading.settings)
     notes = (*reading.source.warnings, *rig.notes, *studio.warnings)
     return ShownGroom(studio, rig.rest_pose, rig.strands.grid, notes)
 
@@ -57,19 +58,8 @@ def file_name(name: str) -> str:
     return re.sub(r"[^\w .-]+", "_", name).strip(" .") or "groom"
 
 
-def _studio(hair: bpy.types.Object, rig: Rig, choices: Choices) -> Studio:
-    occlusion = pipeline.rest_occlusion(rig, choices.ambient)
-    head_occlusion = pipeline.head_occlusion(rig, choices.ambient)
-    look = Look(
-        choices.shading,
-        choices.strands,
-        choices.detail,
-        choices.debug_view,
-        volume=choices.volume,
-        skin=choices.skin,
-        shafts=choices.shafts,
-        card_drawing=choices.card_drawing,
-        card_form=choices.card_form,
-        card_pictures=chosen_pictures(hair.data.hairloom.card_images)[0],
-    )
-    return Studio(rig, occlusion, head_occlusion, look)
+def _studio(hair: bpy.types.Object, rig: Rig, settings: GroomSettings) -> Studio:
+    ambient = settings[AmbientSettings]
+    pictures, _ = chosen_pictures(hair.data.hairloom.card_images)
+    occlusion = pipeline.rest_occlusion(rig, ambient), pipeline.head_occlusion(rig, ambient)
+    return Studio(rig, *occlusion, settings, pictures)

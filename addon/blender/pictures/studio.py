@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Hashable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from ... import pipeline
 from ...arrays import Floats
-from ...cards.drawing_settings import CardDrawingSettings
 from ...pipeline import Pose, Rig
-from ...refine.settings import DetailSettings
 from ...render.camera import Camera, frame_camera
 from ...render.card_pass import CardPass
 from ...render.card_snapshot import CardSnapshot
@@ -21,19 +19,16 @@ from ...render.mesh_pass import MeshPass
 from ...render.snapshot import MeshSnapshot, Snapshot
 from ...render.strand_pass import Statistics, StrandPass
 from ...shading.lights import Light, three_point_lights
-from ...shading.settings import ShadingSettings, StrandSettings
-from ...shading.shafts_settings import ShaftSettings
 from ...shading.skin.notes import skin_notes
-from ...shading.skin.settings import SkinSettings
-from ...shading.volume.settings import VolumeSettings
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
 from ..base.gpu_context import ensure_gpu
 from ..cards.card_builds import BuiltCards, built_cards
+from ..cards.card_making import CardInputs, cards_key
 from ..cards.shown_cards import as_shown
-from ..properties.card_form import CardForm
+from ..properties.groom_settings import GroomSettings
 from ..sessions.hiders import Hiders
-from ..sessions.shown import snapshot_of
+from ..sessions.shown import snapshot_of, with_settings
 from .skin_picture import shown_skin_shadow
 from .slices import shown_slices
 
@@ -49,32 +44,13 @@ BACKDROP = (0.045, 0.05, 0.058, 1.0)
 type Rgba = tuple[float, float, float, float]
 
 
-@dataclass(frozen=True)
-class Look:
-    """How hair is drawn.
-
-    debug_view: what strands are coloured by, see render.snapshot.
-    card_form, card_pictures: what cards are built by where card_drawing shows them.
-    """
-
-    shading: ShadingSettings
-    strands: StrandSettings
-    detail: DetailSettings
-    debug_view: str = "none"
-    volume: VolumeSettings = field(default_factory=VolumeSettings)
-    skin: SkinSettings = field(default_factory=SkinSettings)
-    shafts: ShaftSettings = field(default_factory=ShaftSettings)
-    card_drawing: CardDrawingSettings = field(default_factory=CardDrawingSettings)
-    card_form: CardForm = field(default_factory=CardForm)
-    card_pictures: Mapping[str, Floats] = field(default_factory=dict)
-
-
 class Studio:
     """Draws moments of one groom, always with the same framing, so that pictures compare.
 
     Args:
         occlusion: (strand_count, cv_count) in [0, 1], at rest.
         head_occlusion: (vertex_count,) in [0, 1], at rest; None without a head.
+        card_pictures: what takes the place of textures where cards are shown.
     """
 
     def __init__(
@@ -82,29 +58,21 @@ class Studio:
         rig: Rig,
         occlusion: Floats,
         head_occlusion: Floats | None,
-        look: Look,
+        settings: GroomSettings,
+        card_pictures: Mapping[str, Floats] | None = None,
     ) -> None:
         ensure_gpu()
         self._rig, self._head_occlusion = rig, head_occlusion
         self._passes, self._card_pass = (MeshPass(), StrandPass()), CardPass()
-        self._cards: BuiltCards | None = None
+        self._cards: tuple[Hashable, BuiltCards] | None = None
+        self._card_pictures = card_pictures or {}
         self._hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
         self._groom = snapshot_of(rig, occlusion, pipeline.strand_ranks(rig))
-        self.look = look
+        self.settings = settings
 
     @property
     def _at_rest(self) -> Snapshot:
-        look = self.look
-        return replace(
-            self._groom,
-            shading=look.shading,
-            strand_settings=look.strands,
-            detail=look.detail,
-            volume=look.volume,
-            skin=look.skin,
-            shafts=look.shafts,
-            debug_view=look.debug_view,
-        )
+        return with_settings(self._groom, self.settings)
 
     def picture(
         self,
@@ -149,13 +117,13 @@ class Studio:
 
     def _cards_at(self, pose: Pose, points: Floats) -> CardSnapshot | None:
         """The cards riding on the guides among these strands, where cards are shown."""
-        look = self.look
-        if look.card_drawing.shown_as != "cards":
+        if not self.settings.shows_cards:
             return None
-        if self._cards is None or self._cards.form != look.card_form:
-            self._cards = built_cards(self._rig, look.card_form, look.card_pictures)
-        drawn = look.card_drawing, look.strands
-        return self._cards.at(pose, points[self._rig.guides], drawn)
+        key, sections = cards_key(self.settings), self.settings.sections
+        if self._cards is None or self._cards[0] != key:
+            inputs = CardInputs(sections, self._card_pictures)
+            self._cards = key, built_cards(self._rig, inputs)
+        return self._cards[1].at(pose, points[self._rig.guides], sections)
 
     def slices(self, pose: Pose, points: Floats) -> Floats:
         """The layers of the shadow maps in the studio's light, see opacity_tiles.

@@ -36,7 +36,7 @@ def is_edited(session: Session, edited: set[int]) -> bool:
 
 def is_weighted_anew(session: Session, edited: set[int]) -> bool:
     """Whether the head's own mesh changed, and with it maybe the weights that children grow by."""
-    if session.head is None or not session.choices.children_density:
+    if session.head is None or not session.settings.children_density:
         return False
     head = session.head.handle.find()
     return head is not None and head.data.session_uid in edited

@@ -12,6 +12,7 @@ from functools import partial
 import bpy
 
 from ...errors import HairloomError
+from ...shading.volume.settings import VolumeSettings
 from ..bakes.simulated import Simulated
 from ..base.gpu_context import is_interrupted
 from ..base.latest_job import ARRIVAL_TIME, unwatch, watch
@@ -179,7 +180,7 @@ def publish(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     refresh_panels()
     is_replaced = hair.mode == "OBJECT" and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original and session.is_made
-    volume = session.choices.volume
+    volume = session.settings[VolumeSettings]
     has_own_shadow = volume.on_body and volume.shadows != "none"
     show_originals(hair, depsgraph, show=not hides, has_own_shadow=has_own_shadow)
 

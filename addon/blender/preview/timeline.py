@@ -28,7 +28,7 @@ from ..bakes.cache import Cache, Facts
 from ..bakes.fingerprints import RIG_PARTS, frame_rate, groom_fingerprint
 from ..bakes.simulated import Simulated, as_now, differences
 from ..base.objects import Handle, head_of
-from ..properties.choices import Choices
+from ..properties.groom_settings import GroomSettings
 from ..sessions.session import Session
 from . import late
 
@@ -183,7 +183,7 @@ def rig_for(hair: bpy.types.Object, scene: bpy.types.Scene) -> BakedRig | None:
         cache = playback.cache_of(hair)
         if cache is None:
             return None
-        now = groom_fingerprint(hair, head_of(hair), Choices.of(hair), scene)
+        now = groom_fingerprint(hair, head_of(hair), GroomSettings.of(hair), scene)
         changed = differences(cache.facts.fingerprint, now)
         return None if set(changed) & set(RIG_PARTS) else playback.rig_in(cache)
     except HairloomError:  # told when the bake is to be shown

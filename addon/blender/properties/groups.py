@@ -7,32 +7,16 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
 
-from ...parameters import ALL_SETTINGS
+from ...parameters import ALL_SETTINGS, sections_of
+from ...params import Owner
 from ..base.objects import head_of
+from ..base.redraw import redraw_views
 from ..base.vertex_weights import weight_names
 from . import changed
 from .bake_group import HAIRLOOM_PG_bake
 from .card_group import HAIRLOOM_PG_card_images, HAIRLOOM_PG_card_object
 from .fin_group import FIN_PROPERTIES
 from .properties import OVERRIDABLE, property_annotations, property_group
-
-GROOM_SECTIONS = (
-    "guides",
-    "children",
-    "detail",
-    "strands",
-    "shading",
-    "volume",
-    "skin",
-    "shafts",
-    "ambient",
-    "cards",
-    "atlas",
-    "card_occlusion",
-    "card_texture",
-    "card_drawing",
-)
-CHARACTER_SECTIONS = ("dynamics", "fin")
 
 #: Shapes that the artist can choose from; "automatic" is what an object looks like.
 COLLIDER_SHAPES = (
@@ -71,7 +55,11 @@ _DEBUG_VIEWS = (
 )
 
 
-def _pointers(sections: tuple[str, ...]) -> dict[str, Any]:
+def _redraw(_scene: bpy.types.ID) -> None:
+    redraw_views()
+
+
+def _pointers(owner: Owner) -> dict[str, Any]:
     return {
         section: PointerProperty(
             type=SECTION_GROUPS[section],
@@ -79,7 +67,7 @@ def _pointers(sections: tuple[str, ...]) -> dict[str, Any]:
             description=f"Settings of {ALL_SETTINGS[section].title.lower()}",
             override=OVERRIDABLE,
         )
-        for section in sections
+        for section in sections_of(owner)
     }
 
 
@@ -95,9 +83,11 @@ def _densities(group: Any, _context: bpy.types.Context, typed: str) -> list[str]
     return [name for name in names if typed.lower() in name.lower()]
 
 
+#: section -> its class of properties, of all that a file keeps
 SECTION_GROUPS = {
-    section: property_group(ALL_SETTINGS[section], changed.settings)
-    for section in (*GROOM_SECTIONS, *CHARACTER_SECTIONS)
+    section: property_group(kind, _redraw if kind.owner == "scene" else changed.settings)
+    for section, kind in ALL_SETTINGS.items()
+    if kind.owner != "job"
 }
 SECTION_GROUPS["fin"].__annotations__ |= FIN_PROPERTIES
 
@@ -141,7 +131,7 @@ class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
     """Everything about one groom that goes with its curves."""
 
     __annotations__ = {
-        **_pointers(GROOM_SECTIONS),
+        **_pointers("groom"),
         **_SWITCHES,
         "card_images": PointerProperty(
             type=HAIRLOOM_PG_card_images,
@@ -162,7 +152,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
     """Everything about the hair of one object, of which several may share their curves."""
 
     __annotations__ = {
-        **_pointers(CHARACTER_SECTIONS),
+        **_pointers("character"),
         "bake": PointerProperty(
             type=HAIRLOOM_PG_bake,
             name="Bake",
@@ -237,6 +227,12 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
     }
 
 
+class HAIRLOOM_PG_scene(bpy.types.PropertyGroup):
+    """Everything about the pictures of one scene."""
+
+    __annotations__ = _pointers("scene")
+
+
 CLASSES = (
     *SECTION_GROUPS.values(),
     HAIRLOOM_PG_bake,
@@ -244,6 +240,7 @@ CLASSES = (
     HAIRLOOM_PG_card_images,
     HAIRLOOM_PG_groom,
     HAIRLOOM_PG_character,
+    HAIRLOOM_PG_scene,
 )
 
 
@@ -261,8 +258,12 @@ def register() -> None:
         description="Settings of this object's hair",
         override=OVERRIDABLE,
     )
+    bpy.types.Scene.hairloom = PointerProperty(
+        type=HAIRLOOM_PG_scene, name="Hairloom", description="Settings of this scene's pictures"
+    )
 
 
 def unregister() -> None:
+    del bpy.types.Scene.hairloom
     del bpy.types.Object.hairloom
     del bpy.types.Curves.hairloom

@@ -1,47 +1,35 @@
-"""Hair that was read, made ready by its own settings."""
+"""Hair that was read, made ready by settings."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import bpy
 
 from ... import pipeline
 from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
+from ...params import SettingsMap
 from ...pipeline import Rig
-from ..properties.properties import settings_of
+from ..properties.groom_settings import GroomSettings
 from .source import Source
 
 
-@dataclass(frozen=True)
-class RigSettings:
-    """What decides which strands and guides there are; name: of the hair, in messages."""
+def rig_from(source: Source, settings: SettingsMap, *, place: str) -> Rig:
+    """The hair made ready, at rest as it was read; from arrays alone.
 
-    name: str
-    guides: GuideSettings
-    children: ChildrenSettings
+    Args:
+        place: names the hair in messages.
 
-    @classmethod
-    def of(cls, hair: bpy.types.Object) -> RigSettings:
-        groom = hair.data.hairloom
-        guides = settings_of(groom.guides, GuideSettings)
-        return cls(hair.name, guides, settings_of(groom.children, ChildrenSettings))
-
-    def rig(self, source: Source) -> Rig:
-        """The hair made ready, at rest as it was read; from arrays alone.
-
-        Raises:
-            HairloomError: no hair that can be used.
-        """
-        return pipeline.prepare(
-            source.strands,
-            source.head,
-            self.guides,
-            place=self.name,
-            children=self.children,
-            density=source.density,
-        )
+    Raises:
+        HairloomError: no hair that can be used.
+    """
+    return pipeline.prepare(
+        source.strands,
+        source.head,
+        settings[GuideSettings],
+        place=place,
+        children=settings[ChildrenSettings],
+        density=source.density,
+    )
 
 
 def rig_of(hair: bpy.types.Object, source: Source) -> Rig:
@@ -50,4 +38,4 @@ def rig_of(hair: bpy.types.Object, source: Source) -> Rig:
     Raises:
         HairloomError: no hair that can be used.
     """
-    return RigSettings.of(hair).rig(source)
+    return rig_from(source, GroomSettings.of(hair).sections, place=hair.name)

@@ -13,7 +13,7 @@ from ..bakes.simulated import Arrays
 from ..base.latest_job import LatestJob
 from ..base.objects import Body
 from ..base.thread_work import ThreadWork
-from ..properties.choices import Choices
+from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source
 from .making import Made, Order, make, placeholder
 from .reading import Reading
@@ -73,9 +73,9 @@ class Groom:
         return self._reading.source
 
     @property
-    def choices(self) -> Choices:
+    def settings(self) -> GroomSettings:
         """What the artist has set, as far as it is taken over."""
-        return self._reading.choices
+        return self._reading.settings
 
     @property
     def rig(self) -> Rig:

@@ -8,13 +8,16 @@ from dataclasses import replace
 import bpy
 
 from ...pipeline import Pose, Rig
+from ...refine.settings import DetailSettings
 from ...render.hair_ball import HairBall
 from ...render.snapshot import Snapshot
 from ...shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
+from ...shading.settings import ShadingSettings
+from ...shading.volume.settings import VolumeSettings
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
 from ..cards.shown_cards import ShownCards
-from ..properties.choices import Choices
+from ..properties.groom_settings import GroomSettings
 from ..scene.lights import (
     light_warnings,
     no_light_warnings,
@@ -23,7 +26,7 @@ from ..scene.lights import (
     scene_lights_are_shown,
 )
 from .making import Made
-from .shown import shapes_alike, snapshot_of, with_choices, with_tables
+from .shown import shapes_alike, snapshot_of, with_settings, with_tables
 from .solvers import Solver
 
 
@@ -64,31 +67,31 @@ class GroomPicture:
         lights = snapshot.lights if scene_lights_are_shown() else ()
         return shadow_warnings(lights, self._ball.of(snapshot), snapshot.volume)
 
-    def take_made(self, made: Made, choices: Choices) -> None:
+    def take_made(self, made: Made, settings: GroomSettings) -> None:
         """All that hangs on the strands; it stands at rest, without light."""
         self._made = made
         snapshot = snapshot_of(made.rig, made.occlusion, made.rank)
-        self.snapshot = with_choices(snapshot, choices)
-        self._want_cards(made.rig, choices)
+        self.snapshot = with_settings(snapshot, settings)
+        self._want_cards(made.rig, settings)
 
-    def take_choices(self, rig: Rig, was: Choices, now: Choices) -> bool:
+    def take_settings(self, rig: Rig, was: GroomSettings, now: GroomSettings) -> bool:
         """Take over what acts at once; whether hair has to be shown again where it is."""
-        self.snapshot = with_choices(self.snapshot, now)
-        if not shapes_alike(was.shading, now.shading) and not bpy.app.background:
+        self.snapshot = with_settings(self.snapshot, now)
+        if not shapes_alike(was[ShadingSettings], now[ShadingSettings]) and not bpy.app.background:
             self.snapshot = with_tables(self.snapshot, PREVIEW_SIZE)
-        is_other = (was.detail.culling, was.volume.shadows) != (
-            now.detail.culling,
-            now.volume.shadows,
+        is_other = (
+            was[DetailSettings].culling != now[DetailSettings].culling
+            or was[VolumeSettings].shadows != now[VolumeSettings].shadows
         )
         return self._want_cards(rig, now) or is_other
 
-    def _want_cards(self, rig: Rig, choices: Choices) -> bool:
+    def _want_cards(self, rig: Rig, settings: GroomSettings) -> bool:
         """Have cards built if they are to be shown; whether what is shown of them changes now."""
         is_whole = self._made is not None and self._made.is_whole
-        if not (self._is_drawn and is_whole and choices.shows_cards):
+        if not (self._is_drawn and is_whole and settings.shows_cards):
             self.cards.forget()
             return self.snapshot.cards is not None
-        self.cards.want(rig, choices.card_form)
+        self.cards.want(rig, settings)
         return True
 
     @property
@@ -109,22 +112,26 @@ class GroomPicture:
         )
         self._light_warnings = light_warnings(depsgraph)
 
-    def show(self, rig: Rig, solver: Solver, choices: Choices) -> None:
+    def show(self, rig: Rig, solver: Solver, settings: GroomSettings) -> None:
         """The hair where the solver has it."""
         pose, hiders = solver.pose, None
         known = None if self._made is None else self._made.hiders
-        if known is not None and choices.detail.culling == "hidden":
+        if known is not None and settings[DetailSettings].culling == "hidden":
             hiders = known.at(pose)
         self.snapshot = replace(
             solver.shown(self.snapshot),
             hiders=hiders,
-            casters=_casters(rig, pose, choices),
-            cards=self.cards.now(rig, pose, solver.guides, choices.cards_drawn),
+            casters=_casters(rig, pose, settings),
+            cards=self.cards.now(rig, pose, solver.guides, settings.sections),
         )
 
 
-def _casters(rig: Rig, pose: Pose, choices: Choices) -> tuple[Surface, ...]:
+def _casters(rig: Rig, pose: Pose, settings: GroomSettings) -> tuple[Surface, ...]:
     """The head as it is posed, where its shadow is wanted."""
-    if rig.head is None or pose.head_positions is None or choices.volume.shadows == "none":
+    if (
+        rig.head is None
+        or pose.head_positions is None
+        or settings[VolumeSettings].shadows == "none"
+    ):
         return ()
     return (Surface(pose.head_positions, rig.head.triangles),)

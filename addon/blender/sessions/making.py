@@ -16,10 +16,13 @@ import numpy as np
 from ... import pipeline
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
+from ...groom.settings import GuideSettings
 from ...pipeline import Rig
+from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet, Surface
 from ..bakes.baked_rig import used_vertices
-from ..properties.choices import Choices
+from ..properties.groom_settings import GroomSettings
+from ..scene.rigs import rig_from
 from ..scene.source import Source
 from .hiders import Hiders
 
@@ -38,14 +41,14 @@ class Order:
 
     name: str
     source: Source
-    choices: Choices
+    settings: GroomSettings
     rig: Rig | None = None
 
     def gives_rig_of(self, other: Order) -> bool:
         """Whether both give the same rig, as far as can be told without making it."""
         one, two = self.source, other.source
         return (
-            self.choices.of_rig == other.choices.of_rig
+            self.settings.of_rig == other.settings.of_rig
             and one.strands is two.strands
             and one.head is two.head
             and np.array_equal(one.density, two.density)  # type: ignore[arg-type]
@@ -81,14 +84,7 @@ def rig_of(order: Order) -> Rig:
     """
     if order.rig is not None:
         return order.rig
-    return pipeline.prepare(
-        order.source.strands,
-        order.source.head,
-        order.choices.guides,
-        place=order.name,
-        children=order.choices.children,
-        density=order.source.density,
-    )
+    return rig_from(order.source, order.settings.sections, place=order.name)
 
 
 def make(
@@ -116,8 +112,9 @@ def make(
     report("ambient occlusion")
     # other guides on the same hair leave its shade and its head as they are
     known = before if before is not None and _same_hair(before.rig, rig) else None
-    ambient = order.choices.ambient
-    if known is not None and known.occlusion is not None and known.order.choices.ambient == ambient:
+    ambient = order.settings[AmbientSettings]
+    is_lit_alike = known is not None and known.order.settings[AmbientSettings] == ambient
+    if known is not None and known.occlusion is not None and is_lit_alike:
         occlusion = known.occlusion
     else:
         occlusion = pipeline.rest_occlusion(rig, ambient)
@@ -155,10 +152,10 @@ def _quickly_bound(few: StrandSet, head: Surface | None, order: Order) -> Rig:
         part = replace(head, triangles=head.triangles[near], corner_uv=uv)
         # roots that seem far away may be near to the rest of the head
         with suppress(HairloomError):
-            rig = pipeline.prepare(few, part, order.choices.guides, place=order.name)
+            rig = pipeline.prepare(few, part, order.settings[GuideSettings], place=order.name)
             bound = replace(rig.strands, root_triangle=near[rig.strands.root_triangle])
             return replace(rig, strands=bound, head=head)
-    return pipeline.prepare(few, head, order.choices.guides, place=order.name)
+    return pipeline.prepare(few, head, order.settings[GuideSettings], place=order.name)
 
 
 def _triangles_near(points: Floats, surface: Surface) -> Ints:

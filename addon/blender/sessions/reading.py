@@ -12,11 +12,12 @@ import numpy as np
 
 from ...arrays import Floats
 from ...pipeline import Pose, Rig
+from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet
 from ..bakes.baked_rig import BakedRig, RestMatrices
 from ..bakes.fingerprints import groom_fingerprint, groom_moment
 from ..base.objects import Body, head_of, matrix_of
-from ..properties.choices import Choices
+from ..properties.groom_settings import GroomSettings
 from ..scene.poses import check_finite, read_pose
 from ..scene.source import read_density, read_source, usable_curves
 from .making import Order, rig_of
@@ -25,7 +26,7 @@ from .making import Order, rig_of
 class Reading:
     """One groom as it was read.
 
-    source, choices: of the hair that is shown.
+    source, settings: of the hair that is shown.
     ordered: what was read last, from which hair is being made unless it is shown already.
 
     Args:
@@ -42,8 +43,8 @@ class Reading:
         uses_head = self.source.head is not None and head is not None
         self.head = Body.at_rest(head, depsgraph) if uses_head else None
         self._head_uid = head and head.session_uid
-        self.choices = Choices.of(hair, depsgraph)
-        self.ordered = Order(self.name, self.source, self.choices)
+        self.settings = GroomSettings.of(hair, depsgraph)
+        self.ordered = Order(self.name, self.source, self.settings)
         check_finite(hair.name, self.hair.rest)
 
     @property
@@ -66,7 +67,7 @@ class Reading:
         """Order the rig of a bake of this very groom, to be the same to the bit."""
         if baked is not None and (baked.rests.head is None) == (self.head is None):
             rig = self._rig_of(baked)
-            self.ordered = Order(self.name, self.source, self.choices, rig)
+            self.ordered = Order(self.name, self.source, self.settings, rig)
 
     def _rig_of(self, baked: BakedRig) -> Rig:
         """The rig of a bake; rest is where hair and head were then."""
@@ -107,8 +108,11 @@ class Reading:
             density=density,
             density_warning=warning,
         )
-        order = Order(self.name, source, Choices.of(hair))
-        if order.gives_rig_of(known) and order.choices.ambient == known.choices.ambient:
+        order = Order(self.name, source, GroomSettings.of(hair))
+        if (
+            order.gives_rig_of(known)
+            and order.settings[AmbientSettings] == known.settings[AmbientSettings]
+        ):
             self.source = replace(self.source, dropped=read.dropped, density_warning=warning)
             return None
         self.ordered = order
@@ -117,13 +121,13 @@ class Reading:
     def accept(self, order: Order) -> None:
         """Its hair is shown from now on; what acts at once is as it is set now."""
         self.source = order.source
-        self.choices = Choices.of(self.hair.found()).at_once(order.choices)
+        self.settings = GroomSettings.of(self.hair.found()).at_once(order.settings)
 
-    def take_choices(self) -> bool:
+    def take_settings(self) -> bool:
         """Take over what acts at once; whether there is more, for which hair is to be made anew."""
-        choices = Choices.of(self.hair.found())
-        self.choices = choices.at_once(self.choices)
-        return not choices.acts_at_once(self.ordered.choices)
+        settings = GroomSettings.of(self.hair.found())
+        self.settings = settings.at_once(self.settings)
+        return not settings.acts_at_once(self.ordered.settings)
 
     def pose(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Pose:
         """Where the body is now; see `poses.read_pose`."""
@@ -134,7 +138,7 @@ class Reading:
         """See `simulated.Simulated`."""
         hair = self.hair.found()
         head = None if self.head is None else self.head.found()
-        return groom_fingerprint(hair, head, self.choices, depsgraph.scene)
+        return groom_fingerprint(hair, head, self.settings, depsgraph.scene)
 
     def moment(self, pose: Pose, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
+from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...pipeline import Rig
 from ...render.snapshot import Snapshot
@@ -91,8 +92,8 @@ class Session(Groom):
         goes_on = before is not None and self.is_playing and _same_guides(made.rig, before.rig)
         if not is_same:
             motion = self.solver.motion if goes_on else None
-            self.solver: Solver = solver_of(made.rig, self.choices.dynamics.form, motion)
-        self.picture.take_made(made, self.choices)
+            self.solver: Solver = solver_of(made.rig, self.settings[DynamicsSettings].form, motion)
+        self.picture.take_made(made, self.settings)
         self.light(depsgraph)
         if is_same or goes_on:
             self._show()
@@ -148,12 +149,12 @@ class Session(Groom):
         Raises:
             HairloomError: the form of computing that was chosen is not to be had here.
         """
-        before = self.choices
-        self.is_stale |= self._reading.take_choices()
-        if self.picture.take_choices(self.rig, before, self.choices):
+        before = self.settings
+        self.is_stale |= self._reading.take_settings()
+        if self.picture.take_settings(self.rig, before, self.settings):
             self._show()
-        if self.choices.dynamics.form != before.dynamics.form:
-            self._change_form(self.choices.dynamics.form)
+        if self.settings[DynamicsSettings].form != before[DynamicsSettings].form:
+            self._change_form(self.settings[DynamicsSettings].form)
 
     def take_cards(self) -> None:
         """Show the cards that were built meanwhile."""
@@ -240,7 +241,7 @@ class Session(Groom):
             self.hair.found(),
             self.head,
             self.rig.head,
-            self.choices.dynamics,
+            self.settings[DynamicsSettings],
             depsgraph,
             self.obstacles,
             self.made.used,
@@ -263,7 +264,7 @@ class Session(Groom):
             self.solver.advance(
                 pose,
                 () if self.obstacles is None else self.obstacles.move(depsgraph, duration),
-                self.choices.dynamics,
+                self.settings[DynamicsSettings],
                 gravity_of(depsgraph.scene),
                 duration,
                 scene_wind(depsgraph),
@@ -294,7 +295,7 @@ class Session(Groom):
         self._show()
 
     def _show(self) -> None:
-        self.picture.show(self.rig, self.solver, self.choices)
+        self.picture.show(self.rig, self.solver, self.settings)
 
 
 def _same_guides(one: Rig, other: Rig) -> bool:

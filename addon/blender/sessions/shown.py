@@ -8,11 +8,15 @@ import numpy as np
 
 from ...arrays import Floats
 from ...pipeline import Rig
+from ...refine.settings import DetailSettings
 from ...render.snapshot import Snapshot
 from ...shading.marschner.look import fibre_of
 from ...shading.marschner.tables import shape_of
-from ...shading.settings import ShadingSettings
-from ..properties.choices import Choices
+from ...shading.settings import ShadingSettings, StrandSettings
+from ...shading.shafts_settings import ShaftSettings
+from ...shading.skin.settings import SkinSettings
+from ...shading.volume.settings import VolumeSettings
+from ..properties.groom_settings import GroomSettings
 
 
 def snapshot_of(rig: Rig, occlusion: Floats | None, rank: Floats | None) -> Snapshot:
@@ -33,17 +37,17 @@ def snapshot_of(rig: Rig, occlusion: Floats | None, rank: Floats | None) -> Snap
     )
 
 
-def with_choices(snapshot: Snapshot, choices: Choices) -> Snapshot:
+def with_settings(snapshot: Snapshot, settings: GroomSettings) -> Snapshot:
     """The same groom by these settings."""
     return replace(
         snapshot,
-        shading=choices.shading,
-        strand_settings=choices.strands,
-        detail=choices.detail,
-        volume=choices.volume,
-        skin=choices.skin,
-        shafts=choices.shafts,
-        debug_view=choices.debug_view,
+        shading=settings[ShadingSettings],
+        strand_settings=settings[StrandSettings],
+        detail=settings[DetailSettings],
+        volume=settings[VolumeSettings],
+        skin=settings[SkinSettings],
+        shafts=settings[ShaftSettings],
+        debug_view=settings.debug_view,
     )
 
 

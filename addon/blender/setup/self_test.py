@@ -20,7 +20,7 @@ from ...pipeline import Rig
 from ...refine.settings import DetailSettings
 from ...render.camera import frame_camera
 from ...render.frame import render_image
-from ...shading.ambient import AmbientSettings
+from ...shading.ambient_settings import AmbientSettings
 from ...shading.lights import three_point_lights
 from ...shading.settings import ShadingSettings
 from ...shading.volume.settings import VolumeSettings

@@ -15,6 +15,7 @@ from ...dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
+from ...dynamics.settings import DynamicsSettings
 from ...dynamics.wind import Air, air_of
 from ...errors import HairloomError
 from ...shading.lights import Light
@@ -51,7 +52,7 @@ def aids_of(
     made = {
         "colliders": lambda: collider_lines(session, depsgraph),
         "wind": lambda: wind_lines(
-            air_of(session.choices.dynamics, scene_wind(depsgraph)), *points
+            air_of(session.settings[DynamicsSettings], scene_wind(depsgraph)), *points
         ),
         "lights": lambda: light_lines(session.snapshot.lights, *points),
     }

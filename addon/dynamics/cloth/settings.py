@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ...params import integer, number, toggle
 from ..settings import DynamicsSettings
@@ -17,8 +16,9 @@ class FinSettings(WindSettings):
     Each vertex weighs the same. What hair has too has the same name and means the same.
     """
 
-    section: ClassVar[str] = "fin"
-    title: ClassVar[str] = "Fin"
+    section = "fin"
+    title = "Fin"
+    owner = "character"
 
     substep_rate: float = number(
         240.0,

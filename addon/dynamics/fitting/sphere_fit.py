@@ -18,16 +18,15 @@ Nothing is random: the same mesh gives the same balls.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...params import Settings, integer, number
 from ...strands import Surface
 from ...strands.closest_point import ClosestPointSearch
 from ..colliders.winding import winding_number
+from .settings import SphereFitSettings
 from .sphere_error import SphereError, measured_error
 from .surface_samples import Boundary, SurfaceSamples, boundary_of, samples_of
 
@@ -39,31 +38,6 @@ _SHRINKS = 40
 _SETTLED = 5.0e-3
 #: Balls that differ by less than this share of the mesh's longest side are one candidate.
 _ALIKE = 0.006
-
-
-@dataclass(frozen=True, kw_only=True)
-class SphereFitSettings(Settings):
-    """How a mesh is covered by balls."""
-
-    section: ClassVar[str] = "sphere_fit"
-    title: ClassVar[str] = "Fitted Spheres"
-
-    sphere_count: int = integer(
-        60,
-        label="Spheres",
-        description="How many spheres stand for the mesh",
-        soft=(4, 200),
-        hard=(1, 1000),
-    )
-    overshoot: float = number(
-        0.01,
-        label="Overshoot",
-        description="How far spheres may stick out, as a share of the mesh's longest side; more "
-        "leaves smaller gaps between them",
-        soft=(0.0, 0.05),
-        hard=(0.0, 0.5),
-        unit="factor",
-    )
 
 
 @dataclass(frozen=True)

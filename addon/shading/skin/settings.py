@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ...params import Settings, integer, number, toggle
 
@@ -14,8 +13,9 @@ _GREEN = "Green 2004, GPU Gems, chapter 16: texture-space diffusion"
 class SkinSettings(Settings):
     """Soft shadows on the head."""
 
-    section: ClassVar[str] = "skin"
-    title: ClassVar[str] = "Soft Shadow on Skin"
+    section = "skin"
+    title = "Soft Shadow on Skin"
+    owner = "groom"
 
     soft_shadow: bool = toggle(
         True,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ...params import Settings, choice, integer, number, toggle
 
@@ -22,8 +21,9 @@ SHADOWS = (
 class VolumeSettings(Settings):
     """Shadows of strands, and scattering between them."""
 
-    section: ClassVar[str] = "volume"
-    title: ClassVar[str] = "Shadows"
+    section = "volume"
+    title = "Shadows"
+    owner = "groom"
 
     shadows: str = choice(
         "deep",

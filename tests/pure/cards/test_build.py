@@ -24,7 +24,7 @@ from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.shading.ambient import AmbientSettings
+from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.strands import StrandSet
 

@@ -19,7 +19,7 @@ from hairloom.addon.cards.steps import result_of
 from hairloom.addon.cards.strand_occlusion import strands_occlusion
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.pipeline import Rig
-from hairloom.addon.shading.ambient import AmbientSettings
+from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.kajiya_kay import strand_normal
 from tests.pure.cards.test_build import falling
 

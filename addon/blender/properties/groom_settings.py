@@ -1,0 +1,90 @@
+"""All that the artist has set for one groom, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import bpy
+
+from ...cards.drawing_settings import CardDrawingSettings
+from ...groom.children_settings import ChildrenSettings
+from ...groom.settings import GuideSettings
+from ...parameters import ALL_SETTINGS, sections_of
+from ...params import Owner, Settings, SettingsMap
+from ...shading.ambient_settings import AmbientSettings
+from .card_group import picture_names
+from .properties import settings_of
+
+
+@dataclass(frozen=True)
+class GroomSettings:
+    """The settings of the curves and of their object; `groom[ShadingSettings]` is one section.
+
+    card_pictures: (texture, picture) by name, of pictures instead of generated textures.
+    children_density: vertex group or attribute of the head, by name; empty: none.
+    debug_view: what strands are coloured by, see render.snapshot.DEBUG_VIEWS.
+    """
+
+    sections: SettingsMap = field(default_factory=SettingsMap)
+    card_pictures: tuple[tuple[str, str], ...] = ()
+    children_density: str = ""
+    debug_view: str = "none"
+
+    def __getitem__[S: Settings](self, kind: type[S]) -> S:
+        return self.sections[kind]
+
+    @classmethod
+    def of(
+        cls, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph | None = None
+    ) -> GroomSettings:
+        """What is set at the moment.
+
+        Blender writes animated and driven settings into the data itself only where a window shows
+        them. A render has them in its own copies alone, which in a window lag behind edits.
+
+        Args:
+            hair: not the evaluated copy.
+            depsgraph: where the hair is shown or rendered.
+        """
+        groom, character = hair.data.hairloom, hair.hairloom
+        if depsgraph is not None and depsgraph.mode == "RENDER":
+            groom = hair.data.evaluated_get(depsgraph).hairloom
+            character = hair.evaluated_get(depsgraph).hairloom
+        owners: dict[Owner, bpy.types.PropertyGroup] = {"groom": groom, "character": character}
+        return cls(
+            SettingsMap(
+                *(
+                    settings_of(getattr(group, section), ALL_SETTINGS[section])
+                    for owner, group in owners.items()
+                    for section in sections_of(owner)
+                )
+            ),
+            picture_names(groom.card_images),
+            character.children_density,
+            character.debug_view,
+        )
+
+    def with_settings(self, *settings: Settings) -> GroomSettings:
+        """The same but for these sections."""
+        return replace(self, sections=self.sections.with_settings(*settings))
+
+    @property
+    def shows_cards(self) -> bool:
+        """Whether cards are shown instead of the strands."""
+        return self[CardDrawingSettings].shown_as == "cards"
+
+    @property
+    def of_rig(self) -> tuple[SettingsMap, str]:
+        """What decides which strands and guides there are."""
+        if self[ChildrenSettings].way == "none":
+            return self.sections.only(GuideSettings), ""
+        return self.sections.only(GuideSettings, ChildrenSettings), self.children_density
+
+    def acts_at_once(self, before: GroomSettings) -> bool:
+        """Whether only such settings differ that need nothing to be read or made again."""
+        return (self.of_rig, self[AmbientSettings]) == (before.of_rig, before[AmbientSettings])
+
+    def at_once(self, before: GroomSettings) -> GroomSettings:
+        """These, but for what waits until the hair is read again."""
+        waiting = (before[kind] for kind in (GuideSettings, ChildrenSettings, AmbientSettings))
+        return replace(self.with_settings(*waiting), children_density=before.children_density)

@@ -1,0 +1,32 @@
+"""Parameters of fitted spheres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...params import Settings, integer, number
+
+
+@dataclass(frozen=True, kw_only=True)
+class SphereFitSettings(Settings):
+    """How a mesh is covered by balls."""
+
+    section = "sphere_fit"
+    title = "Fitted Spheres"
+
+    sphere_count: int = integer(
+        60,
+        label="Spheres",
+        description="How many spheres stand for the mesh",
+        soft=(4, 200),
+        hard=(1, 1000),
+    )
+    overshoot: float = number(
+        0.01,
+        label="Overshoot",
+        description="How far spheres may stick out, as a share of the mesh's longest side; more "
+        "leaves smaller gaps between them",
+        soft=(0.0, 0.05),
+        hard=(0.0, 0.5),
+        unit="factor",
+    )

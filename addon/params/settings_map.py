@@ -1,0 +1,50 @@
+"""Settings of any number of sections as one value: frozen, comparable, and typed by their class."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, cast
+
+from .field import Settings
+
+
+class SettingsMap:
+    """At most one of each `Settings` class; of a class that is not in it, its defaults.
+
+    `settings[ShadingSettings]` is a ShadingSettings. Maps are equal if they give equal settings of
+    every class.
+    """
+
+    __slots__ = ("_values",)
+
+    def __init__(self, *settings: Settings) -> None:
+        # defaults are left out, so that maps that say the same hold the same
+        self._values = {type(one): one for one in settings if one != _default(type(one))}  # type: ignore[arg-type]
+
+    def __getitem__[S: Settings](self, kind: type[S]) -> S:
+        found = self._values.get(kind)
+        return cast(S, _default(kind) if found is None else found)  # type: ignore[arg-type]
+
+    def with_settings(self, *settings: Settings) -> SettingsMap:
+        """The same but for these."""
+        kept = (one for kind, one in self._values.items() if kind not in map(type, settings))
+        return SettingsMap(*kept, *settings)
+
+    def only(self, *kinds: type[Settings]) -> SettingsMap:
+        """The settings of these classes alone."""
+        return SettingsMap(*(self[kind] for kind in kinds))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, SettingsMap) and self._values == other._values
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._values.values()))
+
+    def __repr__(self) -> str:
+        return f"SettingsMap({', '.join(map(repr, self._values.values()))})"
+
+
+@cache
+def _default(kind: Any) -> Any:
+    """Made and checked once, as some are asked for in each frame."""
+    return kind()

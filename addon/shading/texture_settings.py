@@ -1,0 +1,119 @@
+"""Parameters of generated hair textures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..params import Settings, choice, integer, number
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextureSettings(Settings):
+    """What the strips of hair on a card texture look like."""
+
+    section = "card_texture"
+    title = "Card Texture"
+    owner = "groom"
+
+    variant_width: int = integer(
+        128,
+        label="Variant Width",
+        description="Width of one strip of hair in pixels",
+        soft=(32, 512),
+        hard=(8, 4096),
+    )
+    height: int = integer(
+        512,
+        label="Height",
+        description="Height from root to tip in pixels",
+        soft=(128, 2048),
+        hard=(8, 8192),
+    )
+    strand_count: int = integer(
+        32,
+        label="Strands",
+        description="Strands side by side in one strip",
+        soft=(8, 64),
+        hard=(2, 1024),
+    )
+    contrast: float = number(
+        0.45,
+        label="Contrast",
+        description="How much darker than full the darkest strand is",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        source="Scheuermann 2004, stretched noise as base texture",
+    )
+    edge_width: float = number(
+        0.3,
+        label="Edge Width",
+        description="Part of the width, from each side, in which the strip dissolves into strands",
+        unit="factor",
+        soft=(0.05, 0.5),
+        hard=(0.001, 0.5),
+    )
+    root_length: float = number(
+        0.04,
+        label="Root Length",
+        description="Part of the length in which the strip gathers from strands at the root",
+        unit="factor",
+        soft=(0.0, 0.3),
+        hard=(0.0, 1.0),
+    )
+    tip_length: float = number(
+        0.6,
+        label="Tip Length",
+        description="Part of the length, from the tip, in which the strip dissolves into strands",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+    )
+    softness: float = number(
+        0.25,
+        label="Softness",
+        description="How softly a strand ends; the less, the harder its edges",
+        unit="factor",
+        soft=(0.05, 1.0),
+        hard=(0.001, 1.0),
+    )
+    wander: float = number(
+        0.04,
+        label="Wander",
+        description="How far strands stray to the sides on their way, as a part of the width",
+        soft=(0.0, 0.1),
+        hard=(0.0, 0.1),
+    )
+    shift_cells: int = integer(
+        3,
+        label="Shift Cells",
+        description="Cells of the shift texture along a strand, from one shift to the next",
+        soft=(1, 16),
+        hard=(1, 256),
+        source="Scheuermann 2004, specular shift texture",
+    )
+    sparkle_cells: int = integer(
+        24,
+        label="Sparkle Cells",
+        description="Cells of the noise texture along a strand: sparkles of the second highlight",
+        soft=(1, 64),
+        hard=(1, 1024),
+        source="Scheuermann 2004, specular noise texture",
+    )
+    highlights: str = choice(
+        "shift",
+        (
+            ("shift", "Shift Texture", "Each strand moves the highlights along the hair"),
+            ("tangent", "Tangent Map", "The map says which way each strand runs"),
+        ),
+        label="Highlights By",
+        description="What breaks up the highlights",
+        source="Scheuermann 2004, hair shading",
+    )
+    seed: int = integer(
+        0,
+        label="Seed",
+        description="Another number gives other strands",
+        soft=(0, 100),
+        hard=(0, 2**31 - 1),
+    )
