@@ -1,0 +1,125 @@
+"""The recipes of docs/dev/extending.md are followed to the letter, and what they add is used."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import subprocess
+import sys
+import tokenize
+from pathlib import Path
+from typing import Any
+
+import pytest
+from recipes import REPOSITORY, copy_with_recipes, listed_files, recipes
+
+#: In the copy with all recipes applied: what each has added, used as its reader would use it.
+USES = {
+    "A collider shape": """
+import numpy as np
+from hairloom.addon.dynamics.colliders import PosedCollider
+from hairloom.addon.dynamics.colliders.box import BoxCollider
+from hairloom.addon.dynamics.reference.step import advance_slowly
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.state import start
+from hairloom.addon.dynamics.step import Drive, advance
+
+box = BoxCollider(np.array([0.1, 0.1, 0.05], np.float32))
+along = np.linspace(0.0, 0.1, 8)[:, None]
+guides = np.stack([[0.06, y, 0.1] + along * [1.0, 0.0, 0.0] for y in (-0.02, 0.02)])
+guides = guides.astype(np.float32)
+settings = DynamicsSettings(style_root=0.0, style_tip=0.0, bend=0.0, weight_held=0.0)
+colliders = (PosedCollider(box, np.eye(4), np.eye(4)),)
+drive = Drive(guides, guides, gravity=np.array([0.0, 0.0, -9.81]), colliders=colliders)
+fast = slow = start(guides)
+for _ in range(10):
+    fast = advance(fast, drive, settings, 1.0 / 24.0)
+    slow = advance_slowly(slow, drive, settings, 1.0 / 24.0)
+points = fast.grid.reshape(-1, 3).T
+facts["fell"] = float(guides[:, -1, 2].mean() - fast.grid[:, -1, 2].mean())
+facts["depth"] = float(-box.distance(points)[0].min())
+facts["difference"] = float(np.abs(fast.position - slow.position).max())
+""",
+    "A verb": """
+from hairloom.addon.blender.command_line import command_line, verb_docs
+
+report = "count.json"
+facts["code"] = command_line.run(["count", "--set", "grow.strand_count=50", "--report", report])
+facts["report"] = json.loads(open(report).read())
+facts["page"] = verb_docs.page(command_line.VERBS)
+""",
+}
+
+
+@pytest.fixture(scope="module")
+def facts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    """What the uses above found, by recipe."""
+    tree = tmp_path_factory.mktemp("extended")
+    copy_with_recipes(tree)
+    lines = [
+        "import json, sys",
+        f"sys.path.insert(0, {str(tree / 'tools')!r})",
+        "import bpy",
+        "from extension_loader import load_package",
+        "load_package().register()",
+        "found = {}",
+    ]
+    for recipe, use in USES.items():
+        lines += [f"facts = found[{recipe!r}] = {{}}", use]
+    lines.append("print('FOUND ' + json.dumps(found))")
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, cwd=tree
+    )
+    assert done.returncode == 0, done.stderr
+    found: dict[str, dict[str, Any]] = json.loads(done.stdout.rpartition("FOUND ")[2])
+    return found
+
+
+def files_with(part: str) -> set[str]:
+    """Sources in which a name has this word, or a text is this word."""
+    found = set()
+    for folder, kind in (("addon", "*.py"), ("gpu_shaders", "*.glsl")):
+        for path in (REPOSITORY / folder).rglob(kind):
+            if re.search(rf"(?<![a-z]){part}(?![a-z])", _names(path), re.IGNORECASE):
+                found.add(path.relative_to(REPOSITORY).as_posix())
+    return found
+
+
+def _names(path: Path) -> str:
+    """All names and short texts of a file, in snake_case, one a line."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".py":
+        kinds = (tokenize.NAME, tokenize.STRING)
+        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+        words = [
+            token.string for token in tokens if token.type in kinds and " " not in token.string
+        ]
+    else:
+        words = re.findall(r"\w+", re.sub(r"//[^\n]*", "", text))
+    return "\n".join(re.sub(r"([a-z])([A-Z])", r"\1_\2", word) for word in words)
+
+
+def test_every_recipe_is_walked() -> None:
+    assert set(recipes()) == {*USES, "A force or constraint"}
+
+
+def test_the_places_of_a_force_are_complete() -> None:
+    others = {"addon/dynamics/constraints.py", "addon/ui/operators_fins.py", "addon/ui/sections.py"}
+    assert listed_files("A force or constraint") - others == files_with("drag") - others
+
+
+def test_a_collider_shape(facts: dict[str, dict[str, Any]]) -> None:
+    found = facts["A collider shape"]
+    assert found["fell"] > 0.02  # over the edge of the box
+    assert found["depth"] < 2.0e-4
+    assert found["difference"] < 1.0e-3
+    others = {"gpu_shaders/lib_collider.glsl", "addon/blender/colliders/obstacles.py"}
+    assert listed_files("A collider shape") - others == files_with("capsule") - others
+
+
+def test_a_verb(facts: dict[str, dict[str, Any]]) -> None:
+    found = facts["A verb"]
+    assert found["code"] == 0
+    assert found["report"]["counted"] == found["report"]["strands"] > 0
+    assert "Count the strands and guides of a groom." in found["page"]
