@@ -1,6 +1,8 @@
 """Tests Hairloom in a Blender that has a window, on OpenGL and on Vulkan.
 
-python tools/test_ui.py [SESSION ...]      all of it, or only the named window sessions
+python tools/test_ui.py                 what a commit has to pass
+python tools/test_ui.py --all           everything, on both backends
+python tools/test_ui.py SESSION ...     only these window sessions, on both backends
 
 First the extension's zip is installed as an artist would, then tests run in that Blender in the
 background, and what they have drawn on both backends is compared; then each
@@ -16,8 +18,10 @@ import sys
 import threading
 import time
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import flip_evaluator
@@ -30,15 +34,25 @@ INSTALLED = OUTPUT / "installed"
 BACKENDS = ("opengl", "vulkan")
 #: What runs in this Blender's own Python. On OpenGL `make test` has run the rest already, with
 #: Blender as a module: each test runs on each backend that concerns it, and in both Blenders.
-TESTS = {"opengl": ("tests/pure", "tests/gpu"), "vulkan": ("tests/gpu", "tests/blender")}
-TESTS_LIMIT_S = 2400
-SESSION_LIMIT_S = float(os.environ.get("HAIRLOOM_SESSION_LIMIT", "900"))
+ALL_TESTS = {"opengl": ("tests/pure", "tests/gpu"), "vulkan": ("tests/gpu", "tests/blender")}
+#: For a commit: what may differ with another Python and numpy, and what Vulkan may draw otherwise.
+COMMIT_TESTS = {
+    "opengl": ("-m", "portable", "tests/pure", "tests/gpu", "tests/blender"),
+    "vulkan": ("-m", "draws and not slow", "tests/gpu", "tests/blender"),
+}
+TESTS_LIMIT_S = 3600
+SESSION_LIMIT_S = float(os.environ.get("HAIRLOOM_SESSION_LIMIT", "1800"))
+#: For a commit each session plays on one backend: these on Vulkan, for they look at what is drawn.
+ON_VULKAN = ("cards", "engine", "look", "shadows", "first_light", "random")
+#: It makes pictures of the documentation, and is played where all is.
+NOT_IN_COMMITS = ("guide_pictures",)
 #: Sessions that need another screen than the usual one: long panels are pictured uncut, and random
 #: actions need not look closely, while most of their time goes into drawing the window.
 SCREENS = {"session_guide_pictures": "1600x1500x24", "session_random": "800x600x24"}
 #: random actions, and how many of each seed
 SEEDS = os.environ.get("HAIRLOOM_SEEDS", "1 2 3 4 5").split()
 ACTIONS = int(os.environ.get("HAIRLOOM_ACTIONS", "80"))
+COMMIT_ACTIONS = 40
 CLOSING_LINE = "SESSION PASSED"
 PROBLEM_LINES = 30
 #: mean FLIP of the same picture on both backends
@@ -46,6 +60,10 @@ MOST_DIFFERENT = 0.02
 
 _running: set[subprocess.Popen[bytes]] = set()
 _interrupted = threading.Event()
+
+
+#: at a time
+BESIDE = 2
 
 
 @dataclass
@@ -56,6 +74,9 @@ class Tally:
     def add(self, passed: int, failed: int) -> None:
         self.passed += passed
         self.failed += failed
+
+
+Job = Callable[[Tally], None]
 
 
 def run_blender(
@@ -137,12 +158,12 @@ def run_command_line(tally: Tally) -> None:
         made.unlink(missing_ok=True)
 
 
-def run_tests(backend: str, tally: Tally) -> None:
+def run_tests(backend: str, chosen: tuple[str, ...], tally: Tally) -> None:
     """In Blender's own Python, in the background."""
     log, report = OUTPUT / f"tests-{backend}.log", OUTPUT / f"tests-{backend}.xml"
     arguments = ["--factory-startup", "--gpu-backend", backend, "--python-exit-code", "1"]
     arguments += ["--python", "tests/run_in_blender.py", "--", f"--junitxml={report}"]
-    arguments += TESTS[backend]
+    arguments += chosen
     kept = {"HAIRLOOM_PICTURES": str(OUTPUT)}
     for packages in INSTALLED.glob("extensions/.local/lib/python*/site-packages"):
         kept["HAIRLOOM_PACKAGES"] = str(packages)
@@ -181,11 +202,19 @@ def compare_backends(tally: Tally) -> None:
     tally.add(passed, not passed)
 
 
+def copy_or_link(source: str, target: str) -> None:
+    """The packages that the extension brings along, nobody changes: 140 MB that need no copy."""
+    if "site-packages" in Path(source).parts:
+        os.link(source, target)
+    else:
+        shutil.copy2(source, target)
+
+
 def run_session(script: Path, part: dict[str, str], backend: str, tally: Tally) -> None:
     """One window session, in a Blender of its own with the extension installed, not enabled."""
     name = "-".join((script.stem.removeprefix("session_"), *part.values(), backend))
     log, resources = OUTPUT / f"{name}.log", OUTPUT / f"resources-{name}"
-    shutil.copytree(INSTALLED, resources)
+    shutil.copytree(INSTALLED, resources, copy_function=copy_or_link)
     arguments = ["--factory-startup", "--gpu-backend", backend, "--enable-event-simulate"]
     arguments += ["--python-exit-code", "1", "--python", str(script)]
     environment = {
@@ -207,22 +236,42 @@ def run_session(script: Path, part: dict[str, str], backend: str, tally: Tally) 
     tally.add(passed, not passed)
 
 
-def parts_of(script: Path, backend: str) -> list[dict[str, str]]:
+def parts_of(script: Path, backend: str, is_commit: bool) -> list[dict[str, str]]:
     """The settings of each Blender that a session is played in."""
-    return random_parts(SEEDS, ACTIONS, backend) if script.stem == "session_random" else [{}]
+    if script.stem != "session_random":
+        return [{}]
+    if is_commit:
+        return random_parts(SEEDS[:1], COMMIT_ACTIONS, backend)
+    return random_parts(SEEDS, ACTIONS, backend)
 
 
-def run_backend(backend: str, sessions: list[Path], with_tests: bool) -> Tally:
-    tally = Tally()
+def jobs_of(sessions: list[Path], *, is_commit: bool, with_tests: bool) -> list[Job]:
+    """What is run side by side; the longest come first, so that none is left over at the end."""
+    tests = COMMIT_TESTS if is_commit else ALL_TESTS
+    jobs: list[Job] = []
     if with_tests:
-        run_tests(backend, tally)
-    for script, part in ((s, p) for s in sessions for p in parts_of(s, backend)):
-        if not _interrupted.is_set():
-            run_session(script, part, backend, tally)
+        jobs += [partial(run_tests, backend, tests[backend]) for backend in reversed(BACKENDS)]
+    for script in sessions:
+        name = script.stem.removeprefix("session_")
+        chosen = BACKENDS
+        if is_commit:
+            chosen = () if name in NOT_IN_COMMITS else BACKENDS[name in ON_VULKAN :][:1]
+        for backend in chosen:
+            for part in parts_of(script, backend, is_commit):
+                jobs.append(partial(run_session, script, part, backend))
+    return jobs
+
+
+def run(job: Job) -> Tally:
+    tally = Tally()
+    if not _interrupted.is_set():
+        job(tally)
     return tally
 
 
-def main(wanted: list[str]) -> int:
+def main(arguments: list[str]) -> int:
+    wanted = [each for each in arguments if each != "--all"]
+    is_commit = not arguments
     sessions = sorted((REPOSITORY / "tests" / "window").glob("session_*.py"))
     if unknown := set(wanted) - {script.stem for script in sessions}:
         print(f"no such session: {', '.join(sorted(unknown))}")
@@ -234,10 +283,11 @@ def main(wanted: list[str]) -> int:
     if installed and not wanted:
         run_command_line(tally)
     chosen = [s for s in sessions if installed and (not wanted or s.stem in wanted)]
+    jobs = jobs_of(chosen, is_commit=is_commit, with_tests=not wanted)
     # Side by side: a Blender that waits or computes leaves most of the machine to the other.
-    with ThreadPoolExecutor(len(BACKENDS)) as pool:
+    with ThreadPoolExecutor(BESIDE) as pool:
         try:
-            for each in pool.map(lambda b: run_backend(b, chosen, not wanted), BACKENDS):
+            for each in pool.map(run, jobs):
                 tally.add(each.passed, each.failed)
         except KeyboardInterrupt:
             _interrupted.set()

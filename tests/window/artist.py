@@ -1,6 +1,7 @@
 """An artist's hands and eyes in a window session: mouse and keys, and what the screen shows.
 
-Events are sent one a tick, as Blender wants them: call what yields by `yield from`.
+Events are sent one a tick, as Blender wants them: call what yields by `yield from`. Screens are
+pictures as `driver.screenshot` gives them.
 """
 
 import subprocess
@@ -11,7 +12,7 @@ from typing import Any
 import bpy
 import driver
 import numpy as np
-from driver import of_hairloom
+from driver import of_hairloom, until
 from mathutils import Euler
 
 #: Buttons of our panel, the first of its tab: x from the sidebar's left edge as a part of its
@@ -44,17 +45,19 @@ def click(x: int, y: int) -> Iterator[int]:
     """The left mouse button at a pixel of the window, from its lower left corner."""
     window = bpy.context.window
     window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
-    yield 2
+    yield 1
+    yield 1  # the button under it must have been drawn as such
     for value in ("PRESS", "RELEASE"):
         window.event_simulate("LEFTMOUSE", value, x=x, y=y)
         yield 1
+    yield 1  # what is clicked acts after its event
 
 
 def open_our_sidebar() -> Iterator[int]:
     viewport().spaces.active.show_region_ui = True
-    yield 5
+    yield
     region("UI").active_panel_category = "Hairloom"
-    yield 5
+    yield
 
 
 def sidebar_button(operator: str) -> tuple[int, int]:
@@ -116,13 +119,13 @@ def look_from_front(distance: float) -> None:
     view.view_distance = distance
 
 
-def viewport_pixels(screenshot: Path) -> np.ndarray:
+def viewport_pixels(screen: np.ndarray) -> np.ndarray:
     """The viewport between toolbar and sidebar, (height, width, 3) in 0 to 1, top row first."""
     view, header, tools, sidebar = (region(k) for k in ("WINDOW", "HEADER", "TOOLS", "UI"))
     # the tool settings' header lies over the view as well, below the header; so does the text
     top = header.y - 2 * header.height
     left, right = tools.x + tools.width, sidebar.x if sidebar.width > 1 else view.x + view.width
-    return _rectangle(screenshot, left, right, view.y, top)
+    return _rectangle(screen, left, right, view.y, top)
 
 
 def pixels(label: str) -> np.ndarray:
@@ -130,36 +133,36 @@ def pixels(label: str) -> np.ndarray:
     return viewport_pixels(driver.screenshot(label))
 
 
+def picture(label: str) -> Iterator[int]:
+    """As `pixels`, once the viewport shows what was set."""
+    yield
+    return pixels(label)
+
+
 def changed(before: np.ndarray, after: np.ndarray, at_least: float = 0.1) -> float:
     """Share of the pixels that differ by more than Blender's own anti-aliasing does."""
     return float((np.abs(after - before).max(axis=2) > at_least).mean())
 
 
-def until(is_so: Callable[[], bool], message: str, tries: int = 60) -> Iterator[int]:
-    """Ticks until something is so: a busy machine draws late. Fails after twelve seconds."""
-    for _ in range(tries):
-        if is_so():
-            return
-        yield 2
-    raise AssertionError(message)
-
-
 def pixels_at_rest(label: str) -> Iterator[int]:
-    """As `pixels`, once Blender has drawn all samples of its own anti-aliasing."""
-    before = pixels(label)
-    for _ in range(30):
-        yield 5
-        now = pixels(label)
-        if np.array_equal(before, now):
-            return now
-        before = now
-    raise AssertionError(f"{label} does not come to rest")
+    """As `picture`, once Blender has drawn all samples of its own anti-aliasing."""
+    return (yield from at_rest(label, lambda: pixels(label)))
+
+
+def at_rest(label: str, look: Callable[[], np.ndarray], count: int = 3) -> Iterator[int]:
+    """What something looks like when that has been the same for so many drawings in a row."""
+    seen: list[np.ndarray] = []
+    while len(seen) < count or not all(np.array_equal(each, seen[-1]) for each in seen[-count:]):
+        assert len(seen) < 500, f"{label} does not come to rest"
+        yield
+        seen.append(look())
+    return seen[-1]
 
 
 def hair_is_made() -> Iterator[int]:
     """Ticks until the hair of all previews is there: it is made in a thread."""
-    live = of_hairloom("blender.preview.live")
-    yield from until(lambda: all(each.is_made for each in live.sessions()), "no hair is made", 300)
+    live = of_hairloom("live")
+    yield from until(lambda: all(each.is_made for each in live.sessions()), "no hair is made")
 
 
 def file_browser() -> Any:
@@ -169,10 +172,17 @@ def file_browser() -> Any:
     return next((area for area in areas if area.type == "FILE_BROWSER"), None)
 
 
+def redrawn(area: Any) -> Iterator[int]:
+    """Blender draws what is tagged in each turn of its loop, and comes to a tick once a turn."""
+    area.tag_redraw()
+    yield 1
+    yield 1
+
+
 def confirm_file(folder: Path | None = None) -> Iterator[int]:
     """The button of a file browser that fills the window, in this folder instead of its own."""
     yield from until(lambda: file_browser() is not None, "no file browser opens")
-    yield 5
+    yield from redrawn(file_browser())
     browser = file_browser()
     if folder is not None:
         browser.spaces.active.params.directory = bytes(str(folder), "utf-8")
@@ -180,18 +190,18 @@ def confirm_file(folder: Path | None = None) -> Iterator[int]:
     # since its folder changed
     x, y = browser.x + browser.width // 2, browser.y + browser.height // 2
     bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
-    yield 5
+    yield from redrawn(browser)
     main = next(each for each in browser.regions if each.type == "WINDOW")
     with bpy.context.temp_override(area=browser, region=main):
         bpy.ops.file.execute("INVOKE_DEFAULT")
     yield from until(lambda: file_browser() is None, "the file browser stays")
 
 
-def viewport_middle(screenshot: Path, reach: int = 20) -> np.ndarray:
+def viewport_middle(screen: np.ndarray, reach: int = 20) -> np.ndarray:
     """The pixels around the middle of the view, as in `viewport_pixels`."""
     view = region("WINDOW")
     x, y = view.x + view.width // 2, view.y + view.height // 2
-    return _rectangle(screenshot, x - reach, x + reach, y - reach, y + reach)
+    return _rectangle(screen, x - reach, x + reach, y - reach, y + reach)
 
 
 def side_by_side() -> None:
@@ -211,21 +221,13 @@ def side_by_side() -> None:
         subprocess.run(["xdotool", "windowmove", window, str(number * width), "0"], check=True)
 
 
-def picture_of(window: Any, area: Any, screenshot: Path) -> np.ndarray:
+def picture_of(window: Any, area: Any, screen: np.ndarray) -> np.ndarray:
     """What an area of a window shows; as `viewport_pixels`."""
     part = next(each for each in area.regions if each.type == "WINDOW")
     x, y = window.x + part.x, window.y + part.y
-    return _rectangle(screenshot, x, x + part.width, y, y + part.height)
+    return _rectangle(screen, x, x + part.width, y, y + part.height)
 
 
-def _rectangle(screenshot: Path, left: int, right: int, bottom: int, top: int) -> np.ndarray:
-    """A part of the screen, counted from below."""
-    raw = subprocess.run(
-        ["identify", "-format", "%w %h", str(screenshot)], check=True, capture_output=True
-    ).stdout
-    width, height = (int(each) for each in raw.split())
-    raw = subprocess.run(
-        ["convert", str(screenshot), "-depth", "8", "rgb:-"], check=True, capture_output=True
-    ).stdout
-    screen = np.frombuffer(raw, np.uint8).reshape(height, width, 3)
-    return screen[height - top : height - bottom, left:right] / 255.0
+def _rectangle(screen: np.ndarray, left: int, right: int, bottom: int, top: int) -> np.ndarray:
+    """A part of the screen, counted from below, in 0 to 1."""
+    return screen[len(screen) - top : len(screen) - bottom, left:right] / 255.0

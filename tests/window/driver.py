@@ -1,32 +1,95 @@
 """How a window session drives Blender: one step a timer tick, so that events and redraws happen.
 
 A session is a script session_NAME.py that ends with `driver.play(steps())`, where `steps` is a
-generator: what stands before a `yield` runs in one tick, Blender redraws, the next tick goes on.
-`yield 5` lets five ticks pass. A failed assert or any exception fails the session.
+generator. What stands before a `yield` runs in one tick. `yield` goes on once the window shows what
+was set: nothing of ours is deferred any more, every 3D view has been drawn since, and that drawing
+is on the screen. `yield 1` lets one tick pass, for what is looked at while something goes on; to
+wait for anything else, ask for it by `until`. A failed assert or any exception fails the session.
 """
 
 import faulthandler
 import os
-import subprocess
 import sys
+import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import addon_utils
 import bpy
+import numpy as np
+import screen
+from view_mark import ViewMark
 
-TICK_S = 0.1
+TICK_S = 0.05
+#: A machine may be as slow as it likes: only what never comes fails.
+PATIENCE_S = 180.0
 EXTENSION = "bl_ext.user_default.hairloom"
 
+#: Where in the extension what sessions look at is. Each module is named here and nowhere else.
+MODULES = {
+    "card_object": "blender.cards.object",
+    "engine": "blender.engine.engine",
+    "export_check": "ui.operators_export_check",
+    "fin_modifier": "blender.scene.fin_modifier",
+    "groom_file": "exchange.groom",
+    "hair_file": "exchange.hair_file",
+    "live": "blender.preview.live",
+    "long_work": "ui.long_work",
+    "measures": "blender.sessions.measures",
+    "overlay": "blender.viewport.overlay",
+    "pipeline": "pipeline",
+    "playback": "blender.bakes.playback",
+    "preferences": "ui.preferences",
+    "presets": "blender.properties.presets",
+    "preview_operators": "ui.operators_preview",
+    "registration": "registration",
+    "self_test": "blender.setup.self_test",
+    "strand_pass": "render.strand_pass",
+    "strands": "strands",
+    "suspension": "blender.base.suspension",
+    "tables": "shading.marschner.tables",
+    "timeline": "blender.preview.timeline",
+    "tressfx": "exchange.tressfx",
+    "troubles": "blender.preview.troubles",
+    "view_transform": "blender.viewport.view_transform",
+}
 
-def play(steps: Iterator[int | None]) -> None:
+
+class Timers:
+    """Blender's timers that call Hairloom: all that it defers. Blender has no list of them."""
+
+    def __init__(self) -> None:
+        self._seen: dict[Any, None] = {}
+        self._register = bpy.app.timers.register
+        bpy.app.timers.register = self._note
+
+    def _note(self, function: Any, **settings: Any) -> None:
+        self._seen[function] = None
+        self._register(function, **settings)
+
+    def pending(self) -> list[str]:
+        """Those that are still to come."""
+        return [
+            f"{each.__module__}.{each.__qualname__}"
+            for each in self._seen
+            if getattr(each, "__module__", "").startswith(EXTENSION)
+            and bpy.app.timers.is_registered(each)
+        ]
+
+
+timers = Timers()
+_mark = ViewMark()
+
+
+def play(steps: Iterator[float | None]) -> None:
     """Plays the session, says how it ended and quits Blender."""
+    ticks = _ticks(steps)
 
     def tick() -> float | None:
         try:
-            return TICK_S * (next(steps) or 1)
+            return TICK_S * next(ticks)
         except StopIteration:
             print("SESSION PASSED", flush=True)
             bpy.ops.wm.quit_blender()
@@ -44,20 +107,57 @@ def play(steps: Iterator[int | None]) -> None:
     bpy.app.timers.register(tick, first_interval=1.0, persistent=True)
 
 
+def _ticks(steps: Iterator[float | None]) -> Iterator[float]:
+    for wait in steps:
+        if wait is None:
+            yield from _shown()
+        else:
+            assert wait <= 1, "wait for what is asked by `yield` or `until`, not for ticks"
+            yield wait
+
+
+def _shown() -> Iterator[float]:
+    """Until the window shows what was set."""
+    yield 1  # events first, and what Blender evaluates after them
+    while True:
+        yield from until(lambda: not timers.pending(), lambda: f"deferred: {timers.pending()}")
+        yield from until(lambda: bpy.context.window is not None, "there is no window")
+        _mark.draw_again()
+        yield from until(_mark.is_shown, "the 3D views are not drawn")
+        if not timers.pending():
+            return
+
+
+def until(is_so: Callable[[], Any], message: str | Callable[[], str]) -> Iterator[float]:
+    """Ticks until something is so."""
+    end = time.monotonic() + PATIENCE_S
+    while not is_so():
+        if time.monotonic() > end:
+            raise AssertionError(message if isinstance(message, str) else message())
+        yield 1
+
+
 def enable_extension() -> None:
     """Enables the installed extension; Blender itself only prints when that goes wrong."""
     assert addon_utils.enable(EXTENSION, default_set=True) is not None, f"{EXTENSION} fails"
     assert all(addon_utils.check(EXTENSION)), f"{EXTENSION} is not enabled"
 
 
-def of_hairloom(module: str) -> Any:
-    """A module of the enabled extension, such as "blender.preview.live"."""
-    return sys.modules[f"{EXTENSION}.addon.{module}"]
+def of_hairloom(name: str) -> Any:
+    """A module of the enabled extension, by its name in MODULES."""
+    return sys.modules[f"{EXTENSION}.addon.{MODULES[name]}"]
 
 
-def screenshot(label: str) -> Path:
-    """A picture of the whole screen, taken now: let some ticks pass after a change before it."""
+def screenshot_path(label: str) -> Path:
     folder, session = os.environ["HAIRLOOM_SCREENSHOTS"], os.environ["HAIRLOOM_SESSION"]
-    path = Path(folder) / f"{session}-{label}.png"
-    subprocess.run(["import", "-window", "root", str(path)], check=True)
-    return path
+    return Path(folder) / f"{session}-{label}.png"
+
+
+def screenshot(label: str) -> np.ndarray:
+    """The whole screen as it is now, kept as a file: (height, width, 3), uint8, top row first.
+
+    After a change, `yield` before it.
+    """
+    pixels = screen.pixels()
+    screenshot_path(label).write_bytes(screen.png(pixels))
+    return pixels

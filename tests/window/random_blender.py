@@ -134,7 +134,7 @@ def go_to_a_frame(dice):
 @action(4)
 def play_the_animation(dice):
     call(dice, "screen.animation_play")
-    yield dice.pick([0.2, 2])
+    yield dice.pick([0.2, 1])
 
 
 @action(2)

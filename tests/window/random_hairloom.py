@@ -56,7 +56,7 @@ def press_a_slow_button(dice):
     hair.hairloom.bake.use_own_range, hair.hairloom.bake.last = True, 4
     step("range")
     clicked(dice, f"hairloom.{dice.pick(['bake', 'bake', 'make_cards', 'fit_spheres'])}")
-    yield dice.pick([0.2, 3])
+    yield dice.pick([0.2, 1])
     yield from press("ESC")
 
 
@@ -92,7 +92,7 @@ def choose_for_an_object(dice):
 
 @action(4)
 def take_a_preset(dice):
-    presets = Path(of_hairloom("blender.properties.presets").PRESET_FOLDER)
+    presets = Path(of_hairloom("presets").PRESET_FOLDER)
     path = dice.pick(sorted(presets.rglob("*.json")))
     name = path.relative_to(presets).with_suffix("").as_posix()
     clicked(dice, "hairloom.apply_preset", name=name)
@@ -121,7 +121,7 @@ def out_and_in_again(dice):
 def disable_and_enable(dice):
     dice.note("the extension off")
     addon_utils.disable(driver.EXTENSION, default_set=True)
-    yield dice.pick([0.2, 2])
+    yield dice.pick([0.2, 1])
     dice.note("the extension on")
     driver.enable_extension()
 

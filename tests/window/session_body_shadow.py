@@ -19,10 +19,9 @@ from artist import (
     pixels_at_rest,
     press,
     sidebar_button,
-    until,
     viewport,
 )
-from driver import of_hairloom
+from driver import of_hairloom, until
 
 
 def volume():
@@ -35,7 +34,7 @@ def steps():
     yield from set_the_scene()
     yield from hair_shades_the_head()
     yield from layers_are_shown()
-    assert of_hairloom("blender.viewport.overlay").failure() == ""
+    assert of_hairloom("overlay").failure() == ""
 
 
 def set_the_scene():
@@ -63,30 +62,28 @@ def set_the_scene():
     look_from_front(0.6)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from until(has_drawn, "no hair is drawn", tries=200)
-    yield 30
+    yield from until(has_drawn, "no hair is drawn")
 
 
 def has_drawn():
-    passes = of_hairloom("blender.viewport.overlay")._passes
+    passes = of_hairloom("overlay")._passes
     return any(each.statistics.strands > 0 for each in passes.values())
 
 
 def hair_shades_the_head():
     """By a light that throws shadows, and as before when it does so again."""
-    shaded = pixels("on_body")
+    shaded = yield from pixels_at_rest("on_body")
     sun = bpy.data.objects["Sun"].data
     sun.use_shadow = False
     yield from until(
         lambda: changed(shaded, pixels("bare"), 0.05) > 0.004, "hair does not shade the head"
     )
-    yield 10
-    bare = pixels("bare")
+    bare = yield from pixels_at_rest("bare")
     assert np.quantile((shaded - bare).max(axis=2), 0.995) < 0.05, "it only darkens"
     # with neither shadows of the light nor On Body it is the same: Blender's strands throw none
     volume().on_body = False
-    yield 10
-    assert changed(bare, pixels("no_shadow_at_all"), 0.05) < 5e-3
+    none = yield from pixels_at_rest("no_shadow_at_all")
+    assert changed(bare, none, 0.05) < 5e-3
     volume().on_body = sun.use_shadow = True
     yield from until(
         lambda: changed(shaded, pixels("on_body_again"), 0.05) < 5e-3, "it does not come back"
@@ -98,10 +95,10 @@ def hair_shades_the_head():
     )
     hidden = yield from pixels_at_rest("hidden_head")
     volume().on_body = False
-    yield 20
-    assert changed(hidden, pixels("hidden_head_bare"), 0.05) < 1e-3
+    bare = yield from pixels_at_rest("hidden_head_bare")
+    assert changed(hidden, bare, 0.05) < 1e-3
     bpy.data.objects["Head"].hide_set(False)
-    yield 20
+    yield
 
 
 def layers_are_shown():
@@ -110,7 +107,7 @@ def layers_are_shown():
     space = next(each for each in area.regions if each.type == "WINDOW")
     with bpy.context.temp_override(area=area, region=space):
         assert bpy.ops.hairloom.show_slices() == {"FINISHED"}
-    yield 20
+    yield
     windows = bpy.context.window_manager.windows
     assert len(windows) == before + 1
     editor = windows[-1].screen.areas[0]

@@ -18,11 +18,10 @@ from artist import (
     press,
     region,
     sidebar_button,
-    until,
     viewport,
     viewport_middle,
 )
-from driver import of_hairloom
+from driver import of_hairloom, until
 
 SAMPLES = 8
 #: pixels from the middle of the view that are compared
@@ -31,7 +30,7 @@ REACH = 150
 
 def view():
     """What draws the viewport; the newest, where Blender has not let go of an older one yet."""
-    kind = of_hairloom("blender.engine.engine").HAIRLOOM_RE_engine
+    kind = of_hairloom("engine").HAIRLOOM_RE_engine
     engines = [each for each in gc.get_objects() if type(each) is kind]
     return engines[-1].view if engines else None
 
@@ -43,9 +42,9 @@ def is_finished():
 
 def settled():
     """Until a change has been taken over and all samples are there again, and shown."""
-    yield 10
+    yield
     yield from until(is_finished, "the viewport does not finish its samples")
-    yield 10
+    yield
 
 
 def pixels(label):
@@ -61,7 +60,7 @@ def steps():
     yield from a_region_alone_is_drawn()
     yield from it_begins_anew_at_a_change()
     yield from hair_plays_in_it()
-    assert of_hairloom("blender.viewport.overlay").failure() == ""
+    assert of_hairloom("overlay").failure() == ""
 
 
 def set_the_scene():
@@ -89,7 +88,7 @@ def it_gets_better_and_rests():
     yield from settled()
     first = pixels("rendered")
     assert first.std() > 0.05, "nothing is seen in Rendered mode"
-    yield 10
+    yield
     np.testing.assert_array_equal(first, pixels("rendered_later"))
     assert is_finished()
 
@@ -121,7 +120,7 @@ def it_is_what_f12_gives():
     yield from until(
         lambda: path.is_file() and not bpy.app.is_job_running("RENDER"), "F12 writes no picture"
     )
-    yield 5
+    yield
     image = bpy.data.images.load(str(path))
     image.colorspace_settings.is_data = True
     rendered = np.empty(len(image.pixels), np.float32)
@@ -169,7 +168,7 @@ def it_begins_anew_at_a_change():
 
 def hair_plays_in_it():
     yield from click(*sidebar_button("hairloom.preview"))
-    overlay = of_hairloom("blender.viewport.overlay")
+    overlay = of_hairloom("overlay")
     yield from until(lambda: bool(overlay.drawn()), "the preview does not start")
     yield from settled()
     at_rest = pixels("previewed")

@@ -18,15 +18,15 @@ from artist import (
     look_from_front,
     new_head,
     open_our_sidebar,
+    picture,
     pixels,
     pixels_at_rest,
     press,
     sidebar_button,
-    until,
     viewport,
 )
 from dice import press as press_in_view
-from driver import of_hairloom
+from driver import of_hairloom, until
 
 failures: list[str] = []
 drawn: set[str] = set()
@@ -78,9 +78,9 @@ def nothing_selected():
         bpy.data.objects.remove(obj)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
-    yield 3
+    yield
     driver.screenshot("nothing-selected")
-    assert of_hairloom("blender.preview.live").sessions() == ()
+    assert of_hairloom("live").sessions() == ()
 
 
 def set_the_scene():
@@ -90,29 +90,29 @@ def set_the_scene():
     bpy.context.object.data.add_curves([1, 1, 1])
     hide_floor()
     look_from_front(0.9)
-    yield 5
+    yield
 
 
 def every_panel_draws():
     """In the sidebar and in Properties > Data, without preview and with it."""
     properties = next(a for a in bpy.context.screen.areas if a.type == "PROPERTIES")
     properties.spaces.active.context = "DATA"
-    yield 5
+    yield
     drawn.clear()
     yield from click(*sidebar_button("hairloom.preview"))
     yield from hair_is_made()
-    yield 10
+    yield
     driver.screenshot("all-panels")
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
-    fin_modifier = of_hairloom("blender.scene.fin_modifier")
+    fin_modifier = of_hairloom("fin_modifier")
     fin_modifier.add_modifier(head)
     for obj, tab in ((head, "PHYSICS"), (hair, "DATA")):  # a mesh has panels of its own
         bpy.context.active_object.select_set(False)
         obj.select_set(True)
         bpy.context.view_layer.objects.active = obj
-        yield 3
+        yield
         properties.spaces.active.context = tab
-        yield 5
+        yield
         driver.screenshot(f"panels-of-{obj.name.lower()}")
     fin_modifier.remove_modifier(head)
     yield from panels_of_the_engine(properties)
@@ -120,7 +120,7 @@ def every_panel_draws():
         each.__name__ for each in of_hairloom("registration").CLASSES if "_PT_" in each.__name__
     } - drawn
     assert not missing, f"never drawn: {missing}"
-    (session,) = of_hairloom("blender.preview.live").sessions()
+    (session,) = of_hairloom("live").sessions()
     assert session.source.dropped == {"fewer than two points": 3}
 
 
@@ -130,36 +130,34 @@ def panels_of_the_engine(properties):
     before, render.engine = render.engine, "HAIRLOOM"
     for tab in ("RENDER", "VIEW_LAYER"):
         properties.spaces.active.context = tab
-        yield 10
+        yield
         driver.screenshot(f"panels-of-the-engine-{tab.lower()}")
     render.engine = before
     properties.spaces.active.context = "DATA"
-    yield 3
+    yield
 
 
 def hiding_and_local_view():
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
-    shown = pixels("shown")
+    shown = yield from pixels_at_rest("shown")
     hair.hide_set(True)
-    yield 10
-    hidden = pixels("hidden")
+    hidden = yield from pixels_at_rest("hidden")
     assert changed(shown, hidden) > 0.01, "hidden hair is drawn"
     hair.hide_set(False)
     hair.select_set(True)  # hiding deselects
-    yield 10
-    assert changed(shown, pixels("shown-again")) < 0.003
+    again = yield from pixels_at_rest("shown-again")
+    assert changed(shown, again) < 0.003
 
     hair.select_set(False)
     head.select_set(True)
     with bpy.context.temp_override(area=viewport(), region=viewport().regions[-1]):
         bpy.ops.view3d.localview(frame_selected=False)
-    yield 10
-    local = pixels("local-view")
+    local = yield from pixels_at_rest("local-view")
     assert changed(hidden, local) < 0.003, "hair is drawn in a local view without it"
     with bpy.context.temp_override(area=viewport(), region=viewport().regions[-1]):
         bpy.ops.view3d.localview(frame_selected=False)
-    yield 10
-    assert changed(local, pixels("out-of-local-view")) > 0.01
+    out = yield from picture("out-of-local-view")
+    assert changed(local, out) > 0.01
 
 
 def what_acts_on_it():
@@ -169,7 +167,6 @@ def what_acts_on_it():
     ball = bpy.data.objects.new("Ball", bpy.data.objects["Head"].data)
     bpy.context.collection.objects.link(ball)
     hair.hairloom.dynamics.wind_speed = 8.0
-    yield 5
     without = yield from pixels_at_rest("no-aids")
     for aid in ("colliders", "wind", "lights"):
         hair.hairloom.shown_aids = set()
@@ -179,22 +176,21 @@ def what_acts_on_it():
             lambda aid=aid: 0.0002 < changed(without, pixels(f"aid-{aid}")) < 0.1, f"no {aid}"
         )
     hair.hairloom.shown_aids = {"colliders", "wind", "lights"}
-    yield 5
+    yield
     driver.screenshot("all-aids")
     overlay.show_overlays = False
-    yield 5
-    bare = pixels("aids-without-overlays")
+    bare = yield from pixels_at_rest("aids-without-overlays")
     hair.hairloom.shown_aids = set()
-    yield 5
-    assert changed(bare, pixels("no-overlays")) < 0.001, "lines without overlays"
+    without = yield from pixels_at_rest("no-overlays")
+    assert changed(bare, without) < 0.001, "lines without overlays"
     overlay.show_overlays = True
     hair.hairloom.dynamics.wind_speed = 0.0
-    yield 3
+    yield
 
 
 def duplicates_by_keys():
     """Shift-D and Alt-D while hair plays: it plays on, Blender shows the copy, Ctrl-Z takes it."""
-    live, hair = of_hairloom("blender.preview.live"), bpy.data.objects["Hair"]
+    live, hair = of_hairloom("live"), bpy.data.objects["Hair"]
     choose(hair)
     bpy.ops.ed.undo_push(message="the scene")
     yield from click(*sidebar_button("hairloom.play"))
@@ -218,14 +214,14 @@ def duplicates_by_keys():
 
 
 def still_plays(where):
-    live = of_hairloom("blender.preview.live")
+    live = of_hairloom("live")
     assert len(live.sessions()) == 1 and live.notice() == "", f"{where}: {live.notice()}"
     before = live.sessions()[0].strands
 
     def has_moved():
         return not np.array_equal(live.sessions()[0].strands, before)
 
-    yield from until(has_moved, f"{where} it stands still", 300)
+    yield from until(has_moved, f"{where} it stands still")
 
 
 def shown_as(name):
@@ -243,7 +239,7 @@ def choose(obj):
 
 def blenders_own_animation():
     """Space bar: hair that is not to be simulated goes with the head, drawn at every frame."""
-    live, head = of_hairloom("blender.preview.live"), bpy.data.objects["Head"]
+    live, head = of_hairloom("live"), bpy.data.objects["Head"]
     bpy.data.objects["Hair"].hairloom.bake.follows = False
     for frame, x in ((1, 0.0), (40, 0.2)):
         head.location.x = x
@@ -251,37 +247,36 @@ def blenders_own_animation():
     bpy.context.scene.frame_set(1)
     at_first = live.sessions()[0].strands
     bpy.ops.screen.animation_play()
-    yield 10
+    yield from until(lambda: bpy.context.scene.frame_current > 1, "Blender does not play")
     bpy.ops.screen.animation_cancel(restore_frame=False)
-    yield 2
+    yield
     moved = live.sessions()[0].strands - at_first
-    assert bpy.context.scene.frame_current > 1
     assert np.allclose(moved, [head.matrix_world.translation.x, 0.0, 0.0], atol=1e-5)
     head.animation_data_clear()
     head.location.x = 0.0
-    yield 5
+    yield
 
 
 def hair_without_a_surface():
     """A warning in the panel, no more."""
-    live = of_hairloom("blender.preview.live")
+    live = of_hairloom("live")
     hair = bpy.data.objects["Hair"]
     live.stop_all()
     hair.data.surface, hair.parent = None, None
     hair.select_set(True)
     bpy.context.view_layer.objects.active = hair
-    yield 3
+    yield
     yield from click(*sidebar_button("hairloom.preview"))
     yield from hair_is_made()
-    yield 10
+    yield
     (session,) = live.sessions()
     assert "no surface" in session.source.warnings[0]
     driver.screenshot("without-surface")
 
 
 def a_failing_shader_is_told_once():
-    overlay = of_hairloom("blender.viewport.overlay")
-    strand_pass = of_hairloom("render.strand_pass").StrandPass
+    overlay = of_hairloom("overlay")
+    strand_pass = of_hairloom("strand_pass").StrandPass
     draw, calls = strand_pass.draw, []
 
     def fail(*_, **__):
@@ -291,17 +286,17 @@ def a_failing_shader_is_told_once():
     strand_pass.draw = fail
     for x in (0.01, 0.02, 0.0):
         bpy.data.objects["Hair"].location.x = x
-        yield 5
+        yield
     driver.screenshot("failing-shader")
     assert len(calls) == 1, f"it was tried {len(calls)} times"
     hair = bpy.data.objects["Hair"].evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert hair.display_type == "TEXTURED", "neither our strands nor Blender's are to be seen"
-    assert "this GPU refuses" in of_hairloom("blender.preview.live").notice()
+    assert "this GPU refuses" in of_hairloom("live").notice()
     strand_pass.draw = draw
     for _ in range(2):  # off and on again
         yield from click(*sidebar_button("hairloom.preview"))
-        yield 5
-    assert overlay.failure() == "" and of_hairloom("blender.preview.live").notice() == ""
+        yield
+    assert overlay.failure() == "" and of_hairloom("live").notice() == ""
     driver.screenshot("drawn-again")
 
 

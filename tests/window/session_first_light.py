@@ -18,15 +18,16 @@ from artist import (
     look_from_front,
     new_head,
     open_our_sidebar,
+    picture,
     pixels,
+    pixels_at_rest,
     press,
     sidebar_button,
-    until,
     viewport,
     viewport_middle,
     viewport_pixels,
 )
-from driver import of_hairloom
+from driver import of_hairloom, until
 
 STRANDS = 1500
 RED = (0.8, 0.05, 0.05)
@@ -35,11 +36,11 @@ FILE = str(Path(bpy.app.tempdir) / "first_light.blend")
 
 
 def live():
-    return of_hairloom("blender.preview.live")
+    return of_hairloom("live")
 
 
 def overlay():
-    return of_hairloom("blender.viewport.overlay")
+    return of_hairloom("overlay")
 
 
 def steps():
@@ -71,10 +72,9 @@ def preview(shading):
     """The button in the sidebar draws the strands; once more, and all is as before."""
     viewport().spaces.active.shading.type = shading
     yield from wait_for_the_head()
-    off = pixels(f"{shading.lower()}-off")
+    off = yield from pixels_at_rest(f"{shading.lower()}-off")
     yield from click(*sidebar_button("hairloom.preview"))
-    yield 10
-    assert len(live().sessions()) == 1, "the Preview button did nothing"
+    yield from until(live().sessions, "the Preview button did nothing")
     name = f"{shading.lower()}-preview"
     yield from until(
         lambda: changed(off, pixels(name)) > 0.02, f"{shading}: the strands do not show"
@@ -84,26 +84,25 @@ def preview(shading):
     yield from depth_is_tested(shading)
     if shading == "SOLID":
         yield from click(*sidebar_button("hairloom.preview"))
-        yield 15  # until Blender's own anti-aliasing has settled
-        assert live().sessions() == ()
-        left, shown = changed(off, pixels("solid-off-again")), changed(off, on)
+        yield from until(lambda: not live().sessions(), "the Preview button does not end it")
+        again = yield from pixels_at_rest("solid-off-again")
+        left, shown = changed(off, again), changed(off, on)
         assert left < 0.1 * shown, f"something stays after the preview: {left} of {shown}"
 
 
 def wait_for_the_head():
     """Until it stays in the middle of the view: EEVEE compiles its shaders first, and goes on
     showing the last picture for a while."""
-    seen = 0
-    for _ in range(80):
-        yield 10
-        picture = driver.screenshot("waiting")
-        background = np.median(viewport_pixels(picture)[-20:, :20], axis=(0, 1))
-        middle = np.median(viewport_middle(picture), axis=(0, 1))
-        picture.unlink()
-        seen = seen + 1 if np.abs(middle - background).max() > 0.1 else 0
-        if seen == 4:
-            return
-    raise AssertionError("the head never shows")
+    yield
+
+    def is_seen():
+        screen = driver.screenshot("waiting")
+        background = np.median(viewport_pixels(screen)[-20:, :20], axis=(0, 1))
+        return np.abs(np.median(viewport_middle(screen), axis=(0, 1)) - background).max() > 0.1
+
+    yield from until(is_seen, "the head never shows")
+    yield from pixels_at_rest("waiting")
+    yield from until(is_seen, "the head does not stay")
 
 
 def depth_is_tested(shading):
@@ -112,25 +111,20 @@ def depth_is_tested(shading):
     plate = bpy.context.object
     plate.scale.y = 0.01
     look_at_hair_from_above()
-    before = yield from roughness(f"{shading.lower()}-plate-before", lambda found: found < 0.02)
+    before = f"{shading}: hair shines through a plate before it"
+    yield from until(lambda: roughness(f"{shading.lower()}-plate-before") < 0.02, before)
     plate.location.y = 0.4
-    behind = yield from roughness(f"{shading.lower()}-plate-behind", lambda found: found > 0.05)
+    behind = f"{shading}: a plate behind hides the hair"
+    yield from until(lambda: roughness(f"{shading.lower()}-plate-behind") > 0.05, behind)
     bpy.data.objects.remove(plate)
     look_from_front(DISTANCE)
     select_hair()
-    yield 5
-    assert before < 0.02, f"hair shines through a plate before it: {before}"
-    assert behind > 0.05, f"a plate behind hides the hair: {behind}"
+    yield
 
 
-def roughness(name, is_expected):
-    """How much the middle of the view varies, once it is as expected; a busy machine draws late."""
-    for _ in range(8):
-        yield 5
-        found = viewport_middle(driver.screenshot(name)).std(axis=(0, 1)).max()
-        if is_expected(found):
-            break
-    return found
+def roughness(name):
+    """How much the middle of the view varies."""
+    return viewport_middle(driver.screenshot(name)).std(axis=(0, 1)).max()
 
 
 def look_at_hair_from_above():
@@ -161,28 +155,29 @@ def play_and_stop():
     """Play by the button, move the head meanwhile, stop by ESC."""
     head = bpy.data.objects["Head"]
     at_rest = live().sessions()[0].strands
-    before = pixels("play-before")
+    before = yield from pixels_at_rest("play-before")
     yield from click(*sidebar_button("hairloom.play"))
-    yield 40  # the collider is made
-    assert live().is_playing(), "the Play button did nothing"
-    offsets = []
-    for frame in range(20):
-        head.location.x = 0.06 if frame < 10 else 0.08
-        yield 1
-        strands = live().sessions()[0].strands
+    yield from until(lambda: live().sessions()[0].is_playing, "the Play button did nothing")
+    lags = [0.0]
+
+    def lag():
         carried = at_rest + np.array([head.location.x, 0.0, 0.0])
-        offsets.append(float((strands - carried)[:, -1, 0].mean()))
-    moving = pixels("play-moving")
-    assert min(offsets) < -0.001, f"the tips do not lag behind: {offsets}"
-    assert abs(offsets[9]) < abs(min(offsets)), f"the tips do not come after: {offsets}"
+        lags.append(float((carried - live().sessions()[0].strands)[:, -1, 0].mean()))
+        return lags[-1]
+
+    head.location.x = 0.06
+    yield from until(lambda: lag() > 0.001, "the tips do not lag behind")
+    yield from until(lambda: lag() < 0.5 * max(lags), "the tips do not come after")
+    head.location.x = 0.08
+    moving = yield from picture("play-moving")
     head.location.x = 0.0
-    yield 2
+    yield
     yield from press("ESC")
-    yield 15
-    assert not live().is_playing()
+    yield from until(lambda: not live().is_playing(), "ESC does not end Play")
+    stopped = yield from pixels_at_rest("play-stopped")
     strands = live().sessions()[0].strands
     assert np.abs(strands - at_rest).max() < 1e-5, "ESC did not restore the style"
-    left = changed(before, pixels("play-stopped"))
+    left = changed(before, stopped)
     assert left < 0.1 * changed(before, moving), "the picture is not the one before"
 
 
@@ -192,56 +187,53 @@ def undo():
     bpy.ops.ed.undo_push(message="before the move")
     bpy.data.objects["Head"].location.z = 0.05
     bpy.ops.ed.undo_push(message="the move")
-    yield 5
+    yield
     moved = live().sessions()[0].strands
     assert np.abs(moved - at_rest - np.float32([0, 0, 0.05])).max() < 1e-5
     bpy.ops.ed.undo()
-    yield 10
+    yield
     assert np.abs(live().sessions()[0].strands - at_rest).max() < 1e-5
     bpy.ops.ed.redo()
-    yield 10
+    yield
     assert np.abs(live().sessions()[0].strands - moved).max() < 1e-5
     bpy.ops.ed.undo()
-    yield 10
+    yield
     driver.screenshot("undone")
 
 
 def save_and_reload():
     """Loading in the middle of Play: sessions go, settings stay, and preview works again."""
     yield from click(*sidebar_button("hairloom.play"))
-    yield 15
-    assert live().is_playing()
+    yield from until(live().is_playing, "the Play button did nothing")
     bpy.ops.wm.save_as_mainfile(filepath=FILE)
-    yield 5
+    yield
     assert live().is_playing(), "saving stopped it"
     bpy.ops.wm.open_mainfile(filepath=FILE)
-    yield 10
+    yield
     assert live().sessions() == ()
     hair = bpy.data.objects["Hair"]
     assert np.allclose(hair.data.hairloom.shading.base_color, RED)
     assert hair.display_type == "TEXTURED"
-    off = pixels("reloaded-off")
+    off = yield from picture("reloaded-off")
     yield from click(*sidebar_button("hairloom.preview"))
     yield from hair_is_made()
-    yield 10
-    assert changed(off, pixels("reloaded-preview")) > 0.02
+    on = yield from picture("reloaded-preview")
+    assert changed(off, on) > 0.02
 
 
 def disable():
     """Disabling in the middle of Play leaves nothing that draws, ticks or raises."""
     yield from click(*sidebar_button("hairloom.play"))
-    yield 15
-    assert live().is_playing()
-    on = pixels("before-disabling")
+    yield from until(live().is_playing, "the Play button did nothing")
+    on = yield from picture("before-disabling")
     addon_utils.disable(driver.EXTENSION, default_set=True)
-    yield 10
+    off = yield from picture("disabled")
     assert not hasattr(bpy.types.Curves, "hairloom")
-    off = pixels("disabled")
     assert changed(on, off) > 0.02
     driver.enable_extension()
-    yield 5
+    yield
     addon_utils.disable(driver.EXTENSION, default_set=True)
-    yield 5
+    yield
     os.remove(FILE)
 
 

@@ -18,17 +18,18 @@ from artist import (
     hide_floor,
     look_from_front,
     open_our_sidebar,
+    picture,
     pixels,
+    pixels_at_rest,
     press,
     region,
-    until,
     viewport,
 )
-from driver import of_hairloom
+from driver import of_hairloom, until
 
 
 def live():
-    return of_hairloom("blender.preview.live")
+    return of_hairloom("live")
 
 
 def in_view():
@@ -53,7 +54,7 @@ def steps():
     yield from a_warning_mends()
     yield from to_the_engine()
     yield from the_page_in_the_preferences()
-    assert of_hairloom("blender.viewport.overlay").failure() == "" and live().notice() == ""
+    assert of_hairloom("overlay").failure() == "" and live().notice() == ""
 
 
 def nothing_selected():
@@ -64,7 +65,7 @@ def nothing_selected():
     assert not bpy.ops.hairloom.add_groom.poll()
     with in_view():
         bpy.ops.wm.call_menu(name="VIEW3D_MT_curve_add")
-    yield 5
+    yield
     driver.screenshot("add-menu")
     yield from press("ESC")
 
@@ -84,10 +85,10 @@ def the_sample_scene_plays():
     assert changed(one, other) > 0.02, "nothing has moved"
     with in_view():
         bpy.ops.screen.animation_cancel(restore_frame=False)
-    yield 3
+    yield
     bpy.context.window.scene = own
     live().stop_all()
-    yield 5
+    yield
 
 
 def hair_on_a_mesh_of_ones_own():
@@ -99,20 +100,17 @@ def hair_on_a_mesh_of_ones_own():
     bpy.context.object.name = "Ball"
     hide_floor()
     look_from_front(0.9)
-    yield 10
-    bare = pixels("bare")
+    bare = yield from pixels_at_rest("bare")
     bpy.ops.ed.undo_push(message="a head")
     invoke("add_groom", strand_count=1500)
     yield from until(lambda: live().is_playing(), "it does not play")
     (session,) = live().sessions()
     yield from hair_is_made()
     at_first = session.strands
-    yield from until(
-        lambda: np.abs(session.strands - at_first).max() > 1.0e-3, "nothing moves", tries=300
-    )
-    yield 5
-    assert changed(bare, pixels("own-mesh")) > 0.02, "no hair is seen"
-    line = of_hairloom("blender.sessions.measures").frame_line(session.uid)
+    yield from until(lambda: np.abs(session.strands - at_first).max() > 1.0e-3, "nothing moves")
+    grown = yield from picture("own-mesh")
+    assert changed(bare, grown) > 0.02, "no hair is seen"
+    line = of_hairloom("measures").frame_line(session.uid)
     assert "simulation" in line and "drawing" in line, line
 
 
@@ -121,34 +119,34 @@ def undo_takes_it_away():
         bpy.ops.ed.undo()
     yield from until(lambda: not live().sessions(), "the preview outlives its hair")
     assert not live().is_playing() and live().notice() == ""
-    yield 5
+    yield
     with in_view():
         bpy.ops.ed.redo()
-    yield 5
+    yield
     assert bpy.context.scene.objects.get("Ball Hair") is not None
     hair = bpy.context.scene.objects["Ball Hair"]
     bpy.context.view_layer.objects.active = hair
     hair.select_set(True)
     assert bpy.ops.hairloom.preview() == {"FINISHED"}
     yield from hair_is_made()
-    yield 5
+    yield
 
 
 def presets_have_pictures():
-    presets = of_hairloom("blender.properties.presets")
+    presets = of_hairloom("presets")
     bpy.context.window.cursor_warp(viewport().x + 300, viewport().y + viewport().height // 2)
     for section in ("shading", "dynamics", "volume", "cards"):
         entries = presets.shipped(section)
         assert entries and all(entry.icon for entry in entries), section
         invoke("choose_preset", section=section)
-        yield 8
+        yield
         driver.screenshot(f"presets-{section}")
         yield from press("ESC")
-        yield 2
-    before = pixels("brown")
+        yield
+    before = yield from picture("brown")
     bpy.ops.hairloom.apply_preset("EXEC_DEFAULT", True, name="looks/blond")
-    yield 8
-    assert changed(before, pixels("blond")) > 0.01, "the look is the same"
+    blond = yield from picture("blond")
+    assert changed(before, blond) > 0.01, "the look is the same"
 
 
 def a_warning_mends():
@@ -159,7 +157,7 @@ def a_warning_mends():
     assert bpy.ops.hairloom.preview() == {"FINISHED"}
     properties = next(a for a in bpy.context.screen.areas if a.type == "PROPERTIES")
     bpy.ops.hairloom.show_settings()
-    yield 25  # panels slide to their places
+    yield
     driver.screenshot("warnings")
     assert properties.spaces.active.context == "DATA"
     assert bpy.ops.hairloom.set_surface() == {"FINISHED"} and hair.data.surface == head
@@ -167,7 +165,7 @@ def a_warning_mends():
     yield from until(
         lambda: live().sessions() and live().sessions()[0].head is not None, "it has no head yet"
     )
-    troubles = of_hairloom("blender.preview.troubles").troubles_of(hair, live().sessions()[0])
+    troubles = of_hairloom("troubles").troubles_of(hair, live().sessions()[0])
     driver.screenshot("mended")
     assert [trouble.operator for trouble in troubles] in ([], ["hairloom.snap_roots"])
 
@@ -177,8 +175,8 @@ def to_the_engine():
         path = os.path.join(folder, "cards.glb")
         bpy.ops.hairloom.apply_preset(name="cards/crowd")
         assert bpy.ops.hairloom.export_cards(filepath=path) & {"FINISHED", "RUNNING_MODAL"}
-        yield from until(lambda: os.path.isfile(path), "no cards were written", tries=300)
-    yield 3
+        yield from until(lambda: os.path.isfile(path), "no cards were written")
+    yield
 
 
 def the_page_in_the_preferences():
@@ -187,20 +185,20 @@ def the_page_in_the_preferences():
     bpy.context.preferences.active_section = "ADDONS"
     bpy.context.window_manager.addon_search = "hairloom"
     bpy.ops.preferences.addon_expand(module=driver.EXTENSION)
-    yield 5
+    yield
     assert bpy.ops.hairloom.self_test() == {"FINISHED"}
-    checks = of_hairloom("blender.setup.self_test").last_report()
+    checks = of_hairloom("self_test").last_report()
     failed = [check for check in checks if check.outcome == "failed"]
     assert not failed and sum(check.outcome == "passed" for check in checks) >= 5, checks
     bpy.ops.hairloom.copy_report()
     assert "Drawing, Marschner" in bpy.context.window_manager.clipboard
-    yield 5
+    yield
     driver.screenshot("preferences")
-    page = of_hairloom("ui.preferences").preferences(bpy.context)
+    page = of_hairloom("preferences").preferences(bpy.context)
     assert page.bl_rna.identifier.startswith("HAIRLOOM"), "it is the defaults, not the page"
     page.look = "looks/red"
     area.type = "VIEW_3D"
-    yield 3
+    yield
 
 
 driver.play(steps())

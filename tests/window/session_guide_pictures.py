@@ -11,8 +11,9 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import file_browser, look_from_front, open_our_sidebar, press, region, until, viewport
-from cropping import changed_box, crop, cut, keep, made, pixels_of, raw
+from artist import at_rest, file_browser, look_from_front, open_our_sidebar, press, region, viewport
+from cropping import changed_box, crop, keep, made
+from driver import until
 from guide_panels import OTHERS, PICTURES, TWINS
 from open_panels import (
     OURS,
@@ -27,8 +28,8 @@ from open_panels import (
 )
 
 EXPORTS = ("export_cards", "export_alembic", "export_usd", "export_tfx", "export_hair")
-#: ticks after which panels have slid to their places
-SLIDE = 15
+#: so many drawings in a row are the same when panels have slid to their places
+STILL = 6
 #: [pixels] how wide the Properties editor is
 COLUMN = 340
 #: share of the window's height that is pictured
@@ -45,9 +46,9 @@ def steps():
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
     yield from nothing_yet()
     yield from set_the_scene(distance=0.9)
-    keep("window", [as_far_as_used(driver.screenshot("window"))])
+    keep("window", [as_far_as_used((yield from whole_screen("window")))])
     bpy.ops.wm.read_homefile()  # panels that have been drawn stay closed
-    yield 5
+    yield
     only_our_panels()
     yield from set_the_scene(distance=4.0)  # far away, where hair is drawn fast
     yield from the_sidebar()
@@ -65,7 +66,7 @@ def steps():
 
 def nothing_yet():
     yield from clear()
-    yield SLIDE
+    yield from whole_screen("start")
     keep("start", [crop("start", *sidebar())])
 
 
@@ -85,12 +86,12 @@ def set_the_scene(distance):
     hair.data.hairloom.children.way = "multi"
     hair.data.hairloom.shafts.use_shafts = True
     bpy.ops.hairloom.preview()
-    yield from until(lambda: is_drawn(hair), "the hair is not drawn", 300)
-    yield 3 * SLIDE
+    yield from until(lambda: is_drawn(hair), "the hair is not drawn")
+    yield
     region("UI").tag_redraw()
     properties = next(a for a in bpy.context.screen.areas if a.type == "PROPERTIES")
     properties.spaces.active.context = "DATA"
-    yield SLIDE
+    yield
 
 
 def clear():
@@ -104,33 +105,37 @@ def clear():
 
 def is_drawn(hair, at_least=50):
     """With its children: until they are made others stand in for them."""
-    drawn = of_hairloom("blender.viewport.overlay").statistics_of(hair.session_uid)
+    drawn = of_hairloom("overlay").statistics_of(hair.session_uid)
     return drawn.strands >= at_least
 
 
 def as_far_as_used(screen):
     """The window without the empty lower part of the Properties editor, and what is beside it."""
     window = bpy.context.window
-    return cut(screen, 0, 0, window.width, int(USED * window.height))
+    return screen[: int(USED * window.height), : window.width]
+
+
+def whole_screen(label):
+    """Once nothing slides any more."""
+    return (yield from at_rest(label, lambda: driver.screenshot(label), STILL))
 
 
 def picture(name, place):
     """The columns of a picture, each with its panels open."""
-    files = []
+    columns = []
     for number, names in enumerate(PICTURES[name]):
         full = [OURS + each for each in names]
         show(full)
         place()
-        yield SLIDE
+        yield
         yield from until(lambda full=full: drawn.issuperset(full), f"not drawn for {name}: {full}")
-        seen: list[bytes] = []
-        while len(seen) < 3 or seen[-1] != seen[-2]:  # panels slide, on a busy machine for long
+
+        def column(label=f"{name}{number}", full=full):
             show(full)
-            yield SLIDE
-            file = crop(f"{name}{number}", *place())
-            seen.append(raw(file))
-        files.append(file)
-    keep(name, files)
+            return crop(label, *place())
+
+        columns.append((yield from at_rest(name, column, STILL)))
+    keep(name, columns)
 
 
 def sidebar():
@@ -139,13 +144,13 @@ def sidebar():
 
 def the_sidebar():
     yield from picture("preview", sidebar)
-    live = of_hairloom("blender.preview.live")
+    live = of_hairloom("live")
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
     live.stop_all()
     hair.data.surface, hair.parent = None, None
     hair.scale.x = 1.4
     bpy.ops.hairloom.preview()
-    yield from until(lambda: is_drawn(hair), "the guides are not drawn", 300)
+    yield from until(lambda: is_drawn(hair), "the guides are not drawn")
     yield from picture("warnings", sidebar)
     hair.scale.x = 1.0
     live.stop_all()
@@ -155,14 +160,14 @@ def the_sidebar():
     for name in twins:  # all is pictured in Properties > Data
         show([name])
         yield from until(lambda name=name: name in drawn, f"{name} is not drawn")
-        yield 3
+        yield
         driver.screenshot(f"twin_{name}")
 
 
 def of_meshes_in_the_sidebar():
     head = bpy.data.objects["Head"]
     choose(head)
-    of_hairloom("blender.scene.fin_modifier").add_modifier(head)
+    of_hairloom("fin_modifier").add_modifier(head)
     yield from picture("meshes", sidebar)
 
 
@@ -175,14 +180,14 @@ def choose(obj):
 
 def popups():
     """The presets, the check before an export, and the options of sorting cards."""
-    of_hairloom("blender.preview.live").stop_all()
+    of_hairloom("live").stop_all()
     yield from popup("sort", "sort_cards")
     choose(bpy.data.objects["Hair"])
     yield from popup("presets", "choose_preset", section="shading")
     yield from popup("check", "check_export")
-    assert of_hairloom("ui.operators_export_check").count() == 0, "the check goes on unseen"
+    assert of_hairloom("export_check").count() == 0, "the check goes on unseen"
     bpy.ops.hairloom.preview()
-    yield from until(lambda: is_drawn(bpy.data.objects["Hair"]), "the hair is not drawn", 300)
+    yield from until(lambda: is_drawn(bpy.data.objects["Hair"]), "the hair is not drawn")
 
 
 def popup(name, operator, **settings):
@@ -190,23 +195,21 @@ def popup(name, operator, **settings):
     view = region("WINDOW")
     x, y = view.x + view.width // 2, view.y + view.height // 2
     bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
-    yield SLIDE
-    before = pixels_of(driver.screenshot(f"before_{name}"))
+    before = yield from whole_screen(f"before_{name}")
     with bpy.context.temp_override(area=viewport(), region=view):
         getattr(bpy.ops.hairloom, operator)("INVOKE_DEFAULT", **settings)
-    yield SLIDE
+    yield
     if operator == "choose_preset":
         yield from until(lambda: is_coloured(before, name), "pictures of presets do not come")
-    yield SLIDE
-    screen = driver.screenshot(f"part_{name}")
-    keep(name, [cut(screen, *changed_box(before, pixels_of(screen)))])
+    screen = yield from whole_screen(f"part_{name}")
+    keep(name, [screen[changed_box(before, screen)]])
     yield from press("ESC")
-    yield 5
+    yield
 
 
 def is_coloured(before, name):
     """Whether the pictures of looks are there, which come one by one."""
-    now = pixels_of(driver.screenshot(f"part_{name}"))
+    now = driver.screenshot(f"part_{name}")
     counts = [int(np.sum(np.ptp(each, axis=2) > COLOURED)) for each in (before, now)]
     return counts[1] - counts[0] > COLOURED_COUNT
 
@@ -226,19 +229,19 @@ def of_hair():
     share = 1.0 - COLUMN / viewport().width
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         bpy.ops.screen.area_split(direction="VERTICAL", factor=share)
-    yield 5
+    yield
     views = [a for a in bpy.context.screen.areas if a.type == "VIEW_3D"]
     min(views, key=lambda each: each.width).type = "PROPERTIES"
-    yield 5
+    yield
     column()[0].spaces.active.context = "DATA"
-    yield 5
+    yield
     for name in ("data", "look", "shadows", "strands", "dynamics", "cards", "show"):
         yield from picture(name, column)
 
 
 def of_a_mesh():
     choose(bpy.data.objects["Head"])
-    yield 5
+    yield
     column()[0].spaces.active.context = "PHYSICS"
     yield from picture("physics", column)
     choose(bpy.data.objects["Hair"])
@@ -263,7 +266,7 @@ def at_the_tab():
 
 def options_of_files():
     """The right of the file browser, format by format; those of strands beside each other."""
-    of_hairloom("blender.preview.live").stop_all()
+    of_hairloom("live").stop_all()
     pictures = {}
     for name in (*EXPORTS, "import_strands"):
         settings = {"filepath": str(Path(bpy.app.tempdir) / "hair")} if name in EXPORTS else {}
@@ -272,17 +275,17 @@ def options_of_files():
         with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
             getattr(bpy.ops.hairloom, name)("INVOKE_DEFAULT", **settings)
         yield from until(lambda: file_browser() is not None, f"no options for {name}")
-        yield SLIDE
+        yield from whole_screen(name)
         area = file_browser()
         pictures[name] = crop(name, area, next(r for r in area.regions if r.type == "TOOL_PROPS"))
         x, y = area.x + area.width // 3, area.y + area.height // 2
         bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
-        yield 5
+        yield
         main = next(each for each in area.regions if each.type == "WINDOW")
         with bpy.context.temp_override(area=area, region=main):
             bpy.ops.file.cancel()
         yield from until(lambda: file_browser() is None, "the file browser stays")
-        yield 5
+        yield
     keep("export_cards", [pictures["export_cards"], pictures["import_strands"]])
     keep("export_strands", [pictures[name] for name in EXPORTS[1:]])
 
@@ -293,15 +296,13 @@ def the_preferences():
     bpy.context.preferences.active_section = "ADDONS"
     bpy.context.window_manager.addon_search = "hairloom"
     bpy.ops.preferences.addon_expand(module=driver.EXTENSION)
-    yield 5
+    yield
     assert bpy.ops.hairloom.self_test() == {"FINISHED"}
-    yield SLIDE
+    yield from whole_screen("preferences")
     window = next(each for each in area.regions if each.type == "WINDOW")
-    whole = crop("preferences", area, window)
-    height = len(raw(whole)) // (3 * window.width)
-    keep("preferences", [cut(whole, 0, BLENDERS, window.width, height - BLENDERS)])
+    keep("preferences", [crop("preferences", area, window)[BLENDERS:]])
     area.type = "VIEW_3D"
-    yield 3
+    yield
 
 
 driver.play(steps())

@@ -9,8 +9,8 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import look_from_front, new_head, press, until, viewport
-from driver import of_hairloom
+from artist import look_from_front, new_head, press, viewport
+from driver import of_hairloom, until
 
 FOLDER = Path(bpy.app.tempdir) / "grooms"
 
@@ -34,9 +34,9 @@ def set_the_scene():
     strands = of_hairloom("strands").StrandSet(
         points.reshape(-1, 3), np.arange(501) * 8, np.full(4000, 1e-4), np.arange(500) % 3
     )
-    groom = of_hairloom("exchange.groom").Groom(strands)
-    of_hairloom("exchange.tressfx").write_tfx(FOLDER / "first.tfx", groom)
-    of_hairloom("exchange.hair_file").write_hair_file(FOLDER / "second.hair", groom)
+    groom = of_hairloom("groom_file").Groom(strands)
+    of_hairloom("tressfx").write_tfx(FOLDER / "first.tfx", groom)
+    of_hairloom("hair_file").write_hair_file(FOLDER / "second.hair", groom)
     with in_the_view():
         bpy.ops.ed.undo_push(message="the scene")  # what a script changes is no step by itself
 
@@ -61,7 +61,7 @@ def the_menu_opens_a_browser_for_its_format():
     with in_the_view():
         bpy.ops.hairloom.import_strands("INVOKE_DEFAULT", filter_glob="*.hair")
     yield from until(lambda: bool(browsers()), "no file browser has come")
-    yield 10
+    yield
     (browser,) = browsers()
     assert browser.spaces.active.params.filter_glob == "*.hair"
     driver.screenshot("browser")
@@ -83,7 +83,7 @@ def dropped_files_come_in_after_the_popup():
             directory=str(FOLDER),
             files=[{"name": "first.tfx"}, {"name": "second.hair"}],
         )
-    yield 10
+    yield
     assert grooms() == {}, "it does not ask before"
     driver.screenshot("popup")
     yield from press("RET")
@@ -91,19 +91,19 @@ def dropped_files_come_in_after_the_popup():
     head = bpy.data.objects["Head"]
     assert all(each.data.surface == head for each in grooms().values())
     assert bpy.context.view_layer.objects.active == grooms()["first"]
-    yield 10
+    yield
     driver.screenshot("imported")
 
 
 def undo_and_redo():
     with in_the_view():
         bpy.ops.ed.undo()
-    yield 5
+    yield
     assert grooms() == {}
     assert [each.name for each in bpy.data.objects if each.type == "MESH"] == ["Head"]
     with in_the_view():
         bpy.ops.ed.redo()
-    yield 5
+    yield
     assert sorted(grooms()) == ["first", "second"]
 
 

@@ -10,8 +10,8 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
-from artist import changed, hair_is_made, press, until
-from driver import of_hairloom
+from artist import changed, hair_is_made, press
+from driver import of_hairloom, until
 from two_windows import (
     SAME,
     hair,
@@ -51,7 +51,7 @@ def two_view_layers_with_the_hair():
     settings.guides.guide_count = 61
     (session,) = live().sessions()
     yield from until(lambda: session.is_pending, "no other hair is made")
-    yield from until(lambda: not session.is_pending, "it is never made", 300)
+    yield from until(lambda: not session.is_pending, "it is never made")
     yield from ours_alone("both-layers-made", mine)
     yield from played_in_both(head)
     yield from ours_alone("both-layers-played", mine)
@@ -61,14 +61,14 @@ def two_view_layers_with_the_hair():
     second.view_layer = mine
     scene.view_layers.remove(other)
     scene.frame_set(1)
-    yield 5
+    yield
     yield from with_and_without("both-layers-back", [True, True])
 
 
 def ended_in_both(mine, other):
     """Blender's own strands are back in each of them; then it is previewed again."""
     live().stop_all()
-    yield 5
+    yield
     assert not is_box(mine) and not is_box(other), "a box is left"
     bpy.ops.hairloom.preview()
     yield from hair_is_made()
@@ -82,10 +82,10 @@ def ours_alone(label, mine):
     yield from until(lambda: is_box(mine) and is_box(other), f"{label}: {is_box(mine)}")
     _, shown = yield from pictures(label)
     second.view_layer = mine
-    yield 5
+    yield
     _, wanted = yield from pictures(f"{label}-wanted")
     second.view_layer = other
-    yield 5
+    yield
     share = changed(shown, wanted)
     print(f"{label}: {share:.4f} of the second window is otherwise", flush=True)
     assert share < SAME, f"{label}: Blender's own strands are seen"
@@ -107,7 +107,7 @@ def played_in_both(head):
     scene.frame_set(1)
     session = live().sessions()[0]
     bpy.ops.screen.animation_play()
-    yield from until(lambda: session.is_playing, "Blender plays, the hair does not", 300)
+    yield from until(lambda: session.is_playing, "Blender plays, the hair does not")
     lags, frames = [], set()
 
     def has_swung():
@@ -115,9 +115,9 @@ def played_in_both(head):
         lags.append(lag(session))
         return len(frames) > 12
 
-    yield from until(has_swung, "Blender does not play", 300)
+    yield from until(has_swung, "Blender does not play")
     bpy.ops.screen.animation_cancel(restore_frame=False)
-    yield 3
+    yield
     print("lags [mm]", [round(1000.0 * each, 1) for each in lags], flush=True)
     swinging = [each > 1.0e-4 for each in lags[2:]]
     assert sum(swinging) > 0.7 * len(swinging), f"it is put to rest again and again: {lags}"

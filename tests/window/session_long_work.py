@@ -18,10 +18,9 @@ from artist import (
     open_our_sidebar,
     press,
     region,
-    until,
     viewport,
 )
-from driver import of_hairloom
+from driver import of_hairloom, until
 
 FOLDER = Path(bpy.app.tempdir) / "long"
 SMALL = {"size": 64, "samples": 1}
@@ -34,12 +33,12 @@ failures: list[str] = []
 
 
 def running():
-    return of_hairloom("ui.long_work").running()
+    return of_hairloom("long_work").running()
 
 
 def told():
     """What the status bar says of it."""
-    work = of_hairloom("ui.long_work")._running
+    work = of_hairloom("long_work")._running
     return "" if work is None else work.progress.text
 
 
@@ -109,7 +108,7 @@ def sort_by_dialog(rays):
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         asked = bpy.ops.hairloom.sort_cards("INVOKE_DEFAULT", head="Head", rays=rays)
     assert asked == {"RUNNING_MODAL"}
-    yield 3
+    yield
     yield from press("RET")
     yield from until(lambda: running() == "Sort Hair Cards", "the dialog starts nothing")
 
@@ -125,7 +124,7 @@ def from_a_dialog():
     yield from until(lambda: not running(), "Esc does not cancel")
     assert np.array_equal(order(), before)
     yield from sort_by_dialog(FEW)
-    yield from until(lambda: not running(), "sorting does not end", 300)
+    yield from until(lambda: not running(), "sorting does not end")
     after = order()
     assert not np.array_equal(after, before)
     repeated_at_once(bpy.ops.ed.undo_redo)
@@ -134,7 +133,7 @@ def from_a_dialog():
     assert np.array_equal(order(), before), "undo does not bring the order back"
     bpy.ops.ed.redo()
     assert np.array_equal(order(), after)
-    yield 2
+    yield
 
 
 def repeated_at_once(repeat):
@@ -150,10 +149,10 @@ def undone_in_mid_work():
     yield from sort_by_dialog(MANY)
     bpy.ops.ed.undo()
     assert not running(), "the work goes on with data that is gone"
-    yield 3
+    yield
     assert bpy.ops.hairloom.sort_cards.poll()
     bpy.ops.ed.redo()
-    yield 3
+    yield
     assert np.array_equal(order(), after)
 
 
@@ -167,15 +166,15 @@ def turntable(frames):
 
 def from_the_file_browser():
     yield from turntable(2000)
-    yield 5
+    yield 1
     driver.screenshot("turning")
     yield from press("ESC")
     yield from until(lambda: not running(), "Esc does not cancel the turntable")
     assert list(FOLDER.iterdir()) == []
     yield from turntable(3)
-    yield from until(lambda: not running(), "the turntable does not end", 300)
+    yield from until(lambda: not running(), "the turntable does not end")
     assert len(list(FOLDER.glob("Hair_000*.png"))) == 3
-    yield 3
+    yield
 
 
 def cards_in_motion():
@@ -199,14 +198,14 @@ def cards_in_motion():
         bpy.ops.hairloom.export_cards("INVOKE_DEFAULT", motion="joints")
     yield from confirm_file(cards)
     yield from until(lambda: running() == "Export Hair Cards", "the browser starts no export")
-    yield from until(lambda: told() == "Fitting joints", "no joints are fitted", 300)
+    yield from until(lambda: told() == "Fitting joints", "no joints are fitted")
     driver.screenshot("fitting")
     yield from press("ESC")
     yield from until(lambda: not running(), "Esc does not cancel the export of cards")
     assert [file.name for file in cards.iterdir()] == ["Hair.glb"]
     assert (cards / "Hair.glb").read_bytes() == b"the cards of before"
     head.animation_data_clear()
-    yield 3
+    yield
 
 
 def another_file_in_mid_work():
@@ -214,7 +213,7 @@ def another_file_in_mid_work():
     bpy.ops.wm.save_as_mainfile(filepath=path)
     yield from turntable(2000)
     bpy.ops.wm.open_mainfile(filepath=path)
-    yield 5
+    yield
     assert not running() and list(FOLDER.glob(".turntable*")) == []
     assert bpy.ops.hairloom.turntable.poll()
 
@@ -223,7 +222,7 @@ def disabled_in_mid_work():
     yield from turntable(2000)
     addon_utils.disable(driver.EXTENSION, default_set=True)
     assert list(FOLDER.glob(".turntable*")) == []
-    yield 5
+    yield
     driver.screenshot("disabled")
 
 

@@ -23,7 +23,7 @@ from artist import (
     sidebar_button,
     viewport,
 )
-from driver import of_hairloom
+from driver import of_hairloom, until
 
 #: where Blender's own picture of a radiance is, and ours, for the hair's root and its tip
 PLANES = ((-0.25, 0.0, -0.12), (-0.25, 0.0, 0.12))
@@ -36,7 +36,7 @@ NO_LIGHT = 0.0
 
 
 def session():
-    (one,) = of_hairloom("blender.preview.live").sessions()
+    (one,) = of_hairloom("live").sessions()
     return one
 
 
@@ -67,17 +67,21 @@ def apart(label):
 def agree(label, tolerance=TOLERANCE):
     """Both show the same, and what Blender saves of these radiances, as soon as EEVEE has compiled
     and drawn what it was asked for."""
-    for _ in range(30):
-        yield 3
+    yield
+    shown = []
+
+    def is_so():
         difference, theirs, _ = apart(label)
-        if max(difference, np.abs(theirs - saved()).max()) <= tolerance:
-            return theirs
-    raise AssertionError(f"{label}: {difference} code values apart")
+        shown.append(theirs)
+        return max(difference, np.abs(theirs - saved()).max()) <= tolerance
+
+    yield from until(is_so, f"{label}: the hair is of another colour than the planes")
+    return shown[-1]
 
 
 def saved():
     """Code values of the planes' radiances in a picture that Blender saves, by this view's mode."""
-    transform = of_hairloom("blender.viewport.view_transform")
+    transform = of_hairloom("view_transform")
     view, gain, gamma = transform.view_of(shading(), bpy.context.scene)
     nodes = [material.node_tree.nodes["Emission"] for material in bpy.data.materials]
     radiances = np.float32([node.inputs["Color"].default_value[:3] for node in nodes])
@@ -94,8 +98,8 @@ def steps():
     yield from a_slider_is_refined()
     yield from own_presets()
     yield from the_panels_of_both_models()
-    assert of_hairloom("blender.viewport.overlay").failure() == ""
-    assert of_hairloom("blender.viewport.view_transform").trouble() == ""
+    assert of_hairloom("overlay").failure() == ""
+    assert of_hairloom("view_transform").trouble() == ""
 
 
 def set_the_scene():
@@ -131,7 +135,7 @@ def set_the_scene():
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
     yield from hair_is_made()
-    yield 10
+    yield
     hair.select_set(False)  # no outline
     assert session().snapshot.lights == ()
 
@@ -165,7 +169,7 @@ def radiance_by_view_transforms():
 
 def every_mode_has_its_transform():
     """The light that reaches the hair is fixed here, so that modes with another light compare."""
-    overlay, view, scene = of_hairloom("blender.viewport.overlay"), shading(), bpy.context.scene
+    overlay, view, scene = of_hairloom("overlay"), shading(), bpy.context.scene
     lit, settings, (world, color, _) = overlay.lit, scene.view_settings, LIT[0]
     overlay.lit = lambda snapshot, *_: replace(snapshot, lights=(), ambient=(world,) * 3)
     shine(world, color, color)
@@ -202,42 +206,44 @@ def a_scene_without_light():
     """Hair is lit by a studio then, and the artist is told; a light that comes takes over."""
     shading().type = "RENDERED"
     shine(NO_LIGHT, *LIT[1][1:])
-    yield 10
-    _, theirs, ours = apart("no-light")
-    assert theirs.max() < 5.0 and ours.max() > 40.0, "hair is black"
+    yield
+
+    def is_lit_by_a_studio():
+        _, theirs, ours = apart("no-light")
+        return theirs.max() < 5.0 and ours.max() > 40.0
+
+    yield from until(is_lit_by_a_studio, "hair is black")
     assert any("no light" in warning for warning in session().warnings)
     bpy.ops.object.light_add(type="SUN", rotation=(np.pi / 2.0, 0.0, 0.0))
     bpy.context.object.data.energy = 1.0
-    yield 10
+    yield
     assert not any("no light" in warning for warning in session().warnings)
     bpy.data.objects.remove(bpy.context.object)
-    yield 10
+    yield
     assert any("no light" in warning for warning in session().warnings), "it shines on"
 
 
 def a_slider_is_refined():
-    tables = of_hairloom("shading.marschner.tables")
+    tables = of_hairloom("tables")
     look = bpy.data.objects["Hair"].data.hairloom.shading
     bpy.ops.object.light_add(type="SUN", rotation=(np.pi / 2.0, 0.0, 0.0))
     bpy.context.object.data.energy = 10.0
     look.model, look.base_color, look.tip_tint = "marschner", (0.25, 0.13, 0.06), 0.0
     look.volume_shade = 0.0  # one strand has no side that faces away
-    yield 15
-    look.width_r = 0.12
-    yield 1
-    assert session().snapshot.table_size == tables.PREVIEW_SIZE
+    yield
+    for width in (0.12, 0.14):
+        look.width_r = width
+        assert session().snapshot.table_size == tables.PREVIEW_SIZE
+        yield 1
     driver.screenshot("coarse")
-    look.width_r = 0.14
-    yield 1
-    assert session().snapshot.table_size == tables.PREVIEW_SIZE
-    yield 15
+    yield
     assert session().snapshot.table_size == tables.DEFAULT_SIZE
     assert color_at(driver.screenshot("refined"), HAIR[0]).max() > 40.0
 
 
 def own_presets():
     """Saved where Blender keeps what belongs to the extension, shown with a picture, deleted."""
-    presets = of_hairloom("blender.properties.presets")
+    presets = of_hairloom("presets")
     folder = presets.own_folder()
     assert "extensions" in folder.parts and presets.own("shading") == ((), ())
     assert bpy.ops.hairloom.save_preset(title="Mine") == {"FINISHED"}
@@ -250,10 +256,10 @@ def own_presets():
     assert entry.icon > 0 and warning.startswith("broken.json")
     view = viewport()
     bpy.context.window.cursor_warp(view.x + view.width // 3, view.y + view.height // 2)
-    yield 3
+    yield
     with bpy.context.temp_override(area=view, region=region("WINDOW")):
         bpy.ops.hairloom.choose_preset("INVOKE_DEFAULT")
-    yield 10
+    yield
     driver.screenshot("presets")
     yield from press("ESC")
     assert bpy.ops.hairloom.delete_preset(name=entry.name) == {"FINISHED"}
@@ -282,7 +288,7 @@ def the_panels_of_both_models():
     properties.spaces.active.context = "DATA"
     with bpy.context.temp_override(area=properties):
         bpy.ops.screen.screen_full_area(use_hide_panels=False)
-    yield 10
+    yield
     look = hair.data.hairloom.shading
     for model, pigment in (
         ("kajiya_kay", "color"),
@@ -291,7 +297,7 @@ def the_panels_of_both_models():
         ("marschner", "absorption"),
     ):
         look.model, look.pigment = model, pigment
-        yield 8
+        yield
         driver.screenshot(f"panel-{model}-{pigment}")
     assert bpy.ops.hairloom.look_from_material() == {"FINISHED"}
     assert look.model == "marschner" and look.pigment == "color"

@@ -18,31 +18,30 @@ from artist import (
     field,
     look_from_front,
     open_our_sidebar,
+    pixels,
     press,
-    until,
     viewport,
-    viewport_pixels,
 )
 from dice import in_view
 from dice import press as press_in_view
-from driver import of_hairloom
+from driver import of_hairloom, until
 from open_panels import open_from_the_start
 
-log, registered = traces.Log(), traces.Registered()
+log = traces.Log()
 STRANDS = 300
 #: pixels that the mouse drags a slider
 DRAGGED = 45
 
 
 def live():
-    return of_hairloom("blender.preview.live")
+    return of_hairloom("live")
 
 
 def steps():
     yield from press("ESC")  # the splash screen takes the first event
     driver.enable_extension()  # once before: Blender turns menus into lists the first time
     addon_utils.disable(driver.EXTENSION, default_set=True)
-    yield 2
+    yield
     before = traces.of_blender()
     driver.enable_extension()
     with tempfile.TemporaryDirectory() as folder:
@@ -56,14 +55,14 @@ def steps():
     yield from disabled_and_enabled()
     addon_utils.disable(driver.EXTENSION, default_set=True)
     # a thread that makes a collider comes to its end
-    yield from until(lambda: traces.of_blender() == before, "something of ours is left", 300)
+    yield from until(lambda: traces.of_blender() == before, "something of ours is left")
     nothing_raised("disabling")
 
 
 def playing_hair():
     """In a fresh file: hair on a ball, which swings."""
     bpy.ops.wm.read_homefile(use_factory_startup=False)
-    yield 5
+    yield
     new_ball()
     bpy.ops.ed.undo_push(message="a ball")
     yield from grow()
@@ -94,13 +93,14 @@ def moves(where):
     def has_moved():
         return not np.array_equal(live().sessions()[0].strands, before)
 
-    yield from until(has_moved, f"{where}, but nothing moves", tries=300)
+    yield from until(has_moved, f"{where}, but nothing moves")
 
 
 def ended(where):
     """Nothing plays, ticks, draws, is on the GPU or has raised."""
     yield from until(lambda: not any(traces.of_previews().values()), f"{where}: something goes on")
-    yield from until(lambda: registered.timers() == [], f"{where}: {registered.timers()}")
+    pending = driver.timers.pending
+    yield from until(lambda: not pending(), lambda: f"{where}: {pending()}")
     nothing_raised(where)
 
 
@@ -111,13 +111,13 @@ def nothing_raised(where):
 def undo_and_redo_each_step():
     """Grow, change, preset, cards, move, delete: back to nothing by keys, and forth again."""
     bpy.ops.wm.read_homefile(use_factory_startup=False)
-    yield 5
+    yield
     new_ball()
     bpy.ops.ed.undo_push(message="a ball")
     states = [state()]
     for step in (grow, longer_locks, redder, take_a_preset, show_cards, move_the_ball, delete_all):
         yield from step()
-        yield 3
+        yield
         states.append(state())
         assert states[-1] != states[-2], f"{step.__name__} has changed nothing"
         nothing_raised(step.__name__)
@@ -131,9 +131,9 @@ def undo_and_redo_each_step():
 def by_keys(states, shift):
     for number, wanted in enumerate(states):
         yield from press_in_view("Z", ctrl=True, shift=shift)
-        what = f"{'redo' if shift else 'undo'} {number}: {state()}, not {wanted}"
-        yield from until(lambda wanted=wanted: state() == wanted, what, tries=30)
-        yield 3
+        what = f"{'redo' if shift else 'undo'} {number} to {wanted}"
+        yield from until(lambda wanted=wanted: state() == wanted, what)
+        yield
         nothing_raised(what)
 
 
@@ -180,7 +180,7 @@ def show_cards():
 def move_the_ball():
     bpy.data.objects["Ball"].location.x = 0.05
     bpy.ops.ed.undo_push(message="move")
-    yield 5
+    yield
 
 
 def delete_all():
@@ -196,10 +196,10 @@ def a_slider_is_dragged():
     yield from playing_hair()
     look_from_front(0.45)
     yield from open_our_sidebar()
-    yield 10
+    yield
     dynamics, window = hair().hairloom.dynamics, bpy.context.window
     x, y = yield from field(viewport(), "UI", "dynamics.gravity")
-    before, shot = dynamics.gravity, viewport_pixels(driver.screenshot("before-dragging"))
+    before, shot = dynamics.gravity, pixels("before-dragging")
     window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
     yield 1
     values = []
@@ -210,13 +210,13 @@ def a_slider_is_dragged():
     yield from moves("the mouse is still pressed")
     assert live().is_playing(), "the drag has stopped it"
     window.event_simulate("LEFTMOUSE", "RELEASE", x=x + DRAGGED, y=y)
-    yield 2
+    yield
     after = dynamics.gravity
     print(f"gravity from {before:.3f} by {[round(each, 3) for each in values]} to {after:.3f}")
     assert after > before and len(set(values)) > 3, "the value did not follow the mouse"
     assert after == values[-1], "it goes on without the mouse"
     yield from moves("the mouse is off")
-    moved = changed(shot, viewport_pixels(driver.screenshot("dragged")))
+    moved = changed(shot, pixels("dragged"))
     assert moved > 0.01, f"the picture stands still: {moved:.4f} of it has changed"
     yield from press_in_view("Z", ctrl=True)
     yield from until(lambda: hair().hairloom.dynamics.gravity == before, "Ctrl-Z does nothing")
@@ -232,7 +232,7 @@ def another_file(folder):
     for _ in range(3):
         in_play.append(traces.of_gpu())
         bpy.ops.wm.open_mainfile(filepath=path)
-        yield 3  # until there is a window again
+        yield
         yield from ended("another file")
         at_rest.append(traces.of_gpu())
         assert hair().display_type == "TEXTURED"
@@ -257,10 +257,10 @@ def delete_hair():
 def delete_head():
     """Hair without a head is told of; it may be previewed, and ends with its own object."""
     bpy.data.objects.remove(bpy.data.objects["Ball"])
-    yield 10
+    yield
     nothing_raised("without a head")
     bpy.data.objects.remove(hair())
-    yield 2
+    yield
 
 
 def delete_by_key():
@@ -295,7 +295,7 @@ def disabled_and_enabled():
     addon_utils.disable(driver.EXTENSION, default_set=True)
     yield from ended("disabled again")
     driver.enable_extension()
-    yield 3
+    yield
 
 
 driver.play(steps())

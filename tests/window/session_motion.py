@@ -19,14 +19,14 @@ from artist import (
     sidebar_button,
     viewport,
 )
-from driver import of_hairloom
+from driver import of_hairloom, until
 
 LAST = 40
 FOLDER = Path(bpy.app.tempdir) / "bake"
 
 
 def session():
-    (one,) = of_hairloom("blender.preview.live").sessions()
+    (one,) = of_hairloom("live").sessions()
     return one
 
 
@@ -51,7 +51,7 @@ def set_the_scene():
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
     yield from hair_is_made()
-    yield 10
+    yield
     assert session().rig.strands.strand_count > 100
 
 
@@ -59,8 +59,7 @@ def play_keeps_the_scenes_rate():
     """What is simulated is no more than passes, in whole frames; on slow machines it is less."""
     rate, durations = 24.0, []
     yield from click(*sidebar_button("hairloom.play"))
-    yield 40  # the collider is made
-    assert of_hairloom("blender.preview.live").is_playing(), "the Play button did nothing"
+    yield from until(lambda: session().is_playing, "the Play button did nothing")
     advance = type(session()).advance
 
     def noted(self, depsgraph, duration):
@@ -69,7 +68,7 @@ def play_keeps_the_scenes_rate():
 
     type(session()).advance = noted
     begin = time.perf_counter()
-    yield 30
+    yield from until(lambda: sum(durations) > 0.5, "it does not advance")
     passed = time.perf_counter() - begin
     type(session()).advance = advance
     frames = np.array(durations) * rate
@@ -80,41 +79,42 @@ def play_keeps_the_scenes_rate():
 
 
 def pause_resume_and_reset():
-    live, head = of_hairloom("blender.preview.live"), bpy.data.objects["Head"]
+    live, head = of_hairloom("live"), bpy.data.objects["Head"]
     yield from click(*sidebar_button("hairloom.pause"))
-    yield 3
-    assert live.is_paused()
+    yield from until(live.is_paused, "it is not paused")
     held = session().strands
     head.location.x = 0.05
-    yield 5
+    yield
     assert np.array_equal(session().strands, held), "paused hair moves"
     driver.screenshot("paused")
     yield from click(*sidebar_button("hairloom.pause"))
-    yield 5
-    assert not live.is_paused() and not np.array_equal(session().strands, held)
+    yield from until(lambda: not live.is_paused(), "it stays paused")
+    yield from until(lambda: not np.array_equal(session().strands, held), "it does not go on")
     head.location.x = 0.0
     yield from click(*sidebar_button("hairloom.reset"))
-    yield 3
+    yield
     assert live.is_playing()
 
 
 def playback_takes_over():
     """Space while hair plays: from now on each frame of the animation moves it."""
-    live = of_hairloom("blender.preview.live")
+    live = of_hairloom("live")
     head, scene = bpy.data.objects["Head"], bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
     for frame, x in ((1, 0.0), (10, 0.1), (20, -0.1), (LAST, 0.0)):
         head.location.x = x
         head.keyframe_insert("location", frame=frame)
     scene.frame_set(1)
-    yield 3
+    yield
     assert live.is_playing()
     bpy.ops.screen.animation_play()
-    yield 12
-    assert not live.is_playing() and session().is_playing, "Blender's playback did not take over"
+
+    def has_taken_over():
+        return not live.is_playing() and session().is_playing and scene.frame_current > 5
+
+    yield from until(has_taken_over, "Blender's playback does not take over")
     bpy.ops.screen.animation_cancel(restore_frame=False)
-    yield 3
-    assert scene.frame_current > 1
+    yield
     carried = session().source.strands.grid[:, -1] - session().source.strands.grid[:, 0]
     lag = session().strands[:, -1] - session().strands[:, 0] - carried
     assert 1e-4 < np.linalg.norm(lag, axis=1).max() < 0.2
@@ -128,31 +128,28 @@ def run_bake():
 
 
 def is_baking():
-    return of_hairloom("ui.long_work").running() == "Bake"
+    return of_hairloom("long_work").running() == "Bake"
 
 
 def bake_in_the_window():
     scene = bpy.context.scene
     scene.frame_set(7)
     run_bake()
-    yield 2
+    yield 1
     driver.screenshot("baking")
-    for _ in range(200):
-        if not is_baking():
-            break
-        yield 1
-    yield 3
-    assert not is_baking() and scene.frame_current == 7
-    cache = of_hairloom("blender.bakes.playback").cache_of(bpy.data.objects["Hair"])
+    yield from until(lambda: not is_baking(), "the bake does not end")
+    yield
+    assert scene.frame_current == 7
+    cache = of_hairloom("playback").cache_of(bpy.data.objects["Hair"])
     assert cache.facts.frame_count == LAST
-    baked = of_hairloom("blender.preview.timeline").baked(session().uid)
+    baked = of_hairloom("timeline").baked(session().uid)
     assert baked.is_shown and baked.changed == (), baked
     driver.screenshot("baked")
     bpy.ops.screen.animation_play()
-    yield 10
+    yield from until(lambda: scene.frame_current not in (7, LAST), "Blender does not play")
     bpy.ops.screen.animation_cancel(restore_frame=False)
-    yield 2
-    strands = of_hairloom("blender.bakes.playback").strands_in(cache, scene.frame_current)
+    yield
+    strands = of_hairloom("playback").strands_in(cache, scene.frame_current)
     assert np.abs(session().strands - strands).max() < 1e-5
 
 
@@ -160,11 +157,11 @@ def escape_cancels_a_bake():
     before = (FOLDER / "cache.json").stat().st_mtime_ns
     bpy.context.scene.frame_end = 5000
     run_bake()
-    yield 3
+    yield 1
     assert is_baking()
     yield from press("ESC")
-    yield 3
-    assert not is_baking() and not of_hairloom("blender.base.suspension").is_suspended()
+    yield from until(lambda: not is_baking(), "Esc does not cancel the bake")
+    assert not of_hairloom("suspension").is_suspended()
     assert (FOLDER / "cache.json").stat().st_mtime_ns == before
     assert not FOLDER.with_name("bake.new").exists()
     bpy.context.scene.frame_end = LAST
@@ -184,32 +181,28 @@ def a_render_beside_the_window():
     finished = []
     bpy.app.handlers.render_complete.append(lambda *_: finished.append(1))
     bpy.ops.render.render("INVOKE_DEFAULT")
-    for _ in range(300):
-        if finished:
-            break
-        yield 1
-    yield 5
-    assert finished, "the render never ended"
+    yield from until(lambda: finished, "the render never ends")
+    yield
     bpy.app.handlers.render_complete.pop()
     curves = hair.hairloom.bake.copy.data
     points = np.empty((len(curves.position_data), 3), np.float32)
     curves.position_data.foreach_get("vector", points.ravel())
-    cache = of_hairloom("blender.bakes.playback").cache_of(hair)
-    strands = of_hairloom("blender.bakes.playback").strands_in(cache, 15)
+    cache = of_hairloom("playback").cache_of(hair)
+    strands = of_hairloom("playback").strands_in(cache, 15)
     assert np.array_equal(points, strands.reshape(-1, 3))
-    assert len(of_hairloom("blender.preview.live").sessions()) == 1
+    assert len(of_hairloom("live").sessions()) == 1
     driver.screenshot("rendered")
 
 
 def loading_in_the_middle_of_a_bake():
     bpy.context.scene.frame_end = 5000
     run_bake()
-    yield 3
+    yield 1
     assert is_baking()
     bpy.ops.wm.read_homefile(use_factory_startup=False)
-    yield 10
-    assert not is_baking() and not of_hairloom("blender.base.suspension").is_suspended()
-    assert of_hairloom("blender.preview.live").sessions() == ()
+    yield
+    assert not is_baking() and not of_hairloom("suspension").is_suspended()
+    assert of_hairloom("live").sessions() == ()
     assert not FOLDER.with_name("bake.new").exists()
     assert (FOLDER / "cache.json").is_file()
 

@@ -20,8 +20,9 @@ import driver
 import random_blender
 import random_hairloom
 import traces
-from artist import press, until
+from artist import press
 from dice import Dice, actions_in
+from driver import until
 
 SEEDS = [int(seed) for seed in os.environ.get("HAIRLOOM_SEEDS", "1 2 3 4 5").split()]
 ACTIONS = actions_in(random_hairloom, random_blender)
@@ -32,14 +33,14 @@ REDRAWN = 0.3
 BRIEFLY = 0.1
 RAISED = ("Traceback (most recent call last)", "Error: Python:", "SystemError")
 
-log, registered = traces.Log(), traces.Registered()
+log = traces.Log()
 
 
 def steps():
     yield from press("ESC")  # the splash screen takes the first event
     driver.enable_extension()  # once before: Blender turns menus into lists the first time
     addon_utils.disable(driver.EXTENSION, default_set=True)
-    yield 2
+    yield
     before = traces.of_blender()
     driver.enable_extension()
     enabled = traces.of_blender()
@@ -51,15 +52,15 @@ def steps():
             yield from until(lambda: is_at_rest(enabled), f"seed {seed}: something is left")
     addon_utils.disable(driver.EXTENSION, default_set=True)
     # a thread that makes a collider comes to its end
-    yield from until(lambda: traces.of_blender() == before, "something of ours is left", 300)
-    assert registered.timers() == []
+    yield from until(lambda: traces.of_blender() == before, "something of ours is left")
+    assert driver.timers.pending() == []
     assert "Traceback" not in log.added(), "disabling raised"
 
 
 def play(seed, folder):
     dice, began, refused = Dice(seed, folder), time.monotonic(), 0
     bpy.ops.wm.read_homefile(use_factory_startup=False)
-    yield 3
+    yield
     shrink_the_view()
     for number in range(ACTION_COUNT):
         try:
@@ -107,7 +108,7 @@ def shrink_the_view():
 
 def is_at_rest(enabled):
     """Whether an empty file has ended all that went on."""
-    is_idle = not any(traces.of_previews().values()) and registered.timers() == []
+    is_idle = not any(traces.of_previews().values()) and driver.timers.pending() == []
     return is_idle and traces.of_blender() == enabled
 
 

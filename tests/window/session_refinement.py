@@ -15,29 +15,30 @@ from artist import (
     look_from_front,
     new_head,
     open_our_sidebar,
+    picture,
     pixels,
+    pixels_at_rest,
     press,
     sidebar_button,
-    until,
     viewport,
 )
-from driver import of_hairloom
+from driver import of_hairloom, until
 
 GUIDES, CHILDREN = 300, 2000
 
 
 def session():
-    (one,) = of_hairloom("blender.preview.live").sessions()
+    (one,) = of_hairloom("live").sessions()
     return one
 
 
 def statistics():
     """Of the last draw in the viewport."""
-    return of_hairloom("blender.viewport.overlay")._passes[session().uid].statistics
+    return of_hairloom("overlay")._passes[session().uid].statistics
 
 
 def has_drawn_some():
-    passes = of_hairloom("blender.viewport.overlay")._passes
+    passes = of_hairloom("overlay")._passes
     return session().uid in passes and statistics().strands > 0
 
 
@@ -69,7 +70,7 @@ def steps():
     yield from far_and_near()
     yield from sliders_while_it_plays()
     yield from two_grooms()
-    assert of_hairloom("blender.viewport.overlay").failure() == ""
+    assert of_hairloom("overlay").failure() == ""
 
 
 def set_the_scene():
@@ -87,7 +88,7 @@ def set_the_scene():
 
 
 def children_appear():
-    before = pixels("guides")
+    before = yield from picture("guides")
     children = hair().data.hairloom.children
     children.way, children.strand_count = "multi", CHILDREN
     yield from strands_come(GUIDES + CHILDREN)
@@ -96,33 +97,31 @@ def children_appear():
 
 def strands_come(count):
     """Once edits have settled."""
-    yield from until(
-        lambda: session().rig.strands.strand_count == count, f"not {count} strands", tries=150
-    )
+    yield from until(lambda: session().rig.strands.strand_count == count, f"not {count} strands")
 
 
 def debug_views_and_counts():
     hair().hairloom.debug_view = "none"
-    yield 3
-    plain = pixels("plain")
+    plain = yield from pixels_at_rest("plain")
     hair().hairloom.show_counts = True
     yield from until(
         lambda: changed(corner(plain), corner(pixels("counts"))) > 0.01, "no counts are to be seen"
     )
-    counted = pixels("counts")
+    counted = yield from pixels_at_rest("counts")
     assert changed(plain[:-60], counted[:-60]) < 0.003, "the counts lie over something"
     hair().hairloom.show_counts = False
     assert saturation(plain) < 0.01
     for view in ("detail", "guide", "group"):
         hair().hairloom.debug_view = view
-        yield 3
+        yield
         yield from until(lambda view=view: saturation(pixels(view)) > 0.02, view)
         shown = pixels(view)
         assert changed(corner(plain), corner(shown)) > 0.01, "a debug view without its counts"
     hair().hairloom.debug_view = "occlusion"  # in grey
-    yield 3
+    yield
     yield from until(lambda: changed(shown, pixels("occlusion")) > 0.02, "no occlusion is shown")
-    assert saturation(pixels("occlusion")) < 0.01
+    grey = yield from picture("occlusion")
+    assert saturation(grey) < 0.01
     overlays = viewport().spaces.active.overlay
     overlays.show_overlays = False
     yield from until(
@@ -131,7 +130,7 @@ def debug_views_and_counts():
     )
     overlays.show_overlays = True
     hair().hairloom.debug_view = "none"
-    yield 3
+    yield
 
 
 def what_the_head_hides():
@@ -139,14 +138,14 @@ def what_the_head_hides():
     detail.full_size = 0.0
     detail.culling = "none"
     yield from until(draws_all, "strands are missing")
-    yield 3
-    everything, count = pixels("nothing-left-out"), GUIDES + CHILDREN
+    everything = yield from pixels_at_rest("nothing-left-out")
+    count = GUIDES + CHILDREN
     detail.culling = "hidden"
     yield from until(
         lambda: 0.3 * count < statistics().strands < 0.95 * count, "the head hides no strands"
     )
-    yield 3
-    assert changed(everything, pixels("hidden-left-out")) < 0.0005, "what is seen was left out"
+    left = yield from pixels_at_rest("hidden-left-out")
+    assert changed(everything, left) < 0.0005, "what is seen was left out"
     shading.show_xray = True
     yield from until(draws_all, "the head hides hair in X-ray")
     driver.screenshot("xray")
@@ -155,9 +154,9 @@ def what_the_head_hides():
     yield from until(draws_all, "a hidden head hides hair")
     driver.screenshot("hidden-head")
     bpy.data.objects["Head"].hide_set(False)
-    yield 3
+    yield
     detail.full_size = 300.0
-    yield 3
+    yield
 
 
 def far_and_near():
@@ -165,21 +164,20 @@ def far_and_near():
     hair().hairloom.show_counts = True
     for distance in (0.15, 0.7, 5.0):
         look_from_front(distance)
-        yield 3
+        yield
         drawn[distance] = statistics()
         driver.screenshot(f"from-{distance}-m")
     each = {distance: one.pieces / one.strands for distance, one in drawn.items()}
     assert each[0.15] >= each[0.7] >= each[5.0], each
     assert drawn[5.0].strands < 0.4 * drawn[0.7].strands, drawn
     look_from_front(0.7)
-    yield 3
+    yield
 
 
 def sliders_while_it_plays():
-    live, head = of_hairloom("blender.preview.live"), bpy.data.objects["Head"]
+    live, head = of_hairloom("live"), bpy.data.objects["Head"]
     yield from click(*sidebar_button("hairloom.play"))
-    yield 30
-    assert live.is_playing(), "the Play button did nothing"
+    yield from until(live.is_playing, "the Play button did nothing")
     children = hair().data.hairloom.children
     for count, x in ((500, 0.02), (3000, 0.04), (1000, 0.0)):
         children.strand_count = count
@@ -187,7 +185,7 @@ def sliders_while_it_plays():
         yield from strands_come(GUIDES + count)
         assert live.is_playing()
     children.way = "single"
-    yield 15
+    yield
     children.way = "none"
     yield from strands_come(GUIDES)
     children.way = "multi"
@@ -201,8 +199,7 @@ def sliders_while_it_plays():
     yield from strands_come(GUIDES + 1000)
     assert live.is_playing()
     yield from press("ESC")
-    yield 5
-    assert not live.is_playing()
+    yield from until(lambda: not live.is_playing(), "ESC does not end Play")
 
 
 def two_grooms():
@@ -210,16 +207,16 @@ def two_grooms():
     twin = bpy.data.objects.new("Twin", hair().data)
     bpy.context.collection.objects.link(twin)
     twin.hairloom.show_counts = True
-    live = of_hairloom("blender.preview.live")
+    live = of_hairloom("live")
     live.start(twin, bpy.context.evaluated_depsgraph_get())
     look_from_front(1.2)
     yield from hair_is_made()
-    yield 5
+    yield
     driver.screenshot("two-grooms")
     assert len(live.sessions()) == 2
     live.stop_all()
-    yield 3
-    assert of_hairloom("blender.viewport.overlay")._handles == ()
+    yield
+    assert of_hairloom("overlay")._handles == ()
 
 
 driver.play(steps())

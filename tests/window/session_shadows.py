@@ -15,11 +15,11 @@ from artist import (
     new_head,
     open_our_sidebar,
     pixels,
+    pixels_at_rest,
     press,
     sidebar_button,
-    until,
 )
-from driver import of_hairloom
+from driver import of_hairloom, until
 
 
 def volume():
@@ -32,7 +32,7 @@ def steps():
     yield from set_the_scene()
     yield from shadows_appear()
     yield from they_stay_while_hair_plays()
-    assert of_hairloom("blender.viewport.overlay").failure() == ""
+    assert of_hairloom("overlay").failure() == ""
 
 
 def set_the_scene():
@@ -46,11 +46,11 @@ def set_the_scene():
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
     yield from until(has_drawn, "no hair is drawn")
-    yield 10
+    yield
 
 
 def has_drawn():
-    passes = of_hairloom("blender.viewport.overlay")._passes
+    passes = of_hairloom("overlay")._passes
     return any(each.statistics.strands > 0 for each in passes.values())
 
 
@@ -59,21 +59,19 @@ def shadows_appear():
     drawn without a failure.
     """
     assert volume().shadows == "deep"
-    shaded = pixels("shadows_at_first")
+    shaded = yield from pixels_at_rest("shadows_at_first")
     volume().shadows = "none"
     yield from seen_to_differ(shaded, "without_shadows")
-    yield 10
-    plain = pixels("without_shadows")
+    plain = yield from pixels_at_rest("without_shadows")
     for form in ("slices", "deep"):
         volume().shadows = form
         yield from seen_to_differ(plain, f"shadows_{form}")
-        assert of_hairloom("blender.viewport.overlay").failure() == ""
-    yield 10
-    shaded = pixels("shadows_deep")
+        assert of_hairloom("overlay").failure() == ""
+    shaded = yield from pixels_at_rest("shadows_deep")
     volume().scattering = False
     yield from seen_to_differ(shaded, "without_scattering")
     volume().scattering = True
-    yield 20
+    yield
 
 
 def seen_to_differ(before, label):
@@ -81,15 +79,15 @@ def seen_to_differ(before, label):
 
 
 def they_stay_while_hair_plays():
-    before = pixels("before_play")
+    before = yield from pixels_at_rest("before_play")
     yield from click(*sidebar_button("hairloom.play"))
-    yield 20
+    yield
     bpy.data.objects["Head"].location.x = 0.05
     yield from seen_to_differ(before, "playing")
     yield from press("ESC")
-    yield 10
+    yield
     bpy.data.objects["Head"].location.x = 0.0
-    yield 20
+    yield
 
 
 driver.play(steps())

@@ -7,8 +7,8 @@ import bpy
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import look_from_front, new_head, open_our_sidebar, press, until
-from driver import of_hairloom
+from artist import look_from_front, new_head, open_our_sidebar, press
+from driver import of_hairloom, until
 
 STRANDS, FRAMES = 300, 5
 FOLDER = Path(bpy.app.tempdir) / "shown"
@@ -16,7 +16,7 @@ SMALL = {"size": 64, "samples": 1}
 
 
 def running():
-    return of_hairloom("ui.long_work").running()
+    return of_hairloom("long_work").running()
 
 
 def steps():
@@ -43,7 +43,7 @@ def turntable(**options):
 def a_whole_turn():
     """Pictures and a video, while the window stays alive."""
     turntable(frames=FRAMES)
-    yield from until(lambda: not running(), "the turntable does not end", tries=300)
+    yield from until(lambda: not running(), "the turntable does not end")
     names = sorted(path.name for path in FOLDER.iterdir())
     assert names == ["Hair.mp4", *(f"Hair_000{n}.png" for n in range(1, FRAMES + 1))], names
     clip = bpy.data.movieclips.load(str(FOLDER / "Hair.mp4"))
@@ -57,7 +57,7 @@ def a_cancelled_one():
     before = {path.name: path.stat().st_mtime_ns for path in FOLDER.iterdir()}
     turntable(frames=2000)
     third = ".turntable.hl-*/*_0003.png"
-    yield from until(lambda: any(FOLDER.glob(third)), "no picture is drawn", 300)
+    yield from until(lambda: any(FOLDER.glob(third)), "no picture is drawn")
     assert running() == "Turntable"
     driver.screenshot("turning")
     yield from press("ESC")

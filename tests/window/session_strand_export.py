@@ -16,10 +16,9 @@ from artist import (
     open_our_sidebar,
     press,
     region,
-    until,
     viewport,
 )
-from driver import of_hairloom
+from driver import of_hairloom, until
 from open_panels import open_from_the_start
 
 FOLDER = Path(bpy.app.tempdir) / "strands"
@@ -28,7 +27,7 @@ failures: list[str] = []
 
 
 def running():
-    return of_hairloom("ui.long_work").running()
+    return of_hairloom("long_work").running()
 
 
 def steps():
@@ -67,12 +66,12 @@ def export(**options):
         asked = bpy.ops.hairloom.export_alembic("INVOKE_DEFAULT", filepath=path, **options)
     assert asked == {"RUNNING_MODAL"}
     yield from until(lambda: file_browser() is not None, "no file browser opens")
-    yield 8
+    yield
 
 
 def the_check_stands_beside_the_options():
     yield from export()
-    check = of_hairloom("ui.operators_export_check")
+    check = of_hairloom("export_check")
     assert check.count() == 1 and "guides" in check._check.lines[0], check._check
     driver.screenshot("options")
     yield from confirm_file()
@@ -85,9 +84,9 @@ def motion_comes_in_steps():
     yield from export(frames="own", first=1, last=20)
     yield from confirm_file()
     yield from until(lambda: bool(running()), "the export does not begin")
-    yield 3
+    yield
     driver.screenshot("writing")
-    yield from until(lambda: not running(), "the export does not end", 300)
+    yield from until(lambda: not running(), "the export does not end")
     assert (FOLDER / "hair.abc").exists()
     assert bpy.context.scene.frame_current == 1
 
@@ -97,7 +96,7 @@ def escape_leaves_the_old_file():
     yield from export(frames="own", first=1, last=4000)
     yield from confirm_file()
     yield from until(lambda: bool(running()), "the export does not begin")
-    yield 5
+    yield
     yield from press("ESC")
     yield from until(lambda: not running(), "Esc does not cancel the export")
     yield from until(
@@ -109,18 +108,18 @@ def escape_leaves_the_old_file():
 
 def the_check_alone():
     """By its button, the lowest one of all."""
-    check, sidebar = of_hairloom("ui.operators_export_check"), region("UI")
+    check, sidebar = of_hairloom("export_check"), region("UI")
     for y in range(sidebar.y + 6, sidebar.y + sidebar.height, 12):
         yield from click(sidebar.x + sidebar.width // 2, y)
         if check.count():
             break
     else:
         raise AssertionError("no button opens the check")
-    yield 5
+    yield
     driver.screenshot("check")
     yield from press("ESC")
-    yield 3
-    assert of_hairloom("ui.operators_export_check").count() == 0
+    yield
+    assert of_hairloom("export_check").count() == 0
 
 
 driver.play(steps())

@@ -10,8 +10,8 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
-from artist import changed, press, until
-from driver import of_hairloom
+from artist import changed, press
+from driver import of_hairloom, until
 from two_windows import (
     HAIR,
     SAME,
@@ -54,10 +54,10 @@ def local_view_in_one_window():
             bpy.ops.view3d.localview(frame_selected=False)
 
     switch()
-    yield 5
+    yield
     yield from with_and_without("local-view", [True, False])
     switch()
-    yield 5
+    yield
 
 
 def another_view_layer_in_one_window():
@@ -67,11 +67,11 @@ def another_view_layer_in_one_window():
     layer.layer_collection.children["Groom"].exclude = True
     first = second.view_layer
     second.view_layer = layer
-    yield 5
+    yield
     yield from with_and_without("view-layer", [True, False])
     second.view_layer = first
     scene.view_layers.remove(layer)
-    yield 5
+    yield
     yield from with_and_without("view-layer-back", [True, True])
 
 
@@ -80,7 +80,7 @@ def another_scene_in_one_window():
     first, second = windows()
     mine, other = first.scene, bpy.data.scenes.new("Other")
     second.scene = other
-    yield 5
+    yield
     look()
     yield from with_and_without("scene", [True, False])
     (session,) = live().sessions()
@@ -89,13 +89,13 @@ def another_scene_in_one_window():
     other.collection.objects.link(ball)
     for x in (0.01, 0.02, 0.0):  # updates of the other scene
         ball.location.x = x
-        yield 3
+        yield
     assert session.rig is rig, "work in another scene reads the hair again"
     yield from with_and_without("scene-worked-on", [True, False])
     second.scene = mine
     bpy.data.objects.remove(ball)
     bpy.data.scenes.remove(other)
-    yield 5
+    yield
     look()
     yield from with_and_without("scene-back", [True, True])
     yield from closed_while_it_moves(second)
@@ -106,7 +106,7 @@ def closed_while_it_moves(second):
     with bpy.context.temp_override(window=second):
         bpy.ops.wm.window_close()
     bpy.ops.hairloom.reset()
-    yield 5
+    yield
     assert len(windows()) == 1
     assert len(live().sessions()) == 1, live().notice()
     yield from until(lambda: not live().sessions()[0].is_stale, "it is not read again")
@@ -128,7 +128,7 @@ def hidden_in_every_way():
         setattr(owner, name, True)
         (found,) = yield from pictures(f"ways-{name}")
         setattr(owner, name, False)
-        yield 5
+        yield
         assert not live().notice(), live().notice()
         (back,) = yield from pictures(f"ways-{name}-back")
         assert changed(found, without) > HAIR, "the head is hidden as well"
@@ -149,7 +149,7 @@ def hair_pixels(found, shown, without):
 
 def instances_are_told():
     """An instance of the groom's collection has its head alone, and the panel says so."""
-    scene, note = bpy.context.scene, of_hairloom("blender.preview.troubles").instances_note
+    scene, note = bpy.context.scene, of_hairloom("troubles").instances_note
     twin = bpy.data.objects.new("Twin", None)
     twin.instance_type, twin.instance_collection = "COLLECTION", bpy.data.collections["Groom"]
     twin.location.x = 0.25

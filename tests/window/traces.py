@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-import driver
 import gpu
 from driver import of_hairloom
 
@@ -35,27 +34,6 @@ class Log:
             new = stream.read()
         self._offset += len(new)
         return new.decode(errors="replace")
-
-
-class Registered:
-    """Timers and draw handlers of ours: Blender has no list of either, so each is noted."""
-
-    def __init__(self) -> None:
-        self._timers: dict[Any, None] = {}
-        self._register = bpy.app.timers.register
-        bpy.app.timers.register = self._note
-
-    def _note(self, function: Any, **settings: Any) -> None:
-        self._timers[function] = None
-        self._register(function, **settings)
-
-    def timers(self) -> list[str]:
-        """Those of Hairloom that are still to come."""
-        return [
-            f"{each.__module__}.{each.__qualname__}"
-            for each in self._timers
-            if each.__module__.startswith(driver.EXTENSION) and bpy.app.timers.is_registered(each)
-        ]
 
 
 def of_blender() -> dict[str, Any]:
@@ -93,9 +71,9 @@ def of_gpu() -> Counter[str]:
 def of_previews() -> dict[str, Any]:
     """What only a preview, Play or long work keeps; all empty when nothing of them goes on."""
     return {
-        "previews": [each.name for each in of_hairloom("blender.preview.live").simulated()],
-        "draw handlers": of_hairloom("blender.viewport.overlay")._handles,
-        "drawn": sorted(of_hairloom("blender.viewport.overlay").drawn()),
-        "ticks": of_hairloom("ui.operators_preview")._timer,
-        "work": of_hairloom("ui.long_work").running(),
+        "previews": [each.name for each in of_hairloom("live").simulated()],
+        "draw handlers": of_hairloom("overlay")._handles,
+        "drawn": sorted(of_hairloom("overlay").drawn()),
+        "ticks": of_hairloom("preview_operators")._timer,
+        "work": of_hairloom("long_work").running(),
     }

@@ -3,8 +3,8 @@
 import bpy
 import driver
 import numpy as np
-from artist import changed, new_head, picture_of, side_by_side, until
-from driver import of_hairloom
+from artist import changed, new_head, picture_of, side_by_side
+from driver import of_hairloom, until
 from mathutils import Euler
 
 #: shares of a view's pixels: what hair covers, and what Blender's own redraw differs by
@@ -20,17 +20,17 @@ def set_the_scene():
     for obj in (bpy.data.objects["Head"], hair()):
         obj.users_collection[0].objects.unlink(obj)
         collection.objects.link(obj)
-    yield 2
+    yield
     hair().select_set(True)
     bpy.context.view_layer.objects.active = hair()
     bpy.ops.hairloom.preview()
     yield from until(live().sessions, "there is no preview")
     look()
-    yield 5
+    yield
 
 
 def live():
-    return of_hairloom("blender.preview.live")
+    return of_hairloom("live")
 
 
 def hair():
@@ -59,19 +59,17 @@ def look():
 
 def pictures(label):
     """The 3D view of each window, as it is now."""
-    for window in windows():
-        view_of(window).tag_redraw()
-    yield 5
+    yield
     shot = driver.screenshot(label)
     return [picture_of(window, view_of(window), shot) for window in windows()]
 
 
 def two_windows():
     bpy.ops.wm.window_new_main()  # any other shares the scene and the view layer of the first
-    yield 5
+    yield
     assert len(windows()) == 2
     side_by_side()
-    yield 10
+    yield
     look()
     yield from with_and_without("two-windows", [True, True])
 
@@ -82,7 +80,7 @@ def with_and_without(label, drawn):
     hair().hide_viewport = True
     hidden = yield from pictures(f"{label}-hidden")
     hair().hide_viewport = False
-    yield 5
+    yield
     shares = [changed(one, other) for one, other in zip(shown, hidden, strict=True)]
     print(f"{label}: {[round(share, 4) for share in shares]}", flush=True)
     for share, is_drawn in zip(shares, drawn, strict=True):

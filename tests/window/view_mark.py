@@ -1,0 +1,92 @@
+"""Tells whether what a 3D view has drawn is on the screen: each drawing is numbered by a mark.
+
+Drawing and showing are two things: on Vulkan a picture may come to the screen later. So every 3D
+view draws a number into its lower left corner, eight squares that are black or white.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import gpu
+import numpy as np
+import screen
+from gpu_extras.batch import batch_for_shader
+
+BITS, SIDE = 8, 4
+BLACK, WHITE = (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0)
+
+
+class ViewMark:
+    def __init__(self) -> None:
+        self._number, self._is_wanted = 0, False
+        self._shader: Any = None
+        bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_PIXEL")
+
+    def draw_again(self) -> None:
+        """Have all 3D views drawn again, with a number that none of them has shown lately."""
+        self._number, self._is_wanted = self._number % 255 + 1, True
+        for _, region in _views():
+            region.tag_redraw()
+
+    def is_shown(self) -> bool:
+        """Whether all 3D views that can be seen show that drawing."""
+        shown = screen.pixels()
+        if not all(self._is_marked(shown, window, region) for window, region in _views()):
+            return False
+        self._is_wanted = False
+        return True
+
+    def _bits(self) -> list[int]:
+        return [self._number >> bit & 1 for bit in range(BITS)]
+
+    def _is_marked(self, shown: np.ndarray, window: Any, region: Any) -> bool:
+        x = window.x + region.x + SIDE // 2
+        row = len(shown) - 1 - (window.y + region.y + SIDE // 2)
+        if not (0 <= row < len(shown) and x >= 0 and x + BITS * SIDE <= shown.shape[1]):
+            return True  # beyond the screen
+        return [
+            int(each[1] > 127) for each in shown[row, x : x + BITS * SIDE : SIDE]
+        ] == self._bits()
+
+    def _draw(self) -> None:
+        if not self._is_wanted:
+            return
+        self._shader = self._shader or gpu.shader.from_builtin("FLAT_COLOR")
+        corners, colours = [], []
+        for number, bit in enumerate(self._bits()):
+            left, right = number * SIDE, (number + 1) * SIDE
+            corners += [
+                (left, 0),
+                (right, 0),
+                (right, SIDE),
+                (left, 0),
+                (right, SIDE),
+                (left, SIDE),
+            ]
+            colours += [WHITE if bit else BLACK] * 6
+        gpu.state.blend_set("NONE")
+        batch_for_shader(self._shader, "TRIS", {"pos": corners, "color": colours}).draw(
+            self._shader
+        )
+
+
+def _views() -> Iterator[tuple[Any, Any]]:
+    """The 3D views of all windows that no other window may cover, each with its window."""
+    windows = list(bpy.context.window_manager.windows)
+    for window in windows:
+        if any(_meet(window, other) for other in windows if other != window):
+            continue
+        for area in window.screen.areas:
+            for region in area.regions:
+                if (
+                    area.type == "VIEW_3D"
+                    and region.type == "WINDOW"
+                    and region.width > BITS * SIDE
+                ):
+                    yield window, region
+
+
+def _meet(one: Any, other: Any) -> bool:
+    across = one.x < other.x + other.width and other.x < one.x + one.width
+    return across and one.y < other.y + other.height and other.y < one.y + one.height
