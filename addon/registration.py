@@ -91,12 +91,17 @@ def register() -> None:
 
 def unregister() -> None:
     """The exact mirror image, after the previews have ended."""
-    operators_preview.stop_ticking()
-    long_work.stop()
-    reactions.clear()
+    end_all()
     engine.unregister()
     for _, undo in reversed(_steps()):
         undo()
+
+
+def end_all() -> None:
+    """End what goes on: previews, long work, and all that is deferred."""
+    operators_preview.stop_ticking()
+    long_work.stop()
+    reactions.clear()
 
 
 def _steps() -> tuple[Step, ...]:

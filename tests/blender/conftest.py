@@ -11,6 +11,7 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 from engine_stage import SIZE, set_world  # noqa: E402
 
 import hairloom  # noqa: E402  it is loaded by tests/conftest.py
+from hairloom.addon import registration  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
 
@@ -20,12 +21,27 @@ def empty_scene() -> None:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 
 
+_is_enabled = False
+
+
 @pytest.fixture
 def extension(empty_scene: None) -> Iterator[None]:
-    """Hairloom registered, as when its extension is enabled."""
-    hairloom.register()
+    """Hairloom registered, as when its extension is enabled: once, and for each test at rest."""
+    global _is_enabled
+    if not _is_enabled:
+        hairloom.register()
+        _is_enabled = True
     yield
-    hairloom.unregister()
+    registration.end_all()
+
+
+@pytest.fixture
+def no_extension(empty_scene: None) -> None:
+    """Hairloom not registered, for what registers it itself, and unregisters it at its end."""
+    global _is_enabled
+    if _is_enabled:
+        hairloom.unregister()
+        _is_enabled = False
 
 
 @pytest.fixture

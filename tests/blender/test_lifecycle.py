@@ -11,7 +11,7 @@ from hairloom.addon.blender.viewport import overlay
 
 
 @pytest.fixture
-def commands(monkeypatch):
+def commands(no_extension, monkeypatch):
     """The command line verbs that Blender knows; it has no list of its own."""
     known = []
     add, remove = bpy.utils.register_cli_command, bpy.utils.unregister_cli_command

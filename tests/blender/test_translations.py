@@ -31,7 +31,7 @@ def test_texts_of_every_kind_are_found(extension):
     assert "Bl Label" not in found["*"], "Blender translates its own"
 
 
-def test_a_language_reaches_blender_and_goes_again(empty_scene, monkeypatch, tmp_path):
+def test_a_language_reaches_blender_and_goes_again(no_extension, monkeypatch, tmp_path):
     template = {
         "*": {"Play at Once": "Gleich abspielen", "Look": ""},
         "Operator": {"Make Cards": "x"},

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -275,12 +274,3 @@ def test_axes_are_even_over_the_sphere() -> None:
     np.testing.assert_allclose(axes.T @ axes / 500, np.eye(3) / 3.0, atol=0.005)
     apart = axes @ axes.T - 2.0 * np.eye(500)
     assert np.degrees(np.arccos(apart.max())) > 2.5
-
-
-def test_time_grows_no_faster_than_with_a_loop_over_directions() -> None:
-    """800 cards of 20,000 vertices take a few seconds; a sixteenth of the rays is tried here."""
-    mesh, head = hanging(800, layers=0.03, segment_count=8), ball()
-    assert len(mesh.positions) > 20_000
-    started = time.process_time()
-    vertex_occlusion(mesh, [CardShade(mesh)], [head], CardOcclusionSettings(rays=16))
-    assert time.process_time() - started < 3.0

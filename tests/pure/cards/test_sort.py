@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -390,18 +389,11 @@ def empty_mesh() -> CardMesh:
     return build_cards(np.zeros((0, 16, 3)), np.zeros((0, 3)), CardSettings())
 
 
-def test_five_thousand_cards_are_sorted_in_a_blink() -> None:
-    """29 ms measured with pieces found and vertices moved; the limit leaves room for slow CI."""
+def test_five_thousand_cards_are_sorted() -> None:
     mesh, _ = shells(5000)
     key = np.random.default_rng(0).random(mesh.card_count)
-
-    def seconds() -> float:
-        begin = time.process_time()
-        assert connected_components(mesh.triangles).max() == 4999
-        reordered(mesh, key)
-        return time.process_time() - begin
-
-    assert min(seconds() for _ in range(5)) < 0.25
+    assert connected_components(mesh.triangles).max() == 4999
+    assert (np.diff(key[reordered(mesh, key).card]) >= 0.0).all()
 
 
 def test_the_order_of_few_cards_is_the_best_of_all_orders() -> None:
