@@ -1,6 +1,6 @@
 # All that one does here, in one place. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-ui test-engines bench docs pictures zip lock clean
+.PHONY: help setup demo lint test tests-of-a-commit test-ui test-engines test-all bench docs pictures zip lock clean
 
 PYTHON = .venv/bin/python
 OUT = out
@@ -16,16 +16,30 @@ demo: setup ## the whole way on a groom: GROOM=x.tfx HEAD=x.obj COLLIDER=x.obj O
 	$(PYTHON) tools/headless.py demo $(if $(GROOM),--groom "$(GROOM)") $(if $(HEAD),--head "$(HEAD)") \
 	    $(if $(COLLIDER),--collider "$(COLLIDER)") --output "$(OUT)"
 
-test: setup ## lint, types, and all tests that need no window
+lint: setup
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
-	$(PYTHON) -m pytest -q -n auto tests/pure
-	$(PYTHON) -m pytest -q -n 2 --dist loadfile tests/gpu tests/blender
 
-test-ui: zip ## the tests in a Blender with a window, OpenGL and Vulkan; SESSIONS="session_x" for some
+# What draws comes first: its tests are the longest, and none is to be left over at the end.
+TESTS = tests/blender tests/gpu tests/pure
+PYTEST = $(PYTHON) -m pytest -q -n 2 --dist worksteal
+
+tests-of-a-commit: setup
+	$(PYTEST) -m "not slow" $(TESTS)
+
+test: setup ## lint, types, and the tests that a commit has to pass and that need no window
+	@$(PYTHON) tools/timings.py test_minutes $(MAKE) --no-print-directory lint tests-of-a-commit
+
+test-ui: zip ## the same in a Blender with a window, OpenGL and Vulkan; SESSIONS="session_x" for some
 	tools/window_blender install
 	$(PYTHON) tools/test_ui.py $(SESSIONS)
+
+test-all: lint zip ## everything, on both backends: before an issue is resolved
+	$(PYTEST) $(TESTS)
+	tools/window_blender install
+	$(PYTHON) tools/test_ui.py --all
+	$(PYTHON) -m pytest -q tests/engines
 
 test-engines: setup ## exported cards drawn by Godot and by three.js, held against our own picture
 	$(PYTHON) -m pytest -q tests/engines

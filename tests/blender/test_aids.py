@@ -20,6 +20,8 @@ from hairloom.addon.dynamics.colliders import (
     SphereSetCollider,
 )
 
+pytestmark = pytest.mark.draws
+
 
 @pytest.fixture
 def preview(new_hair, sphere, evaluated):

@@ -18,6 +18,8 @@ from hairloom.addon.blender.command_line import command_line  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
 from hairloom.addon.shading.textures import TEXTURES  # noqa: E402
 
+pytestmark = pytest.mark.draws
+
 SHAPE = (6, 8)
 
 

@@ -12,6 +12,8 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.clean import clean
 
+pytestmark = pytest.mark.portable
+
 
 def ragged(seed=0, counts=(2, 5, 16, 3)):
     rng = np.random.default_rng(seed)

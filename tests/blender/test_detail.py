@@ -19,6 +19,8 @@ from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.strand_pass import Statistics, StrandPass
 from hairloom.addon.strands import Surface
 
+pytestmark = pytest.mark.draws
+
 
 @pytest.fixture
 def preview(new_hair, sphere, evaluated):

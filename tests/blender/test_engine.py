@@ -16,7 +16,7 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 
 from engine_stage import SIZE, add_ball, coded, passes_in, picture, rendered  # noqa: E402
 
-pytestmark = pytest.mark.usefixtures("gpu_context", "extension")
+pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
 
 
 def test_radiance_arrives_as_it_is(stage: Any, tmp_path: Path) -> None:

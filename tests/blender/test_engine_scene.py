@@ -15,7 +15,7 @@ from engine_stage import SIZE, add_ball, picture, rendered  # noqa: E402
 
 from hairloom.addon.blender.engine.engine_meshes import read_meshes  # noqa: E402
 
-pytestmark = pytest.mark.usefixtures("gpu_context", "extension")
+pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
 
 
 def test_view_layers_and_holdouts(stage: Any, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 
 from engine_stage import add_ball, picture, set_world  # noqa: E402
 
-pytestmark = pytest.mark.usefixtures("gpu_context", "extension")
+pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
 
 
 @pytest.fixture

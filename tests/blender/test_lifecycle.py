@@ -9,6 +9,8 @@ from hairloom.addon.blender.preview import live, reactions
 from hairloom.addon.blender.properties import groups
 from hairloom.addon.blender.viewport import overlay
 
+pytestmark = pytest.mark.portable
+
 
 @pytest.fixture
 def commands(no_extension, monkeypatch):

@@ -14,6 +14,8 @@ from hairloom.addon.render.snapshot import MeshPictures
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.strands import Surface
 
+pytestmark = pytest.mark.draws
+
 SIZE = 64
 
 

@@ -17,6 +17,8 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.curve import PLACES
 
+pytestmark = pytest.mark.portable
+
 SECTIONS = list(groups.SECTION_GROUPS)
 
 

@@ -7,7 +7,7 @@ import pytest
 from hairloom.addon.blender.sessions import solvers
 from hairloom.addon.blender.setup import self_test
 
-pytestmark = pytest.mark.usefixtures("extension")
+pytestmark = [pytest.mark.portable, pytest.mark.usefixtures("extension")]
 
 
 def test_all_is_well_here_and_can_be_copied(monkeypatch):

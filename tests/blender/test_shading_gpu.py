@@ -16,7 +16,7 @@ from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.strand_noise import strand_noise
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
-pytestmark = pytest.mark.usefixtures("gpu_context")
+pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context")]
 
 PLAIN = ShadingSettings(model="marschner", shift_noise=0.0, sparkle=0.0, grey_share=0.0)
 SIZE = 99

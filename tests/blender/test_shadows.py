@@ -16,7 +16,7 @@ from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import SHADOWS, VolumeSettings
 from hairloom.addon.strands import Surface
 
-pytestmark = pytest.mark.usefixtures("gpu_context")
+pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context")]
 
 SIZE = 64
 PLAIN = ShadingSettings(color_variation=0.0, shift_noise=0.0, sparkle=0.0)

@@ -12,6 +12,8 @@ from hairloom.addon.blender.engine.engine_hair import read_groom  # noqa: E402
 from hairloom.addon.blender.preview import live, reactions  # noqa: E402
 from hairloom.addon.blender.viewport import overlay  # noqa: E402
 
+pytestmark = pytest.mark.draws
+
 
 @pytest.fixture
 def preview(new_hair, sphere, evaluated):

@@ -20,7 +20,7 @@ from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
-pytestmark = pytest.mark.usefixtures("gpu_context")
+pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context")]
 
 SMALL = ["--set", "grow.strand_count=200", "--width", "32", "--height", "32", "--samples", "1"]
 

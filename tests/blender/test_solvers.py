@@ -25,6 +25,8 @@ from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.render.snapshot import Snapshot
 
+pytestmark = pytest.mark.draws
+
 RATE = 30.0
 #: With local shape a few guides in a hundred are so ill-conditioned that numpy, too, drifts away
 #: from itself by centimetres when it starts one rounding off. Without it rounding grows to 0.1 mm.

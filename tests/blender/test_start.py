@@ -15,7 +15,7 @@ from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.ui import operators_start
 from hairloom.addon.ui.preferences import DYNAMICS, LOOK, preferences
 
-pytestmark = pytest.mark.usefixtures("extension")
+pytestmark = [pytest.mark.portable, pytest.mark.usefixtures("extension")]
 FEW = {"strand_count": 150, "length": 0.1}
 
 

@@ -28,7 +28,7 @@ from hairloom.addon.blender.properties.presets import shipped
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files import stale_temp_files
 
-pytestmark = pytest.mark.usefixtures("gpu_context")
+pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context")]
 
 SMALL = TurntableSettings(frames=4, width=64, height=48, samples=1, video=False)
 

@@ -21,6 +21,8 @@ from hairloom.addon.blender.viewport.view_transform import (
 )
 from hairloom.addon.render.display import Display, DisplayTable, table_radiances
 
+pytestmark = pytest.mark.draws
+
 
 @pytest.fixture(autouse=True)
 def nothing_kept() -> Any:

@@ -12,6 +12,12 @@ import pytest
 SHADERS = Path(__file__).parent / "shaders"
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.path.is_relative_to(Path(__file__).parent):
+            item.add_marker(pytest.mark.draws)
+
+
 @pytest.fixture
 def compute(gpu_context: Any) -> Callable[..., np.ndarray]:
     """Run a compute shader of tests/gpu/shaders over a grid, back comes (height, width, 4)."""

@@ -20,6 +20,8 @@ from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
+pytestmark = pytest.mark.portable
+
 SIZE = 160
 VOLUMES = {
     "none": VolumeSettings(extinction=0.0, shadows="slices", scattering=False),

@@ -17,6 +17,8 @@ from hairloom.addon.shading.lights import Light, light_at, light_irradiance, pac
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.strand_noise import hash_integer, hash_unit, strand_noise
 
+pytestmark = pytest.mark.portable
+
 CENTER = np.array([0.1, -0.2, 0.3])
 WEAK = {"primary_strength": 1.0, "secondary_strength": 1.0}
 SETTINGS = {

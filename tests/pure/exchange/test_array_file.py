@@ -12,6 +12,8 @@ import pytest
 
 from hairloom.addon.exchange.files.array_file import read_arrays
 
+pytestmark = pytest.mark.portable
+
 ARRAYS = {
     "guides": np.arange(24, dtype=np.float32).reshape(2, 4, 3),
     "heads": np.asfortranarray(np.arange(12.0).reshape(3, 4)),

@@ -10,6 +10,8 @@ import pytest
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files.atomic import atomic_write, write_bytes_atomic, write_text_atomic
 
+pytestmark = pytest.mark.portable
+
 
 def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())

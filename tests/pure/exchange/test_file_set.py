@@ -12,6 +12,8 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files import file_set
 from hairloom.addon.exchange.files.file_set import written_together
 
+pytestmark = pytest.mark.portable
+
 FILES = ("hair.glb", "hair_base.png", "hair.json")
 
 

@@ -17,6 +17,7 @@ import damaged_files
 import fuzz_files
 import pytest
 from extension_loader import REPOSITORY
+from tiers import few_in_commits
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files.subprocess_reader import same_packages
@@ -54,14 +55,14 @@ def test_no_damage_ends_in_anything_but_a_groom_or_a_message(kind: str) -> None:
     assert min(found["read"], found["refused"]) > FILES // 20, found
 
 
-@pytest.mark.parametrize("kind", APART)
+@pytest.mark.parametrize("kind", few_in_commits(APART))
 def test_damage_to_what_libraries_parse_is_told_too(kind: str) -> None:
     found = report("fuzz_files", kind, str(FILES_APART))
     assert found["failures"] == []
     assert found["read"] + found["refused"] == FILES_APART
 
 
-@pytest.mark.parametrize("kind", WRITTEN)
+@pytest.mark.parametrize("kind", few_in_commits(WRITTEN, 2))
 def test_a_killed_writer_leaves_the_old_file_or_the_new_one(kind: str) -> None:
     """And what it leaves beside goes with the next write."""
     found = report("kill_writes", kind, str(KILLS))

@@ -11,6 +11,8 @@ import pytest
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.cards.glb_file import GlbFile
 
+pytestmark = pytest.mark.portable
+
 
 def written(content: dict[str, object], binary: bytes) -> bytes:
     """A GLB by the specification alone."""

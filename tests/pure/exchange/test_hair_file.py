@@ -15,6 +15,8 @@ from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.strand_set import DEFAULT_RADIUS
 
+pytestmark = pytest.mark.portable
+
 SEGMENTS = (2, 3, 1)
 POINTS = np.arange(27, dtype=np.float32).reshape(9, 3) * np.float32(0.01)
 

@@ -13,6 +13,8 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files import subprocess_reader
 from hairloom.addon.exchange.files.subprocess_reader import run_reader
 
+pytestmark = pytest.mark.portable
+
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:

@@ -17,6 +17,8 @@ from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.strand_set import DEFAULT_RADIUS
 
+pytestmark = pytest.mark.portable
+
 STRANDS, VERTICES = 3, 4
 
 

@@ -14,6 +14,8 @@ from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params import Parameter, Settings, choice, color, curve, integer, number, toggle
 from hairloom.addon.params.curve import PLACES
 
+pytestmark = pytest.mark.portable
+
 ADDON = Path(__file__).parents[3] / "addon"
 PURE_ROOMS = ("groom", "dynamics", "refine", "shading", "cards", "exchange")
 

@@ -13,6 +13,8 @@ from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.params import preset
 from hairloom.addon.params.preset import PRESET_VERSION, Preset, preset_as_dict, read_any_preset
 
+pytestmark = pytest.mark.portable
+
 KINDS = {GrowSettings.section: GrowSettings}
 GOOD: dict[str, Any] = {
     "hairloom": PRESET_VERSION,

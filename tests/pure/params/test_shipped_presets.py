@@ -12,6 +12,8 @@ from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import preset_as_dict, read_any_preset
 from hairloom.addon.shading.shafts_settings import ShaftSettings
 
+pytestmark = pytest.mark.portable
+
 FOLDER = Path(__file__).parents[3] / "presets"
 PRESETS = sorted(FOLDER.rglob("*.json"))
 

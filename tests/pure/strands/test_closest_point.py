@@ -11,6 +11,8 @@ from hairloom.addon.strands import Surface
 from hairloom.addon.strands.closest_point import ClosestPointSearch, closest_point
 from hairloom.addon.strands.triangle_distance import TriangleForms
 
+pytestmark = pytest.mark.portable
+
 BOX_CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 BOX_QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 BOX = Surface(BOX_CORNERS, [q[:3] for q in BOX_QUADS] + [(q[0], q[2], q[3]) for q in BOX_QUADS])

@@ -8,6 +8,8 @@ import pytest
 from hairloom.addon.arrays import Floats
 from hairloom.addon.strands.frames import tangents, transported_normals
 
+pytestmark = pytest.mark.portable
+
 
 def helix(count: int, pitch: float, turns: float = 1.0) -> tuple[Floats, Floats]:
     """Points (count, 3) and unit tangents (count, 3) of a helix of radius 1."""

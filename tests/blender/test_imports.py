@@ -1,0 +1,17 @@
+"""Every module of the extension can be imported in the Blender that is here."""
+
+import importlib
+import pkgutil
+
+import pytest
+
+from hairloom import addon
+
+pytestmark = pytest.mark.portable
+
+
+def test_every_module_is_imported():
+    names = [each.name for each in pkgutil.walk_packages(addon.__path__, f"{addon.__name__}.")]
+    assert len(names) > 300
+    for name in names:
+        importlib.import_module(name)
