@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import HairloomError
-from ..params import Settings, choice, integer, number
+from ..params import Settings, choice, integer, number, when
 from .atlas_grid import AtlasGrid
 
 #: Sizes that engines take: powers of two, so that each mip map halves it.
@@ -36,6 +36,7 @@ class AtlasSettings(Settings):
         tuple((str(size), str(size), f"{size} x {size} pixels") for size in SIZES),
         label="Size",
         description="Width and height of the atlas in pixels",
+        shown_when=when("atlas.source", "baked"),
     )
     columns: int = integer(
         16,
@@ -43,6 +44,7 @@ class AtlasSettings(Settings):
         description="Tiles side by side; a power of two keeps tiles apart in all mip maps",
         soft=(1, 32),
         hard=(1, 64),
+        shown_when=when("atlas.source", "baked"),
     )
     rows: int = integer(
         4,
@@ -50,6 +52,7 @@ class AtlasSettings(Settings):
         description="Rows of tiles; a power of two keeps tiles apart in all mip maps",
         soft=(1, 16),
         hard=(1, 64),
+        shown_when=when("atlas.source", "baked"),
     )
     padding: int = integer(
         4,
@@ -57,6 +60,7 @@ class AtlasSettings(Settings):
         description="Pixels left free on each side of a tile, so that no tile shows in another",
         soft=(0, 16),
         hard=(0, 256),
+        shown_when=when("atlas.source", "baked"),
     )
     strand_width: float = number(
         1.57,  # pi / 2: the mean of |cos| over all turns of a card is 2 / pi
@@ -65,6 +69,7 @@ class AtlasSettings(Settings):
         "which makes what is on them narrower, and strands are not",
         soft=(1.0, 2.0),
         hard=(0.01, 100.0),
+        shown_when=when("atlas.source", "baked"),
     )
     seed: int = integer(
         0,
@@ -72,6 +77,7 @@ class AtlasSettings(Settings):
         description="Another number chooses other strands for the tiles",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
+        shown_when=when("atlas.source", "baked"),
     )
 
     @property

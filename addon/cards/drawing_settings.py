@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..params import Settings, choice, toggle
+from ..params import Settings, choice, toggle, when
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,6 +14,7 @@ class CardDrawingSettings(Settings):
     section = "card_drawing"
     title = "Card Drawing"
     owner = "groom"
+    panels = ("Drawing",)
 
     shown_as: str = choice(
         "strands",
@@ -33,6 +34,8 @@ class CardDrawingSettings(Settings):
         label="Passes",
         description="The scheme by which cards are drawn",
         source="Scheuermann 2004, optimized scheme and its fall-back",
+        panel="Drawing",
+        active_when=when("card_drawing.shown_as", "cards"),
     )
     order: str = choice(
         "static",
@@ -47,10 +50,15 @@ class CardDrawingSettings(Settings):
         label="Order",
         description="In which order cards are drawn over each other",
         source="Scheuermann 2004, rendering with approximate depth sorting",
+        panel="Drawing",
+        active_when=when("card_drawing.shown_as", "cards"),
     )
     skip_clear: bool = toggle(
         True,
         label="Skip Clear Pixels",
         description="Four passes: the last one tests alpha, so that clear pixels hide nothing; "
         "without it that pass is as in the paper, and quicker on some GPUs",
+        panel="Drawing",
+        active_when=when("card_drawing.shown_as", "cards"),
+        shown_when=when("card_drawing.passes", "four"),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..params import Settings, choice, integer, number, toggle
+from ..params import Settings, choice, integer, number, toggle, when
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +30,7 @@ class CardSettings(Settings):
         description="Clusters: how many cards are made",
         soft=(50, 2000),
         hard=(1, 20_000),
+        shown_when=when("cards.way", "clusters"),
     )
     error: float = number(
         0.002,
@@ -39,6 +40,7 @@ class CardSettings(Settings):
         soft=(0.0005, 0.02),
         hard=(0.0, 10.0),
         unit="length",
+        shown_when=when("cards.way", "clusters"),
     )
     cover: float = number(
         1.0,
@@ -46,12 +48,14 @@ class CardSettings(Settings):
         description="Clusters: width of a card, as a factor of how widely its strands lie",
         soft=(0.5, 2.0),
         hard=(0.01, 100.0),
+        shown_when=when("cards.way", "clusters"),
     )
     crossed: bool = toggle(
         False,
         label="Crossed Pairs",
         description="Clusters: a second card through each, turned by a right angle, so that hair "
         "has body from all sides",
+        shown_when=when("cards.way", "clusters"),
     )
     fly_aways: float = number(
         0.1,
@@ -61,6 +65,7 @@ class CardSettings(Settings):
         soft=(0.0, 0.5),
         hard=(0.0, 1.0),
         unit="factor",
+        shown_when=when("cards.way", "clusters"),
     )
     layers: int = integer(
         3,
@@ -105,6 +110,7 @@ class CardSettings(Settings):
         description="Guides: width at the root, in mean distances between neighbouring guides",
         soft=(1.0, 6.0),
         hard=(0.01, 100.0),
+        shown_when=when("cards.way", "guides"),
     )
     tip_width: float = number(
         0.5,
@@ -112,6 +118,7 @@ class CardSettings(Settings):
         description="Guides: width at the tip as a part of the width at the root",
         soft=(0.0, 1.0),
         hard=(0.0, 10.0),
+        shown_when=when("cards.way", "guides"),
     )
     bend: float = number(
         0.1,
@@ -134,6 +141,7 @@ class CardSettings(Settings):
         description="Different strips of hair side by side in the texture; each card uses one",
         soft=(1, 8),
         hard=(1, 64),
+        shown_when=when("atlas.source", "made"),
     )
     order_by: str = choice(
         "pieces",

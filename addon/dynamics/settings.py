@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..params import choice, curve, integer, number, toggle
-from .wind_settings import WindSettings
+from .motion_settings import MotionSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class DynamicsSettings(WindSettings):
+class DynamicsSettings(MotionSettings):
     """How guides move, keep their style and meet colliders.
 
     Stiffness is given as the number of swings a second that a strand would make if this stiffness
@@ -19,6 +19,7 @@ class DynamicsSettings(WindSettings):
     section = "dynamics"
     title = "Dynamics"
     owner = "character"
+    panels = ("Style", "Medium & Wind", "Lengths", "Collisions")
 
     form: str = choice(
         "automatic",
@@ -63,41 +64,6 @@ class DynamicsSettings(WindSettings):
         hard=(0.0, 1.0),
         unit="factor",
     )
-    buoyancy: float = number(
-        0.0,
-        label="Buoyancy",
-        description="Share of the weight that the medium carries: 0 in air; at 1 hair floats",
-        soft=(0.0, 1.0),
-        hard=(0.0, 2.0),
-        source="Archimedes",
-    )
-    damping: float = number(
-        0.5,
-        label="Air Damping",
-        description="How fast still air, or water, takes the speed out of the hair, and how fast "
-        "wind gives it its own",
-        soft=(0.0, 10.0),
-        hard=(0.0, 1000.0),
-        unit="rate",
-        source="Jakobsen 2001",
-    )
-    drag: float = number(
-        0.0,
-        label="Drag",
-        description="Braking by the square of the speed through air or water, for each metre of "
-        "way; in water a few",
-        soft=(0.0, 10.0),
-        hard=(0.0, 1000.0),
-        source="Rayleigh's drag equation",
-    )
-    style_damping: float = number(
-        5.0,
-        label="Swing Damping",
-        description="How fast swinging about the style dies away, seen from the moving head",
-        soft=(0.0, 20.0),
-        hard=(0.0, 1000.0),
-        unit="rate",
-    )
     style_root: float = number(
         4.0,
         label="Root Stiffness",
@@ -106,6 +72,7 @@ class DynamicsSettings(WindSettings):
         hard=(0.0, 1000.0),
         unit="rate",
         source="Global shape constraint, Han and Harada 2012",
+        panel="Style",
     )
     style_tip: float = number(
         1.2,
@@ -115,6 +82,7 @@ class DynamicsSettings(WindSettings):
         hard=(0.0, 1000.0),
         unit="rate",
         source="Global shape constraint, Han and Harada 2012",
+        panel="Style",
     )
     style_along: tuple[float, ...] = curve(
         (1.0, 0.75, 0.5, 0.25, 0.0),
@@ -122,6 +90,16 @@ class DynamicsSettings(WindSettings):
         description="How the style's stiffness goes along the strand, from that of the root (1) "
         "to that of the tip (0)",
         hard=(0.0, 1.0),
+        panel="Style",
+    )
+    style_damping: float = number(
+        5.0,
+        label="Swing Damping",
+        description="How fast swinging about the style dies away, seen from the moving head",
+        soft=(0.0, 20.0),
+        hard=(0.0, 1000.0),
+        unit="rate",
+        panel="Style",
     )
     bend: float = number(
         1.5,
@@ -132,12 +110,14 @@ class DynamicsSettings(WindSettings):
         hard=(0.0, 50.0),
         unit="rate",
         source="Local shape constraint, Han and Harada 2012",
+        panel="Style",
     )
     bend_along: tuple[float, ...] = curve(
         (1.0, 1.0, 1.0, 1.0, 1.0),
         label="Bend Along",
         description="Share of the bend stiffness along the strand, from root to tip",
         hard=(0.0, 1.0),
+        panel="Style",
     )
     length_solver: str = choice(
         "direct",
@@ -152,6 +132,7 @@ class DynamicsSettings(WindSettings):
         label="Length Solver",
         description="How segments keep their length",
         source="Direct: Goldenthal et al. 2007. Relaxation: Jakobsen 2001",
+        panel="Lengths",
     )
     relaxations: int = integer(
         8,
@@ -160,6 +141,7 @@ class DynamicsSettings(WindSettings):
         soft=(1, 32),
         hard=(1, 256),
         source="Jakobsen 2001",
+        panel="Lengths",
     )
     long_range: bool = toggle(
         True,
@@ -167,6 +149,7 @@ class DynamicsSettings(WindSettings):
         description="With relaxation, no point goes farther from its root than its length along "
         "the strand",
         source="Kim, Chentanez and Mueller 2012",
+        panel="Lengths",
     )
     length_tolerance: float = number(
         0.002,
@@ -174,6 +157,7 @@ class DynamicsSettings(WindSettings):
         description="Guides are solved again until no segment is off by more than this share",
         soft=(0.0005, 0.01),
         hard=(0.0001, 0.02),
+        panel="Lengths",
     )
     length_iterations: int = integer(
         8,
@@ -182,6 +166,7 @@ class DynamicsSettings(WindSettings):
         soft=(1, 16),
         hard=(1, 64),
         source="Fast projection, Goldenthal et al. 2007",
+        panel="Lengths",
     )
     contact_passes: int = integer(
         2,
@@ -189,14 +174,7 @@ class DynamicsSettings(WindSettings):
         description="How often contacts and lengths are solved in turn in each substep",
         soft=(1, 4),
         hard=(1, 16),
-    )
-    friction: float = number(
-        0.3,
-        label="Friction",
-        description="Coefficient of friction between hair and colliders",
-        soft=(0.0, 1.0),
-        hard=(0.0, 10.0),
-        source="Coulomb; position-based as in Macklin et al. 2014",
+        panel="Collisions",
     )
     radius_root: float = number(
         0.001,
@@ -206,6 +184,7 @@ class DynamicsSettings(WindSettings):
         hard=(0.0, 0.1),
         unit="length",
         source='"Pearl" configuration, Nguyen and Donnelly 2005',
+        panel="Collisions",
     )
     radius_tip: float = number(
         0.004,
@@ -215,19 +194,5 @@ class DynamicsSettings(WindSettings):
         hard=(0.0, 0.1),
         unit="length",
         source='"Pearl" configuration, Nguyen and Donnelly 2005',
-    )
-    push_speed: float = number(
-        0.5,
-        label="Push-out Speed",
-        description="How fast hair that starts inside a collider is led out",
-        soft=(0.05, 5.0),
-        hard=(0.001, 100.0),
-        unit="speed",
-    )
-    collider_resolution: int = integer(
-        56,
-        label="Collider Cells",
-        description="Cells along the longest side of a mesh collider's distance field",
-        soft=(24, 96),
-        hard=(8, 192),
+        panel="Collisions",
     )

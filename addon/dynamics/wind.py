@@ -18,7 +18,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..strands.vectors import unit
-from .wind_settings import WindSettings
+from .motion_settings import MotionSettings
 
 #: Modes in the sum.
 MODES = 8
@@ -53,7 +53,7 @@ class Air:
         return result
 
 
-def air_of(settings: WindSettings, scene_wind: Floats) -> Air | None:
+def air_of(settings: MotionSettings, scene_wind: Floats) -> Air | None:
     """The air of these settings; None when it stands still.
 
     Args:

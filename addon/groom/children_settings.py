@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..params import Settings, choice, curve, integer, number
+from ..params import Settings, choice, curve, either, integer, number, when
 
 _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
 _TARIQ = "Tariq 2008, Real-time hair rendering on the GPU"
+_PARTS = either(when("children.way", "multi"), when("children.clump"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +38,7 @@ class ChildrenSettings(Settings):
         soft=(100, 20_000),
         hard=(0, 500_000),
         source=_NALU,
+        shown_when=when("children.way", "multi", "single"),
     )
     parting: float = number(
         math.radians(60.0),
@@ -45,6 +47,8 @@ class ChildrenSettings(Settings):
         unit="angle",
         soft=(math.radians(10.0), math.radians(90.0)),
         hard=(0.0, math.pi),
+        shown_when=when("children.way", "multi", "single"),
+        active_when=_PARTS,
     )
     length_variation: float = number(
         0.2,
@@ -53,6 +57,7 @@ class ChildrenSettings(Settings):
         unit="factor",
         soft=(0.0, 0.9),
         hard=(0.0, 0.99),
+        shown_when=when("children.way", "multi", "single"),
     )
     clump: float = number(
         0.5,
@@ -61,12 +66,15 @@ class ChildrenSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
+        shown_when=when("children.way", "multi", "single"),
     )
     clump_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.25, 0.5, 0.75, 1.0),
         label="Clump Along",
         description="Share of the clump from root to tip",
         hard=(0.0, 1.0),
+        shown_when=when("children.way", "multi", "single"),
+        active_when=when("children.clump"),
     )
     clump_size: int = integer(
         12,
@@ -74,6 +82,8 @@ class ChildrenSettings(Settings):
         description="How many children make a lock, on average; 1 makes none",
         soft=(1, 100),
         hard=(1, 100_000),
+        shown_when=when("children.way", "multi", "single"),
+        active_when=when("children.clump"),
     )
     frizz: float = number(
         0.001,
@@ -82,12 +92,15 @@ class ChildrenSettings(Settings):
         unit="length",
         soft=(0.0, 0.01),
         hard=(0.0, 1.0),
+        shown_when=when("children.way", "multi", "single"),
     )
     frizz_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.4, 0.7, 0.9, 1.0),
         label="Frizz Along",
         description="Share of the frizz from root to tip",
         hard=(0.0, 1.0),
+        shown_when=when("children.way", "multi", "single"),
+        active_when=when("children.frizz"),
     )
     frizz_length: float = number(
         0.03,
@@ -96,6 +109,8 @@ class ChildrenSettings(Settings):
         unit="length",
         soft=(0.005, 0.2),
         hard=(0.0001, 100.0),
+        shown_when=when("children.way", "multi", "single"),
+        active_when=when("children.frizz"),
     )
     width: float = number(
         1.0,
@@ -103,6 +118,7 @@ class ChildrenSettings(Settings):
         description="Width of children as a factor of their guides' width",
         soft=(0.1, 4.0),
         hard=(0.001, 1000.0),
+        shown_when=when("children.way", "multi", "single"),
     )
     seed: int = integer(
         1,
@@ -110,4 +126,5 @@ class ChildrenSettings(Settings):
         description="Another seed gives other children of the same kind",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
+        shown_when=when("children.way", "multi", "single"),
     )

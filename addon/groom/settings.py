@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..params import Settings, choice, integer, number, toggle
+from ..params import Settings, both, choice, either, integer, number, toggle, when
 
 _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
+_HAS_THRESHOLD = both(when("grow.way", "normals"), when("grow.per_vertex"))
+_HAS_COUNT = either(when("grow.way", "combed"), when("grow.per_vertex", False))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +33,7 @@ class GrowSettings(Settings):
         label="One per Vertex",
         description="Along the normals: one strand from each vertex instead of a number of strands",
         source=_NALU,
+        shown_when=when("grow.way", "normals"),
     )
     threshold: float = number(
         0.5,
@@ -39,6 +42,7 @@ class GrowSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
+        shown_when=_HAS_THRESHOLD,
     )
     strand_count: int = integer(
         4095,
@@ -47,6 +51,7 @@ class GrowSettings(Settings):
         soft=(100, 20_000),
         hard=(0, 500_000),
         source=_NALU,
+        shown_when=_HAS_COUNT,
     )
     cv_count: int = integer(
         16,
@@ -87,6 +92,7 @@ class GrowSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
+        shown_when=when("grow.way", "combed"),
     )
     comb_back: float = number(
         0.7,
@@ -95,6 +101,7 @@ class GrowSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
+        shown_when=when("grow.way", "combed"),
     )
     comb_share: float = number(
         0.45,
@@ -103,6 +110,7 @@ class GrowSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
+        shown_when=when("grow.way", "combed"),
     )
     droop: float = number(
         0.45,
@@ -111,6 +119,7 @@ class GrowSettings(Settings):
         unit="factor",
         soft=(0.0, 0.9),
         hard=(0.0, 1.0),
+        shown_when=when("grow.way", "combed"),
     )
     clump: float = number(
         0.85,
@@ -119,6 +128,7 @@ class GrowSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
+        shown_when=when("grow.way", "combed"),
     )
     clump_size: int = integer(
         30,
@@ -126,6 +136,7 @@ class GrowSettings(Settings):
         description="How many strands make a lock, on average",
         soft=(1, 100),
         hard=(1, 100_000),
+        shown_when=when("grow.way", "combed"),
     )
     wave: float = number(
         0.007,
@@ -134,6 +145,7 @@ class GrowSettings(Settings):
         unit="length",
         soft=(0.0, 0.02),
         hard=(0.0, 1.0),
+        shown_when=when("grow.way", "combed"),
     )
     wave_length: float = number(
         0.075,
@@ -142,6 +154,7 @@ class GrowSettings(Settings):
         unit="length",
         soft=(0.01, 0.3),
         hard=(0.001, 100.0),
+        shown_when=when("grow.way", "combed"),
     )
     frizz: float = number(
         0.001,
@@ -150,6 +163,7 @@ class GrowSettings(Settings):
         unit="length",
         soft=(0.0, 0.01),
         hard=(0.0, 1.0),
+        shown_when=when("grow.way", "combed"),
     )
     clearance: float = number(
         0.002,
@@ -158,6 +172,7 @@ class GrowSettings(Settings):
         unit="length",
         soft=(0.0, 0.02),
         hard=(0.0, 1.0),
+        shown_when=when("grow.way", "combed"),
     )
     volume: float = number(
         0.018,
@@ -166,6 +181,7 @@ class GrowSettings(Settings):
         unit="length",
         soft=(0.0, 0.05),
         hard=(0.0, 10.0),
+        shown_when=when("grow.way", "combed"),
     )
     radius: float = number(
         2.0e-4,

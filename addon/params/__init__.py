@@ -6,7 +6,20 @@ and its bytes (`params.glsl`), the preset check (`params.preset`) and the row in
 (`params.docs`).
 """
 
-from .field import Owner, Parameter, Settings, choice, color, curve, integer, number, toggle
+from .field import (
+    Owner,
+    Parameter,
+    Settings,
+    both,
+    choice,
+    color,
+    curve,
+    either,
+    integer,
+    number,
+    toggle,
+    when,
+)
 from .settings_map import SettingsMap
 
 __all__ = [
@@ -14,10 +27,13 @@ __all__ = [
     "Parameter",
     "Settings",
     "SettingsMap",
+    "both",
     "choice",
     "color",
     "curve",
+    "either",
     "integer",
     "number",
     "toggle",
+    "when",
 ]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 
 from ..errors import HairloomError
 from .curve import PLACES, Curve
@@ -20,6 +20,8 @@ Range = tuple[float, float]
 #: What keeps a set of parameters: the groom (Blender's Curves), the character (the Object), the
 #: scene, or nothing: a job's are those of one operator or one call of a verb.
 Owner = Literal["groom", "character", "scene", "job"]
+#: Asked with what holds all sections of the same owner: a property group, or anything like it.
+Condition = Callable[[Any], bool]
 
 _METADATA_KEY = "parameter"
 
@@ -30,6 +32,8 @@ class Parameter:
 
     `soft_range` is what a slider offers, `hard_range` what a value may be; both inclusive.
     `source` names the paper or equation, or says "Hairloom".
+    `panel` is the panel below that of the section in which it is drawn; none: in that one itself.
+    It is drawn where `shown_when` holds, and greyed out where `active_when` does not.
     """
 
     name: str
@@ -42,6 +46,9 @@ class Parameter:
     soft_range: Range | None = None
     hard_range: Range | None = None
     choices: tuple[tuple[str, str, str], ...] = ()  # identifier, label, description
+    panel: str = ""
+    shown_when: Condition | None = None
+    active_when: Condition | None = None
 
     def checked(self, value: Any, place: str) -> Any:
         """The value in its canonical type, or HairloomError naming the value and its range."""
@@ -110,6 +117,8 @@ class Settings:
     section: ClassVar[str] = ""
     title: ClassVar[str] = ""
     owner: ClassVar[Owner] = "job"
+    #: below that of the section, in order
+    panels: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         for parameter in self.parameters():
@@ -146,6 +155,33 @@ class Settings:
         return cls(**{name: declared[name].checked(v, place) for name, v in values.items()})
 
 
+def when(parameter: str, *values: Any) -> Condition:
+    """Whether a parameter, as "section.name", has one of these values; without any: it is not 0."""
+    section, _, name = parameter.partition(".")
+
+    def holds(sections: Any) -> bool:
+        value = getattr(getattr(sections, section), name)
+        return value in values if values else bool(value)
+
+    return holds
+
+
+def both(one: Condition, other: Condition) -> Condition:
+    return lambda sections: one(sections) and other(sections)
+
+
+def either(one: Condition, other: Condition) -> Condition:
+    return lambda sections: one(sections) or other(sections)
+
+
+class _Drawn(TypedDict, total=False):
+    """Where and when a parameter is drawn, see `Parameter`."""
+
+    panel: str
+    shown_when: Condition
+    active_when: Condition
+
+
 def number(
     default: float,
     *,
@@ -155,10 +191,13 @@ def number(
     hard: Range,
     unit: Unit = "none",
     source: str = "Hairloom",
+    **drawn: Unpack[_Drawn],
 ) -> Any:
     """Declare a real number."""
     return _declare(
-        Parameter("", "number", float(default), label, description, source, unit, soft, hard)
+        Parameter(
+            "", "number", float(default), label, description, source, unit, soft, hard, **drawn
+        )
     )
 
 
@@ -170,10 +209,13 @@ def integer(
     soft: Range,
     hard: Range,
     source: str = "Hairloom",
+    **drawn: Unpack[_Drawn],
 ) -> Any:
     """Declare a whole number."""
     return _declare(
-        Parameter("", "integer", int(default), label, description, source, "none", soft, hard)
+        Parameter(
+            "", "integer", int(default), label, description, source, "none", soft, hard, **drawn
+        )
     )
 
 
@@ -184,17 +226,27 @@ def color(
     description: str,
     source: str = "Hairloom",
     maximum: float = 1.0,
+    **drawn: Unpack[_Drawn],
 ) -> Any:
     """Declare a scene-linear Rec.709 colour."""
     span = (0.0, maximum)
     return _declare(
-        Parameter("", "color", tuple(default), label, description, source, "none", span, span)
+        Parameter(
+            "", "color", tuple(default), label, description, source, "none", span, span, **drawn
+        )
     )
 
 
-def toggle(default: bool, *, label: str, description: str, source: str = "Hairloom") -> Any:
+def toggle(
+    default: bool,
+    *,
+    label: str,
+    description: str,
+    source: str = "Hairloom",
+    **drawn: Unpack[_Drawn],
+) -> Any:
     """Declare an on/off switch."""
-    return _declare(Parameter("", "toggle", default, label, description, source))
+    return _declare(Parameter("", "toggle", default, label, description, source, **drawn))
 
 
 def choice(
@@ -204,17 +256,37 @@ def choice(
     label: str,
     description: str,
     source: str = "Hairloom",
+    **drawn: Unpack[_Drawn],
 ) -> Any:
     """Declare one of several named options, each (identifier, label, description)."""
-    return _declare(Parameter("", "choice", default, label, description, source, choices=choices))
+    return _declare(
+        Parameter(
+            "",
+            "choice",
+            default,
+            label,
+            description,
+            source,
+            choices=choices,
+            **drawn,
+        )
+    )
 
 
 def curve(
-    default: Curve, *, label: str, description: str, hard: Range, source: str = "Hairloom"
+    default: Curve,
+    *,
+    label: str,
+    description: str,
+    hard: Range,
+    source: str = "Hairloom",
+    **drawn: Unpack[_Drawn],
 ) -> Any:
     """Declare values along the strand, see `curve.along`."""
     return _declare(
-        Parameter("", "curve", tuple(default), label, description, source, "none", hard, hard)
+        Parameter(
+            "", "curve", tuple(default), label, description, source, "none", hard, hard, **drawn
+        )
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..params import Settings, choice, integer, number
+from ..params import Settings, choice, integer, number, when
 
 _SSALOD = "Rapp and Spielmann, Real-time hair rendering with screen space adaptive level of detail"
 _WANG = "Wang 1984, subdivision depth of Bezier curves"
@@ -37,6 +37,7 @@ class DetailSettings(Settings):
         hard=(0.01, 100.0),
         unit="pixels",
         source=_WANG,
+        shown_when=when("detail.mode", "adaptive"),
     )
     piece_length: float = number(
         8.0,
@@ -46,6 +47,7 @@ class DetailSettings(Settings):
         hard=(0.5, 1000.0),
         unit="pixels",
         source=_SSALOD,
+        shown_when=when("detail.mode", "heuristic"),
     )
     subdivisions: int = integer(
         2,
@@ -53,6 +55,7 @@ class DetailSettings(Settings):
         description="Fixed: pieces of each segment",
         soft=(1, 8),
         hard=(1, 64),
+        shown_when=when("detail.mode", "fixed"),
     )
     most: int = integer(
         64,
@@ -61,6 +64,7 @@ class DetailSettings(Settings):
         soft=(1, 64),
         hard=(1, 64),
         source=_SSALOD,
+        shown_when=when("detail.mode", "adaptive", "heuristic"),
     )
     culling: str = choice(
         "hidden",
@@ -89,4 +93,5 @@ class DetailSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
+        shown_when=when("detail.full_size"),
     )

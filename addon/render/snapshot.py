@@ -5,12 +5,14 @@ Pure numpy: importable without gpu.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from inspect import isclass
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..params import Settings
 from ..refine.settings import DetailSettings
 from ..shading.lights import Light
 from ..shading.marschner.tables import DEFAULT_SIZE
@@ -256,3 +258,11 @@ class Snapshot:
         if not self.strand_count:
             return np.zeros(3, np.float32)
         return self.strands[:, 0].mean(axis=0, dtype=np.float64).astype(np.float32)
+
+
+#: field of a snapshot -> the settings that it holds
+SECTIONS: dict[str, type[Settings]] = {
+    each.name: each.default_factory
+    for each in fields(Snapshot)
+    if isclass(each.default_factory) and issubclass(each.default_factory, Settings)
+}

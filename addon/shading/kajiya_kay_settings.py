@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..params import Settings, color, number
+from ..params import Settings, color, number, when
 
 _SOURCE = "Scheuermann 2004, hair shading"
 
@@ -18,6 +18,8 @@ class KajiyaKaySettings(Settings):
         label="First Highlight",
         description="Colour of the highlight on the surface of the hair, before the hair tints it",
         source=_SOURCE,
+        panel="First Highlight",
+        shown_when=when("shading.model", "kajiya_kay"),
     )
     primary_strength: float = number(
         9.0,
@@ -26,6 +28,8 @@ class KajiyaKaySettings(Settings):
         soft=(0.0, 20.0),
         hard=(0.0, 100.0),
         source=_SOURCE,
+        panel="First Highlight",
+        shown_when=when("shading.model", "kajiya_kay"),
     )
     primary_exponent: float = number(
         90.0,
@@ -34,6 +38,8 @@ class KajiyaKaySettings(Settings):
         soft=(2.0, 300.0),
         hard=(1.0, 2000.0),
         source=_SOURCE,
+        panel="First Highlight",
+        shown_when=when("shading.model", "kajiya_kay"),
     )
     primary_shift: float = number(
         0.1,
@@ -42,12 +48,16 @@ class KajiyaKaySettings(Settings):
         soft=(-0.5, 0.5),
         hard=(-2.0, 2.0),
         source=_SOURCE,
+        panel="First Highlight",
+        shown_when=when("shading.model", "kajiya_kay"),
     )
     secondary_color: tuple[float, float, float] = color(
         (1.0, 0.75, 0.5),
         label="Second Highlight",
         description="Colour of the highlight that has passed through the hair",
         source=_SOURCE,
+        panel="Second Highlight",
+        shown_when=when("shading.model", "kajiya_kay"),
     )
     secondary_strength: float = number(
         5.0,
@@ -56,6 +66,8 @@ class KajiyaKaySettings(Settings):
         soft=(0.0, 20.0),
         hard=(0.0, 100.0),
         source=_SOURCE,
+        panel="Second Highlight",
+        shown_when=when("shading.model", "kajiya_kay"),
     )
     secondary_exponent: float = number(
         22.0,
@@ -64,6 +76,8 @@ class KajiyaKaySettings(Settings):
         soft=(2.0, 300.0),
         hard=(1.0, 2000.0),
         source=_SOURCE,
+        panel="Second Highlight",
+        shown_when=when("shading.model", "kajiya_kay"),
     )
     secondary_shift: float = number(
         -0.14,
@@ -72,4 +86,6 @@ class KajiyaKaySettings(Settings):
         soft=(-0.5, 0.5),
         hard=(-2.0, 2.0),
         source=_SOURCE,
+        panel="Second Highlight",
+        shown_when=when("shading.model", "kajiya_kay"),
     )

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..params import Settings, choice, color, number
+from ..params import Settings, both, choice, color, either, number, when
 from .kajiya_kay_settings import KajiyaKaySettings
 from .marschner.settings import MarschnerSettings
+
+_PIGMENT = "Chiang et al. 2016; Blender's Principled Hair"
 
 MODELS = (
     ("kajiya_kay", "Kajiya-Kay", "Two shifted highlights by Scheuermann: quick, and free to shape"),
     ("marschner", "Marschner", "Light reflected and refracted by a fibre: as real hair has it"),
+)
+
+PIGMENTS = (
+    ("color", "Colour", "What absorbs light so much that a mass of hair has the colour above"),
+    ("melanin", "Melanin", "The pigments of natural hair"),
+    ("absorption", "Absorption", "Set outright"),
 )
 
 TRANSPARENCIES = (
@@ -18,6 +26,10 @@ TRANSPARENCIES = (
     ("hashed", "Hashed", "The same on average, by chance: no memory, but noise"),
     ("none", "None", "Opaque strands with hard edges, no thinner than the minimum width"),
 )
+_IS_MARSCHNER = when("shading.model", "marschner")
+_HAS_MELANIN = both(_IS_MARSCHNER, when("shading.pigment", "melanin"))
+_HAS_ABSORPTION = both(_IS_MARSCHNER, when("shading.pigment", "absorption"))
+_HAS_COLOR = either(when("shading.model", "kajiya_kay"), when("shading.pigment", "color"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,15 +42,52 @@ class SharedSettings(Settings):
         label="Model",
         description="How the light on a strand becomes its colour",
     )
+    pigment: str = choice(
+        "color",
+        PIGMENTS,
+        label="Pigment",
+        description="What says how much light is absorbed inside the hair",
+        source=_PIGMENT,
+        panel="Colour",
+        shown_when=when("shading.model", "marschner"),
+    )
     base_color: tuple[float, float, float] = color(
         (0.055, 0.03, 0.018),
         label="Colour",
         description="Colour of the hair; it tints the highlights as well",
+        panel="Colour",
+        shown_when=_HAS_COLOR,
     )
-    tip_color: tuple[float, float, float] = color(
-        (0.23, 0.145, 0.065),
-        label="Tip Colour",
-        description="Colour at the tips, as far as Tip Tint lets it through",
+    melanin: float = number(
+        0.75,
+        label="Melanin",
+        description="Amount of pigment: white 0, blond 0.25, brown 0.75, black 1",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        source=_PIGMENT,
+        panel="Colour",
+        shown_when=_HAS_MELANIN,
+    )
+    redness: float = number(
+        0.3,
+        label="Redness",
+        description="Share of the pigment that is red",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        source=_PIGMENT,
+        panel="Colour",
+        shown_when=_HAS_MELANIN,
+    )
+    absorption: tuple[float, float, float] = color(
+        (0.25, 0.42, 0.83),
+        label="Absorption",
+        description="How much red, green and blue hair absorbs inside, on the length of its radius",
+        maximum=100.0,
+        source=_PIGMENT,
+        panel="Colour",
+        shown_when=_HAS_ABSORPTION,
     )
     tip_tint: float = number(
         0.0,
@@ -47,6 +96,14 @@ class SharedSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
+        panel="Colour",
+    )
+    tip_color: tuple[float, float, float] = color(
+        (0.23, 0.145, 0.065),
+        label="Tip Colour",
+        description="Colour at the tips, as far as Tip Tint lets it through",
+        panel="Colour",
+        active_when=when("shading.tip_tint"),
     )
     tint_start: float = number(
         0.3,
@@ -55,6 +112,8 @@ class SharedSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
+        panel="Colour",
+        active_when=when("shading.tip_tint"),
     )
     tint_end: float = number(
         0.9,
@@ -63,6 +122,8 @@ class SharedSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
+        panel="Colour",
+        active_when=when("shading.tip_tint"),
     )
     color_variation: float = number(
         0.3,
@@ -71,6 +132,7 @@ class SharedSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
+        panel="Variation",
     )
     grey_share: float = number(
         0.0,
@@ -79,6 +141,7 @@ class SharedSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
+        panel="Variation",
     )
     shift_noise: float = number(
         0.2,
@@ -87,6 +150,7 @@ class SharedSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 4.0),
         source="Scheuermann 2004, specular shift texture",
+        panel="Variation",
     )
     sparkle: float = number(
         0.6,
@@ -96,6 +160,7 @@ class SharedSettings(Settings):
         hard=(0.0, 1.0),
         unit="factor",
         source="Scheuermann 2004, specular noise texture",
+        panel="Variation",
     )
     noise_cells: float = number(
         4.0,
@@ -103,6 +168,7 @@ class SharedSettings(Settings):
         description="Cells of the shift and sparkle noise between root and tip",
         soft=(0.0, 32.0),
         hard=(0.0, 1000.0),
+        panel="Variation",
     )
     ambient: float = number(
         1.0,
@@ -120,6 +186,14 @@ class ShadingSettings(MarschnerSettings, KajiyaKaySettings, SharedSettings):
     section = "shading"
     title = "Shading"
     owner = "groom"
+    panels = (
+        "Colour",
+        "First Highlight",
+        "Second Highlight",
+        "Rim Light",
+        "Fibre",
+        "Variation",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..params import Settings, color, integer, number, toggle
+from ..params import Settings, color, integer, number, toggle, when
 
 _NGUYEN = "Nguyen and Donnelly 2005, hair of Nalu"
 
@@ -32,6 +32,7 @@ class ShaftSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1000.0),
         source=_NGUYEN,
+        active_when=when("shafts.use_shafts"),
     )
     length: float = number(
         math.radians(10.0),
@@ -42,6 +43,7 @@ class ShaftSettings(Settings):
         hard=(0.0, math.radians(86.0)),
         unit="angle",
         source=_NGUYEN,
+        active_when=when("shafts.use_shafts"),
     )
     samples: int = integer(
         256,
@@ -50,7 +52,11 @@ class ShaftSettings(Settings):
         soft=(32, 512),
         hard=(2, 4096),
         source=_NGUYEN,
+        active_when=when("shafts.use_shafts"),
     )
     tint: tuple[float, float, float] = color(
-        (1.0, 1.0, 1.0), label="Tint", description="Colour of the haze, times that of the light"
+        (1.0, 1.0, 1.0),
+        label="Tint",
+        description="Colour of the haze, times that of the light",
+        active_when=when("shafts.use_shafts"),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..params import Settings, choice, integer, number
+from ..params import Settings, choice, integer, number, when
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +44,7 @@ class TextureSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         source="Scheuermann 2004, stretched noise as base texture",
+        shown_when=when("atlas.source", "made"),
     )
     edge_width: float = number(
         0.3,
@@ -52,6 +53,7 @@ class TextureSettings(Settings):
         unit="factor",
         soft=(0.05, 0.5),
         hard=(0.001, 0.5),
+        shown_when=when("atlas.source", "made"),
     )
     root_length: float = number(
         0.04,
@@ -60,6 +62,7 @@ class TextureSettings(Settings):
         unit="factor",
         soft=(0.0, 0.3),
         hard=(0.0, 1.0),
+        shown_when=when("atlas.source", "made"),
     )
     tip_length: float = number(
         0.6,
@@ -68,6 +71,7 @@ class TextureSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
+        shown_when=when("atlas.source", "made"),
     )
     softness: float = number(
         0.25,
@@ -76,6 +80,7 @@ class TextureSettings(Settings):
         unit="factor",
         soft=(0.05, 1.0),
         hard=(0.001, 1.0),
+        shown_when=when("atlas.source", "made"),
     )
     wander: float = number(
         0.04,
@@ -109,6 +114,7 @@ class TextureSettings(Settings):
         label="Highlights By",
         description="What breaks up the highlights",
         source="Scheuermann 2004, hair shading",
+        shown_when=when("atlas.source", "made"),
     )
     seed: int = integer(
         0,

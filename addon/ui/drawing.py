@@ -1,8 +1,8 @@
-"""Drawing parameters in a panel: a group of them, some by name, a curve as sliders."""
+"""Drawing the parameters of a section in a panel, as their declarations say."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection
 from typing import Any
 
 import bpy
@@ -16,28 +16,35 @@ type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
 _PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
 
 
-def draw_titled(layout: bpy.types.UILayout, group: Any) -> None:
-    layout.label(text=group.settings.title)
-    draw_group(layout, group)
+def draw_section(
+    layout: bpy.types.UILayout,
+    sections: Any,
+    section: str,
+    panel: str = "",
+    *,
+    leave_out: Collection[str] = (),
+) -> None:
+    """Draw what one panel shows of a section; what does not act now is greyed out.
 
-
-def draw_group(layout: bpy.types.UILayout, group: Any) -> None:
-    draw_named(layout, group, [parameter.name for parameter in group.settings.parameters()])
-
-
-def draw_named(layout: bpy.types.UILayout, group: Any, names: Sequence[str]) -> None:
-    """Draw the parameters of these names; a curve as five sliders, from root to tip."""
-    column = layout.column()
+    Args:
+        sections: the properties that hold it, such as `hair.data.hairloom`.
+        leave_out: parameters that are drawn elsewhere, such as in the header.
+    """
+    group, column = getattr(sections, section), layout.column()
     for parameter in group.settings.parameters():
-        if parameter.name not in names:
+        is_shown = parameter.shown_when is None or parameter.shown_when(sections)
+        if parameter.panel != panel or parameter.name in leave_out or not is_shown:
             continue
+        own = column.column()
+        own.active = parameter.active_when is None or parameter.active_when(sections)
         if parameter.kind == "curve":
-            _draw_curve(column, group, parameter)
+            _draw_curve(own, group, parameter)
         else:
-            column.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
+            own.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
 
 
 def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter) -> None:
+    """Five sliders, from root to tip."""
     layout.label(text=parameter.label)
     sliders = layout.column(align=True)
     for index, place in enumerate(_PLACES):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
@@ -10,23 +11,8 @@ from bpy.props import StringProperty
 
 from ..blender.base.vertex_weights import weight_names
 from ..blender.properties.groups import operator_properties
+from ..parameters import ALL_SETTINGS
 from .selection import ground_mesh
-
-#: settings that say nothing about hair that stands straight along the normals, and the other way
-_COMBED_ONLY: tuple[str, ...] = (
-    "lift",
-    "comb_back",
-    "comb_share",
-    "droop",
-    "clump",
-    "clump_size",
-    "wave",
-    "wave_length",
-    "frizz",
-    "clearance",
-    "volume",
-)
-_NORMALS_ONLY: tuple[str, ...] = ("per_vertex", "threshold")
 
 
 def _weight_names(_operator: Any, context: bpy.types.Context, typed: str) -> list[str]:
@@ -59,11 +45,12 @@ def draw_grow(
     layout: bpy.types.UILayout, operator: Any, names: Iterable[str] = GROW_PROPERTIES
 ) -> None:
     """Draw only the options of the chosen method."""
-    hidden = _NORMALS_ONLY if operator.way == "combed" else _COMBED_ONLY
-    if operator.way == "normals" and operator.per_vertex:
-        hidden += ("strand_count",)
-    elif operator.way == "normals":
-        hidden += ("threshold",)
+    sections = SimpleNamespace(grow=operator)
+    hidden = {
+        parameter.name
+        for parameter in ALL_SETTINGS["grow"].parameters()
+        if parameter.shown_when is not None and not parameter.shown_when(sections)
+    }
     for name in names:
         if name not in hidden:
             layout.prop(operator, name)

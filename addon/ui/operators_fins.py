@@ -15,7 +15,7 @@ from ..blender.scene.fin_modifier import (
     is_shown,
     remove_modifier,
 )
-from .drawing import draw_named
+from .drawing import draw_section
 from .messages import draw_message
 from .reports import reporting, waiting
 from .selection import active_mesh
@@ -122,15 +122,6 @@ class HAIRLOOM_OT_fin_reset(bpy.types.Operator):
 
 
 #: section of a fin -> its parameters
-FIN: dict[str, tuple[str, ...]] = {
-    "Cloth": ("gravity", "stretch", "bend", "shape", "pin_pull", "long_range"),
-    "Medium & Wind": ("buoyancy", "damping", "drag", "edgewise", "wind_speed", "wind_direction")
-    + ("wind_rise", "gusts", "gust_size", "gust_seed"),
-    "Collisions": ("friction", "radius", "push_speed", "collider_resolution"),
-    "Steps": ("substep_rate", "small_steps", "longest_frame"),
-}
-
-
 def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     """Draw the buttons and settings of a mesh that is, or may become, a fin."""
     if fin_modifier(obj) is None:
@@ -147,7 +138,7 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     column = layout.column()
     column.active = fin.enabled
     column.prop_search(fin, "pin_group", obj, "vertex_groups")
-    for label, names in FIN.items():
+    for label in fin.settings.panels:
         header, body = column.panel(f"hairloom_fin_{label}")
         header.label(text=label)
         if body is None:
@@ -155,7 +146,7 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         if label == "Collisions":
             body.prop(obj.hairloom, "collider")
             body.prop(obj.hairloom, "collider_collection")
-        draw_named(body, fin, names)
+        draw_section(body, obj.hairloom, "fin", label)
 
 
 def draw_switch(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:

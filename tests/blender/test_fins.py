@@ -219,7 +219,7 @@ def change_topology(flag):
     [
         (change_topology, "Play again"),
         (lambda flag: bpy.ops.object.mode_set(mode="EDIT"), "Edit Mode"),
-        (lambda flag: flag.modifiers.clear(), "no fin"),
+        (lambda flag: flag.modifiers.clear(), "not a fin"),
         (lambda flag: setattr(flag, "scale", (1.0, 0.0, 1.0)), "scale"),
         (lambda flag: bpy.data.objects.remove(flag), "gone"),
     ],

@@ -15,7 +15,7 @@ from hairloom.addon.shading.kajiya_kay_settings import KajiyaKaySettings
 from hairloom.addon.shading.marschner.settings import MarschnerSettings
 from hairloom.addon.shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
 from hairloom.addon.shading.settings import SharedSettings
-from hairloom.addon.ui import look, sections
+from hairloom.addon.ui import sections
 
 
 @pytest.fixture
@@ -97,9 +97,11 @@ def test_nothing_ticks_on_when_hairloom_is_disabled(preview: Any, window: None) 
     assert not bpy.app.timers.is_registered(reactions._refine)
 
 
-def drawn_in_look(hair: Any) -> list[str]:
-    """The parameters that the section Look and those below it draw, in order."""
+def drawn_in_look(hair: Any) -> tuple[list[str], set[str]]:
+    """The parameters that the section Look and those below it draw, in order, and those of them
+    that are greyed out."""
     found: list[str] = []
+    grey: set[str] = set()
 
     class Layout:
         """Takes what a layout is asked for, and notes the properties of shading."""
@@ -109,19 +111,20 @@ def drawn_in_look(hair: Any) -> list[str]:
         def prop(self, group: Any, name: str, **_: Any) -> None:
             assert group == hair.data.hairloom.shading
             found.append(name)
+            if not self.active:
+                grey.add(name)
 
         def __getattr__(self, name: str) -> Any:
             return lambda *_, **__: Layout()
 
     for draw in (sections.draw_look, *(draw for _, _, draw in sections.SUB_SECTIONS["look"])):
         draw(Layout(), hair)
-    return found
+    return found, grey
 
 
-#: what acts in one model alone, or with one pigment of Marschner
 KAJIYA_KAY = {parameter.name for parameter in KajiyaKaySettings.parameters()}
 MARSCHNER = {parameter.name for parameter in MarschnerSettings.parameters()}
-SHARED = {parameter.name for parameter in SharedSettings.parameters()}
+#: parameters of both models that act with one pigment of Marschner alone
 PIGMENTS = {
     "color": {"base_color"},
     "melanin": {"melanin", "redness"},
@@ -139,33 +142,32 @@ def test_every_parameter_that_acts_is_drawn_once_and_no_other(
     hair = new_hair()
     shading = hair.data.hairloom.shading
     shading.model, shading.pigment = model, pigment
-    acting = SHARED | KAJIYA_KAY
+    shared = {parameter.name for parameter in SharedSettings.parameters()}
+    shared -= {"pigment"}.union(*PIGMENTS.values())
     if model == "marschner":
-        others = set().union(*(names for kind, names in PIGMENTS.items() if kind != pigment))
-        acting = (SHARED | MARSCHNER) - others
-    drawn = drawn_in_look(hair)
+        acting = shared | MARSCHNER | {"pigment"} | PIGMENTS[pigment]
+    else:
+        acting = shared | KAJIYA_KAY | {"base_color"}
+    drawn, _ = drawn_in_look(hair)
     assert sorted(drawn) == sorted(acting)
     assert drawn[0] == "model"
 
 
 def test_colours_of_tips_are_grey_until_they_act(new_hair: Any) -> None:
-    groom = new_hair().data.hairloom
-    shading, volume = groom.shading, groom.volume
-    assert look.is_idle("tip_color", shading, volume)
-    assert not look.is_idle("tip_tint", shading, volume)
-    shading.tip_tint = 0.5
-    assert not look.is_idle("tip_color", shading, volume)
+    hair = new_hair()
+    _, grey = drawn_in_look(hair)
+    assert "tip_color" in grey and "tip_tint" not in grey
+    hair.data.hairloom.shading.tip_tint = 0.5
+    _, grey = drawn_in_look(hair)
+    assert "tip_color" not in grey
 
 
-def test_what_stands_in_for_shadows_and_scattering_is_grey_where_they_are(new_hair: Any) -> None:
-    groom = new_hair().data.hairloom
-
-    def idle() -> list[str]:
-        names = ("ambient", "scattered", "volume_shade")
-        return [name for name in names if look.is_idle(name, groom.shading, groom.volume)]
-
-    assert idle() == ["scattered", "volume_shade"], "a new groom has both"
+def test_what_replaces_shadows_and_scattering_is_grey_where_they_are(new_hair: Any) -> None:
+    hair = new_hair()
+    groom = hair.data.hairloom
+    groom.shading.model, groom.shading.tip_tint = "marschner", 1.0
+    assert drawn_in_look(hair)[1] == {"scattered", "volume_shade"}, "a new groom has both"
     groom.volume.scattering = False
-    assert idle() == ["volume_shade"]
+    assert drawn_in_look(hair)[1] == {"volume_shade"}
     groom.volume.shadows = "none"
-    assert idle() == []
+    assert drawn_in_look(hair)[1] == set()

@@ -69,7 +69,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "parameters": PURE,
     "render": PURE | {"gpu"},
     **{f"blender.{room}": PURE | FLOWS | {"render", "gpu"} | BLENDER for room in BLENDER_ROOMS},
-    "ui": {"params", "strands", "blender"} | BLENDER,
+    "ui": {"params", "parameters", "strands", "blender"} | BLENDER,
     "registration": {"blender", "ui"} | BLENDER,
     "__init__": {"registration"},
 }

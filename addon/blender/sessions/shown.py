@@ -8,14 +8,10 @@ import numpy as np
 
 from ...arrays import Floats
 from ...pipeline import Rig
-from ...refine.settings import DetailSettings
-from ...render.snapshot import Snapshot
+from ...render.snapshot import SECTIONS, Snapshot
 from ...shading.marschner.look import fibre_of
 from ...shading.marschner.tables import shape_of
-from ...shading.settings import ShadingSettings, StrandSettings
-from ...shading.shafts_settings import ShaftSettings
-from ...shading.skin.settings import SkinSettings
-from ...shading.volume.settings import VolumeSettings
+from ...shading.settings import ShadingSettings
 from ..properties.groom_settings import GroomSettings
 
 
@@ -39,16 +35,8 @@ def snapshot_of(rig: Rig, occlusion: Floats | None, rank: Floats | None) -> Snap
 
 def with_settings(snapshot: Snapshot, settings: GroomSettings) -> Snapshot:
     """The same groom by these settings."""
-    return replace(
-        snapshot,
-        shading=settings[ShadingSettings],
-        strand_settings=settings[StrandSettings],
-        detail=settings[DetailSettings],
-        volume=settings[VolumeSettings],
-        skin=settings[SkinSettings],
-        shafts=settings[ShaftSettings],
-        debug_view=settings.debug_view,
-    )
+    sections = {name: settings[kind] for name, kind in SECTIONS.items()}
+    return replace(snapshot, debug_view=settings.debug_view, **sections)
 
 
 def with_tables(snapshot: Snapshot, size: int) -> Snapshot:

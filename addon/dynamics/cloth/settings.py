@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...params import integer, number, toggle
+from ..motion_settings import MotionSettings
 from ..settings import DynamicsSettings
-from ..wind_settings import WindSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class FinSettings(WindSettings):
+class FinSettings(MotionSettings):
     """How a mesh moves as cloth: what hangs on its edges, on the air and on colliders.
 
     Each vertex weighs the same. What hair has too has the same name and means the same.
@@ -19,6 +19,7 @@ class FinSettings(WindSettings):
     section = "fin"
     title = "Fin"
     owner = "character"
+    panels = ("Cloth", "Medium & Wind", "Collisions", "Steps")
 
     substep_rate: float = number(
         240.0,
@@ -28,6 +29,7 @@ class FinSettings(WindSettings):
         hard=(30.0, 2000.0),
         unit="rate",
         source="Jakobsen 2001; fixed step with accumulator, Fiedler 2004",
+        panel="Steps",
     )
     small_steps: int = integer(
         10,
@@ -37,6 +39,7 @@ class FinSettings(WindSettings):
         soft=(1, 24),
         hard=(1, 256),
         source="Macklin et al. 2019",
+        panel="Steps",
     )
     longest_frame: float = number(
         0.25,
@@ -45,6 +48,7 @@ class FinSettings(WindSettings):
         soft=(0.05, 1.0),
         hard=(0.01, 10.0),
         unit="time",
+        panel="Steps",
     )
     gravity: float = number(
         1.0,
@@ -52,14 +56,7 @@ class FinSettings(WindSettings):
         description="Share of the scene's gravity that pulls at the cloth",
         soft=(0.0, 2.0),
         hard=(-10.0, 10.0),
-    )
-    buoyancy: float = number(
-        0.0,
-        label="Buoyancy",
-        description="Share of the weight that the medium carries: 0 in air; at 1 cloth floats",
-        soft=(0.0, 1.0),
-        hard=(0.0, 2.0),
-        source="Archimedes",
+        panel="Cloth",
     )
     damping: float = number(
         3.0,
@@ -70,6 +67,7 @@ class FinSettings(WindSettings):
         hard=(0.0, 1000.0),
         unit="rate",
         source="Jakobsen 2001",
+        panel="Medium & Wind",
     )
     drag: float = number(
         0.0,
@@ -79,6 +77,7 @@ class FinSettings(WindSettings):
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         source="Rayleigh's drag equation",
+        panel="Medium & Wind",
     )
     edgewise: float = number(
         0.1,
@@ -88,6 +87,7 @@ class FinSettings(WindSettings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
+        panel="Medium & Wind",
     )
     stretch: float = number(
         0.0,
@@ -98,6 +98,7 @@ class FinSettings(WindSettings):
         hard=(0.0, 10.0),
         unit="factor",
         source="XPBD, Macklin et al. 2016",
+        panel="Cloth",
     )
     bend: float = number(
         1.0,
@@ -108,6 +109,7 @@ class FinSettings(WindSettings):
         hard=(0.0, 1000.0),
         unit="rate",
         source="XPBD, Macklin et al. 2016",
+        panel="Cloth",
     )
     shape: float = number(
         0.0,
@@ -117,6 +119,7 @@ class FinSettings(WindSettings):
         hard=(0.0, 1000.0),
         unit="rate",
         source="Global shape constraint, Han and Harada 2012",
+        panel="Cloth",
     )
     pin_pull: float = number(
         4.0,
@@ -126,6 +129,7 @@ class FinSettings(WindSettings):
         soft=(0.0, 20.0),
         hard=(0.0, 1000.0),
         unit="rate",
+        panel="Cloth",
     )
     long_range: bool = toggle(
         True,
@@ -133,14 +137,7 @@ class FinSettings(WindSettings):
         description="No vertex goes farther from its nearest pinned vertex than its way along "
         "the edges",
         source="Kim, Chentanez and Mueller 2012",
-    )
-    friction: float = number(
-        0.3,
-        label="Friction",
-        description="Coefficient of friction between cloth and colliders",
-        soft=(0.0, 1.0),
-        hard=(0.0, 10.0),
-        source="Coulomb; position-based as in Macklin et al. 2014",
+        panel="Cloth",
     )
     radius: float = number(
         0.003,
@@ -149,21 +146,7 @@ class FinSettings(WindSettings):
         soft=(0.0, 0.02),
         hard=(0.0, 0.1),
         unit="length",
-    )
-    push_speed: float = number(
-        0.5,
-        label="Push-out Speed",
-        description="How fast cloth that starts inside a collider is led out",
-        soft=(0.05, 5.0),
-        hard=(0.001, 100.0),
-        unit="speed",
-    )
-    collider_resolution: int = integer(
-        56,
-        label="Collider Cells",
-        description="Cells along the longest side of a mesh collider's distance field",
-        soft=(24, 96),
-        hard=(8, 192),
+        panel="Collisions",
     )
 
     def as_dynamics(self) -> DynamicsSettings:

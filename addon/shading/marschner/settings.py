@@ -6,55 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...params import Settings, choice, color, number
+from ...params import Settings, either, number, when
 
 _MARSCHNER = "Marschner et al. 2003"
-_PIGMENT = "Chiang et al. 2016; Blender's Principled Hair"
 _WIDEST = float(np.radians(60.0))
-
-PIGMENTS = (
-    ("color", "Colour", "What absorbs light so much that a mass of hair has the colour above"),
-    ("melanin", "Melanin", "The pigments of natural hair"),
-    ("absorption", "Absorption", "Set outright"),
-)
+_HAS_NO_SCATTERING = either(when("volume.shadows", "none"), when("volume.scattering", False))
 
 
 @dataclass(frozen=True, kw_only=True)
 class MarschnerSettings(Settings):
     """Act in the model Marschner alone. Angles are in radians."""
 
-    pigment: str = choice(
-        "color",
-        PIGMENTS,
-        label="Pigment",
-        description="What says how much light is absorbed inside the hair",
-        source=_PIGMENT,
-    )
-    melanin: float = number(
-        0.75,
-        label="Melanin",
-        description="Amount of pigment: white 0, blond 0.25, brown 0.75, black 1",
-        soft=(0.0, 1.0),
-        hard=(0.0, 1.0),
-        unit="factor",
-        source=_PIGMENT,
-    )
-    redness: float = number(
-        0.3,
-        label="Redness",
-        description="Share of the pigment that is red",
-        soft=(0.0, 1.0),
-        hard=(0.0, 1.0),
-        unit="factor",
-        source=_PIGMENT,
-    )
-    absorption: tuple[float, float, float] = color(
-        (0.25, 0.42, 0.83),
-        label="Absorption",
-        description="How much red, green and blue hair absorbs inside, on the length of its radius",
-        maximum=100.0,
-        source=_PIGMENT,
-    )
     index_of_refraction: float = number(
         1.55,
         label="IOR",
@@ -62,14 +24,8 @@ class MarschnerSettings(Settings):
         soft=(1.2, 1.8),
         hard=(1.0, 4.0),
         source=_MARSCHNER,
-    )
-    eccentricity: float = number(
-        1.0,
-        label="Eccentricity",
-        description="One axis of the cross-section over the other; round hair has 1",
-        soft=(0.8, 1.25),
-        hard=(0.5, 2.0),
-        source=f"{_MARSCHNER}, section 5.2.3",
+        panel="Fibre",
+        shown_when=when("shading.model", "marschner"),
     )
     cuticle_tilt: float = number(
         float(np.radians(3.0)),
@@ -80,6 +36,18 @@ class MarschnerSettings(Settings):
         hard=(-float(np.radians(30.0)), float(np.radians(30.0))),
         unit="angle",
         source=_MARSCHNER,
+        panel="Fibre",
+        shown_when=when("shading.model", "marschner"),
+    )
+    eccentricity: float = number(
+        1.0,
+        label="Eccentricity",
+        description="One axis of the cross-section over the other; round hair has 1",
+        soft=(0.8, 1.25),
+        hard=(0.5, 2.0),
+        source=f"{_MARSCHNER}, section 5.2.3",
+        panel="Fibre",
+        shown_when=when("shading.model", "marschner"),
     )
     strength_r: float = number(
         1.0,
@@ -88,6 +56,8 @@ class MarschnerSettings(Settings):
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         source=_MARSCHNER,
+        panel="First Highlight",
+        shown_when=when("shading.model", "marschner"),
     )
     width_r: float = number(
         float(np.radians(5.0)),
@@ -98,6 +68,8 @@ class MarschnerSettings(Settings):
         hard=(0.0, _WIDEST),
         unit="angle",
         source=_MARSCHNER,
+        panel="First Highlight",
+        shown_when=when("shading.model", "marschner"),
     )
     offset_r: float = number(
         0.0,
@@ -106,6 +78,8 @@ class MarschnerSettings(Settings):
         soft=(-float(np.radians(10.0)), float(np.radians(10.0))),
         hard=(-float(np.radians(45.0)), float(np.radians(45.0))),
         unit="angle",
+        panel="First Highlight",
+        shown_when=when("shading.model", "marschner"),
     )
     strength_tt: float = number(
         1.0,
@@ -114,6 +88,8 @@ class MarschnerSettings(Settings):
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         source=_MARSCHNER,
+        panel="Rim Light",
+        shown_when=when("shading.model", "marschner"),
     )
     width_tt: float = number(
         float(np.radians(3.0)),
@@ -124,6 +100,8 @@ class MarschnerSettings(Settings):
         hard=(0.0, _WIDEST),
         unit="angle",
         source=_MARSCHNER,
+        panel="Rim Light",
+        shown_when=when("shading.model", "marschner"),
     )
     offset_tt: float = number(
         0.0,
@@ -132,6 +110,8 @@ class MarschnerSettings(Settings):
         soft=(-float(np.radians(10.0)), float(np.radians(10.0))),
         hard=(-float(np.radians(45.0)), float(np.radians(45.0))),
         unit="angle",
+        panel="Rim Light",
+        shown_when=when("shading.model", "marschner"),
     )
     strength_trt: float = number(
         1.0,
@@ -140,6 +120,8 @@ class MarschnerSettings(Settings):
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         source=_MARSCHNER,
+        panel="Second Highlight",
+        shown_when=when("shading.model", "marschner"),
     )
     width_trt: float = number(
         float(np.radians(8.0)),
@@ -150,6 +132,8 @@ class MarschnerSettings(Settings):
         hard=(0.0, _WIDEST),
         unit="angle",
         source=_MARSCHNER,
+        panel="Second Highlight",
+        shown_when=when("shading.model", "marschner"),
     )
     offset_trt: float = number(
         0.0,
@@ -158,6 +142,8 @@ class MarschnerSettings(Settings):
         soft=(-float(np.radians(10.0)), float(np.radians(10.0))),
         hard=(-float(np.radians(45.0)), float(np.radians(45.0))),
         unit="angle",
+        panel="Second Highlight",
+        shown_when=when("shading.model", "marschner"),
     )
     glint_strength: float = number(
         1.0,
@@ -166,6 +152,8 @@ class MarschnerSettings(Settings):
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         source=f"{_MARSCHNER}, appendix A",
+        panel="Second Highlight",
+        shown_when=when("shading.model", "marschner"),
     )
     glint_width: float = number(
         float(np.radians(10.0)),
@@ -175,6 +163,8 @@ class MarschnerSettings(Settings):
         hard=(float(np.radians(0.5)), float(np.radians(90.0))),
         unit="angle",
         source=f"{_MARSCHNER}, appendix A",
+        panel="Second Highlight",
+        shown_when=when("shading.model", "marschner"),
     )
     azimuthal_width: float = number(
         0.0,
@@ -184,6 +174,8 @@ class MarschnerSettings(Settings):
         hard=(0.0, _WIDEST),
         unit="angle",
         source="d'Eon et al. 2011",
+        panel="Fibre",
+        shown_when=when("shading.model", "marschner"),
     )
     strength_rest: float = number(
         1.0,
@@ -192,6 +184,8 @@ class MarschnerSettings(Settings):
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         source="d'Eon et al. 2011; Chiang et al. 2016",
+        panel="Rim Light",
+        shown_when=when("shading.model", "marschner"),
     )
     scattered: float = number(
         0.6,
@@ -200,6 +194,8 @@ class MarschnerSettings(Settings):
         "where Shadows with Scattering do not give it",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
+        shown_when=when("shading.model", "marschner"),
+        active_when=_HAS_NO_SCATTERING,
     )
     volume_shade: float = number(
         1.0,
@@ -210,4 +206,6 @@ class MarschnerSettings(Settings):
         hard=(0.0, 1.0),
         unit="factor",
         source="Scheuermann 2004, highlights attenuated by the diffuse bias",
+        shown_when=when("shading.model", "marschner"),
+        active_when=when("volume.shadows", "none"),
     )

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...params import Settings, integer, number, toggle
+from ...params import Settings, both, integer, number, toggle, when
 
 _GREEN = "Green 2004, GPU Gems, chapter 16: texture-space diffusion"
+#: Where hair throws no shadow there is none on skin.
+_IS_SOFT = both(when("skin.soft_shadow"), when("volume.shadows", "deep", "slices"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +34,7 @@ class SkinSettings(Settings):
         hard=(0.0, 1.0),
         unit="length",
         source=_GREEN,
+        active_when=_IS_SOFT,
     )
     skin_resolution: int = integer(
         512,
@@ -39,4 +42,5 @@ class SkinSettings(Settings):
         description="Texels along the longer side of the head's UV map, for the shadow on it",
         soft=(128, 2048),
         hard=(64, 4096),
+        active_when=_IS_SOFT,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...params import Settings, choice, integer, number, toggle
+from ...params import Settings, both, choice, integer, number, toggle, when
 
 _KIM = "Kim and Neumann 2001, opacity shadow maps"
 _YUKSEL = "Yuksel and Keyser 2008, deep opacity maps"
@@ -15,6 +15,8 @@ SHADOWS = (
     ("slices", "Opacity Slices", "Even slices through the whole of the hair"),
     ("none", "None", "Ambient occlusion stands in for shadows"),
 )
+_CAN_SCATTER = when("shading.model", "marschner")
+_SCATTERS = both(_CAN_SCATTER, when("volume.scattering"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +42,7 @@ class VolumeSettings(Settings):
         soft=(0.0, 4.0),
         hard=(0.0, 1000.0),
         source=_KIM,
+        shown_when=when("volume.shadows", "deep", "slices"),
     )
     resolution: int = integer(
         512,
@@ -47,6 +50,7 @@ class VolumeSettings(Settings):
         description="Texels along a side of each light's map",
         soft=(128, 1024),
         hard=(16, 2048),
+        shown_when=when("volume.shadows", "deep", "slices"),
     )
     slices: int = integer(
         16,
@@ -55,6 +59,7 @@ class VolumeSettings(Settings):
         soft=(4, 64),
         hard=(4, 64),
         source=_KIM,
+        shown_when=when("volume.shadows", "slices"),
     )
     layers: int = integer(
         8,
@@ -64,6 +69,7 @@ class VolumeSettings(Settings):
         soft=(4, 16),
         hard=(2, 64),
         source=_YUKSEL,
+        shown_when=when("volume.shadows", "deep"),
     )
     layer_depth: float = number(
         0.25,
@@ -74,6 +80,7 @@ class VolumeSettings(Settings):
         hard=(0.001, 0.9),
         unit="factor",
         source=_YUKSEL,
+        shown_when=when("volume.shadows", "deep"),
     )
     bias: float = number(
         0.01,
@@ -84,6 +91,7 @@ class VolumeSettings(Settings):
         hard=(0.0, 1.0),
         unit="factor",
         source=_KIM,
+        shown_when=when("volume.shadows", "deep", "slices"),
     )
     strand_share: float = number(
         0.5,
@@ -92,6 +100,7 @@ class VolumeSettings(Settings):
         soft=(0.05, 1.0),
         hard=(0.001, 1.0),
         unit="factor",
+        shown_when=when("volume.shadows", "deep", "slices"),
     )
     most_lights: int = integer(
         3,
@@ -99,12 +108,14 @@ class VolumeSettings(Settings):
         description="Lights that throw shadows at most, the strongest first",
         soft=(0, 8),
         hard=(0, 8),
+        shown_when=when("volume.shadows", "deep", "slices"),
     )
     on_body: bool = toggle(
         False,
         label="On Body",
         description="Where a 3D view goes by the scene's lights, hair as it moves shades the head "
         "that Blender draws, in place of Blender's own strands at rest, which shade all meshes",
+        shown_when=when("volume.shadows", "deep", "slices"),
     )
     scattering: bool = toggle(
         True,
@@ -112,6 +123,8 @@ class VolumeSettings(Settings):
         description="With shadows and in the model Marschner: light that has passed from strand to "
         "strand, without which light hair is brown",
         source=_ZINKE,
+        shown_when=when("volume.shadows", "deep", "slices"),
+        active_when=_CAN_SCATTER,
     )
     density: float = number(
         0.75,
@@ -122,4 +135,6 @@ class VolumeSettings(Settings):
         hard=(0.0, 1.0),
         unit="factor",
         source=_ZINKE,
+        shown_when=when("volume.shadows", "deep", "slices"),
+        active_when=_SCATTERS,
     )

@@ -1,0 +1,127 @@
+"""The parameters that hair and cloth share: the medium, its wind, and contacts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ..params import Settings, integer, number
+
+#: keyframes may turn the wind round and round: sixteen turns [rad]
+_MOST_TURNED = math.radians(16.0 * 360.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionSettings(Settings):
+    """Of all that moves by itself; a base of settings, not a section of its own."""
+
+    buoyancy: float = number(
+        0.0,
+        label="Buoyancy",
+        description="Share of the weight that the medium carries: 0 in air; at 1 it floats",
+        soft=(0.0, 1.0),
+        hard=(0.0, 2.0),
+        source="Archimedes",
+        panel="Medium & Wind",
+    )
+    damping: float = number(
+        0.5,
+        label="Air Damping",
+        description="How fast still air, or water, takes the speed out of what moves, and how "
+        "fast wind gives it its own",
+        soft=(0.0, 10.0),
+        hard=(0.0, 1000.0),
+        unit="rate",
+        source="Jakobsen 2001",
+        panel="Medium & Wind",
+    )
+    drag: float = number(
+        0.0,
+        label="Drag",
+        description="Braking by the square of the speed through air or water, for each metre of "
+        "way; in water a few",
+        soft=(0.0, 10.0),
+        hard=(0.0, 1000.0),
+        source="Rayleigh's drag equation",
+        panel="Medium & Wind",
+    )
+    wind_speed: float = number(
+        0.0,
+        label="Wind",
+        description="Speed of the air, or of the current under water; the scene's wind force "
+        "fields add to it",
+        soft=(0.0, 20.0),
+        hard=(0.0, 200.0),
+        unit="speed",
+        panel="Medium & Wind",
+    )
+    wind_direction: float = number(
+        0.0,
+        label="Wind Direction",
+        description="Where the wind blows to: 0 is world +X, a quarter turn +Y",
+        soft=(-math.pi, math.pi),
+        hard=(-_MOST_TURNED, _MOST_TURNED),
+        unit="angle",
+        panel="Medium & Wind",
+    )
+    wind_rise: float = number(
+        0.0,
+        label="Wind Rise",
+        description="How steeply the wind blows upwards",
+        soft=(-0.5 * math.pi, 0.5 * math.pi),
+        hard=(-_MOST_TURNED, _MOST_TURNED),
+        unit="angle",
+        panel="Medium & Wind",
+    )
+    gusts: float = number(
+        0.5,
+        label="Gusts",
+        description="How strongly the wind swells and turns, as a share of its speed",
+        soft=(0.0, 2.0),
+        hard=(0.0, 10.0),
+        source="Random Fourier modes, Kraichnan 1970",
+        panel="Medium & Wind",
+    )
+    gust_size: float = number(
+        0.5,
+        label="Gust Size",
+        description="Length of a gust from one swell to the next",
+        soft=(0.05, 5.0),
+        hard=(0.01, 1000.0),
+        unit="length",
+        panel="Medium & Wind",
+    )
+    gust_seed: int = integer(
+        1,
+        label="Gust Seed",
+        description="Another seed gives other gusts of the same kind",
+        soft=(0, 100),
+        hard=(0, 2**31 - 1),
+        panel="Medium & Wind",
+    )
+    friction: float = number(
+        0.3,
+        label="Friction",
+        description="Coefficient of friction with colliders",
+        soft=(0.0, 1.0),
+        hard=(0.0, 10.0),
+        source="Coulomb; position-based as in Macklin et al. 2014",
+        panel="Collisions",
+    )
+    push_speed: float = number(
+        0.5,
+        label="Push-out Speed",
+        description="How fast what starts inside a collider is led out",
+        soft=(0.05, 5.0),
+        hard=(0.001, 100.0),
+        unit="speed",
+        panel="Collisions",
+    )
+    collider_resolution: int = integer(
+        56,
+        label="Collider Cells",
+        description="Cells along the longest side of a mesh collider's distance field",
+        soft=(24, 96),
+        hard=(8, 192),
+        panel="Collisions",
+    )
