@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ def snapshot_of(rig: Rig, occlusion: Floats | None, rank: Floats | None) -> Snap
 
 def with_settings(snapshot: Snapshot, settings: GroomSettings) -> Snapshot:
     """The same groom by these settings."""
-    sections = {name: settings[kind] for name, kind in SECTIONS.items()}
+    sections: dict[str, Any] = {name: settings[kind] for name, kind in SECTIONS.items()}
     return replace(snapshot, debug_view=settings.debug_view, **sections)
 
 
