@@ -9,14 +9,13 @@ import numpy as np
 
 from .arrays import Floats
 from .cards.atlas_settings import AtlasSettings
-from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps
+from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps, strand_shade
 from .cards.card_mesh import CardMesh
 from .cards.follow import CardBinding, bind_cards, card_lines, follow_guides
 from .cards.occlusion import CardShade
 from .cards.occlusion_settings import CardOcclusionSettings
 from .cards.settings import CardSettings
 from .cards.steps import result_of
-from .cards.strand_shade import strand_shade
 from .groom.weights import guide_weights
 from .pipeline import Pose, Rig, rest_occlusion, root_normals, root_turns
 from .shading.ambient_settings import AmbientSettings

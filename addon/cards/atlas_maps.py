@@ -1,16 +1,26 @@
-"""`AtlasMaps`: the pictures of an atlas."""
+"""`AtlasMaps`, the pictures of an atlas, and what they say where no hair is: what is on both sides.
+
+So that filtering and mip maps never mix in what is no hair, nor another tile. Between two hairs of
+a row values go over from one to the other; beside the outermost they go on. A row without hair
+takes the nearest one of its tile that has some. Hair runs along a tile, so rows find what is near.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+from typing import Any
 
-from ..arrays import Floats
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from .atlas_grid import AtlasGrid
 
 
 @dataclass(frozen=True, eq=False)
 class AtlasMaps:
     """Maps of one size, float32 in [0, 1], row 0 the lowest; what they say of hair goes on where
-    alpha is 0, see bake_dilation.
+    alpha is 0, see `dilated`.
 
     Directions d are 0.5 d + 0.5 in the card's own frame: x across the card, along u; y along the
     card from root to tip; z away from the head.
@@ -44,3 +54,87 @@ class AtlasMaps:
 
 #: The maps by name.
 MAPS = tuple(field.name for field in fields(AtlasMaps) if field.name != "base_gain")
+#: What stands in tiles without hair.
+_EMPTY: dict[str, float | tuple[float, ...]] = {
+    "base": 1.0,
+    "normal": (0.5, 0.5, 1.0),
+    "tangent": (0.5, 1.0, 0.5),
+    "depth": 0.5,
+    "along": 0.0,
+    "strand_id": 0.0,
+    "occlusion": 1.0,
+}
+
+
+def dilated(maps: AtlasMaps, grid: AtlasGrid) -> AtlasMaps:
+    """The same maps, going on where alpha is 0; alpha stays as it is."""
+    left, right, share = hair_beside(maps.alpha > 0.0, grid)
+    is_free = maps.alpha == 0.0
+    left, right, share = left[is_free], right[is_free], share[is_free]
+    done: dict[str, Any] = {}
+    for name in MAPS:
+        if name != "alpha":
+            image = getattr(maps, name).copy()
+            values = _between(name, image.reshape(-1, *image.shape[2:]), left, right, share)
+            values[left < 0] = _EMPTY[name]
+            image[is_free] = values
+            done[name] = image
+    return replace(maps, **done)
+
+
+def _between(name: str, texels: Floats, left: Ints, right: Ints, share: Floats) -> Floats:
+    """What goes over from one texel to the other, (n, ...)."""
+    if name == "strand_id":  # a number between two is a third strand's
+        return texels[np.where(share < 0.5, left, right)]
+    mixed = texels[left]
+    mixed += (texels[right] - mixed) * share.reshape(-1, *[1] * (texels.ndim - 1))
+    if name in ("normal", "tangent"):
+        way = mixed - 0.5
+        length = np.sqrt(np.einsum("ni,ni->n", way, way))
+        mixed = 0.5 + way * (0.5 / np.maximum(length, 1e-6))[:, None]
+    return mixed
+
+
+def tile_edges(size: int, count: int) -> Ints:
+    """Where tiles begin, and the end of the last, (count + 1,) [pixels]: a texel is of the tile
+    in which its middle lies."""
+    return np.ceil(np.arange(count + 1) * (size / count) - 0.5).astype(np.int64)
+
+
+def hair_beside(is_hair: Bools, grid: AtlasGrid) -> tuple[Ints, Ints, Floats]:
+    """The two texels, as row * width + column, that each lies between, and how near to the second.
+
+    Both are the texel itself where it has hair, and -1 in tiles without hair.
+    """
+    height, width = is_hair.shape
+    beside = np.full((2, height, width), -1, np.int32)
+    share = np.zeros((height, width), np.float32)
+    for low, high in pairwise(tile_edges(height, grid.rows)):
+        for first, last in pairwise(tile_edges(width, grid.columns)):
+            tile = is_hair[low:high, first:last]
+            with_hair = np.flatnonzero(tile.any(axis=1))
+            if len(with_hair):
+                columns, shares = _beside_in_rows(tile[with_hair])
+                texels = (low + with_hair)[:, None] * width + first + columns
+                nearest = _nearest_of(with_hair, high - low)
+                beside[:, low:high, first:last] = texels[:, nearest]
+                share[low:high, first:last] = shares[nearest]
+    return beside[0], beside[1], share
+
+
+def _beside_in_rows(is_hair: Bools) -> tuple[Ints, Floats]:
+    """The columns of the hair on both sides, (2, rows, columns), and how near to the second."""
+    count = is_hair.shape[1]
+    column = np.arange(count)
+    left = np.maximum.accumulate(np.where(is_hair, column, -1), axis=1)
+    right = np.where(is_hair, column, count)[:, ::-1]
+    right = np.minimum.accumulate(right, axis=1)[:, ::-1]
+    left, right = np.where(left < 0, right, left), np.where(right == count, left, right)
+    share = (column - left) / np.maximum(right - left, 1)
+    return np.stack([left, right]), np.clip(share, 0.0, 1.0).astype(np.float32)
+
+
+def _nearest_of(places: Ints, count: int) -> Ints:
+    """Which of the ascending places is nearest to each of 0 .. count - 1, (count,)."""
+    middles = (places[:-1] + places[1:]) / 2.0
+    return np.searchsorted(middles, np.arange(count))

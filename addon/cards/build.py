@@ -25,12 +25,14 @@ from .settings import CardSettings
 from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, in_order, order_steps
 from .steps import retold
 from .strand_occlusion import strands_occlusion
-from .strip import Strips, UncutCards, guide_strips, scattered_tiles
+from .strip import Strips, UncutCards, guide_strips, scattered_tiles, strip_mesh
 
 #: Directions from which coarser levels are looked at to be sorted.
 _COARSER_VIEWS = 16
 #: Views in which it is counted how often the order is wrong.
 _CHECKED_VIEWS = 8
+#: Cards are enough that stand for so many strands each; so many there are at most.
+_STRANDS_PER_CARD, _MOST_CARDS = 12, 600
 
 
 @dataclass(frozen=True)
@@ -261,3 +263,28 @@ def with_occlusion_of(finest: CardMesh, level: CardMesh) -> CardMesh:
     gap = (finest.uv[candidate] - level.uv[:, None]) * tiles
     nearest = np.einsum("vci,vci->vc", gap, gap).argmin(axis=1)
     return level.with_occlusion(finest.occlusion[candidate[np.arange(len(mine)), nearest]])
+
+
+def strand_shade(groom: CardGroom) -> CardShade:
+    """Strands as cards that only shade others, for grooms of which no cards were made.
+
+    They lie along clusters of the strands, each row as dense as the strands in it.
+
+    Strands take pi / 4 of their area of light from everywhere, cards half of theirs times tau
+    (Cauchy, see shading/volume/card_opacity.py). So a row that is w wide and holds strands of
+    radius r has  tau = pi / 2 sum 2 r / w.  Nothing is baked, sorted or shaded: it takes a second
+    where cards take a minute. A row of texels is a row of all cards, and a column a card.
+    """
+    strands, radius = groom.strands, groom.radius
+    count = min(max(strands.strand_count // _STRANDS_PER_CARD, 1), _MOST_CARDS)
+    settings = CardSettings(way="clusters", card_count=count, fly_aways=0.0)
+    cluster = cluster_of_strands(strands.grid, strands.group, settings)
+    strips = fit_strips(strands.grid, radius, cluster, groom.root_normal, settings)
+    covered = np.zeros(strips.width.shape)
+    np.add.at(covered, cluster, 2.0 * radius)
+    tau = 0.5 * np.pi * covered / np.maximum(strips.width, 1.0e-9)
+    numbers = np.arange(len(strips), dtype=np.int32)
+    same = np.zeros_like(numbers)
+    cards = UncutCards(strips, same, same, same, numbers, AtlasGrid(columns=len(strips)))
+    mesh = strip_mesh([(numbers, strips)], cards, 1, settings)
+    return CardShade(mesh, (1.0 - np.exp(-tau)).T.astype(np.float32))

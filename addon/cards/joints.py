@@ -15,8 +15,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from .card_mesh import CardMesh
 from .follow import card_lines
-from .joint_chains import Chains, card_chains
-from .joint_rest import reach_of, rest_joints
+from .joint_chains import Chains, card_chains, reach_of, rest_joints
 from .joint_solve import INFLUENCES, Skin, best_weights, first_joints, move_joints, skinned
 from .sort import card_of_vertex
 

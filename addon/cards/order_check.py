@@ -20,10 +20,12 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
 from .card_mesh import CardMesh
-from .order_alpha import LEAST_ALPHA, OPAQUE_ALPHA, alpha_at
 from .order_views import (
+    LEAST_ALPHA,
+    OPAQUE_ALPHA,
     Fragments,
     View,
+    alpha_at,
     fragments,
     nearest,
     sphere_of,

@@ -12,13 +12,16 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
 from .card_mesh import CardMesh
-from .order_alpha import LEAST_ALPHA, OPAQUE_ALPHA, alpha_at, seen_from_afar
 from .order_views import (
+    LEAST_ALPHA,
     LOWEST,
+    OPAQUE_ALPHA,
     Fragments,
     View,
+    alpha_at,
     far_to_near,
     fragments,
+    seen_from_afar,
     sphere_of,
     view_directions,
 )

@@ -25,9 +25,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import Surface
 from ..strands.closest_point import closest_point
-from .canonical import canonical
-from .card_mesh import OF_VERTICES, CardMesh
-from .order_groups import dangling_groups, sections
+from .card_mesh import OF_CARDS, OF_VERTICES, CardMesh
 from .order_pairs import Pairs, all_pairs, pairs_by_view
 from .order_search import Wishes, least_broken, wishes
 from .steps import result_of
@@ -42,6 +40,12 @@ MOST_PIECES = 30_000
 MOST_TRIANGLES = 250_000
 #: Views looked at in a step, and how much of the time they take.
 _VIEWS_PER_STEP, _SHARE_OF_VIEWS = 8, 0.6
+
+#: A group dangles where its middle card is so many times as far from the head as nearly all cards
+#: of the groups that lie nearer and do not dangle.
+_FARTHER = 1.25
+#: Nearly all, in percent.
+_NEARLY_ALL = 90.0
 
 #: What is sorted: pieces of cards or whole cards, by what is seen; whole cards by distance alone.
 type SortBy = Literal["pieces", "cards", "distance"]
@@ -111,7 +115,7 @@ def _canonical_orders(
     view_count: int,
     alpha: Floats | None,
 ) -> Generator[float, None, CardOrders]:
-    """As order_steps, of a mesh that is numbered by canonical.py."""
+    """As order_steps, of a mesh that is numbered by `canonical`."""
     distance = card_distances(mesh, head)
     section = _section_of_cards(mesh, distance, apart)
     inside_out = np.lexsort((distance, section))
@@ -160,12 +164,94 @@ def _triangles_of(mesh: CardMesh, cards: Ints) -> Ints:
 
 
 def _section_of_cards(mesh: CardMesh, distance: Floats, apart: Collection[int] | None) -> Ints:
-    """Of each card number that has a distance, see order_groups.py."""
+    """Of each card number that has a distance, see `sections`."""
     group = mesh.group[: len(distance)]
     if apart is None:
         used = np.unique(mesh.card)
         apart = dangling_groups(group[used], distance[used])
     return sections(group, apart)
+
+
+def dangling_groups(group: Ints, distance: Floats) -> list[int]:
+    """Groups that hang far from the head, the nearest of them first.
+
+    Args:
+        group, distance: (card_count,) of each card; distance from the head [m].
+    """
+    names = np.unique(group).tolist()
+    middle = {name: float(np.median(distance[group == name])) for name in names}
+    ordered = sorted(names, key=lambda name: middle[name])
+    near, dangling = ordered[:1], ordered[:0]
+    for name in ordered[1:]:
+        usual = float(np.percentile(distance[np.isin(group, near)], _NEARLY_ALL))
+        (dangling if middle[name] > _FARTHER * usual else near).append(name)
+    return dangling
+
+
+def sections(group: Ints, apart: Collection[int]) -> Ints:
+    """What is drawn on its own, (len(group),): 0 for all groups but those of `apart`, which follow
+    as 1, 2 ...
+    """
+    section = np.zeros(len(group), np.int64)
+    for number, name in enumerate(apart, 1):
+        section[group == name] = number
+    return section
+
+
+@dataclass(frozen=True)
+class Canonical:
+    """mesh: the same cards; the triangles of a card follow each other from root to tip.
+    triangle: (triangle_count,) which triangle of the source each of its triangles is.
+    """
+
+    mesh: CardMesh
+    triangle: Ints
+
+
+def canonical(mesh: CardMesh) -> Canonical:
+    """The mesh numbered by the way from the root, then by place, then by UV.
+
+    A search that starts from the order at hand ends in another one each time. So cards are numbered
+    by where they are before they are sorted, and sorting a mesh that is sorted changes nothing.
+
+    What is alike in all of these keeps the order of its vertices.
+    """
+    vertices, rank = _by_place(mesh)
+    number = np.empty(len(vertices), np.int32)
+    number[vertices] = np.arange(len(vertices), dtype=np.int32)
+    corners = _lowest_first(number[mesh.triangles])
+    first, second, third = rank[corners].T
+    inside = np.lexsort((corners[:, 0], third, second, first))  # the last counts most
+    names, place = np.unique(mesh.card[inside], return_index=True)
+    cards = names[np.argsort(place)]
+    card = np.zeros(int(names.max(initial=-1)) + 1, np.int32)
+    card[cards] = np.arange(len(cards), dtype=np.int32)
+    order = inside[np.argsort(card[mesh.card[inside]], kind="stable")]
+    numbered = replace(
+        mesh,
+        triangles=corners[order],
+        card=card[mesh.card[order]],
+        **{name: getattr(mesh, name)[vertices] for name in OF_VERTICES},
+        **{name: getattr(mesh, name)[cards] for name in OF_CARDS},
+    )
+    return Canonical(numbered, order)
+
+
+def _by_place(mesh: CardMesh) -> tuple[Ints, Ints]:
+    """Vertices from root to tip, and the rank of each of these, which those that are alike share;
+    (vertex_count,) each."""
+    keys = np.column_stack([mesh.along, mesh.positions, mesh.uv])
+    vertices = np.lexsort(keys.T[::-1])
+    keys = keys[vertices]
+    is_other = np.ones(len(keys), bool)
+    is_other[1:] = (keys[1:] != keys[:-1]).any(axis=1)
+    return vertices, np.cumsum(is_other)
+
+
+def _lowest_first(triangles: Ints) -> Ints:
+    """The same triangles, each turned so that its lowest number comes first, (n, 3)."""
+    turned = (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(triangles, turned, axis=1)
 
 
 def order_from(mesh: CardMesh, eye: Floats) -> Ints:

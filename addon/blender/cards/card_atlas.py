@@ -8,9 +8,8 @@ import gpu
 import numpy as np
 
 from ...cards.atlas import AtlasPlan
-from ...cards.atlas_maps import AtlasMaps
+from ...cards.atlas_maps import AtlasMaps, dilated
 from ...cards.bake import sampled_maps
-from ...cards.bake_dilation import dilated
 from ...cards.bake_strands import FlatStrands, flat_strands
 from ...pipeline import Rig
 from ...render.atlas_pass import baked_maps, baking

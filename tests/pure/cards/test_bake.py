@@ -9,9 +9,8 @@ import pytest
 
 from hairloom.addon.cards.atlas import AtlasPlan
 from hairloom.addon.cards.atlas_grid import AtlasGrid
-from hairloom.addon.cards.atlas_maps import AtlasMaps
+from hairloom.addon.cards.atlas_maps import AtlasMaps, dilated, tile_edges
 from hairloom.addon.cards.bake import sampled_maps
-from hairloom.addon.cards.bake_dilation import dilated, tile_edges
 from hairloom.addon.cards.bake_strands import FlatStrands, flat_strands
 from hairloom.addon.cards.strip import CardFrames, Strips
 

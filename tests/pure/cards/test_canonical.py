@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hairloom.addon.cards.canonical import canonical
 from hairloom.addon.cards.card_mesh import OF_CARDS, OF_VERTICES, CardMesh
+from hairloom.addon.cards.sort import canonical
 
 #: a strip of two segments and one column
 STRIP = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]], np.int32)

@@ -9,9 +9,8 @@ import pytest
 from sheets import VIEW, sheets
 
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.cards.order_alpha import alpha_at, seen_from_afar, texels_per_metre
 from hairloom.addon.cards.order_pairs import all_pairs, pairs_by_view
-from hairloom.addon.cards.order_views import fragments
+from hairloom.addon.cards.order_views import alpha_at, fragments, seen_from_afar, texels_per_metre
 from hairloom.addon.cards.sort import SortBy, card_orders
 
 

@@ -9,7 +9,6 @@ import pytest
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.order_check import seen_cards
-from hairloom.addon.cards.order_groups import dangling_groups, sections
 from hairloom.addon.cards.order_pairs import (
     LEAST_WEIGHT,
     all_pairs,
@@ -25,6 +24,7 @@ from hairloom.addon.cards.order_views import (
     sphere_of,
     view_directions,
 )
+from hairloom.addon.cards.sort import dangling_groups, sections
 from hairloom.addon.strands import Surface
 
 
