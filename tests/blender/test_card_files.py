@@ -26,7 +26,7 @@ jsonschema = pytest.importorskip("jsonschema", reason="it is missing: `make setu
 
 from hairloom.addon.blender.cards import card_files  # noqa: E402
 from hairloom.addon.blender.cards.card_choices import suffix_of  # noqa: E402
-from hairloom.addon.blender.cards.card_material import TABLE_SIZE  # noqa: E402
+from hairloom.addon.blender.cards.textures import TABLE_SIZE  # noqa: E402
 from hairloom.addon.blender.command_line import command_line  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("extension")

@@ -13,7 +13,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="Blender's images need Blender or the bpy module")
 
 from hairloom.addon.blender.base import images  # noqa: E402
-from hairloom.addon.blender.cards.card_images import chosen_pictures, named_pictures  # noqa: E402
+from hairloom.addon.blender.cards.textures import chosen_pictures, named_pictures  # noqa: E402
 from hairloom.addon.blender.command_line import command_line  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
 from hairloom.addon.shading.textures import TEXTURES  # noqa: E402

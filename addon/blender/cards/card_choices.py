@@ -10,7 +10,7 @@ from ...exchange.cards.card_formats import FBX, FORMATS, GLB, OBJ, USD
 from ...exchange.files.names import plain_name
 from .card_files import CardOutput
 from .card_motion import MotionChoices
-from .card_textures import TextureFiles
+from .textures import TextureFiles
 
 FORMAT_ITEMS = (
     (GLB.name, "glTF (.glb)", "Metres, Y up; for three.js, Godot and most others"),

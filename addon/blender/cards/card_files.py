@@ -24,7 +24,7 @@ from ...shading.settings import ShadingSettings
 from ..base.report import hairloom_version
 from .card_making import CardInputs, MadeCards, making_steps
 from .card_maps import CardMaps, made_maps
-from .card_material import material_of, write_tables
+from .card_material import material_of
 from .card_motion import (
     GuideMotion,
     JointMotion,
@@ -34,8 +34,8 @@ from .card_motion import (
     joint_motion_steps,
     moved_cards,
 )
-from .card_textures import TextureFiles, texture_channels, texture_roles, write_textures
 from .exporters import CardLook, check_cards, check_exporter, level_names, write_card_mesh
+from .textures import TextureFiles, texture_channels, texture_roles, write_tables, write_textures
 
 type Stage = Callable[[str], AbstractContextManager[None]]
 #: Tells what is being done, and which share of it is done; None where nobody knows.

@@ -19,9 +19,9 @@ from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings, StrandSettings
 from ...shading.texture_settings import TextureSettings
 from ..properties.groom_settings import GroomSettings
-from .card_images import chosen_pictures
 from .card_maps import CardMaps, made_maps
 from .occluders import OtherHair, read_other_hair
+from .textures import chosen_pictures
 
 
 @dataclass(frozen=True, eq=False)

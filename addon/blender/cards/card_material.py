@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-from ...exchange.textures.texture_files import has_openimageio, write_texture
 from ...params import Settings
 from ...shading.kajiya_kay_settings import KajiyaKaySettings
 from ...shading.marschner.look import fibre_of, pack_fibre
 from ...shading.marschner.settings import MarschnerSettings
-from ...shading.marschner.tables import marschner_tables, shape_of
 from ...shading.settings import ShadingSettings, SharedSettings
 
-#: Texels along a side of a table: half of those of our own pictures, in which one sees no more.
-TABLE_SIZE = 128
 _UNITS = {
     "length": "m",
     "angle": "rad",
@@ -53,24 +48,3 @@ def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str
         strengths = list(fibre_of(shading).strengths)
         content["fibre"] = {"root": packed[:4], "tip": packed[4:8], "strengths": strengths}
     return content
-
-
-def write_tables(folder: Path, stem: str, shading: ShadingSettings) -> dict[str, str]:
-    """Marschner's tables as EXR files of 32 bits, name -> file; nothing for the other model, or
-    without OpenImageIO.
-
-    Raises:
-        HairloomError: nothing can be written there.
-    """
-    if shading.model != "marschner" or not has_openimageio():
-        return {}
-    tables = marschner_tables(shape_of(fibre_of(shading)), TABLE_SIZE)
-    pixels = {
-        "longitudinal": tables.longitudinal[0],
-        "azimuthal": tables.azimuthal,
-        "paths": tables.paths,
-    }
-    files = {name: f"{stem}_{name}.exr" for name in pixels}
-    for name, file in files.items():
-        write_texture(folder / file, pixels[name], is_color=False, depth="float", is_packed=True)
-    return files

@@ -24,9 +24,9 @@ from ..base import latest_job
 from ..base.latest_job import LatestJob, Work
 from ..properties.groom_settings import GroomSettings
 from .card_builds import BuiltCards, built_cards, cards_built_in_thread, told
-from .card_images import chosen_pictures
 from .card_making import CardInputs, cards_key, order_line
 from .occluders import OtherHair, read_other_hair
+from .textures import chosen_pictures
 
 
 def as_shown(snapshot: Snapshot) -> Snapshot:

@@ -18,11 +18,10 @@ from ...pipeline import Rig
 from ..bakes.bake_settings import folder_of
 from ..cards.card_choices import motion_choices
 from ..cards.card_files import CardOutput, WrittenCards, write_cards
-from ..cards.card_images import chosen_pictures, named_pictures
 from ..cards.card_making import CardInputs, order_line
 from ..cards.card_motion import GuideMotion, baked_motion, take_motion
-from ..cards.card_textures import TextureFiles
 from ..cards.occluders import read_other_hair
+from ..cards.textures import TextureFiles, chosen_pictures, named_pictures
 from .card_options import add_card_options
 from .job_options import add_texture_option, frames_of_option
 from .job_steps import Job, finish, read_rig, tell_notes

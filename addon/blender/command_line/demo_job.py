@@ -10,8 +10,8 @@ from ...pipeline import Rig
 from ..base.images import write_png
 from ..cards.card_builds import tied_cards
 from ..cards.card_files import WrittenCards
-from ..cards.card_images import named_pictures
 from ..cards.card_making import MadeCards
+from ..cards.textures import named_pictures
 from ..pictures.studio import Studio
 from .cards_job import written_cards
 from .job_options import add_motion_options, add_picture_options, add_texture_option

@@ -30,10 +30,10 @@ from ..base.latest_job import LatestJob
 from ..base.objects import head_of
 from ..base.redraw import redraw_views
 from ..cards.card_builds import BuiltCards, built_cards
-from ..cards.card_images import chosen_pictures
 from ..cards.card_making import CardInputs, cards_key
 from ..cards.occluders import OtherHair, read_other_hair
 from ..cards.shown_cards import as_shown
+from ..cards.textures import chosen_pictures
 from ..properties.groom_settings import GroomSettings
 from ..sessions.reading import Reading
 from ..sessions.shown import snapshot_of, with_all_strands, with_settings

@@ -11,7 +11,7 @@ from ... import pipeline
 from ...arrays import Floats
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
-from ..cards.card_images import chosen_pictures
+from ..cards.textures import chosen_pictures
 from ..preview import live
 from ..properties.groom_settings import GroomSettings
 from ..sessions.reading import Reading

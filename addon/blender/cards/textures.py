@@ -1,4 +1,4 @@
-"""The textures of hair cards as files beside their mesh."""
+"""Pictures of hair cards: the artist's own, and all that are written as files beside a mesh."""
 
 from __future__ import annotations
 
@@ -11,8 +11,56 @@ import numpy as np
 
 from ...arrays import Floats
 from ...cards.atlas_grid import AtlasGrid
+from ...errors import HairloomError
 from ...exchange.textures.card_textures import WrittenTexture, write_card_textures
-from ..base.images import write_texture
+from ...exchange.textures.texture_files import has_openimageio
+from ...shading.marschner.look import fibre_of
+from ...shading.marschner.tables import marschner_tables, shape_of
+from ...shading.settings import ShadingSettings
+from ...shading.textures import TEXTURES, picture_as
+from ..base.images import read_image, read_texture, write_texture
+
+#: Texels along a side of a table: half of those of our own pictures, in which one sees no more.
+TABLE_SIZE = 128
+
+
+def chosen_pictures(group: Any) -> tuple[dict[str, Floats], tuple[str, ...]]:
+    """Those pictures of a HAIRLOOM_PG_card_images that can be used, and a warning for each other.
+
+    Pictures are (height, width) or (height, width, 3), as `picture_as` has them.
+    """
+    pictures, warnings = {}, []
+    for name in TEXTURES:
+        image = getattr(group, name)
+        if image is None:
+            continue
+        place = f"Image '{image.name}'"
+        try:
+            picture = read_image(image, is_color=name == "base", place=place)
+            pictures[name] = picture_as(name, picture, place=place)
+        except HairloomError as error:
+            warnings.append(f"{error} Until then the generated {name} texture takes its place.")
+    return pictures, tuple(warnings)
+
+
+def named_pictures(arguments: list[str]) -> dict[str, Floats]:
+    """The pictures that the command line names as NAME=FILE.
+
+    Raises:
+        HairloomError: another name, or a file that cannot be used.
+    """
+    pictures = {}
+    for argument in arguments:
+        name, _, file = argument.partition("=")
+        if name not in TEXTURES or not file:
+            raise HairloomError(
+                f"'{argument}' names no texture and file",
+                place="--texture",
+                remedy=f"Write NAME=FILE with one of {', '.join(TEXTURES)}",
+            )
+        picture = read_texture(Path(file), is_color=name == "base")
+        pictures[name] = picture_as(name, picture, place=file)
+    return pictures
 
 
 @dataclass(frozen=True)
@@ -100,3 +148,26 @@ def _of_one_size(maps: Mapping[str, Floats]) -> dict[str, Floats]:
         else image[row * len(image) // height, column * image.shape[1] // width]
         for name, image in maps.items()
     }
+
+
+def write_tables(folder: Path, stem: str, shading: ShadingSettings) -> dict[str, str]:
+    """Marschner's tables as EXR files of 32 bits, name -> file; nothing for the other model, or
+    without OpenImageIO.
+
+    Raises:
+        HairloomError: nothing can be written there.
+    """
+    if shading.model != "marschner" or not has_openimageio():
+        return {}
+    tables = marschner_tables(shape_of(fibre_of(shading)), TABLE_SIZE)
+    pixels = {
+        "longitudinal": tables.longitudinal[0],
+        "azimuthal": tables.azimuthal,
+        "paths": tables.paths,
+    }
+    files = {name: f"{stem}_{name}.exr" for name in pixels}
+    for name, file in files.items():
+        texture_files.write_texture(
+            folder / file, pixels[name], is_color=False, depth="float", is_packed=True
+        )
+    return files
