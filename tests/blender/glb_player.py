@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from test_glb import Glb
+from glb_files import Glb
 
 
 class Player:
@@ -14,8 +14,6 @@ class Player:
 
     def __init__(self, path: Path) -> None:
         self.file = Glb(path)
-        self.file._WIDTH = {**Glb._WIDTH, "MAT4": 16}
-        self.file._DTYPE = {**Glb._DTYPE, 5121: "u1"}
         self.json = self.file.json
 
     def corners(self, seconds: float) -> list[np.ndarray]:

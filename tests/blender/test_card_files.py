@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import struct
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from glb_files import Glb
 
 from hairloom.addon.exchange.cards.card_formats import FORMATS
 from hairloom.addon.exchange.textures.card_textures import FORMATS as TEXTURE_FORMATS
@@ -72,12 +72,6 @@ def oiio_pixels(path: Path) -> np.ndarray:
     return pixels.reshape(spec.height, spec.width, spec.nchannels)[::-1]
 
 
-def glb_parts(path: Path) -> tuple[dict[str, Any], bytes]:
-    content = path.read_bytes()
-    (length,) = struct.unpack_from("<I", content, 12)
-    return json.loads(content[20 : 20 + length]), content[28 + length :]
-
-
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usda", ".obj"])
 def test_every_format_comes_with_a_sidecar_that_follows_the_schema(
     tmp_path: Path, suffix: str
@@ -97,23 +91,20 @@ def test_every_format_comes_with_a_sidecar_that_follows_the_schema(
 def test_the_index_buffer_holds_the_indices_of_the_glb(tmp_path: Path) -> None:
     """As an engine would use it: with the vertices of the GLB."""
     assert cards(tmp_path / "hair.glb", *BAKED, "--levels", "3", "--index-buffer") == 0
-    content, (file, binary) = sidecar_of(tmp_path / "hair.glb"), glb_parts(tmp_path / "hair.glb")
+    content, glb = sidecar_of(tmp_path / "hair.glb"), Glb(tmp_path / "hair.glb")
     indices = np.frombuffer((tmp_path / "hair.indices.bin").read_bytes(), "<u2")
-    nodes = {node["name"]: node for node in file["nodes"]}
+    nodes = {node["name"]: node for node in glb.json["nodes"]}
     assert len(content["levels"]) == 3
     for level in content["levels"]:
-        (primitive,) = file["meshes"][nodes[level["node"]]["mesh"]]["primitives"]
-        accessor = file["accessors"][primitive["indices"]]
-        view = file["bufferViews"][accessor["bufferView"]]
-        dtype = {5123: "<u2", 5125: "<u4"}[accessor["componentType"]]
-        expected = np.frombuffer(binary, dtype, accessor["count"], view.get("byteOffset", 0))
+        (primitive,) = glb.json["meshes"][nodes[level["node"]]["mesh"]]["primitives"]
+        expected = glb.accessor(primitive["indices"]).ravel()
         found = indices[level["buffer_first"] :][: level["indices"]]
         np.testing.assert_array_equal(found, expected)
         back = indices[level["buffer_back_first"] :][: level["indices"]]
         corners = {tuple(triangle) for triangle in found.reshape(-1, 3).tolist()}
         assert {tuple(triangle) for triangle in back.reshape(-1, 3).tolist()} == corners
         assert not np.array_equal(back, found)
-        positions = file["accessors"][primitive["attributes"]["POSITION"]]
+        positions = glb.json["accessors"][primitive["attributes"]["POSITION"]]
         assert positions["count"] == level["vertices"]
         np.testing.assert_allclose(positions["min"], level["bounds"]["minimum"], atol=1e-6)
         np.testing.assert_allclose(positions["max"], level["bounds"]["maximum"], atol=1e-6)

