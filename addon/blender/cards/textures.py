@@ -167,7 +167,5 @@ def write_tables(folder: Path, stem: str, shading: ShadingSettings) -> dict[str,
     }
     files = {name: f"{stem}_{name}.exr" for name in pixels}
     for name, file in files.items():
-        texture_files.write_texture(
-            folder / file, pixels[name], is_color=False, depth="float", is_packed=True
-        )
+        write_texture(folder / file, pixels[name], is_color=False, depth="float", is_packed=True)
     return files
