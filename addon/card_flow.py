@@ -15,42 +15,37 @@ from .cards.follow import CardBinding, bind_cards, card_lines, follow_guides
 from .cards.occlusion import CardShade
 from .cards.occlusion_settings import CardOcclusionSettings
 from .cards.settings import CardSettings
-from .cards.steps import result_of
 from .groom.weights import guide_weights
+from .params import SettingsMap
 from .pipeline import Pose, Rig, rest_occlusion, root_normals, root_turns
 from .shading.ambient_settings import AmbientSettings
 from .shading.drawn_strands import drawn_radius
 from .shading.settings import StrandSettings
 
 _AS_THEY_ARE = StrandSettings()
-_SHADED = AmbientSettings()
 
 
 def card_build_steps(
     rig: Rig,
-    settings: CardSettings,
-    atlas: AtlasSettings,
-    occlusion: CardOcclusionSettings,
+    settings: SettingsMap,
     alpha_of: AlphaOf = lambda _build: None,
-    drawn: StrandSettings = _AS_THEY_ARE,
     others: Sequence[CardShade] = (),
-    ambient: AmbientSettings = _SHADED,
 ) -> Generator[str, None, CardBuild]:
     """Cards at rest in all levels of detail, with occlusion, from inside to outside.
 
     Args:
         alpha_of: the alpha of the atlas, which is best baked here; see `cards.build`.
-        drawn: how wide strands are drawn.
         others: cards of other grooms, which shade these, world space.
-        ambient: how the strands shade each other; the cards take it over.
 
     Yields what comes next, and returns the cards.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
     """
-    groom = replace(card_groom(rig, drawn), occlusion=rest_occlusion(rig, ambient))
-    return card_steps(groom, settings, atlas, occlusion, alpha_of, others)
+    occlusion = rest_occlusion(rig, settings[AmbientSettings])
+    groom = replace(card_groom(rig, settings[StrandSettings]), occlusion=occlusion)
+    sections = settings[CardSettings], settings[AtlasSettings], settings[CardOcclusionSettings]
+    return card_steps(groom, *sections, alpha_of, others)
 
 
 def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
@@ -63,20 +58,6 @@ def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
 def shade_of(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardShade:
     """What shades others in the place of this groom's strands, world space."""
     return strand_shade(card_groom(rig, drawn))
-
-
-def card_build(
-    rig: Rig,
-    settings: CardSettings,
-    atlas: AtlasSettings,
-    occlusion: CardOcclusionSettings,
-    alpha_of: AlphaOf = lambda _build: None,
-    drawn: StrandSettings = _AS_THEY_ARE,
-    ambient: AmbientSettings = _SHADED,
-) -> CardBuild:
-    """All steps of `card_build_steps` at once."""
-    steps = card_build_steps(rig, settings, atlas, occlusion, alpha_of, drawn, (), ambient)
-    return result_of(steps)
 
 
 def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:

@@ -8,9 +8,11 @@ import time
 import numpy as np
 from _cards_groom import SETTINGS, sintel_rig
 
-from hairloom.addon.blender.cards.card_atlas import baked_atlas
-from hairloom.addon.card_flow import card_build
+from hairloom.addon.blender.cards.build import baked_atlas
+from hairloom.addon.card_flow import card_build_steps
 from hairloom.addon.cards.build import CardBuild
+from hairloom.addon.cards.steps import result_of
+from hairloom.addon.params import SettingsMap
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 
 ROUNDS = 3
@@ -31,6 +33,6 @@ def atlas_figures() -> dict[str, float]:
             seconds.append((time.perf_counter() - begin[0], time.process_time() - begin[1]))
         return maps.alpha
 
-    card_build(rig, *SETTINGS, alpha_of, STRANDS)
+    result_of(card_build_steps(rig, SettingsMap(*SETTINGS, STRANDS), alpha_of))
     wall, cpu = np.min(seconds, axis=0)
     return {"atlas_seconds": float(wall), "atlas_cpu_seconds": float(cpu)}

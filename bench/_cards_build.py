@@ -8,7 +8,8 @@ from dataclasses import replace
 from _cards_groom import SETTINGS, sintel_rig
 
 from hairloom.addon import card_flow
-from hairloom.addon.shading.settings import StrandSettings
+from hairloom.addon.cards.steps import result_of
+from hairloom.addon.params import SettingsMap
 
 
 def build_figures() -> dict[str, float]:
@@ -16,9 +17,8 @@ def build_figures() -> dict[str, float]:
     rig = sintel_rig()
     cards, atlas, occlusion = SETTINGS
     begin = time.perf_counter(), time.process_time()
-    card_flow.card_build(
-        rig, cards, replace(atlas, source="made"), occlusion, drawn=StrandSettings()
-    )
+    settings = SettingsMap(cards, replace(atlas, source="made"), occlusion)
+    result_of(card_flow.card_build_steps(rig, settings))
     return {
         "build_seconds": time.perf_counter() - begin[0],
         "build_cpu_seconds": time.process_time() - begin[1],

@@ -13,12 +13,14 @@ from _cards_groom import sintel_rig
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from hairloom.addon.card_flow import card_build
+from hairloom.addon.card_flow import card_build_steps
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.occlusion import CardShade, vertex_occlusion
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
+from hairloom.addon.cards.steps import result_of
+from hairloom.addon.params import SettingsMap
 from hairloom.addon.shading.texture_settings import TextureSettings
 from hairloom.addon.shading.textures import hair_textures
 from hairloom.addon.strands import Surface
@@ -62,7 +64,8 @@ def sintel_cards() -> tuple[CardMesh, np.ndarray, Surface]:
     rig = sintel_rig()
     assert rig.head is not None
     quick = CardOcclusionSettings(rays=1)
-    mesh = card_build(rig, CARDS, AtlasSettings(source="made"), quick).finest
+    settings = SettingsMap(CARDS, AtlasSettings(source="made"), quick)
+    mesh = result_of(card_build_steps(rig, settings)).finest
     return mesh, hair_textures(TextureSettings(), mesh.atlas.columns).alpha, rig.head
 
 

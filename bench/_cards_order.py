@@ -16,12 +16,11 @@ import numpy as np
 from _cards_atlas import STRANDS
 from _cards_groom import sintel_rig
 
-from hairloom.addon.blender.cards.card_atlas import baked_atlas
-from hairloom.addon.card_flow import card_build
+from hairloom.addon.blender.cards.build import baked_atlas
+from hairloom.addon.card_flow import card_build_steps
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.build import CardBuild
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.order_check import seen_cards, views_of, wrong_pixels
 from hairloom.addon.cards.order_views import View
 from hairloom.addon.cards.settings import CardSettings
@@ -32,6 +31,8 @@ from hairloom.addon.cards.sort import (
     order_from,
     reordered,
 )
+from hairloom.addon.cards.steps import result_of
+from hairloom.addon.params import SettingsMap
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.texture_settings import TextureSettings
@@ -97,8 +98,8 @@ def cards_and_alpha(rig: Rig, way: str, source: str) -> tuple[CardMesh, np.ndarr
             alphas.append(baked_atlas(rig, build.plan, ShadingSettings(), STRANDS).alpha)
         return alphas[0]
 
-    settings, atlas = CardSettings(way=way, levels=1), AtlasSettings(source=source)
-    build = card_build(rig, settings, atlas, CardOcclusionSettings(), alpha_of, STRANDS)
+    settings = SettingsMap(CardSettings(way=way, levels=1), AtlasSettings(source=source), STRANDS)
+    build = result_of(card_build_steps(rig, settings, alpha_of))
     return as_built(build.finest), alphas[0]
 
 

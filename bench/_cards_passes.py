@@ -15,8 +15,7 @@ import gpu
 import numpy as np
 from _cards_groom import sintel_rig
 
-from hairloom.addon.blender.cards.card_builds import built_cards
-from hairloom.addon.blender.cards.card_making import CardInputs
+from hairloom.addon.blender.cards.build import BuiltCards, CardInputs
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.drawing_settings import CardDrawingSettings
 from hairloom.addon.cards.settings import CardSettings
@@ -116,7 +115,7 @@ def sintel_cards() -> tuple[CardSnapshot, MeshSnapshot]:
         rig = sintel_rig()
         assert rig.head is not None
         settings = SettingsMap(CARDS, AtlasSettings(source="made"))
-        built = built_cards(rig, CardInputs(settings))
+        built = BuiltCards.now(CardInputs(rig, settings))
         cards = built.drawn(built.rest, settings)
         _kept.append((cards, MeshSnapshot.of(rig.head)))
     return _kept[0]

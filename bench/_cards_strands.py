@@ -15,8 +15,13 @@ from extension_loader import REPOSITORY
 
 from hairloom.addon import pipeline
 from hairloom.addon.blender.base.images import contact_sheet, write_png
-from hairloom.addon.blender.cards.card_making import CardInputs, MadeCards, making_steps
-from hairloom.addon.blender.cards.card_maps import made_maps
+from hairloom.addon.blender.cards.build import (
+    CardInputs,
+    MappedCards,
+    build_steps,
+    card_maps,
+    drawn_maps,
+)
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.params import SettingsMap
@@ -75,14 +80,14 @@ def _settings(look: str, width: float) -> SettingsMap:
     return SettingsMap(*SETTINGS, _look(look), StrandSettings(width_scale=width))
 
 
-def _made(rig: Rig, width: float) -> MadeCards:
-    return result_of(making_steps(rig, CardInputs(_settings(LOOKS[0], width))))
+def _made(rig: Rig, width: float) -> MappedCards:
+    return result_of(build_steps(CardInputs(rig, _settings(LOOKS[0], width))))
 
 
-def _cards(rig: Rig, made: MadeCards, look: str, width: float) -> CardSnapshot:
+def _cards(rig: Rig, made: MappedCards, look: str, width: float) -> CardSnapshot:
     """The cards in a look, which changes nothing but their maps."""
     settings, build, grid = _settings(look, width), made.build, rig.strands.grid
-    maps, mesh = made_maps(rig, build, settings, {}), build.finest
+    maps, mesh = card_maps(CardInputs(rig, settings), build, drawn_maps), build.finest
     area = StrandArea.of(grid, rig.strands.radius.reshape(grid.shape[:2]))
     shade = card_shade(mesh.positions, mesh.triangles, mesh.uv, maps.textures.alpha)
     return CardSnapshot(

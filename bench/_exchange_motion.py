@@ -20,18 +20,19 @@ from _cards_groom import SETTINGS, sintel_rig  # noqa: E402
 
 from hairloom.addon.blender.bakes.take import TakeDrive, shaken_poses, simulate  # noqa: E402
 from hairloom.addon.blender.base.images import read_texture  # noqa: E402
-from hairloom.addon.blender.cards.card_motion import (  # noqa: E402
+from hairloom.addon.blender.cards.motion import (  # noqa: E402
     GuideMotion,
     MotionChoices,
     TextureMotion,
     joint_motion_steps,
     moved_cards,
 )
-from hairloom.addon.card_flow import card_build  # noqa: E402
+from hairloom.addon.card_flow import card_build_steps  # noqa: E402
 from hairloom.addon.cards.steps import result_of  # noqa: E402
 from hairloom.addon.dynamics.colliders import DistanceField  # noqa: E402
 from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import GLB  # noqa: E402
+from hairloom.addon.params import SettingsMap  # noqa: E402
 from hairloom.addon.pipeline import Rig  # noqa: E402
 
 RATE = 60.0
@@ -47,7 +48,8 @@ def motion_figures(seconds: float) -> dict[str, float]:
     motion = _shaken(rig, seconds)
     cards, atlas, occlusion = SETTINGS
     # light on cards says nothing about their motion
-    levels = card_build(rig, cards, atlas, replace(occlusion, rays=8)).levels
+    settings = SettingsMap(cards, atlas, replace(occlusion, rays=8))
+    levels = result_of(card_build_steps(rig, settings)).levels
     begin = time.perf_counter()
     moved = result_of(moved_cards(motion, levels, space="head", with_directions=True))
     ridden = time.perf_counter()

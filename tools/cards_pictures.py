@@ -47,15 +47,14 @@ class Shots:
 
     def built(self, way: str, levels: int = 1) -> tuple[Any, Any]:
         """Cards in this way, and how they are drawn."""
-        settings, builds = self.settings, of_addon("blender.cards.card_builds")
+        settings, builds = self.settings, of_addon("blender.cards.build")
         chosen = of_addon("params").SettingsMap(
             settings["cards"](way=way, card_count=CARDS, levels=levels),
             settings["card_occlusion"](rays=64),
         )
-        making = of_addon("blender.cards.card_making")
-        steps = making.making_steps(self.rig, making.CardInputs(chosen))
+        steps = builds.build_steps(builds.CardInputs(self.rig, chosen))
         made = of_addon("cards.steps").result_of(steps)
-        tied = builds.tied_cards(self.rig, made)
+        tied = builds.BuiltCards.of(self.rig, made)
         return made.build, tied.drawn(tied.rest, chosen)
 
     def cards(self, mesh: Any, drawn: Any, back: Any = None) -> Any:

@@ -25,8 +25,7 @@ from ..blender.cards.card_choices import (
     file_stem,
     suffix_of,
 )
-from ..blender.cards.card_files import FileSteps
-from ..blender.cards.card_out import CardExport
+from ..blender.cards.files import CardExport, FileSteps
 from ..errors import HairloomError
 from .long_work import LongWork, Progress, Steps, threaded
 from .messages import draw_lines
@@ -152,7 +151,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         plans = [self._plan(context, each, is_alone=len(hair) == 1) for each in hair]
         outcomes = []
         for plan in plans:
-            made = yield from threaded(plan.making())
+            made = yield from threaded(plan.building())
             outcomes.append((yield from _shown(plan.writing(made))))
         for outcome in outcomes:
             tell(self, outcome)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..blender.base.outcome import Outcome
-from ..blender.cards.card_making import order_line
+from ..blender.cards.build import order_line
 from ..blender.cards.object import CardObjectJob, card_objects
 from .long_work import LongWork, Progress, Steps, draw_progress, threaded
 from .reports import tell
@@ -31,7 +31,7 @@ class HAIRLOOM_OT_make_cards(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         job = CardObjectJob(chosen_hair(context)[0], context.evaluated_depsgraph_get())
         yield Progress("Reading the hair")
-        job.write((yield from threaded(job.making())))
+        job.write((yield from threaded(job.building())))
         finest, levels = job.objects[0], len(job.objects)
         detail = f"{levels} levels of detail" if levels > 1 else "one level of detail"
         result = f"{finest.name}: {_counts(finest)}, {detail}. {job.order}"

@@ -24,7 +24,7 @@ from hairloom.addon.shading.settings import ShadingSettings
 bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy module")
 jsonschema = pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
 
-from hairloom.addon.blender.cards import card_files  # noqa: E402
+from hairloom.addon.blender.cards import files  # noqa: E402
 from hairloom.addon.blender.cards.card_choices import suffix_of  # noqa: E402
 from hairloom.addon.blender.cards.textures import TABLE_SIZE  # noqa: E402
 from hairloom.addon.blender.command_line import command_line  # noqa: E402
@@ -154,7 +154,7 @@ def test_a_failure_in_the_middle_leaves_the_old_files(
     def full(_content: object) -> str:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(card_files, "sidecar_text", full)
+    monkeypatch.setattr(files, "sidecar_text", full)
     assert cards(tmp_path / f"hair{suffix}", "--set", "grow.length=0.3", "--levels", "2") == 1
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
     told = capfd.readouterr().err

@@ -19,9 +19,9 @@ bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy 
 
 from hairloom.addon import pipeline  # noqa: E402
 from hairloom.addon.blender.bakes.take import shaken_poses  # noqa: E402
-from hairloom.addon.blender.cards.card_files import CardOutput, WrittenCards, write_cards  # noqa: E402
-from hairloom.addon.blender.cards.card_making import CardInputs  # noqa: E402
-from hairloom.addon.blender.cards.card_motion import GuideMotion, MotionChoices  # noqa: E402
+from hairloom.addon.blender.cards.build import CardInputs  # noqa: E402
+from hairloom.addon.blender.cards.files import CardOutput, WrittenCards, write_cards  # noqa: E402
+from hairloom.addon.blender.cards.motion import GuideMotion, MotionChoices  # noqa: E402
 from hairloom.addon.blender.command_line.inputs import Sources, read_inputs  # noqa: E402
 from hairloom.addon.card_flow import bound_cards, cards_at  # noqa: E402
 from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
@@ -36,12 +36,10 @@ from hairloom.addon.shading.texture_settings import TextureSettings  # noqa: E40
 
 FRAMES, RATE = 31, 30.0
 PANDA_MOTION = Path(__file__).parent / "panda_motion.py"
-INPUTS = CardInputs(
-    SettingsMap(
-        CardSettings(way="guides", levels=2),
-        AtlasSettings(source="made"),
-        TextureSettings(variant_width=32, height=64),
-    )
+SETTINGS = SettingsMap(
+    CardSettings(way="guides", levels=2),
+    AtlasSettings(source="made"),
+    TextureSettings(variant_width=32, height=64),
 )
 
 
@@ -65,7 +63,7 @@ def motion() -> GuideMotion:
 
 def write(path: Path, motion: GuideMotion, **choices: Any) -> WrittenCards:
     output = CardOutput(motion=MotionChoices(**choices))
-    return write_cards(path, motion.rig, INPUTS, output, motion=motion)
+    return write_cards(path, CardInputs(motion.rig, SETTINGS), output, motion=motion)
 
 
 def simulated(motion: GuideMotion, written: WrittenCards, frame: int) -> list[np.ndarray]:

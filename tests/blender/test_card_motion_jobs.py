@@ -11,9 +11,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
-from hairloom.addon.blender.cards.card_files import CardOutput  # noqa: E402
-from hairloom.addon.blender.cards.card_motion import MotionChoices  # noqa: E402
-from hairloom.addon.blender.cards.card_out import CardExport  # noqa: E402
+from hairloom.addon.blender.cards.files import CardExport, CardOutput  # noqa: E402
+from hairloom.addon.blender.cards.motion import MotionChoices  # noqa: E402
 from hairloom.addon.blender.command_line import command_line  # noqa: E402
 from hairloom.addon.blender.preview.bake import Bake  # noqa: E402
 
@@ -109,7 +108,7 @@ def test_cancelled_in_its_midst_it_leaves_the_old_files(
         folder / "hair.glb",
         CardOutput(motion=MotionChoices(kind)),
     )
-    making = plan.making()
+    making = plan.building()
     while not making.run_main_thread_steps():
         time.sleep(0.001)
     writing = plan.writing(making.result())

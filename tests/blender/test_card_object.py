@@ -169,7 +169,7 @@ def test_it_can_be_undone_and_the_groom_is_remembered_in_the_file(hair, tmp_path
 
 def test_hair_that_was_removed_meanwhile_changes_nothing(hair):
     job = CardObjectJob(hair, bpy.context.evaluated_depsgraph_get())
-    work = job.making()
+    work = job.building()
     bpy.data.objects.remove(hair)
     with pytest.raises(Exception, match="gone"):
         job.write(result_of(threaded(work)))

@@ -12,7 +12,7 @@ import pytest
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.stale_bakes import changed_since
-from hairloom.addon.blender.cards.card_motion import baked_motion
+from hairloom.addon.blender.cards.motion import baked_motion
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.strands.export_check import ExportCheck
 from hairloom.addon.blender.strands.strand_export import StrandExport

@@ -20,8 +20,8 @@ from extension_loader import REPOSITORY
 pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
 from hairloom.addon import pipeline
-from hairloom.addon.blender.cards.card_files import CardOutput, WrittenCards, write_cards
-from hairloom.addon.blender.cards.card_making import CardInputs
+from hairloom.addon.blender.cards.build import CardInputs
+from hairloom.addon.blender.cards.files import CardOutput, WrittenCards, write_cards
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.exchange.textures.texture_files import read_texture
@@ -106,7 +106,7 @@ def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
         look,
     )
     written = write_cards(
-        folder / "cards.glb", rig, CardInputs(settings), CardOutput(index_buffer=True)
+        folder / "cards.glb", CardInputs(rig, settings), CardOutput(index_buffer=True)
     )
     view = {
         "eye": glb_axes(EYE),

@@ -8,8 +8,8 @@ from typing import Any
 from ...cards.joints import JointChoices
 from ...exchange.cards.card_formats import FBX, FORMATS, GLB, OBJ, USD
 from ...exchange.files.names import plain_name
-from .card_files import CardOutput
-from .card_motion import MotionChoices
+from .files import CardOutput
+from .motion import MotionChoices
 from .textures import TextureFiles
 
 FORMAT_ITEMS = (

@@ -21,8 +21,7 @@ from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
 from ..scene.rigs import rig_of
 from ..scene.source import read_source
-from .card_builds import made_in_thread
-from .card_making import MadeCards, card_inputs, order_line
+from .build import CardInputs, MappedCards, built_in_thread, order_line
 from .material import Color, fill_image, new_material
 from .mesh import OCCLUSION_LAYER, fill_mesh
 
@@ -41,20 +40,20 @@ class CardObjectJob:
         for obj in card_objects(hair):
             _check_editable(obj)
         source = read_source(hair, depsgraph)
-        self._rig = rig_of(hair, source)
-        self._inputs, warnings = card_inputs(hair)
+        rig = rig_of(hair, source)
+        self._inputs, warnings = CardInputs.of(hair, rig)
         self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)
         self.objects: list[bpy.types.Object] = []
         self.order = ""
-        self.notes = (*source.warnings, *notes_of(hair, self._rig), *warnings)
+        self.notes = (*source.warnings, *notes_of(hair, rig), *warnings)
         self.dropped = source.dropped
 
-    def making(self) -> ThreadWork[MadeCards]:
-        """Make the cards in a thread, which touches nothing of Blender's."""
-        rig, inputs = self._rig, self._inputs
-        return ThreadWork(lambda work: made_in_thread(work, rig, inputs), "hairloom card objects")
+    def building(self) -> ThreadWork[MappedCards]:
+        """Build the cards in a thread, which touches nothing of Blender's."""
+        inputs = self._inputs
+        return ThreadWork(lambda work: built_in_thread(work, inputs), "hairloom card objects")
 
-    def write(self, made: MadeCards) -> None:
+    def write(self, made: MappedCards) -> None:
         """Put them into the scene.
 
         Raises:

@@ -16,10 +16,10 @@ from ...errors import HairloomError
 from ...exchange.cards.card_formats import format_of
 from ...pipeline import Rig
 from ..bakes.bake_settings import folder_of
+from ..cards.build import CardInputs, order_line
 from ..cards.card_choices import motion_choices
-from ..cards.card_files import CardOutput, WrittenCards, write_cards
-from ..cards.card_making import CardInputs, order_line
-from ..cards.card_motion import GuideMotion, baked_motion, take_motion
+from ..cards.files import CardOutput, WrittenCards, write_cards
+from ..cards.motion import GuideMotion, baked_motion, take_motion
 from ..cards.occluders import read_other_hair
 from ..cards.textures import TextureFiles, chosen_pictures, named_pictures
 from .card_options import add_card_options
@@ -71,8 +71,8 @@ def written_cards(
         settings = settings.with_settings(replace(settings[CardSettings], levels=levels))
     hair = bpy.data.objects.get(job.sources.groom or "")
     others = read_other_hair(settings[CardOcclusionSettings], hair)
-    inputs = CardInputs(settings, pictures, others)
-    written = write_cards(path, rig, inputs, output, report.stage, motion)
+    inputs = CardInputs(rig, settings, pictures, others)
+    written = write_cards(path, inputs, output, report.stage, motion)
     report.facts.update(
         cards=written.mesh.card_count,
         card_triangles=len(written.mesh.triangles),

@@ -8,9 +8,8 @@ from pathlib import Path
 from ...exchange.tressfx import write_tfx
 from ...pipeline import Rig
 from ..base.images import write_png
-from ..cards.card_builds import tied_cards
-from ..cards.card_files import WrittenCards
-from ..cards.card_making import MadeCards
+from ..cards.build import BuiltCards, MappedCards
+from ..cards.files import WrittenCards
 from ..cards.textures import named_pictures
 from ..pictures.studio import Studio
 from .cards_job import written_cards
@@ -45,7 +44,7 @@ def _write_card_still(
 ) -> None:
     """The cards where the strands are in the still."""
     options = job.options
-    built = tied_cards(rig, MadeCards(written.build, written.maps))
+    built = BuiltCards.of(rig, MappedCards(written.build, written.maps))
     shown = built.drawn(built.rest, job.settings)
     with job.report.stage("draw cards"):
         picture = studio.card_picture(shown, options.width, options.height, options.samples)

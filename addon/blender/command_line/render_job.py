@@ -21,7 +21,7 @@ from ..bakes.bake_settings import folder_of
 from ..bakes.take import Take, read_take
 from ..base.images import contact_sheet, write_png
 from ..base.objects import head_of
-from ..cards.card_motion import GuideMotion, baked_motion
+from ..cards.motion import GuideMotion, baked_motion
 from ..pictures.studio import Studio
 from ..scene.surfaces import read_surface
 from .job_options import add_moment_options, add_picture_options

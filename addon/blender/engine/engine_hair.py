@@ -29,10 +29,9 @@ from ..bakes.cache import Cache
 from ..base.latest_job import LatestJob
 from ..base.objects import head_of
 from ..base.redraw import redraw_views
-from ..cards.card_builds import BuiltCards, built_cards
-from ..cards.card_making import CardInputs, cards_key
+from ..cards.build import BuiltCards, CardInputs, cards_key
 from ..cards.occluders import OtherHair, read_other_hair
-from ..cards.shown_cards import as_shown
+from ..cards.show import as_shown
 from ..cards.textures import chosen_pictures
 from ..properties.groom_settings import GroomSettings
 from ..sessions.reading import Reading
@@ -67,7 +66,7 @@ class _Made:
             if known == key and is_lit_alike:
                 return built
         pictures, _ = chosen_pictures(owner.data.hairloom.card_images)
-        built = built_cards(self.rig, CardInputs(settings.sections, pictures, others))
+        built = BuiltCards.now(CardInputs(self.rig, settings.sections, pictures, others))
         self._cards[:] = [(key, built, others)]
         return built
 

@@ -23,9 +23,8 @@ from ...shading.skin.notes import skin_notes
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
 from ..base.gpu_context import ensure_gpu
-from ..cards.card_builds import BuiltCards, built_cards
-from ..cards.card_making import CardInputs, cards_key
-from ..cards.shown_cards import as_shown
+from ..cards.build import BuiltCards, CardInputs, cards_key
+from ..cards.show import as_shown
 from ..properties.groom_settings import GroomSettings
 from ..sessions.hiders import Hiders
 from ..sessions.shown import snapshot_of, with_settings
@@ -121,8 +120,8 @@ class Studio:
             return None
         key, sections = cards_key(self.settings), self.settings.sections
         if self._cards is None or self._cards[0] != key:
-            inputs = CardInputs(sections, self._card_pictures)
-            self._cards = key, built_cards(self._rig, inputs)
+            inputs = CardInputs(self._rig, sections, self._card_pictures)
+            self._cards = key, BuiltCards.now(inputs)
         return self._cards[1].at(pose, points[self._rig.guides], sections)
 
     def slices(self, pose: Pose, points: Floats) -> Floats:

@@ -16,7 +16,7 @@ from ...shading.settings import ShadingSettings
 from ...shading.volume.settings import VolumeSettings
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
-from ..cards.shown_cards import ShownCards
+from ..cards.show import ShownCards
 from ..properties.groom_settings import GroomSettings
 from ..scene.lights import (
     light_warnings,

@@ -16,7 +16,7 @@ from ...pipeline import Rig
 from ...render.snapshot import Snapshot
 from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays
 from ..bakes.simulated import Arrays
-from ..cards.shown_cards import ShownCards
+from ..cards.show import ShownCards
 from ..colliders.fields import NotMadeYetError
 from ..colliders.obstacles import Obstacles
 from ..scene.source import dynamics_warnings, refuse_own_dynamics

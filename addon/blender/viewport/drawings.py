@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..base.objects import is_solid, layers_with, spaces_without
-from ..cards.shown_cards import as_shown, without_strands
+from ..cards.show import as_shown, without_strands
 from ..sessions.session import Session
 from ..sessions.shown import with_all_strands
 from .aids import aids_of

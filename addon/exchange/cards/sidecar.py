@@ -96,7 +96,7 @@ class CardFile:
         its channels hold. highlights: which of them breaks up the highlights, "shift" or "tangent".
     base_gain: what the base texture is to be multiplied by.
     even_alpha: mean_facing and least_facing where alpha is that of baked strands, else empty.
-    material: model, values, units, fibre and tables, see blender/cards/card_material.py.
+    material: model, values, units, fibre and tables, see blender/cards/files.py.
     indices: the index buffer and its file, or None.
     motion: what moves, see exchange/cards/sidecar_motion.py; empty: nothing.
     generator: version of Hairloom.

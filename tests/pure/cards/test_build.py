@@ -23,6 +23,7 @@ from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.params import SettingsMap
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.strands import StrandSet
@@ -57,7 +58,8 @@ def built(
 ) -> CardBuild:
     rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
     settings = CardSettings(**{"way": "clusters", "card_count": 30, **changed})  # type: ignore[arg-type]
-    return card_flow.card_build(rig, settings, atlas, FEW_RAYS, lambda _: alpha, ambient=DENSE)
+    chosen = SettingsMap(settings, atlas, FEW_RAYS, DENSE)
+    return result_of(card_flow.card_build_steps(rig, chosen, lambda _: alpha))
 
 
 @pytest.mark.parametrize("way", ["clusters", "guides"])

@@ -20,7 +20,9 @@ from hairloom.addon.cards.follow import (
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import card_of_vertex
+from hairloom.addon.cards.steps import result_of
 from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.params import SettingsMap
 from hairloom.addon.pipeline import Pose
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.frames import tangents, transported_normals
@@ -204,7 +206,8 @@ def test_cards_of_a_rig_ride_as_its_strands_do() -> None:
     rig = pipeline.prepare(strands, None, GuideSettings(guide_count=24), place="hair")
     settings = CardSettings(way="clusters", card_count=10)
     made, occlusion = AtlasSettings(source="made"), CardOcclusionSettings(rays=16)
-    mesh = card_flow.card_build(rig, settings, made, occlusion).finest
+    steps = card_flow.card_build_steps(rig, SettingsMap(settings, made, occlusion))
+    mesh = result_of(steps).finest
     binding = card_flow.bound_cards(rig, mesh)
     pose = Pose(None, np.eye(4))
     guides = pipeline.carried(rig, pose, rig.guides)

@@ -18,6 +18,7 @@ from hairloom.addon.cards.sort import card_of_vertex
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.cards.strand_occlusion import strands_occlusion
 from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.params import SettingsMap
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.kajiya_kay import strand_normal
@@ -132,7 +133,8 @@ def test_other_grooms_shade_beside_that() -> None:
 @pytest.mark.parametrize("way", ["clusters", "guides"])
 def test_normals_are_those_of_strands_across_the_tangents_and_on_the_front(way: str) -> None:
     rig = rig_of(300)
-    build = card_flow.card_build(rig, replace(CLUSTERS, way=way, levels=2), MADE, FEW_RAYS)
+    settings = SettingsMap(replace(CLUSTERS, way=way, levels=2), MADE, FEW_RAYS)
+    build = result_of(card_flow.card_build_steps(rig, settings))
     center = rig.strands.roots.mean(axis=0)
     for mesh in build.levels:
         expected = strand_normal(mesh.positions, mesh.tangent, center)

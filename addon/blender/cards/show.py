@@ -23,8 +23,7 @@ from ...render.snapshot import Snapshot
 from ..base import latest_job
 from ..base.latest_job import LatestJob, Work
 from ..properties.groom_settings import GroomSettings
-from .card_builds import BuiltCards, built_cards, cards_built_in_thread, told
-from .card_making import CardInputs, cards_key, order_line
+from .build import BuiltCards, CardInputs, cards_key, order_line
 from .occluders import OtherHair, read_other_hair
 from .textures import chosen_pictures
 
@@ -166,20 +165,20 @@ class ShownCards:
         assert self._wanted is not None
         rig, settings = self._wanted
         if latest_job.is_blocking():
-            self._take(lambda: built_cards(rig, self._read(settings, others)))
+            self._take(lambda: BuiltCards.now(self._read(rig, settings, others)))
         else:
             self._job.want(self._wanted, lambda: self._begun(rig, settings, others))
 
     def _begun(
         self, rig: Rig, settings: GroomSettings, others: OtherHair | None
     ) -> Work[BuiltCards]:
-        return partial(cards_built_in_thread, rig=rig, inputs=self._read(settings, others))
+        return partial(BuiltCards.in_thread, inputs=self._read(rig, settings, others))
 
-    def _read(self, settings: GroomSettings, others: OtherHair | None) -> CardInputs:
+    def _read(self, rig: Rig, settings: GroomSettings, others: OtherHair | None) -> CardInputs:
         """With the chosen pictures and the other hair as they are now."""
         self._others = others or self._read_others(settings)
         pictures, _ = chosen_pictures(self._hair().data.hairloom.card_images)
-        return CardInputs(settings.sections, pictures, self._others)
+        return CardInputs(rig, settings.sections, pictures, self._others)
 
     def _read_others(self, settings: GroomSettings) -> OtherHair:
         depsgraph = bpy.context.view_layer.depsgraph
@@ -191,7 +190,8 @@ class ShownCards:
         try:
             built = result()
         except HairloomError as error:
-            self._built, self._shown, self.warnings = None, None, (told(error),)
+            self._built = self._shown = None
+            self.warnings = (f"Strands are shown, because there are no cards. {error}",)
             return
         if built is not None:
             self._built, self.warnings = built, built.notes

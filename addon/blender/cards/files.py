@@ -1,43 +1,72 @@
-"""Hair cards of a groom as files: the mesh, the textures beside it, and the sidecar."""
+"""Hair cards of a groom as files: the mesh, the textures beside it, and the sidecar, which says how
+the cards are drawn and what the hair's look is made of."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+import bpy
 
 from ...arrays import Floats, Ints
 from ...cards.build import CardBuild
 from ...cards.card_mesh import CardMesh
+from ...cards.settings import CardSettings
 from ...cards.steps import result_of, retold
 from ...cards.vertex_animation import motion_layout
 from ...exchange.cards.card_formats import CardFormat, format_of
 from ...exchange.cards.index_buffer import index_buffer
 from ...exchange.cards.sidecar import SUFFIX, CardFile, sidecar_text
 from ...exchange.files.file_set import written_together
-from ...params import SettingsMap
-from ...pipeline import Rig
+from ...params import Settings, SettingsMap
 from ...shading.card_look import EVEN_ALPHA
-from ...shading.settings import ShadingSettings
+from ...shading.kajiya_kay_settings import KajiyaKaySettings
+from ...shading.marschner.look import fibre_of, pack_fibre
+from ...shading.marschner.settings import MarschnerSettings
+from ...shading.settings import ShadingSettings, SharedSettings
+from ..base.outcome import Outcome, notes_of
 from ..base.report import hairloom_version
-from .card_making import CardInputs, MadeCards, making_steps
-from .card_maps import CardMaps, made_maps
-from .card_material import material_of
-from .card_motion import (
+from ..base.thread_work import ThreadWork
+from ..scene.rigs import rig_of
+from ..scene.source import read_source
+from .build import (
+    CardInputs,
+    CardMaps,
+    MappedCards,
+    Stage,
+    build_steps,
+    built_in_thread,
+    order_line,
+    untimed,
+)
+from .exporters import CardLook, check_cards, check_exporter, level_names, write_card_mesh
+from .motion import (
     GuideMotion,
     JointMotion,
     MotionChoices,
     TextureMotion,
+    baked_motion,
     check_motion,
     joint_motion_steps,
     moved_cards,
 )
-from .exporters import CardLook, check_cards, check_exporter, level_names, write_card_mesh
 from .textures import TextureFiles, texture_channels, texture_roles, write_tables, write_textures
 
-type Stage = Callable[[str], AbstractContextManager[None]]
+_UNITS = {
+    "length": "m",
+    "angle": "rad",
+    "time": "s",
+    "rate": "1/s",
+    "speed": "m/s",
+    "factor": "0 to 1",
+    "acceleration": "m/s^2",
+    "pixels": "px",
+    "none": "1",
+}
+_OF_KIND = {"color": "scene-linear Rec. 709", "choice": "name", "toggle": "true or false"}
+
 #: Tells what is being done, and which share of it is done; None where nobody knows.
 type FileSteps[Result] = Generator[tuple[str, float | None], None, Result]
 
@@ -85,16 +114,11 @@ class WrittenCards:
         return self.build.finest
 
 
-def _untimed(_name: str) -> AbstractContextManager[None]:
-    return nullcontext()
-
-
 def write_cards(
     path: Path,
-    rig: Rig,
     inputs: CardInputs,
     output: CardOutput | None = None,
-    stage: Stage = _untimed,
+    stage: Stage = untimed,
     motion: GuideMotion | None = None,
 ) -> WrittenCards:
     """Build the cards of a rig and write them.
@@ -110,13 +134,8 @@ def write_cards(
     """
     output = output or CardOutput()
     check_output(path, output, motion)
-
-    def maps_of(build: CardBuild) -> CardMaps:
-        with stage("card texture"):
-            return made_maps(rig, build, inputs.settings, inputs.pictures)
-
     with stage("build cards"):
-        made = result_of(making_steps(rig, inputs, maps_of))
+        made = result_of(build_steps(inputs, stage=stage))
     return result_of(file_steps(path, made, inputs.settings, output, stage, motion))
 
 
@@ -134,10 +153,10 @@ def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> 
 
 def file_steps(
     path: Path,
-    made: MadeCards,
+    made: MappedCards,
     settings: SettingsMap,
     output: CardOutput,
-    stage: Stage = _untimed,
+    stage: Stage = untimed,
     motion: GuideMotion | None = None,
 ) -> FileSteps[WrittenCards]:
     """Write cards that are made; closing it leaves old files as they were.
@@ -163,7 +182,7 @@ class _Writer:
     """Writes all files into the folder of `path`. motion: what the sidecar says of it."""
 
     path: Path
-    made: MadeCards
+    made: MappedCards
     settings: SettingsMap
     output: CardOutput
     file_format: CardFormat
@@ -278,3 +297,116 @@ def _look(
         alpha = None
     red, green, blue = (min(value * maps.base_gain, 1.0) for value in shading.base_color)
     return CardLook(maps.card, base, alpha, (red, green, blue))
+
+
+def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str, Any]:
+    """What the sidecar says of the material.
+
+    Args:
+        tables: name -> file of the tables that lie beside it, see `write_tables`.
+    """
+    own: type[Settings] = KajiyaKaySettings if shading.model == "kajiya_kay" else MarschnerSettings
+    parameters = [
+        each for each in (*SharedSettings.parameters(), *own.parameters()) if each.name != "model"
+    ]
+    content: dict[str, Any] = {
+        "model": shading.model,
+        "values": {each.name: getattr(shading, each.name) for each in parameters},
+        "units": {each.name: _OF_KIND.get(each.kind, _UNITS[each.unit]) for each in parameters},
+        "meanings": {each.name: each.description for each in parameters},
+        "fibre": {},
+        "tables": {name: {"file": file} for name, file in tables.items()},
+    }
+    if shading.model == "marschner":
+        packed = pack_fibre(shading).tolist()
+        strengths = list(fibre_of(shading).strengths)
+        content["fibre"] = {"root": packed[:4], "tip": packed[4:8], "strengths": strengths}
+    return content
+
+
+@dataclass(frozen=True, eq=False)
+class CardExport:
+    """What is written of one hair, and where. notes: what the artist should know."""
+
+    path: Path
+    output: CardOutput
+    inputs: CardInputs
+    motion: GuideMotion | None
+    dropped: dict[str, int]
+    notes: tuple[str, ...]
+
+    @classmethod
+    def of(
+        cls,
+        hair: bpy.types.Object,
+        depsgraph: bpy.types.Depsgraph,
+        path: Path,
+        output: CardOutput,
+        *,
+        levels: int | None = None,
+        frames: range | None = None,
+    ) -> CardExport:
+        """Read the hair; where it is to move, from its bake.
+
+        Args:
+            levels: of detail; None is what the groom's own settings say.
+            frames: of the bake; None is all of them.
+
+        Raises:
+            HairloomError: no hair that can be used, no bake, or a format that cannot be written.
+        """
+        motion = None if output.motion.kind == "none" else baked_motion(hair, frames)
+        check_output(path, output, motion)
+        dropped: dict[str, int] = {}
+        if motion is None:
+            source = read_source(hair, depsgraph)
+            rig, dropped = rig_of(hair, source), source.dropped
+            notes = (*source.warnings, *notes_of(hair, rig))
+        else:
+            rig, notes = motion.rig, (*notes_of(hair, motion.rig), *motion.notes)
+        inputs, warnings = CardInputs.of(hair, rig)
+        if levels is not None:
+            cards = replace(inputs.settings[CardSettings], levels=levels)
+            inputs = replace(inputs, settings=inputs.settings.with_settings(cards))
+        return cls(path, output, inputs, motion, dropped, (*notes, *warnings))
+
+    def building(self) -> ThreadWork[MappedCards]:
+        """Build the cards in a thread."""
+        return ThreadWork(lambda work: built_in_thread(work, self.inputs), "hairloom card files")
+
+    def writing(self, made: MappedCards) -> FileSteps[Outcome]:
+        """Write the cards that were made; closing it leaves old files as they were."""
+        steps = file_steps(self.path, made, self.inputs.settings, self.output, motion=self.motion)
+        return self.outcome((yield from steps))
+
+    def outcome(self, written: WrittenCards) -> Outcome:
+        """What the artist is told."""
+        first, *beside = (file.name for file in written.files)
+        result = (
+            f"Wrote {written.mesh.card_count:,} cards in {len(written.levels)} levels of detail "
+            f"to {first}, with {len(beside)} files beside it. "
+            f"{order_line(written.build.wrong_share)}"
+        )
+        return Outcome(
+            f"{result}{_motion_line(written)}", self.dropped, (*self.notes, *written.notes)
+        )
+
+
+def _motion_line(written: WrittenCards) -> str:
+    """How the motion was written, such as "; 127 chains of 2 joints, off by 0.6% of the
+    hair's length (root mean square; 99% by less than 2.1%, the worst by 14.0%)".
+    """
+    motion = written.motion
+    if not motion:
+        return ""
+    if motion["kind"] == "texture":
+        return f"; motion textures of {motion['width']} x {motion['height']} texels"
+    length = motion["error"]["hair_length"]
+    share, most, worst = (
+        motion["error"][name] / length for name in ("root_mean_square", "percentile_99", "worst")
+    )
+    return (
+        f"; {motion['chains']} chains of {motion['joints_in_chain']} joints, off by {share:.1%} of "
+        f"the hair's length (root mean square; 99% by less than {most:.1%}, the worst by "
+        f"{worst:.1%})"
+    )

@@ -1,0 +1,321 @@
+"""From a groom's settings to its cards and their maps, for whoever shows, writes or keeps them.
+
+Any thread may build them. An atlas is drawn on the GPU, and textures are uploaded there: that is
+the main thread's, so a build in a thread waits until it is served.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Hashable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import bpy
+import gpu
+import numpy as np
+
+from ...arrays import Floats
+from ...card_flow import bound_cards, card_build_steps, cards_at
+from ...cards.atlas import AtlasPlan
+from ...cards.atlas_maps import AtlasMaps, dilated
+from ...cards.atlas_settings import AtlasSettings
+from ...cards.bake import sampled_maps
+from ...cards.bake_strands import FlatStrands, flat_strands
+from ...cards.build import CardBuild
+from ...cards.drawing_settings import CardDrawingSettings
+from ...cards.follow import CardBinding
+from ...cards.occlusion_settings import CardOcclusionSettings
+from ...cards.settings import CardSettings
+from ...cards.steps import result_of, retold
+from ...params import SettingsMap
+from ...pipeline import Pose, Rig
+from ...render.atlas_pass import baked_maps, baking
+from ...render.card_snapshot import CardSnapshot
+from ...render.card_textures import CardTextures, packed_textures
+from ...shading.ambient_settings import AmbientSettings
+from ...shading.drawn_strands import drawn_radius, strand_variation
+from ...shading.settings import ShadingSettings, StrandSettings
+from ...shading.texture_settings import TextureSettings
+from ...shading.textures import TEXTURES, HairTextures, hair_textures
+from ...shading.volume.card_opacity import StrandArea, card_shade
+from ..base.gpu_context import ensure_gpu
+from ..base.thread_work import ThreadWork
+from ..properties.groom_settings import GroomSettings
+from .occluders import OtherHair, read_other_hair
+from .textures import chosen_pictures
+
+#: Draws flat strands into an atlas of this size [pixels].
+type AtlasDraw = Callable[[FlatStrands, int], AtlasMaps]
+#: Gives a context in which a named stage is timed.
+type Stage = Callable[[str], AbstractContextManager[None]]
+
+
+def untimed(_name: str) -> AbstractContextManager[None]:
+    return nullcontext()
+
+
+@dataclass(frozen=True, eq=False)
+class CardInputs:
+    """All that cards are built from.
+
+    pictures: used instead of generated textures, see `textures.picture_as`.
+    others: hair of other grooms, which shades these, where it is while these are at rest.
+    """
+
+    rig: Rig
+    settings: SettingsMap = field(default_factory=SettingsMap)
+    pictures: Mapping[str, Floats] = field(default_factory=dict)
+    others: OtherHair = field(default_factory=OtherHair)
+
+    @classmethod
+    def of(cls, hair: bpy.types.Object, rig: Rig) -> tuple[CardInputs, tuple[str, ...]]:
+        """What the groom's own settings say, and warnings of pictures that cannot be used."""
+        pictures, warnings = chosen_pictures(hair.data.hairloom.card_images)
+        settings = GroomSettings.of(hair).sections
+        others = read_other_hair(settings[CardOcclusionSettings], hair)
+        return cls(rig, settings, pictures, others), warnings
+
+
+def cards_key(groom: GroomSettings) -> Hashable:
+    """The same for settings that give the same cards.
+
+    Of the strands in the atlas a change of colours alone counts as none, since the atlas holds how
+    strands differ from the mean, which colours hardly change.
+    """
+    kinds = CardSettings, AtlasSettings, CardOcclusionSettings, TextureSettings
+    look = groom[ShadingSettings]
+    return (
+        groom.sections.only(*kinds, StrandSettings, AmbientSettings),
+        (look.model, look.color_variation, look.grey_share),
+        groom.card_pictures,
+    )
+
+
+@dataclass(frozen=True)
+class CardMaps:
+    """by_name: those that are written, see exchange.texture_packing.MEANINGS.
+
+    textures: those that our own pictures are drawn with; their base has the gain in it.
+    highlights: what breaks them up, "shift" or "tangent", see TextureSettings: the atlas holds the
+        directions of its own strands.
+    base_gain: what the written base is to be multiplied by.
+    is_even: the alpha is that of baked strands, see CardSnapshot.
+    """
+
+    by_name: dict[str, Floats]
+    textures: HairTextures
+    highlights: str
+    base_gain: float = 1.0
+    is_even: bool = False
+
+    @property
+    def has_tangent_map(self) -> bool:
+        return self.highlights == "tangent"
+
+    @property
+    def card(self) -> Floats:
+        """Base as it is written and alpha, (height, width, 4)."""
+        return replace(self.textures, base=self.by_name["base"]).card
+
+
+@dataclass(frozen=True)
+class MappedCards:
+    """Cards at rest, and their maps. notes: what the artist should know."""
+
+    build: CardBuild
+    maps: CardMaps
+    notes: tuple[str, ...] = ()
+
+
+def build_steps(
+    inputs: CardInputs, draw: AtlasDraw | None = None, stage: Stage = untimed
+) -> Generator[str, None, MappedCards]:
+    """Cards with their maps; each step names what comes next.
+
+    Args:
+        draw: everything else may be done in any thread; None draws here.
+
+    Raises:
+        HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
+    """
+    made: list[CardMaps] = []
+
+    def alpha_of(build: CardBuild) -> Floats:
+        with stage("card texture"):
+            made.append(card_maps(inputs, build, draw or drawn_maps))
+        return made[-1].textures.alpha
+
+    yield "Other hair"
+    others, notes = inputs.others.shades()
+    build = yield from card_build_steps(inputs.rig, inputs.settings, alpha_of, others)
+    return MappedCards(build, made[-1], (*build.notes, *notes))
+
+
+def built_in_thread(work: ThreadWork[Any], inputs: CardInputs) -> MappedCards:
+    """All steps in the thread of this work; the main thread draws the atlas.
+
+    Raises:
+        HairloomError: no cards can be made.
+        GivenUpError: nobody waits for them.
+    """
+
+    def draw(flat: FlatStrands, size: int) -> AtlasMaps:
+        return work.on_main_thread(drawing_maps(flat, size))
+
+    return result_of(retold(build_steps(inputs, draw), work.report))
+
+
+def order_line(wrong_share: float) -> str:
+    """How often the order of cards is wrong, such as "Order: 18 % of pixels wrong"."""
+    return f"Order: {100.0 * wrong_share:.0f} % of pixels wrong"
+
+
+def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps:
+    """The maps of these cards: baked from strands, or made by chance, with the artist's own.
+
+    Shift and noise break up highlights from strand to strand and are made by chance in any case.
+    """
+    settings, pictures = inputs.settings, inputs.pictures
+    texture = settings[TextureSettings]
+    made = hair_textures(texture, build.finest.atlas.columns)
+    if build.plan is None:
+        textures = made.with_pictures(pictures)
+        by_name = {name: getattr(textures, name) for name in TEXTURES}
+        return CardMaps(by_name, textures, texture.highlights)
+    look, strands = settings[ShadingSettings], settings[StrandSettings]
+    maps = baked_atlas(inputs.rig, build.plan, look, strands, draw)
+    # as many strips above each other as the atlas has rows
+    rows = (build.plan.grid.rows, 1)
+    noises = {"shift": np.tile(made.shift, rows), "noise": np.tile(made.noise, rows)}
+    by_name = {**maps.by_name, **noises, **pictures}
+    gain = 1.0 if "base" in pictures else maps.base_gain
+    names = ("alpha", "shift", "noise", "tangent", "normal")
+    shown = {name: by_name[name] for name in names}
+    textures = HairTextures(base=by_name["base"] * gain, **shown)
+    return CardMaps(by_name, textures, "tangent", gain, is_even="alpha" not in pictures)
+
+
+def drawn_maps(flat: FlatStrands, size: int) -> AtlasMaps:
+    """Here and now; the main thread's."""
+    return baked_maps(flat, size) if has_gpu() else sampled_maps(flat, size)
+
+
+def drawing_maps(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMaps]:
+    """The same in steps."""
+    if not has_gpu():
+        return sampled_maps(flat, size)
+    return (yield from baking(flat, size))
+
+
+def baked_atlas(
+    rig: Rig,
+    plan: AtlasPlan,
+    shading: ShadingSettings,
+    drawn: StrandSettings,
+    draw: AtlasDraw = drawn_maps,
+) -> AtlasMaps:
+    """The maps of all tiles, which go on where there is no hair: strands laid flat and drawn.
+
+    Args:
+        drawn: how wide strands are drawn.
+    """
+    grid = rig.strands.grid
+    count, cv_count = grid.shape[:2]
+    radius = drawn_radius(rig.strands.radius.reshape(count, cv_count), drawn)
+    colors = strand_variation(np.arange(count), cv_count, shading)
+    flat = flat_strands(plan, grid, radius, colors)
+    return dilated(draw(flat, plan.size), plan.grid)
+
+
+def has_gpu() -> bool:
+    """Blender in the background has none until it is asked for, and on some machines none then."""
+    try:
+        ensure_gpu()
+        gpu.platform.backend_type_get()
+    except (SystemError, RuntimeError):
+        return False
+    return True
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltCards:
+    """Cards at rest, tied to the guides of their rig, with all that drawing them needs.
+
+    wrong_share: see cards.build.CardBuild.
+    notes: what the artist should know.
+    """
+
+    rig: Rig
+    binding: CardBinding
+    rest: CardSnapshot
+    strand_area: StrandArea
+    card_shade: float
+    wrong_share: float
+    notes: tuple[str, ...]
+
+    @classmethod
+    def of(cls, rig: Rig, cards: MappedCards) -> BuiltCards:
+        build, maps = cards.build, cards.maps
+        mesh, strands, textures = build.finest, rig.strands, maps.textures
+        return cls(
+            rig,
+            bound_cards(rig, mesh),
+            CardSnapshot(
+                mesh, textures, maps.has_tangent_map, build.backs[0], is_even=maps.is_even
+            ),
+            StrandArea.of(strands.grid, strands.radius.reshape(strands.strand_count, -1)),
+            card_shade(mesh.positions, mesh.triangles, mesh.uv, textures.alpha),
+            build.wrong_share,
+            cards.notes,
+        )
+
+    @classmethod
+    def now(cls, inputs: CardInputs) -> BuiltCards:
+        """Build them here and now.
+
+        Raises:
+            HairloomError: no cards can be made.
+        """
+        return cls.of(inputs.rig, result_of(build_steps(inputs)))
+
+    @classmethod
+    def in_thread(cls, work: ThreadWork[BuiltCards], inputs: CardInputs) -> BuiltCards:
+        """Build them in the thread of this work, with their textures on the GPU.
+
+        Raises:
+            HairloomError: no cards can be made.
+            GivenUpError: nobody waits for them.
+        """
+        built = cls.of(inputs.rig, built_in_thread(work, inputs))
+        work.report("Textures")
+        return replace(built, rest=replace(built.rest, device=_uploaded(work, built.rest)))
+
+    def at(self, pose: Pose, guides: Floats, settings: SettingsMap) -> CardSnapshot:
+        """The cards riding on guides (guide_count, cv_count, 3) [m, world]."""
+        mesh = cards_at(self.rig, self.binding, pose, guides)
+        return self.drawn(replace(self.rest, mesh=mesh), settings)
+
+    def drawn(self, cards: CardSnapshot, settings: SettingsMap) -> CardSnapshot:
+        """The same cards by these settings."""
+        shade = self.strand_area.shade(settings[StrandSettings])
+        thickness = shade / max(self.card_shade, 1.0e-12)
+        return replace(cards, drawing=settings[CardDrawingSettings], thickness=thickness)
+
+
+def _uploaded(work: ThreadWork[Any], cards: CardSnapshot) -> CardTextures | None:
+    """In the thread: their textures on the GPU, so that no draw waits for them; None without one.
+
+    Raises:
+        GivenUpError: nobody waits for them.
+    """
+    packed = list(packed_textures(cards.textures, cards.mesh.atlas))
+
+    def uploading() -> Generator[None, None, CardTextures | None]:
+        if not has_gpu():
+            return None
+        device = CardTextures()
+        yield from device.uploading(cards.textures, cards.mesh.atlas, packed)
+        return device
+
+    return work.on_main_thread(uploading())
