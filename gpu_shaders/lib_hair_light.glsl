@@ -1,7 +1,7 @@
 // What hair, strands and cards alike, sends to the eye of one light that reaches it whole: by the
 // model that the program holds, and with SCATTERING from strand to strand.
 //
-// Reads the blocks `shading` and `fibre`, and the textures of strand_recipe.
+// Reads the blocks `shading` and `fibre`, and the textures that their features declare.
 #include "lib_kajiya_kay.glsl"
 #if MARSCHNER
 #  include "lib_marschner.glsl"

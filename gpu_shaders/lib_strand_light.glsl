@@ -3,7 +3,7 @@
 // With SCATTERING light goes from strand to strand. OTHERS: there is more hair in the way than the maps
 // hold; `between` is its optical depth, of the first lights.
 //
-// Reads the blocks `view`, `lights`, `strands`, `shading`, `fibre`, and the textures of strand_recipe.
+// Reads the blocks `view`, `lights`, `strands`, `shading`, `fibre`, and the textures of their features.
 #include "lib_lights.glsl"
 #include "lib_strand_noise.glsl"
 #include "lib_hair_light.glsl"

@@ -16,45 +16,26 @@ from typing import Any
 import gpu
 import numpy as np
 
-from ..shading.lights import pack_lights
 from ..strands import Surface
 from .camera import Camera
 from .display import Display
-from .marschner_textures import hair_forward
-from .opacity_maps import OpacityForm, OpacityMaps
-from .shader_program import ShaderRecipe, program, released_with_shaders
+from .marschner_textures import under_hair_feature
+from .opacity_maps import OpacityMaps
+from .shader_feature import UniformBlocks, bound
+from .shader_program import ShaderRecipe, released_with_shaders
 from .snapshot import Caster, Snapshot, surface_of
-from .textures import UniformBlock, drawing_state
-from .view_block import view_values
+from .textures import drawing_state
+from .view_block import lights_feature, view_feature
 
-_BLOCKS = (("View", "view"), ("Lights", "lights"), ("Opacity", "opacity"))
-
-
-def body_shadow_recipe(opacity: OpacityForm, *, has_display: bool) -> ShaderRecipe:
-    """The program; with a display it knows how the viewport shows a colour, see display.py."""
-    return ShaderRecipe(
-        name=f"body_shadow_{opacity.slots}_{opacity.is_deep}{'_display' * has_display}",
-        vertex="body_shadow.vert.glsl",
-        fragment="body_shadow.frag.glsl",
-        structs=("struct_view.glsl", "struct_lights.glsl", "struct_opacity.glsl"),
-        blocks=_BLOCKS,
-        textures=(
-            *opacity.samplers,
-            *((("FLOAT_3D", "display_table"),) if has_display else ()),
-        ),
-        numbers=(
-            ("VEC3", "hair_forward"),
-            *((("VEC4", "display_shaper"),) if has_display else ()),
-        ),
-        inputs=(("VEC3", "position"), ("VEC3", "normal")),
-        varyings=(("smooth", "VEC3", "mesh_point"), ("smooth", "VEC3", "mesh_normal")),
-        outputs=(("VEC4", "color"),),
-        defines=(
-            ("SHADOWS", 1),
-            *opacity.defines,
-            *((("DISPLAY", 1),) if has_display else ()),
-        ),
-    )
+_RECIPE = ShaderRecipe(
+    name="body_shadow",
+    vertex="body_shadow.vert.glsl",
+    fragment="body_shadow.frag.glsl",
+    structs=("struct_view.glsl", "struct_lights.glsl", "struct_opacity.glsl"),
+    inputs=(("VEC3", "position"), ("VEC3", "normal")),
+    varyings=(("smooth", "VEC3", "mesh_point"), ("smooth", "VEC3", "mesh_normal")),
+    outputs=(("VEC4", "color"),),
+)
 
 
 class BodyShadow:
@@ -83,29 +64,19 @@ class BodyShadow:
             ShaderError: the shader does not compile here.
         """
         self._upload(snapshot.casters)
-        values = {
-            "view": view_values(camera, width, height),
-            "lights": pack_lights(snapshot.lights, snapshot.ambient),
-            "opacity": maps.values,
-        }
-        textures = dict(maps.textures)
-        numbers: dict[str, Any] = {"hair_forward": hair_forward(snapshot)}
-        if display is not None:
-            textures["display_table"] = display.table.texture
-            numbers["display_shaper"] = display.shaper
-        shader = program(body_shadow_recipe(maps.form, has_display=display is not None))
+        features = [
+            view_feature(camera, width, height),
+            lights_feature(snapshot),
+            under_hair_feature(snapshot, maps),
+            *([] if display is None else [display.feature]),
+        ]
         for _, batch in self._batches:
             with drawing_state(depth_write=False, blend="ALPHA_PREMULT"):
-                shader.bind(
-                    blocks={name: self._blocks[name].holding(values[name]) for name in values},
-                    textures=textures,
-                    numbers=numbers,
-                )
-                batch.draw(shader.shader)
+                batch.draw(bound(_RECIPE, features, self._blocks).shader)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
-        self._blocks = {name: UniformBlock() for _, name in _BLOCKS}
+        self._blocks = UniformBlocks()
         self._batches: list[tuple[Surface, Any]] = []
 
     def _upload(self, casters: tuple[Caster, ...]) -> None:

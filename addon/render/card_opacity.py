@@ -1,4 +1,4 @@
-"""Draws hair cards into opacity maps, as opacity_pass.py does strands.
+"""Draws hair cards into opacity maps, see opacity_maps.py.
 
 A card's triangles add what its alpha stands for (shading/volume/card_opacity.py) to all layers that
 end behind them. Deep layers lie between the first and the last card that are not clear: two depth
@@ -7,7 +7,8 @@ buffers as large as the map find them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import gpu
@@ -15,19 +16,17 @@ import numpy as np
 
 from ..cards.card_mesh import CardMesh
 from ..exchange.cards.sidecar import LEAST_ALPHA
-from ..shading.lights import Light, kept_lights
-from ..shading.settings import StrandSettings
+from ..shading.lights import kept_lights
 from ..shading.volume.light_frame import Ball, ball_around
 from ..shading.volume.map_size import START_TEXELS
-from ..shading.volume.settings import VolumeSettings
+from .card_snapshot import CardSnapshot
 from .card_textures import tiles_of
-from .opacity_maps import OpacityMaps
-from .opacity_pass import OpacityPass
+from .opacity_maps import OpacityDrawing, OpacityMaps
+from .shader_feature import ShaderFeature, UniformBlocks, bound
 from .shader_program import ShaderRecipe, program
-from .snapshot import Caster
+from .snapshot import Snapshot
 from .textures import drawing_into, drawing_state
 
-_BLOCKS = (("Opacity", "opacity"),)
 _INPUTS = (("VEC3", "position"), ("VEC2", "uv"), ("VEC3", "tangent"))
 _VARYINGS = (
     ("smooth", "VEC2", "card_uv"),
@@ -36,45 +35,25 @@ _VARYINGS = (
     ("smooth", "VEC3", "card_tangent"),
     ("smooth", "VEC3", "light_way"),
 )
-
-
-def card_opacity_recipe(slots: int, *, is_deep: bool, is_even: bool) -> ShaderRecipe:
-    """The program that draws cards into so many slots; is_even: see CardSnapshot."""
-    starts = (("UINT_2D", "opacity_starts"),) if is_deep else ()
-    return ShaderRecipe(
-        name=f"opacity_cards_{slots}_{'deep' if is_deep else 'slices'}{'_even' * is_even}",
-        vertex="opacity_card.vert.glsl",
-        fragment="opacity.frag.glsl",
-        structs=("struct_opacity.glsl",),
-        blocks=_BLOCKS,
-        textures=(("FLOAT_2D", "alpha_texture"), *starts),
-        integers=("light_index", "first_texel", *(("map_index",) if is_deep else ())),
-        numbers=(("FLOAT", "card_thickness"), ("VEC2", "atlas_tiles")),
-        inputs=_INPUTS,
-        varyings=_VARYINGS,
-        outputs=tuple(("VEC4", f"layers_{slot}") for slot in range(slots)),
-        defines=(
-            ("TARGETS", slots),
-            ("DEEP", int(is_deep)),
-            ("CARDS", 1),
-            ("EVEN", int(is_even)),
-        ),
-    )
-
-
+_LAYERS_RECIPE = ShaderRecipe(
+    name="opacity_cards",
+    vertex="opacity_card.vert.glsl",
+    fragment="opacity.frag.glsl",
+    structs=("struct_opacity.glsl",),
+    numbers=(("FLOAT", "card_thickness"),),
+    inputs=_INPUTS,
+    varyings=_VARYINGS,
+    defines=(("DEEP", 0), ("CARDS", 1)),
+)
 _DEPTH_RECIPE = ShaderRecipe(
     name="opacity_card_depth",
     vertex="opacity_card.vert.glsl",
     fragment="opacity_card_depth.frag.glsl",
     structs=("struct_opacity.glsl",),
-    blocks=_BLOCKS,
-    textures=(("FLOAT_2D", "alpha_texture"),),
-    integers=("light_index",),
-    numbers=(("FLOAT", "least_alpha"), ("VEC2", "atlas_tiles")),
+    numbers=(("FLOAT", "least_alpha"),),
     inputs=_INPUTS,
     varyings=_VARYINGS,
 )
-
 
 _STARTS_RECIPE = ShaderRecipe(
     name="opacity_card_starts",
@@ -85,104 +64,89 @@ _STARTS_RECIPE = ShaderRecipe(
 )
 
 
-class CardOpacity(OpacityPass):
-    """Keeps the maps of one set of cards from draw to draw; making one touches no GPU."""
+@dataclass(frozen=True, eq=False)
+class _Cards:
+    """Cards on the GPU; see CardSnapshot for thickness and is_even."""
 
-    def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw makes it anew."""
-        super().release()
-        self._batch: Any = None
-        self._alpha: Any = None
-        self._thickness, self._is_even, self._tiles = 1.0, False, (1.0, 1.0)
-        self._serial = 0
-        self._extent: tuple[CardMesh | None, Ball] = (None, Ball(np.zeros(3), 1.0))
+    state: Hashable
+    blocks: UniformBlocks
+    batch: Any
+    alpha: Any
+    tiles: tuple[float, float]
+    thickness: float
+    is_even: bool
 
-    def of(
-        self,
-        mesh: CardMesh,
-        batch: Any,
-        alpha: Any,
-        lights: Sequence[Light],
-        settings: VolumeSettings,
-        casters: tuple[Caster, ...] = (),
-        thickness: float = 1.0,
-        is_even: bool = False,
-    ) -> OpacityMaps:
-        """The maps of these cards.
+    @property
+    def feature(self) -> ShaderFeature:
+        return ShaderFeature(
+            name="even" if self.is_even else "",
+            textures={"alpha_texture": ("FLOAT_2D", self.alpha)},
+            numbers={"atlas_tiles": ("VEC2", self.tiles)},
+            defines={"EVEN": int(self.is_even)},
+        )
 
-        Args:
-            batch: the mesh on the GPU. alpha: its texture; another object whenever it is another.
-            lights, casters: as in OpacityPass.maps.
-            thickness, is_even: see CardSnapshot.
-        """
-        counted = self._thickness, self._is_even
-        is_same = self._batch is batch and self._alpha is alpha and counted == (thickness, is_even)
-        if not is_same:
-            self._batch, self._alpha, self._serial = batch, alpha, self._serial + 1
-            self._thickness, self._is_even = thickness, is_even
-        self._tiles = tiles_of(mesh.atlas)
-        if self._extent[0] is not mesh:
-            self._extent = mesh, ball_around(mesh.positions)
-        ball, lit_by = self._extent[1], kept_lights(lights)
-        strands = StrandSettings()
-        return self.maps(None, self._serial, (1, 2), ball, lit_by, settings, strands, casters)
+    def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
+        shader = bound(
+            _LAYERS_RECIPE,
+            [*features, self.feature],
+            self.blocks,
+            numbers={"card_thickness": self.thickness},
+        )
+        self.batch.draw(shader.shader)
 
-    def _draw_map(
-        self, maps: OpacityMaps, number: int, light: int, hair: Any, settings: VolumeSettings
-    ) -> None:
-        """The map of one light: where its layers start, then what they hold."""
-        blocks = {"opacity": self._blocks["opacity"].buffer}
-        textures, integers = {"alpha_texture": self._alpha}, {"light_index": light}
-        if maps.starts is not None:
-            self._draw_starts(maps, number, light)
-            textures["opacity_starts"] = maps.starts
-            integers["map_index"] = number
-        slots, passes = len(maps.slots), maps.passes
-        is_deep = maps.starts is not None
-        shader = program(card_opacity_recipe(slots, is_deep=is_deep, is_even=self._is_even))
-        for turn in range(passes):
-            layer = number * passes + turn
-            target = gpu.types.GPUFrameBuffer(
-                color_slots=tuple({"texture": slot, "layer": layer} for slot in maps.slots)
-            )
-            with (
-                drawing_into(target),
-                drawing_state(depth_test="NONE", depth_write=False, blend="ADDITIVE_PREMULT"),
-            ):
-                target.clear(color=(0.0, 0.0, 0.0, 0.0))
-                shader.bind(
-                    blocks=blocks,
-                    textures=textures,
-                    integers={**integers, "first_texel": turn * slots},
-                    numbers={"card_thickness": self._thickness, "atlas_tiles": self._tiles},
-                )
-                self._batch.draw(shader.shader)
-
-    def _draw_starts(self, maps: OpacityMaps, number: int, light: int) -> None:
+    def draw_starts(self, maps: OpacityMaps, number: int, place: ShaderFeature) -> None:
         """Depths of the first and the last card, then the outermost of each block of texels."""
+        side = maps.size.side
         depths = {
-            "first_cards": self._depths(maps, light, "LESS_EQUAL", 1.0),
-            "last_cards": self._depths(maps, light, "GREATER_EQUAL", 0.0),
+            "first_cards": self._depths(side, place, "LESS_EQUAL", 1.0),
+            "last_cards": self._depths(side, place, "GREATER_EQUAL", 0.0),
         }
         shader = program(_STARTS_RECIPE)
         shader.bind(textures=depths, images={"starts": maps.starts}, integers={"map_index": number})
-        groups = -(-maps.size.side // START_TEXELS // 8)
+        groups = -(-side // START_TEXELS // 8)
         gpu.compute.dispatch(shader.shader, groups, groups, 1)
         gpu.shader.unbind()
 
-    def _depths(self, maps: OpacityMaps, light: int, depth_test: str, none: float) -> Any:
+    def _depths(self, side: int, place: ShaderFeature, depth_test: str, none: float) -> Any:
         """A texture with the depth of the one card in each texel that wins; `none` without any."""
-        side = maps.size.side
         depths = gpu.types.GPUTexture((side, side), format="DEPTH_COMPONENT32F")
         target = gpu.types.GPUFrameBuffer(depth_slot=depths)
-        shader = program(_DEPTH_RECIPE)
         with drawing_into(target), drawing_state(depth_test=depth_test):
             target.clear(depth=none)
-            shader.bind(
-                blocks={"opacity": self._blocks["opacity"].buffer},
-                textures={"alpha_texture": self._alpha},
-                integers={"light_index": light},
-                numbers={"least_alpha": LEAST_ALPHA, "atlas_tiles": self._tiles},
-            )
-            self._batch.draw(shader.shader)
+            features, numbers = [place, self.feature], {"least_alpha": LEAST_ALPHA}
+            shader = bound(_DEPTH_RECIPE, features, self.blocks, numbers=numbers)
+            self.batch.draw(shader.shader)
         return depths
+
+
+class CardOpacity:
+    """Keeps the maps of one set of cards from draw to draw; making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU; the next draw makes it again."""
+        self._drawing, self._blocks = OpacityDrawing(), UniformBlocks()
+        self._drawn: tuple[Any, Any] = (None, None)
+        self._serial = 0
+        self._extent: tuple[CardMesh | None, Ball] = (None, Ball(np.zeros(3), 1.0))
+
+    def of(self, cards: CardSnapshot, batch: Any, alpha: Any, snapshot: Snapshot) -> OpacityMaps:
+        """The maps of these cards, in the light of a snapshot.
+
+        Args:
+            batch: the mesh on the GPU. alpha: its texture; another object whenever it is another.
+        """
+        if self._drawn[0] is not batch or self._drawn[1] is not alpha:
+            self._drawn, self._serial = (batch, alpha), self._serial + 1
+        mesh = cards.mesh
+        if self._extent[0] is not mesh:
+            self._extent = mesh, ball_around(mesh.positions)
+        state = self._serial, cards.thickness, cards.is_even
+        tiles = tiles_of(mesh.atlas)
+        hair = _Cards(state, self._blocks, batch, alpha, tiles, cards.thickness, cards.is_even)
+        lights = kept_lights(snapshot.lights)
+        return self._drawing.maps(
+            hair, self._extent[1], lights, snapshot.volume, snapshot.all_casters
+        )

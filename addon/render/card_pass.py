@@ -21,9 +21,9 @@ Baked cards are made so much denser (card_look.MEAN_FACING).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import gpu
@@ -31,37 +31,63 @@ import gpu
 from ..cards.drawing_settings import CardDrawingSettings
 from ..exchange.cards.sidecar import FOUR_PASSES, OPAQUE_ALPHA, THREE_PASSES, DrawPass
 from ..params.glsl import struct_values
-from ..shading.lights import kept_lights, kinds_needed, pack_lights
-from ..shading.marschner.look import pack_fibre
+from ..shading.settings import ShadingSettings
 from .camera import Camera
-from .card_batches import CardBatches
+from .card_batches import ATTRIBUTES, CardBatches
 from .card_opacity import CardOpacity
-from .card_recipe import PRIME_RECIPE, CardShading
 from .card_snapshot import CardSnapshot
 from .card_textures import CardTextures, tiles_of
 from .display import Display
-from .marschner_textures import MARSCHNER
+from .marschner_textures import marschner_feature, scattering_feature
 from .opacity_maps import OpacityMaps
-from .shader_program import program, released_with_shaders
+from .shader_feature import ShaderFeature, UniformBlocks, bound
+from .shader_program import ShaderRecipe, released_with_shaders
 from .shader_source import output_index
 from .snapshot import Snapshot
-from .textures import UniformBlock, drawing_state
-from .view_block import view_values
+from .textures import drawing_state
+from .view_block import lights_feature, view_feature
 
-_BLOCKS = ("view", "lights", "shading", "fibre", "opacity")
+_INPUTS = tuple(
+    ("FLOAT" if length == 1 else f"VEC{length}", name) for name, length in ATTRIBUTES.items()
+)
+
+_PRIME_RECIPE = ShaderRecipe(
+    name="card_prime",
+    vertex="card.vert.glsl",
+    fragment="card.frag.glsl",
+    structs=("struct_view.glsl",),
+    textures=(("FLOAT_2D", "alpha_texture"),),
+    numbers=(("FLOAT", "opaque_alpha"), ("FLOAT", "sharpness"), ("VEC2", "atlas_tiles")),
+    inputs=_INPUTS,
+    varyings=(("smooth", "VEC2", "card_uv"),),
+    outputs=(("VEC4", "color"),),
+    defines=(("PRIME", 1),),
+)
+#: shades; what is optional are features
+_SHADED_RECIPE = ShaderRecipe(
+    name="card",
+    vertex="card.vert.glsl",
+    fragment="card.frag.glsl",
+    structs=("struct_view.glsl", "struct_lights.glsl", "struct_fibre.glsl", "struct_opacity.glsl"),
+    settings=(ShadingSettings,),
+    integers=("is_opaque", "output_encoding"),
+    inputs=_INPUTS,
+    varyings=(
+        ("smooth", "VEC2", "card_uv"),
+        ("smooth", "VEC3", "card_point"),
+        ("smooth", "VEC3", "card_normal"),
+        ("smooth", "VEC3", "card_tangent"),
+        ("smooth", "FLOAT", "card_occlusion"),
+        ("smooth", "FLOAT", "card_along"),
+    ),
+    outputs=(("VEC4", "color"),),
+    defines=(
+        *(("PRIME", 0), ("CLIPPED", 0), ("EVEN", 0), ("TANGENT_MAP", 0), ("NORMAL_MAP", 0)),
+        *(("MARSCHNER", 0), ("SHADOWS", 0), ("SCATTERING", 0)),
+    ),
+)
 #: from this alpha on a card is what stands in a pixel, for depth and object masks
 _PRESENT_ALPHA = 0.5
-
-
-@dataclass(frozen=True)
-class _Shaded:
-    """All that the passes which shade bind."""
-
-    shading: CardShading
-    blocks: dict[str, Any]
-    textures: dict[str, Any]
-    integers: dict[str, int]
-    numbers: dict[str, Any]
 
 
 class CardPass:
@@ -83,16 +109,8 @@ class CardPass:
         if cards is None or snapshot.volume.shadows == "none":
             return None
         self._take_textures(cards)
-        return self._opacity.of(
-            cards.mesh,
-            self._batches.static(cards),
-            self._textures.of("alpha"),
-            snapshot.lights,
-            snapshot.volume,
-            snapshot.all_casters,
-            cards.thickness,
-            is_even=cards.is_even,
-        )
+        batch, alpha = self._batches.static(cards), self._textures.of("alpha")
+        return self._opacity.of(cards, batch, alpha, snapshot)
 
     def draw(
         self,
@@ -120,15 +138,18 @@ class CardPass:
             return
         self._take_textures(cards)
         batches = self._batches.of(cards, camera.eye)
-        shaded = self._shaded(snapshot, cards, camera, (width, height), opacity, display)
-        shaded.integers["output_encoding"] = output_index(output)
+        view = view_feature(camera, width, height)
+        features = (view, *self._shading(snapshot, cards, opacity))
+        if display is not None:
+            features = (*features, display.feature)
+        encoding = output_index(output)
         for each in passes_of(cards.drawing):
             batch = batches["back" if each.cull == "front" else "front"]
             with _state_of(each):
                 if each.color_write:
-                    _draw_shaded(each, shaded, batch)
+                    self._draw_shaded(each, features, batch, encoding)
                 else:
-                    self._draw_depth(shaded.blocks["view"], batch, OPAQUE_ALPHA, sharpness=1.0)
+                    self._draw_depth(view, batch, OPAQUE_ALPHA, sharpness=1.0)
 
     def draw_depth(
         self,
@@ -148,13 +169,13 @@ class CardPass:
         if cards is None:
             return
         self._take_textures(cards)
-        view = self._blocks["view"].holding(view_values(camera, width, height))
+        view = view_feature(camera, width, height)
         with _state_of(FOUR_PASSES[0]):
             self._draw_depth(view, self._batches.static(cards), least_alpha, sharpness=0.0)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
-        self._blocks = {name: UniformBlock() for name in _BLOCKS}
+        self._blocks = UniformBlocks()
         self._opacity.release()
         self._batches.release()
         self._own_textures = self._textures = CardTextures()
@@ -163,66 +184,68 @@ class CardPass:
         self._textures = cards.device or self._own_textures
         self._textures.upload(cards)
 
-    def _shaded(
-        self,
-        snapshot: Snapshot,
-        cards: CardSnapshot,
-        camera: Camera,
-        size: tuple[int, int],
-        opacity: OpacityMaps | None,
-        display: Display | None,
-    ) -> _Shaded:
-        look = snapshot.shading
-        is_marschner = look.model == "marschner"
-        shading = CardShading(
-            model=look.model,
-            has_tangent_map=cards.has_tangent_map,
-            has_normal_map=cards.textures.normal is not None,
-            has_display=display is not None,
-            is_even=cards.is_even,
-            opacity=None if opacity is None else opacity.form,
-            scatters=opacity is not None and is_marschner and snapshot.volume.scattering,
-            light_kinds=kinds_needed(kept_lights(snapshot.lights)),
+    def _shading(
+        self, snapshot: Snapshot, cards: CardSnapshot, maps: OpacityMaps | None
+    ) -> Iterator[ShaderFeature]:
+        """What all programs that shade these cards have."""
+        yield lights_feature(snapshot)
+        yield self._maps_feature(cards)
+        yield ShaderFeature(
+            blocks={"shading": ("ShadingSettings", struct_values(snapshot.shading))},
+            defines={"EVEN": int(cards.is_even)},
         )
-        values = {
-            "view": view_values(camera, *size),
-            "lights": pack_lights(snapshot.lights, snapshot.ambient),
-            "shading": struct_values(look),
-        }
-        textures = {f"{name}_texture": self._textures.of(name) for name in shading.textures}
-        numbers: dict[str, Any] = {"atlas_tiles": tiles_of(cards.mesh.atlas)}
+        is_marschner = snapshot.shading.model == "marschner"
         if is_marschner:
-            values["fibre"] = pack_fibre(look)
-            textures |= MARSCHNER.of(look, snapshot.table_size)
-        if shading.scatters:
-            textures |= MARSCHNER.shares(look, snapshot.table_size)
-            numbers["scatter_density"] = snapshot.volume.density
-            numbers["skin_color"] = snapshot.skin_color
-        if opacity is not None:
-            values["opacity"] = opacity.values
-            textures |= opacity.textures
-            numbers["card_thickness"] = cards.thickness
-        if display is not None:
-            textures["display_table"] = display.table.texture
-            numbers["display_shaper"] = display.shaper
-        blocks = {name: self._blocks[name].holding(values[name]) for name in values}
-        return _Shaded(shading, blocks, textures, {}, numbers)
+            yield marschner_feature(snapshot)
+        if maps is not None:
+            yield maps.feature
+            yield ShaderFeature(numbers={"card_thickness": ("FLOAT", cards.thickness)})
+        if maps is not None and is_marschner and snapshot.volume.scattering:
+            yield scattering_feature(snapshot)
 
-    def _draw_depth(self, view: Any, batch: Any, least_alpha: float, *, sharpness: float) -> None:
+    def _maps_feature(self, cards: CardSnapshot) -> ShaderFeature:
+        """What a program has that reads the pictures of these cards."""
+        has_normal, has_tangent = cards.textures.normal is not None, cards.has_tangent_map
+        names = ["base", "alpha", "noise", "tangent" if has_tangent else "shift"]
+        names += ["normal"] * has_normal
+        return ShaderFeature(
+            name="_".join(names[3:]),
+            textures={f"{name}_texture": ("FLOAT_2D", self._textures.of(name)) for name in names},
+            numbers={"atlas_tiles": ("VEC2", tiles_of(cards.mesh.atlas))},
+            defines={"TANGENT_MAP": int(has_tangent), "NORMAL_MAP": int(has_normal)},
+        )
+
+    def _draw_shaded(
+        self, each: DrawPass, features: Sequence[ShaderFeature], batch: Any, encoding: int
+    ) -> None:
+        """A pass that tests alpha may have to shade pixels that are hidden."""
+        if each.alpha_range is not None:
+            numbers = {"alpha_range": ("VEC2", each.alpha_range)}
+            clipped = ShaderFeature(name="clipped", numbers=numbers, defines={"CLIPPED": 1})
+            features = [*features, clipped]
+        integers = {"is_opaque": int(not each.is_blended), "output_encoding": encoding}
+        batch.draw(bound(_SHADED_RECIPE, features, self._blocks, integers=integers).shader)
+
+    def _draw_depth(
+        self, view: ShaderFeature, batch: Any, least_alpha: float, *, sharpness: float
+    ) -> None:
         """Pixels of that alpha alone, by a shader that asks for nothing else.
 
         Args:
             sharpness: 1 chooses mip maps as shading does; 0 asks the picture itself, of which small
                 pixels meet as many that are opaque as large ones.
         """
-        shader = program(PRIME_RECIPE)
-        textures = {"alpha_texture": self._textures.of("alpha")}
-        numbers = {
-            "opaque_alpha": least_alpha,
-            "sharpness": sharpness,
-            "atlas_tiles": self._textures.tiles,
-        }
-        shader.bind(blocks={"view": view}, textures=textures, numbers=numbers)
+        shader = bound(
+            _PRIME_RECIPE,
+            [view],
+            self._blocks,
+            textures={"alpha_texture": self._textures.of("alpha")},
+            numbers={
+                "opaque_alpha": least_alpha,
+                "sharpness": sharpness,
+                "atlas_tiles": self._textures.tiles,
+            },
+        )
         batch.draw(shader.shader)
 
 
@@ -238,18 +261,6 @@ def passes_of(drawing: CardDrawingSettings) -> tuple[DrawPass, ...]:
 def _drawn(snapshot: Snapshot) -> CardSnapshot | None:
     cards = snapshot.cards
     return None if cards is None or not len(cards.mesh.triangles) else cards
-
-
-def _draw_shaded(each: DrawPass, shaded: _Shaded, batch: Any) -> None:
-    clip = each.alpha_range
-    shader = program(replace(shaded.shading, is_clipped=clip is not None).recipe)
-    shader.bind(
-        blocks=shaded.blocks,
-        textures=shaded.textures,
-        integers={**shaded.integers, "is_opaque": int(not each.is_blended)},
-        numbers=shaded.numbers if clip is None else {**shaded.numbers, "alpha_range": clip},
-    )
-    batch.draw(shader.shader)
 
 
 @contextmanager

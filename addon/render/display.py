@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
+from .shader_feature import ShaderFeature
 from .shader_program import released_with_shaders
 from .textures import volume_from
 
@@ -83,6 +84,16 @@ class Display:
     def shaper(self) -> tuple[float, float, float, float]:
         """For the shader: gain / DARKEST, 1 / stops, texels, 1 / gamma."""
         return self.gain / DARKEST, 1.0 / _STOPS, float(SIZE), 1.0 / self.gamma
+
+    @property
+    def feature(self) -> ShaderFeature:
+        """What a program that shows colours as a view does has."""
+        return ShaderFeature(
+            name="display",
+            textures={"display_table": ("FLOAT_3D", self.table.texture)},
+            numbers={"display_shaper": ("VEC4", self.shaper)},
+            defines={"DISPLAY": 1},
+        )
 
     def shown(self, radiance: Floats) -> Floats:
         """Code values of radiances (..., 3), in [0, 1].

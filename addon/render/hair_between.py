@@ -17,27 +17,23 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.lights import LIGHT_CAPACITY
 from ..shading.volume.light_frame import Ball
-from .opacity_maps import OpacityForm, OpacityMaps
-from .shader_program import ShaderRecipe, program
+from .opacity_maps import OpacityMaps
+from .shader_feature import UniformBlocks, bound
+from .shader_program import ShaderRecipe
 from .shader_source import OTHERS_LIGHTS
-from .textures import UniformBlock
 
 #: of a place that has no groom of its own
 NOBODY = -5
 
 
-def between_recipe(form: OpacityForm) -> ShaderRecipe:
-    """The program that asks maps of this form."""
-    return ShaderRecipe(
-        name=f"hair_between_{form.slots}_{form.is_deep}",
-        compute="hair_between.comp.glsl",
-        structs=("struct_opacity.glsl",),
-        blocks=(("Opacity", "opacity"),),
-        textures=(("FLOAT_2D", "places"), *form.samplers),
-        images=(("RGBA32F", "between", "READ_WRITE"),),
-        integers=("light_count", "own_number"),
-        defines=form.defines,
-    )
+_RECIPE = ShaderRecipe(
+    name="hair_between",
+    compute="hair_between.comp.glsl",
+    structs=("struct_opacity.glsl",),
+    textures=(("FLOAT_2D", "places"),),
+    images=(("RGBA32F", "between", "READ_WRITE"),),
+    integers=("light_count", "own_number"),
+)
 
 
 class HairBetween:
@@ -48,7 +44,7 @@ class HairBetween:
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next call makes it anew."""
-        self._blocks: list[UniformBlock] = []
+        self._blocks: list[UniformBlocks] = []
         self._found: Any = None
         self._made_of: tuple[Any, ...] = ()
 
@@ -75,12 +71,13 @@ class HairBetween:
             return self._found
         self._made_of, self._kept = made_of, grooms
         self._found.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
-        self._blocks += [UniformBlock() for _ in range(len(grooms) - len(self._blocks))]
+        self._blocks += [UniformBlocks() for _ in range(len(grooms) - len(self._blocks))]
         for block, (number, maps) in zip(self._blocks, grooms, strict=False):
-            shader = program(between_recipe(maps.form))
-            shader.bind(
-                blocks={"opacity": block.holding(maps.values)},
-                textures={"places": places, **maps.textures},
+            shader = bound(
+                _RECIPE,
+                [maps.feature],
+                block,
+                textures={"places": places},
                 images={"between": self._found},
                 integers={
                     "light_count": min(light_count, OTHERS_LIGHTS),

@@ -7,14 +7,16 @@ share their textures.
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..arrays import Floats
-from ..shading.marschner.look import fibre_of
+from ..shading.marschner.look import fibre_of, pack_fibre
 from ..shading.marschner.tables import MarschnerTables, marschner_tables, shape_of
 from ..shading.settings import ShadingSettings
 from ..shading.volume.dual import Shares, mean_forward, shares
+from .opacity_maps import OpacityMaps
+from .shader_feature import ShaderFeature
 from .shader_program import released_with_shaders
 from .snapshot import Snapshot
 from .textures import texture_from, volume_from
@@ -77,6 +79,38 @@ class MarschnerTextures:
 
 #: what all passes share
 MARSCHNER = MarschnerTextures()
+
+
+def marschner_feature(snapshot: Snapshot) -> ShaderFeature:
+    """What a program that shades by Marschner's model has."""
+    shading = snapshot.shading
+    textures = MARSCHNER.of(shading, snapshot.table_size)
+    return ShaderFeature(
+        name="marschner",
+        blocks={"fibre": ("Fibre", pack_fibre(shading))},
+        textures={name: (kind, textures[name]) for kind, name in MARSCHNER_TEXTURES},
+        defines={"MARSCHNER": 1},
+    )
+
+
+def scattering_feature(snapshot: Snapshot) -> ShaderFeature:
+    """What a program has that adds light from strand to strand, in Marschner's model."""
+    textures = MARSCHNER.shares(snapshot.shading, snapshot.table_size)
+    return ShaderFeature(
+        name="scattering",
+        textures={name: (kind, textures[name]) for kind, name in SHARES_TEXTURES},
+        numbers={
+            "scatter_density": ("FLOAT", snapshot.volume.density),
+            "skin_color": ("VEC3", snapshot.skin_color),
+        },
+        defines={"SCATTERING": 1},
+    )
+
+
+def under_hair_feature(snapshot: Snapshot, maps: OpacityMaps) -> ShaderFeature:
+    """What a program has that lights what lies under hair, through its maps."""
+    feature = maps.feature
+    return replace(feature, numbers={"hair_forward": ("VEC3", hair_forward(snapshot))})
 
 
 def hair_forward(snapshot: Snapshot) -> tuple[float, float, float]:

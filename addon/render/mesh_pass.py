@@ -2,25 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..shading.lights import kept_lights, kinds_needed, pack_lights
+from ..shading.lights import kept_lights
 from ..shading.skin.layout import SkinLayout
 from .camera import Camera
 from .hashed_alpha import shifts
-from .marschner_textures import hair_forward
+from .marschner_textures import hair_forward, under_hair_feature
 from .mesh_batch import mesh_batch
 from .mesh_pictures import PictureTextures, pictures_of
-from .mesh_recipe import MeshForm
-from .mesh_shadows import MeshShadowPass, MeshShadows, ShadowBlock
-from .opacity_pass import OpacityMaps
-from .shader_program import program, released_with_shaders
+from .mesh_shadows import MeshShadowPass, MeshShadows
+from .opacity_maps import OpacityMaps
+from .shader_feature import ShaderFeature, UniformBlocks, bound
+from .shader_program import ShaderRecipe, released_with_shaders
 from .shader_source import output_index
 from .skin_pass import SkinPass, SkinShadow
-from .snapshot import MeshPictures, MeshSnapshot, Snapshot
-from .textures import UniformBlock, drawing_state
-from .view_block import view_values
+from .snapshot import MeshSnapshot, Snapshot
+from .textures import drawing_state
+from .view_block import lights_feature, view_feature
+
+_RECIPE = ShaderRecipe(
+    name="mesh",
+    vertex="mesh.vert.glsl",
+    fragment="mesh.frag.glsl",
+    structs=(
+        *("struct_view.glsl", "struct_lights.glsl"),
+        *("struct_opacity.glsl", "struct_mesh_shadows.glsl"),
+    ),
+    integers=("output_encoding",),
+    inputs=(("VEC3", "position"), ("VEC3", "normal"), ("FLOAT", "occlusion")),
+    varyings=(
+        ("smooth", "VEC3", "mesh_point"),
+        ("smooth", "VEC3", "mesh_normal"),
+        ("smooth", "FLOAT", "mesh_occlusion"),
+    ),
+    outputs=(("VEC4", "color"),),
+    defines=(("SHADOWS", 0),),
+)
 
 type _Batch = tuple[MeshSnapshot, SkinLayout | None, Any]
 
@@ -53,69 +72,65 @@ class MeshPass:
             between: what other hair is in the way, at each pixel of the target, see HairBetween;
                 counts where there are maps. Others as in StrandPass.draw.
         """
-        forward = (0.0, 0.0, 0.0) if opacity is None else hair_forward(snapshot)
-        light_count = len(kept_lights(snapshot.lights))
         skins = self.skin.shadows(
-            snapshot.meshes, opacity, snapshot.skin, light_count, forward, shadows
+            snapshot.meshes,
+            opacity,
+            snapshot.skin,
+            len(kept_lights(snapshot.lights)),
+            (0.0, 0.0, 0.0) if opacity is None else hair_forward(snapshot),
+            shadows,
         )
         self._upload(snapshot.meshes, skins)
-        values = {
-            "view": view_values(camera, width, height),
-            "lights": pack_lights(snapshot.lights, snapshot.ambient),
-            **({} if opacity is None else {"opacity": opacity.values}),
-        }
-        form = None if opacity is None else opacity.form
-        shadow_block = self._shadow_block.of(shadows, camera.sample)
-        kinds = kinds_needed(kept_lights(snapshot.lights))
+        shared = [view_feature(camera, width, height), lights_feature(snapshot)]
+        if opacity is not None:
+            shared.append(under_hair_feature(snapshot, opacity))
+        if shadows is not None:
+            shared.append(shadows.feature(camera.sample))
+        integers = {"output_encoding": output_index(output)}
         for number, (mesh, _, batch) in enumerate(_far_to_near(self._batches, camera)):
-            skin, pictures = skins.get(id(mesh)), pictures_of(mesh)
+            features = [*shared, *self._mesh_features(mesh, skins.get(id(mesh)))]
             is_blended = mesh.transparency == "blended"
             # a pixel stands for what lies behind all that is blended
-            has_others = between is not None and opacity is not None and not is_blended
-            shader = program(
-                MeshForm(
-                    form,
-                    skin is not None,
-                    pictures is not None,
-                    mesh.transparency,
-                    kinds,
-                    shadows is not None,
-                    has_others,
-                ).recipe
-            )
-            with drawing_state(
-                depth_write=not is_blended, blend="ALPHA_PREMULT" if is_blended else "NONE"
-            ):
-                shader.bind(
-                    blocks={
-                        **{name: self._blocks[name].holding(values[name]) for name in values},
-                        **shadow_block,
-                    },
-                    textures={
-                        **({} if opacity is None else opacity.textures),
-                        **({} if shadows is None else shadows.textures),
-                        **({"hair_between": between} if has_others else {}),
-                        **({} if skin is None else skin.textures),
-                        **({} if pictures is None else self._pictures.textures(mesh, pictures)),
-                    },
-                    integers={"output_encoding": output_index(output)},
-                    numbers={
-                        **_numbers(mesh, pictures),
-                        **_chance(mesh, number, camera.sample),
-                        **({} if opacity is None else {"hair_forward": forward}),
-                    },
-                )
-                batch.draw(shader.shader)
+            if between is not None and opacity is not None and not is_blended:
+                features.append(_between_feature(between))
+            if mesh.transparency == "hashed":
+                features.append(_hashed_feature(number, camera.sample))
+            blend = "ALPHA_PREMULT" if is_blended else "NONE"
+            with drawing_state(depth_write=not is_blended, blend=blend):
+                batch.draw(bound(_RECIPE, features, self._blocks, integers=integers).shader)
         self._pictures.forget_but(snapshot.meshes)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
-        self._blocks = {name: UniformBlock() for name in ("view", "lights", "opacity")}
-        self._shadow_block = ShadowBlock()
+        self._blocks = UniformBlocks()
         self._batches: list[_Batch] = []
         self.skin = SkinPass()
         self.mesh_shadows.release()
         self._pictures = PictureTextures()
+
+    def _mesh_features(
+        self, mesh: MeshSnapshot, skin: SkinShadow | None
+    ) -> Iterator[ShaderFeature]:
+        """What the program of one mesh has: its surface, its soft shadow, its pictures."""
+        yield ShaderFeature(
+            numbers={
+                "mesh_sheen": ("FLOAT", mesh.sheen),
+                "mesh_cover": ("FLOAT", 0.0 if mesh.is_holdout else 1.0),
+            }
+        )
+        if skin is not None:
+            yield skin.feature
+        pictures = pictures_of(mesh)
+        if pictures is None:
+            yield ShaderFeature(numbers={"mesh_color": ("VEC3", mesh.color)})
+        else:
+            yield self._pictures.feature(mesh, pictures)
+        if mesh.transparency != "opaque":
+            yield ShaderFeature(
+                name=mesh.transparency,
+                numbers={"mesh_alpha": ("FLOAT", mesh.alpha)},
+                defines={mesh.transparency.upper(): 1},
+            )
 
     def _upload(self, meshes: tuple[MeshSnapshot, ...], skins: Mapping[int, SkinShadow]) -> None:
         kept = {(id(mesh), id(layout)): batch for mesh, layout, batch in self._batches}
@@ -130,19 +145,18 @@ class MeshPass:
         ]
 
 
-def _numbers(mesh: MeshSnapshot, pictures: MeshPictures | None) -> dict[str, Any]:
-    """Those that the program of a mesh has."""
-    return {
-        "mesh_sheen": mesh.sheen,
-        "mesh_cover": 0.0 if mesh.is_holdout else 1.0,
-        **({"mesh_color": mesh.color} if pictures is None else {"mesh_bump": pictures.bump}),
-        **({} if mesh.transparency == "opaque" else {"mesh_alpha": mesh.alpha}),
-    }
+def _between_feature(between: Any) -> ShaderFeature:
+    """What a program has that knows of more hair in the way than the maps hold, by pixel."""
+    return ShaderFeature(
+        name="others",
+        textures={"hair_between": ("FLOAT_2D", between)},
+        defines={"OTHERS": 1},
+    )
 
 
-def _chance(mesh: MeshSnapshot, number: int, sample: int) -> dict[str, Any]:
+def _hashed_feature(number: int, sample: int) -> ShaderFeature:
     """How far the pattern by which a hashed mesh is left out is shifted; see hashed_alpha.py."""
-    return {"mesh_chance": shifts(number, sample)} if mesh.transparency == "hashed" else {}
+    return ShaderFeature(numbers={"mesh_chance": ("VEC2", shifts(number, sample))})
 
 
 def _far_to_near(batches: list[_Batch], camera: Camera) -> list[_Batch]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
+from .shader_feature import ShaderFeature
 from .snapshot import Color, MeshPictures, MeshSnapshot
 from .textures import texture_from
 
@@ -30,15 +31,21 @@ class PictureTextures:
         self._kept: dict[int, tuple[Floats, Any]] = {}
         self._colors: dict[Color, Any] = {}
 
-    def textures(self, mesh: MeshSnapshot, pictures: MeshPictures) -> dict[str, Any]:
-        """By their names in the shader; of what has no picture one texel."""
-        color = pictures.color
-        return {
+    def feature(self, mesh: MeshSnapshot, pictures: MeshPictures) -> ShaderFeature:
+        """What a program has that lays them over a mesh's UVs; of what has no picture one texel."""
+        color, normal = pictures.color, pictures.normal
+        texels = {
             "mesh_color_map": self._plain(mesh.color) if color is None else self._texture(color),
-            "mesh_normal_map": self._texture(
-                _LEVEL if pictures.normal is None else pictures.normal
-            ),
+            "mesh_normal_map": self._texture(_LEVEL if normal is None else normal),
         }
+        return ShaderFeature(
+            name="pictures",
+            textures={name: ("FLOAT_2D", texture) for name, texture in texels.items()},
+            numbers={"mesh_bump": ("FLOAT", pictures.bump)},
+            inputs=(("VEC2", "picture_place"),),
+            varyings=(("smooth", "VEC2", "mesh_uv"),),
+            defines={"PICTURES": 1},
+        )
 
     def color(self, picture: Floats) -> Any:
         """A picture of colours by itself, (height, width, 4)."""

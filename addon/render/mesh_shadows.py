@@ -26,13 +26,10 @@ from ..shading.volume.mesh_frames import (
 )
 from .hashed_alpha import shifts
 from .mesh_depths import MeshDepths
+from .shader_feature import ShaderFeature
 from .shader_program import released_with_shaders
 from .snapshot import Caster, surface_of
-from .textures import UniformBlock
 
-#: what a program that reads the maps has to declare
-MESH_SHADOW_BLOCKS = (("MeshShadows", "mesh_shadows"),)
-MESH_SHADOW_TEXTURES = (("DEPTH_2D_ARRAY", "mesh_depths"),)
 _TEXEL_BYTES = 4
 #: of hashed_alpha.shifts, by which the texels that are asked move from sample to sample
 _SEQUENCE = 1
@@ -45,18 +42,18 @@ class MeshShadows:
     values: Floats
     depths: Any
 
-    @property
-    def textures(self) -> dict[str, Any]:
-        """By their names in the shader."""
-        return {"mesh_depths": self.depths}
-
-    def values_of(self, sample: int) -> Floats:
-        """The block for a sample of a picture: each asks other places of the maps, so that the mean
-        of them has smooth edges.
+    def feature(self, sample: int) -> ShaderFeature:
+        """What a program that reads them has, in a sample of a picture: each looks up other places
+        of the maps, so that the mean of them has smooth edges.
         """
         values = self.values.copy()
         values[-4:-2] = 2.0 * (np.add(shifts(_SEQUENCE, sample), 0.5) % 1.0) - 1.0
-        return values
+        return ShaderFeature(
+            name="depths",
+            blocks={"mesh_shadows": ("MeshShadows", values)},
+            textures={"mesh_depths": ("DEPTH_2D_ARRAY", self.depths)},
+            defines={"MESH_SHADOWS": 1},
+        )
 
 
 class MeshShadowPass:
@@ -129,17 +126,6 @@ class MeshShadowPass:
             return self._maps.depths
         self._shape = side, layers
         return gpu.types.GPUTexture((side, side), layers=layers, format="DEPTH_COMPONENT32F")
-
-
-class ShadowBlock:
-    """The block of a draw; making one touches no GPU."""
-
-    def __init__(self) -> None:
-        self._block = UniformBlock()
-
-    def of(self, maps: MeshShadows | None, sample: int) -> dict[str, Any]:
-        """By its name in the shader; nothing without maps."""
-        return {} if maps is None else {"mesh_shadows": self._block.holding(maps.values_of(sample))}
 
 
 def mesh_map_side(asked: int, layers: int, most: int) -> int:

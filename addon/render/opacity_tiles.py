@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import gpu
 import numpy as np
 
@@ -11,12 +9,20 @@ from ..arrays import Floats
 from ..errors import HairloomError
 from ..shading.lights import LIGHT_CAPACITY
 from .opacity_maps import OpacityMaps
-from .shader_program import ShaderRecipe, program
+from .shader_feature import UniformBlocks, bound
+from .shader_program import ShaderRecipe
 from .shader_source import TILE_GAP
-from .textures import UniformBlock, texture_to_array
+from .textures import texture_to_array
 
 #: pixels along a side of a tile, at most
 _TILE = 256
+_RECIPE = ShaderRecipe(
+    name="opacity_tiles",
+    compute="opacity_tiles.comp.glsl",
+    structs=("struct_opacity.glsl",),
+    images=(("RGBA32F", "tiles"),),
+    integers=("map_index", "tile_count", "tile_columns", "texels_across"),
+)
 
 
 def opacity_tiles(maps: OpacityMaps, layer_count: int) -> Floats:
@@ -43,33 +49,18 @@ def opacity_tiles(maps: OpacityMaps, layer_count: int) -> Floats:
     return np.concatenate([_tiles(maps, each, layer_count) for each in reversed(range(map_count))])
 
 
-def _recipe(maps: OpacityMaps) -> ShaderRecipe:
-    samplers = [each for each in maps.form.samplers if each[1] != "opacity_meshes"]
-    return ShaderRecipe(
-        name=f"opacity_tiles_{maps.form.slots}_{'deep' if maps.form.is_deep else 'slices'}",
-        compute="opacity_tiles.comp.glsl",
-        structs=("struct_opacity.glsl",),
-        blocks=(("Opacity", "opacity"),),
-        textures=tuple(samplers),
-        images=(("RGBA32F", "tiles"),),
-        integers=("map_index", "tile_count", "tile_columns", "texels_across"),
-        defines=maps.form.defines,
-    )
-
-
 def _tiles(maps: OpacityMaps, number: int, layer_count: int) -> Floats:
-    count = layer_count + maps.form.is_deep
+    count = layer_count + int(maps.starts is not None)
     columns = int(np.ceil(np.sqrt(count)))
     across = -(-maps.slots[0].width // _TILE)
     pitch = maps.slots[0].width // across + TILE_GAP
     width, height = columns * pitch, -(-count // columns) * pitch
     tiles = gpu.types.GPUTexture((width, height), format="RGBA32F")
-    recipe, block = _recipe(maps), UniformBlock()
-    shader = program(recipe)
-    textures: dict[str, Any] = {name: maps.textures[name] for _, name in recipe.textures}
-    shader.bind(
-        blocks={"opacity": block.holding(maps.values)},
-        textures=textures,
+    blocks = UniformBlocks()
+    shader = bound(
+        _RECIPE,
+        [maps.feature],
+        blocks,
         images={"tiles": tiles},
         integers={
             "map_index": number,

@@ -23,13 +23,14 @@ from ..arrays import Floats, Ints
 from ..shading.skin.layout import SkinLayout
 from ..shading.skin.settings import SkinSettings
 from ..strands import Surface
-from .mesh_shadows import MESH_SHADOW_BLOCKS, MESH_SHADOW_TEXTURES, MeshShadows, ShadowBlock
-from .opacity_pass import OpacityForm, OpacityMaps
+from .mesh_shadows import MeshShadows
+from .opacity_maps import OpacityMaps
+from .shader_feature import ShaderFeature, UniformBlocks, bound
 from .shader_program import ShaderRecipe, program
 from .shader_source import SKIN_COPIES_ACROSS, SKIN_SEAMS_ACROSS, SKIN_TRIANGLES_ACROSS
 from .skin_layouts import layout_of
 from .snapshot import Color, MeshSnapshot
-from .textures import UniformBlock, texture_from, texture_to_array
+from .textures import texture_from, texture_to_array
 
 #: what a program that looks the shadow up needs
 SKIN_TEXTURES = tuple(
@@ -37,29 +38,15 @@ SKIN_TEXTURES = tuple(
 )
 
 
-def _shadow_recipe(opacity: OpacityForm, *, has_depths: bool) -> ShaderRecipe:
-    return ShaderRecipe(
-        name=f"skin_shadow_{opacity.slots}_{opacity.is_deep}{'_depths' * has_depths}",
-        compute="skin_shadow.comp.glsl",
-        structs=("struct_opacity.glsl", "struct_mesh_shadows.glsl"),
-        blocks=(("Opacity", "opacity"), *(MESH_SHADOW_BLOCKS if has_depths else ())),
-        textures=(
-            ("FLOAT_2D", "skin_texels"),
-            ("FLOAT_2D", "skin_corners"),
-            *opacity.samplers,
-            *(MESH_SHADOW_TEXTURES if has_depths else ()),
-        ),
-        images=(("RGBA32F", "reaching"),),
-        integers=("light_count",),
-        numbers=(("VEC3", "hair_forward"),),
-        defines=(
-            ("SHADOWS", 1),
-            *opacity.defines,
-            *((("MESH_SHADOWS", 1),) if has_depths else ()),
-        ),
-    )
-
-
+_SHADOW_RECIPE = ShaderRecipe(
+    name="skin_shadow",
+    compute="skin_shadow.comp.glsl",
+    structs=("struct_opacity.glsl", "struct_mesh_shadows.glsl"),
+    textures=(("FLOAT_2D", "skin_texels"), ("FLOAT_2D", "skin_corners")),
+    images=(("RGBA32F", "reaching"),),
+    integers=("light_count",),
+    numbers=(("VEC3", "hair_forward"),),
+)
 _BLUR_RECIPE = ShaderRecipe(
     name="skin_blur",
     compute="skin_blur.comp.glsl",
@@ -88,6 +75,17 @@ class SkinShadow:
     layout: SkinLayout
     textures: dict[str, Any]
 
+    @property
+    def feature(self) -> ShaderFeature:
+        """What a program that looks the shadow up has."""
+        return ShaderFeature(
+            name="skin",
+            textures={name: (kind, self.textures[name]) for kind, name in SKIN_TEXTURES},
+            inputs=(("VEC3", "skin_place"),),
+            varyings=(("smooth", "VEC3", "mesh_skin"),),
+            defines={"SKIN": 1},
+        )
+
     def picture(self) -> Floats:
         """The map as a picture, (rows, columns, channels), row 0 at v = 0: the share of each light
         that reaches the skin, 1 where there is none.
@@ -97,7 +95,7 @@ class SkinShadow:
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """What a shadow hangs on."""
+    """What a shadow depends on."""
 
     positions: Floats
     opacity: OpacityMaps
@@ -145,7 +143,7 @@ class SkinPass:
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw makes it anew."""
         self._heads: list[_Head] = []
-        self._block, self._shadow_block = UniformBlock(), ShadowBlock()
+        self._blocks = UniformBlocks()
 
     def shadows(
         self,
@@ -210,24 +208,17 @@ class SkinPass:
 
     def _reaching(self, head: _Head, surface: Surface, wanted: _Drawn) -> Any:
         """How much of each light reaches the skin, as it is."""
-        opacity = wanted.opacity
         corners = texture_from(
             _in_rows(surface.corners.reshape(-1, 3), 3 * SKIN_TRIANGLES_ACROSS), "RGBA32F"
         )
-        texels = head.textures["skin_texels"]
-        shadows = wanted.shadows
-        shader = program(_shadow_recipe(opacity.form, has_depths=shadows is not None))
+        texels, shadows = head.textures["skin_texels"], wanted.shadows
         found = _like(texels)
-        shader.bind(
-            blocks={
-                "opacity": self._block.holding(opacity.values),
-                **self._shadow_block.of(shadows, sample=0),
-            },
-            textures={
-                **{"skin_texels": texels, "skin_corners": corners},
-                **opacity.textures,
-                **({} if shadows is None else shadows.textures),
-            },
+        depths = [] if shadows is None else [shadows.feature(sample=0)]
+        shader = bound(
+            _SHADOW_RECIPE,
+            [wanted.opacity.feature, *depths],
+            self._blocks,
+            textures={"skin_texels": texels, "skin_corners": corners},
             images={"reaching": found},
             integers={"light_count": wanted.light_count},
             numbers={"hair_forward": wanted.forward},

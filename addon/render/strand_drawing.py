@@ -1,77 +1,173 @@
-"""One draw of strands: the resources of all its programs by name, and each program's own part."""
+"""One draw of strands by its programs: shaded as they are drawn, or later, as layers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+from ..shading.settings import ShadingSettings, StrandSettings
 from .detail_pass import DetailOrder
-from .shader_program import ShaderProgram, ShaderRecipe, program
-from .strand_recipe import StrandShading, gather_recipe, shade_recipe, shown_recipe, strand_recipe
+from .shader_feature import ShaderFeature, UniformBlocks, bound
+from .shader_program import ShaderProgram, ShaderRecipe
 
-Named = Mapping[str, Any]
+#: what covers pixels in part, see ribbon_coverage in lib_coverage.glsl
+_RIBBON = (("smooth", "VEC4", "ribbon"),)
+_STRUCTS = ("struct_view.glsl", "struct_lights.glsl", "struct_fibre.glsl", "struct_opacity.glsl")
+_SETTINGS = (StrandSettings, ShadingSettings)
+#: of shading, for programs without the features that turn these on
+_PLAIN = (("MARSCHNER", 0), ("SHADOWS", 0), ("SCATTERING", 0))
+#: of strand.vert.glsl, likewise
+_WHOLE = (("ADAPTIVE", 0), ("DEBUG", 0))
+_VARYINGS = (
+    ("smooth", "VEC3", "strand_point"),
+    ("smooth", "VEC3", "strand_tangent"),
+    ("smooth", "VEC2", "strand_along_and_occlusion"),
+    ("smooth", "FLOAT", "strand_radius"),
+    ("flat", "INT", "strand_seed"),
+)
+
+_OPAQUE_RECIPE = ShaderRecipe(
+    name="strand_opaque",
+    vertex="strand.vert.glsl",
+    fragment="strand.frag.glsl",
+    structs=_STRUCTS,
+    settings=_SETTINGS,
+    integers=("output_encoding", "samples_across"),
+    varyings=_VARYINGS,
+    outputs=(("VEC4", "color"),),
+    defines=(*_PLAIN, *_WHOLE, ("HASHED", 0), ("COVERED", 0), ("GATHERED", 0)),
+)
+#: leaves fragments out by chance
+_HASHED_RECIPE = ShaderRecipe(
+    name="strand_hashed",
+    vertex="strand.vert.glsl",
+    fragment="strand.frag.glsl",
+    structs=_STRUCTS,
+    settings=_SETTINGS,
+    integers=("output_encoding",),
+    varyings=(*_VARYINGS, *_RIBBON),
+    outputs=(("VEC4", "color"),),
+    defines=(*_PLAIN, *_WHOLE, ("HASHED", 1), ("COVERED", 1), ("GATHERED", 0)),
+)
+#: puts each fragment into the list of its pixel
+_GATHER_RECIPE = ShaderRecipe(
+    name="strand_gather",
+    vertex="strand.vert.glsl",
+    fragment="strand_layers.frag.glsl",
+    structs=("struct_view.glsl",),
+    settings=(StrandSettings,),
+    images=(
+        ("R32UI", "layer_count", "READ_WRITE"),
+        ("R32UI", "layer_heads", "READ_WRITE"),
+        ("R32UI", "layer_pixels"),
+        ("RGBA32UI", "layer_nodes"),
+    ),
+    integers=("capacity",),
+    varyings=(("smooth", "FLOAT", "strand_along"), ("flat", "INT", "strand_index"), *_RIBBON),
+    outputs=(("VEC4", "color"),),
+    defines=(*_WHOLE, ("COVERED", 1), ("GATHERED", 1)),
+)
+#: shades those of all lists that are seen
+_SHADE_RECIPE = ShaderRecipe(
+    name="strand_layers_shade",
+    compute="strand_layers_shade.comp.glsl",
+    structs=_STRUCTS,
+    settings=_SETTINGS,
+    images=(("R32UI", "layer_seen", "READ"), ("RGBA32UI", "layer_nodes", "READ_WRITE")),
+    integers=("seen_count",),
+    group_size=(64, 1),
+    defines=_PLAIN,
+)
+#: adds up each pixel's list
+_SHOWN_RECIPE = ShaderRecipe(
+    name="strand_layers_shown",
+    vertex="strand_layers.vert.glsl",
+    fragment="strand_layers_shown.frag.glsl",
+    images=(
+        ("R32UI", "layer_heads", "READ"),
+        ("RGBA32UI", "layer_nodes", "READ"),
+        ("RG32F", "layer_fronts", "READ"),
+    ),
+    integers=("output_encoding", "writes_depth"),
+    outputs=(("VEC4", "color"),),
+)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StrandDrawing:
-    """What a moment needs to be drawn.
+    """All that one draw binds.
 
     order: which strands, in how many pieces.
-    blocks, textures, integers, numbers: of all programs; each binds those that it declares.
     ribbon: the vertices of a strand that has room for so many pieces.
+    points: where strands and eye are. shading: what all programs that shade have.
+    shown: what those that write colours have beside that.
     """
 
     order: DetailOrder
-    shading: StrandShading
     ribbon: Callable[[int], Any]
-    blocks: Named
-    textures: Named
-    integers: Named
-    numbers: Named = field(default_factory=dict)
-
-    @property
-    def is_adaptive(self) -> bool:
-        return self.order.factors is not None
+    blocks: UniformBlocks
+    points: Sequence[ShaderFeature]
+    shading: Sequence[ShaderFeature]
+    shown: Sequence[ShaderFeature]
+    output_encoding: int
+    samples_across: int
 
     def draw(self, *, is_hashed: bool) -> None:
         """All strands, each pixel shaded as it is drawn."""
-        self._draw(
-            strand_recipe(self.shading, is_adaptive=self.is_adaptive, is_hashed=is_hashed), {}, {}
+        integers = {"output_encoding": self.output_encoding}
+        if not is_hashed:
+            integers["samples_across"] = self.samples_across
+        features = [*self.points, self._detail, *self.shading, *self.shown]
+        recipe = _HASHED_RECIPE if is_hashed else _OPAQUE_RECIPE
+        self._draw(bound(recipe, features, self.blocks, integers=integers))
+
+    def gather(self, images: Mapping[str, Any], capacity: int) -> None:
+        """All strands into the lists of pixels, see strand_layers.py."""
+        features = [*self.points, self._detail]
+        integers = {"capacity": capacity}
+        self._draw(self._bound(_GATHER_RECIPE, features, images, integers))
+
+    def shade(self, images: Mapping[str, Any], seen_count: int) -> ShaderProgram:
+        """Bind what shades so many nodes that are seen."""
+        features = [*self.points, *self.shading]
+        return self._bound(_SHADE_RECIPE, features, images, {"seen_count": seen_count})
+
+    def show(self, images: Mapping[str, Any], *, writes_depth: bool) -> ShaderProgram:
+        """Bind what adds up these lists."""
+        integers = {
+            "output_encoding": self.output_encoding,
+            "writes_depth": int(writes_depth),
+        }
+        return self._bound(_SHOWN_RECIPE, self.shown, images, integers)
+
+    @property
+    def _detail(self) -> ShaderFeature:
+        """How many pieces a program draws: equally many of every segment, or of each its own."""
+        order = self.order
+        if order.factors is None:
+            return ShaderFeature(name="fixed", integers={"subdivisions": order.subdivisions})
+        return ShaderFeature(
+            name="adaptive",
+            textures={"order": ("FLOAT_2D", order.order), "factors": ("FLOAT_2D", order.factors)},
+            integers={"first_instance": 0},
+            defines={"ADAPTIVE": 1},
         )
 
-    def gather(self, images: Named, capacity: int) -> None:
-        """All strands into the lists of pixels, see strand_layers.py."""
-        recipe = gather_recipe(is_adaptive=self.is_adaptive)
-        self._draw(recipe, images, {"capacity": capacity})
-
-    def shade(self, images: Named, seen_count: int) -> ShaderProgram:
-        """Bind what shades so many nodes that are seen."""
-        recipe = shade_recipe(replace(self.shading, has_display=False))
-        return self._bound(recipe, images, {"seen_count": seen_count})
-
-    def show(self, images: Named, *, writes_depth: bool) -> ShaderProgram:
-        """Bind what adds up these lists."""
-        recipe = shown_recipe(has_display=self.shading.has_display)
-        return self._bound(recipe, images, {"writes_depth": int(writes_depth)})
-
-    def _draw(self, recipe: ShaderRecipe, images: Named, integers: Named) -> None:
-        shader = self._bound(recipe, images, integers).shader
+    def _draw(self, shader: ShaderProgram) -> None:
         for drawn in self.order.classes:
-            if self.is_adaptive:
-                shader.uniform_int("first_instance", drawn.first)
+            if self.order.factors is not None:
+                shader.shader.uniform_int("first_instance", drawn.first)
             self.ribbon(drawn.capacity).draw_instanced(
-                shader, instance_start=0, instance_count=drawn.count
+                shader.shader, instance_start=0, instance_count=drawn.count
             )
 
-    def _bound(self, recipe: ShaderRecipe, images: Named, integers: Named) -> ShaderProgram:
-        own = {**self.integers, **integers}
-        shader = program(recipe)
-        shader.bind(
-            blocks={name: self.blocks[name] for _, name in recipe.blocks},
-            textures={name: self.textures[name] for _, name in recipe.textures},
-            images={name: images[name] for _, name, *_ in recipe.images},
-            integers={name: own[name] for name in recipe.integers},
-            numbers={name: self.numbers[name] for _, name in recipe.numbers},
-        )
-        return shader
+    def _bound(
+        self,
+        recipe: ShaderRecipe,
+        features: Sequence[ShaderFeature],
+        images: Mapping[str, Any],
+        integers: Mapping[str, int],
+    ) -> ShaderProgram:
+        own = {name: images[name] for _, name, *_ in recipe.images}
+        return bound(recipe, features, self.blocks, images=own, integers=integers)

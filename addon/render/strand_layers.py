@@ -20,17 +20,36 @@ from typing import Any
 import gpu
 import numpy as np
 
-from .shader_program import ShaderProgram, program, released_with_shaders
+from ..shading.volume.transparency import LAYERS
+from .shader_program import ShaderProgram, ShaderRecipe, program, released_with_shaders
 from .shader_source import LAYER_ROW
 from .strand_drawing import StrandDrawing
-from .strand_recipe import DONE_RECIPE, ORDER_RECIPE
 from .textures import drawing_state
 
 #: rows of nodes at first, and at most: 32 Mi fragments, 640 MiB. What comes after that is missing:
 #: the farthest, since near strands are drawn first.
-FIRST_ROWS, MOST_ROWS = 256, 8192
+FIRST_ROWS, MAX_ROWS = 256, 8192
 #: a count that turned out too small is made this much larger than what was found
 _SPARE = 1.25
+
+_ORDER_RECIPE = ShaderRecipe(
+    name="strand_layers_order",
+    compute="strand_layers_order.comp.glsl",
+    images=(
+        ("R32UI", "layer_count", "READ_WRITE"),
+        ("R32UI", "layer_heads", "READ_WRITE"),
+        ("R32UI", "layer_pixels", "READ"),
+        ("RGBA32UI", "layer_nodes", "READ_WRITE"),
+        ("R32UI", "layer_seen"),
+        ("RG32F", "layer_fronts"),
+    ),
+    integers=("pixel_count",),
+    group_size=(64, 1),
+    defines=(("LAYERS", LAYERS),),
+)
+_DONE_RECIPE = ShaderRecipe(
+    name="strand_layers_done", compute="strand_layers_done.comp.glsl", group_size=(1, 1)
+)
 
 
 class StrandLayers:
@@ -62,9 +81,9 @@ class StrandLayers:
         if not pixel_count:
             return
         images = self._images
-        order = program(ORDER_RECIPE)
+        order = program(_ORDER_RECIPE)
         order.bind(
-            images={name: images[name] for _, name, *_ in ORDER_RECIPE.images},
+            images={name: images[name] for _, name, *_ in _ORDER_RECIPE.images},
             integers={"pixel_count": pixel_count},
         )
         _dispatch(order, pixel_count, self._pixels.width)
@@ -84,14 +103,14 @@ class StrandLayers:
         # adds nothing to the colours; with the colour mask off, drivers skip such a draw
         with drawing_state(depth_write=False, blend="ADDITIVE_PREMULT"):
             drawing.gather(self._images, capacity)
-        done = program(DONE_RECIPE)
+        done = program(_DONE_RECIPE)
         done.bind()
         gpu.compute.dispatch(done.shader, 1, 1, 1)
         gpu.shader.unbind()
         found, _, _ = self._counts()
-        if found <= capacity or self._nodes.height == MOST_ROWS:
+        if found <= capacity or self._nodes.height == MAX_ROWS:
             return True
-        self._make_nodes(min(int(found * _SPARE) // LAYER_ROW + 1, MOST_ROWS))
+        self._make_nodes(min(int(found * _SPARE) // LAYER_ROW + 1, MAX_ROWS))
         return False
 
     def _counts(self) -> tuple[int, int, int]:

@@ -11,7 +11,7 @@ How many pieces each segment has comes from detail_pass.py, unless all have equa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,25 +20,28 @@ import numpy as np
 
 from ..arrays import Floats
 from ..params.glsl import struct_values
-from ..shading.lights import kept_lights, kinds_needed, pack_lights
-from ..shading.marschner.look import pack_fibre
+from ..shading.lights import kept_lights
 from ..shading.strand_noise import SEED_LIMIT
 from ..shading.volume.light_frame import Ball
 from .camera import Camera
-from .detail_pass import DetailOrder, DetailPass
+from .detail_pass import DetailPass
 from .display import Display
 from .hair_ball import HairBall
 from .hair_between import NOBODY, HairBetween
-from .marschner_textures import MARSCHNER
-from .opacity_pass import OpacityMaps, OpacityPass
+from .marschner_textures import marschner_feature, scattering_feature
+from .opacity_maps import OpacityMaps
+from .opacity_pass import OpacityPass
+from .shader_feature import ShaderFeature, UniformBlocks
 from .shader_program import released_with_shaders
-from .shader_source import ShaderError, output_index
+from .shader_source import DEBUG_VIEWS, ShaderError, output_index
 from .snapshot import Snapshot
 from .strand_drawing import StrandDrawing
 from .strand_layers import LAYERS_OF_PIXELS
-from .strand_recipe import NUMBERED_VIEWS, StrandShading
-from .textures import UniformBlock, drawing_state, strand_rows, texture_from
-from .view_block import view_values
+from .textures import drawing_state, strand_rows, texture_from
+from .view_block import lights_feature, view_feature
+
+#: debug views that show a number of each strand
+NUMBERED_VIEWS = ("guide", "group")
 
 
 @dataclass(frozen=True)
@@ -104,21 +107,26 @@ class StrandPass:
         order = self._detail.order(snapshot, points, serial, camera, size)
         if not order.classes:
             return
-        drawing = self._drawing(
-            snapshot,
-            order,
-            display,
-            others,
-            view=view_values(camera, width, height),
-            integers={"output_encoding": output_encoding, "samples_across": samples},
-        )
         is_debug = snapshot.debug_view != "none"
-        way = "none" if is_debug else snapshot.strand_settings.transparency
-        if way == "layers":
+        drawing = StrandDrawing(
+            order=order,
+            ribbon=self._ribbon,
+            blocks=self._blocks,
+            points=(view_feature(camera, width, height), self._points_feature(snapshot)),
+            shading=tuple(self._shading(snapshot, others)),
+            shown=(
+                *(() if display is None else (display.feature,)),
+                *((self._debug_feature(snapshot.debug_view),) if is_debug else ()),
+            ),
+            output_encoding=output_encoding,
+            samples_across=samples,
+        )
+        transparency = "none" if is_debug else snapshot.strand_settings.transparency
+        if transparency == "layers":
             LAYERS_OF_PIXELS.draw(drawing)
         else:
             with drawing_state():
-                drawing.draw(is_hashed=way == "hashed")
+                drawing.draw(is_hashed=transparency == "hashed")
         self.statistics = Statistics(
             strands=sum(drawn.count for drawn in order.classes),
             pieces=order.pieces,
@@ -153,8 +161,7 @@ class StrandPass:
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
-        names = ("view", "lights", "strands", "shading", "fibre", "opacity")
-        self._blocks = {name: UniformBlock() for name in names}
+        self._blocks = UniformBlocks()
         self._opacity.release()
         self._ball, self._between = HairBall(), HairBetween()
         self._textures: dict[str, Any] = {}
@@ -162,71 +169,61 @@ class StrandPass:
         self._ribbons: dict[int, Any] = {}
         self._detail.release()
 
-    def _drawing(
-        self,
-        snapshot: Snapshot,
-        order: DetailOrder,
-        display: Display | None,
-        others: Sequence[OpacityMaps],
-        *,
-        view: Floats,
-        integers: dict[str, int],
-    ) -> StrandDrawing:
-        """All that any program of this draw may bind."""
-        shading, debug_view = snapshot.shading, snapshot.debug_view
-        model = shading.model if debug_view == "none" else "kajiya_kay"
-        maps = self.opacity(snapshot) if debug_view == "none" else None
-        scatters = maps is not None and model == "marschner" and snapshot.volume.scattering
-        blocks = {
-            "view": view,
-            "lights": pack_lights(snapshot.lights, snapshot.ambient),
-            "strands": struct_values(snapshot.strand_settings.as_drawn),
-            "shading": struct_values(shading),
-        }
-        textures = dict(self._textures)
-        numbers: dict[str, Any] = {"volume_center": snapshot.center.tolist()}
-        if order.factors is not None:
-            textures |= {"order": order.order, "factors": order.factors}
-        if model == "marschner":
-            blocks["fibre"] = pack_fibre(shading)
-            textures |= MARSCHNER.of(shading, snapshot.table_size)
-        if scatters:
-            textures |= MARSCHNER.shares(shading, snapshot.table_size)
-            numbers["scatter_density"] = snapshot.volume.density
-            numbers["skin_color"] = snapshot.skin_color
-        if maps is not None:
-            blocks["opacity"] = maps.values
-            textures |= maps.textures
-        has_others = maps is not None and bool(others)
-        if has_others:
-            grooms = [(NOBODY, other) for other in others]
-            textures["cv_between"] = self._between.at(
-                textures["cv_points"], self._points_serial, grooms, len(snapshot.lights)
-            )
-        if display is not None:
-            textures["display_table"] = display.table.texture
-            numbers["display_shaper"] = display.shaper
-        return StrandDrawing(
-            order=order,
-            shading=StrandShading(
-                model=model,
-                debug_view=debug_view,
-                has_display=display is not None,
-                opacity=None if maps is None else maps.form,
-                scatters=scatters,
-                light_kinds=kinds_needed(kept_lights(snapshot.lights)),
-                has_others=has_others,
-            ),
-            ribbon=self._ribbon,
-            blocks={name: self._blocks[name].holding(blocks[name]) for name in blocks},
-            textures=textures,
-            integers={
-                **integers,
-                "cv_count": snapshot.cv_count,
-                "subdivisions": order.subdivisions,
-                "first_instance": 0,
+    def _points_feature(self, snapshot: Snapshot) -> ShaderFeature:
+        """What all programs that know where strands are have."""
+        return ShaderFeature(
+            blocks={
+                "strands": ("StrandSettings", struct_values(snapshot.strand_settings.as_drawn))
             },
-            numbers=numbers,
+            textures={"cv_points": ("FLOAT_2D", self._textures["cv_points"])},
+            integers={"cv_count": snapshot.cv_count},
+        )
+
+    def _shading(
+        self, snapshot: Snapshot, others: Sequence[OpacityMaps]
+    ) -> Iterator[ShaderFeature]:
+        """What all programs that shade these strands have.
+
+        A debug view has no model: it is the same with either.
+        """
+        yield ShaderFeature(
+            textures={"cv_looks": ("FLOAT_2D", self._textures["cv_looks"])},
+            blocks={"shading": ("ShadingSettings", struct_values(snapshot.shading))},
+            numbers={"volume_center": ("VEC3", snapshot.center.tolist())},
+        )
+        yield lights_feature(snapshot)
+        if snapshot.debug_view != "none":
+            return
+        is_marschner, maps = snapshot.shading.model == "marschner", self.opacity(snapshot)
+        if is_marschner:
+            yield marschner_feature(snapshot)
+        if maps is None:
+            return
+        yield maps.feature
+        if is_marschner and snapshot.volume.scattering:
+            yield scattering_feature(snapshot)
+        if others:
+            yield self._between_feature(others, len(snapshot.lights))
+
+    def _between_feature(self, others: Sequence[OpacityMaps], light_count: int) -> ShaderFeature:
+        """What a program has that knows of more hair in the way than its maps hold, by CV."""
+        points, grooms = self._textures["cv_points"], [(NOBODY, other) for other in others]
+        between = self._between.at(points, self._points_serial, grooms, light_count)
+        return ShaderFeature(
+            name="others",
+            textures={"cv_between": ("FLOAT_2D", between)},
+            varyings=(("smooth", "VEC4", "strand_between"),),
+            defines={"OTHERS": 1},
+        )
+
+    def _debug_feature(self, debug_view: str) -> ShaderFeature:
+        """What a program has that shows a debug view."""
+        numbers = {"debug_numbers": ("FLOAT_2D", self._textures.get("debug_numbers"))}
+        return ShaderFeature(
+            name=debug_view,
+            textures=numbers if debug_view in NUMBERED_VIEWS else {},
+            varyings=(("flat", "INT", "strand_index"),),
+            defines={"DEBUG": DEBUG_VIEWS.index(debug_view)},
         )
 
     def _upload(self, snapshot: Snapshot) -> None:

@@ -1,15 +1,33 @@
-"""The uniform block `View` that every drawing shader shares (struct_view.glsl)."""
+"""What drawing shaders share: the blocks `View` and `Lights`."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..arrays import Floats
+from ..shading.lights import kept_lights, kinds_needed, pack_lights
 from .camera import Camera
+from .shader_feature import ShaderFeature
+from .snapshot import Snapshot
+
+
+def view_feature(camera: Camera, width: int, height: int) -> ShaderFeature:
+    """The block `View` for a target of so many pixels."""
+    return ShaderFeature(blocks={"view": ("View", view_values(camera, width, height))})
+
+
+def lights_feature(snapshot: Snapshot) -> ShaderFeature:
+    """The block `Lights`, and what kinds of them a program has to know."""
+    kinds = kinds_needed(kept_lights(snapshot.lights))
+    return ShaderFeature(
+        name=str(kinds),
+        blocks={"lights": ("Lights", pack_lights(snapshot.lights, snapshot.ambient))},
+        defines={"LIGHT_KINDS": kinds},
+    )
 
 
 def view_values(camera: Camera, width: int, height: int) -> Floats:
-    """`View` in std140, (40,) float32; GLSL's matrices are stored by columns.
+    """`View` of struct_view.glsl in std140, (40,) float32; GLSL's matrices are stored by columns.
 
     Args:
         width, height: of the target [pixels].

@@ -137,7 +137,7 @@ def painted(frame: Any, cards: list[Any], view: Any, textures: HairTextures) -> 
 def test_states_are_those_of_the_paper(
     frame: Any, monkeypatch: Any, scheme: str, model: str
 ) -> None:
-    """What the GPU is told, at the moment of each draw, with `skip_clear` as the paper has it."""
+    """The state that is set at each draw, with `skip_clear` as the paper has it."""
     from hairloom.addon.render import card_pass
 
     now: dict[str, Any] = {}
@@ -157,13 +157,14 @@ def test_states_are_those_of_the_paper(
             drawn.append(dict(now))
 
     programs = []
-    real_program = card_pass.program
+    real_bound = card_pass.bound
 
-    def program(recipe: Any) -> Any:
-        programs.append(recipe)
-        return real_program(recipe)
+    def bound(*given: Any, **own: Any) -> Any:
+        shader = real_bound(*given, **own)
+        programs.append(shader.recipe)
+        return shader
 
-    monkeypatch.setattr(card_pass, "program", program)
+    monkeypatch.setattr(card_pass, "bound", bound)
     monkeypatch.setattr(card_pass.CardBatches, "of", lambda *_: {"front": Batch(), "back": Batch()})
     shading = dataclasses.replace(LOOK["shading"], model=model)
     drawing = CardDrawingSettings(passes=scheme, skip_clear=False)

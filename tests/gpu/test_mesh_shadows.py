@@ -83,7 +83,7 @@ def found_light(
             name: np.pad(values, ((0, 0), (0, 1)))[None].astype(np.float32)
             for name, values in textures.items()
         },
-        blocks={"mesh_shadows": ("MeshShadows", maps.values_of(0))},
+        blocks={"mesh_shadows": maps.feature(0).blocks["mesh_shadows"]},
         samplers={"mesh_depths": ("DEPTH_2D_ARRAY", maps.depths)},
         structs=("struct_mesh_shadows.glsl",),
     )[0, :, :2]
@@ -160,12 +160,16 @@ def test_an_edge_lies_where_it_should(
 def test_samples_of_a_picture_ask_places_all_around(gpu_context: Any) -> None:
     """So that the mean of them has smooth edges: within a texel to each side, each way alike."""
     maps = maps_of((ground(), box((0.0, 0.0, 0.5), 1.0)), (LIGHTS["sun"],))
-    shifts = np.array([maps.values_of(sample)[-4:-2] for sample in range(64)])
+    shifts = np.array(
+        [maps.feature(sample).blocks["mesh_shadows"][1][-4:-2] for sample in range(64)]
+    )
     assert np.abs(shifts).max() <= 1.0
     for across in (-1.0, 1.0):
         for upward in (-1.0, 1.0):
             assert 12 <= ((shifts * (across, upward)) > 0.0).all(axis=1).sum() <= 20
-    rest = [np.delete(maps.values_of(sample), [-4, -3]) for sample in (0, 5)]
+    rest = [
+        np.delete(maps.feature(sample).blocks["mesh_shadows"][1], [-4, -3]) for sample in (0, 5)
+    ]
     np.testing.assert_array_equal(*rest)
 
 

@@ -138,15 +138,14 @@ def spans_of(maps: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def path_at(compute: Callable[..., np.ndarray], maps: Any, points: np.ndarray) -> np.ndarray:
     """What the shader finds, (n, 3)."""
-    samplers = {name: (kind, maps.textures[name]) for kind, name in maps.form.samplers}
     return compute(
         "light_path.glsl",
         (len(points), 1),
         textures={"points": np.pad(points, ((0, 0), (0, 1)))[None].astype(np.float32)},
         blocks={"opacity": ("Opacity", maps.values)},
-        samplers=samplers,
+        samplers=maps.feature.textures,
         structs=("struct_opacity.glsl",),
-        defines=maps.form.defines,
+        defines=tuple(maps.feature.defines.items()),
     )[0, :, :3]
 
 
@@ -342,7 +341,7 @@ def test_hair_that_moves_keeps_its_textures(gpu_context: Any) -> None:
         light = (LIGHTS["sun"],)
         maps = opacity.maps(moved, serial, strands.shape[:2], ball, light, settings, PLAIN)
         kept.append(maps)
-        return set(map(id, maps.textures.values()))
+        return {id(texture) for _, texture in maps.feature.textures.values()}
 
     kept: list[Any] = []
     first = textures(0, 32)

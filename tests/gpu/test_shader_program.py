@@ -31,9 +31,11 @@ def test_compile_error_names_our_file_and_line(recipes: Any, capfd: Any) -> None
 
 
 def test_each_recipe_is_compiled_once(recipes: Any) -> None:
-    from hairloom.addon.render.strand_recipe import strand_recipe
+    from dataclasses import replace
 
-    first, again = (recipes.program(strand_recipe(is_adaptive=False)) for _ in range(2))
+    from hairloom.addon.render.frame import _BOX_RECIPE
+
+    first, again = (recipes.program(replace(_BOX_RECIPE)) for _ in range(2))
     assert first is again
 
 
@@ -84,9 +86,9 @@ def test_an_unknown_access_is_refused(recipes: Any) -> None:
 
 
 def test_release_forgets_all_and_shaders_come_back(recipes: Any) -> None:
-    from hairloom.addon.render.mesh_recipe import MeshForm
+    from hairloom.addon.render.frame import _BOX_RECIPE
 
-    before = recipes.program(MeshForm().recipe)
+    before = recipes.program(_BOX_RECIPE)
     recipes.release()
     recipes.release()
-    assert recipes.program(MeshForm().recipe) is not before
+    assert recipes.program(_BOX_RECIPE) is not before
