@@ -1,0 +1,75 @@
+"""Figures of the house: arrows, circles, what changes, dead code, words, how long checks take.
+
+They come from the tree itself, and the minutes from out/timings.json, where `make test`, `.ci/run`
+and tools/load_runs.py leave them; `--run` runs these three first, which takes hours. What has not
+been measured is null. Exit code 1: a limit is missed.
+
+make bench NAME=house
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+
+import house_rules as house
+import words
+from timings import timings
+
+from hairloom.addon.parameters import ALL_SETTINGS
+
+RUNS = 10
+#: figure -> the most that it may be
+LIMITS = {
+    "arrows_up": 0,
+    "import_circles": 0,
+    "module_mutable_names": house.MOST_MUTABLE_WANTED,
+    "names_used_by_tests_only": 0,
+    "sections_to_touch_for_a_setting": 1,
+    "retired_terms": 0,
+    "ci_minutes": 25,
+    "test_minutes": 8,
+}
+
+
+def figures() -> dict[str, float | None]:
+    taken = timings()
+    return {
+        "arrows_up": len(house.arrows_up()),
+        "import_circles": int(bool(house.import_circle())),
+        "module_mutable_names": len(house.mutable_names()),
+        "names_used_by_tests_only": len(house.unused_names()),
+        "sections_to_touch_for_a_setting": 1 + len(house.files_that_list_sections([*ALL_SETTINGS])),
+        "addon_lines": house.addon_lines(),
+        "retired_terms": sum(words.amount(found) for found in words.uses().values()),
+        "ci_minutes": taken.get("ci_minutes"),
+        "test_minutes": taken.get("test_minutes"),
+        "load_runs_passed": taken.get("load_runs_passed"),
+    }
+
+
+def missed(found: dict[str, float | None]) -> list[str]:
+    """The figures that are not as they have to be."""
+    above = [name for name, limit in LIMITS.items() if (found[name] or 0) > limit]
+    passed = found["load_runs_passed"]
+    return above + ["load_runs_passed"] * (passed is not None and passed < RUNS)
+
+
+def run() -> None:
+    for command in (["make", "test"], [".ci/run"], [sys.executable, "tools/load_runs.py"]):
+        subprocess.run(command, cwd=house.REPOSITORY, check=False, stdout=sys.stderr)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="house", description=__doc__)
+    parser.add_argument("--run", action="store_true", help="measure the minutes now")
+    if parser.parse_args().run:
+        run()
+    found = figures()
+    print(json.dumps(found | {"missed": missed(found)}, indent=1))
+    return int(bool(missed(found)))
+
+
+sys.exit(main())

@@ -1,0 +1,303 @@
+"""Reads the tree: rooms and their arrows, circles, tables that change, names that nobody calls.
+
+tests/pure/test_house.py holds the rules; bench/house.py prints the figures.
+"""
+
+from __future__ import annotations
+
+import ast
+import graphlib
+import re
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+ADDON = REPOSITORY / "addon"
+BLENDER = {"bpy", "bmesh", "bpy_extras", "addon_utils", "blf", "imbuf", "mathutils"}
+
+#: modules that stand beside the rooms: the ground floor, and the flows over the pure rooms
+GROUND = {"errors", "arrays"}
+PURE = {"params", "strands", "groom", "dynamics", "refine", "shading", "cards", "exchange"}
+FLOWS = {"pipeline", "card_flow", "parameters"}
+
+#: The rooms of blender/, in the order of the data: properties say what is read from the scene with
+#: its colliders and bakes; cards and strands leave it; a session moves it, the viewport shows it,
+#: the preview keeps both in step with Blender; pictures and the engine draw it; setup begins with
+#: it, and the command line calls it all.
+BLENDER_ROOMS = (
+    "base",
+    "properties",
+    "scene",
+    "colliders",
+    "bakes",
+    "cards",
+    "strands",
+    "sessions",
+    "viewport",
+    "preview",
+    "pictures",
+    "engine",
+    "setup",
+    "command_line",
+)
+
+#: room -> what it may import, beside itself, the ground floor, the standard library and numpy
+MAY_IMPORT: dict[str, set[str]] = {
+    "errors": set(),
+    "arrays": set(),
+    "params": set(),
+    "strands": {"params"},
+    "groom": {"params", "strands"},
+    "dynamics": {"params", "strands"},
+    "refine": {"params", "strands"},
+    "shading": {"params", "strands"},
+    "cards": {"params", "strands"},
+    "exchange": {
+        "params",
+        "strands",
+        "cards",
+        "OpenImageIO",
+        "etcpak",
+        "alembic3d",
+        "imath",
+        "pxr",
+    },
+    "pipeline": PURE,
+    "card_flow": PURE | {"pipeline"},
+    "parameters": PURE,
+    "render": PURE | {"gpu"},
+    **{f"blender.{room}": PURE | FLOWS | {"render", "gpu"} | BLENDER for room in BLENDER_ROOMS},
+    "ui": {"params", "parameters", "strands", "blender"} | BLENDER,
+    "registration": {"blender", "ui"} | BLENDER,
+    "__init__": {"registration"},
+}
+
+
+def module_name(file: Path, addon: Path = ADDON) -> str:
+    return ".".join(file.relative_to(addon).with_suffix("").parts)
+
+
+def room_of(name: str) -> str:
+    """The first part of a dotted name, in blender/ the first two."""
+    first, *rest = name.lstrip(".").split(".")
+    return f"blender.{rest[0]}" if first == "blender" and rest and rest[0] else first
+
+
+def arrow_back(room: str, target: str) -> str:
+    """Why a room of blender/ may not import another; empty where it may, or is none."""
+    one, other = (name.removeprefix("blender.") for name in (room, target))
+    if not (room.startswith("blender.") and target.startswith("blender.")):
+        return ""
+    if BLENDER_ROOMS.index(other) <= BLENDER_ROOMS.index(one):
+        return ""
+    return f"{other} stands after {one} in the order of the rooms: move what both need down"
+
+
+def imports_of(file: Path, addon: Path = ADDON) -> Iterator[tuple[int, str]]:
+    """(line, name) of each import; a name inside the add-on starts with a dot."""
+    package = file.relative_to(addon).parent.parts
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield node.lineno, node.module or ""
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - (node.level - 1)]
+            module = [*base, *(node.module.split(".") if node.module else [])]
+            yield from ((node.lineno, "." + ".".join([*module, a.name])) for a in node.names)
+
+
+def violations(addon: Path) -> list[str]:
+    """Every import that the table above does not allow."""
+    found = []
+    for file in sorted(addon.rglob("*.py")):
+        room = room_of(module_name(file, addon))
+        if room == "blender.__init__":
+            continue  # empty
+        allowed = MAY_IMPORT[room] | GROUND | {room}
+        for line, name in imports_of(file, addon):
+            target = room_of(name)
+            if why := arrow_back(room, target):
+                found.append(f"{file.relative_to(addon)}:{line} imports {name}: {why}")
+                continue
+            if target.startswith("blender.") and room.startswith("blender."):
+                continue
+            target = target.partition(".")[0]
+            external = target in sys.stdlib_module_names or target == "numpy"
+            if target not in allowed and (name.startswith(".") or not external):
+                found.append(f"{file.relative_to(addon)}:{line} imports {name}")
+    return found
+
+
+def arrows_up(addon: Path = ADDON) -> list[str]:
+    """Imports within blender/ from a room that comes later."""
+    return [each for each in violations(addon) if "in the order of the rooms" in each]
+
+
+def import_graph(addon: Path) -> dict[str, set[str]]:
+    """Module -> modules of the add-on that it imports."""
+    modules = {module_name(file, addon): file for file in addon.rglob("*.py")}
+    graph: dict[str, set[str]] = {}
+    for module, file in modules.items():
+        names = [name.lstrip(".") for _, name in imports_of(file, addon) if name.startswith(".")]
+        graph[module] = {
+            candidate
+            for name in names
+            for candidate in (name, name.rpartition(".")[0])
+            if candidate in modules and candidate != module
+        }
+    return graph
+
+
+def import_circle(addon: Path = ADDON) -> list[str]:
+    """The modules of a circle of imports; empty where there is none."""
+    try:
+        list(graphlib.TopologicalSorter(import_graph(addon)).static_order())
+    except graphlib.CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+@cache
+def _tree(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+#: what changes a list, a dict or a set
+_CHANGING = {"append", "add", "update", "pop", "popitem", "clear", "discard", "remove", "extend"}
+_CHANGING |= {"setdefault", "insert", "difference_update", "appendleft", "popleft", "subtract"}
+
+
+#: Names that modules may change, at most; and the aim. The first may only fall.
+MOST_MUTABLE, MOST_MUTABLE_WANTED = 48, 20
+
+
+def mutable_names(addon: Path = ADDON) -> list[str]:
+    """Names of modules that functions bind again or whose contents they change."""
+    found = []
+    for file in sorted(addon.rglob("*.py")):
+        changed: set[str] = set()
+        for node in ast.walk(_tree(file)):
+            if isinstance(node, ast.Global):
+                changed.update(node.names)
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                if node.func.attr in _CHANGING and isinstance(node.func.value, ast.Name):
+                    changed.add(node.func.value.id)
+            elif isinstance(node, ast.Subscript) and not isinstance(node.ctx, ast.Load):
+                if isinstance(node.value, ast.Name):
+                    changed.add(node.value.id)
+            elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
+                changed.add(node.target.id)
+        found += [f"{file.relative_to(addon)}: {name}" for name in sorted(changed & _bound(file))]
+    return found
+
+
+def _bound(file: Path) -> set[str]:
+    """Names that the module itself binds, and none that a function has for itself."""
+    bound: set[str] = set()
+    own: set[str] = set()
+    for node in _tree(file).body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        bound.update(each.id for each in targets if isinstance(each, ast.Name))
+    for node in ast.walk(_tree(file)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            shared = {
+                n for each in ast.walk(node) if isinstance(each, ast.Global) for n in each.names
+            }
+            arguments = node.args
+            own.update(
+                a.arg for a in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)
+            )
+            own.update(
+                each.id
+                for each in ast.walk(node)
+                if isinstance(each, ast.Name)
+                and isinstance(each.ctx, ast.Store)
+                and each.id not in shared
+            )
+    return bound - own
+
+
+#: what Blender itself calls, by name
+_OF_BLENDER = {
+    "bake",
+    "check",
+    "description",
+    "draw",
+    "draw_header",
+    "draw_header_preset",
+    "execute",
+}
+_OF_BLENDER |= {
+    "invoke",
+    "modal",
+    "cancel",
+    "poll",
+    "poll_drop",
+    "register",
+    "unregister",
+    "render",
+}
+_OF_BLENDER |= {"update", "update_render_passes", "view_draw", "view_update", "filter_items"}
+_OF_BLENDER |= {"update_script_node", "draw_item"}
+
+
+def unused_names(repository: Path = REPOSITORY) -> list[str]:
+    """Functions, classes and methods that nothing in the add-on uses.
+
+    What a shader has under the same name is wanted, and so are references: shaders and fast code
+    are tested against them.
+    """
+    addon = repository / "addon"
+    used: Counter[str] = Counter()
+    defined: list[tuple[str, str]] = []
+    for file in sorted(addon.rglob("*.py")):
+        for node in ast.walk(_tree(file)):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                defined.append((node.name, f"{file.relative_to(repository)}:{node.lineno}"))
+            elif isinstance(node, ast.Name):
+                used[node.id] += 1
+            elif isinstance(node, ast.Attribute):
+                used[node.attr] += 1
+            elif isinstance(node, ast.alias) and node.asname:
+                used[node.name] += 1
+            elif isinstance(node, ast.keyword) and node.arg:
+                used[node.arg] += 1
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                used.update(re.findall(r"\w+", node.value) if len(node.value) < 200 else ())
+    shaders = " ".join(file.read_text() for file in (repository / "gpu_shaders").rglob("*.glsl"))
+    defined = [(name, place) for name, place in defined if "reference" not in place]
+    of_shaders = set(re.findall(r"\w+", shaders)) | _OF_BLENDER | set(WANTED)
+    return [
+        f"{place} {name}"
+        for name, place in defined
+        if not used[name] and name.lstrip("_") not in of_shaders and not name.startswith("__")
+    ]
+
+
+#: unused names that stay, each for its reason
+WANTED = {
+    "detail_factors": "what the pieces drawn by shaders are tested against",
+    "points_at": "what the points drawn by shaders are tested against",
+}
+
+
+def files_that_list_sections(sections: list[str], addon: Path = ADDON) -> list[str]:
+    """Files that name nearly all sections of settings: a new one would have to be named there."""
+    found = []
+    for file in sorted(addon.rglob("*.py")):
+        named = {
+            node.value if isinstance(node, ast.Constant) else node.attr
+            for node in ast.walk(_tree(file))
+            if isinstance(node, ast.Constant | ast.Attribute)
+        }
+        if len(named.intersection(sections)) > 0.6 * len(sections):
+            found.append(str(file.relative_to(addon)))
+    return found
+
+
+def addon_lines(addon: Path = ADDON) -> int:
+    return sum(len(file.read_text(encoding="utf-8").splitlines()) for file in addon.rglob("*.py"))
