@@ -56,7 +56,7 @@ def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
 
 
 def shade_of(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardShade:
-    """What shades others in the place of this groom's strands, world space."""
+    """What shades others instead of this groom's strands, world space."""
     return strand_shade(card_groom(rig, drawn))
 
 

@@ -24,7 +24,7 @@ from hairloom.addon.render.textures import drawing_into
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
-from hairloom.addon.shading.volume.transparency import layer_shares, strip_coverage
+from hairloom.addon.shading.volume.transparency import layer_fractions, strip_coverage
 
 SIZE, RIBBONS, WIDTH_OF, OPACITY = 128, 500, 2.5, 0.7
 WIDTH, HEIGHT, STRANDS, POINTS, RADIUS = 800, 600, 4_095, 30, 0.003
@@ -106,7 +106,7 @@ def sorted_picture(strands: np.ndarray, brightness: np.ndarray, camera: Camera) 
     alphas[(share < 0.0) | (share > 1.0)] = 0.0
     colors = np.broadcast_to(brightness[:, None], (*alphas.shape, 3))
     depths = between(clip[..., 2] / clip[..., 3])
-    shares = layer_shares(depths, alphas, layers=RIBBONS, unseen_share=0.0)
+    shares = layer_fractions(depths, alphas, layers=RIBBONS, unseen_share=0.0)
     light = np.einsum("pn,pnc->pc", shares, colors)
     exact = np.column_stack([light, 1.0 - np.prod(1.0 - alphas, axis=-1)])
     return exact.reshape(SIZE, SIZE, 4)

@@ -1,7 +1,7 @@
 // Hair's shadow on meshes that Blender has drawn: how much of the light hair leaves, as black that
 // lies over the finished picture.
 //
-// What a colour of the picture becomes hangs on its view transform; a middle grey stands for all.
+// What a colour of the picture becomes depends on its view transform; a middle grey stands for all.
 #include "lib_lights.glsl"
 #include "lib_shadows.glsl"
 #include "lib_output.glsl"

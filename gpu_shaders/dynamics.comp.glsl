@@ -90,7 +90,7 @@ void predict(vec4 moment, vec3 air_way)
       before = braked(here, before, frame.drag, air_way);
     }
     vec3 impulse = style_way[i + 2] * moment.z + style_bow[i + 2] * moment.w;
-    impulse += fall[i] + air_way * frame.air_share;
+    impulse += fall[i] + air_way * frame.air_fraction;
     position[i + 2] = (here - before) * frame.kept + here + impulse;
     previous[i + 2] = here;
   }

@@ -2,9 +2,9 @@
 //
 // Twin of addon/shading/volume/transparency.py. Holds no resources.
 
-// The share of a pixel that lies below a line, whose distance from the pixel's centre is `distance`,
+// The fraction of a pixel that lies below a line, whose distance from the pixel's centre is `distance`,
 // positive above it. `normal` is the line's unit normal without its signs.
-float share_below(float distance, vec2 normal)
+float fraction_below(float distance, vec2 normal)
 {
   float wide = max(normal.x, normal.y), narrow = min(normal.x, normal.y);
   float inner = 0.5 * (wide - narrow), reach = 0.5 * (wide + narrow);
@@ -18,10 +18,10 @@ float share_below(float distance, vec2 normal)
 // the pixel's centre [pixels].
 float strip_coverage(float distance, float half_width, vec2 normal)
 {
-  return share_below(distance + half_width, normal) - share_below(distance - half_width, normal);
+  return fraction_below(distance + half_width, normal) - fraction_below(distance - half_width, normal);
 }
 
-// How far beyond its edge a strip reaches pixels' centres that it covers a share of [pixels].
+// How far beyond its edge a strip reaches pixels' centres that it covers a fraction of [pixels].
 float coverage_reach(vec2 normal)
 {
   return 0.5 * (abs(normal.x) + abs(normal.y));

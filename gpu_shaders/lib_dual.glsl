@@ -8,8 +8,8 @@
 #include "lib_marschner.glsl"
 
 const float DUAL_SMALLEST = 1.0e-6;
-const float DUAL_MOST = 0.999, DUAL_MOST_KEPT = 0.9999;
-const float DUAL_LEAST_LIGHT = 1.0e-3, DUAL_DIFFUSIVITY = 1.66;
+const float DUAL_MAX = 0.999, DUAL_MAX_KEPT = 0.9999;
+const float DUAL_MIN_LIGHT = 1.0e-3, DUAL_DIFFUSIVITY = 1.66;
 
 // What a fibre sends on, or back, at cos theta_d, by colour and lobe.
 mat3x4 shares_at(sampler2D shares, float cos_d, vec3 absorption)
@@ -26,10 +26,10 @@ vec3 sum_of_lobes(mat3x4 lobes)
   return vec4(1.0) * lobes;
 }
 
-// What so many strands, one behind the other, give back of the light on the first.
+// What a number of strands, one behind the other, gives back of the light on the first.
 vec3 returned(vec3 a_forward, vec3 a_backward, float count)
 {
-  a_forward = clamp(a_forward, vec3(0.0), max(DUAL_MOST_KEPT - a_backward, 0.0));
+  a_forward = clamp(a_forward, vec3(0.0), max(DUAL_MAX_KEPT - a_backward, 0.0));
   vec3 middle = 1.0 + a_backward * a_backward - a_forward * a_forward;
   vec3 root = sqrt(max(middle * middle - 4.0 * a_backward * a_backward, 0.0));
   vec3 deep = 2.0 * a_backward / max(middle + root, DUAL_SMALLEST);
@@ -41,7 +41,7 @@ vec3 returned(vec3 a_forward, vec3 a_backward, float count)
 // x width and y shift of theta_h in what returns, z the width that one passage on adds.
 vec3 returned_shape(vec4 forward, vec4 backward, Fibre fibre)
 {
-  float a_f = min(dot(forward, vec4(1.0)), DUAL_MOST), a_b = dot(backward, vec4(1.0));
+  float a_f = min(dot(forward, vec4(1.0)), DUAL_MAX), a_b = dot(backward, vec4(1.0));
   float on = max(a_f, DUAL_SMALLEST), back = max(a_b, DUAL_SMALLEST);
   float wide_f = sqrt(dot(forward, fibre.widths * fibre.widths) / on);
   float wide_b = sqrt(dot(backward, fibre.widths * fibre.widths) / back);
@@ -84,7 +84,7 @@ vec3 dual_scattering(vec3 single,
                      float density)
 {
   float theta_h = 0.5 * (angles.x + angles.y);
-  float cos_d = max(cos(0.5 * (angles.y - angles.x)), LEAST_COSINE);
+  float cos_d = max(cos(0.5 * (angles.y - angles.x)), MIN_COSINE);
   float squared = cos_d * cos_d;
   vec3 a_f = sum_of_lobes(forward), a_b = sum_of_lobes(backward);
   vec3 straight = vec3(exp(-tau));
@@ -121,7 +121,7 @@ vec3 off_the_skin(float phi,
   facing = max(facing, 0.0);
   vec3 a_f = sum_of_lobes(forward), a_b = sum_of_lobes(backward);
   float strands = tau + beyond * (1.0 + DUAL_DIFFUSIVITY * facing);
-  vec3 kept = max(1.0 - skin * returned(a_f, a_b, beyond), 1.0 - DUAL_MOST);
+  vec3 kept = max(1.0 - skin * returned(a_f, a_b, beyond), 1.0 - DUAL_MAX);
   vec3 lit = skin * facing / (ANGLE_PI * kept);
   float cosine = cos(phi);
   vec3 onward = 0.5 * (a_f * (1.0 + cosine) + a_b * (1.0 - cosine));
@@ -129,7 +129,7 @@ vec3 off_the_skin(float phi,
 }
 
 // What one light sends to the eye from a strand among others: as marschner_light, of which it has
-// all but the colour that stands in for light from strand to strand.
+// all but the colour that replaces light from strand to strand.
 vec3 scattering_light(sampler3D longitudinal,
                       sampler2D azimuthal,
                       sampler2D paths,
@@ -157,7 +157,7 @@ vec3 scattering_light(sampler3D longitudinal,
   mat3x4 forward = shares_at(shares_forward, cos_d, absorption);
   mat3x4 backward = shares_at(shares_backward, cos_d, absorption);
   float straight = straight_light(normal, to_light, tau, shading);
-  float passed = tau < 0.0 ? -log(max(straight, DUAL_LEAST_LIGHT)) : tau;
+  float passed = tau < 0.0 ? -log(max(straight, DUAL_MIN_LIGHT)) : tau;
   vec3 scattered = dual_scattering(
       single, angles, forward, backward, passed, beyond, fibre, density);
   float facing = dot(normal, to_light);

@@ -61,7 +61,7 @@ void newton_step(bool has_normals)
   }
 }
 
-// Whether a segment is off by more than this share of its length; by squares, without a root.
+// Whether a segment is off by more than this fraction of its length; by squares, without a root.
 bool is_off_length(float tolerance)
 {
   float low = max(1.0 - tolerance, 0.0) * max(1.0 - tolerance, 0.0);
@@ -76,7 +76,7 @@ bool is_off_length(float tolerance)
   return is_off;
 }
 
-// Lay the guide out anew from the root, with its segments' directions; one with a held tip from the
+// Lay the guide out again from the root, with its segments' directions; one with a held tip from the
 // tip first.
 void lay_out()
 {

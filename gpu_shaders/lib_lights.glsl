@@ -12,8 +12,8 @@
 const float LIGHT_PI = 3.14159265358979;
 const float POINT_LIGHT = 1.0, SPOT_LIGHT = 2.0, RECTANGLE_LIGHT = 3.0, DISK_LIGHT = 4.0;
 const float ROUND_GRID_LIGHT = 6.0;
-// FAR and LEAST_HEIGHT of addon/shading/area_lights.py
-const float FAR_PANEL = 2.5e-3, LEAST_HEIGHT = 1.0e-6;
+// FAR and MIN_HEIGHT of addon/shading/area_lights.py
+const float FAR_PANEL = 2.5e-3, MIN_HEIGHT = 1.0e-6;
 // Gauss-Legendre, six nodes on -1 .. 1: these and their mirror images
 const vec3 PANEL_NODES = vec3(0.23861918608319692, 0.6612093864662645, 0.932469514203152);
 const vec3 PANEL_WEIGHTS = vec3(0.46791393457269104, 0.3607615730481386, 0.17132449237917036);
@@ -103,7 +103,7 @@ vec3 panel_grid(Lights lights, int index, bool is_round, vec3 offset)
   return total / (LIGHT_PI * 4.0 * a * b * (is_round ? 0.25 * LIGHT_PI : 1.0));
 }
 
-// Four points in the place of a panel far away, which lie as wide along each axis as it does.
+// Four points instead of a panel far away, which lie as wide along each axis as it does.
 vec3 panel_four_points(Lights lights, int index, bool is_round, vec2 half_sides, vec3 offset)
 {
   vec2 place = half_sides * (is_round ? 0.5 : 0.5773502691896257);
@@ -123,7 +123,7 @@ vec3 panel_vector_irradiance(Lights lights, int index, vec3 away)
 {
   mat3 axes = mat3(lights.across[index].xyz, lights.upward[index].xyz, lights.along[index].xyz);
   vec3 offset = -away * axes;
-  if (offset.z <= LEAST_HEIGHT) {
+  if (offset.z <= MIN_HEIGHT) {
     return vec3(0.0);
   }
   float form = lights.vector_and_kind[index].w;
@@ -143,7 +143,7 @@ vec3 panel_vector_irradiance(Lights lights, int index, vec3 away)
 }
 
 // What a spot's cone lets through; width is the squared sine of the angle that the light fills.
-float cone_share(Lights lights, int index, vec3 away, float width)
+float cone_fraction(Lights lights, int index, vec3 away, float width)
 {
   float x = -dot(lights.across[index].xyz, away), y = -dot(lights.upward[index].xyz, away);
   float ahead = dot(lights.along[index].xyz, away);
@@ -185,7 +185,7 @@ void light_at(Lights lights, int index, vec3 point, out vec3 to_light, out vec3 
   float squared = max(dot(away, away) + added, least);
   float let_through = 1.0;
   if (light.w == SPOT_LIGHT) {
-    let_through = cone_share(lights, index, away, min((added + least) / squared, 1.0));
+    let_through = cone_fraction(lights, index, away, min((added + least) / squared, 1.0));
   }
   irradiance *= let_through / (4.0 * LIGHT_PI * squared);
 #endif

@@ -8,10 +8,10 @@
 #include "lib_kajiya_kay.glsl"
 #include "lib_tint.glsl"
 
-// LEAST_COSINE of addon/shading/marschner/interface.py
-const float LEAST_COSINE = 1.0e-4;
-// _LEAST_VARIANCE of addon/shading/marschner/tables.py
-const float LEAST_VARIANCE = 1.0e-6;
+// MIN_COSINE of addon/shading/marschner/interface.py
+const float MIN_COSINE = 1.0e-4;
+// _MIN_VARIANCE of addon/shading/marschner/tables.py
+const float MIN_VARIANCE = 1.0e-6;
 
 // theta_i, theta_r and |phi| of unit vectors.
 vec3 directions_to_angles(vec3 tangent, vec3 to_light, vec3 to_eye)
@@ -44,7 +44,7 @@ float table_level(float angle, sampler3D longitudinal)
 // rise again, it stays at its lowest.
 mat4x3 kept_light(vec4 paths, vec3 absorption)
 {
-  vec3 reached = min(absorption, vec3(paths.y / max(paths.z, LEAST_VARIANCE)));
+  vec3 reached = min(absorption, vec3(paths.y / max(paths.z, MIN_VARIANCE)));
   return mat4x3(vec3(1.0),
                 exp(-absorption * paths.x),
                 exp(-reached * (paths.y - 0.5 * reached * paths.z)),
@@ -68,7 +68,7 @@ vec3 look_up(sampler3D longitudinal,
   vec4 clear = textureLod(azimuthal, place, 0.0);
   mat4x3 kept = kept_light(textureLod(paths, place, 0.0), absorption);
   vec4 factors = strengths * along.xyzz * clear;
-  float cos_d = max(along.w, LEAST_COSINE);
+  float cos_d = max(along.w, MIN_COSINE);
   return kept * factors / (cos_d * cos_d);
 }
 
@@ -76,7 +76,7 @@ vec3 look_up(sampler3D longitudinal,
 vec3 strand_absorption(
     Fibre fibre, float along, float color_noise, float grey_noise, ShadingSettings shading)
 {
-  vec3 mixed = mix(fibre.root.xyz, fibre.tip.xyz, tip_share(along, shading));
+  vec3 mixed = mix(fibre.root.xyz, fibre.tip.xyz, tip_fraction(along, shading));
   float amount = 1.0 + shading.color_variation * (1.0 - 2.0 * color_noise);
   vec3 grey = vec3(fibre.tip.w * dot(mixed, vec3(1.0 / 3.0)));
   return amount * (grey_noise < shading.grey_share ? grey : mixed);
@@ -117,7 +117,7 @@ float pixel_level(sampler3D longitudinal,
 }
 #endif
 
-// The share of light that no strand is in the way of: what passes tau strands, or, where tau is not
+// The fraction of light that no strand is in the way of: what passes tau strands, or, where tau is not
 // known, which is when it is negative, by how much the hair's volume faces the light.
 float straight_light(vec3 normal, vec3 to_light, float tau, ShadingSettings shading)
 {

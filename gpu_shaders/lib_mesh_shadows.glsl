@@ -42,7 +42,7 @@ vec3 mesh_slope(int map, vec3 place, vec3 normal)
   return vec3(slope / max(length(slope) / ({{steepest}} * unit), 1.0), unit);
 }
 
-// The share of a light that reaches a point. normal: of its triangle; its sign and its length count for
+// The fraction of a light that reaches a point. normal: of its triangle; its sign and its length count for
 // nothing.
 float mesh_light(int light, vec3 point, vec3 normal)
 {

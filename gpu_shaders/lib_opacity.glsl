@@ -9,7 +9,7 @@
 //   ------>   |-----------|---------|---------------|------->
 //             0          sum 0     sum 1           sum 2      what the map holds at each end; in
 //                                                             between tau is linear
-// Depth is counted from where a texel's layers start, in shares of how thick they are together.
+// Depth is counted from where a texel's layers start, in fractions of how thick they are together.
 
 // The layers whose sums a strand at this depth behind their start is part of: four of them.
 vec4 adds_to(float depth, vec4 ends)
@@ -17,7 +17,7 @@ vec4 adds_to(float depth, vec4 ends)
   return vec4(lessThanEqual(vec4(depth), ends));
 }
 
-// The share of each layer that lies in front of this depth: four of them. `before` is the end of the
+// The fraction of each layer that lies in front of this depth: four of them. `before` is the end of the
 // layer before these.
 vec4 layers_passed(float depth, vec4 ends, float before)
 {

@@ -52,7 +52,7 @@ vec2 summed_layers(int map, vec2 place, ivec2 texel, vec2 depths)
   return tau;
 }
 
-// x tau between the light and a place, y tau from there on to the first mesh, z the share of the
+// x tau between the light and a place, y tau from there on to the first mesh, z the fraction of the
 // light that no mesh is in the way of.
 vec3 light_path(int light, vec3 point)
 {

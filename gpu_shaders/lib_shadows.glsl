@@ -8,7 +8,7 @@
 #endif
 
 // x how many strands a light passes on its way to a point, -1 where nothing is known of it, y how
-// many lie behind the point, z the share of the light that no mesh is in the way of.
+// many lie behind the point, z the fraction of the light that no mesh is in the way of.
 vec3 way_of_light(int index, vec3 point)
 {
 #if SHADOWS
@@ -34,7 +34,7 @@ vec3 way_of_light_to_mesh(int index, vec3 point, vec3 normal)
     vec3 place = map_place(opacity, index, point);
     float within = within_map(place.xy);
 #  ifdef MESH_SHADOWS
-    // depths before and behind all hair are not told apart
+    // depths before and behind all hair are not distinguished
     within = min(within, within_map(vec2(0.5, place.z - opacity.bias)));
 #  endif
     way.z = mix(beyond, way.z, within);
@@ -44,7 +44,7 @@ vec3 way_of_light_to_mesh(int index, vec3 point, vec3 normal)
   return vec3(way.xy, beyond);
 }
 
-// The share of a light that hair and meshes in its way leave, by colour: of what strands take they
+// The fraction of a light that hair and meshes in its way leave, by colour: of what strands take they
 // send `forward` on.
 vec3 light_left(vec3 way, vec3 forward)
 {

@@ -6,10 +6,10 @@
 // height [m], in z the nearest seam, -1 none. A seam is four texels: its start and its end, xy on its
 // own side and zw on the other; its two islands; the copies of its ends. Holds no resources.
 
-// LEAST_KNOWN and NARROW of diffusion.py
-const float SKIN_LEAST_KNOWN = 1e-6, SKIN_NARROW = 1.0;
+// MIN_KNOWN and NARROW of diffusion.py
+const float SKIN_MIN_KNOWN = 1e-6, SKIN_NARROW = 1.0;
 
-// Of the colours' shares of light that hair sends on the one with which the shadow is spread.
+// Of the colours' fractions of light that hair sends on the one with which the shadow is spread.
 float skin_forward(vec3 forward)
 {
   return dot(forward, vec3(1.0 / 3.0));
@@ -50,7 +50,7 @@ vec4 skin_looked_up(
     total += weight * texelFetch(values, at, 0);
     known += weight;
   }
-  return total / max(known, SKIN_LEAST_KNOWN);
+  return total / max(known, SKIN_MIN_KNOWN);
 }
 
 // Where on an edge the place nearest to a point lies, 0 at its start and 1 at its end.

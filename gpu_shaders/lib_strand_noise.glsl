@@ -1,4 +1,4 @@
-// Noise that hangs on a strand's seed alone, so that it stays with the strand as it moves.
+// Noise that depends on a strand's seed alone, so that it stays with the strand as it moves.
 //
 // Twin of addon/shading/strand_noise.py: the hash agrees bit by bit.
 // Reference: the integer hash "lowbias32" of Wellons 2018, "Prospecting for Hash Functions".

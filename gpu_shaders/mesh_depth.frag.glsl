@@ -1,5 +1,5 @@
 // Depths of meshes as a light sees them, fragment stage. What is nearer than where the map begins
-// counts as if it lay there. ALPHA: it has so many holes as alpha asks for, a texel each.
+// counts as if it lay there. ALPHA: it has as many holes as alpha asks for, a texel each.
 #ifdef ALPHA
 #  include "lib_hashed.glsl"
 #endif

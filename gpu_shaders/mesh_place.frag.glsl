@@ -1,5 +1,5 @@
 // Where meshes are, fragment stage: the place in the world, and a number of the mesh. ALPHA: what covers
-// less than a share of the pixel is left out; with a pattern where mesh_chance is not negative.
+// less than a fraction of the pixel is left out; with a pattern where mesh_chance is not negative.
 #ifdef ALPHA
 #  include "lib_hashed.glsl"
 #endif

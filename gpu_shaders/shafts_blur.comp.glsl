@@ -16,8 +16,8 @@ void main()
   for (int texel = 0; texel < radii; texel++) {
     vec2 place = screen_place(shafts, ray, texel);
     bool is_inside = all(greaterThanEqual(place, vec2(0.0))) && all(lessThanEqual(place, size));
-    float open_share = is_inside ? 1.0 - bilinear_red(caster, place - 0.5, false) : 1.0;
-    total = open_share * gained + total * shafts.kept;
+    float open_fraction = is_inside ? 1.0 - bilinear_red(caster, place - 0.5, false) : 1.0;
+    total = open_fraction * gained + total * shafts.kept;
     weight = gained + weight * shafts.kept;
     imageStore(rays, ivec2(texel, ray), vec4(total / weight));
   }

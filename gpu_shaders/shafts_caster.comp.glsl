@@ -1,4 +1,4 @@
-// What stands before a light: the share of each pixel that is covered by what is nearer than it, or
+// What stands before a light: the fraction of each pixel that is covered by what is nearer than it, or
 // by hair so thin that it has no depth.
 // Colour and depth may have several samples for each pixel of the picture.
 

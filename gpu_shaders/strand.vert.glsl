@@ -4,7 +4,7 @@
 // order of detail_pass.py, their stations as its factors say.
 //
 // COVERED: ribbons as wide as strands are, and as much wider as to reach all pixels that they cover a
-// share of. GATHERED: what it takes to find a fragment's looks later, in place of the looks.
+// fraction of. GATHERED: what it takes to find a fragment's looks later, in place of the looks.
 #include "lib_strand_geometry.glsl"
 #include "lib_detail_packing.glsl"
 #if COVERED

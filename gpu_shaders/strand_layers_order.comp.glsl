@@ -1,11 +1,11 @@
 // Strands as layers, second step, one invocation a pixel that has hair. Its list becomes that of the
 // layers that are shaded, in order: the nearest, as far as enough light comes from behind them, or, where
-// these are more than LAYERS, so many that stand for all. In place of its depth a node has its share of
+// these are more than LAYERS, a sample that represents all. In place of its depth a node has its fraction of
 // the pixel's light. `layer_seen` has the numbers of all that are left.
 //
 // A list is sorted nearest first: runs of LAYERS first, then by merging two at a time.
 //
-// Twin of layer_shares in addon/shading/volume/transparency.py.
+// Twin of layer_fractions in addon/shading/volume/transparency.py.
 #include "lib_layer_packing.glsl"
 
 const uvec4 NO_LAYER = uvec4(0u, 0xFFFFFFFFu, 0xFFFFFFFFu, 0xFFFFFFFFu);
@@ -128,7 +128,7 @@ void keep_layer(uint number, uvec4 node, float share)
   kept_count++;
 }
 
-// x the share of light that comes from behind all, y the depth from which on half of it is hidden, 2
+// x the fraction of light that comes from behind all, y the depth from which on half of it is hidden, 2
 // where it never is.
 vec2 hidden_by(uint sorted)
 {

@@ -1,5 +1,5 @@
 // Strands as layers, third step: the nodes that are seen, one an invocation. What tells a node's
-// colour gives way to the colour itself: yzw, as floats' bits, times its share of the pixel's light.
+// colour gives way to the colour itself: yzw, as floats' bits, times its fraction of the pixel's light.
 #include "lib_strand_geometry.glsl"
 #include "lib_strand_light.glsl"
 #include "lib_layer_packing.glsl"

@@ -1,4 +1,4 @@
-// What detail hangs on besides its settings. Filled by addon/render/detail_pass.py.
+// What detail depends on besides its settings. Filled by addon/render/detail_pass.py.
 struct DetailView {
   mat4 view_projection;
   vec4 eye;      // as in View

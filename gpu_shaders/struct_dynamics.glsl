@@ -10,8 +10,8 @@ struct Dynamics {
   int long_range;
   float length_tolerance;
   float dt;           // [s]
-  float kept;         // share of the speed that damping leaves
-  float air_share;    // share of the air's speed that damping gives
+  float kept;         // fraction of the speed that damping leaves
+  float air_fraction;    // fraction of the air's speed that damping gives
   float drag;         // [1/m]
   float friction;
   float led_out;      // [m] in a substep

@@ -7,7 +7,7 @@ struct Shafts {
   float span;           // between the first and the last ray [rad]
   float nearest;        // where rays begin [pixels]
   float radial_step;    // between texels of a ray [pixels]
-  float kept;           // share of a shaft that is left after a step
+  float kept;           // fraction of a shaft that is left after a step
   float before;         // what counts of the way from the light to where rays begin
   float fall;           // of the haze [1 / pixels]
   int angles;           // rays

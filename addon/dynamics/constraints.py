@@ -30,8 +30,8 @@ PINNED = 2
 #: b above. At 1 a segment that stands straight on a collider could not change its length at all;
 #: at 0.98 hair with its root deep inside of a collider was seen to tremble, at 0.9 not.
 CONTACT_WEIGHT = np.float32(0.9)
-#: Mass that a held tip seems to have more than others, as a share: all but 1, as the lengths of a
-#: straight guide between two ends that cannot move have no solution. The tip is put back at once.
+#: Mass that a held tip seems to have more than others, as a fraction: all but 1, as the lengths of
+#: a straight guide between two ends that cannot move have no solution. The tip is put back at once.
 HELD = np.float32(0.99)
 #: Lengths below this count as zero [m].
 TINY = np.float32(1.0e-9)
@@ -138,7 +138,7 @@ def finish_lengths(
     """Go on, with the guides that need it, until no segment is off by more than `tolerance`.
 
     Few guides do, and only when they are jerked around. One that is still off after `iterations`
-    Newton steps is laid out anew.
+    Newton steps is laid out again.
     """
     if position.shape[1] <= PINNED:
         return
@@ -175,7 +175,7 @@ def _laid_out(position: Floats, length: Floats, tip_held: Floats | None) -> Floa
 
 
 def _off_length(position: Floats, length: Floats, tolerance: float) -> Ints:
-    """Guides of which a segment is off by more than this share of its length."""
+    """Guides of which a segment is off by more than this fraction of its length."""
     segment = position[:, PINNED:] - position[:, PINNED - 1 : -1]
     error = dot_rows(segment, segment)
     np.sqrt(error, out=error)

@@ -14,12 +14,12 @@ from .settings import DynamicsSettings
 
 
 def speed_kept(settings: DynamicsSettings, dt: float) -> float:
-    """Share of the speed that damping leaves after `dt` seconds."""
+    """Fraction of the speed that damping leaves after `dt` seconds."""
     return math.exp(-(settings.damping + settings.style_damping) * dt)
 
 
-def carried_share(settings: DynamicsSettings, dt: float) -> float:
-    """Share of the head's own speed that swing damping gives to the hair in `dt` seconds.
+def carried_fraction(settings: DynamicsSettings, dt: float) -> float:
+    """Fraction of the head's own speed that swing damping gives to the hair in `dt` seconds.
 
     Swing damping acts on the speed against the carried style, air damping on the speed in the
     world; both together leave  v kept + v_style (1 - kept) style_damping / (sum of both).
@@ -28,8 +28,8 @@ def carried_share(settings: DynamicsSettings, dt: float) -> float:
     return (1.0 - speed_kept(settings, dt)) * settings.style_damping / both if both else 0.0
 
 
-def air_share(settings: DynamicsSettings, dt: float) -> float:
-    """Share of the air's speed that damping gives to the hair in `dt` seconds, as above."""
+def air_fraction(settings: DynamicsSettings, dt: float) -> float:
+    """Fraction of the air's speed that damping gives to the hair in `dt` seconds, as above."""
     both = settings.damping + settings.style_damping
     return (1.0 - speed_kept(settings, dt)) * settings.damping / both if both else 0.0
 

@@ -11,7 +11,7 @@ from ..arrays import Floats
 from ..errors import HairloomError
 from .colliders import PosedCollider
 from .contacts import radius_of_all
-from .forces import carried_share, felt_gravity
+from .forces import carried_fraction, felt_gravity
 from .settings import DynamicsSettings
 from .state import DynamicsState, Rest, StyleRows, as_rows, checked_grid
 from .style import StyleBand, style_band
@@ -126,12 +126,12 @@ class Frame:
         return cls(drive, settings, dt, duration, state.time, state.time_left, turn, matrix, air)
 
     @property
-    def carried_share(self) -> float:
-        """Share of the style's way in the frame that each CV gets in a substep."""
-        return carried_share(self.settings, self.dt) * self.dt / self.duration
+    def carried_fraction(self) -> float:
+        """Fraction of the style's way in the frame that each CV gets in a substep."""
+        return carried_fraction(self.settings, self.dt) * self.dt / self.duration
 
     def span(self, number: int) -> tuple[float, float]:
-        """Begin and end of a substep as shares of the frame."""
+        """Begin and end of a substep as fractions of the frame."""
         begin = (number * self.dt - self.time_left) / self.duration
         return begin, begin + self.dt / self.duration
 
@@ -173,7 +173,7 @@ class Block:
         way = now - before
         bent = bow(earlier[0], before, now, drive.earlier_ratio) if earlier else None
         middle = before + way * np.float32(0.5)
-        impulse = way * np.float32(frame.carried_share)
+        impulse = way * np.float32(frame.carried_fraction)
         impulse += felt_gravity(drive.gravity, settings, frame.turn, middle) * np.float32(dt * dt)
         position, previous = state.position[:, :, guides].copy(), state.previous[:, :, guides]
         if state.substep and state.substep != dt:
@@ -186,7 +186,7 @@ class Block:
             way,
             bent,
             impulse,
-            None if bent is None else bent * np.float32(frame.carried_share),
+            None if bent is None else bent * np.float32(frame.carried_fraction),
             radius_of_all(settings, state.cv_count, before.shape[2]),
         )
 

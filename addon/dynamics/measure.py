@@ -11,7 +11,7 @@ from .state import DynamicsState
 
 
 def max_stretch(state: DynamicsState) -> float:
-    """Largest change of a simulated segment's length, as a share of its rest length.
+    """Largest change of a simulated segment's length, as a fraction of its rest length.
 
     Segments between pinned CVs belong to the style, and those without length cannot stretch.
     """

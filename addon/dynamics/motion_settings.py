@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..params import Settings, integer, number
 
 #: keyframes may turn the wind round and round: sixteen turns [rad]
-_MOST_TURNED = math.radians(16.0 * 360.0)
+_MAX_TURNED = math.radians(16.0 * 360.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +60,7 @@ class MotionSettings(Settings):
         label="Wind Direction",
         description="Where the wind blows to: 0 is world +X, a quarter turn +Y",
         soft=(-math.pi, math.pi),
-        hard=(-_MOST_TURNED, _MOST_TURNED),
+        hard=(-_MAX_TURNED, _MAX_TURNED),
         unit="angle",
         panel="Medium & Wind",
     )
@@ -69,7 +69,7 @@ class MotionSettings(Settings):
         label="Wind Rise",
         description="How steeply the wind blows upwards",
         soft=(-0.5 * math.pi, 0.5 * math.pi),
-        hard=(-_MOST_TURNED, _MOST_TURNED),
+        hard=(-_MAX_TURNED, _MAX_TURNED),
         unit="angle",
         panel="Medium & Wind",
     )

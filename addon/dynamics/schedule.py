@@ -6,7 +6,7 @@ import math
 
 from ..errors import HairloomError
 
-#: A substep is due when all but this share of it has passed, so that 4 / 240 s is one 60th.
+#: A substep is due when all but this fraction of it has passed, so that 4 / 240 s is one 60th.
 _DUE = 1.0e-6
 
 

@@ -51,15 +51,15 @@ class DynamicsSettings(MotionSettings):
     gravity: float = number(
         1.0,
         label="Gravity",
-        description="Share of the scene's gravity that pulls at the hair",
+        description="Fraction of the scene's gravity that pulls at the hair",
         soft=(0.0, 2.0),
         hard=(-10.0, 10.0),
     )
     weight_held: float = number(
         1.0,
         label="Weight Held",
-        description="Share of the weight that the style already carries as it was combed; at 1 a "
-        "groom does not sag when it comes to rest",
+        description="Fraction of the weight that the style already carries as it was combed; at 1 "
+        "a groom does not sag when it comes to rest",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -115,7 +115,7 @@ class DynamicsSettings(MotionSettings):
     bend_along: tuple[float, ...] = curve(
         (1.0, 1.0, 1.0, 1.0, 1.0),
         label="Bend Along",
-        description="Share of the bend stiffness along the strand, from root to tip",
+        description="Fraction of the bend stiffness along the strand, from root to tip",
         hard=(0.0, 1.0),
         panel="Style",
     )

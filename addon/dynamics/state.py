@@ -69,7 +69,7 @@ class DynamicsState:
     rest: the style and the lengths to keep.
     substep: length [s] of the last substep; 0 when there was none.
     time_left: time [s] that has passed but is shorter than a substep, so not yet simulated.
-    time: [s] simulated since the start; gusts hang on it.
+    time: [s] simulated since the start; gusts depend on it.
     styles: what the last frame went by, so that the next need not turn and check it again.
     """
 

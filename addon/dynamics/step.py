@@ -38,7 +38,7 @@ from .constraints import (
     relax_lengths,
 )
 from .contacts import find_contacts, touched_by
-from .forces import air_share, brake, predict, speed_kept
+from .forces import air_fraction, brake, predict, speed_kept
 from .frame import Block, Drive, Frame, check_drive, style_rows
 from .schedule import due_substeps
 from .settings import DynamicsSettings
@@ -91,7 +91,7 @@ def _advance_block(
     """Position and previous position after the frame's substeps; takes the block's own arrays."""
     settings, dt, rest = frame.settings, frame.dt, block.rest
     position, previous, spare = block.position, block.previous, np.empty_like(block.position)
-    kept, blown = speed_kept(settings, dt), air_share(settings, dt)
+    kept, blown = speed_kept(settings, dt), air_fraction(settings, dt)
     for number, span in enumerate(spans):
         style = block.style_at(span[1])
         impulse = block.impulse_at(span)

@@ -74,7 +74,7 @@ class LocalShape:
 
     @cached_property
     def turning(self) -> Floats:
-        """The share of the curvature that turns with the strand."""
+        """The fraction of the curvature that turns with the strand."""
         return self.curvature * self.hold
 
     @cached_property
@@ -187,15 +187,15 @@ def _carried_on(first: Floats, tangent: Floats, middle: Floats) -> Floats:
     normal = np.empty_like(along)
     normal[0] = first
     here = list(normal)
-    product, share = np.empty_like(first), np.empty_like(first[0])
+    product, fraction = np.empty_like(first), np.empty_like(first[0])
     x, y, z = product
     for before, after, next_along, next_turn in zip(
         here[:-1], here[1:], along[1:], turn, strict=True
     ):
         np.multiply(before, next_along, product)
-        np.add(x, y, share)
-        np.add(share, z, share)
-        np.multiply(next_turn, share, product)
+        np.add(x, y, fraction)
+        np.add(fraction, z, fraction)
+        np.multiply(next_turn, fraction, product)
         np.subtract(before, product, after)
     return np.ascontiguousarray(normal.transpose(1, 0, 2))
 

@@ -41,7 +41,7 @@ def rest_sample(grid: Floats) -> Floats:
 def rotation_from(rest: Floats, now: Floats) -> Floats:
     """The rotation (3, 3) float64 from `rest_sample` to `sample`.
 
-    Kabsch 1976. A small share of the identity picks the smallest rotation where the groom leaves
+    Kabsch 1976. A small fraction of the identity picks the smallest rotation where the groom leaves
     one free, as a single straight guide does.
     """
     spread = np.einsum("in,jn->ij", now, rest)  # no BLAS: it would wake its threads for this

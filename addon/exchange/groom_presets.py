@@ -12,7 +12,7 @@ from .files.file_space import FileSpace
 from .groom import Groom
 
 #: Thinner than any hair [m]. A width of 0 makes Unity drop all widths.
-LEAST_WIDTH = 1.0e-6
+MIN_WIDTH = 1.0e-6
 #: Wider than any hair [m]: a mistake in units.
 WIDEST = 5.0e-3
 
@@ -22,9 +22,9 @@ class GroomPreset:
     """How a groom Alembic is laid out for one engine.
 
     space: the file's unit and axes.
-    most_points: longer curves are resampled to so many points; the engine would cut or refuse them.
-    least_points: of a curve that the engine takes.
-    most_strands: of a group that the engine takes.
+    max_points: longer curves are resampled to this count; the engine would cut or refuse them.
+    min_points: of a curve that the engine takes.
+    max_strands: of a group that the engine takes.
     parts: "strands" without guides, "guides" alone, or "both".
     is_split: one curves object for each group instead of one for all.
     has_curve_uv: root UVs are written as the curves' own, one for each point, too.
@@ -33,9 +33,9 @@ class GroomPreset:
 
     name: str
     space: FileSpace
-    most_points: int
-    least_points: int = 2
-    most_strands: int | None = None
+    max_points: int
+    min_points: int = 2
+    max_strands: int | None = None
     parts: str = "both"
     is_split: bool = False
     has_curve_uv: bool = False
@@ -47,24 +47,24 @@ class GroomPreset:
 UNREAL = GroomPreset(
     "unreal",
     FileSpace("Z", 100.0, is_mirrored=True),
-    most_points=255,
-    most_strands=(1 << 22) - 1,
+    max_points=255,
+    max_strands=(1 << 22) - 1,
 )
 #: Unity's Alembic importer takes files as right-handed with Y up and scales them by 0.01, unless
-#: told otherwise: so centimetres. Its hair wants all strands, a curves object for a strand group,
+#: set otherwise: so centimetres. Its hair wants all strands, a curves object for a strand group,
 #: and reads root UVs from the curves.
 UNITY = GroomPreset(
     "unity",
     FileSpace("Y", 100.0),
-    most_points=128,
-    least_points=3,
-    most_strands=64_000,
+    max_points=128,
+    min_points=3,
+    max_strands=64_000,
     parts="strands",
     is_split=True,
     has_curve_uv=True,
 )
 #: As Blender's own Alembic files are, bit-exact.
-BLENDER = GroomPreset("blender", FileSpace("Y", 1.0), most_points=1 << 16)
+BLENDER = GroomPreset("blender", FileSpace("Y", 1.0), max_points=1 << 16)
 PRESETS = {preset.name: preset for preset in (UNREAL, UNITY, BLENDER)}
 
 
@@ -102,7 +102,7 @@ def preflight(groom: Groom, preset: GroomPreset) -> dict[str, Any]:
         np.zeros(strands.strand_count, bool) if written.is_guide is None else written.is_guide
     )
     guides = int(is_guide.sum())
-    counts = np.minimum(strands.point_counts, preset.most_points)
+    counts = np.minimum(strands.point_counts, preset.max_points)
     hair = strands.group if is_guide.all() else strands.group[~is_guide]
     ids, sizes = np.unique(hair, return_counts=True)
     corners = preset.space.to_file(np.stack(strands.bounds()))
@@ -114,11 +114,11 @@ def preflight(groom: Groom, preset: GroomPreset) -> dict[str, Any]:
         "points": int(counts.sum()),
         "groups": dict(zip(ids.tolist(), sizes.tolist(), strict=True)),
         "points_per_curve": _range(counts),
-        "width": _range(np.maximum(strands.radius * 2.0, LEAST_WIDTH) * scale),
+        "width": _range(np.maximum(strands.radius * 2.0, MIN_WIDTH) * scale),
         "length": _range(strands.lengths() * scale),
         "lowest": corners.min(axis=0).tolist(),
         "highest": corners.max(axis=0).tolist(),
-        "resampled": int((strands.point_counts > preset.most_points).sum()),
+        "resampled": int((strands.point_counts > preset.max_points).sum()),
         "warnings": list(_warnings(groom, written, preset)),
     }
 
@@ -131,22 +131,22 @@ def _warnings(groom: Groom, written: Groom, preset: GroomPreset) -> list[str]:
     warnings = []
     zero = int((strands.radius <= 0.0).sum())
     if zero:
-        warnings.append(f"{zero} points have no width: they are written as {LEAST_WIDTH * 1e3} mm")
+        warnings.append(f"{zero} points have no width: they are written as {MIN_WIDTH * 1e3} mm")
     if strands.radius.max() * 2.0 > WIDEST:
         warnings.append(f"Widths reach {strands.radius.max() * 2e3:.3g} mm: check the units")
     if len(np.unique(strands.group)) == 1:
         warnings.append("All strands are in one group: they can have only one material")
     if strands.root_uv is None:
         warnings.append("There are no root UVs: the engine makes some up, or has none")
-    long = int((strands.point_counts > preset.most_points).sum())
+    long = int((strands.point_counts > preset.max_points).sum())
     if long:
-        warnings.append(f"{long} strands are resampled to {preset.most_points} points")
-    short = int((strands.point_counts < preset.least_points).sum())
+        warnings.append(f"{long} strands are resampled to {preset.max_points} points")
+    short = int((strands.point_counts < preset.min_points).sum())
     if short:
-        warnings.append(f"{short} strands have fewer than {preset.least_points} points")
+        warnings.append(f"{short} strands have fewer than {preset.min_points} points")
     most = int(np.unique(strands.group, return_counts=True)[1].max())
-    if preset.most_strands is not None and most > preset.most_strands:
-        warnings.append(f"A group has {most} strands; the engine takes {preset.most_strands}")
+    if preset.max_strands is not None and most > preset.max_strands:
+        warnings.append(f"A group has {most} strands; the engine takes {preset.max_strands}")
     if written.closest_guides is not None and preset.parts != "both":
         warnings.append("Closest guides are left out: they need strands and guides in one file")
     if preset.parts == "both" and (groom.is_guide is None or not groom.is_guide.any()):

@@ -46,7 +46,7 @@ _ARRAYS = {
     _UV: ("UVs", 2),
 }
 #: Segments of a strand that fit into 16 bits.
-MOST_SEGMENTS = 0xFFFF
+MAX_SEGMENTS = 0xFFFF
 _WHITE = (1.0, 1.0, 1.0)
 
 HEADER = np.dtype(
@@ -168,10 +168,10 @@ def write_hair_file(
         _one_or_each(header, arrays, "color", _COLOR, groom.color)
     if uv and strands.root_uv is not None:
         arrays[_UV] = np.repeat(strands.root_uv, strands.point_counts, axis=0)
-    if _SEGMENTS in arrays and segments.max() > MOST_SEGMENTS:
+    if _SEGMENTS in arrays and segments.max() > MAX_SEGMENTS:
         raise HairloomError(
             f"a strand has {segments.max():,} segments, and .hair files hold up to "
-            f"{MOST_SEGMENTS:,} of each",
+            f"{MAX_SEGMENTS:,} of each",
             place=str(path),
             remedy="Resample the hair to fewer points",
         )

@@ -13,7 +13,7 @@ from .tfxbone import BoneWeights
 
 
 def joined_grooms(grooms: Sequence[Groom], name: str) -> tuple[Groom, tuple[str, ...]]:
-    """All strands one after the other, their groups numbered anew, and named after their groom.
+    """All strands one after the other, their groups numbered again, and named after their groom.
 
     Returns:
         the groom, and what is lost because not all of them have it.

@@ -12,7 +12,7 @@ from .strand_output import StrandOutput, layout_of
 #: units in a metre -> name
 _UNITS = {1.0: "m", 10.0: "dm", 100.0: "cm", 1000.0: "mm"}
 #: Groups that are named one by one.
-_MOST_NAMED = 8
+_MAX_NAMED = 8
 
 
 def check_strands(groom: Groom, kind: StrandFormat, output: StrandOutput) -> dict[str, Any]:
@@ -67,5 +67,5 @@ def _corner(values: list[float]) -> str:
 def _groups(facts: dict[str, Any]) -> str:
     names = facts["group_names"]
     told = [f"{names.get(group, group)} ({size:,})" for group, size in facts["groups"].items()]
-    rest = len(told) - _MOST_NAMED
-    return ", ".join(told[:_MOST_NAMED]) + (f" and {rest} more" if rest > 0 else "")
+    rest = len(told) - _MAX_NAMED
+    return ", ".join(told[:_MAX_NAMED]) + (f" and {rest} more" if rest > 0 else "")

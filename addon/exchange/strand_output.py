@@ -9,7 +9,7 @@ from types import MappingProxyType
 from ..errors import HairloomError
 from .files.file_space import FileSpace
 from .groom_presets import PRESETS, GroomPreset
-from .hair_file import MOST_SEGMENTS
+from .hair_file import MAX_SEGMENTS
 from .strand_formats import ALEMBIC, HAIR, TRESSFX, USD, StrandFormat
 from .tfxbone import BoneWeights
 from .tressfx_layout import VERTEX_COUNTS
@@ -21,13 +21,13 @@ ENGINES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 #: format -> up axis and metres in one unit where nothing else is asked for
 _SPACES = {TRESSFX.name: ("Y", 1.0), HAIR.name: ("Z", 1.0)}
-_MOST_POINTS = {TRESSFX.name: VERTEX_COUNTS[-1], HAIR.name: MOST_SEGMENTS + 1}
+_MAX_POINTS = {TRESSFX.name: VERTEX_COUNTS[-1], HAIR.name: MAX_SEGMENTS + 1}
 _ENDLESS = (1 << 31) - 1
 
 
 @dataclass(frozen=True)
 class StrandOutput:
-    """What is asked for; what a format cannot do is told by `write_strands`.
+    """What is asked for; `write_strands` reports what a format cannot do.
 
     engine: one of ENGINES; "" is the format's usual one. It decides unit, axes and parts.
     parts: "strands", "guides" or "both"; "" is what the engine wants.
@@ -87,7 +87,7 @@ def layout_of(kind: StrandFormat, output: StrandOutput) -> GroomPreset:
     return GroomPreset(
         engine or kind.name,
         FileSpace(up, 1.0 / scale),
-        most_points=_MOST_POINTS.get(kind.name, _ENDLESS),
+        max_points=_MAX_POINTS.get(kind.name, _ENDLESS),
         parts=output.parts or ("both" if engine == "unreal" else "strands"),
         is_split=output.by_group,
         basis=output.basis or "cubic",

@@ -67,10 +67,10 @@ def _write_alembic(
     preset = layout_of(ALEMBIC, output)
     write_groom_alembic(path, groom, preset, motion=motion)
     counts = groom.strands.point_counts[chosen_strands(groom, preset.parts)]
-    long = int((counts > preset.most_points).sum())
+    long = int((counts > preset.max_points).sum())
     notes: tuple[str, ...] = ()
     if long:
-        notes = (f"{path.name}: {long:,} strands were resampled to {preset.most_points} points.",)
+        notes = (f"{path.name}: {long:,} strands were resampled to {preset.max_points} points.",)
     return WrittenStrands((path,), notes)
 
 

@@ -30,7 +30,7 @@ from .groom_presets import chosen_parts
 from .read_groom import ReadGroom, finite, kept_points, plausible, usable
 from .tressfx_layout import HEADER_4, VERTEX_COUNTS, TressfxFile
 
-#: TressFX simulates so many strands at a time.
+#: TressFX simulates this many strands at a time.
 STRANDS_AT_ONCE = 64
 
 

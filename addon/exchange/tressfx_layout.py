@@ -67,7 +67,7 @@ class TressfxFile(BinaryFile):
         return int(self._header["follow_count"]) if self.position_width == 3 else 0
 
     def held(self, strand_count: int) -> Bools:
-        """Which vertices of so many strands a file of version 3 holds, as its loader does: the
+        """Which vertices of these strands a file of version 3 holds, as its loader does: the
         first two, and the last two where both ends are immovable; (vertices,)."""
         held = np.zeros((strand_count, self.vertex_count), bool)
         held[:, :2] = True

@@ -112,8 +112,8 @@ class _Target:
         """
         random = np.random.default_rng(stream)
         last = np.searchsorted(self.reached, self.mass)  # the last share that is not empty
-        share = np.searchsorted(self.reached, random.random(count) * self.mass, side="right")
-        triangle, corner = np.divmod(np.minimum(share, last), 3)
+        fraction = np.searchsorted(self.reached, random.random(count) * self.mass, side="right")
+        triangle, corner = np.divmod(np.minimum(fraction, last), 3)
         _, middle, last_cut = np.sort(random.random((count, 3)), axis=1).T
         rows, barycentric = np.arange(count), np.empty((count, 3))
         barycentric[rows, corner] = middle

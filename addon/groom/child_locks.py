@@ -35,8 +35,8 @@ def clump(grid: Floats, group: Ints, settings: ChildrenSettings) -> None:
     """
     if not settings.clump or settings.clump_size == 1:
         return
-    share = settings.clump * along(settings.clump_along, np.linspace(0.0, 1.0, grid.shape[1]))
-    share[0] = 0.0
+    fraction = settings.clump * along(settings.clump_along, np.linspace(0.0, 1.0, grid.shape[1]))
+    fraction[0] = 0.0
     first, last = 0, _FIRST_LEVEL
     while first < len(grid):
         middle_count = max(1, round(last / settings.clump_size))
@@ -45,7 +45,7 @@ def clump(grid: Floats, group: Ints, settings: ChildrenSettings) -> None:
             middle, strength = _middles(grid, group, member, middle_count, settings.parting)
             for start in range(0, len(member), _CHUNK):
                 chunk = slice(start, start + _CHUNK)
-                pull = (strength[chunk, None] * share).astype(np.float32)[..., None]
+                pull = (strength[chunk, None] * fraction).astype(np.float32)[..., None]
                 own = grid[member[chunk]]
                 grid[member[chunk]] = own + pull * (grid[middle[chunk]] - own)
         first, last = last, 2 * last

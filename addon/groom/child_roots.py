@@ -33,10 +33,10 @@ _TUFT = 0.25
 #: Triangles are split until they are smaller than this part of the reach, or so often.
 _FINE, _SPLITS = 0.5, 8
 #: Triangles that splitting may add.
-_MOST_PIECES = 100_000
+_MAX_PIECES = 100_000
 #: Roots tried for each one wanted, before what was found has to do.
 _TRIES = 32
-#: With less than this part of the painted area near guides, the artist is told.
+#: With less than this part of the painted area near guides, the artist gets a warning.
 _BARE = 0.95
 
 
@@ -133,7 +133,7 @@ def _near_guides(pieces: Pieces, guided: _Guided) -> Pieces:
     Roots that are thrown away cost as much as others, and guides may stand on a small part of a
     large mesh, or of a large triangle.
     """
-    done, most = [], len(pieces) + _MOST_PIECES
+    done, most = [], len(pieces) + _MAX_PIECES
     pieces = pieces.take(pieces.mass > 0.0)
     for split in range(_SPLITS + 1):
         center = pieces.point.mean(axis=1)

@@ -95,8 +95,8 @@ def frizz(grid: Floats, settings: ChildrenSettings) -> None:
         return
     random = np.random.default_rng([settings.seed, 3])
     own = random.random((len(grid), 2, 4))
-    share = settings.frizz * along(settings.frizz_along, np.linspace(0.0, 1.0, grid.shape[1]))
-    share[0] = 0.0
+    fraction = settings.frizz * along(settings.frizz_along, np.linspace(0.0, 1.0, grid.shape[1]))
+    fraction[0] = 0.0
     for start in range(0, len(grid), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         reached = arc_length(grid[chunk])
@@ -106,7 +106,7 @@ def frizz(grid: Floats, settings: ChildrenSettings) -> None:
             height, around, phase, pitch = own[chunk, wave].T
             swing = np.sin(_TURN * (turns * (0.75 + 0.5 * pitch)[:, None] + phase[:, None]))
             direction = _on_sphere(height, around)[:, None]
-            grid[chunk] += (0.5 * share * swing)[..., None] * direction
+            grid[chunk] += (0.5 * fraction * swing)[..., None] * direction
 
 
 def arc_length(grid: Floats) -> Floats:

@@ -4,8 +4,8 @@ Tariq (2008, Real-time hair rendering on the GPU) has two patterns: multi strand
 guides (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23), and single strand, around one guide.
 
 Children are progressive: those of a smaller number are exactly the first of a larger number. So
-roots come in an order of their own (`blue_noise`), what is random about a child hangs on its place
-in that order, and nothing is measured over all children.
+roots come in an order of their own (`blue_noise`), what is random about a child depends on its
+place in that order, and nothing is measured over all children.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ class ChildrenSettings(Settings):
     clump_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.25, 0.5, 0.75, 1.0),
         label="Clump Along",
-        description="Share of the clump from root to tip",
+        description="Fraction of the clump from root to tip",
         hard=(0.0, 1.0),
         shown_when=when("children.way", "multi", "single"),
         active_when=when("children.clump"),
@@ -97,7 +97,7 @@ class ChildrenSettings(Settings):
     frizz_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.4, 0.7, 0.9, 1.0),
         label="Frizz Along",
-        description="Share of the frizz from root to tip",
+        description="Fraction of the frizz from root to tip",
         hard=(0.0, 1.0),
         shown_when=when("children.way", "multi", "single"),
         active_when=when("children.frizz"),

@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import StrandSet, Surface
 from ..strands.vectors import unit
-from .grown import at_roots, bound_strands, checked_weights, segment_shares
+from .grown import at_roots, bound_strands, checked_weights, segment_fractions
 from .locks import assign_locks, style_locks
 from .normal_growth import grow_along_normals, somewhere
 from .scalp import find_cranium, sample_roots, scalp_density
@@ -114,15 +114,15 @@ def _segments(lock: Ints, settings: GrowSettings, random: np.random.Generator) -
     count = len(lock)
     shorter = 0.6 * random.random(count)[lock] + 0.4 * random.random(count)
     length = settings.length * (1.0 - settings.length_variation * shorter)
-    return length[:, None] * segment_shares(settings.cv_count, settings.segment_ratio)
+    return length[:, None] * segment_fractions(settings.cv_count, settings.segment_ratio)
 
 
 def _heights(lock: Ints, settings: GrowSettings, random: np.random.Generator) -> Floats:
     """How far from the skin each segment's end stays, (strand_count, cv_count - 1) [m]."""
     layer = 0.7 * random.random(len(lock))[lock] + 0.3 * random.random(len(lock))
-    share = np.linspace(0.0, 1.0, settings.cv_count)[1:]
-    rise = 1.0 - (1.0 - np.minimum(3.0 * share, 1.0)) ** 2
-    clearance = settings.clearance * np.minimum(5.0 * share, 1.0)
+    fraction = np.linspace(0.0, 1.0, settings.cv_count)[1:]
+    rise = 1.0 - (1.0 - np.minimum(3.0 * fraction, 1.0)) ** 2
+    clearance = settings.clearance * np.minimum(5.0 * fraction, 1.0)
     return clearance + settings.volume * rise * layer[:, None]
 
 
@@ -144,8 +144,8 @@ def _fallen(
     grid = np.repeat(root[:, None], settings.cv_count, axis=1)
     direction = unit(settings.lift * normal + (1.0 - settings.lift) * comb)
     for cv in range(1, settings.cv_count):
-        share = cv / (settings.cv_count - 1)
-        fall = min(share / settings.comb_share, 1.0) if settings.comb_share else 1.0
+        fraction = cv / (settings.cv_count - 1)
+        fall = min(fraction / settings.comb_share, 1.0) if settings.comb_share else 1.0
         aim = unit((1.0 - fall) * comb + fall * _DOWN)
         turn = 1.0 - (1.0 - settings.droop) ** (plan.segment[:, cv - 1] / _DROOP_STEP)
         direction = unit(direction + turn[:, None] * (aim - direction))
@@ -163,7 +163,7 @@ def _laid(styled: Floats, plan: _Plan) -> Floats:
     for cv in range(1, grid.shape[1]):
         way = unit(styled[:, cv] - grid[:, cv - 1])
         if cv > 1:
-            way = _turned_at_most(unit(grid[:, cv - 1] - grid[:, cv - 2]), way)
+            way = _turn_limited(unit(grid[:, cv - 1] - grid[:, cv - 2]), way)
         grid[:, cv] = plan.step(cv, grid[:, cv - 1], way)
     # keeping the length may have drawn a point in again; half of its height is always kept
     free = plan.skin.outside(grid[:, 1:].reshape(-1, 3), 0.5 * plan.height.ravel())
@@ -171,7 +171,7 @@ def _laid(styled: Floats, plan: _Plan) -> Floats:
     return grid
 
 
-def _turned_at_most(before: Floats, way: Floats) -> Floats:
+def _turn_limited(before: Floats, way: Floats) -> Floats:
     """Unit directions (n, 3), those that turn too sharply from the ones before turned back."""
     cosine = np.einsum("ij,ij->i", before, way)[:, None]
     beside = unit(way - before * cosine)

@@ -9,14 +9,14 @@ from ..errors import HairloomError
 from ..strands import StrandSet, Surface
 
 
-def segment_shares(cv_count: int, ratio: float) -> Floats:
-    """Share of each segment in the strand's length, (cv_count - 1,), summing to 1.
+def segment_fractions(cv_count: int, ratio: float) -> Floats:
+    """Fraction of each segment in the strand's length, (cv_count - 1,), summing to 1.
 
     A geometric series, each segment `ratio` times as long as the one before it: with a ratio above
     1 they get longer to the tip (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23).
     """
-    share = ratio ** np.arange(cv_count - 1)
-    return share / share.sum()
+    fraction = ratio ** np.arange(cv_count - 1)
+    return fraction / fraction.sum()
 
 
 def checked_weights(weights: Floats | None, surface: Surface, name: str) -> Floats | None:

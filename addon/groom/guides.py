@@ -23,16 +23,16 @@ def choose_guides(strands: StrandSet, settings: GuideSettings) -> Ints:
     _, group = np.unique(strands.group, return_inverse=True)
     by_group = np.argsort(group, kind="stable")
     sizes = np.bincount(group)
-    shares = group_shares(sizes, settings.guide_count)
+    fractions = group_fractions(sizes, settings.guide_count)
     members = np.split(by_group, np.cumsum(sizes)[:-1]) if len(sizes) else []
     chosen = [
-        _spread(strands.roots, member, int(share), random)
-        for member, share in zip(members, shares, strict=True)
+        _spread(strands.roots, member, int(fraction), random)
+        for member, fraction in zip(members, fractions, strict=True)
     ]
     return np.sort(np.concatenate([np.zeros(0, np.int64), *chosen]))
 
 
-def group_shares(sizes: Ints, guide_count: int) -> Ints:
+def group_fractions(sizes: Ints, guide_count: int) -> Ints:
     """How many guides each group gets, (group_count,): one each, then by largest remainder.
 
     Never more than the group's size; in total guide_count, or as many as there are strands, or
@@ -44,10 +44,10 @@ def group_shares(sizes: Ints, guide_count: int) -> Ints:
         return np.ones(group_count, np.int64)
     # after the first guide of each group; then no share can pass its group's size
     quota = spare * (sizes - 1) / (total - group_count)
-    share = np.floor(quota).astype(np.int64)
-    left_over = spare - int(share.sum())
-    share[np.argsort(share - quota, kind="stable")[:left_over]] += 1
-    return share + 1
+    fraction = np.floor(quota).astype(np.int64)
+    left_over = spare - int(fraction.sum())
+    fraction[np.argsort(fraction - quota, kind="stable")[:left_over]] += 1
+    return fraction + 1
 
 
 def _spread(roots: Floats, member: Ints, count: int, random: np.random.Generator) -> Ints:

@@ -38,14 +38,14 @@ def style_locks(
 
     Roots stay; lengths change a little.
     """
-    share = np.linspace(0.0, 1.0, grid.shape[1])[None, :, None]
-    pull = settings.clump * share**0.8 * (0.75 + 0.25 * random.random((len(grid), 1, 1)))
+    fraction = np.linspace(0.0, 1.0, grid.shape[1])[None, :, None]
+    pull = settings.clump * fraction**0.8 * (0.75 + 0.25 * random.random((len(grid), 1, 1)))
     styled = grid + pull * (grid[lock] - grid)
     along = _arc_length(grid)
-    fade = np.minimum(share * 3.0, 1.0)
+    fade = np.minimum(fraction * 3.0, 1.0)
     swing = _swing(along / settings.wave_length, lock, random) * settings.wave
     stray = _swing(along / (0.6 * settings.wave_length), np.arange(len(grid)), random)
-    return styled + fade * (swing + stray * settings.frizz * (0.5 + share))
+    return styled + fade * (swing + stray * settings.frizz * (0.5 + fraction))
 
 
 def _swing(turns: Floats, owner: Ints, random: np.random.Generator) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
-from .grown import at_roots, bound_strands, checked_weights, segment_shares
+from .grown import at_roots, bound_strands, checked_weights, segment_fractions
 from .scalp import sample_roots
 from .settings import GrowSettings
 
@@ -56,7 +56,7 @@ def grow_along_normals(
     if length is not None:
         strand_length *= at_roots(length, surface, triangle, barycentric)
     along = np.zeros(settings.cv_count)
-    along[1:] = segment_shares(settings.cv_count, settings.segment_ratio).cumsum()
+    along[1:] = segment_fractions(settings.cv_count, settings.segment_ratio).cumsum()
     reach = strand_length[:, None] * along
     grid = root[:, None] + reach[..., None] * _normals(surface, triangle, barycentric)[:, None]
     return bound_strands(grid, triangle, barycentric, surface, settings.radius)

@@ -17,7 +17,7 @@ LOOSE_DISTANCE = 0.01
 #: Factors between the units that grooms come in: powers of ten, inch and foot, to and from metres.
 _UNIT_FACTORS = (*(10.0**n for n in range(-4, 5)), 0.0254, 0.3048, 1 / 0.0254, 1 / 0.3048)
 _SAMPLED_ROOTS = 500
-#: Another way to read roots must bring them so many times nearer than the way they were read.
+#: Another way to read roots must bring them this many times nearer than the way they were read.
 _CLEARLY = 4.0
 
 

@@ -98,9 +98,9 @@ def sample_roots(
     barycentric = _inside_triangles(count, random)
     if density is None:
         return triangle, barycentric
-    share = np.clip((along[place] - stratum) / area[triangle], 0.0, 1.0)  # left of the triangle
+    fraction = np.clip((along[place] - stratum) / area[triangle], 0.0, 1.0)  # left of the triangle
     return triangle, _towards_density(
-        barycentric, np.maximum(density, 0.0)[surface.triangles[triangle]], share
+        barycentric, np.maximum(density, 0.0)[surface.triangles[triangle]], fraction
     )
 
 

@@ -38,7 +38,7 @@ _SAMPLES = 512
 #: Steps with which a ball moves away from the surface, and how much shorter each is.
 _STEPS, _SHORTER = 8, 0.65
 #: A ball must stand out of the others by this part of the largest one's radius.
-_LEAST_NEWS = 0.2
+_MIN_NEWS = 0.2
 #: A ball is shrunk to this part, so that it is well inside.
 INNER_PART = 0.95
 
@@ -167,8 +167,10 @@ def _box(surface: Surface, roots: Floats | None) -> tuple[Floats, Floats]:
 
 def _first_places(surface: Surface, low: Floats, high: Floats, count: int) -> Floats:
     """Places (n <= count, 3) in a box for about the largest balls, by some of the triangles."""
-    shares = (np.arange(_PLACES) + 0.5) / _PLACES
-    cells = np.stack(np.meshgrid(shares, shares, shares, indexing="ij"), axis=-1).reshape(-1, 3)
+    fractions = (np.arange(_PLACES) + 0.5) / _PLACES
+    cells = np.stack(np.meshgrid(fractions, fractions, fractions, indexing="ij"), axis=-1).reshape(
+        -1, 3
+    )
     places = low + cells * (high - low)
     points, normals = _samples(surface)
     squared = sum((places[:, None, axis] - points[:, axis]) ** 2 for axis in range(3))
@@ -249,7 +251,7 @@ def _different(balls: Floats, count: int) -> Floats:
     news = balls[:, 3].copy()
     while len(chosen) < min(count, len(balls)):
         best = int(news.argmax())
-        if not news[best] > _LEAST_NEWS * balls[:, 3].max():
+        if not news[best] > _MIN_NEWS * balls[:, 3].max():
             break
         chosen.append(best)
         apart = np.linalg.norm(balls[:, :3] - balls[best, :3], axis=1)

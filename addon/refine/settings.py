@@ -89,7 +89,7 @@ class DetailSettings(Settings):
     least_share: float = number(
         0.125,
         label="Least Share",
-        description="Share of the strands that is drawn in any distance",
+        description="Fraction of the strands that is drawn in any distance",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),

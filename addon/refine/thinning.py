@@ -36,16 +36,16 @@ from .settings import DetailSettings
 #: From this share on every strand is drawn and as wide as it is.
 WHOLE = 1.25
 #: A share below is taken to be this, which is no strand or one.
-SMALLEST_SHARE = 1.0e-6
+SMALLEST_FRACTION = 1.0e-6
 #: How fast a strand gets its width once the share exceeds its rank: all of it at rank * WHOLE.
 FADE = WHOLE / (WHOLE - 1.0)
 
 
 @dataclass(frozen=True)
 class Thinning:
-    """What of a groom is drawn. share: see `drawn_share`. widening: factor of the width."""
+    """What of a groom is drawn. share: see `drawn_fraction`. widening: factor of the width."""
 
-    share: float = WHOLE
+    fraction: float = WHOLE
     widening: float = 1.0
 
 
@@ -66,15 +66,15 @@ def thinning(
         minimum_width: strands are drawn no thinner [pixels].
     """
     size = groom_size(bounds, view)
-    share = drawn_share(size[1], settings)
-    if share >= WHOLE:
+    fraction = drawn_fraction(size[1], settings)
+    if fraction >= WHOLE:
         return Thinning()
     pixels_per_metre = size[1] / max(_height(bounds, view), 1.0e-9)
     width = max(2.0 * radius * pixels_per_metre, minimum_width)
     across, up = (max(side, 1.0) for side in size)
     layers = total_length * pixels_per_metre * width / (across * up)
     overhang = width * (1.0 / across + 1.0 / up)
-    return Thinning(share, widening(share, layers, overhang))
+    return Thinning(fraction, widening(fraction, layers, overhang))
 
 
 def groom_size(bounds: tuple[Floats, Floats], view: PictureView) -> tuple[float, float]:
@@ -90,7 +90,7 @@ def groom_size(bounds: tuple[Floats, Floats], view: PictureView) -> tuple[float,
     return float(across), float(up)
 
 
-def drawn_share(height_px: float, settings: DetailSettings) -> float:
+def drawn_fraction(height_px: float, settings: DetailSettings) -> float:
     """Strands of a lower rank than this are drawn: WHOLE is all of them in full width.
 
     Args:
@@ -98,28 +98,28 @@ def drawn_share(height_px: float, settings: DetailSettings) -> float:
     """
     if settings.full_size <= 0.0 or settings.least_share >= 1.0:
         return WHOLE
-    share = WHOLE * height_px / settings.full_size
-    return float(min(max(share, settings.least_share), WHOLE))
+    fraction = WHOLE * height_px / settings.full_size
+    return float(min(max(fraction, settings.least_share), WHOLE))
 
 
-def width_factor(rank: Floats, share: float, widening: float = 1.0) -> Floats:
+def width_factor(rank: Floats, fraction: float, widening: float = 1.0) -> Floats:
     """Factor of the width of strands (n,); 0 is not drawn.
 
     It applies to the width after its lower limit in pixels.
     """
-    left = 1.0 - rank / max(share, SMALLEST_SHARE)
+    left = 1.0 - rank / max(fraction, SMALLEST_FRACTION)
     return widening * np.clip(FADE * left, 0.0, 1.0)
 
 
-def widening(share: float, layers: float, overhang: float) -> float:
+def widening(fraction: float, layers: float, overhang: float) -> float:
     """The width of thinned strands as a factor: f in c(s, f) = c(1, 1), see above.
 
     Args:
-        share: as from `drawn_share`.
+        fraction: as from `drawn_fraction`.
         layers: L, of all strands.
         overhang: q.
     """
-    kept = _mean_factor(max(share, SMALLEST_SHARE))
+    kept = _mean_factor(max(fraction, SMALLEST_FRACTION))
     second = kept * overhang * (layers + 1.0)
     first = kept * (1.0 - layers * overhang)
     constant = 1.0 + overhang
@@ -169,9 +169,9 @@ def _height(bounds: tuple[Floats, Floats], view: PictureView) -> float:
     return float(np.ptp(_corners(bounds) @ np.asarray(view.view, np.float64)[1]))
 
 
-def _mean_factor(share: float) -> float:
+def _mean_factor(fraction: float) -> float:
     """The mean of `width_factor` over ranks from 0 to 1, before strands are widened."""
-    full = share / WHOLE
-    drawn = min(share, 1.0)
-    at_last = FADE * (1.0 - drawn / share)
+    full = fraction / WHOLE
+    drawn = min(fraction, 1.0)
+    at_last = FADE * (1.0 - drawn / fraction)
     return full + (drawn - full) * (1.0 + at_last) / 2.0

@@ -219,7 +219,7 @@ def _widths(snapshot: Snapshot, thinned: Thinning) -> Floats:
     """Factor of each strand's width (strand_count,); 0 where it is not drawn."""
     if snapshot.rank is None or thinned == Thinning():
         return np.ones(snapshot.strand_count, np.float32)
-    return width_factor(snapshot.rank, thinned.share, thinned.widening)
+    return width_factor(snapshot.rank, thinned.fraction, thinned.widening)
 
 
 def _ordered(factors: Any, totals: Floats, widths: Floats) -> DetailOrder:

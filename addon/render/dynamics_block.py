@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import Floats
 from ..dynamics.constraints import PINNED
 from ..dynamics.contacts import REACH, cv_radius
-from ..dynamics.forces import air_share, carried_share, speed_kept
+from ..dynamics.forces import air_fraction, carried_fraction, speed_kept
 from ..dynamics.frame import Frame
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.style import style_band
@@ -40,7 +40,7 @@ def moments_of(frame: Frame, first: int, spans: Floats) -> Floats:
     table = np.zeros((len(spans), MOMENT_TEXELS, 4), np.float32)
     begin, end = spans.T
     table[:, 0, 0] = end
-    table[:, 0, 2] = part = carried_share(frame.settings, frame.dt) * (end - begin)
+    table[:, 0, 2] = part = carried_fraction(frame.settings, frame.dt) * (end - begin)
     if frame.drive.target_earlier is not None:
         ratio = held_ratio(frame.drive.earlier_ratio)
         table[:, 0, 1] = end * (end - 1.0) / (ratio * (ratio + 1.0))
@@ -76,7 +76,7 @@ def block_of(
         settings.length_tolerance,
         dt,
         speed_kept(settings, dt),
-        air_share(settings, dt),
+        air_fraction(settings, dt),
         settings.drag,
         settings.friction,
         settings.push_speed * dt,

@@ -47,21 +47,21 @@ def ambient_occlusion(
     depth = hair_depth(strands, grid) * np.float32(settings.extinction)
     if body is not None:
         depth = np.maximum(depth, body_depth(body, grid))
-    openness = sky_openness(depth, settings.upper_share)
+    openness = sky_openness(depth, settings.upper_fraction)
     seen = sample(openness, grid.coordinates(points)) / settings.open_sky
     return (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
 
 
-def sky_openness(depth: Floats, upper_share: float) -> Floats:
+def sky_openness(depth: Floats, upper_fraction: float) -> Floats:
     """Mean transmittance of the sky's light at the centre of each cell, of depth's shape."""
     total = np.zeros_like(depth)
-    for direction, weight in sky_directions(upper_share):
+    for direction, weight in sky_directions(upper_fraction):
         total += weight * np.exp(-depth_towards(depth, direction))
     return total
 
 
-def sky_directions(upper_share: float) -> Iterator[tuple[Step, float]]:
-    """Steps to the 26 neighbours of a cell and the share of light from there; shares sum to 1."""
+def sky_directions(upper_fraction: float) -> Iterator[tuple[Step, float]]:
+    """Steps to the 26 neighbours of a cell and the fraction of light from there; their sum is 1."""
     steps: list[Step] = [
         step for step in itertools.product((-1, 0, 1), (-1, 0, 1), (-1, 0, 1)) if any(step)
     ]
@@ -69,8 +69,8 @@ def sky_directions(upper_share: float) -> Iterator[tuple[Step, float]]:
     even = np.array([_DIRECTION_WEIGHTS[sum(map(abs, step))] for step in steps])
     # from above only: the lobe up^4 is about as wide as the directions lie apart
     above = even * up**4
-    share = (1.0 - upper_share) * even + upper_share * above / above.sum()
-    return ((step, float(weight)) for step, weight in zip(steps, share, strict=True) if weight)
+    fraction = (1.0 - upper_fraction) * even + upper_fraction * above / above.sum()
+    return ((step, float(weight)) for step, weight in zip(steps, fraction, strict=True) if weight)
 
 
 def depth_towards(depth: Floats, step: Step) -> Floats:

@@ -32,7 +32,7 @@ class AmbientSettings(Settings):
         hard=(0.0, 10_000.0),
         source="Kajiya and Kay 1989, section 2; Kim and Neumann 2001, opacity shadow maps",
     )
-    upper_share: float = number(
+    upper_fraction: float = number(
         0.4,
         label="Light from Above",
         description="0: the sky shines from all sides alike, 1: from straight above only",
@@ -43,7 +43,7 @@ class AmbientSettings(Settings):
     open_sky: float = number(
         0.5,
         label="Open Sky",
-        description="Share of the sky that counts as no shade at all: half of it is what the "
+        description="Fraction of the sky that counts as no shade at all: half of it is what the "
         "surface of a solid body sees",
         unit="factor",
         soft=(0.25, 1.0),

@@ -30,11 +30,11 @@ type Vector = tuple[float, float, float]
 #: is narrow also against its spread); in lib_lights
 FAR = 2.5e-3
 #: nearer to its plane than this [m] is behind a panel; in lib_lights
-LEAST_HEIGHT = 1.0e-6
+MIN_HEIGHT = 1.0e-6
 #: sides no shorter than this [m], nor than this of the other side
-LEAST_SIDE, LEAST_ASPECT = 1.0e-4, 1.0e-3
+MIN_SIDE, MIN_ASPECT = 1.0e-4, 1.0e-3
 #: a spread of none is a beam of this [rad]
-LEAST_SPREAD = float(np.radians(1.0))
+MIN_SPREAD = float(np.radians(1.0))
 #: the tangent of a spread of a half turn
 OPEN = 1.0e8
 
@@ -61,7 +61,7 @@ class Panel:
     @property
     def half_sides(self) -> tuple[float, float]:
         """Half width and half height [m], none of them nought."""
-        least = max(LEAST_SIDE, LEAST_ASPECT * max(self.half_width, self.half_height))
+        least = max(MIN_SIDE, MIN_ASPECT * max(self.half_width, self.half_height))
         return max(self.half_width, least), max(self.half_height, least)
 
     @property
@@ -73,7 +73,7 @@ class Panel:
         """Of half of the spread."""
         if self.is_open:
             return OPEN
-        return float(np.tan(0.5 * max(self.spread, LEAST_SPREAD)))
+        return float(np.tan(0.5 * max(self.spread, MIN_SPREAD)))
 
     @property
     def normalizer(self) -> float:
@@ -82,7 +82,7 @@ class Panel:
 
     @property
     def quarter_place(self) -> float:
-        """Where four points stand for the panel, as a share of its half sides."""
+        """Where four points stand for the panel, as a fraction of its half sides."""
         return 0.5 if self.is_round else float(np.sqrt(1.0 / 3.0))
 
     @property
@@ -102,7 +102,7 @@ def vector_irradiance(panel: Panel, offsets: Floats) -> Floats:
     """
     axes = np.array([panel.right, panel.up, panel.shines_along])
     x, y, height = np.moveaxis(np.asarray(offsets, np.float64) @ axes.T, -1, 0)
-    is_before = height > LEAST_HEIGHT
+    is_before = height > MIN_HEIGHT
     height = np.where(is_before, height, 1.0)
     found = {"rectangle": _rectangle, "disk": _disk, "grid": _grid}[panel.form](panel, x, y, height)
     squared = x * x + y * y + height * height
@@ -199,9 +199,9 @@ def _row(
         sine = 0.5 * (first + last) + half * node
         cosine = np.sqrt(np.maximum(1.0 - sine * sine, 1e-12))
         u = distance * sine / cosine
-        share = weight * half * _shade(panel, np.hypot(u, v) / height)
+        fraction = weight * half * _shade(panel, np.hypot(u, v) / height)
         way = np.stack([sine, v / distance * cosine, -height / distance * cosine], axis=-1)
-        total += share[..., None] * way
+        total += fraction[..., None] * way
     return total
 
 

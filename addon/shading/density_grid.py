@@ -118,13 +118,16 @@ def sample(values: Floats, coordinates: Floats) -> Floats:
     limit = np.array(values.shape, np.float32) - 1.0
     inside = np.clip(coordinates, 0.0, limit)
     cell = np.minimum(inside.astype(np.int32), np.array(values.shape, np.int32) - 2)
-    share = inside - cell
+    fraction = inside - cell
     strides = np.array([values.shape[1] * values.shape[2], values.shape[2], 1])
     flat, index = values.ravel(), cell @ strides
     total = np.zeros(len(coordinates), np.float32)
     for corner in itertools.product((0, 1), repeat=3):
         weight = np.prod(
-            [share[:, axis] if far else 1.0 - share[:, axis] for axis, far in enumerate(corner)],
+            [
+                fraction[:, axis] if far else 1.0 - fraction[:, axis]
+                for axis, far in enumerate(corner)
+            ],
             axis=0,
         )
         total += weight * flat[index + int(strides @ corner)]

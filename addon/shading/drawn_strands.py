@@ -14,7 +14,7 @@ from .strand_noise import strand_noise
 #: Channels of the strands' noise, as in gpu_shaders/lib_strand_light.glsl.
 _COLOR, _GREY = 2, 3
 #: What grey strands may be brighter than hair that is nearly black.
-_MOST = 4.0
+_MAX = 4.0
 _DARKEST = 1e-4
 
 
@@ -33,7 +33,7 @@ def strand_variation(seed: Ints, cv_count: int, shading: ShadingSettings) -> Flo
     """The colour of strands as a factor of the card's mean, (n, cv_count, 3), up to _MOST.
 
     Args:
-        seed: (n,) what the noise of a strand hangs on, as in Snapshot.
+        seed: (n,) what the noise of a strand depends on, as in Snapshot.
     """
     along = np.linspace(0.0, 1.0, cv_count)[None, :]
     color_noise = strand_noise(seed, _COLOR, np.zeros(1))[:, None]
@@ -46,4 +46,4 @@ def strand_variation(seed: Ints, cv_count: int, shading: ShadingSettings) -> Flo
     else:
         own = strand_base(along, color_noise, grey_noise, shading)
         mean = card_base(along, shading)
-    return np.clip(own / np.maximum(mean, _DARKEST), 0.0, _MOST)
+    return np.clip(own / np.maximum(mean, _DARKEST), 0.0, _MAX)

@@ -22,7 +22,7 @@ from ..arrays import Floats
 from ..strands.frames import volume_normals
 from ..strands.vectors import dot, unit_or
 from .settings import ShadingSettings
-from .tint import tip_share
+from .tint import tip_fraction
 
 #: of strands that have lost their colour; in lib_kajiya_kay
 GREY_COLOR = (0.42, 0.42, 0.43)
@@ -93,7 +93,7 @@ def strand_base(
             grey.
     """
     base, tip = np.array(shading.base_color), np.array(shading.tip_color)
-    color = base + (tip - base) * tip_share(along, shading)[..., None]
+    color = base + (tip - base) * tip_fraction(along, shading)[..., None]
     color = np.where((grey_noise < shading.grey_share)[..., None], GREY_COLOR, color)
     brightness = 1.0 + shading.color_variation * (2.0 * color_noise - 1.0)
     return color * brightness[..., None]

@@ -42,7 +42,7 @@ class Cone:
     axes: (3, 3) rows that turn a direction in world space into the spot's own axes, in which it
         shines along -z; a scaled object squeezes its cone.
     size: full angle [rad].
-    blend: share of the cone over which its rim fades, 0 to 1.
+    blend: fraction of the cone over which its rim fades, 0 to 1.
     """
 
     axes: tuple[Vector, Vector, Vector]
@@ -179,7 +179,7 @@ def light_at(light: Light, points: Floats) -> tuple[Floats, Floats]:
     if light.cone is None:
         return to_light, evenly
     width = np.minimum((added + least) / squared, 1.0)
-    return to_light, evenly * _cone_share(light.cone, away, width)
+    return to_light, evenly * _cone_fraction(light.cone, away, width)
 
 
 def light_irradiance(light: Light, points: Floats) -> Floats:
@@ -187,7 +187,7 @@ def light_irradiance(light: Light, points: Floats) -> Floats:
     return light_at(light, points)[1]
 
 
-def _cone_share(cone: Cone, away: Floats, width: Floats) -> Floats:
+def _cone_fraction(cone: Cone, away: Floats, width: Floats) -> Floats:
     """What a cone lets through towards the points from which the light is `away`, (..., 1).
 
     A light with a radius blurs the rim. Its own smooth step and the disk, seen at an angle whose
@@ -207,8 +207,8 @@ def _cone_share(cone: Cone, away: Floats, width: Floats) -> Floats:
     off_axis = off_axis + 0.25 * width * (1.0 - off_axis)
     middle, own_half = cone.fade
     half = np.sqrt(own_half * own_half + 1.25 * width * aside / squared)
-    share = np.clip(0.5 * (middle + half - off_axis) / half, 0.0, 1.0)
-    return share * share * (3.0 - 2.0 * share)
+    fraction = np.clip(0.5 * (middle + half - off_axis) / half, 0.0, 1.0)
+    return fraction * fraction * (3.0 - 2.0 * fraction)
 
 
 def _unit(away: Floats) -> Floats:
@@ -216,7 +216,7 @@ def _unit(away: Floats) -> Floats:
 
 
 def three_point_lights(view: Floats, strength: float = 1.0) -> tuple[Light, ...]:
-    """A studio's key, fill and rim light as suns that hang on the camera.
+    """A studio's key, fill and rim light as suns that are attached to the camera.
 
     Args:
         view: (4, 4) world to view space, a rigid motion.

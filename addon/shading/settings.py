@@ -137,7 +137,7 @@ class SharedSettings(Settings):
     grey_share: float = number(
         0.0,
         label="Grey Strands",
-        description="Share of the strands that have lost their colour",
+        description="Fraction of the strands that have lost their colour",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",

@@ -29,14 +29,14 @@ from ..arrays import Floats
 from .lights import Light, light_irradiance
 from .shafts_settings import ShaftSettings
 
-#: the haze reaches so many lengths from its light
+#: the haze reaches this many lengths from its light
 REACH = 2.0
 #: radiance below which a light's haze is left out
 FAINTEST = 1.0e-4
 #: length [pixels] up to which there are no shafts
 _SHORTEST = 1.0e-3
 #: rays on the way out from a light at most, and at least
-_MOST_ANGLES, _LEAST_ANGLES = 4096, 64
+_MAX_ANGLES, _MIN_ANGLES = 4096, 64
 
 
 @dataclass(frozen=True)
@@ -80,13 +80,13 @@ class PolarGrid:
         width: int,
         height: int,
         radii: int = 0,
-        most_angles: int = _MOST_ANGLES,
+        max_angles: int = _MAX_ANGLES,
     ) -> PolarGrid:
         """The grid around a place in or outside of a picture [pixels].
 
         Args:
             radii: texels on a ray; 0: one a pixel.
-            most_angles: rays at most; up to there, one a pixel at the farthest corner.
+            max_angles: rays at most; up to there, one a pixel at the farthest corner.
         """
         x, y = center
         corners = np.array([[0, 0], [width, 0], [0, height], [width, height]]) - (x, y)
@@ -97,7 +97,7 @@ class PolarGrid:
         if nearest > 0.0:
             middle = float(np.arctan2(height / 2.0 - y, width / 2.0 - x))
             span = 2.0 * float(np.abs(_angles_from(middle, corners)).max())
-        angles = int(np.clip(np.ceil(span * farthest), _LEAST_ANGLES, most_angles))
+        angles = int(np.clip(np.ceil(span * farthest), _MIN_ANGLES, max_angles))
         radii = radii or max(int(np.ceil(farthest - nearest)), 1)
         return cls((x, y), middle, span, nearest, farthest, angles, radii)
 
@@ -154,7 +154,7 @@ def _on_screen(
     center = (0.5 + 0.5 * x / w) * size[0], (0.5 + 0.5 * y / w) * size[1]
     depth = 1.0 if is_sun else min(0.5 + 0.5 * z / w, 1.0)
     r, g, b = (float(channel) for channel in haze)
-    nearest = PolarGrid.over(center, *size, 1, _LEAST_ANGLES).nearest
+    nearest = PolarGrid.over(center, *size, 1, _MIN_ANGLES).nearest
     if max(r, g, b) * np.exp(-nearest / (REACH * length)) < FAINTEST:
         return None
     return LightOnScreen(center, (r, g, b), depth, length)
@@ -182,8 +182,8 @@ def light_shafts(
         grid = PolarGrid.over(light.center, width, height, samples)
         is_before = (depth < light.depth) | (depth >= 1.0)
         casting = np.where(is_before, alpha, 0.0)[..., None]
-        open_share = 1.0 - to_polar(casting, grid, outside=0.0)
-        blurred = radial_blur(open_share, grid, light.length)
+        open_fraction = 1.0 - to_polar(casting, grid, outside=0.0)
+        blurred = radial_blur(open_fraction, grid, light.length)
         haze = np.exp(-_distances(grid, width, height) / (REACH * light.length))[..., None]
         result[..., :3] += haze * from_polar(blurred, grid, width, height) * light.radiance
     return result.astype(np.float32)

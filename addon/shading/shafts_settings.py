@@ -28,7 +28,7 @@ class ShaftSettings(Settings):
     strength: float = number(
         0.4,
         label="Strength",
-        description="How bright the haze is, as a share of matt white in the same light",
+        description="How bright the haze is, as a fraction of matt white in the same light",
         soft=(0.0, 1.0),
         hard=(0.0, 1000.0),
         source=_NGUYEN,

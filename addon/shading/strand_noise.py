@@ -1,4 +1,4 @@
-"""Noise that hangs on a strand's seed alone, so that it stays with the strand as it moves.
+"""Noise that depends on a strand's seed alone, so that it stays with the strand as it moves.
 
 Twin of gpu_shaders/lib_strand_noise.glsl: the hash agrees bit by bit.
 """

@@ -69,7 +69,7 @@ class HairTextures:
         return np.concatenate([base, alpha[..., None]], axis=-1)
 
     def with_pictures(self, pictures: Mapping[str, Floats]) -> HairTextures:
-        """The same with these in the place of those of their names, see `picture_as`."""
+        """The same with these instead of those of their names, see `picture_as`."""
         return replace(self, **pictures)
 
 

@@ -27,7 +27,7 @@ _CHUNK = 4096
 _PAIR_LIMIT = 2_000_000
 #: Pairs of points and their cluster's triangles looked at at once.
 _PAIRS = 1 << 16
-#: Clusters save work where they have so many points on average, and no more triangles than this.
+#: Clusters save work where they have this many points on average, and no more triangles than this.
 _WORTHWHILE, _CROWDED = 3, 512
 #: A hair more than a distance, so that rounding leaves nothing out.
 _HAIR = 1.0 + 1.0e-9

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 
 #: Cells along each axis at most, so that three indices fit into 63 bits.
-_MOST_CELLS = 1 << 20
+_MAX_CELLS = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ def clustered(points: Floats, size: float) -> PointClusters:
     """Gather points (point_count, 3), at least one, by cells of this size, or larger ones where
     the points reach too far."""
     low, high = points.min(axis=0), points.max(axis=0)
-    size = max(size, float((high - low).max()) / _MOST_CELLS)
+    size = max(size, float((high - low).max()) / _MAX_CELLS)
     cell = ((points - low) / size if size > 0.0 else np.zeros_like(points)).astype(np.int64)
-    key = (cell[:, 0] * (_MOST_CELLS + 1) + cell[:, 1]) * (_MOST_CELLS + 1) + cell[:, 2]
+    key = (cell[:, 0] * (_MAX_CELLS + 1) + cell[:, 1]) * (_MAX_CELLS + 1) + cell[:, 2]
     order = np.argsort(key, kind="stable")
     begins = np.diff(key[order], prepend=-1) != 0
     cluster, first = np.cumsum(begins) - 1, np.flatnonzero(begins)

@@ -44,8 +44,8 @@ def arc_length_positions(strands: StrandSet, cv_count: int) -> tuple[Ints, Float
     along = np.cumsum(step)  # ascending over all strands, so one search serves them all
     first, last = strands.offsets[:-1], strands.offsets[1:] - 1
 
-    share = np.linspace(0.0, 1.0, cv_count)
-    wanted = along[first, None] + (along[last] - along[first])[:, None] * share
+    fraction = np.linspace(0.0, 1.0, cv_count)
+    wanted = along[first, None] + (along[last] - along[first])[:, None] * fraction
     right = np.searchsorted(along, wanted.ravel(), side="left").reshape(wanted.shape)
     right = np.clip(right, first[:, None] + 1, last[:, None])
     left = right - 1

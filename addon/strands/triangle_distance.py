@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 
-#: Pairs measured at once: so many stay in the processor's cache.
+#: Pairs measured at once: this many stay in the processor's cache.
 _AT_ONCE = 1 << 14
 #: A triangle whose area^2 is below this part of its edges' product has no inside, only edges.
 _FLAT = 1.0e-12

@@ -1,7 +1,7 @@
 """A balanced tree of boxes over the triangles of a surface: which ones can be nearest to a point.
 
 Built and walked level by level, so that numpy does the work for all points at once. A node of
-level n is a box around its share of the triangles; node i has the children 2 i and 2 i + 1.
+level n is a box around its fraction of the triangles; node i has the children 2 i and 2 i + 1.
 """
 
 from __future__ import annotations

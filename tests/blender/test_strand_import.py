@@ -164,7 +164,7 @@ def test_a_file_of_guides_alone_gives_one_object(tmp_path, guides):
 @pytest.mark.parametrize("preset", [UNREAL, UNITY], ids=["unreal", "unity"])
 def test_files_for_engines_come_back_in_metres_with_z_up(tmp_path, head, preset):
     groom = hairdo()
-    write_groom_alembic(tmp_path / "hair.abc", groom, replace(preset, most_points=100))
+    write_groom_alembic(tmp_path / "hair.abc", groom, replace(preset, max_points=100))
     (hair,) = imported(tmp_path / "hair.abc")
     strands = groom_of(hair).strands
     low, high = strands.bounds()

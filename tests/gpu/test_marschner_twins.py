@@ -26,7 +26,7 @@ from hairloom.addon.shading.marschner.tables import (
     marschner_tables,
 )
 from hairloom.addon.shading.settings import ShadingSettings
-from hairloom.addon.shading.tint import tip_share
+from hairloom.addon.shading.tint import tip_fraction
 
 ROWS, COLUMNS = 96, 128
 #: both are of the goal: GLSL within 1e-3 of Python
@@ -201,7 +201,7 @@ def test_colors(compute: Callable[..., np.ndarray], changes: dict[str, Any]) -> 
     along, color_noise, grey_noise = np.moveaxis(places[0].astype(np.float64), -1, 0)
     absorption = strand_absorption(settings, along, color_noise, grey_noise)
     base = strand_base(along, color_noise, grey_noise, settings)
-    assert np.abs(found[0, :, 3] - tip_share(along, settings)).max() < 1e-5
+    assert np.abs(found[0, :, 3] - tip_fraction(along, settings)).max() < 1e-5
     assert found[0, :, :3] == pytest.approx(absorption, rel=1e-4)
     assert found[1, :, :3] == pytest.approx(strand_color(absorption), rel=1e-4)
     assert found[2, :, :3] == pytest.approx(base, rel=1e-4)

@@ -14,7 +14,7 @@ from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.shading.volume.transparency import (
     LAYERS,
-    layer_shares,
+    layer_fractions,
     strip_coverage,
 )
 from hairloom.addon.strands import Surface
@@ -179,7 +179,7 @@ def test_crossing_strands_are_those_sorted_in_numpy(
 
 def over_layers(depth, alpha, colors, **limits):
     """Layers of pixels one over the other, premultiplied (pixel_count, 4)."""
-    light = np.einsum("pn,pnc->pc", layer_shares(depth, alpha, **limits), colors)
+    light = np.einsum("pn,pnc->pc", layer_fractions(depth, alpha, **limits), colors)
     return np.column_stack([light, 1.0 - np.prod(1.0 - alpha, axis=-1)])
 
 
@@ -234,8 +234,8 @@ def test_layers_that_are_shaded_stand_for_all_of_them() -> None:
     random = np.random.default_rng(15)
     depths, alphas = random.random((500, 60)), 0.3 * random.random((500, 60)) ** 2
     alphas[:, 7] = 0.6
-    exact = layer_shares(depths, alphas, layers=60, unseen_share=0.0)
-    shares = layer_shares(depths, alphas)
+    exact = layer_fractions(depths, alphas, layers=60, unseen_share=0.0)
+    shares = layer_fractions(depths, alphas)
     covered = 1.0 - np.prod(1.0 - alphas, axis=1)
     assert ((shares > 0.0).sum(axis=1) <= LAYERS).all()
     assert shares.sum(axis=1) == pytest.approx(covered)

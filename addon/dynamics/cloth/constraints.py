@@ -19,11 +19,11 @@ from .state import Color, Fabric
 _HANGING = 9.81 * 1.0
 
 
-def keep_distances(position: Floats, color: Color, share: Floats) -> None:
+def keep_distances(position: Floats, color: Color, fraction: Floats) -> None:
     """Bring the pairs of one colour to their length, in place; position: (3, n) float32 [m].
 
     Args:
-        share: (m,) of the error that each vertex takes: w_i / (w_i + w_j + compliance / dt^2),
+        fraction: (m,) of the error that each vertex takes: w_i / (w_i + w_j + compliance / dt^2),
             which is XPBD with one step of the solver in each step of time.
     """
     vertices = color.vertices
@@ -35,7 +35,7 @@ def keep_distances(position: Floats, color: Color, share: Floats) -> None:
     np.maximum(part, TINY, out=part)
     np.divide(color.length, part, out=part)
     np.subtract(np.float32(1.0), part, out=part)
-    part *= share
+    part *= fraction
     way *= part
     here += way
     if vertices is not None:
@@ -70,7 +70,7 @@ def pull_of(fabric: Fabric, settings: FinSettings, small: float) -> Floats:
     return pull
 
 
-def edge_shares(
+def edge_fractions(
     fabric: Fabric, mobility: Floats, settings: FinSettings, small: float
 ) -> tuple[Floats, ...]:
     """See `keep_distances`, for a small step [s]; mobility: (n,) inverse masses.
@@ -79,19 +79,19 @@ def edge_shares(
     l sqrt(k), whatever l is: hanging, it stretches by g h / (l^2 k) at its upper end.
     """
     softness = settings.stretch / _HANGING / small**2
-    return tuple(_shares(edge, mobility, edge.length**2 * softness) for edge in fabric.edges)
+    return tuple(_fractions(edge, mobility, edge.length**2 * softness) for edge in fabric.edges)
 
 
-def fold_shares(fabric: Fabric, settings: FinSettings, dt: float) -> tuple[Floats, ...]:
+def fold_fractions(fabric: Fabric, settings: FinSettings, dt: float) -> tuple[Floats, ...]:
     """Two unit masses that a spring of k brings back swing with w^2 = 2 k."""
     if not settings.bend:
         return ()
     mobility = np.where(fabric.pinned, 0.0, 1.0).astype(np.float32)
     stiffness = np.float32((2.0 * math.pi * settings.bend * dt) ** 2 / 2.0)
-    return tuple(_shares(fold, mobility * stiffness, 1.0) for fold in fabric.folds)
+    return tuple(_fractions(fold, mobility * stiffness, 1.0) for fold in fabric.folds)
 
 
-def _shares(color: Color, mobility: Floats, compliance: Floats | float) -> Floats:
+def _fractions(color: Color, mobility: Floats, compliance: Floats | float) -> Floats:
     """Share (m,) of the error that each vertex of a colour takes; see `keep_distances`."""
     own = mobility if color.vertices is None else mobility[color.vertices]
     other = mobility[color.mates]

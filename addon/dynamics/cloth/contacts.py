@@ -45,12 +45,12 @@ class MovingPlanes:
     ) -> None:
         """Keep vertices out in small step `number` of `steps`, in place, without a bounce."""
         known = self.contacts
-        share = np.float32((number + 1) / steps)
+        fraction = np.float32((number + 1) / steps)
         origin = previous.take(known.index, axis=1)
         origin += self.way * np.float32(1.0 / steps)
         now = replace(
             known,
-            offset=self.begin + (known.offset - self.begin) * share,
+            offset=self.begin + (known.offset - self.begin) * fraction,
             origin=origin,
             push=np.zeros_like(self.begin),
         )
@@ -87,14 +87,14 @@ def push_out_at_end(
     before: Floats,
     contacts: list[Contacts],
     friction: float,
-    share: float,
+    fraction: float,
 ) -> None:
     """Push vertices out of colliders as the substep ends, in place.
 
     Args:
         before: (3, n) world [m], vertices at the substep's begin.
-        share: of the substep that a small step is. Contacts span a substep, the speed in
-            `previous` only a small step: it gets that share of the push.
+        fraction: of the substep that a small step is. Contacts span a substep, the speed in
+            `previous` only a small step: it gets that fraction of the push.
     """
     pushed, unbounced = position.copy(), before.copy()
     for one in contacts:
@@ -105,7 +105,7 @@ def push_out_at_end(
     unbounced -= before
     unbounced -= pushed
     previous += pushed
-    previous += unbounced * np.float32(share)
+    previous += unbounced * np.float32(fraction)
 
 
 def seen_from(origin: Floats, posed: PosedCollider) -> PosedCollider:

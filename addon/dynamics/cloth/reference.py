@@ -83,10 +83,10 @@ class _Cloth:
         ahead = [x + (x - p) * steps + fall for x, p in zip(self.x, self.previous, strict=True)]
         planes = self._planes(ahead, before, begin, end)
         for number in range(steps):
-            share = (number + 1) / steps
-            self._small_step(begin + (end - begin) * share)
+            fraction = (number + 1) / steps
+            self._small_step(begin + (end - begin) * fraction)
             for plane in planes:
-                self._press(plane, share)
+                self._press(plane, fraction)
         self._push_out_at_end(before, begin, end)
 
     def _feel_air(self, time: float) -> None:
@@ -186,10 +186,10 @@ class _Cloth:
                 planes.append(_Plane(v, normal, way, first, offset))
         return planes
 
-    def _press(self, plane: _Plane, share: float) -> None:
+    def _press(self, plane: _Plane, fraction: float) -> None:
         """In one small step: push out, rub, and do not bounce."""
         v, normal = plane.vertex, plane.normal
-        offset = plane.first + (plane.last - plane.first) * share
+        offset = plane.first + (plane.last - plane.first) * fraction
         origin = self.previous[v] + plane.way * self.small / self.dt
         bounce = self._push(plane, offset, origin)
         self.previous[v] = self.previous[v] + normal * bounce
@@ -200,10 +200,10 @@ class _Cloth:
             v = plane.vertex
             one = self._push(plane, plane.last, before[v] + plane.way)
             bounce[v] = bounce[v] + plane.normal * one
-        share = self.small / self.dt
+        fraction = self.small / self.dt
         for v in range(len(self.x)):
             pushed = self.x[v] - free[v]
-            self.previous[v] = self.previous[v] + pushed - (pushed - bounce[v]) * share
+            self.previous[v] = self.previous[v] + pushed - (pushed - bounce[v]) * fraction
 
     def _push(self, plane: _Plane, offset: float, origin: Floats) -> float:
         """Bring a vertex to its plane, with friction; how far [m] it would bounce."""

@@ -53,7 +53,7 @@ class FinSettings(MotionSettings):
     gravity: float = number(
         1.0,
         label="Gravity",
-        description="Share of the scene's gravity that pulls at the cloth",
+        description="Fraction of the scene's gravity that pulls at the cloth",
         soft=(0.0, 2.0),
         hard=(-10.0, 10.0),
         panel="Cloth",
@@ -82,7 +82,7 @@ class FinSettings(MotionSettings):
     edgewise: float = number(
         0.1,
         label="Edgewise Share",
-        description="Share of damping and drag that acts on motion along the face, which slips "
+        description="Fraction of damping and drag that acts on motion along the face, which slips "
         "through the air",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),

@@ -76,7 +76,7 @@ class ClothState:
     position, previous: (3, vertex_count) float64 world [m], one small step apart.
     small_step: length [s] of the last small step; 0 when there was none.
     time_left: time [s] that has passed but is shorter than a substep, so not yet simulated.
-    time: [s] simulated since the start; gusts hang on it.
+    time: [s] simulated since the start; gusts depend on it.
     """
 
     position: Floats

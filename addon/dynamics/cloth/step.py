@@ -38,7 +38,7 @@ from ..schedule import due_substeps
 from ..step import Drive
 from ..way import at
 from ..wind import Air, air_of
-from .constraints import edge_shares, fold_shares, hold_in_reach, keep_distances, pull_of
+from .constraints import edge_fractions, fold_fractions, hold_in_reach, keep_distances, pull_of
 from .contacts import MovingPlanes, planes_ahead, push_out_at_end, seen_from
 from .settings import FinSettings
 from .state import ClothState, Fabric, broadside_normals, vertex_rows
@@ -62,8 +62,8 @@ class _Frame:
     small: float  # [s] of a small step
     pull: Floats  # (n,) of the spring to where a vertex is carried, times small^2; 0 for the pinned
     mobility: Floats  # (n,) inverse mass with that spring, 0 for the pinned
-    edge_shares: tuple[Floats, ...]
-    fold_shares: tuple[Floats, ...]
+    edge_fractions: tuple[Floats, ...]
+    fold_fractions: tuple[Floats, ...]
     radius: Floats  # (n,) [m]
 
     def carried(self, moment: float, chosen: Ints | slice) -> Floats:
@@ -167,8 +167,8 @@ def _hold_folds(
         return
     ahead = position + (position - previous) * np.float32(frame.dt / frame.small)
     held = ahead.copy()
-    for fold, share in zip(fabric.folds, frame.fold_shares, strict=True):
-        keep_distances(held, fold, share)
+    for fold, fraction in zip(fabric.folds, frame.fold_fractions, strict=True):
+        keep_distances(held, fold, fraction)
     held -= ahead
     held *= np.float32(frame.small / frame.dt)
     previous -= held
@@ -213,8 +213,8 @@ def _substep(
 
 
 def _keep_edges(position: Floats, fabric: Fabric, frame: _Frame, settings: FinSettings) -> None:
-    for edge, share in zip(fabric.edges, frame.edge_shares, strict=True):
-        keep_distances(position, edge, share)
+    for edge, fraction in zip(fabric.edges, frame.edge_fractions, strict=True):
+        keep_distances(position, edge, fraction)
     if settings.long_range:
         hold_in_reach(position, fabric)
 
@@ -249,7 +249,7 @@ def _prepare(state: ClothState, drive: Drive, settings: FinSettings, dt: float) 
         small=small,
         pull=pull,
         mobility=mobility,
-        edge_shares=edge_shares(fabric, mobility, settings, small),
-        fold_shares=fold_shares(fabric, settings, dt),
+        edge_fractions=edge_fractions(fabric, mobility, settings, small),
+        fold_fractions=fold_fractions(fabric, settings, dt),
         radius=np.where(fabric.pinned, -np.inf, settings.radius).astype(np.float32),
     )

@@ -21,7 +21,7 @@ from ...arrays import Floats, Ints
 RESOLUTION, BLOCK = 40, 4
 #: Pairs of points and balls measured at once.
 PAIR_LIMIT = 1 << 18
-#: Share of a cell added to h, for rounding.
+#: Fraction of a cell added to h, for rounding.
 _SLACK = 1.0e-3
 
 

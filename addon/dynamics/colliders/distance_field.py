@@ -26,9 +26,9 @@ from .winding import winding_number
 
 #: Cells around the mesh's box, so that the nearest outside is sampled too.
 MARGIN = 2
-#: Distances of up to so many cells are exact; hair touches the surface within one.
+#: Distances of up to this many cells are exact; hair touches the surface within one.
 EXACT = 6.0
-#: Farther away every so many nodes are exact, and what lies between is interpolated.
+#: Farther away one node in this many is exact, and the others are interpolated.
 STRIDE = 3
 
 

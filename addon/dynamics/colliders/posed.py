@@ -11,8 +11,8 @@ from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ..way import at
 
-#: A collider that turns around within a frame is flat on its way; then it holds nothing out. Share
-#: of the largest scale.
+#: A collider that turns around within a frame is flat on its way; then it holds nothing out. A
+#: fraction of the largest scale.
 FLAT = 1.0e-3
 
 
@@ -67,7 +67,7 @@ class PosedCollider:
         """Where it is after each substep; None where it is flat.
 
         Args:
-            spans: begin and end of the substeps as shares of the frame.
+            spans: begin and end of the substeps as fractions of the frame.
         """
         moments: Any = np.array(spans).T[..., None, None]  # in matrix_at an array does for a number
         before, now = self.matrix_at(moments)

@@ -85,9 +85,9 @@ class CapsuleCollider:
         axis = self.end - self.start
         length_squared = np.maximum((axis * axis).sum(), TINY * TINY)
         outward = points - self.start[:, None]
-        share = outward[0] * axis[0] + outward[1] * axis[1] + outward[2] * axis[2]
-        share = np.clip(share / length_squared, np.float32(0.0), np.float32(1.0))
-        outward -= axis[:, None] * share
+        fraction = outward[0] * axis[0] + outward[1] * axis[1] + outward[2] * axis[2]
+        fraction = np.clip(fraction / length_squared, np.float32(0.0), np.float32(1.0))
+        outward -= axis[:, None] * fraction
         return distance_from(outward, self.radius)
 
 

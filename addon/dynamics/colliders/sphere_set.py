@@ -1,4 +1,4 @@
-"""A union of balls as one collider, the quick stand-in for a mesh.
+"""A union of balls as one collider, a quick replacement for a mesh.
 
 The distance is that of the nearest ball, min_i |x - c_i| - r_i. Which ball is the nearest one is
 narrowed down by a grid (see `ball_grid.py`), so that a look-up costs a few balls instead of all.

@@ -107,8 +107,8 @@ def _dipoles(tree: TriangleTree, leaves: Ints, corners: Floats) -> list[_Dipoles
     levels = []
     for level, (low, high) in enumerate(tree.levels):
         members = leaves.reshape(1 << level, -1)
-        share = weight[members]
-        middle = np.einsum("nm,nmk->nk", share, center[members]) / share.sum(axis=1)[:, None]
+        fraction = weight[members]
+        middle = np.einsum("nm,nmk->nk", fraction, center[members]) / fraction.sum(axis=1)[:, None]
         reach = np.maximum(high - middle, middle - low)  # to the box's farthest corner
         radius = np.linalg.norm(reach, axis=1)
         levels.append(_Dipoles(middle, moment[members].sum(axis=1), radius))

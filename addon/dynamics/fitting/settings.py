@@ -24,7 +24,7 @@ class SphereFitSettings(Settings):
     overshoot: float = number(
         0.01,
         label="Overshoot",
-        description="How far spheres may stick out, as a share of the mesh's longest side; more "
+        description="How far spheres may stick out, as a fraction of the mesh's longest side; more "
         "leaves smaller gaps between them",
         soft=(0.0, 0.05),
         hard=(0.0, 0.5),

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...arrays import Floats
 
-#: Points whose second widest direction is narrower than this share of the widest lie on a line.
+#: Points whose second widest direction is narrower than this fraction of the widest lie on a line.
 _LINE = 1.0e-3
 
 
@@ -35,7 +35,7 @@ class Similarity:
 def fit_similarity(before: Floats, now: Floats) -> Similarity | None:
     """The similarity that brings points (n, 3) nearest to where they are now, (n, 3) [m].
 
-    None where it cannot be told: fewer than three points, points in a line or in one place, before
+    None where it cannot be found: fewer than three points, points in a line or in one place, before
     or now, or points that are not finite.
     """
     before, now = np.asarray(before, np.float64), np.asarray(now, np.float64)

@@ -53,8 +53,8 @@ def union_places(balls: SphereSetCollider) -> Floats:
     """
     area = balls.radii.astype(np.float64) ** 2
     places = []
-    for center, radius, share in zip(balls.centers, balls.radii, area / area.sum(), strict=True):
-        count = max(int(2 * _PLACES * share), 16)
+    for center, radius, fraction in zip(balls.centers, balls.radii, area / area.sum(), strict=True):
+        count = max(int(2 * _PLACES * fraction), 16)
         up = 1.0 - (2.0 * np.arange(count) + 1.0) / count
         turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
         across = np.sqrt(1.0 - up * up)

@@ -31,12 +31,12 @@ from .sphere_error import SphereError, measured_error
 from .surface_samples import Boundary, SurfaceSamples, boundary_of, samples_of
 
 #: Surface samples for each ball asked for, and the least and most in all.
-_SAMPLES, _LEAST, _MOST = 40, 1200, 3000
+_SAMPLES, _MIN, _MAX = 40, 1200, 3000
 #: Steps at most until a ball no longer shrinks.
 _SHRINKS = 40
 #: A ball that shrinks by less than this share has found its place.
 _SETTLED = 5.0e-3
-#: Balls that differ by less than this share of the mesh's longest side are one candidate.
+#: Balls that differ by less than this fraction of the mesh's longest side are one candidate.
 _ALIKE = 0.006
 
 
@@ -61,7 +61,7 @@ def fit_spheres(surface: Surface, settings: SphereFitSettings, *, place: str = "
         HairloomError: no faces, no size, or no inside.
     """
     boundary = boundary_of(surface, place)
-    count = min(max(_SAMPLES * settings.sphere_count, _LEAST), _MOST)
+    count = min(max(_SAMPLES * settings.sphere_count, _MIN), _MAX)
     samples = samples_of(boundary.mesh, count)
     search = ClosestPointSearch(boundary.surface)
     size = float(np.ptp(samples.point, axis=0).max())

@@ -12,7 +12,7 @@ from ...strands import Surface
 from ..colliders.winding import winding_number
 from .holes import close_holes
 
-#: How far beside a face it is looked for what is in and out, as a share of the mesh's longest side.
+#: How far beside a face inside and outside are tested, as a fraction of the mesh's longest side.
 _BESIDE = 1.0e-4
 #: Steps of the R2 sequence (Roberts 2018), which fills a square evenly: 1 / g and 1 / g^2, where
 #: g^3 = g + 1.
@@ -81,8 +81,8 @@ def samples_of(surface: Surface, count: int) -> SurfaceSamples:
     triangle = np.minimum(np.searchsorted(along, place, side="right"), len(area) - 1)
     one, other = (np.mod(0.5 + step * np.arange(1, count + 1), 1.0) for step in _R2)
     root = np.sqrt(one)  # uniform within a triangle (Turk 1990, Graphics Gems)
-    share = np.stack([1.0 - root, root * (1.0 - other), root * other], axis=1)
-    point = np.einsum("nk,nkj->nj", share, corners[triangle])
+    fraction = np.stack([1.0 - root, root * (1.0 - other), root * other], axis=1)
+    point = np.einsum("nk,nkj->nj", fraction, corners[triangle])
     normal = cross[triangle] / np.maximum(area[triangle, None], 1.0e-300)
     return SurfaceSamples(point, normal)
 

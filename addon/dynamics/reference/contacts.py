@@ -16,7 +16,7 @@ from ..settings import DynamicsSettings
 
 @dataclass(frozen=True)
 class Moment:
-    """A substep: begin and end as shares of the frame, its begin on the clock, its length [s]."""
+    """A substep: begin and end as fractions of the frame; its time and length [s]."""
 
     begin: float
     end: float

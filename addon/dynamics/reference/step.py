@@ -96,8 +96,8 @@ class _Guide:
         for plane in planes:
             plane.absorb(self.x, self.previous)
 
-    def _style_at(self, share: float) -> Floats:
-        return self.before + self.way * share + self.bow * share * (share - 1.0)
+    def _style_at(self, fraction: float) -> Floats:
+        return self.before + self.way * fraction + self.bow * fraction * (fraction - 1.0)
 
     def _air(self, drive: Drive, settings: DynamicsSettings, moment: Moment) -> Floats:
         """Velocity of the air at the root, (3,)."""

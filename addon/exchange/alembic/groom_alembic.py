@@ -24,13 +24,13 @@ from ...strands.resample import arc_length_positions
 from ..files.atomic import atomic_write, check_free_space, unwritable
 from ..files.names import plain_name
 from ..groom import Groom, GroomMotion, points_of
-from ..groom_presets import LEAST_WIDTH, UNREAL, GroomPreset, chosen_strands
+from ..groom_presets import MIN_WIDTH, UNREAL, GroomPreset, chosen_strands
 from .alembic_library import alembic_library, array_of, sample_of, scope_of, write_parameter
 
 VERSION = (1, 5)
 TOOL = "Hairloom"
 #: A frame rate that nobody has; files and times would be broken by it.
-_MOST_RATE = 1.0e4
+_MAX_RATE = 1.0e4
 #: No fewer bytes than a point, and a strand, have with all attributes; and all headers together.
 _POINT_BYTES, _STRAND_BYTES, _HEADER_BYTES = 40, 64, 1 << 18
 
@@ -86,7 +86,7 @@ class _Part:
     def taken(self, groom: Groom, preset: GroomPreset) -> _Taken:
         """Its own copy of the groom, as large as the object: for as long as it is written."""
         own = groom if self.chosen is None else groom.take(self.chosen)
-        return _Taken(own, point_cap(own.strands, preset.most_points))
+        return _Taken(own, point_cap(own.strands, preset.max_points))
 
     def point_counts(self, strands: StrandSet, most: int) -> Ints:
         """Points of each curve that is written."""
@@ -162,7 +162,7 @@ def _write(
 
     Alembic's library ends the process where the disk is full, so that is looked at before.
     """
-    counts = [part.point_counts(groom.strands, preset.most_points) for part in parts]
+    counts = [part.point_counts(groom.strands, preset.max_points) for part in parts]
     points, strands = sum(int(each.sum()) for each in counts), sum(map(len, counts))
     check_free_space(path, points * _POINT_BYTES + strands * _STRAND_BYTES + _HEADER_BYTES)
     archive, time = _archive(library, path, groom, motion)
@@ -190,7 +190,7 @@ def _archive(library: Any, path: Path, groom: Groom, motion: GroomMotion | None)
     """A new archive, and the number of its time sampling."""
     if motion is None:
         return library.abc.CreateArchiveWithInfo(str(path), TOOL, groom.name), 0
-    if not 0.0 < motion.rate <= _MOST_RATE:
+    if not 0.0 < motion.rate <= _MAX_RATE:
         raise HairloomError(
             f"{motion.rate} frames a second cannot be written",
             place="frame rate",
@@ -287,7 +287,7 @@ def _write_group_names(library: Any, parent: Any, groom: Groom) -> None:
 
 def _widths(part: _Taken, preset: GroomPreset) -> Floats:
     """Widths of the points that are written, in the file's unit."""
-    width = np.maximum(part.capped(part.groom.strands.radius) * np.float32(2.0), LEAST_WIDTH)
+    width = np.maximum(part.capped(part.groom.strands.radius) * np.float32(2.0), MIN_WIDTH)
     return (width * preset.space.per_metre).astype(np.float32)
 
 

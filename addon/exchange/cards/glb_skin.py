@@ -26,10 +26,10 @@ ANIMATION = "hair_motion"
 _OF_VERTICES = 34962  # ARRAY_BUFFER
 #: Turns Z-up vectors into the file's: (x, z, -y).
 _AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-#: How far a vertex of the file may be from ours, a share of the hair's size.
+#: How far a vertex of the file may be from ours, a fraction of the hair's size.
 _SAME = 1.0e-5
 #: Weights below this are none.
-_LEAST_WEIGHT = 1.0e-5
+_MIN_WEIGHT = 1.0e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ def vertices_of(file: GlbFile, primitive: dict[str, Any], mesh: CardMesh, place:
 def _add_weights(file: GlbFile, node: int, mesh: CardMesh, skin: Skin, place: str) -> None:
     (primitive,) = file.content["meshes"][file.content["nodes"][node]["mesh"]]["primitives"]
     owner = vertices_of(file, primitive, mesh, place)
-    weight = np.where(skin.weight < _LEAST_WEIGHT, 0.0, skin.weight)
+    weight = np.where(skin.weight < _MIN_WEIGHT, 0.0, skin.weight)
     weight = (weight / weight.sum(axis=1, keepdims=True)).astype(np.float32)
     # the root is joint 0, and what has no weight names no joint
     joint = np.where(weight > 0.0, skin.joint + 1, 0)

@@ -16,7 +16,7 @@ from ...arrays import Ints
 from ...cards.card_mesh import CardMesh
 
 #: Vertices that uint16 can tell apart: its largest value is the end of a strip to some engines.
-_MOST_SHORT = 0xFFFF
+_MAX_SHORT = 0xFFFF
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def index_buffer(levels: Sequence[CardMesh], back: Sequence[Ints] = ()) -> Index
         back: of each level (triangle_count, 3), the order for back faces; empty: there is none.
     """
     parts = [np.asarray(part).ravel() for part in (*(mesh.triangles for mesh in levels), *back)]
-    is_short = max((len(mesh.positions) for mesh in levels), default=0) <= _MOST_SHORT
+    is_short = max((len(mesh.positions) for mesh in levels), default=0) <= _MAX_SHORT
     first = np.cumsum([0, *(len(part) for part in parts)]).tolist()
     content = np.concatenate(parts).astype("<u2" if is_short else "<u4").tobytes()
     return IndexBuffer(

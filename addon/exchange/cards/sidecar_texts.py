@@ -4,7 +4,7 @@ from __future__ import annotations
 
 ATLAS = {
     "tiles_are": "strips of hair, counted along rows from the lowest left one; each card shows one",
-    "padding_is": "share of a tile's width, and of its height, that is left free on each side",
+    "padding_is": "fraction of a tile's width, and of its height, that is left free on each side",
     "root": "the lower end of a tile",
 }
 DRAW_ORDER = {
@@ -30,7 +30,7 @@ SHADING = {
 }
 MATERIAL = {
     "fibre_are": "marschner alone. root: absorption per radius, factor of a root of absorption; "
-    "tip: the same of the tips, share of absorption that a grey strand has; strengths of R, TT, "
+    "tip: the same of the tips, fraction of absorption that a grey strand has; strengths of R, TT, "
     "TRT and the rest",
     "tables_are": "marschner alone; as they are stored, clamped, the lowest row first. "
     "longitudinal: column theta_i, row theta_r, each from -pi/2 to pi/2; M_R, M_TT, M_TRT, cos "

@@ -29,9 +29,9 @@ DIRECTIONS = ("normal", "tangent")
 #: Maps of names rather than amounts.
 LABELS = ("strand_id",)
 #: Fewer texels than these say nothing about a tile's coverage: the whole texture's is kept then.
-_LEAST_TILE_TEXELS = 16
+_MIN_TILE_TEXELS = 16
 #: What texels without hair weigh, so that where there is none at all the mean is that of all.
-_LEAST_WEIGHT = 1e-12
+_MIN_WEIGHT = 1e-12
 #: Below it there is no direction [1].
 _NOTHING = 1e-6
 
@@ -83,7 +83,7 @@ class _Taps:
     """
 
     index: Ints
-    share: Floats
+    fraction: Floats
 
     @classmethod
     def between(cls, old: int, new: int, tiles: int) -> _Taps:
@@ -92,14 +92,14 @@ class _Taps:
         first = np.floor(np.arange(new) * ratio + 1e-9).astype(np.intp)
         index = first[:, None] + np.arange(int(np.ceil(ratio)) + (old % new > 0))
         begin, end = np.arange(new)[:, None] * ratio, np.arange(1, new + 1)[:, None] * ratio
-        share = np.minimum(end, index + 1) - np.maximum(begin, index)
-        share = np.where(index < old, np.maximum(share, 0.0), 0.0)
+        fraction = np.minimum(end, index + 1) - np.maximum(begin, index)
+        fraction = np.where(index < old, np.maximum(fraction, 0.0), 0.0)
         index = np.minimum(index, old - 1)
         if new >= tiles:  # else a texel is larger than a tile
             is_own = _tile_of(old, tiles)[index] == _tile_of(new, tiles)[:, None]
-            share = share * is_own
-        share = share / share.sum(axis=1, keepdims=True)
-        return cls(index, share.astype(np.float32))
+            fraction = fraction * is_own
+        fraction = fraction / fraction.sum(axis=1, keepdims=True)
+        return cls(index, fraction.astype(np.float32))
 
     def mean(self, values: Floats) -> Floats:
         """Along axis 0, (new, ...)."""
@@ -108,17 +108,19 @@ class _Taps:
             total = sum(pairs[:, each] for each in range(1, pairs.shape[1])) + pairs[:, 0]
             return (total / np.float32(pairs.shape[1])).astype(np.float32, copy=False)
         total = np.zeros((len(self.index), *values.shape[1:]), np.float32)
-        for index, share in zip(self.index.T, self.share.T, strict=True):
-            total += values[index] * share.reshape(-1, *(1,) * (values.ndim - 1))
+        for index, fraction in zip(self.index.T, self.fraction.T, strict=True):
+            total += values[index] * fraction.reshape(-1, *(1,) * (values.ndim - 1))
         return total
 
     @property
     def is_even(self) -> bool:
-        return bool(np.all(self.share == self.share[0, 0]))
+        return bool(np.all(self.fraction == self.fraction[0, 0]))
 
     def with_most(self, values: Floats, weight: Floats) -> tuple[Floats, Floats]:
         """The value of greatest weight along axis 0, and that weight."""
-        weights = np.where(self.share.reshape(*self.share.shape, 1) > 0, weight[self.index], -1.0)
+        weights = np.where(
+            self.fraction.reshape(*self.fraction.shape, 1) > 0, weight[self.index], -1.0
+        )
         best = np.argmax(weights, axis=1)[:, None]
         chosen = np.take_along_axis(values[self.index], best, axis=1)[:, 0]
         return chosen, np.take_along_axis(weights, best, axis=1)[:, 0]
@@ -157,7 +159,7 @@ def _as_averaged(name: str, values: Floats, weight: Floats) -> Floats:
         return values
     plain = 2.0 * values - 1.0 if name in DIRECTIONS else values
     by_weight = weight if values.ndim == 2 else weight[..., None]
-    weighted: Floats = (plain * (by_weight + np.float32(_LEAST_WEIGHT))).astype(
+    weighted: Floats = (plain * (by_weight + np.float32(_MIN_WEIGHT))).astype(
         np.float32, copy=False
     )
     return weighted
@@ -168,7 +170,7 @@ def _as_shown(name: str, values: Floats, weight: Floats) -> Floats:
     if name == "alpha" or name in LABELS:
         return values
     by_weight = weight if values.ndim == 2 else weight[..., None]
-    mean = values / (by_weight + np.float32(_LEAST_WEIGHT))
+    mean = values / (by_weight + np.float32(_MIN_WEIGHT))
     if name in DIRECTIONS:
         return np.asarray(
             0.5 * unit_or(mean, np.array([0.0, 0.0, 1.0], mean.dtype), _NOTHING) + 0.5, np.float32
@@ -180,7 +182,7 @@ def _tiles(shape: tuple[int, ...], grid: AtlasGrid) -> list[tuple[slice, slice]]
     """The texels of each tile; the whole level as one where tiles are too small."""
     height, width = shape
     texels = height * width / grid.tile_count
-    if height < grid.rows or width < grid.columns or texels < _LEAST_TILE_TEXELS:
+    if height < grid.rows or width < grid.columns or texels < _MIN_TILE_TEXELS:
         return [(slice(None), slice(None))]
     rows = np.searchsorted(_tile_of(height, grid.rows), np.arange(grid.rows + 1))
     columns = np.searchsorted(_tile_of(width, grid.columns), np.arange(grid.columns + 1))
@@ -192,7 +194,7 @@ def _tiles(shape: tuple[int, ...], grid: AtlasGrid) -> list[tuple[slice, slice]]
 
 
 def _coverage(alpha: Floats, grid: AtlasGrid, threshold: float) -> Floats:
-    """(tiles,) share of each tile's texels that pass the alpha test."""
+    """(tiles,) fraction of each tile's texels that pass the alpha test."""
     return np.array([np.mean(alpha[tile] >= threshold) for tile in _tiles(alpha.shape, grid)])
 
 
@@ -202,21 +204,21 @@ def _with_coverage(alpha: Floats, coverage: Floats, grid: AtlasGrid, threshold: 
     if len(tiles) != len(coverage):
         coverage = np.array([coverage.mean()])
     kept = np.empty_like(alpha)
-    for tile, share in zip(tiles, coverage, strict=True):
-        kept[tile] = _passing(alpha[tile], share, threshold)
+    for tile, fraction in zip(tiles, coverage, strict=True):
+        kept[tile] = _passing(alpha[tile], fraction, threshold)
     return kept
 
 
-def _passing(alpha: Floats, share: float, threshold: float) -> Floats:
-    """Alpha, scaled so that this share of it passes the test, and one texel at least if any did.
+def _passing(alpha: Floats, fraction: float, threshold: float) -> Floats:
+    """Alpha, scaled so that this fraction of it passes the test, and one texel at least if any did.
 
     Castano scales all alphas by one factor; here this goes for those below the threshold, and
     those above it are scaled by their distance to 1, so that opaque hair stays opaque.
     """
-    if share == 0.0:
+    if fraction == 0.0:
         return np.minimum(alpha, np.nextafter(np.float32(threshold), np.float32(0.0)))
     values = np.sort(alpha, axis=None)[::-1]
-    wanted = min(max(round(share * values.size), 1), values.size)
+    wanted = min(max(round(fraction * values.size), 1), values.size)
     # Equal texels pass together or not at all
     steps = np.append(np.flatnonzero(values[:-1] > values[1:]) + 1, values.size)
     count = steps[np.argmin(np.abs(steps - wanted))]

@@ -25,7 +25,7 @@ from .srgb import srgb_decoded, srgb_encoded
 #: The largest side of a texture on every GPU that Blender supports [pixels].
 LARGEST_SIDE = 16384
 #: More than anybody paints [pixels]; as four float channels they take 1 GiB.
-MOST_PIXELS = 1 << 26
+MAX_PIXELS = 1 << 26
 #: suffix -> the depths that such a file can have, the first being the usual one
 DEPTHS = {
     ".png": ("uint8", "uint16"),
@@ -55,7 +55,7 @@ def check_size(width: int, height: int, place: str) -> None:
     Raises:
         HairloomError: it is too large.
     """
-    if max(width, height) > LARGEST_SIDE or width * height > MOST_PIXELS:
+    if max(width, height) > LARGEST_SIDE or width * height > MAX_PIXELS:
         raise HairloomError(
             f"{width} x {height} pixels are too many",
             place=place,

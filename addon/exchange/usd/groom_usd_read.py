@@ -2,7 +2,7 @@
 
 Units, axes and the places of prims come from the file. Strands are read at rest: values without a
 time, or those of the first one. Instances of prims are read as often as they stand in the file;
-point instancers are not, and of other geometry only its number is told.
+point instancers are not, and of other geometry only its number is reported.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .usd_curves import Curves, UnusableCurvesError, curves_of
 from .usd_library import damage_told, opened_stage, usd_library
 
 #: More than any groom; their positions alone take 3 GiB.
-MOST_POINTS = 1 << 28
+MAX_POINTS = 1 << 28
 
 
 def read_usd(
@@ -108,9 +108,9 @@ class _Reading:
                     self._problems.append(f"{prim.GetPath()} was left out: {error}")
                     continue
                 total += len(piece.points)
-                if total > MOST_POINTS:
+                if total > MAX_POINTS:
                     raise self._error(
-                        f"it has more than {MOST_POINTS:,} points", "Export fewer strands"
+                        f"it has more than {MAX_POINTS:,} points", "Export fewer strands"
                     )
                 self.notes += [f"{prim.GetPath()}: {note}" for note in piece.notes]
                 yield piece
@@ -197,7 +197,7 @@ def _together(arrays: list[NDArray[Any]]) -> NDArray[Any]:
 
 
 def _of_all(what: str, arrays: list[NDArray[Any] | None], notes: list[str]) -> NDArray[Any] | None:
-    """All arrays as one, or None where a prim has none; told where another one has."""
+    """All arrays as one, or None where a prim has none; reported if another one has."""
     known = [array for array in arrays if array is not None]
     if len(known) == len(arrays):
         return _together(known)

@@ -45,7 +45,7 @@ class OnCurves:
     vertex: from values for each control point; None: they are those of the points.
     varying: from values for each end of a segment; None: they are those of the points.
     varying_count: how many values of the latter kind there must be.
-    wrong_count: curves that are without points, because the basis cannot have so many of theirs.
+    wrong_count: curves that are without points, because their number does not fit the basis.
     """
 
     offsets: Ints
@@ -92,14 +92,14 @@ def _of_bezier(counts: Ints, offsets: Ints, curve: Ints, place: Ints) -> OnCurve
     own = np.flatnonzero(is_sound[curve])
     curve, place = curve[own], place[own]
     third = place % 3
-    share = (third / 3).astype(np.float32)
+    fraction = (third / 3).astype(np.float32)
     index = np.minimum((own - third)[:, None] + np.arange(4), offsets[1:][curve, None] - 1)
     end = end_offsets[curve] + place // 3
     next_end = np.minimum(end + 1, end_offsets[1:][curve] - 1)
     return OnCurves(
         np.concatenate([[0], np.cumsum(np.where(is_sound, counts, 0))]),
         Mix(index, _AT_THIRDS[third]),
-        Mix(np.stack([end, next_end], axis=1), np.stack([1 - share, share], axis=1)),
+        Mix(np.stack([end, next_end], axis=1), np.stack([1 - fraction, fraction], axis=1)),
         int(end_offsets[-1]),
         int((~is_sound).sum()),
     )

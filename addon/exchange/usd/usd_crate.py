@@ -1,8 +1,8 @@
 """Binary USD files (crates), checked before the library opens them.
 
 OpenUSD believes the counts at the beginnings of a crate's sections: a damaged file of 3 kB made it
-fill 5 GB for 40 s. Here they are held against what so many bytes can hold: LZ4 makes bytes at most
-255 times smaller, and of integers, by USD's own coding, no fewer than two bits each are left.
+fill 5 GB for 40 s. Here they are held against what that many bytes can hold: LZ4 makes bytes at
+most 255 times smaller, and of integers, by USD's own coding, no fewer than two bits each are left.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ CRATE = b"PXR-USDC"
 
 _HEADER_SIZE = 88
 _SECTION_SIZE = 32
-_MOST_SECTIONS = 64
-_MOST_BYTES = 255  # from one byte of LZ4
-_MOST_INTEGERS = 4 * _MOST_BYTES
+_MAX_SECTIONS = 64
+_MAX_BYTES = 255  # from one byte of LZ4
+_MAX_INTEGERS = 4 * _MAX_BYTES
 #: Version from which on sections are compressed.
 _COMPRESSED = (0, 4)
 #: section -> counts at its beginning, compressed blocks after them
@@ -44,7 +44,7 @@ def check_crate(path: Path) -> None:
             raise _damaged(path, "the place of its table of contents", 16)
         file.seek(contents)
         (count,) = struct.unpack("<Q", file.read(8))
-        if not 0 < count <= min(_MOST_SECTIONS, (file_size - contents - 8) // _SECTION_SIZE):
+        if not 0 < count <= min(_MAX_SECTIONS, (file_size - contents - 8) // _SECTION_SIZE):
             raise _damaged(path, "the number of its sections", contents)
         for name, start, size in struct.iter_unpack("<16sqq", file.read(count * _SECTION_SIZE)):
             if start < _HEADER_SIZE or size < 8 or start + size > file_size:
@@ -53,7 +53,7 @@ def check_crate(path: Path) -> None:
             file.seek(start)
             if section == b"TOKENS" and size >= 24:
                 tokens, full, packed = struct.unpack("<3Q", file.read(24))
-                is_sound = tokens <= full <= _MOST_BYTES * packed + size
+                is_sound = tokens <= full <= _MAX_BYTES * packed + size
                 is_sound &= packed <= size - 24 or version < _COMPRESSED
             elif section in _BLOCKS and version >= _COMPRESSED:
                 is_sound = _is_sound(file.read(size), *_BLOCKS[section])
@@ -65,7 +65,7 @@ def check_crate(path: Path) -> None:
 
 
 def _is_sound(section: bytes, counts: int, blocks: int) -> bool:
-    """Whether all blocks lie inside, and the counts are of so many integers."""
+    """Whether all blocks lie inside, and the counts match their number of integers."""
     if len(section) < 8 * counts:
         return False
     place, packed = 8 * counts, 0
@@ -78,7 +78,7 @@ def _is_sound(section: bytes, counts: int, blocks: int) -> bool:
         if place > len(section):
             return False
     claimed = struct.unpack_from(f"<{counts}Q", section)
-    return max(claimed) <= _MOST_INTEGERS * packed
+    return max(claimed) <= _MAX_INTEGERS * packed
 
 
 def _damaged(path: Path, what: str, byte: int) -> HairloomError:

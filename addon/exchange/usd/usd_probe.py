@@ -14,13 +14,13 @@ from pathlib import Path
 TOLD = 3
 
 #: Memory that a file may take beside its own size, and as a multiple of it.
-_BESIDE, _MOST_TIMES = 1 << 30, 30
+_BESIDE, _MAX_TIMES = 1 << 30, 30
 
 
 def main(path: Path) -> int:
     from pxr import Tf, Usd
 
-    limit_memory(_BESIDE + _MOST_TIMES * path.stat().st_size)
+    limit_memory(_BESIDE + _MAX_TIMES * path.stat().st_size)
     first = Usd.TimeCode.EarliestTime()
     try:
         stage = Usd.Stage.Open(str(path))
@@ -46,7 +46,7 @@ def told(error: BaseException) -> str:
 
 
 def limit_memory(more: int) -> None:
-    """Let this process take so many bytes more; only Linux says how many it has."""
+    """Let this process take this many bytes more; only Linux says how many it has."""
     if not sys.platform.startswith("linux"):
         return
     import resource

@@ -26,7 +26,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Floats
-from .fibre import LEAST_INDEX, Fibre
+from .fibre import MIN_INDEX, Fibre
 from .interface import (
     attenuation,
     bravais_index,
@@ -42,7 +42,7 @@ _TWIST = tuple(np.cos((np.arange(4) + 0.5) * np.pi / 4.0))
 
 _LAPS = (-2.0 * np.pi, 0.0, 2.0 * np.pi)
 _NEWTON_STEPS = 5
-_LEAST_SLOPE = 1e-6
+_MIN_SLOPE = 1e-6
 
 
 def azimuthal_r(cos_d: Floats, phi: Floats, fibre: Fibre) -> Floats:
@@ -86,7 +86,7 @@ def azimuthal_trt(
         _blurred_trt(cos_d, phi, fibre, elliptic_index(fibre.index_of_refraction, ratio, turn))
         for turn in turns
     ]
-    return np.mean(lobes, axis=0) * _round_share(np.asarray(cos_d), fibre)
+    return np.mean(lobes, axis=0) * _round_fraction(np.asarray(cos_d), fibre)
 
 
 def azimuthal_rest(cos_d: Floats, fibre: Fibre) -> Floats:
@@ -106,7 +106,7 @@ def elliptic_index(index: float, ratio: float, cos_double: float) -> Floats:
     narrow = 2.0 * (index - 1.0) * ratio**2 - index + 2.0
     wide = 2.0 * (index - 1.0) / ratio**2 - index + 2.0
     middle = 0.5 * ((narrow + wide) + cos_double * (narrow - wide))
-    return np.maximum(middle, LEAST_INDEX)
+    return np.maximum(middle, MIN_INDEX)
 
 
 def trt_turn(gamma: Floats, bravais: Floats) -> Floats:
@@ -121,7 +121,7 @@ def trt_caustic(bravais: Floats) -> tuple[Floats, Floats]:
     return gamma, np.maximum(trt_turn(gamma, bravais), 0.0)
 
 
-def _round_share(cos_d: Floats, fibre: Fibre) -> Floats:
+def _round_fraction(cos_d: Floats, fibre: Fibre) -> Floats:
     """Energy of TRT if the fibre were round, over that of a twisted elliptic one, (..., 1)."""
     own = fibre.index_of_refraction
     others = [elliptic_index(own, fibre.eccentricity, turn) for turn in _TWIST]
@@ -212,10 +212,10 @@ def _root(
     """
     span = np.abs(end[0] - top[0])
     slope = 2.0 - 4.0 * np.cos(top[0]) / np.sqrt(bravais**2 - np.sin(top[0]) ** 2)
-    bend = (top[1] - end[1] - slope * span) / np.maximum(span, _LEAST_SLOPE) ** 2
+    bend = (top[1] - end[1] - slope * span) / np.maximum(span, _MIN_SLOPE) ** 2
     due = top[1] - target
     reach = np.sqrt(np.maximum(slope**2 + 4.0 * bend * due, 0.0))
-    step = 2.0 * due / np.maximum(slope + reach, _LEAST_SLOPE)
+    step = 2.0 * due / np.maximum(slope + reach, _MIN_SLOPE)
     gamma = top[0] + np.sign(end[0] - top[0]) * step
     low, high = np.minimum(top[0], end[0]), np.maximum(top[0], end[0])
     for _ in range(_NEWTON_STEPS):
@@ -224,7 +224,7 @@ def _root(
         cosine = np.sqrt(np.maximum(bravais**2 - sine**2, 1e-12))
         excess = 4.0 * np.arcsin(sine / bravais) - 2.0 * gamma - target
         slope = 4.0 * np.cos(gamma) / cosine - 2.0
-        gamma = gamma - excess / np.where(np.abs(slope) < _LEAST_SLOPE, _LEAST_SLOPE, slope)
+        gamma = gamma - excess / np.where(np.abs(slope) < _MIN_SLOPE, _MIN_SLOPE, slope)
     return np.clip(gamma, low, high)
 
 
@@ -232,7 +232,7 @@ def _density(order: int, gamma: Floats, bravais: Floats) -> Floats:
     """1 / |2 dphi/dh|, from dphi/dgamma = 2 p cos gamma / (eta' cos gamma_t) - 2."""
     cosine = np.maximum(np.cos(gamma), 0.0)
     slope = 2.0 * order * cosine / (bravais * np.cos(refracted(gamma, bravais))) - 2.0
-    return 0.5 * cosine / np.maximum(np.abs(slope), _LEAST_SLOPE)
+    return 0.5 * cosine / np.maximum(np.abs(slope), _MIN_SLOPE)
 
 
 def _folded(phi: Floats) -> Floats:

@@ -27,13 +27,13 @@ from ...arrays import Floats
 from ...errors import HairloomError
 
 #: Below this index all light would leave in one direction, and N_TT would have no bounds.
-LEAST_INDEX = 1.01
+MIN_INDEX = 1.01
 
 #: Standard deviation of theta_h below which a lobe would be a spike, [rad]
-LEAST_WIDTH = np.radians(0.5)
+MIN_WIDTH = np.radians(0.5)
 
 #: A tilt or an offset towards the root; what an artist can set ends at 45 degrees, [rad]
-_MOST_TURNED = -1.0
+_MAX_TURNED = -1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +90,7 @@ class Fibre:
             **dict.fromkeys(("strength_r", "strength_tt", "strength_trt", "strength_rest"), 0.0),
             **dict.fromkeys(("glint_width", "glint_strength", "glint_fade"), 0.0),
             "azimuthal_width": 0.0,
-            **dict.fromkeys(("cuticle_tilt", "offset_r", "offset_tt", "offset_trt"), _MOST_TURNED),
+            **dict.fromkeys(("cuticle_tilt", "offset_r", "offset_tt", "offset_trt"), _MAX_TURNED),
         }
         for name, least in limits.items():
             _require(name, getattr(self, name), least)
@@ -106,7 +106,7 @@ class Fibre:
     @property
     def widths(self) -> tuple[float, float, float]:
         """Of R, TT, TRT: standard deviations of theta_h that the lobes really have."""
-        least = float(LEAST_WIDTH)
+        least = float(MIN_WIDTH)
         return (max(self.width_r, least), max(self.width_tt, least), max(self.width_trt, least))
 
     @property

@@ -12,19 +12,19 @@ import functools
 import numpy as np
 
 from ...arrays import Floats
-from .fibre import LEAST_INDEX
+from .fibre import MIN_INDEX
 
 #: cos theta_d below which a ray runs along the fibre and the effective index has no bounds
-LEAST_COSINE = 1e-4
+MIN_COSINE = 1e-4
 
 #: What a passage loses at least, in a quotient: at grazing light, where nothing comes in, it is 0.
-_LEAST_LOSS = 1e-9
+_MIN_LOSS = 1e-9
 
 
 def bravais_index(index: Floats | float, cos_d: Floats) -> Floats:
     """eta' of a cone of cos theta_d; Snell's law in the plane, and light polarised across it."""
-    index = np.maximum(index, LEAST_INDEX)
-    cosine = np.clip(cos_d, LEAST_COSINE, 1.0)
+    index = np.maximum(index, MIN_INDEX)
+    cosine = np.clip(cos_d, MIN_COSINE, 1.0)
     return np.sqrt(index**2 - 1.0 + cosine**2) / cosine
 
 
@@ -34,13 +34,13 @@ def refracted(gamma: Floats, bravais: Floats) -> Floats:
 
 
 def fresnel(gamma: Floats, index: Floats | float, bravais: Floats) -> Floats:
-    """Reflected share of unpolarised light at gamma, from outside, and from inside on its way out.
+    """Reflected fraction of unpolarised light at gamma, from outside and from inside going out.
 
     eta'' = index^2 / eta' stands for the index of the light polarised in the plane.
     """
     cos_i = np.maximum(np.cos(gamma), 0.0)
     cos_t = np.cos(refracted(gamma, bravais))
-    parallel = np.maximum(index, LEAST_INDEX) ** 2 / bravais
+    parallel = np.maximum(index, MIN_INDEX) ** 2 / bravais
     across = (cos_i - bravais * cos_t) / (cos_i + bravais * cos_t)
     along = (parallel * cos_i - cos_t) / (parallel * cos_i + cos_t)
     return 0.5 * (across**2 + along**2)
@@ -74,22 +74,22 @@ def chord(gamma: Floats, cos_d: Floats, index: Floats | float) -> Floats:
     2 cos gamma_t in the plane and longer by 1 / cos theta_t in space. (Marschner's
     1 + cos 2 gamma_t is a misprint.)
     """
-    inside = np.maximum(index, LEAST_INDEX)
-    cos_t = np.sqrt(1.0 - (1.0 - np.clip(cos_d, LEAST_COSINE, 1.0) ** 2) / inside**2)
+    inside = np.maximum(index, MIN_INDEX)
+    cos_t = np.sqrt(1.0 - (1.0 - np.clip(cos_d, MIN_COSINE, 1.0) ** 2) / inside**2)
     return 2.0 * np.cos(refracted(gamma, bravais_index(index, cos_d))) / cos_t
 
 
 def lobe_energy(
     order: int, cos_d: Floats, index: Floats | float, absorption: tuple[float, float, float]
 ) -> Floats:
-    """Share of the light on the fibre that leaves it in lobe p: the mean of A over h, (..., 3)."""
+    """Fraction of the fibre's light that leaves in lobe p: the mean of A over h, (..., 3)."""
     gamma, weight = quarter_turn()
     kept = attenuation(order, gamma, np.asarray(cos_d)[..., None], index, absorption)
     return np.sum(kept * (weight * np.cos(gamma))[:, None], axis=-2)
 
 
 def rest_energy(cos_d: Floats, index: float, absorption: tuple[float, float, float]) -> Floats:
-    """Share of the light that leaves after two or more reflections inside, (..., 3).
+    """Fraction of the light that leaves after two or more reflections inside, (..., 3).
 
     The lobes p = 3, 4, ... are a geometric series: each passage keeps F T of the one before.
     """
@@ -98,7 +98,7 @@ def rest_energy(cos_d: Floats, index: float, absorption: tuple[float, float, flo
     mirrored = fresnel(gamma, index, bravais_index(index, cone))[..., None]
     passage = np.exp(-chord(gamma, cone, index)[..., None] * np.asarray(absorption))
     left = (1.0 - mirrored) ** 2 * mirrored**2 * passage**3
-    left = left / np.maximum(1.0 - mirrored * passage, _LEAST_LOSS)
+    left = left / np.maximum(1.0 - mirrored * passage, _MIN_LOSS)
     return np.sum(left * (weight * np.cos(gamma))[:, None], axis=-2)
 
 

@@ -7,7 +7,7 @@ the eye, one for the solid angle. So M_p is normalised in this measure:
     integral of M_p(theta_i, theta_r) cos^2 theta_r / cos^2 theta_d dtheta_r = 1, for each theta_i.
 
 Marschner's Gaussian of theta_h is so for narrow lobes across the fibre only; it gains energy on
-one side at grazing light and loses it beyond the ends on the other. d'Eon et al. 2011 mend this
+one side at grazing light and loses it beyond the ends on the other. d'Eon et al. 2011 fix this
 with a kernel on the sphere, whose measure has one cosine; ours has two, which is the measure of
 the sphere in four dimensions. The same step there (von Mises-Fisher, concentration k) gives
 
@@ -105,10 +105,10 @@ def _balance(lobes: list[LongitudinalLobe], index: float) -> Floats:
         kept += lobe(theta[:, None], theta_r) * np.interp(np.abs(theta_d), steep, energy) * measure
     balance = np.ones_like(theta)
     for _ in range(_BALANCE_ROUNDS):
-        share = balance * (kept @ np.interp(theta_r, theta, balance))
-        balance = balance / np.sqrt(np.maximum(share, share[::-1]))
-    share = balance * (kept @ np.interp(theta_r, theta, balance))
-    return balance / np.maximum(share, 1.0)
+        fraction = balance * (kept @ np.interp(theta_r, theta, balance))
+        balance = balance / np.sqrt(np.maximum(fraction, fraction[::-1]))
+    fraction = balance * (kept @ np.interp(theta_r, theta, balance))
+    return balance / np.maximum(fraction, 1.0)
 
 
 def _kernel_factor(concentration: float) -> float:

@@ -10,13 +10,13 @@ import numpy as np
 from ...arrays import Floats
 from ..kajiya_kay import diffuse_bias, shifted_tangent
 from ..settings import ShadingSettings
-from ..tint import tip_share
+from ..tint import tip_fraction
 from .fibre import Fibre, directions_to_angles
 from .pigment import COLOR_FACTOR, absorption_color, color_absorption, melanin_absorption
 from .tables import MarschnerTables, look_up
 
-#: Share of the pigment, evened out over the colours, that a grey strand still has: it is white, not
-#: glass.
+#: Fraction of the pigment, evened out over the colours, that a grey strand still has: it is white,
+#: not glass.
 GREY_LEFT = 0.04
 
 
@@ -79,7 +79,7 @@ def strand_absorption(
         color_noise, grey_noise: the strand's own, in [0, 1].
     """
     root, tip = root_absorption(settings), tip_absorption(settings)
-    mixed = root + (tip - root) * tip_share(along, settings)[..., None]
+    mixed = root + (tip - root) * tip_fraction(along, settings)[..., None]
     amount = 1.0 + settings.color_variation * (1.0 - 2.0 * np.asarray(color_noise))
     is_grey = (np.asarray(grey_noise) < settings.grey_share)[..., None]
     grey = GREY_LEFT * mixed.mean(axis=-1, keepdims=True)
@@ -94,10 +94,10 @@ def strand_color(absorption: Floats) -> Floats:
 def straight_light(
     normal: Floats, to_light: Floats, tau: Floats | float, shading: ShadingSettings
 ) -> Floats:
-    """The share of light that no strand is in the way of, (...): what passes tau strands.
+    """The fraction of light that no strand is in the way of, (...): what passes tau strands.
 
     Where tau is not known, which is when it is negative, by how much the hair's volume faces the
-    light: a stand-in.
+    light: an approximation.
     """
     facing = 1.0 + shading.volume_shade * (diffuse_bias(normal, to_light) - 1.0)
     return np.where(np.asarray(tau) < 0.0, facing, np.exp(-np.maximum(tau, 0.0)))

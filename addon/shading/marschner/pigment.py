@@ -20,11 +20,11 @@ from ...arrays import Floats
 EUMELANIN = np.array([0.506, 0.841, 1.653])
 PHEOMELANIN = np.array([0.343, 0.733, 1.924])
 
-#: Blender's: the share of light-coloured hair that is left at melanin 1
-LEAST_LIGHTNESS = 1e-4
+#: Blender's: the fraction of light-coloured hair that is left at melanin 1
+MIN_LIGHTNESS = 1e-4
 
 #: Darkest colour: black itself would ask for absorption without bounds.
-LEAST_COLOR = 1e-4
+MIN_COLOR = 1e-4
 
 #: Chiang et al. 2016, section 4.2: coefficients of rising powers of the azimuthal roughness
 _COLOR_FIT = (5.969, -0.215, 2.532, -10.73, 5.574, 0.245)
@@ -35,9 +35,9 @@ def melanin_absorption(melanin: Floats | float, redness: Floats | float) -> Floa
 
     Args:
         melanin: in [0, 1]: white 0, blond 0.25, brown 0.75, black 1; linear to the eye.
-        redness: in [0, 1]: the share of pheomelanin.
+        redness: in [0, 1]: the fraction of pheomelanin.
     """
-    lightness = np.maximum(1.0 - np.asarray(melanin), LEAST_LIGHTNESS)
+    lightness = np.maximum(1.0 - np.asarray(melanin), MIN_LIGHTNESS)
     amount, redness = -np.log(np.minimum(lightness, 1.0))[..., None], np.asarray(redness)[..., None]
     return amount * ((1.0 - redness) * EUMELANIN + redness * PHEOMELANIN)
 
@@ -49,7 +49,7 @@ def color_absorption(color: Floats, azimuthal_roughness: float = 0.3) -> Floats:
         color: linear rgb, (..., 3), taken into [LEAST_COLOR, 1].
         azimuthal_roughness: Blender's radial roughness, in [0, 1].
     """
-    logarithm = np.log(np.clip(color, LEAST_COLOR, 1.0))
+    logarithm = np.log(np.clip(color, MIN_COLOR, 1.0))
     return (logarithm / _color_fit(azimuthal_roughness)) ** 2
 
 

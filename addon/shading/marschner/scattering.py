@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Floats
 from .azimuthal import azimuthal_r, azimuthal_rest, azimuthal_trt, azimuthal_tt
 from .fibre import Fibre
-from .interface import LEAST_COSINE
+from .interface import MIN_COSINE
 from .longitudinal import longitudinal_lobes
 
 #: Widest step between the places over which azimuthal_width takes its mean, [rad]
@@ -28,7 +28,7 @@ def marschner(theta_i: Floats, theta_r: Floats, phi: Floats, fibre: Fibre) -> Fl
     cos_d = np.cos(0.5 * (theta_r - theta_i))
     along = np.stack([lobe(theta_i, theta_r) for lobe in longitudinal_lobes(fibre)], axis=-1)
     factors = np.array(fibre.strengths) * along[..., [0, 1, 2, 2]]
-    squared = np.maximum(cos_d, LEAST_COSINE)[..., None] ** 2
+    squared = np.maximum(cos_d, MIN_COSINE)[..., None] ** 2
     return np.sum(factors[..., None] * azimuthal_lobes(cos_d, phi, fibre), axis=-2) / squared
 
 

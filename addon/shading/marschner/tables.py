@@ -34,7 +34,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from .azimuthal import azimuthal_r, azimuthal_rest, azimuthal_trt, azimuthal_tt
 from .fibre import Fibre
-from .interface import LEAST_COSINE
+from .interface import MIN_COSINE
 from .longitudinal import longitudinal_lobes
 
 #: While a slider moves, and at rest: texels along a side.
@@ -49,11 +49,11 @@ LEVELS = 6
 _FITTED = (0.0, 0.1, 1.0)
 
 #: What a lobe has at least where its ways are asked for, and in a logarithm.
-_LEAST_LIT = 1e-12
-_LEAST_LIGHT = 1e-100
+_MIN_LIT = 1e-12
+_MIN_LIGHT = 1e-100
 
 #: Keeps a quotient from 0 where all ways are equally long.
-_LEAST_VARIANCE = 1e-6
+_MIN_VARIANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class MarschnerTables:
 
 
 def shape_of(fibre: Fibre) -> Fibre:
-    """The fibre without colour and strengths: what its tables hang on."""
+    """The fibre without colour and strengths, on which its tables depend."""
     return replace(
         fibre,
         absorption=(0.0, 0.0, 0.0),
@@ -137,7 +137,7 @@ def look_up(
     clear = bilinear(tables.azimuthal, cos_d, turn)
     kept = kept_light(bilinear(tables.paths, cos_d, turn), absorption)
     factors = strengths * along[..., [0, 1, 2, 2]] * clear
-    squared = np.maximum(cos_d, LEAST_COSINE)[..., None] ** 2
+    squared = np.maximum(cos_d, MIN_COSINE)[..., None] ** 2
     return np.sum(factors[..., None] * kept, axis=-2) / squared
 
 
@@ -147,7 +147,7 @@ def kept_light(paths: Floats, absorption: Floats) -> Floats:
     Where the fitted parabola would rise again, it stays at its lowest.
     """
     l_tt, l_trt, v_trt, l_rest = np.moveaxis(paths[..., None], -2, 0)
-    reached = np.minimum(absorption, l_trt / np.maximum(v_trt, _LEAST_VARIANCE))
+    reached = np.minimum(absorption, l_trt / np.maximum(v_trt, _MIN_VARIANCE))
     return np.stack(
         [
             np.ones(np.broadcast_shapes(l_tt.shape, absorption.shape)),
@@ -179,8 +179,8 @@ def _spread(lobes: Floats, width: float) -> Floats:
 
 def _mean_path(lobe: Floats, lane: int) -> Floats:
     """l, (...), with which exp(-absorption l) is exact at one absorption of _FITTED."""
-    share = np.maximum(lobe[..., lane], _LEAST_LIGHT) / np.maximum(lobe[..., 0], _LEAST_LIGHT)
-    return -np.log(share) / _FITTED[lane]
+    fraction = np.maximum(lobe[..., lane], _MIN_LIGHT) / np.maximum(lobe[..., 0], _MIN_LIGHT)
+    return -np.log(fraction) / _FITTED[lane]
 
 
 def _path_and_variance(lobe: Floats) -> tuple[Floats, Floats]:
@@ -195,7 +195,7 @@ def _evenly_on(path: Floats, lobe: Floats) -> Floats:
 
     The texture is read between texels, so beside the light a path must not jump.
     """
-    is_lit = lobe[..., 0] > _LEAST_LIT
+    is_lit = lobe[..., 0] > _MIN_LIT
     last = np.maximum.accumulate(np.where(is_lit, np.arange(len(path))[:, None], -1), axis=0)
     return np.take_along_axis(path, np.where(last < 0, is_lit.argmax(axis=0), last), 0)
 

@@ -18,9 +18,9 @@ _TOLERANCE, _OVERLAP = 1e-3, 1e-6
 _ASIDE = (0.0137, 0.0071)
 _REACH = _TOLERANCE + max(_ASIDE)
 #: [texels^2] smaller triangles have no place in the map
-_LEAST_AREA = 1e-7
+_MIN_AREA = 1e-7
 #: [UV units] a map that is smaller is none
-_LEAST_EXTENT = 1e-9
+_MIN_EXTENT = 1e-9
 #: pairs of triangle and texel that are looked at together
 _PAIRS = 1_000_000
 
@@ -49,12 +49,12 @@ def chart_of(corner_uv: Floats, resolution: int, margin: int) -> Chart:
         return Chart(np.zeros_like(uv), is_finite, (0, 0))
     low, high = uv[is_finite].min(axis=(0, 1)), uv[is_finite].max(axis=(0, 1))
     extent = float((high - low).max())
-    if extent < _LEAST_EXTENT:
+    if extent < _MIN_EXTENT:
         return Chart(np.zeros_like(uv), np.zeros_like(is_finite), (0, 0))
     scale = (resolution - 2 * margin) / extent
     place = np.where(is_finite[:, None, None], (uv - low) * scale + margin, 0.0)
     columns, rows = np.ceil((high - low) * scale).astype(int) + 2 * margin
-    return Chart(place, is_finite & (np.abs(_doubled_area(place)) > _LEAST_AREA), (rows, columns))
+    return Chart(place, is_finite & (np.abs(_doubled_area(place)) > _MIN_AREA), (rows, columns))
 
 
 def covering(chart: Chart) -> tuple[Ints, Bools]:

@@ -12,14 +12,14 @@ from ...arrays import Floats, Ints
 from .layout import CLOSING, SkinLayout
 from .near_borders import along_border
 
-#: A Gaussian ends after so many standard deviations, and is sampled at so many texels a side.
+#: Standard deviations after which a Gaussian ends, and the texels a side at which it is sampled.
 KERNEL_REACH, KERNEL_TAPS = 2.5, 24
 #: lights whose shadow one texture holds
 SKIN_LIGHTS = 4
 #: [texels] sides of a seam that are nearer to each other have the same texels
 NARROW = 1.0
-#: below this share of known texels there is nothing to be said
-LEAST_KNOWN = 1e-6
+#: below this fraction of known texels there is nothing to be said
+MIN_KNOWN = 1e-6
 
 
 def blurred(values: Floats, layout: SkinLayout, softness: float, axis: int) -> Floats:
@@ -43,9 +43,9 @@ def blurred(values: Floats, layout: SkinLayout, softness: float, axis: int) -> F
         at = np.clip(there[0], 0, rows - 1), np.clip(there[1], 0, columns - 1)
         counts = inside & (layout.island[at] == layout.island)
         counts &= np.abs(away) <= KERNEL_REACH * sigma
-        share = np.where(counts, np.exp(-0.5 * (away / sigma) ** 2), 0.0)[..., None]
-        total += share * values[at]
-        weight += share
+        fraction = np.where(counts, np.exp(-0.5 * (away / sigma) ** 2), 0.0)[..., None]
+        total += fraction * values[at]
+        weight += fraction
     return np.where(layout.island[..., None] >= 0, total / np.maximum(weight, 1e-9), 1.0)
 
 
@@ -53,7 +53,7 @@ def soft_shadow(
     values: Floats, layout: SkinLayout, place: Floats, island: Ints
 ) -> tuple[Floats, Floats]:
     """Values at places (n, 2) of islands (n,), (n, channels), the same on both sides of a seam; and
-    the share of them that is known, (n,).
+    the fraction of them that is known, (n,).
 
     What the blur has left of a difference is taken half and half to both sides, less and less away
     from the seam.
@@ -67,14 +67,14 @@ def soft_shadow(
     is_same = layout.seam_islands[seam, 0] == layout.seam_islands[seam, 1]
     is_turned = is_same & (_distance(place, ends[..., 2:]) < _distance(place, ends[..., :2]))
     ends = np.where(is_turned[:, None, None], ends[..., [2, 3, 0, 1]], ends)
-    share = along_border(place, ends[:, 0, :2], ends[:, 1, :2])[:, None]
-    on_seam = ends[:, 0] * (1.0 - share) + ends[:, 1] * share
+    fraction = along_border(place, ends[:, 0, :2], ends[:, 1, :2])[:, None]
+    on_seam = ends[:, 0] * (1.0 - fraction) + ends[:, 1] * fraction
     here, _ = looked_up(values, layout.island, on_seam[:, :2], island)
     across, is_known = looked_up(
         values, layout.island, on_seam[:, 2:], layout.seam_islands[seam, 1]
     )
     shifts = corner_shifts(values, layout)[seam]
-    shift = shifts[:, 0] * (1.0 - share) + shifts[:, 1] * share
+    shift = shifts[:, 0] * (1.0 - fraction) + shifts[:, 1] * fraction
     nearness = np.clip(1.0 - np.linalg.norm(place - on_seam[:, :2], axis=1) / CLOSING, 0.0, 1.0)
     fade = nearness * nearness * (3.0 - 2.0 * nearness)
     fade = np.where((seam >= 0) & (is_known > 0.0), fade, 0.0)
@@ -120,8 +120,8 @@ def _seam_at(layout: SkinLayout, place: Floats, island: Ints) -> Ints:
 
 def _distance(place: Floats, edge: Floats) -> Floats:
     """From places (n, 2) to an edge each, start and end (n, 2, 2), (n,)."""
-    share = along_border(place, edge[:, 0], edge[:, 1])[:, None]
-    way = edge[:, 0] * (1.0 - share) + edge[:, 1] * share - place
+    fraction = along_border(place, edge[:, 0], edge[:, 1])[:, None]
+    way = edge[:, 0] * (1.0 - fraction) + edge[:, 1] * fraction - place
     distance: Floats = np.linalg.norm(way, axis=1)
     return distance
 
@@ -130,18 +130,18 @@ def looked_up(
     values: Floats, texel_island: Ints, place: Floats, island: Ints
 ) -> tuple[Floats, Floats]:
     """Values between texels at places (n, 2), of texels of these islands (n,) alone, (n, channels);
-    and the share of them, (n,).
+    and the fraction of them, (n,).
     """
-    share = place - 0.5 - np.floor(place - 0.5)
+    fraction = place - 0.5 - np.floor(place - 0.5)
     total, known = np.zeros((len(place), values.shape[-1])), np.zeros(len(place))
     for corner in range(4):
         at = _texel_around(texel_island.shape, place, corner)
         step = np.array([corner & 1, corner >> 1])
-        weight = np.prod(np.where(step, share, 1.0 - share), axis=-1)
+        weight = np.prod(np.where(step, fraction, 1.0 - fraction), axis=-1)
         weight = np.where((texel_island[at] == island) & (island >= 0), weight, 0.0)
         total += weight[:, None] * values[at]
         known += weight
-    return total / np.maximum(known, LEAST_KNOWN)[:, None], known
+    return total / np.maximum(known, MIN_KNOWN)[:, None], known
 
 
 def _texel_around(shape: tuple[int, ...], place: Floats, corner: int) -> tuple[Ints, Ints]:

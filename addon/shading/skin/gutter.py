@@ -69,9 +69,9 @@ def gutter_at(
 def rim_weights(chart: Chart, borders: Borders, border: Ints, points: Floats) -> Floats:
     """Weights (n, 3), in a border's own triangle, of the place on it nearest to each point."""
     own, start, end = borders.triangle[border], borders.start[border], borders.end[border]
-    share = along_border(points, chart.place[own, start], chart.place[own, end])
+    fraction = along_border(points, chart.place[own, start], chart.place[own, end])
     weights, number = np.zeros((len(points), 3)), np.arange(len(points))
-    weights[number, start], weights[number, end] = 1.0 - share, share
+    weights[number, start], weights[number, end] = 1.0 - fraction, fraction
     return weights
 
 

@@ -29,7 +29,7 @@ GUTTER = 32
 #: [texels] how far from a seam its two sides begin to be blended
 CLOSING = 8.0
 #: [m a texel] no skin is mapped more finely
-_LEAST_STRETCH = 1e-9
+_MIN_STRETCH = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class SkinLayout:
     copies: (n, 3) x, y and island of all places of the vertices at seams' ends; end_copies:
         (seam_count, 2, 2) the first one of a start and of an end, and how many there are.
     place: (triangle_count, 3, 2) of the corners; triangle_island: (triangle_count,).
-    overlapping: share of the covered texels where triangles overlap.
+    overlapping: fraction of the covered texels where triangles overlap.
     """
 
     island: Ints
@@ -68,7 +68,7 @@ class SkinLayout:
 
 
 def skin_layout(surface: Surface, resolution: int) -> SkinLayout:
-    """The layout of a surface: hangs on its triangles and UVs, and on its shape as it is now.
+    """The layout of a surface: depends on its triangles and UVs, and on its shape as it is now.
 
     It is empty where there are no UVs.
 
@@ -113,7 +113,7 @@ def skin_layout(surface: Surface, resolution: int) -> SkinLayout:
         island,
         shown.reshape(chart.shape),
         weights[:, 1:].reshape(*chart.shape, 2),
-        np.maximum(stretch, _LEAST_STRETCH).reshape(*chart.shape, 2),
+        np.maximum(stretch, _MIN_STRETCH).reshape(*chart.shape, 2),
         _nearest_seam(island, chart, seams, triangle_island),
         places,
         seam_islands,

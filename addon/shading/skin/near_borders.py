@@ -57,8 +57,8 @@ def along_border(points: Floats, start: Floats, end: Floats) -> Floats:
     """
     way = end - start
     squared = np.maximum(np.einsum("ij,ij->i", way, way), 1e-18)
-    share: Floats = np.clip(np.einsum("ij,ij->i", points - start, way) / squared, 0.0, 1.0)
-    return share
+    fraction: Floats = np.clip(np.einsum("ij,ij->i", points - start, way) / squared, 0.0, 1.0)
+    return fraction
 
 
 def _distance(points: Floats, start: Floats, end: Floats) -> Floats:
@@ -72,8 +72,8 @@ def _seeds(start: Floats, end: Floats, columns: int, rows: int) -> tuple[Ints, I
     count = np.ceil(np.linalg.norm(end - start, axis=1) / _SEED_STEP).astype(int) + 1
     border = np.repeat(np.arange(len(start)), count)
     number = np.arange(len(border)) - np.repeat(np.cumsum(count) - count, count)
-    share = (number / np.maximum(count - 1, 1)[border])[:, None]
-    point = start[border] + share * (end[border] - start[border])
+    fraction = (number / np.maximum(count - 1, 1)[border])[:, None]
+    point = start[border] + fraction * (end[border] - start[border])
     column, row = np.clip(np.floor(point), 0, [columns - 1, rows - 1]).astype(int).T
     return row * columns + column, border
 

@@ -9,7 +9,7 @@ from .settings import SkinSettings
 
 #: texels along the longer side of a map that is only looked through for overlaps
 _RESOLUTION, _MARGIN = 256, 2
-#: a share of overlapping texels that nobody sees
+#: a fraction of overlapping texels that nobody sees
 _FEW = 0.002
 
 
@@ -29,10 +29,10 @@ def uv_notes(head: Surface) -> tuple[str, ...]:
     if not chart.is_mapped.any():
         return ("the head's UVs have no area: the hair's shadow on it keeps its hard edges",)
     triangle, overlaps = covering(chart)
-    share = float(overlaps.sum() / max(int((triangle >= 0).sum()), 1))
-    if share < _FEW:
+    fraction = float(overlaps.sum() / max(int((triangle >= 0).sum()), 1))
+    if fraction < _FEW:
         return ()
     return (
-        f"the head's UVs overlap in {share:.0%} of their area: there the hair's shadow keeps its "
-        "hard edges",
+        f"the head's UVs overlap in {fraction:.0%} of their area: there the hair's shadow keeps "
+        "its hard edges",
     )

@@ -59,7 +59,7 @@ def even_depth(across: Floats, tangent: Floats, way: Floats) -> Floats:
 
 
 def among_strands(
-    before: Floats, beyond: Floats, scale: Floats, tau: Floats, share: Floats, front: Floats
+    before: Floats, beyond: Floats, scale: Floats, tau: Floats, fraction: Floats, front: Floats
 ) -> tuple[Floats, Floats]:
     """How much hair lies before and beyond the strand of an even card that is seen, (...) each.
 
@@ -68,12 +68,12 @@ def among_strands(
     Args:
         before, beyond: the plane of the card by the map, the card itself in them.
         scale: what one strand of the card counts there. tau: of the card.
-        share: see own_share. front: share of its other strands that the light meets later.
+        fraction: see own_share. front: fraction of its other strands that the light meets later.
     """
     few = np.maximum(tau, LEAST_TAU)
     others = scale * (few / -np.expm1(-few) - 1.0)
-    met = np.maximum(before - scale * tau * share, 0.0) + others * (1.0 - front)
-    left = np.maximum(beyond - scale * tau * (1.0 - share), 0.0) + others * front
+    met = np.maximum(before - scale * tau * fraction, 0.0) + others * (1.0 - front)
+    left = np.maximum(beyond - scale * tau * (1.0 - fraction), 0.0) + others * front
     return met, left
 
 
@@ -128,7 +128,7 @@ def card_shade(positions: Floats, triangles: Ints, uv: Floats, alpha: Floats) ->
 
 
 def _coarser(alpha: Floats, axis: int) -> Floats:
-    """Means of so many texels along an axis, as mip maps have them."""
+    """Means of this many texels along an axis, as mip maps have them."""
     starts = np.arange(0, alpha.shape[axis], _LIT_TEXELS)
     texels = np.diff(np.append(starts, alpha.shape[axis]))
     sums = np.add.reduceat(alpha, starts, axis=axis, dtype=np.float32)
@@ -144,7 +144,7 @@ def own_share(depth: Floats, bias: float, ends: Floats) -> Floats:
 
     Args:
         depth, bias: of the card behind the start of the layers, (...), and how close in front of
-            it nothing counts, in shares of how thick they are together.
+            it nothing counts, in fractions of how thick they are together.
         ends: of the layers, (n,).
     """
     layer = np.minimum(np.searchsorted(ends, depth), len(ends) - 1)

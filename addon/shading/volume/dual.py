@@ -27,7 +27,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ..marschner.fibre import Fibre
-from ..marschner.interface import LEAST_COSINE
+from ..marschner.interface import MIN_COSINE
 from ..marschner.look import (
     fibre_of,
     single_scattering,
@@ -45,14 +45,14 @@ SHARES_SIZE = 32
 #: Absorption in the middle of that axis.
 HALF_WAY = 0.5
 #: share that hair may send on at most, so that sums have bounds
-_MOST = 0.999
-_MOST_KEPT = 0.9999
+_MAX = 0.999
+_MAX_KEPT = 0.9999
 _SMALLEST = 1e-6
-#: even light passes as much as light that is so many times as slanted as light straight up
+#: even light passes as much as light that is this many times as slanted as light straight up
 #: (Elsasser 1942)
 _DIFFUSIVITY = 1.66
-#: what is taken for no light at all where a share of light stands in for tau
-_LEAST_LIGHT = 1e-3
+#: what is taken for no light at all where a fraction of light is given instead of tau
+_MIN_LIGHT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Shares:
     """What a fibre sends on and back, by lobe: R, TT, TRT and the rest.
 
     forward, backward: (SHARES_SIZE, SHARES_SIZE, 4) float32; row by absorption, see
-        absorption_place; column by cos theta_d; shares of the light on the fibre.
+        absorption_place; column by cos theta_d; fractions of the light on the fibre.
     """
 
     forward: Floats
@@ -110,7 +110,7 @@ def shares_at(table: Floats, cos_d: Floats, absorption: Floats) -> Floats:
 
 
 def mean_forward(table: Floats, shading: ShadingSettings) -> Floats:
-    """The share of light that a strand of this hair sends on, by colour, (3,).
+    """The fraction of light that a strand of this hair sends on, by colour, (3,).
 
     Over strands that lie any way, which meet light at theta as often as cos theta, and are then
     cos theta as broad; from root to tip, grey ones as many as there are.
@@ -122,13 +122,13 @@ def mean_forward(table: Floats, shading: ShadingSettings) -> Floats:
     theta = (np.arange(count) + 0.5) / count * 0.5 * np.pi
     along = (np.arange(count) + 0.5) / count
     found = np.zeros(3)
-    for grey_noise, share in ((0.0, shading.grey_share), (1.0, 1.0 - shading.grey_share)):
+    for grey_noise, fraction in ((0.0, shading.grey_share), (1.0, 1.0 - shading.grey_share)):
         noises = np.full(count, 0.5), np.full(count, grey_noise)
         absorption = strand_absorption(shading, along, *noises)
         # light that goes on leaves at the inclination at which it came
         sent = shares_at(table, np.cos(theta)[:, None], absorption).sum(axis=-1).mean(axis=1)
-        found += share * np.average(sent, axis=0, weights=np.cos(theta) ** 2)
-    return np.minimum(found, _MOST)
+        found += fraction * np.average(sent, axis=0, weights=np.cos(theta) ** 2)
+    return np.minimum(found, _MAX)
 
 
 def passed(tau: Floats, a_forward: Floats) -> tuple[Floats, Floats]:
@@ -141,13 +141,13 @@ def passed(tau: Floats, a_forward: Floats) -> tuple[Floats, Floats]:
 
 
 def returned(a_forward: Floats, a_backward: Floats, count: Floats | float = np.inf) -> Floats:
-    """What so many strands, one behind the other, give back of the light on the first.
+    """What a number of strands, one behind the other, gives back of the light on the first.
 
     A layer over deep hair gives the deep hair again: R = a_b + a_f^2 R / (1 - a_b R), with any
     number of turns between the two. From one layer to the next the light keeps
     g = a_f / (1 - a_b R), so that a stack of n gives R (1 - g^2n) / (1 - R^2 g^2n) (Stokes 1862).
     """
-    a_forward = np.clip(a_forward, 0.0, np.maximum(_MOST_KEPT - a_backward, 0.0))
+    a_forward = np.clip(a_forward, 0.0, np.maximum(_MAX_KEPT - a_backward, 0.0))
     middle = 1.0 + a_backward**2 - a_forward**2
     root = np.sqrt(np.maximum(middle**2 - 4.0 * a_backward**2, 0.0))
     # the smaller root, without a difference of near equals
@@ -169,7 +169,7 @@ def returned_shape(
     """
     widths = np.array(fibre.lobe_widths)
     shifts = np.array(fibre.lobe_shifts)
-    a_f = np.minimum(forward.sum(axis=-1), _MOST)
+    a_f = np.minimum(forward.sum(axis=-1), _MAX)
     a_b = backward.sum(axis=-1)
     on, back = np.maximum(a_f, _SMALLEST), np.maximum(a_b, _SMALLEST)
     wide_f = np.sqrt((forward * widths**2).sum(axis=-1) / on)
@@ -231,7 +231,7 @@ def dual_scattering(
         density: d_f and d_b of the paper.
     """
     theta_h, theta_d = 0.5 * (theta_i + theta_r), 0.5 * (theta_r - theta_i)
-    squared = np.maximum(np.cos(theta_d), LEAST_COSINE)[..., None] ** 2
+    squared = np.maximum(np.cos(theta_d), MIN_COSINE)[..., None] ** 2
     a_f, a_b = forward.sum(axis=-1), backward.sum(axis=-1)
     straight, scattered = passed(tau[..., None], a_f)
     # widths are the same for all colours: those of green
@@ -280,7 +280,7 @@ def off_the_skin(
     a_f, a_b = forward.sum(axis=-1), backward.sum(axis=-1)
     behind = np.asarray(beyond)[..., None]
     strands = np.asarray(tau)[..., None] + behind * (1.0 + _DIFFUSIVITY * facing)
-    kept = np.maximum(1.0 - skin * returned(a_f, a_b, behind), 1.0 - _MOST)
+    kept = np.maximum(1.0 - skin * returned(a_f, a_b, behind), 1.0 - _MAX)
     lit = skin * facing / (np.pi * kept)
     cosine = np.cos(phi)[..., None]
     onward = 0.5 * (a_f * (1.0 + cosine) + a_b * (1.0 - cosine))
@@ -306,7 +306,7 @@ def scattering_light(
 ) -> Floats:
     """What one light sends to the eye from a strand among others, (..., 3).
 
-    As look.marschner_light, of which it has all but the colour that stands in for light from strand
+    As look.marschner_light, of which it has all but the colour that replaces light from strand
     to strand.
 
     Args:
@@ -319,7 +319,7 @@ def scattering_light(
     cos_d = np.cos(0.5 * (theta_r - theta_i))
     straight = straight_light(normal, to_light, tau, shading)
     passed_by = np.where(
-        np.asarray(tau) < 0.0, -np.log(np.maximum(straight, _LEAST_LIGHT)), np.asarray(tau)
+        np.asarray(tau) < 0.0, -np.log(np.maximum(straight, _MIN_LIGHT)), np.asarray(tau)
     )
     forward = shares_at(sides.forward, cos_d, absorption)
     backward = shares_at(sides.backward, cos_d, absorption)

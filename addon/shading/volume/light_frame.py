@@ -9,7 +9,7 @@ as a flat picture can, a point's towards the middle of the hair, a spot's and a 
 shine; depth begins at the light. Hair beside and behind it gets no shadow. Only a point light
 amidst the hair has no map at all.
 
-The frame hangs on light and hair alone: what the camera does changes nothing in it. Its centre and
+The frame depends on light and hair alone, not on the camera. Its centre and
 size move in steps, so that hair which sways does not make the map's texels swim.
 """
 
@@ -24,17 +24,17 @@ from ..lights import Light
 
 #: the sphere is a little larger than the hair, so that nothing lies on a map's edge
 _ROOM = 1.02
-#: a tangent that is shorter in a map than this, in shares of its side, points along the light
+#: a tangent that is shorter in a map than this, in fractions of its side, points along the light
 SEEN_FROM_ITS_END = 1e-20
 #: [m] hair smaller than this gets a map as if it were so large
-_LEAST_RADIUS = 1e-4
+_MIN_RADIUS = 1e-4
 #: a map opens no wider than this to each side [rad]: beyond, few texels hold most of the picture
 WIDEST = float(np.radians(75.0))
 #: a point light nearer to the middle of the hair than this, in radii, has hair all around it
 _AMIDST = 0.25
 #: a light within the sphere that has less of it ahead, in radii, shines away from it
-_LEAST_AHEAD = 0.05
-#: sizes of the sphere come in such steps, and its centre in such shares of its radius
+_MIN_AHEAD = 0.05
+#: sizes of the sphere come in such steps, and its centre in such fractions of its radius
 _SIZE_STEP, _PLACE_STEP = 1.05, 1.0 / 64.0
 
 
@@ -76,7 +76,7 @@ class LightFrame:
         return ahead
 
     def strand_area(self, points: Floats, along: Floats) -> Floats:
-        """The share of the map that a short piece of a strand of the width 1 m covers, (...).
+        """The fraction of the map that a short piece of a strand of the width 1 m covers, (...).
 
         Args:
             points: (..., 3) its middle [m]. along: (..., 3) from its one end to the other [m].
@@ -85,7 +85,7 @@ class LightFrame:
         return np.linalg.norm(way, axis=-1) * breadth
 
     def strand_breadth(self, points: Floats, along: Floats) -> Floats:
-        """How broad a strand of the width 1 m is in the map, as a share of the map's side, (...).
+        """How broad a strand of the width 1 m is, as a fraction of the map's side, (...).
 
         The light sees its width across its own ray: towards the rim of a wide map, which lies
         aslant there, it gets broader the more, the less the strand runs towards the middle.
@@ -131,7 +131,7 @@ def reach_of(strands: Floats) -> float:
 
 def stepped_ball(center: Floats, radius: float) -> Ball:
     """A sphere that holds this one; its centre and size move in steps."""
-    radius = max(radius, _LEAST_RADIUS) * _ROOM
+    radius = max(radius, _MIN_RADIUS) * _ROOM
     # a step up: the centre may move by half a step along each axis, and it still holds all
     stepped = radius * (1.0 + np.sqrt(3.0) * _PLACE_STEP)
     stepped = float(_SIZE_STEP ** np.ceil(np.log(stepped) / np.log(_SIZE_STEP)))
@@ -157,7 +157,7 @@ def light_frame(light: Light, ball: Ball) -> LightFrame | None:
             return None
         axis = -away / distance
     ahead = float(-away @ axis)
-    if ahead + ball.radius < _LEAST_AHEAD * ball.radius:
+    if ahead + ball.radius < _MIN_AHEAD * ball.radius:
         return None
     near = max(ahead - ball.radius, 0.0)
     return frame_at(-axis, eye, float(np.tan(WIDEST)), (near, ahead + ball.radius))

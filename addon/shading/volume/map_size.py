@@ -19,7 +19,7 @@ MEMORY_LIMIT = 512 * 2**20
 #: texels of a map along one of where its deep layers start
 START_TEXELS = 4
 #: colour slots that a framebuffer has
-MOST_SLOTS = 6
+MAX_SLOTS = 6
 #: sums of four layers in float32; the depth of the first mesh; first and last hair in every block
 _LAYERS_BYTES, _MESH_BYTES, _SPAN_BYTES = 16, 4, 8
 #: [texels] of a texture on every GPU that Blender supports
@@ -60,7 +60,7 @@ class MapSize:
 def asked_size(settings: VolumeSettings, map_count: int) -> MapSize:
     """What the settings ask for."""
     layers = len(layer_ends(settings))
-    slots = min(-(-layers // 4), MOST_SLOTS)
+    slots = min(-(-layers // 4), MAX_SLOTS)
     side = -(-settings.resolution // START_TEXELS) * START_TEXELS
     is_deep = settings.shadows == "deep"
     return MapSize(side, slots, -(-layers // (4 * slots)), max(map_count, 1), is_deep)
@@ -85,7 +85,7 @@ def fitted_size(
 
 
 def size_note(settings: VolumeSettings, map_count: int, drawn: MapSize | None = None) -> str:
-    """What the artist is told where maps are smaller than asked for; empty where they are not.
+    """A warning if maps are smaller than asked for, else empty.
 
     Args:
         drawn: None where the GPU is not known: what every GPU allows.

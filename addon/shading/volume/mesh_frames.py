@@ -28,7 +28,7 @@ MESH_FRAME_CAPACITY = 24
 _WIDEST = float(np.radians(55.0))
 #: tangent of half the angle of a cube's side, with room for the filter at its border
 _SIDE = 1.02
-#: a mesh is flat whose vertices are as near to a plane, as a share of its size
+#: a mesh is flat whose vertices are as near to a plane, as a fraction of its size
 _FLAT = 1e-5
 #: vertices that are asked before all are
 _FEW = 64

@@ -1,6 +1,6 @@
 """How much of a light meshes let through to a place of a mesh, by the map of their depths.
 
-The share of the four texels around the place that see the light (percentage closer filtering;
+The fraction of the four texels around the place that see the light (percentage closer filtering;
 Reeves, Salesin and Cook 1987). Each of them is compared with the depth of the plane of the place's
 own triangle there: a slope does not shade itself, and edges stay where they are. Each sample of a
 picture asks texels shifted by up to one, so that the mean has smooth edges.
@@ -30,7 +30,7 @@ def mesh_light(
     normals: Floats,
     shift: tuple[float, float] = (0.0, 0.0),
 ) -> Floats:
-    """The share of the light that reaches points, (n,); 1 outside of the map.
+    """The fraction of the light that reaches points, (n,); 1 outside of the map.
 
     Args:
         depths: (size, size) of the first mesh, row 0 at the bottom; 1 where there is none.
@@ -42,12 +42,12 @@ def mesh_light(
     slope, unit = _slope(frame, points, normals, size)
     scaled = places * size + shift - 0.5
     low = np.floor(scaled)
-    share = scaled - low
+    fraction = scaled - low
     lit = np.zeros(len(points))
     for corner in range(4):
         step = np.array([corner & 1, corner >> 1])
         texel = low + step
-        weights = np.where(step == 1, share, 1.0 - share).prod(axis=1)
+        weights = np.where(step == 1, fraction, 1.0 - fraction).prod(axis=1)
         column, row = np.clip(texel, 0, size - 1).astype(int).T
         way = texel - (places * size - 0.5)
         there = np.minimum(depth + (slope * way).sum(axis=1), 1.0) - MESH_BIAS * unit

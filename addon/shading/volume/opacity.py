@@ -29,14 +29,14 @@ from .settings import VolumeSettings
 
 #: deep layers together are at least so thick
 LEAST_THICKNESS = 1.0 / 1024.0
-#: share of a map's side over which the shadows of meshes on meshes fade to its border
+#: fraction of a map's side over which the shadows of meshes on meshes fade to its border
 MAP_BORDER = 0.06
 #: pieces into which the reference cuts strands, in texels
 _PIECE = 0.25
 
 
 def layer_ends(settings: VolumeSettings) -> Floats:
-    """Where layers end, in shares of how thick they are together, (layer_count,), rising to 1."""
+    """Where layers end, as fractions of their whole thickness, (layer_count,), rising to 1."""
     if settings.shadows == "slices":
         return np.arange(1, settings.slices + 1) / settings.slices
     # half of them reach layer_depth
@@ -46,12 +46,12 @@ def layer_ends(settings: VolumeSettings) -> Floats:
 
 
 def adds_to(depth: Floats, ends: Floats) -> Bools:
-    """The layers whose sums a strand at this share of their depth is part of, (..., n)."""
+    """The layers whose sums a strand at this fraction of their depth is part of, (..., n)."""
     return depth[..., None] <= ends
 
 
 def layers_passed(depth: Floats, ends: Floats) -> Floats:
-    """The share of each layer that lies in front of this depth, (..., n)."""
+    """The fraction of each layer that lies in front of this depth, (..., n)."""
     starts = np.concatenate([[0.0], ends[:-1]])
     passed: Floats = np.clip((depth[..., None] - starts) / (ends - starts), 0.0, 1.0)
     return passed
@@ -99,20 +99,20 @@ def look_up(
         thickness: (resolution, resolution) of each texel's layers together; None is 1.
 
     Returns:
-        tau up to each place, tau from there on to the first mesh, and the share of the light that
-        no mesh is in the way of; each (m,).
+        tau up to each place, tau from there on to the first mesh, and the fraction of the light
+        that no mesh is in the way of; each (m,).
     """
     resolution = len(layers)
     thick = np.ones_like(starts) if thickness is None else thickness
     inside = np.minimum(depth, 1.0) - bias
     scaled = places * resolution - 0.5
     low = np.floor(scaled).astype(np.int64)
-    share = scaled - low
+    fraction = scaled - low
     tau, beyond, lit = np.zeros((3, len(places)))
     for right, up in ((0, 0), (1, 0), (0, 1), (1, 1)):
         column = np.clip(low[:, 0] + right, 0, resolution - 1)
         row = np.clip(low[:, 1] + up, 0, resolution - 1)
-        weight = np.abs(1 - right - share[:, 0]) * np.abs(1 - up - share[:, 1])
+        weight = np.abs(1 - right - fraction[:, 0]) * np.abs(1 - up - fraction[:, 1])
         sums, start, mesh = layers[row, column], starts[row, column], meshes[row, column]
         size = thick[row, column]
         weights = layer_weights((inside - start) / size, ends)
@@ -157,7 +157,7 @@ class Coverage:
 
     texel: (n,) number of the texel, row by row; only pieces inside of the map.
     depth: (n,) of each piece's middle.
-    covered: (n,) share of the texel's area.
+    covered: (n,) fraction of the texel's area.
     """
 
     resolution: int
@@ -177,7 +177,7 @@ class Coverage:
     def span(self, block: int = 1) -> tuple[Floats, Floats]:
         """Where each texel's deep layers start, and how thick they are, (resolution^2,) each.
 
-        From the first to the last piece in its block of so many texels each way; 1 and 1 where
+        From the first to the last piece in its block of that many texels each way; 1 and 1 where
         there is none.
         """
         side = self.resolution // block
@@ -223,8 +223,8 @@ def coverage(
     count = np.maximum(np.ceil(texels / _PIECE), 1).astype(np.int64)
     segment = np.repeat(np.arange(len(start)), count)
     first = np.repeat(np.cumsum(count) - count, count)
-    share = (np.arange(len(segment)) - first + 0.5) / count[segment]
-    middle = start[segment] + (end - start)[segment] * share[:, None]
+    fraction = (np.arange(len(segment)) - first + 0.5) / count[segment]
+    middle = start[segment] + (end - start)[segment] * fraction[:, None]
     place, depth = frame.places(middle.astype(np.float64))
     along = (end - start)[segment].astype(np.float64) / count[segment][:, None]
     area = thick[segment] * frame.strand_area(middle.astype(np.float64), along)

@@ -13,7 +13,7 @@ _ZINKE = "Zinke et al. 2008, dual scattering"
 SHADOWS = (
     ("deep", "Deep Opacity", "Layers that follow the side of the hair that faces the light"),
     ("slices", "Opacity Slices", "Even slices through the whole of the hair"),
-    ("none", "None", "Ambient occlusion stands in for shadows"),
+    ("none", "None", "Ambient occlusion replaces shadows"),
 )
 _CAN_SCATTER = when("shading.model", "marschner")
 _SCATTERS = both(_CAN_SCATTER, when("volume.scattering"))
@@ -74,8 +74,8 @@ class VolumeSettings(Settings):
     layer_depth: float = number(
         0.25,
         label="Layer Depth",
-        description="Deep opacity: how deep the first half of the layers reach, as a share of the "
-        "hair there; 0.5 makes all equally thick",
+        description="Deep opacity: how deep the first half of the layers reach, as a fraction of "
+        "the hair there; 0.5 makes all equally thick",
         soft=(0.05, 0.5),
         hard=(0.001, 0.9),
         unit="factor",
@@ -85,7 +85,7 @@ class VolumeSettings(Settings):
     bias: float = number(
         0.01,
         label="Bias",
-        description="How far in front of a place strands must be to shade it, as a share of the "
+        description="How far in front of a place strands must be to shade it, as a fraction of the "
         "hair's size",
         soft=(0.0, 0.05),
         hard=(0.0, 1.0),
@@ -96,7 +96,7 @@ class VolumeSettings(Settings):
     strand_share: float = number(
         0.5,
         label="Strands",
-        description="Share of the strands that throw the shadow; each stands for more of them",
+        description="Fraction of the strands that throw the shadow; each stands for more of them",
         soft=(0.05, 1.0),
         hard=(0.001, 1.0),
         unit="factor",

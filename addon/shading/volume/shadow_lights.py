@@ -12,7 +12,7 @@ from .light_frame import WIDEST, Ball, LightFrame, is_within, light_frame, shine
 from .map_size import size_note
 from .settings import VolumeSettings
 
-#: lights without a shadow are told of where they are more than this share of all light
+#: lights without a shadow are reported if they are more than this fraction of all light
 _MUCH_LIGHT = 0.25
 #: at this extinction one strand, though it covers a hundredth of a texel, takes most of the light
 _HARD_EXTINCTION = 100.0

@@ -1,11 +1,12 @@
-"""Strands that hide only a share of what lies behind them: of a pixel, and one over another.
+"""Strands that hide only a fraction of what lies behind them: of a pixel, and one over another.
 
     covered   a strip over a unit square, exactly: F(d + h) - F(d - h) with d its middle line's
-              distance from the centre, h half its width, and F the share of the square below a line
+              distance from the centre, h half its width, and F the fraction of the square below a
+              line
     over      C = sum of a_i T_i c_i from near to far, T_i = product of (1 - a_j) of all before it
               (Porter and Duff 1984)
 
-Many thin strands may lie in a pixel, far more than can be shaded. `layer_shares` chooses those
+Many thin strands may lie in a pixel, far more than can be shaded. `layer_fractions` chooses those
 that stand for all of them, by how much of the light is theirs; were it the nearest, small pictures
 would show the outermost strands alone, which are lit more. They are chosen as in VarOpt (Cohen et
 al. 2009), where single items that weigh much stay as they are and others share out the rest, but
@@ -22,13 +23,13 @@ from ...arrays import Floats
 
 #: Layers of a pixel that are shaded, at most.
 LAYERS = 8
-#: Layers are shaded until no more than this share of the pixel's light comes from behind them,
+#: Layers are shaded until no more than this fraction of the pixel's light comes from behind them,
 #: where that are not more of them.
 UNSEEN_SHARE = 0.03
 
 
-def share_below(distance: Floats, normal: Floats) -> Floats:
-    """The share of a unit square that lies below a line, (...) in [0, 1].
+def fraction_below(distance: Floats, normal: Floats) -> Floats:
+    """The fraction of a unit square that lies below a line, (...) in [0, 1].
 
     Args:
         distance: (...) of the line from the square's centre, positive above it.
@@ -43,18 +44,18 @@ def share_below(distance: Floats, normal: Floats) -> Floats:
 
 
 def strip_coverage(distance: Floats, half_width: Floats, normal: Floats) -> Floats:
-    """The share of a pixel that a strip covers, (...) in [0, 1].
+    """The fraction of a pixel that a strip covers, (...) in [0, 1].
 
     Args:
         distance: (...) of its middle line from the pixel's centre [pixels].
         half_width: (...) of the strip [pixels].
         normal: (..., 2) the strip's unit normal without its signs.
     """
-    above = share_below(distance + half_width, normal)
-    return above - share_below(distance - half_width, normal)
+    above = fraction_below(distance + half_width, normal)
+    return above - fraction_below(distance - half_width, normal)
 
 
-def layer_shares(
+def layer_fractions(
     depths: Floats,
     alphas: Floats,
     layers: int = LAYERS,
@@ -62,8 +63,8 @@ def layer_shares(
 ) -> Floats:
     """The light of each layer that is shaded, (pixel_count, n): their sum is what all cover.
 
-    The nearest are, until hardly any light comes from behind them; where these are too many, so
-    many of all that stand for the others.
+    The nearest are, until hardly any light comes from behind them; where these are too many, a
+    sample of all represents the others.
 
     Args:
         depths: (pixel_count, n), in any order; ties go by alpha.
@@ -81,9 +82,9 @@ def layer_shares(
     nearest *= covered / np.maximum(nearest.sum(axis=-1, keepdims=True), 1e-6)
     is_many = is_seen.sum(axis=-1, keepdims=True) > layers
     chosen = np.where(is_many, _chosen(weights, covered, layers), nearest)
-    shares: Floats = np.zeros_like(chosen)
-    np.put_along_axis(shares, order, chosen, axis=-1)
-    return shares
+    fractions: Floats = np.zeros_like(chosen)
+    np.put_along_axis(fractions, order, chosen, axis=-1)
+    return fractions
 
 
 def _chosen(weights: Floats, covered: Floats, layers: int) -> Floats:

@@ -1,5 +1,5 @@
 // places: along, colour noise, grey noise. Row 0 strand_absorption, 1 strand_color of it,
-// 2 strand_base with tip_share in w.
+// 2 strand_base with tip_fraction in w.
 #include "lib_marschner.glsl"
 
 void main()
@@ -12,5 +12,5 @@ void main()
   vec3 absorption = strand_absorption(fibre, place.x, place.y, place.z, shading);
   vec3 base = strand_base(place.x, place.y, place.z, shading);
   vec3 value = at.y == 0 ? absorption : at.y == 1 ? strand_color(fibre, absorption) : base;
-  imageStore(result, at, vec4(value, tip_share(place.x, shading)));
+  imageStore(result, at, vec4(value, tip_fraction(place.x, shading)));
 }

@@ -22,7 +22,7 @@ from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembi
 from hairloom.addon.exchange.files.file_space import FileSpace
 from hairloom.addon.exchange.files.subprocess_reader import same_packages, this_python
 from hairloom.addon.exchange.groom import Groom, GroomMotion
-from hairloom.addon.exchange.groom_presets import BLENDER, LEAST_WIDTH, UNITY, UNREAL, preflight
+from hairloom.addon.exchange.groom_presets import BLENDER, MIN_WIDTH, UNITY, UNREAL, preflight
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.strand_set import DEFAULT_RADIUS
 
@@ -158,7 +158,7 @@ def test_unity_gets_all_strands_in_an_object_for_each_group(tmp_path: Path) -> N
         np.testing.assert_array_equal(own_values(schema, "nVertices"), COUNTS[chosen])
         points = UNITY.space.to_file(hair.strands.take(chosen).points)
         np.testing.assert_array_equal(own_values(schema, "P"), points)
-        np.testing.assert_allclose(own_values(schema, "width"), LEAST_WIDTH * 100.0)
+        np.testing.assert_allclose(own_values(schema, "width"), MIN_WIDTH * 100.0)
         uv = np.repeat(hair.strands.root_uv[chosen], COUNTS[chosen], axis=0)
         np.testing.assert_array_equal(own_values(schema, "uv"), uv)
         assert attribute(schema, "groom_group_id")[-1].tolist() == [group] * len(chosen)
@@ -235,7 +235,7 @@ def test_long_curves_alone_are_resampled(tmp_path: Path) -> None:
     radius = np.concatenate([np.linspace(3e-5, 0.0, 301), [2e-5, 1e-5]])
     hair = Groom(StrandSet(points, [0, 301, 303], radius, [1, 2]), color=points)
     motion = GroomMotion([hair.strands.points, hair.strands.points * 2], rate=25.0)
-    write_groom_alembic(path, hair, replace(BLENDER, most_points=4), motion=motion)
+    write_groom_alembic(path, hair, replace(BLENDER, max_points=4), motion=motion)
     ((_, curves),) = first_below(path)
     assert own_values(geometry(curves), "nVertices").tolist() == [4, 2]
     expected = np.array([(0, 0, 0), (0, 0, 1), (0, 0, 2), (0, 0, 3), (5, 0, 0), (5, 0, 1.5)])
@@ -307,7 +307,7 @@ def test_the_space_of_a_foreign_file_can_be_told(tmp_path: Path) -> None:
 
 def test_what_cannot_be_used_is_dropped_and_counted(tmp_path: Path) -> None:
     path, hair = tmp_path / "a.abc", groom()
-    write_groom_alembic(path, hair, replace(BLENDER, most_points=10))
+    write_groom_alembic(path, hair, replace(BLENDER, max_points=10))
     content = path.read_bytes()
     second = BLENDER.space.to_file(hair.strands.points[4:6])
     broken = second.copy()
@@ -493,9 +493,9 @@ def test_preflight_says_what_the_engine_will_see() -> None:
         ({"radius": np.full(27, 0.004)}, UNREAL, "Widths reach 8 mm"),
         ({"group": np.zeros(6)}, UNREAL, "in one group"),
         ({"root_uv": None}, UNREAL, "no root UVs"),
-        ({}, replace(UNREAL, most_points=5), "2 strands are resampled to 5 points"),
+        ({}, replace(UNREAL, max_points=5), "2 strands are resampled to 5 points"),
         ({}, UNITY, "1 strands have fewer than 3 points"),
-        ({}, replace(UNREAL, most_strands=2), "A group has 3 strands; the engine takes 2"),
+        ({}, replace(UNREAL, max_strands=2), "A group has 3 strands; the engine takes 2"),
         ({}, UNITY, "Closest guides are left out"),
     ],
 )

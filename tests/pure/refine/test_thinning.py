@@ -14,7 +14,7 @@ from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.refine.thinning import (
     WHOLE,
     Thinning,
-    drawn_share,
+    drawn_fraction,
     even_ranks,
     groom_size,
     thinning,
@@ -71,11 +71,11 @@ def test_all_strands_are_drawn_from_the_full_size_on() -> None:
     ranks = np.linspace(0.0, 1.0, 101)
     settings = DetailSettings(full_size=200.0)
     for height in (200.0, 1000.0, np.inf):
-        assert drawn_share(height, settings) == WHOLE
+        assert drawn_fraction(height, settings) == WHOLE
     assert width_factor(ranks, WHOLE) == pytest.approx(1.0)
-    assert drawn_share(1.0, DetailSettings(full_size=0.0)) == WHOLE
-    assert drawn_share(1.0, DetailSettings(least_share=1.0)) == WHOLE
-    assert drawn_share(1.0, DetailSettings(least_share=0.125)) == 0.125
+    assert drawn_fraction(1.0, DetailSettings(full_size=0.0)) == WHOLE
+    assert drawn_fraction(1.0, DetailSettings(least_share=1.0)) == WHOLE
+    assert drawn_fraction(1.0, DetailSettings(least_share=0.125)) == 0.125
     assert (width_factor(ranks, 0.125) > 0.0).tolist() == (ranks < 0.125).tolist()
 
 
@@ -83,9 +83,9 @@ def test_a_strand_gets_thin_before_it_is_gone() -> None:
     """From pixel to pixel of the groom's height no width changes by more than a tenth."""
     ranks = np.linspace(0.0, 0.999, 500)
     settings = DetailSettings(full_size=300.0, least_share=0.0)
-    before = width_factor(ranks, drawn_share(310.0, settings))
+    before = width_factor(ranks, drawn_fraction(310.0, settings))
     for height in np.arange(309.0, 60.0, -1.0):
-        now = width_factor(ranks, drawn_share(height, settings))
+        now = width_factor(ranks, drawn_fraction(height, settings))
         assert (now <= before).all()
         assert (before - now).max() < 0.1
         before = now
@@ -132,8 +132,8 @@ def test_the_groom_covers_as_much_when_it_is_thinned(shared_data: Path, height: 
     length = float(np.linalg.norm(np.diff(grid, axis=1), axis=2).sum())
     settings = DetailSettings(full_size=1.25 * 8.0 * height)  # an eighth is left
     thinned = thinning((low, high), length, 4e-5, 1.0, seen, settings)
-    assert thinned.share == pytest.approx(0.125)
-    factors = width_factor(even_ranks(grid[:, 0]), thinned.share, thinned.widening)
+    assert thinned.fraction == pytest.approx(0.125)
+    factors = width_factor(even_ranks(grid[:, 0]), thinned.fraction, thinned.widening)
     drawn = factors > 0.0
     assert drawn.mean() == pytest.approx(0.125, abs=0.001)
     full = covered(grid, np.ones(len(grid)), seen)

@@ -20,7 +20,7 @@ from hairloom.addon.shading.marschner.look import (
 from hairloom.addon.shading.marschner.pigment import color_absorption, melanin_absorption
 from hairloom.addon.shading.marschner.tables import MarschnerTables, marschner_tables
 from hairloom.addon.shading.settings import ShadingSettings
-from hairloom.addon.shading.tint import tip_share
+from hairloom.addon.shading.tint import tip_fraction
 
 ALONG = np.linspace(0.0, 1.0, 101)
 HALF = np.full(101, 0.5)
@@ -82,7 +82,7 @@ def test_tips_turn_from_the_roots_pigment_to_their_own() -> None:
 def test_a_tint_that_ends_where_it_begins_is_a_step(start: float, end: float) -> None:
     settings = replace(PLAIN, tip_tint=1.0, tint_start=start, tint_end=end)
     between = ALONG[:-1] + 0.005
-    assert tip_share(between, settings).tolist() == np.where(between > start, 1.0, 0.0).tolist()
+    assert tip_fraction(between, settings).tolist() == np.where(between > start, 1.0, 0.0).tolist()
 
 
 def test_strands_differ_in_pigment_and_the_grey_ones_have_hardly_any() -> None:
