@@ -12,7 +12,7 @@ import bpy
 
 from .blender.command_line.command_line import run
 from .blender.engine import engine
-from .blender.preview import handlers, reactions
+from .blender.preview import handlers, scene_events
 from .blender.properties import groups, previews
 from .ui import (
     engine_panels,
@@ -101,7 +101,7 @@ def end_all() -> None:
     """End what goes on: previews, long work, and all that is deferred."""
     operators_preview.stop_ticking()
     long_work.stop()
-    reactions.clear()
+    scene_events.clear()
 
 
 def _steps() -> tuple[Step, ...]:

@@ -29,7 +29,8 @@ import numpy as np
 import hairloom
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
-from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.preview.phases import Phase
 from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 
 RATE, FRAMES, MOVES, BEATS = 24.0, 24, 8, 2000
@@ -80,12 +81,12 @@ def main() -> None:
     hair.hairloom.dynamics.form = given.form
     depsgraph = scene.view_layers[0].depsgraph
     stops = Stops()
-    session = stops.timed("preview", lambda: live.start(hair, depsgraph))
+    session = stops.timed("preview", lambda: previews.start(hair, depsgraph))
     stops.timed("fields are begun", lambda: session.make_fields(depsgraph))
-    stops.timed("play", lambda: live.play(depsgraph, blocking=False))
+    stops.timed("play", lambda: previews.play(depsgraph, blocking=False))
 
     def tick() -> None:
-        live.advance(depsgraph, 1.0 / RATE)
+        previews.advance(depsgraph, 1.0 / RATE)
 
     def arrive(kind: str) -> None:
         """Frames until the hair that is being made is shown, and one with it."""
@@ -101,12 +102,12 @@ def main() -> None:
     def take() -> None:
         attempt = partial(session.take_made, depsgraph)
         if session.has_arrived:
-            live.attempt(session, depsgraph, lambda _: attempt())
+            previews.attempt(previews.previews[session.uid], depsgraph, attempt)
 
     seconds: dict[str, float] = {}
     arrive("preview")
     ticks, begin = 0, time.perf_counter()
-    while live.is_waiting(session):
+    while previews.previews[session.uid].phase is Phase.WAITING:
         stops.timed("waiting" if not fields.are_made() else "play begins", tick)
         time.sleep(1.0 / RATE)
         ticks += 1
@@ -118,7 +119,7 @@ def main() -> None:
         stops.beat("heartbeat without a thread")
 
     def read_again(kind: str) -> None:
-        stops.timed(f"{kind}: read again", lambda: reactions.catch_up(depsgraph))
+        stops.timed(f"{kind}: read again", lambda: scene_events.catch_up(depsgraph))
         arrive(kind)
 
     for name, value in SLIDERS.items():
@@ -142,7 +143,7 @@ def main() -> None:
         "python": platform.python_version(),
     }
     print(json.dumps(facts))
-    live.stop_all()
+    previews.stop_all()
     hairloom.unregister()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..blender.preview import live
+from ..blender.preview import previews
 from ..blender.properties.card_group import HAIRLOOM_PG_card_images
 from .drawing import Draw, draw_section
 from .operators_cards import draw_made_cards
@@ -14,7 +14,7 @@ from .preset_chooser import draw_preset_row
 def draw_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_preset_row(layout, hair, "cards")
     draw_section(layout, hair.data.hairloom, "card_drawing")
-    session = live.session_of(hair)
+    session = previews.session_of(hair)
     for line in () if session is None else session.cards.lines:
         layout.label(text=line)
     draw_made_cards(layout, hair)

@@ -8,7 +8,7 @@ import bpy
 
 from ..blender.bakes import playback
 from ..blender.base.outcome import report
-from ..blender.preview import live, timeline
+from ..blender.preview import previews
 from ..blender.preview.bake import Bake, bakeable, free, show_in_renders
 from ..blender.scene.fin_modifier import fin_modifier
 from ..errors import HairloomError
@@ -36,8 +36,8 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        if live.is_playing():
-            live.rest(context.evaluated_depsgraph_get(), keep_playing=False)
+        if previews.is_playing():
+            previews.rest(context.evaluated_depsgraph_get(), keep_playing=False)
         bake = Bake.of(chosen(context), context.scene)
         yield from counted(bake.steps(), bake.frame_count, "frames")
         locks = show_in_renders(bake.objects(), context.evaluated_depsgraph_get())
@@ -113,7 +113,7 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         layout.label(text="Not baked", icon="BLANK1")
         return
     layout.prop(obj.hairloom.bake, "is_shown")
-    facts, known = cache.facts, timeline.baked(obj.session_uid)
+    facts, known = cache.facts, previews.bake_of(obj)
     computed = {"numpy": "CPU", "compute": "GPU"}.get(facts.form, facts.form)
     layout.label(
         text=f"Frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps, {computed}",

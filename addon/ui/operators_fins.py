@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..blender.base.outcome import report
-from ..blender.preview import fins, live
+from ..blender.preview import fins, previews
 from ..blender.scene.fin_modifier import (
     add_modifier,
     clear,
@@ -61,9 +61,9 @@ class HAIRLOOM_OT_fin_remove(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = active_mesh(context)
         assert obj is not None
-        session = live.simulated_of(obj)
+        session = previews.simulated_of(obj)
         if session is not None:
-            live.stop(session)
+            previews.stop(session)
         remove_modifier(obj)
         return {"FINISHED"}
 
@@ -82,10 +82,10 @@ class HAIRLOOM_OT_fin_preview(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj, depsgraph = active_mesh(context), context.evaluated_depsgraph_get()
         assert obj is not None
-        session = live.simulated_of(obj)
+        session = previews.simulated_of(obj)
         if session is not None:
             session.stop(depsgraph)
-            live.stop(session)
+            previews.stop(session)
             return {"FINISHED"}
         with waiting(context):
             fins.start(obj, depsgraph)
@@ -113,7 +113,7 @@ class HAIRLOOM_OT_fin_reset(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = active_mesh(context)
         assert obj is not None
-        session = live.simulated_of(obj)
+        session = previews.simulated_of(obj)
         if session is None:
             clear(obj.data)
         else:
@@ -127,7 +127,7 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     if fin_modifier(obj) is None:
         layout.operator("hairloom.fin_add", icon="MOD_CLOTH")
         return
-    fin, session = obj.hairloom.fin, live.simulated_of(obj)
+    fin, session = obj.hairloom.fin, previews.simulated_of(obj)
     row = layout.row(align=True)
     text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
     row.operator("hairloom.fin_preview", text=text, icon=icon, depress=session is not None)

@@ -10,7 +10,7 @@ import bpy
 
 from ..blender.base.objects import head_of, objects_in
 from ..blender.base.outcome import report
-from ..blender.preview.troubles import is_unevenly_scaled, set_surface, surface_for
+from ..blender.preview.diagnostics import is_unevenly_scaled, set_surface, surface_for
 from ..errors import HairloomError
 from .reports import reporting, waiting
 from .selection import chosen_hair, needs_hair

@@ -15,7 +15,7 @@ from ..blender.bakes.fingerprints import frame_rate
 from ..blender.base.outcome import Outcome, report
 from ..blender.base.pace import Pace
 from ..blender.base.suspension import is_suspended
-from ..blender.preview import fins, live
+from ..blender.preview import fins, previews
 from ..blender.scene.source import mute_own_dynamics, own_dynamics
 from ..blender.sessions.fins import any_enabled
 from .reports import reporting, tell, waiting
@@ -44,7 +44,7 @@ class HAIRLOOM_OT_preview(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)
-        if all(live.session_of(each) for each in hair):
+        if all(previews.session_of(each) for each in hair):
             stop_preview(hair)
             return {"FINISHED"}
         with waiting(context):
@@ -66,24 +66,26 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
         if bpy.app.background:
             cls.poll_message_set("Play needs a window; use the command line's simulate or bake")
             return False
-        return any_enabled(context.view_layer) or bool(live.simulated()) or needs_hair(cls, context)
+        if any_enabled(context.view_layer) or previews.simulated():
+            return True
+        return needs_hair(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         return self._start_or_stop(context)
 
     @reporting
     def _start_or_stop(self, context: bpy.types.Context) -> set[str]:
-        if live.is_playing():
-            live.rest(context.evaluated_depsgraph_get(), keep_playing=False)
+        if previews.is_playing():
+            previews.rest(context.evaluated_depsgraph_get(), keep_playing=False)
             return {"FINISHED"}  # the operator that plays sees it and ends
         with waiting(context):
-            if not live.simulated():
+            if not previews.simulated():
                 start_preview(self, context, chosen_hair(context))
             depsgraph = context.evaluated_depsgraph_get()
             fin_warnings = fins.start_enabled(depsgraph)
-            for warning in (*fin_warnings, *live.play(depsgraph, blocking=False)):
+            for warning in (*fin_warnings, *previews.play(depsgraph, blocking=False)):
                 report(self, "WARNING", warning)
-        if not live.is_playing():
+        if not previews.is_playing():
             return {"CANCELLED"}
         self._ticks = start_ticking(context)
         self._pace = Pace(time.perf_counter())
@@ -93,11 +95,11 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if self._ticks is not _timer:
             return {"FINISHED"}  # another Play has taken over
-        if not live.is_playing():
+        if not previews.is_playing():
             stop_ticking()
             return {"FINISHED"}
         if event.type == "ESC" and event.value == "PRESS":
-            live.rest(context.evaluated_depsgraph_get(), keep_playing=False)
+            previews.rest(context.evaluated_depsgraph_get(), keep_playing=False)
             stop_ticking()
             return {"CANCELLED"}
         if event.type == "TIMER":
@@ -111,12 +113,12 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
     def _tick(self, context: bpy.types.Context) -> None:
         """Simulate the scene's frames that are due, in one step: the head has moved only once."""
         now, rate = time.perf_counter(), frame_rate(context.scene)
-        if live.is_paused() or is_suspended():
+        if previews.is_paused() or is_suspended():
             self._pace.skip(now)
             return
         frames = self._pace.due(now, rate)
         if frames:
-            live.advance(context.evaluated_depsgraph_get(), frames / rate)
+            previews.advance(context.evaluated_depsgraph_get(), frames / rate)
 
 
 class HAIRLOOM_OT_pause(bpy.types.Operator):
@@ -127,15 +129,15 @@ class HAIRLOOM_OT_pause(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if live.is_playing():
+        if previews.is_playing():
             return True
         cls.poll_message_set("No hair is playing: press Play first")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        live.pause(not live.is_paused())
+        previews.pause(not previews.is_paused())
         if _timer is not None:
-            context.workspace.status_text_set(PAUSED if live.is_paused() else STATUS)
+            context.workspace.status_text_set(PAUSED if previews.is_paused() else STATUS)
         return {"FINISHED"}
 
 
@@ -169,13 +171,13 @@ class HAIRLOOM_OT_reset(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if live.simulated():
+        if previews.simulated():
             return True
         cls.poll_message_set("No hair is previewed: press Preview first")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        live.rest(context.evaluated_depsgraph_get(), keep_playing=True)
+        previews.rest(context.evaluated_depsgraph_get(), keep_playing=True)
         return {"FINISHED"}
 
 
@@ -204,8 +206,8 @@ def start_preview(
     """Preview what is not yet previewed, and report what was read."""
     depsgraph = context.evaluated_depsgraph_get()
     for each in hair:
-        if live.session_of(each) is None:
-            session = live.start(each, depsgraph)
+        if previews.session_of(each) is None:
+            session = previews.start(each, depsgraph)
             rig = session.rig
             counts = f"{rig.strands.strand_count:,} strands, {len(rig.guides):,} guides"
             if not session.is_made:
@@ -215,9 +217,9 @@ def start_preview(
 
 def stop_preview(hair: list[bpy.types.Object]) -> None:
     for each in hair:
-        session = live.session_of(each)
+        session = previews.session_of(each)
         if session is not None:
-            live.stop(session)
+            previews.stop(session)
 
 
 CLASSES = (

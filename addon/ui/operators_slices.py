@@ -8,7 +8,7 @@ from ..blender.base.outcome import report
 from ..blender.pictures import skin_picture, slices
 from ..blender.pictures.skin_picture import skin_shadow_of_view
 from ..blender.pictures.slices import shown_image, slices_of_view
-from ..blender.preview import live
+from ..blender.preview import previews
 from ..blender.sessions.session import Session
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
@@ -57,14 +57,14 @@ def _needs_preview(operator: type[bpy.types.Operator], context: bpy.types.Contex
     """For `poll`: whether hair is previewed; says so on the greyed-out button."""
     if not needs_hair(operator, context):
         return False
-    if live.session_of(chosen_hair(context)[0]) is None:
+    if previews.session_of(chosen_hair(context)[0]) is None:
         operator.poll_message_set("Press Preview first")
         return False
     return True
 
 
 def _previewed(context: bpy.types.Context) -> Session:
-    session = live.session_of(chosen_hair(context)[0])
+    session = previews.session_of(chosen_hair(context)[0])
     assert session is not None, "poll"
     session.finish(context.evaluated_depsgraph_get())
     return session

@@ -11,7 +11,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..blender.base.outcome import report
-from ..blender.preview import live
+from ..blender.preview import previews
 from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
 from ..blender.setup.sample_scene import add_sample_scene
 from ..blender.setup.starting import new_groom, take_over
@@ -118,7 +118,7 @@ class HAIRLOOM_OT_use_groom(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not _in_object_mode(cls, context):
             return False
-        if any(live.session_of(hair) is None for hair in chosen_hair(context)):
+        if any(previews.session_of(hair) is None for hair in chosen_hair(context)):
             return True
         cls.poll_message_set("Select hair curves that Hairloom does not preview yet")
         return False
@@ -215,10 +215,10 @@ def _begin(
     start_preview(operator, context, grooms)
     if not plays or bpy.app.background:
         return
-    if live.is_playing():
+    if previews.is_playing():
         depsgraph = context.evaluated_depsgraph_get()
-        for session in filter(None, map(live.session_of, grooms)):
-            live.begin(session, depsgraph, blocking=False)
+        for session in filter(None, map(previews.session_of, grooms)):
+            previews.begin(session, depsgraph, blocking=False)
     else:
         bpy.ops.hairloom.play("INVOKE_DEFAULT")
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ..blender.preview import live
+from ..blender.preview import previews
 from ..blender.scene.particle_hair import hair_systems
 from ..blender.setup.starting import is_untouched
 from .drawing import Draw
@@ -16,7 +16,7 @@ from .operators_strand_export import draw_strand_exports
 from .operators_strand_import import draw_imports
 from .sections import SECTIONS, SESSION_SECTIONS, SUB_SECTIONS, SWITCHES
 from .selection import active_mesh, chosen_hair
-from .state import draw_notice, draw_state, draw_troubles
+from .state import draw_issues, draw_notice, draw_state
 
 
 def _hair(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -28,12 +28,12 @@ def _hair(context: bpy.types.Context) -> bpy.types.Object | None:
 def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Buttons, counts, and what the artist should know."""
     hair = _hair(context)
-    session = live.session_of(hair)
+    session = previews.session_of(hair)
     column = layout.column(align=True)
     column.scale_y = 1.3
     text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
     column.operator("hairloom.preview", text=text, icon=icon, depress=session is not None)
-    playing, paused = live.is_playing(), live.is_paused()
+    playing, paused = previews.is_playing(), previews.is_paused()
     row = column.row(align=True)
     text, icon = ("Stop", "SNAP_FACE") if playing else ("Play", "PLAY")
     row.operator("hairloom.play", text=text, icon=icon, depress=playing)
@@ -50,7 +50,7 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
         return
     if session is None and is_untouched(hair):
         layout.operator("hairloom.use_groom", icon="OUTLINER_OB_CURVES")
-    draw_troubles(layout, context, hair, session)
+    draw_issues(layout, context, hair, session)
     row = layout.row(align=True)
     row.prop(hair.hairloom, "debug_view")
     row.prop(hair.hairloom, "show_counts", text="", icon="INFO")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..blender.base.objects import head_of, objects_in
-from ..blender.preview import live
+from ..blender.preview import previews
 from ..errors import HairloomError
 
 
@@ -33,7 +33,7 @@ def _grown_on(meshes: list[bpy.types.Object], context: bpy.types.Context) -> lis
 
 
 def _previewed() -> list[bpy.types.Object]:
-    found = [session.hair.handle.find() for session in live.sessions()]
+    found = [session.hair.handle.find() for session in previews.sessions()]
     return [obj for obj in found if obj is not None]
 
 

@@ -14,12 +14,12 @@ STEP, FRAMES = 0.03, 4
 
 def swings(session: Any) -> bool:
     """Whether hair that plays lags behind its head, pushed from rest, while its roots do not."""
-    from hairloom.addon.blender.preview import live
+    from hairloom.addon.blender.preview import previews
 
-    live.rest(bpy.context.evaluated_depsgraph_get(), keep_playing=True)
+    previews.rest(bpy.context.evaluated_depsgraph_get(), keep_playing=True)
     head, before = session.head.found(), session.strands
     for _ in range(FRAMES):
         head.location.x += STEP
-        live.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
+        previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
     offset = session.strands - before - [FRAMES * STEP, 0.0, 0.0]
     return bool(offset[:, -1, 0].mean() < -0.005 and np.abs(offset[:, 0]).max() < 1e-5)

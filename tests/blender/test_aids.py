@@ -9,10 +9,10 @@ import pytest
 
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
-from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.groups import AIDS
 from hairloom.addon.blender.viewport import overlay
-from hairloom.addon.blender.viewport.aids import shape_lines
+from hairloom.addon.blender.viewport.debug_lines import shape_lines
 from hairloom.addon.dynamics.colliders import (
     CapsuleCollider,
     DistanceField,
@@ -28,11 +28,11 @@ def preview(new_hair, sphere, evaluated):
     """Hair on a head, previewed: (hair, head, session)."""
     hair = new_hair(sphere)
     hair.hairloom.dynamics.collider_resolution = 16
-    return hair, sphere, live.start(hair, evaluated())
+    return hair, sphere, previews.start(hair, evaluated())
 
 
 def aids(session):
-    return overlay.drawing_of(session.uid).aids
+    return overlay.drawing_of(session.uid).lines
 
 
 def lines_of(hair, session, kind):
@@ -88,11 +88,11 @@ def test_nothing_is_drawn_until_it_is_wanted(preview):
 
 def test_the_box_of_a_field_is_around_its_mesh_and_follows_it(preview, evaluated):
     hair, head, session = preview
-    live.play(evaluated())
+    previews.play(evaluated())
     for x in (0.0, 0.3):
         head.location.x = x
         bpy.context.view_layer.update()
-        live.advance(evaluated(), 0.04)
+        previews.advance(evaluated(), 0.04)
         points = lines_of(hair, session, "colliders")
         assert len(points) == 24
         middle, size = (points.min(axis=0) + points.max(axis=0)) / 2.0, np.ptp(points, axis=0)

@@ -12,7 +12,7 @@ from hairloom.addon.blender.bakes.bake_settings import folder_of
 from hairloom.addon.blender.bakes.cache import FACTS, Cache
 from hairloom.addon.blender.bakes.simulated import SOLVER_VERSION, solver_part
 from hairloom.addon.blender.base.suspension import is_suspended
-from hairloom.addon.blender.preview import live, reactions, timeline
+from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake, free
 from hairloom.addon.errors import HairloomError
 
@@ -41,7 +41,7 @@ def bake(*objects, **options):
 
 
 def drawn(hair):
-    return live.session_of(hair).strands
+    return previews.session_of(hair).strands
 
 
 def played(hair, first=1, last=LAST):
@@ -55,13 +55,13 @@ def played(hair, first=1, last=LAST):
 
 def test_a_bake_equals_playback_bit_for_bit(swinging, evaluated):
     hair, _ = swinging
-    live.start(hair, evaluated())
+    previews.start(hair, evaluated())
     live_strands = played(hair)
     assert np.ptp(live_strands[:, :, -1] - live_strands[:, :, 0], axis=0).max() > 0.01
     bpy.context.scene.frame_set(3)
     assert bake(hair) == list(range(1, LAST + 1))
     assert bpy.context.scene.frame_current == 3
-    assert live.session_of(hair).is_playing is False
+    assert previews.session_of(hair).is_playing is False
     np.testing.assert_array_equal(drawn(hair), live_strands[2])
     np.testing.assert_array_equal(played(hair), live_strands)
     cache = playback.cache_of(hair)
@@ -74,7 +74,7 @@ def test_a_bake_on_the_gpu_equals_playback_on_the_gpu_bit_for_bit(swinging, eval
     """Guides and what is drawn of them; the copy for renders is ridden on the CPU."""
     hair, _ = swinging
     hair.hairloom.dynamics.form = "compute"
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     guides, strands = [], []
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
@@ -99,7 +99,7 @@ def test_a_bake_is_the_same_with_and_without_a_preview(previewed, swinging, eval
     frames = {n: first.frame(n) for n in range(1, LAST + 1)}
     if previewed:
         bpy.context.scene.frame_set(1)
-        live.start(hair, evaluated())
+        previews.start(hair, evaluated())
     bake(hair)
     second = Cache(tmp_path / "bake")
     assert second.facts == first.facts
@@ -114,9 +114,9 @@ def test_a_preview_begun_elsewhere_shows_the_very_same_strands(swinging, evaluat
     bake(hair)
     cache = playback.cache_of(hair)
     bpy.context.scene.frame_set(5)
-    live.start(hair, evaluated())
+    previews.start(hair, evaluated())
     np.testing.assert_array_equal(drawn(hair), playback.strands_in(cache, 5))
-    assert timeline.baked(hair.session_uid).changed == ()
+    assert previews.previews[hair.session_uid].bake.changed == ()
     bpy.context.scene.frame_set(2)
     np.testing.assert_array_equal(drawn(hair), playback.strands_in(cache, 2))
 
@@ -128,7 +128,7 @@ def test_a_deformed_head_carries_baked_hair(swinging, evaluated):
     for frame, strength in ((1, 0.0), (LAST, 0.05)):
         swell.strength = strength
         swell.keyframe_insert("strength", frame=frame)
-    live.start(hair, evaluated())
+    previews.start(hair, evaluated())
     shown = played(hair)
     assert np.linalg.norm(shown[-1, :, 0] - shown[0, :, 0], axis=1).max() > 0.04
     bake(hair)
@@ -145,7 +145,7 @@ def test_hair_without_a_head_is_baked(new_hair, evaluated, tmp_path):
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     hair.hairloom.dynamics.form = "numpy"
     scene.frame_set(1)
-    live.start(hair, evaluated())
+    previews.start(hair, evaluated())
     shown = played(hair, last=4)
     bake(hair)
     np.testing.assert_array_equal(played(hair, last=4), shown)
@@ -153,18 +153,18 @@ def test_hair_without_a_head_is_baked(new_hair, evaluated, tmp_path):
 
 def test_what_has_changed_since_is_said_and_the_bake_still_plays(swinging, evaluated):
     hair, head = swinging
-    live.start(hair, evaluated())
+    previews.start(hair, evaluated())
     bake(hair)
     scene, uid = bpy.context.scene, hair.session_uid
     shown = played(hair)
-    assert timeline.baked(uid).changed == ()
+    assert previews.previews[uid].bake.changed == ()
 
     def changed_at(frame):
         scene.frame_set(frame)
-        return timeline.baked(uid).changed
+        return previews.previews[uid].bake.changed
 
     hair.hairloom.dynamics.damping = 3.0
-    assert timeline.baked(uid).changed == ("settings",), "told at once"
+    assert previews.previews[uid].bake.changed == ("settings",), "told at once"
     assert changed_at(3) == ("settings",)
     np.testing.assert_array_equal(drawn(hair), shown[2])
     hair.hairloom.dynamics.damping = 0.5
@@ -183,7 +183,7 @@ def test_what_has_changed_since_is_said_and_the_bake_still_plays(swinging, evalu
     np.testing.assert_array_equal(drawn(hair), shown[3])
     hair.data.position_data[3].vector.x += 0.01
     bpy.context.view_layer.update()
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert "hair" in changed_at(5)
 
 
@@ -206,12 +206,12 @@ def test_old_bakes_of_animated_settings_are_out_of_date(is_animated, swinging, e
             hair.hairloom.dynamics.damping = value
             hair.keyframe_insert("hairloom.dynamics.damping", frame=frame)
     bake(hair)
-    live.start(hair, evaluated())
-    assert timeline.baked(hair.session_uid).changed == ()
-    live.stop_all()
+    previews.start(hair, evaluated())
+    assert previews.previews[hair.session_uid].bake.changed == ()
+    previews.stop_all()
     aged(folder_of(hair))
-    live.start(hair, evaluated())
-    changed = timeline.baked(hair.session_uid).changed
+    previews.start(hair, evaluated())
+    changed = previews.previews[hair.session_uid].bake.changed
     assert changed == (("solver",) if is_animated else ())
 
 
@@ -219,19 +219,19 @@ def test_a_head_that_is_posed_by_hand_takes_its_hair_along(swinging, evaluated):
     hair, head = swinging
     bake(hair)
     bpy.context.scene.frame_set(4)
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     baked = drawn(hair)
     head.location.y = 0.5
     bpy.context.view_layer.update()
     assert drawn(hair)[:, 0, 1].mean() == pytest.approx(0.5, abs=0.02)
-    assert timeline.baked(session.uid).changed == ("pose",)
+    assert previews.previews[session.uid].bake.changed == ("pose",)
     bpy.context.scene.frame_set(4)
     np.testing.assert_array_equal(drawn(hair), baked)
 
 
 def test_a_bake_can_be_left_out_and_is_simulated_again(swinging, evaluated):
     hair, _ = swinging
-    live.start(hair, evaluated())
+    previews.start(hair, evaluated())
     bake(hair)
     hair.hairloom.dynamics.damping = 9.0
     baked = played(hair)
@@ -317,12 +317,12 @@ def test_a_folder_with_other_files_is_not_touched(swinging, tmp_path):
 
 def test_deleting_a_bake_leaves_what_is_not_its_own(swinging, evaluated, tmp_path):
     hair, _ = swinging
-    live.start(hair, evaluated())
+    previews.start(hair, evaluated())
     bake(hair)
     (tmp_path / "bake" / "diary.txt").write_text("mine")
     free(hair, evaluated())
     assert [path.name for path in (tmp_path / "bake").iterdir()] == ["diary.txt"]
-    assert timeline.baked(hair.session_uid) is None
+    assert previews.previews[hair.session_uid].bake is None
     assert not bpy.ops.hairloom.bake_free.poll()
 
 
@@ -372,14 +372,14 @@ def test_a_damaged_bake_is_told_and_the_hair_simulated(damage, swinging, evaluat
         (folder / "cache.json").write_text(json.dumps(facts | {"version": 99}))
     elif damage == "no constants":
         (folder / "constants.npz").unlink()
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     if damage == "no constants":  # only renders need them
         with pytest.raises(HairloomError, match="Bake again"):
             playback.strands_in(playback.cache_of(hair), 3)
         return
     played(hair, last=3)
-    assert live.sessions() == (session,)
-    assert "ake" in timeline.trouble(session.uid)
+    assert previews.sessions() == (session,)
+    assert "ake" in previews.previews[session.uid].problems
     assert np.isfinite(drawn(hair)).all()
 
 

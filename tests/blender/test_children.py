@@ -10,7 +10,7 @@ import pytest
 from hairloom.addon import pipeline
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.command_line import command_line
-from hairloom.addon.blender.preview import live, reactions, timeline
+from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.strands.strand_export import StrandExport
 from hairloom.addon.blender.viewport import overlay
@@ -51,7 +51,7 @@ def moving(hair, sphere, tmp_path):
 def catch_up(evaluated):
     """What a timer does once edits have settled."""
     bpy.context.view_layer.update()
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
 
 
 def bake(hair):
@@ -76,7 +76,7 @@ def upper_half(head, name):
 @pytest.mark.parametrize("way", ["multi", "single"])
 def test_guides_come_first_and_children_after_them(way, hair, evaluated):
     hair.data.hairloom.children.way = way
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     rig = session.rig
     assert (len(rig.guides), rig.strands.strand_count) == (60, 260)
     np.testing.assert_array_equal(rig.guides, np.arange(60))
@@ -92,7 +92,7 @@ def test_guides_come_first_and_children_after_them(way, hair, evaluated):
 def test_none_is_the_artists_own_hair(new_hair, sphere, evaluated):
     hair = new_hair(sphere)
     hair.data.hairloom.children.strand_count = 17
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     plain = pipeline.prepare(
         session.source.strands, session.source.head, session.settings[GuideSettings], place="Hair"
     )
@@ -103,7 +103,7 @@ def test_none_is_the_artists_own_hair(new_hair, sphere, evaluated):
 
 
 def test_more_children_leave_those_before_bit_for_bit(hair, evaluated):
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     before = session.rig
     hair.data.hairloom.children.strand_count = 300
     assert session.is_stale
@@ -116,12 +116,12 @@ def test_more_children_leave_those_before_bit_for_bit(hair, evaluated):
 
 def test_no_children_at_all_are_the_guides(hair, evaluated):
     hair.data.hairloom.children.strand_count = 0
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     assert session.rig.strands.strand_count == len(session.rig.guides) == 60
 
 
 def test_a_hundred_thousand_children_are_made(hair, evaluated):
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     rig = pipeline.prepare(
         session.source.strands,
         session.source.head,
@@ -137,7 +137,7 @@ def test_without_a_surface_guides_are_shown_with_a_word(new_hair, evaluated):
     hair = new_hair()
     hair.data.hairloom.children.way = "multi"
     hair.data.hairloom.guides.guide_count = 20
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     assert session.rig.strands.strand_count == len(session.rig.guides) == 20
     (note,) = session.rig.notes
     assert f"Hair: {note}" in session.warnings and "surface" in note
@@ -146,7 +146,7 @@ def test_without_a_surface_guides_are_shown_with_a_word(new_hair, evaluated):
 def test_children_grow_where_the_artist_has_painted(hair, sphere, evaluated):
     upper_half(sphere, "Top")
     hair.hairloom.children_density = "Top"
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     assert session.warnings == ()
     assert session.rig.strands.roots[60:, 2].min() > -0.03
     assert session.rig.strands.roots[:60, 2].min() < -0.05, "guides are the artist's"
@@ -155,7 +155,7 @@ def test_children_grow_where_the_artist_has_painted(hair, sphere, evaluated):
 def test_painted_weights_are_followed(hair, sphere, evaluated):
     group = upper_half(sphere, "Top")
     hair.hairloom.children_density = "Top"
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     rig = session.rig
     sphere.data.update()
     bpy.context.view_layer.update()
@@ -172,7 +172,7 @@ def test_painted_weights_are_followed(hair, sphere, evaluated):
 def test_weights_that_cannot_be_used_are_said(hair, sphere, evaluated):
     sphere.vertex_groups.new(name="Nowhere")
     hair.hairloom.children_density = "Nowhere"
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     (warning,) = session.warnings
     assert warning.startswith("Head: ") and "'Nowhere'" in warning and "Paint" in warning
     assert session.rig.strands.strand_count == 260
@@ -185,7 +185,7 @@ def test_weights_that_cannot_be_used_are_said(hair, sphere, evaluated):
 
 def test_an_unknown_density_is_said_and_a_bake_refuses_it(hair, sphere, evaluated):
     upper_half(sphere, "Top")
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     hair.hairloom.children_density = "Bottom"
     catch_up(evaluated)
     (warning,) = session.warnings
@@ -199,7 +199,7 @@ def test_an_unknown_density_is_said_and_a_bake_refuses_it(hair, sphere, evaluate
 
 
 def test_a_bake_of_children_plays_back_bit_for_bit(moving, evaluated):
-    session = live.start(moving, evaluated())
+    session = previews.start(moving, evaluated())
     shown = played(session)
     assert np.ptp(shown[:, 60:, -1] - shown[:, 60:, 0], axis=0).max() > 0.01
     bake(moving)
@@ -207,11 +207,11 @@ def test_a_bake_of_children_plays_back_bit_for_bit(moving, evaluated):
     cache = playback.cache_of(moving)
     for frame in range(1, LAST + 1):
         np.testing.assert_array_equal(playback.strands_in(cache, frame), shown[frame - 1])
-    live.stop(session)
+    previews.stop(session)
     bpy.context.scene.frame_set(4)
-    again = live.start(moving, evaluated())
+    again = previews.start(moving, evaluated())
     np.testing.assert_array_equal(again.strands, shown[3])
-    assert timeline.baked(again.uid).changed == ()
+    assert previews.previews[again.uid].bake.changed == ()
 
 
 def test_a_bake_keeps_what_there_was_to_say(new_hair, evaluated, tmp_path):
@@ -222,19 +222,19 @@ def test_a_bake_keeps_what_there_was_to_say(new_hair, evaluated, tmp_path):
     bpy.context.scene.frame_end = 2
     plan = Bake.of([hair], bpy.context.scene)
     list(plan.steps())
-    (note,) = live.start(hair, evaluated()).rig.notes
+    (note,) = previews.start(hair, evaluated()).rig.notes
     assert plan.notes == [f"Hair: {note}"]
     assert playback.rig_in(playback.cache_of(hair)).rig.notes == (note,)
 
 
 def test_a_bake_says_when_children_have_changed(moving, sphere, evaluated):
     upper_half(sphere, "Top")
-    session = live.start(moving, evaluated())
+    session = previews.start(moving, evaluated())
     bake(moving)
 
     def changed():
         catch_up(evaluated)
-        return timeline.baked(session.uid).changed
+        return previews.previews[session.uid].bake.changed
 
     children = moving.data.hairloom.children
     assert changed() == ()
@@ -250,14 +250,14 @@ def test_a_bake_says_when_children_have_changed(moving, sphere, evaluated):
 
 
 def test_hair_that_plays_goes_on_while_children_change(moving, sphere, evaluated):
-    session = live.start(moving, evaluated())
-    live.play(evaluated())
+    session = previews.start(moving, evaluated())
+    previews.play(evaluated())
 
     def go(frames):
         for _ in range(frames):
             sphere.location.x += 0.02
             bpy.context.view_layer.update()
-            live.advance(evaluated(), 1.0 / 24.0)
+            previews.advance(evaluated(), 1.0 / 24.0)
 
     go(4)
     guides = session.solver.guides()
@@ -273,13 +273,13 @@ def test_hair_that_plays_goes_on_while_children_change(moving, sphere, evaluated
     catch_up(evaluated)
     assert session.is_playing and session.strands.shape[0] == 80, "other guides begin at rest"
     go(1)
-    assert live.sessions() == (session,)
+    assert previews.sessions() == (session,)
 
 
 def test_undo_brings_the_children_back(hair, evaluated):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="begin")
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     before = session.strands
     bpy.data.objects["Hair"].data.hairloom.children.strand_count = 90
     bpy.ops.ed.undo_push(message="fewer")
@@ -287,7 +287,7 @@ def test_undo_brings_the_children_back(hair, evaluated):
     assert session.strands.shape[0] == 150
     bpy.ops.ed.undo()
     catch_up(evaluated)
-    assert live.sessions() == (session,)
+    assert previews.sessions() == (session,)
     np.testing.assert_allclose(session.strands, before, atol=1e-6)
 
 
@@ -298,7 +298,7 @@ def test_cards_are_one_a_guide_and_tressfx_holds_all(hair, evaluated, tmp_path, 
     plan = StrandExport.of([hair], evaluated(), TRESSFX, StrandOutput(up="Z"))
     assert "260 strands" in plan.write(tmp_path / "hair.tfx").result
     written = read_tfx(tmp_path / "hair.tfx", up="Z", scale=1.0).strands
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     np.testing.assert_allclose(written.points, session.rig.strands.points, atol=1e-6)
 
 

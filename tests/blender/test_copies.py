@@ -10,7 +10,7 @@ from swinging import swings
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.base.objects import head_of
 from hairloom.addon.blender.engine import engine_hair
-from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.viewport import overlay
 
 LINKED = pytest.mark.parametrize("linked", [False, True], ids=["Shift-D", "Alt-D"])
@@ -22,8 +22,8 @@ def playing(new_hair, sphere, evaluated):
     hair = new_hair(sphere)
     hair.hairloom.dynamics.form = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
-    session = live.start(hair, evaluated())
-    assert live.play(evaluated()) == []
+    session = previews.start(hair, evaluated())
+    assert previews.play(evaluated()) == []
     return SimpleNamespace(hair=hair, head=sphere, session=session)
 
 
@@ -42,7 +42,7 @@ def duplicated(*objects, linked):
 
 def goes_on(playing):
     """It alone is previewed, plays as before, and nobody needs to be told of anything."""
-    assert live.sessions() == (playing.session,) and live.notice() == ""
+    assert previews.sessions() == (playing.session,) and previews.notice() == ""
     assert playing.session.is_playing and swings(playing.session)
 
 
@@ -68,10 +68,10 @@ def test_a_duplicate_of_hair_and_head_goes_with_its_own_head(linked, playing, ev
     assert head_of(twin) == head and head_of(playing.hair) == playing.head
     head.location = (1.0, 0.5, 0.0)
     bpy.context.view_layer.update()
-    session = live.start(twin, evaluated())
+    session = previews.start(twin, evaluated())
     assert session.warnings == ()
     assert session.strands.mean(axis=(0, 1))[0] == pytest.approx(1.0, abs=0.02)
-    live.play(evaluated())
+    previews.play(evaluated())
     other = playing.session.strands
     assert swings(session) and swings(playing.session)
     assert np.abs(other[..., 0]).max() < 0.5, "the first stays where it is"
@@ -81,13 +81,13 @@ def test_a_duplicate_of_hair_and_head_goes_with_its_own_head(linked, playing, ev
 
 def test_hair_that_shares_its_curves_is_combed_and_coloured_together(playing, evaluated):
     twin, _ = duplicated(playing.hair, linked=True)
-    sessions = playing.session, live.start(twin, evaluated())
-    live.rest(evaluated(), keep_playing=False)
+    sessions = playing.session, previews.start(twin, evaluated())
+    previews.rest(evaluated(), keep_playing=False)
     twin.data.hairloom.shading.ambient = 0.5
     playing.hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
     playing.hair.data.update_tag()
     bpy.context.view_layer.update()
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     for session in sessions:
         assert session.strands[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
         assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 0.5
@@ -100,7 +100,7 @@ def test_a_duplicate_that_is_undone(playing, evaluated):
     bpy.ops.ed.undo_push(message="duplicate")
     bpy.ops.ed.undo()
     assert len(bpy.data.objects) == 2
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     goes_on(playing)
 
 
@@ -118,8 +118,8 @@ def test_hair_of_the_same_name_from_a_file(link, playing, evaluated, tmp_path):
     playing.hair.name = "Wig"  # the one by that name is another from now on
     assert (bpy.data.objects.get("Hair") == theirs) == link
     goes_on(playing)
-    second = live.start(theirs, evaluated())
-    assert set(live.sessions()) == {playing.session, second} and live.notice() == ""
+    second = previews.start(theirs, evaluated())
+    assert set(previews.sessions()) == {playing.session, second} and previews.notice() == ""
 
 
 def test_names_that_are_exchanged(playing, evaluated):
@@ -129,7 +129,7 @@ def test_names_that_are_exchanged(playing, evaluated):
         other.name, one.name = name, other.name
     assert twin.name == "Hair" and playing.hair.name == "Hair.001"
     goes_on(playing)
-    assert live.session_of(twin) is None and playing.session.name == "Hair.001"
+    assert previews.session_of(twin) is None and playing.session.name == "Hair.001"
 
 
 @pytest.mark.parametrize("kind", ["NEW", "LINK_COPY", "FULL_COPY"])
@@ -147,18 +147,18 @@ def test_a_copy_in_another_scene(kind, playing, evaluated):
     bpy.context.view_layer.update()
     (hair,) = (obj for obj in second.objects if obj.type == "CURVES")
     assert (hair == playing.hair) == (kind != "FULL_COPY")
-    assert live.sessions() == (playing.session,) and live.notice() == ""
+    assert previews.sessions() == (playing.session,) and previews.notice() == ""
     drawn = overlay.drawing_of(playing.session.uid)
     if kind == "FULL_COPY":
         assert not drawn.is_visible
         assert head_of(hair) in tuple(second.objects), "it grows from the copied head"
-        live.start(hair, evaluated())
-        live.stop(live.session_of(hair))
+        previews.start(hair, evaluated())
+        previews.stop(previews.session_of(hair))
     else:
         goes_on(playing)
     window.scene = first
     bpy.context.view_layer.update()
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert overlay.drawing_of(playing.session.uid).is_visible
     goes_on(playing)
 

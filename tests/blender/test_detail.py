@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.sessions.hiders import Hiders
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.blender.viewport.overlay_text import counts_line, free_corner
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.draws
 def preview(new_hair, sphere, evaluated):
     """Hair on a head, previewed: (hair, head, session)."""
     hair = new_hair(sphere)
-    return hair, sphere, live.start(hair, evaluated())
+    return hair, sphere, previews.start(hair, evaluated())
 
 
 def drawing(session):
@@ -69,7 +69,7 @@ def test_of_children_the_last_to_grow_are_the_first_to_go(new_hair, sphere, eval
     hair = new_hair(sphere)
     hair.data.hairloom.children.way = "multi"
     hair.data.hairloom.children.strand_count = 240
-    rank = drawing(live.start(hair, evaluated())).snapshot.rank
+    rank = drawing(previews.start(hair, evaluated())).snapshot.rank
     assert (np.diff(rank[60:]) > 0.0).all() and rank[60] >= 60 / 300 and rank[-1] < 1.0
     assert rank[:60].max() < 60 / 300 and len(np.unique(rank[:60])) == 60
 
@@ -135,7 +135,7 @@ def test_a_head_that_is_not_seen_hides_nothing(how, preview):
 
 
 def test_hair_without_a_head_has_nothing_to_hide_it(new_hair, evaluated):
-    session = live.start(new_hair(), evaluated())
+    session = previews.start(new_hair(), evaluated())
     assert drawing(session).snapshot.hiders is None
 
 

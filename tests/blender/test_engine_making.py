@@ -16,7 +16,7 @@ from hairloom.addon import pipeline  # noqa: E402
 from hairloom.addon.blender.base import latest_job  # noqa: E402
 from hairloom.addon.blender.engine import engine_hair  # noqa: E402
 from hairloom.addon.blender.engine.engine_scene import SceneReader  # noqa: E402
-from hairloom.addon.blender.preview import live, reactions  # noqa: E402
+from hairloom.addon.blender.preview import previews, scene_events  # noqa: E402
 from hairloom.addon.blender.viewport import overlay  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
 
@@ -156,7 +156,7 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
     (before,) = view.arrive()
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     gate.opened.clear()
-    session = live.start(hair, bpy.context.evaluated_depsgraph_get())
+    session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
     assert overlay.expected() == {hair.session_uid} and not overlay.drawn()
 
     def read() -> tuple[Any, ...]:
@@ -176,4 +176,4 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
         time.sleep(0.005)
     assert overlay.drawn() == {hair.session_uid} and not overlay.expected()
     assert read() == (), "the preview draws it from now on"
-    reactions.clear()
+    scene_events.clear()

@@ -216,7 +216,7 @@ for _ in range(10):
 bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
 bpy.ops.hairloom.grow(strand_count=50, length=0.1)
 bpy.ops.hairloom.preview()
-live = sys.modules[NAME + ".addon.blender.preview.live"]
+previews = sys.modules[NAME + ".addon.blender.preview.previews"]
 registration = sys.modules[NAME + ".addon.registration"]
 
 def module(name):
@@ -226,7 +226,7 @@ groom, alembic = module("exchange.groom"), module("exchange.alembic.groom_alembi
 child = module("blender.strands.child_python")
 reader = module("exchange.alembic.groom_alembic_read")
 path = pathlib.Path({resources!r}) / "a.abc"
-alembic.write_groom_alembic(path, groom.Groom(live.sessions()[0].rig.strands))
+alembic.write_groom_alembic(path, groom.Groom(previews.sessions()[0].rig.strands))
 
 def strands_read(command):
     return reader.read_groom_alembic(path, python=command).strands.strand_count
@@ -249,7 +249,7 @@ print(json.dumps(dict(
     crashes=[crashes(command) for command in commands],
     enabled=enabled,
     after=sorted(after),
-    strands=live.sessions()[0].rig.strands.strand_count,
+    strands=previews.sessions()[0].rig.strands.strand_count,
     root=registration.ROOT_PACKAGE,
     has_compressor=importlib.util.find_spec("etcpak") is not None,
     installed=[p.parent.name for p in pathlib.Path({resources!r}).rglob("_etcpak_none*")],

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from hairloom.addon.blender.colliders import fields
-from hairloom.addon.blender.preview import live, reactions, timeline
+from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.preview.phases import Phase
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -93,17 +94,17 @@ def made_beside(surface):
 
 def test_previews_keep_the_youngest_fields_only(new_hair, sphere, evaluated, extension):
     oldest = made_beside(surface_of(sphere, evaluated))
-    live.start(new_hair(sphere), evaluated())
+    previews.start(new_hair(sphere), evaluated())
     assert oldest() is None
 
 
 def test_a_preview_takes_no_field_from_hair_that_waits_for_it(new_hair, sphere, evaluated, gate):
-    waiting = live.start(new_hair(sphere), evaluated())
-    live.play(evaluated(), blocking=False)
+    waiting = previews.start(new_hair(sphere), evaluated())
+    previews.play(evaluated(), blocking=False)
     gate.set()
     oldest = made_beside(surface_of(sphere, evaluated))
-    assert live.is_waiting(waiting)
-    live.start(new_hair(sphere), evaluated())
+    assert previews.previews[waiting.uid].phase is Phase.WAITING
+    previews.start(new_hair(sphere), evaluated())
     assert oldest() is not None
 
 
@@ -111,36 +112,40 @@ def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(
     new_hair, sphere, evaluated, gate
 ):
     hair = new_hair(sphere)
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     at_rest = session.strands
-    assert live.play(evaluated(), blocking=False) == []
-    assert live.is_playing() and live.is_waiting(session) and not session.is_playing
+    assert previews.play(evaluated(), blocking=False) == []
+    assert (
+        previews.is_playing()
+        and previews.previews[session.uid].phase is Phase.WAITING
+        and not session.is_playing
+    )
     sphere.location.x = 0.05
     evaluated()
-    live.advance(evaluated(), FRAME)
-    live.rest(evaluated(), keep_playing=True)
-    assert live.is_waiting(session)
+    previews.advance(evaluated(), FRAME)
+    previews.rest(evaluated(), keep_playing=True)
+    assert previews.previews[session.uid].phase is Phase.WAITING
     assert session.strands == pytest.approx(at_rest + [0.05, 0.0, 0.0], abs=2e-6)
     gate.set()
     until_made()
-    live.advance(evaluated(), FRAME)
-    assert session.is_playing and not live.is_waiting(session)
+    previews.advance(evaluated(), FRAME)
+    assert session.is_playing and previews.previews[session.uid].phase is not Phase.WAITING
     sphere.location.x = 0.08
     evaluated()
-    live.advance(evaluated(), FRAME)
+    previews.advance(evaluated(), FRAME)
     carried = at_rest + [0.08, 0.0, 0.0]
     assert np.abs(session.strands - carried)[:, -1].max() > 1e-3, "tips stay behind"
 
 
 def test_stop_while_hair_waits_ends_the_waiting(new_hair, sphere, evaluated, gate):
-    session = live.start(new_hair(sphere), evaluated())
-    live.play(evaluated(), blocking=False)
-    live.rest(evaluated(), keep_playing=False)
-    assert not live.is_playing()
+    session = previews.start(new_hair(sphere), evaluated())
+    previews.play(evaluated(), blocking=False)
+    previews.rest(evaluated(), keep_playing=False)
+    assert not previews.is_playing()
     gate.set()
     until_made()
-    live.advance(evaluated(), FRAME)
-    assert not live.is_playing() and not session.is_playing
+    previews.advance(evaluated(), FRAME)
+    assert not previews.is_playing() and not session.is_playing
 
 
 def test_a_collider_that_cannot_be_made_is_left_out_with_a_warning_as_ever(
@@ -149,10 +154,10 @@ def test_a_collider_that_cannot_be_made_is_left_out_with_a_warning_as_ever(
     hair = new_hair(sphere)
     bpy.ops.mesh.primitive_plane_add(size=0.1)
     hair.hairloom.collider = bpy.context.object
-    session = live.start(hair, evaluated())
-    live.play(evaluated(), blocking=False)
+    session = previews.start(hair, evaluated())
+    previews.play(evaluated(), blocking=False)
     until_made()
-    live.advance(evaluated(), FRAME)
+    previews.advance(evaluated(), FRAME)
     assert session.is_playing
     assert any("encloses no volume" in warning for warning in session.warnings)
 
@@ -166,21 +171,21 @@ def test_more_meshes_than_are_kept_are_all_waited_for(new_hair, sphere, evaluate
         bpy.ops.mesh.primitive_cube_add(size=0.02, location=(1.0 + number, 0.0, 0.0))
         colliders.objects.link(bpy.context.object)
     hair.hairloom.collider_collection = colliders
-    session = live.start(hair, evaluated())
-    live.play(evaluated(), blocking=False)
+    session = previews.start(hair, evaluated())
+    previews.play(evaluated(), blocking=False)
     for _ in range(2):
         until_made()
-        live.advance(evaluated(), FRAME)
+        previews.advance(evaluated(), FRAME)
     assert session.is_playing and len(session.obstacles.parts) == fields.KEPT + 3
 
 
 def test_blenders_playback_waits_and_takes_over(new_hair, sphere, evaluated, extension):
     hair = new_hair(sphere)
     hair.hairloom.bake.follows = True
-    session = live.start(hair, evaluated())
-    live.play(evaluated(), blocking=False)
+    session = previews.start(hair, evaluated())
+    previews.play(evaluated(), blocking=False)
     bpy.context.scene.frame_set(bpy.context.scene.frame_start)
-    timeline.follow(session, evaluated())
-    assert session.is_playing and not live.is_waiting(session)
-    live.advance(evaluated(), FRAME)
-    reactions.clear()
+    previews.previews[session.uid].follow(evaluated())
+    assert session.is_playing and previews.previews[session.uid].phase is not Phase.WAITING
+    previews.advance(evaluated(), FRAME)
+    scene_events.clear()

@@ -6,7 +6,7 @@ import pytest
 from fin_motion import FRAME, play, rest_of, shown, started, update
 from mathutils import Matrix
 
-from hairloom.addon.blender.preview import fins, live
+from hairloom.addon.blender.preview import fins, previews
 from hairloom.addon.blender.scene.fin_modifier import POSITION, fin_modifier
 from hairloom.addon.errors import HairloomError
 
@@ -30,7 +30,7 @@ def test_removing_it_leaves_nothing(flag, evaluated):
     session = started(flag, evaluated)
     play(session, evaluated, 3)
     assert bpy.ops.hairloom.fin_remove() == {"FINISHED"}
-    assert live.simulated() == ()
+    assert previews.simulated() == ()
     assert len(flag.modifiers) == len(bpy.data.node_groups) == 0
     assert POSITION not in flag.data.attributes
     assert np.array_equal(rest_of(flag), rest)
@@ -136,7 +136,7 @@ def test_two_runs_are_alike(flag, evaluated):
         play(session, evaluated, 10)
         ends.append(session.recorded()["position"])
         session.stop(evaluated())
-        live.stop(session)
+        previews.stop(session)
     assert np.array_equal(*ends)
 
 
@@ -226,14 +226,14 @@ def change_topology(flag):
 )
 def test_what_breaks_in_mid_play_ends_it_with_a_notice(flag, evaluated, change, says):
     session = started(flag, evaluated)
-    live.play(evaluated())
+    previews.play(evaluated())
     play(session, evaluated, 2)
     bpy.context.view_layer.objects.active = flag
     change(flag)
     update()
-    live.advance(evaluated(), FRAME)
-    assert live.simulated() == ()
-    assert says in live.notice()
+    previews.advance(evaluated(), FRAME)
+    assert previews.simulated() == ()
+    assert says in previews.notice()
     if bpy.context.object is not None and bpy.context.object.mode == "EDIT":
         bpy.ops.object.mode_set(mode="OBJECT")
 

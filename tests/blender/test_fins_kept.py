@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from fin_motion import play, rest_of, shown, started, update
 
-from hairloom.addon.blender.preview import fins, live, reactions
+from hairloom.addon.blender.preview import fins, previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.scene.fin_modifier import INDEX, POSITION, fin_modifier, is_shown
 
@@ -31,10 +31,10 @@ def test_undo_in_mid_play_goes_on_or_rests(flag, evaluated):
     flag.location.x = 0.1
     bpy.ops.ed.undo_push(message="move")
     bpy.ops.ed.undo()
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     flag = bpy.data.objects["Flag"]
     play(session, evaluated, 2)
-    assert live.simulated() == (session,)
+    assert previews.simulated() == (session,)
     session.stop(evaluated())
     assert POSITION not in flag.data.attributes
 
@@ -49,7 +49,7 @@ def test_a_saved_file_keeps_fin_and_settings(flag, evaluated, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=file)
     bpy.ops.wm.open_mainfile(filepath=file)
     flag = bpy.data.objects["Flag"]
-    assert live.simulated() == ()
+    assert previews.simulated() == ()
     assert flag.hairloom.fin.stretch == 0.25 and flag.hairloom.fin.pin_group == "Pins"
     update()
     assert shown(flag, evaluated) == pytest.approx(drawn, abs=1e-6), "the moment that was saved"
@@ -76,11 +76,11 @@ def test_buttons_say_why_they_are_grey(extension):
 def test_enabled_fins_start_together(flag, evaluated):
     update()
     assert fins.start_enabled(evaluated()) == []
-    assert [each.name for each in live.simulated()] == ["Flag"]
+    assert [each.name for each in previews.simulated()] == ["Flag"]
     assert bpy.ops.hairloom.fin_preview() == {"FINISHED"}
-    assert live.simulated() == ()
+    assert previews.simulated() == ()
     flag.hairloom.fin.enabled = False
-    assert fins.start_enabled(evaluated()) == [] and live.simulated() == ()
+    assert fins.start_enabled(evaluated()) == [] and previews.simulated() == ()
 
 
 def test_attributes_of_the_modifier_stay_out_of_the_mesh(flag, evaluated):
@@ -111,7 +111,7 @@ def test_playback_simulates_it_and_a_bake_shows_exactly_that(flag, evaluated, tm
     assert np.array_equal(simulated[1], rest_of(flag))
     assert simulated[8][:, 2].min() < -0.1
     session.stop(evaluated())
-    live.stop(session)
+    previews.stop(session)
     for _ in Bake.of([flag], bpy.context.scene, frames=range(1, 9), folder=tmp_path).steps():
         pass
     for preview in (False, True):

@@ -5,7 +5,7 @@ import pytest
 
 import hairloom
 from hairloom.addon import registration
-from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties import groups
 from hairloom.addon.blender.viewport import overlay
 
@@ -52,7 +52,7 @@ def traces():
     }
     classes = [name for name in dir(bpy.types) if "hairloom" in name.lower()]
     own_attributes = [hasattr(bpy.types.Curves, "hairloom"), hasattr(bpy.types.Object, "hairloom")]
-    timer = bpy.app.timers.is_registered(reactions._read_again)
+    timer = bpy.app.timers.is_registered(scene_events._read_again)
     operators = dir(bpy.ops.hairloom)
     return handlers, menus, properties, classes, own_attributes, timer, operators
 
@@ -87,14 +87,14 @@ def test_ten_times_on_and_off_leave_nothing(commands):
 
 def test_disabling_ends_previews_and_timers(new_hair, sphere, evaluated):
     hair = new_hair(sphere)
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     hair.data.hairloom.guides.guide_count = 5
-    assert bpy.app.timers.is_registered(reactions._read_again)
+    assert bpy.app.timers.is_registered(scene_events._read_again)
     hairloom.unregister()
     try:
-        assert live.sessions() == ()
+        assert previews.sessions() == ()
         assert overlay.drawing_of(session.uid) is None
-        assert not bpy.app.timers.is_registered(reactions._read_again)
+        assert not bpy.app.timers.is_registered(scene_events._read_again)
         assert hair.evaluated_get(evaluated()).display_type == "TEXTURED"
     finally:
         hairloom.register()

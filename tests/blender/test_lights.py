@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.scene.lights import light_warnings, read_lights
 from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.blender.viewport.overlay import lit
@@ -181,7 +181,7 @@ def test_hair_is_lit_as_blender_lights_the_rest_and_never_black() -> None:
 
 def test_a_light_that_is_deleted_shines_no_longer(new_hair: Any, sphere: Any) -> None:
     hair, lamp = new_hair(sphere), add("POINT", energy=10.0)
-    session = live.start(hair, bpy.context.evaluated_depsgraph_get())
+    session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
     assert len(session.snapshot.lights) == 1
     bpy.data.objects.remove(lamp)
     bpy.context.view_layer.update()

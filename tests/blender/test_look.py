@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import pytest
 
-from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.sessions import groom_picture
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.shading.kajiya_kay_settings import KajiyaKaySettings
@@ -23,7 +23,7 @@ def preview(new_hair: Any, sphere: Any, evaluated: Any) -> Any:
     """(shading group, session) of hair by the model Marschner."""
     hair = new_hair(sphere)
     hair.data.hairloom.shading.model = "marschner"
-    return hair.data.hairloom.shading, live.start(hair, evaluated())
+    return hair.data.hairloom.shading, previews.start(hair, evaluated())
 
 
 @pytest.fixture
@@ -55,9 +55,9 @@ def test_a_slider_of_the_fibres_shape_is_quick_and_refined_when_it_rests(
     assert table_size(session) == DEFAULT_SIZE
     shading.width_r = 0.1
     assert table_size(session) == PREVIEW_SIZE
-    assert bpy.app.timers.is_registered(reactions._refine)
+    assert bpy.app.timers.is_registered(scene_events._refine)
     shading.width_r = 0.2
-    reactions._refine()
+    scene_events._refine()
     assert table_size(session) == DEFAULT_SIZE
     assert session.snapshot.shading.width_r == pytest.approx(0.2)
 
@@ -69,7 +69,7 @@ def test_colours_and_strengths_need_no_other_tables(preview: Any, window: None) 
     shading.strength_trt = 2.0
     shading.sparkle = 0.0
     assert table_size(session) == DEFAULT_SIZE
-    assert not bpy.app.timers.is_registered(reactions._refine)
+    assert not bpy.app.timers.is_registered(scene_events._refine)
 
 
 def test_kajiya_kay_has_no_tables_and_changing_to_marschner_makes_some(
@@ -92,9 +92,9 @@ def test_without_a_window_tables_are_always_full(preview: Any) -> None:
 def test_nothing_ticks_on_when_hairloom_is_disabled(preview: Any, window: None) -> None:
     shading, _ = preview
     shading.width_r = 0.1
-    assert bpy.app.timers.is_registered(reactions._refine)
-    reactions.clear()
-    assert not bpy.app.timers.is_registered(reactions._refine)
+    assert bpy.app.timers.is_registered(scene_events._refine)
+    scene_events.clear()
+    assert not bpy.app.timers.is_registered(scene_events._refine)
 
 
 def drawn_in_look(hair: Any) -> tuple[list[str], set[str]]:

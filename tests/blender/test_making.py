@@ -13,8 +13,9 @@ from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.pictures.showing import shown_groom
-from hairloom.addon.blender.preview import late, live, reactions
+from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import simulated_for
+from hairloom.addon.blender.preview.phases import Phase
 from hairloom.addon.blender.sessions import making
 from hairloom.addon.blender.sessions.making import Order, make
 from hairloom.addon.blender.sessions.reading import Reading
@@ -32,7 +33,7 @@ COUNT = 60
 def in_window(monkeypatch):
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     yield
-    reactions.clear()
+    scene_events.clear()
 
 
 @pytest.fixture
@@ -59,7 +60,7 @@ def hair(new_hair, sphere):
 def arrive(session):
     """As Blender's timer does, until nothing is being made."""
     end = time.monotonic() + 60.0
-    while session.is_pending and live.sessions():
+    while session.is_pending and previews.sessions():
         assert time.monotonic() < end, "it is never made"
         latest_job.take_steps()
         time.sleep(0.005)
@@ -74,7 +75,7 @@ def is_box(hair, evaluated):
 
 
 def test_a_preview_shows_blenders_strands_until_its_own_are_made(hair, evaluated, gate):
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     assert not session.is_made and session.is_pending
     assert shown(session).snapshot.strand_count == 0 and "is being made" in shown(session).note
     assert not is_box(hair, evaluated)
@@ -88,7 +89,7 @@ def test_a_preview_shows_blenders_strands_until_its_own_are_made(hair, evaluated
 def test_what_a_thread_makes_is_the_same_to_the_bit(hair, evaluated, in_window):
     hair.data.hairloom.children.way = "multi"
     hair.data.hairloom.children.strand_count = 500
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     arrive(session)
     alone = make(Reading(hair, evaluated()).ordered, is_drawn=True)
     assert np.array_equal(session.rig.strands.points, alone.rig.strands.points)
@@ -98,22 +99,22 @@ def test_what_a_thread_makes_is_the_same_to_the_bit(hair, evaluated, in_window):
 
 
 def test_play_waits_for_the_hair(hair, evaluated, gate):
-    session = live.start(hair, evaluated())
-    assert live.play(evaluated(), blocking=False) == []
+    session = previews.start(hair, evaluated())
+    assert previews.play(evaluated(), blocking=False) == []
     while not fields.are_made():
         time.sleep(0.005)
-    live.advance(evaluated(), FRAME)
-    assert live.is_waiting(session) and not session.is_playing
+    previews.advance(evaluated(), FRAME)
+    assert previews.previews[session.uid].phase is Phase.WAITING and not session.is_playing
     with pytest.raises(fields.NotMadeYetError):
         session.play(evaluated(), blocking=False)
     gate.set()
     arrive(session)
-    live.advance(evaluated(), FRAME)
+    previews.advance(evaluated(), FRAME)
     assert session.is_playing and len(session.strands) == COUNT
 
 
 def test_blenders_playback_and_a_bake_wait_for_no_timer(hair, evaluated, in_window):
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     session.play(evaluated())
     assert session.is_made and session.is_playing and not session.is_pending
     hair.data.hairloom.guides.guide_count = 7
@@ -125,12 +126,12 @@ def test_blenders_playback_and_a_bake_wait_for_no_timer(hair, evaluated, in_wind
 @pytest.fixture
 def playing(hair, evaluated, in_window, sphere):
     """Hair that swings."""
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     arrive(session)
-    live.play(evaluated())
+    previews.play(evaluated())
     sphere.location.x = 0.05
     for _ in range(3):
-        live.advance(evaluated(), FRAME)
+        previews.advance(evaluated(), FRAME)
     return session
 
 
@@ -150,10 +151,10 @@ def test_old_hair_plays_until_the_new_is_made(playing, hair, evaluated, monkeypa
     opened = hold(monkeypatch)
     hair.data.hairloom.children.way = "multi"
     hair.data.hairloom.children.strand_count = 300
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert playing.is_pending and not playing.is_stale
     before = playing.strands
-    live.advance(evaluated(), FRAME)
+    previews.advance(evaluated(), FRAME)
     assert len(playing.strands) == COUNT and not np.array_equal(playing.strands, before)
     tips = playing.solver.guides()[:, -1]
     opened.set()
@@ -169,7 +170,7 @@ def test_of_many_settings_the_last_one_counts(playing, hair, evaluated, monkeypa
     opened = hold(monkeypatch)
     for count in (10, 11, 12):
         hair.data.hairloom.guides.guide_count = count
-        reactions.catch_up(evaluated())
+        scene_events.catch_up(evaluated())
     made, take = [], type(playing).take_made
     monkeypatch.setattr(
         type(playing), "take_made", lambda s, d: (take(s, d), made.append(len(s.rig.guides)))
@@ -183,7 +184,7 @@ def test_of_many_settings_the_last_one_counts(playing, hair, evaluated, monkeypa
 def test_what_acts_at_once_meanwhile_is_kept(playing, hair, evaluated, monkeypatch):
     opened = hold(monkeypatch)
     hair.data.hairloom.guides.guide_count = 9
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     hair.data.hairloom.strands.width_scale = 3.0
     assert shown(playing).snapshot.strand_settings.width_scale == 3.0
     assert not playing.is_stale
@@ -199,8 +200,8 @@ def test_edits_while_hair_is_made_arrive_too(playing, hair, evaluated, monkeypat
         points = np.empty(len(hair.data.points) * 3, np.float32)
         hair.data.position_data.foreach_get("vector", points)
         hair.data.position_data.foreach_set("vector", points * np.float32(scale))
-        reactions.updated(evaluated())
-        reactions.catch_up(evaluated())
+        scene_events.updated(evaluated())
+        scene_events.catch_up(evaluated())
     opened.set()
     arrive(playing)
     wanted = make(Reading(hair, evaluated()).ordered, is_drawn=False).rig.strands
@@ -213,7 +214,7 @@ def test_ambient_light_needs_no_other_strands(playing, hair, evaluated, monkeypa
     monkeypatch.setattr(pipeline, "prepare", None)
     rig, motion, before = playing.rig, playing.strands, playing.snapshot.occlusion
     hair.data.hairloom.ambient.strength = 0.2
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     arrive(playing)
     assert playing.rig is rig and np.array_equal(playing.strands, motion)
     assert playing.snapshot.occlusion.mean() > before.mean()
@@ -221,15 +222,15 @@ def test_ambient_light_needs_no_other_strands(playing, hair, evaluated, monkeypa
 
 @pytest.mark.parametrize("end", ["stop", "delete", "load"])
 def test_an_end_in_the_middle_leaves_nothing(end, hair, evaluated, gate):
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     if end == "stop":
-        live.stop(session)
+        previews.stop(session)
     elif end == "delete":
         bpy.data.objects.remove(hair)
         bpy.context.view_layer.update()
     else:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert live.sessions() == () and latest_job.take_steps() is None
+    assert previews.sessions() == () and latest_job.take_steps() is None
     assert not session.is_pending, "nobody waits for it any more"
 
 
@@ -239,9 +240,9 @@ def test_hair_that_cannot_be_made_ends_the_preview_with_a_notice(playing, hair, 
 
     monkeypatch.setattr(pipeline, "prepare", fail)
     hair.data.hairloom.guides.guide_count = 5
-    reactions.catch_up(bpy.context.evaluated_depsgraph_get())
+    scene_events.catch_up(bpy.context.evaluated_depsgraph_get())
     arrive(playing)
-    assert live.sessions() == () and "it cannot be" in live.notice()
+    assert previews.sessions() == () and "it cannot be" in previews.notice()
 
 
 def test_a_failure_of_what_nobody_wants_any_more_is_no_matter(
@@ -258,14 +259,14 @@ def test_a_failure_of_what_nobody_wants_any_more_is_no_matter(
     monkeypatch.setattr(pipeline, "prepare", fail_for_five)
     for count in (5, 6):
         hair.data.hairloom.guides.guide_count = count
-        reactions.catch_up(evaluated())
+        scene_events.catch_up(evaluated())
     opened.set()
     arrive(playing)
-    assert live.sessions() == (playing,) and len(playing.rig.guides) == 6
+    assert previews.sessions() == (playing,) and len(playing.rig.guides) == 6
 
 
 def test_pictures_are_of_whole_hair(hair, evaluated, in_window):
-    live.start(hair, evaluated())
+    previews.start(hair, evaluated())
     assert len(shown_groom(hair, evaluated()).points) == COUNT
 
 
@@ -303,26 +304,30 @@ def rounds(session, *frames):
 
 def test_playback_goes_on_before_the_hair_is_made(hair, moving, evaluated, gate, monkeypatch):
     hair.hairloom.dynamics.form = "numpy"
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     fields.field_of(session.source.head, session.settings[DynamicsSettings], place="Head")
     monkeypatch.setattr(playback, "is_played", lambda: True)
     before = rounds(session, 1, 2, 3, 4)  # would wait for the gate for ever
-    assert not session.is_made and not session.is_playing and late.is_late(session)
+    assert (
+        not session.is_made
+        and not session.is_playing
+        and previews.previews[session.uid].is_deferred
+    )
     assert not is_box(hair, evaluated), "Blender's own strands are there until then"
     assert before[3, :, 0, 0].mean() > before[0, :, 0, 0].mean() + 0.01, "it goes with its body"
     gate.set()
     arrive(session)
     begun = rounds(session, 5)[0]
-    assert session.is_playing and not late.is_late(session)
+    assert session.is_playing and not previews.previews[session.uid].is_deferred
     np.testing.assert_array_equal(begun, pipeline.carried(session.rig, session.solver.pose))
     after = rounds(session, 6, 7)[1]
     at_rest = pipeline.carried(session.rig, session.solver.pose)
     assert np.abs(after - at_rest).max() > 1e-3, "it does not swing"
     second = rounds(session, *range(1, 8))
-    live.stop(session)
+    previews.stop(session)
     bpy.context.scene.frame_set(1)  # where the first preview has begun, too
     monkeypatch.setattr(latest_job, "is_blocking", lambda: True)
-    again = live.start(hair, evaluated())
+    again = previews.start(hair, evaluated())
     np.testing.assert_array_equal(second, rounds(again, *range(1, 8)))
 
 
@@ -334,18 +339,18 @@ def test_playback_goes_on_before_a_collider_is_made(hair, moving, evaluated, mon
         return from_surface(*arguments, **named)
 
     monkeypatch.setattr(DistanceField, "from_surface", wait_and_make)
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     monkeypatch.setattr(playback, "is_played", lambda: True)
     rounds(session, 1, 2, 3)
-    assert session.is_made and not session.is_playing and late.is_late(session)
+    assert session.is_made and not session.is_playing and previews.previews[session.uid].is_deferred
     opened.set()
     end = time.monotonic() + 60.0
     while not fields.are_made():
         assert time.monotonic() < end
         time.sleep(0.005)
     rounds(session, 4)
-    assert session.is_playing and not late.is_late(session)
+    assert session.is_playing and not previews.previews[session.uid].is_deferred
 
 
 def test_old_hair_goes_on_in_playback_too(playing, hair, moving, evaluated, monkeypatch):
@@ -353,9 +358,11 @@ def test_old_hair_goes_on_in_playback_too(playing, hair, moving, evaluated, monk
     monkeypatch.setattr(playback, "is_played", lambda: True)
     rounds(playing, 1, 2)
     hair.data.hairloom.guides.guide_count = 7
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     shown = rounds(playing, 3, 4, 1, 2)
-    assert playing.is_pending and playing.is_playing and not late.is_late(playing)
+    assert (
+        playing.is_pending and playing.is_playing and not previews.previews[playing.uid].is_deferred
+    )
     assert np.abs(np.diff(shown, axis=0)).max() > 1e-3
     opened.set()
     arrive(playing)
@@ -363,7 +370,7 @@ def test_old_hair_goes_on_in_playback_too(playing, hair, moving, evaluated, monk
 
 
 def test_a_step_of_a_frame_waits_to_be_exact(hair, moving, evaluated, gate):
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     threading.Timer(0.3, gate.set).start()
     rounds(session, 1, 2)
     assert session.is_made and session.is_playing

@@ -1,30 +1,25 @@
-"""Times and memory, as panel and viewport tell them."""
+"""Times and memory, as panel and viewport report them."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
-from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.sessions import measures
 
 
-@pytest.fixture(autouse=True)
-def nothing_measured():
-    measures._times.clear()
-
-
 def test_the_median_of_the_last_frames_is_told(monkeypatch):
-    now = [0.0]
+    now, times = [0.0], measures.FrameTimes()
     monkeypatch.setattr(measures.time, "perf_counter", lambda: now[0])
     for spent in (0.004, 0.004, 0.9):  # one slow frame is none of them
-        with measures.measured(7, "simulation"):
+        with times.measured("simulation"):
             now[0] += spent
-    assert measures.milliseconds(7, "simulation") == pytest.approx(4.0)
-    assert measures.frame_line(7) == "simulation 4.0 ms"
-    assert measures.frame_line(8) == ""
+    assert times.milliseconds("simulation") == pytest.approx(4.0)
+    assert times.line == "simulation 4.0 ms"
+    assert measures.FrameTimes().line == ""
     now[0] += 100.0
-    assert measures.frame_line(7) == "", "what was long ago is no news"
+    assert times.line == "", "what was long ago is no news"
 
 
 def test_an_array_counts_once_and_a_view_is_its_array():
@@ -40,10 +35,8 @@ def test_an_array_counts_once_and_a_view_is_its_array():
 
 
 def test_a_session_measures_itself(new_hair, sphere, evaluated):
-    session = live.start(new_hair(sphere), evaluated())
+    session = previews.start(new_hair(sphere), evaluated())
     session.play(evaluated())
     session.advance(evaluated(), 1.0 / 24.0)
-    assert measures.milliseconds(session.uid, "simulation") > 0.0
+    assert session.times.milliseconds("simulation") > 0.0
     assert measures.array_bytes(session.rig) >= session.rig.strands.points.nbytes
-    live.stop(session)
-    assert measures.milliseconds(session.uid, "simulation") is None

@@ -15,7 +15,7 @@ from hairloom.addon.blender.cards.build import CardInputs
 from hairloom.addon.blender.cards.object import card_objects
 from hairloom.addon.blender.cards.occluders import other_cards
 from hairloom.addon.blender.engine.engine_hair import read_groom
-from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 
@@ -121,9 +121,9 @@ def shaded(hair, new_hair, sphere, evaluated):
     groom = hair.data.hairloom
     groom.card_occlusion.others, groom.card_drawing.shown_as = True, "cards"
     bpy.context.view_layer.update()
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     yield session, strands
-    live.stop_all()
+    previews.stop_all()
 
 
 def shown(session):
@@ -134,8 +134,8 @@ def shown(session):
 def follow(evaluated):
     """What Blender's events lead to."""
     bpy.context.view_layer.update()
-    reactions.updated(evaluated())
-    reactions.catch_up(evaluated())
+    scene_events.updated(evaluated())
+    scene_events.catch_up(evaluated())
 
 
 def test_the_preview_follows_other_hair(shaded, evaluated):
@@ -173,11 +173,11 @@ def test_the_preview_follows_the_settings_of_other_hair(shaded, evaluated):
     session, strands = shaded
     near = shown(session)
     strands.data.hairloom.strands.width_scale = 1.0
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert shown(session).mean() > near.mean() + 0.02
     before = shown(session)
     strands.data.hairloom.shading.color_variation = 0.5
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert shown(session) is before, "colours shade nothing"
 
 
@@ -186,8 +186,8 @@ def test_undo_has_cards_shaded_again(shaded, evaluated):
     near = shown(session)
     strands.location.x = 5.0
     bpy.context.view_layer.update()  # as undo does it, which tells nobody of objects
-    reactions.undone()
-    reactions.catch_up(evaluated())
+    scene_events.undone()
+    scene_events.catch_up(evaluated())
     assert shown(session).mean() > near.mean() + 0.02
 
 

@@ -9,7 +9,7 @@ from swinging import FRAME, swings
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.engine import engine_hair
-from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.viewport import overlay
@@ -51,8 +51,8 @@ def settings(hair):
 
 def plays(hair):
     """Whether hair lags behind a head that is pushed."""
-    session = live.start(hair, bpy.context.evaluated_depsgraph_get())
-    assert live.play(bpy.context.evaluated_depsgraph_get()) == []
+    session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
+    assert previews.play(bpy.context.evaluated_depsgraph_get()) == []
     return swings(session)
 
 
@@ -67,10 +67,10 @@ def test_a_linked_groom_is_shown_as_it_is_there(library):
     bpy.context.scene.collection.children.link(brought(library, link=True))
     hair = bpy.data.objects["Hair"]
     assert settings(hair) == (2.0, 0.5) and hair.library is not None
-    session = live.start(hair, bpy.context.evaluated_depsgraph_get())
-    assert live.play(bpy.context.evaluated_depsgraph_get()) == []
-    live.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
-    assert np.isfinite(session.strands).all() and live.notice() == ""
+    session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
+    assert previews.play(bpy.context.evaluated_depsgraph_get()) == []
+    previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
+    assert np.isfinite(session.strands).all() and previews.notice() == ""
 
 
 def test_an_override_has_settings_of_its_own_which_last(override, tmp_path):
@@ -80,7 +80,7 @@ def test_an_override_has_settings_of_its_own_which_last(override, tmp_path):
     hair.hairloom.debug_view = "guide"
     hair.data.hairloom.shading.ambient = 0.25
     assert plays(hair)
-    live.stop_all()
+    previews.stop_all()
     hair = saved_and_loaded(tmp_path)
     assert hair.override_library is not None and settings(hair) == (5.0, 0.25)
     assert hair.hairloom.debug_view == "guide" and not hair.hairloom.bake.is_shown
@@ -181,7 +181,7 @@ def test_keyframes_and_drivers_act_in_preview_and_engine(new_hair, sphere, evalu
     scene.collection.objects.link(source)
     keyed(hair.data, "hairloom.strands.width_scale", {1: 1.0, 5: 3.0})
     driven(hair.data, "hairloom.shading.ambient", source)
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     source.location.x = 0.75
     scene.frame_set(5)
     snapshot = overlay.drawing_of(session.uid).snapshot
@@ -202,7 +202,7 @@ def test_a_rendered_animation_has_the_settings_of_each_frame(
     driven(hair.data, "hairloom.shading.ambient", source)
     keyed(source, "location", {1: (0.0, 0.0, 0.0), 3: (1.0, 0.0, 0.0)})
     if is_previewed:
-        live.start(hair, evaluated())
+        previews.start(hair, evaluated())
     found, read = {}, engine_hair.read_groom
 
     def reading(*arguments, **named):
@@ -230,7 +230,7 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
     hair.hairloom.dynamics.gusts = 0.0
     hair.hairloom.dynamics.form = "numpy"
     hair.hairloom.dynamics.collider_resolution = 16
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     frames(scene, 6)
     still = session.strands
     path = "hairloom.dynamics.wind_speed"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.blender.bakes import playback
-from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake, bakeable, simulated_for
 from hairloom.addon.blender.scene.fin_modifier import POSITION, add_modifier
 
@@ -145,12 +145,12 @@ def test_a_fresh_process_renders_the_bake_of_a_saved_file(scene, tmp_path):
 def test_a_render_changes_nothing_of_what_the_viewport_shows(scene, evaluated):
     bpy.ops.hairloom.bake()
     hair = bpy.data.objects["Hair"]
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     scene.frame_set(4)
     before = session.strands
     bpy.ops.render.render()
     np.testing.assert_array_equal(session.strands, before)
-    assert live.sessions() == (session,) and scene.frame_current == 4
+    assert previews.sessions() == (session,) and scene.frame_current == 4
     assert not playback._is_rendering
 
 
@@ -267,7 +267,7 @@ def shown(flag):
 
 def test_a_baked_fin_equals_playback_and_plays_without_a_preview(fin, evaluated):
     assert bakeable(fin)
-    live.add(simulated_for(fin, evaluated()), evaluated())
+    previews.add(simulated_for(fin, evaluated()), evaluated())
     frames = range(1, LAST + 1)
     played = []
     for frame in frames:
@@ -275,7 +275,7 @@ def test_a_baked_fin_equals_playback_and_plays_without_a_preview(fin, evaluated)
         played.append(shown(fin))
     assert np.abs(played[-1] - played[0]).max() > 0.02
     list(Bake.of([fin], bpy.context.scene).steps())
-    live.stop_all()
+    previews.stop_all()
     for frame in (4, 2, 6, 1, 3, 5):
         bpy.context.scene.frame_set(frame)
         np.testing.assert_array_equal(shown(fin), played[frame - 1])

@@ -12,7 +12,7 @@ import pytest
 from mathutils import Matrix
 
 from hairloom.addon.blender.base.objects import layer_key
-from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.strands import StrandSet
@@ -22,7 +22,7 @@ from hairloom.addon.strands import StrandSet
 def preview(new_hair, sphere, evaluated):
     """Hair on a head, previewed: (hair, head, session)."""
     hair = new_hair(sphere)
-    return hair, sphere, live.start(hair, evaluated())
+    return hair, sphere, previews.start(hair, evaluated())
 
 
 def drawn(session):
@@ -35,7 +35,7 @@ def play(evaluated, frames, each=lambda frame: None):
     for frame in range(frames):
         each(frame)
         bpy.context.view_layer.update()
-        live.advance(evaluated(), 1.0 / 60.0)
+        previews.advance(evaluated(), 1.0 / 60.0)
 
 
 def update():
@@ -74,7 +74,7 @@ def test_hair_follows_a_deformed_head(preview):
 
 def test_without_a_surface_hair_follows_its_own_object(new_hair, evaluated):
     hair = new_hair()
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     assert "no surface" in session.source.warnings[0]
     before = drawn(session)
     hair.location = (1.0, 2.0, 3.0)
@@ -98,7 +98,7 @@ def test_guide_settings_act_once_edits_have_settled(preview, evaluated):
     hair, _, session = preview
     hair.data.hairloom.guides.guide_count = 7
     assert session.is_stale
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert len(session.rig.guides) == 7
 
 
@@ -120,15 +120,15 @@ def test_edited_curves_are_read_again_and_others_left_alone(preview, evaluated):
     hair, head, session = preview
     head.location.y = 0.25
     update()
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     rig = session.rig
     hair.data.update_tag()
     update()
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert session.rig is rig, "tagged but not changed"
     hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
     update()
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert session.rig is not rig
     assert drawn(session)[0, -1] == pytest.approx([0.0, 0.25, 0.5], abs=1e-5)
     assert drawn(session)[1, 0] == pytest.approx(
@@ -144,12 +144,12 @@ def test_rounding_far_from_the_origin_is_no_edit(preview, evaluated):
         update()
         hair.data.update_tag()
         update()
-        reactions.catch_up(evaluated())
+        scene_events.catch_up(evaluated())
         assert session.rig is rig
     hair.data.position_data[7].vector.x += 0.001
     hair.data.update_tag()
     update()
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert session.rig is not rig
 
 
@@ -160,8 +160,8 @@ def test_another_surface_begins_the_preview_anew(preview, evaluated):
     bpy.context.collection.objects.link(other)
     hair.data.surface = other
     update()
-    reactions.catch_up(evaluated())
-    (session,) = live.sessions()
+    scene_events.catch_up(evaluated())
+    (session,) = previews.sessions()
     assert session.head.handle.name == "Other"
     other.location.x = 1.0
     update()
@@ -184,7 +184,7 @@ def test_blenders_own_strands_are_hidden_in_the_evaluated_copy_only(preview, eva
     assert display(hair.evaluated_get(evaluated())) == shown
     hair.hairloom.hide_original = True
     assert display(hair.evaluated_get(evaluated())) == hidden
-    live.stop(session)
+    previews.stop(session)
     assert display(hair.evaluated_get(evaluated())) == shown
     assert display(hair) == shown
 
@@ -201,7 +201,7 @@ def test_blenders_own_strands_throw_no_shadow_where_ours_lies_on_the_head(previe
         hair.data.hairloom.volume.on_body = on_body
         assert hair.evaluated_get(evaluated()).visible_shadow is throws
     assert hair.visible_shadow
-    live.stop(session)
+    previews.stop(session)
     assert hair.evaluated_get(evaluated()).visible_shadow
 
 
@@ -209,10 +209,10 @@ def test_a_preview_adds_and_changes_no_data(new_hair, sphere, evaluated):
     new_hair(sphere)
     before = {data.name_full for data in bpy.data.user_map()}
     hair = bpy.data.objects["Hair"]
-    session = live.start(hair, evaluated())
-    live.play(evaluated())
+    session = previews.start(hair, evaluated())
+    previews.play(evaluated())
     play(evaluated, 2)
-    live.stop(session)
+    previews.stop(session)
     assert {data.name_full for data in bpy.data.user_map()} == before
 
 
@@ -273,11 +273,11 @@ def test_scene_lights_are_followed(preview):
 
 def test_two_grooms_on_one_head_go_separate_ways(new_hair, sphere, evaluated):
     one, two = new_hair(sphere), new_hair(sphere)
-    first, second = live.start(one, evaluated()), live.start(two, evaluated())
+    first, second = previews.start(one, evaluated()), previews.start(two, evaluated())
     two.data.hairloom.shading.ambient = 0.5
     assert overlay.drawing_of(first.uid).snapshot.shading.ambient == 1.0
-    live.stop(first)
-    assert live.sessions() == (second,)
+    previews.stop(first)
+    assert previews.sessions() == (second,)
     sphere.location.x = 1.0
     update()
     assert drawn(second)[:, 0].mean(axis=0)[0] == pytest.approx(1.0, abs=0.05)
@@ -297,9 +297,9 @@ def test_the_preview_button_toggles_and_reports_counts(new_hair, sphere, capfd):
     assert bpy.ops.hairloom.preview() == {"FINISHED"}
     told = capfd.readouterr().out
     assert "60 strands, 60 guides; dropped 2 (fewer than two points)" in told
-    assert live.session_of(hair) is not None
+    assert previews.session_of(hair) is not None
     assert bpy.ops.hairloom.preview() == {"FINISHED"}
-    assert live.session_of(hair) is None
+    assert previews.session_of(hair) is None
 
 
 def test_the_preview_button_reports_bad_input_without_a_traceback(new_hair, capfd):
@@ -307,4 +307,4 @@ def test_the_preview_button_reports_bad_input_without_a_traceback(new_hair, capf
     with pytest.raises(RuntimeError, match="Hair: "):
         bpy.ops.hairloom.preview()
     assert "Traceback" not in capfd.readouterr().err
-    assert live.session_of(hair) is None
+    assert previews.session_of(hair) is None

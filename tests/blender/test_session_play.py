@@ -4,14 +4,14 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.blender.preview import live, timeline
+from hairloom.addon.blender.preview import previews
 
 
 @pytest.fixture
 def preview(new_hair, sphere, evaluated):
     """Hair on a head, previewed: (hair, head, session)."""
     hair = new_hair(sphere)
-    return hair, sphere, live.start(hair, evaluated())
+    return hair, sphere, previews.start(hair, evaluated())
 
 
 def drawn(session):
@@ -24,13 +24,13 @@ def play(evaluated, frames, each=lambda frame: None):
     for frame in range(frames):
         each(frame)
         bpy.context.view_layer.update()
-        live.advance(evaluated(), 1.0 / 60.0)
+        previews.advance(evaluated(), 1.0 / 60.0)
 
 
 def test_playing_hair_lags_behind_and_returns_when_stopped(preview, evaluated):
     _, head, session = preview
     at_rest = drawn(session)
-    assert live.play(evaluated()) == []
+    assert previews.play(evaluated()) == []
 
     def push(frame):
         head.location.x = 0.02 * (frame + 1)
@@ -40,8 +40,8 @@ def test_playing_hair_lags_behind_and_returns_when_stopped(preview, evaluated):
     offset = drawn(session) - carried
     assert np.abs(offset[:, 0]).max() < 1e-5, "roots go with the head"
     assert offset[:, -1, 0].mean() < -0.005, "tips stay behind"
-    live.rest(evaluated(), keep_playing=False)
-    assert not live.is_playing()
+    previews.rest(evaluated(), keep_playing=False)
+    assert not previews.is_playing()
     assert drawn(session) == pytest.approx(carried, abs=2e-6)
 
 
@@ -49,19 +49,19 @@ def test_without_motion_gravity_alone_pulls_unheld_hair_down(preview, evaluated)
     hair, _, session = preview
     at_rest = drawn(session)
     hair.hairloom.dynamics.weight_held = 0.0
-    live.play(evaluated())
+    previews.play(evaluated())
     play(evaluated, 12)
     assert (drawn(session) - at_rest)[:, -1, 2].mean() < -0.001
-    live.rest(evaluated(), keep_playing=False)
+    previews.rest(evaluated(), keep_playing=False)
     bpy.context.scene.use_gravity = False
-    live.play(evaluated())
+    previews.play(evaluated())
     play(evaluated, 12)
     assert np.abs(drawn(session) - at_rest).max() < 1e-3
 
 
 def test_hair_stays_out_of_the_head_that_moves_into_it(preview, evaluated):
     _, head, session = preview
-    live.play(evaluated())
+    previews.play(evaluated())
     play(evaluated, 10, lambda frame: setattr(head.location, "z", 0.01 * (frame + 1)))
     distance = np.linalg.norm(drawn(session) - np.array(head.location), axis=2)
     assert distance[:, 2:].min() > 0.098
@@ -72,7 +72,7 @@ def test_a_chosen_collider_is_used_in_place_of_the_head(preview, evaluated):
     bpy.ops.mesh.primitive_cube_add(size=0.05, location=(0.0, 0.0, 1.0))
     cube = bpy.context.object
     hair.hairloom.collider = cube
-    assert live.play(evaluated()) == []
+    assert previews.play(evaluated()) == []
     (part,) = session.obstacles.parts
     assert part.carrier.body.handle.name == cube.name
     play(evaluated, 2, lambda frame: setattr(cube.location, "x", 0.1 * frame))
@@ -87,24 +87,24 @@ def field_of(session):
 def test_a_collider_is_made_once_and_again_only_when_it_differs(preview, evaluated):
     hair, head, session = preview
     hair.hairloom.dynamics.collider_resolution = 8
-    live.play(evaluated())
+    previews.play(evaluated())
     field = field_of(session)
     head.location.x = 1.0
-    live.play(evaluated())
+    previews.play(evaluated())
     assert field_of(session) is field
     hair.hairloom.dynamics.collider_resolution = 9
-    live.play(evaluated())
+    previews.play(evaluated())
     assert field_of(session) is not field
 
     bpy.ops.mesh.primitive_cube_add(size=0.05, location=(0.0, 0.0, 1.0))
     cube = hair.hairloom.collider = bpy.context.object
-    live.play(evaluated())
+    previews.play(evaluated())
     field = field_of(session)
     cube.rotation_euler.x = 1.0
-    live.play(evaluated())
+    previews.play(evaluated())
     assert field_of(session) is field
     cube.data.vertices[0].co.x += 0.1
-    live.play(evaluated())
+    previews.play(evaluated())
     assert field_of(session) is not field
 
 
@@ -113,12 +113,12 @@ def test_a_collider_that_cannot_be_used_is_a_warning_and_play_goes_on(preview, e
     points = bpy.data.objects.new("Points", bpy.data.meshes.new("Points"))
     bpy.context.collection.objects.link(points)
     hair.hairloom.collider = points
-    assert live.play(evaluated()) == []
+    assert previews.play(evaluated()) == []
     (warning,) = session.warnings
     assert "Points" in warning
-    assert live.is_playing()
+    assert previews.is_playing()
     play(evaluated, 2)
-    assert live.session_of(hair) is session
+    assert previews.session_of(hair) is session
 
 
 def test_hair_that_blender_simulates_is_not_simulated_twice(new_hair, sphere, evaluated):
@@ -126,24 +126,24 @@ def test_hair_that_blender_simulates_is_not_simulated_twice(new_hair, sphere, ev
     modifier = hair.modifiers.new("Swing", "NODES")
     modifier.node_group = bpy.data.node_groups.new("Hair Dynamics", "GeometryNodeTree")
     modifier.show_viewport = False
-    assert live.start(hair, evaluated()).warnings == ()
+    assert previews.start(hair, evaluated()).warnings == ()
     modifier.show_viewport = True
     tree = modifier.node_group
     for in_out in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
     source, result = (tree.nodes.new(f"NodeGroup{kind}") for kind in ("Input", "Output"))
     tree.links.new(source.outputs[0], result.inputs[0])
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     (warning,) = session.warnings
     assert "Swing" in warning and "Mute" in warning
-    (refusal,) = live.play(evaluated())
-    assert "Swing" in refusal and not live.is_playing()
+    (refusal,) = previews.play(evaluated())
+    assert "Swing" in refusal and not previews.is_playing()
     bpy.context.scene.frame_set(1)
     bpy.context.scene.frame_set(2)
-    assert not session.is_playing and "Swing" in timeline.trouble(session.uid)
+    assert not session.is_playing and "Swing" in previews.previews[session.uid].problems
 
     assert bpy.ops.hairloom.mute_hair_dynamics() == {"FINISHED"}
     assert not modifier.show_viewport and not modifier.show_render
     assert not bpy.ops.hairloom.mute_hair_dynamics.poll()
     assert session.warnings == ()
-    assert live.play(evaluated()) == [] and live.is_playing()
+    assert previews.play(evaluated()) == [] and previews.is_playing()

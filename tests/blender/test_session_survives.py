@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.blender.preview import live, previewed, reactions
+from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.errors import HairloomError
 
@@ -13,7 +13,7 @@ from hairloom.addon.errors import HairloomError
 def preview(new_hair, sphere, evaluated):
     """Hair on a head, previewed: (hair, head, session)."""
     hair = new_hair(sphere)
-    return hair, sphere, live.start(hair, evaluated())
+    return hair, sphere, previews.start(hair, evaluated())
 
 
 def drawn(session):
@@ -35,8 +35,8 @@ def test_a_defect_ends_the_preview_and_is_told_once(preview, monkeypatch, capfd)
     for x in (1.0, 2.0):
         head.location.x = x
         update()
-    assert live.sessions() == ()
-    assert "a defect" in live.notice()
+    assert previews.sessions() == ()
+    assert "a defect" in previews.notice()
     assert capfd.readouterr().err.count("Traceback") == 1
 
 
@@ -44,13 +44,13 @@ def test_curves_may_become_fewer_and_none(preview, evaluated):
     hair, _, session = preview
     hair.data.remove_curves(indices=list(range(50)))
     update()
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert drawn(session).shape[0] == 10
     hair.data.remove_curves()
     update()
-    reactions.catch_up(evaluated())
-    assert live.sessions() == ()
-    assert "Hair" in live.notice()
+    scene_events.catch_up(evaluated())
+    assert previews.sessions() == ()
+    assert "Hair" in previews.notice()
     assert overlay.drawing_of(session.uid) is None
 
 
@@ -67,23 +67,23 @@ def test_renaming_is_no_matter(preview):
 def test_a_deleted_object_ends_the_preview_with_a_notice(which, preview):
     bpy.data.objects.remove(bpy.data.objects[which])
     update()
-    assert live.sessions() == ()
-    assert which in live.notice() and "gone" in live.notice()
+    assert previews.sessions() == ()
+    assert which in previews.notice() and "gone" in previews.notice()
 
 
 def test_a_head_with_other_vertices_ends_the_preview_with_a_notice(preview):
     _, head, _ = preview
     head.modifiers.new("Smooth", "SUBSURF").levels = 1
     update()
-    assert live.sessions() == ()
-    assert "vertices" in live.notice()
+    assert previews.sessions() == ()
+    assert "vertices" in previews.notice()
 
 
 def test_undo_and_redo_of_a_moved_head_and_edited_hair(new_hair, sphere, evaluated):
     bpy.context.preferences.edit.use_global_undo = True
     hair = new_hair(sphere)
     bpy.ops.ed.undo_push(message="begin")
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     begin = drawn(session)
     sphere.location.x = 1.0
     hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
@@ -91,13 +91,13 @@ def test_undo_and_redo_of_a_moved_head_and_edited_hair(new_hair, sphere, evaluat
     bpy.ops.ed.undo_push(message="change")
 
     bpy.ops.ed.undo()
-    reactions.catch_up(evaluated())
-    assert live.sessions() == (session,)
+    scene_events.catch_up(evaluated())
+    assert previews.sessions() == (session,)
     assert drawn(session) == pytest.approx(begin, abs=1e-6)
     assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 1.0
 
     bpy.ops.ed.redo()
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert drawn(session)[0, -1] == pytest.approx([1.0, 0.0, 0.5], abs=1e-5)
     assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 0.125
 
@@ -107,9 +107,9 @@ def test_loading_a_file_drops_all_previews_and_keeps_the_settings(preview, tmp_p
     hair.data.hairloom.shading.ambient = 0.125
     file = str(tmp_path / "hair.blend")
     bpy.ops.wm.save_as_mainfile(filepath=file)
-    assert live.sessions() == (session,)
+    assert previews.sessions() == (session,)
     bpy.ops.wm.open_mainfile(filepath=file)
-    assert live.sessions() == ()
+    assert previews.sessions() == ()
     assert overlay.drawing_of(session.uid) is None
     assert bpy.data.objects["Hair"].data.hairloom.shading.ambient == 0.125
 
@@ -122,7 +122,7 @@ def test_another_scene_in_the_window_does_not_end_the_preview(preview):
     update()
     bpy.context.scene.objects["Thing"].location.x = 1.0
     update()
-    assert live.sessions() == (session,)
+    assert previews.sessions() == (session,)
     assert not overlay.drawing_of(session.uid).is_visible
     window.scene = scene
     head.location.x = 1.0
@@ -137,7 +137,7 @@ def test_sculpting_shows_blenders_own_strands(preview, evaluated):
     hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
     update()
     assert hair.evaluated_get(evaluated()).display_type == "TEXTURED"
-    reactions.catch_up(evaluated())
+    scene_events.catch_up(evaluated())
     assert drawn(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
     bpy.ops.object.mode_set(mode="OBJECT")
     update()
@@ -154,7 +154,7 @@ def test_a_final_render_does_not_disturb_the_preview(preview):
     before = drawn(session)
     bpy.ops.render.render()
     assert drawn(session) == pytest.approx(before, abs=1e-7)
-    assert live.sessions() == (session,)
+    assert previews.sessions() == (session,)
 
 
 @pytest.mark.parametrize("groom", ["none", "one point each"])
@@ -164,16 +164,16 @@ def test_hair_that_cannot_be_used_is_refused_with_a_remedy(groom, new_hair, eval
     if groom != "none":
         hair.data.add_curves([1, 1, 1])
     with pytest.raises(HairloomError) as raised:
-        live.start(hair, evaluated())
+        previews.start(hair, evaluated())
     assert raised.value.place == "Hair" and raised.value.remedy
-    assert live.sessions() == ()
+    assert previews.sessions() == ()
 
 
 def test_a_groom_of_another_scale_is_refused(new_hair, sphere, evaluated):
     hair = new_hair(sphere)
     hair.scale = (100.0, 100.0, 100.0)
     with pytest.raises(HairloomError, match="scale"):
-        live.start(hair, evaluated())
+        previews.start(hair, evaluated())
 
 
 def test_a_head_without_faces_or_uvs_is_a_warning(new_hair, sphere, evaluated):
@@ -181,11 +181,11 @@ def test_a_head_without_faces_or_uvs_is_a_warning(new_hair, sphere, evaluated):
     while sphere.data.uv_layers:
         sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
     sphere.data.update()
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     assert "Unwrap" in session.source.warnings[0]
-    live.stop(session)
+    previews.stop(session)
     sphere.data.clear_geometry()
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     assert "no faces" in session.source.warnings[0]
     assert session.rig.head is None
 
@@ -194,12 +194,12 @@ def test_a_moment_without_a_gpu_is_waited_for(preview, evaluated, monkeypatch):
     """Blender has no context from a window's closing to the next redraw."""
     _, _, session = preview
     done = []
-    monkeypatch.setattr(previewed, "is_interrupted", lambda: True)
-    live.attempt(session, evaluated(), done.append)
-    assert done == [] and live.sessions() == (session,) and session.is_stale
-    monkeypatch.setattr(previewed, "is_interrupted", lambda: False)
-    assert not bpy.app.timers.is_registered(reactions._read_again)
+    monkeypatch.setattr(previews, "is_interrupted", lambda: True)
+    previews.attempt(previews.previews[session.uid], evaluated(), lambda: done.append(session))
+    assert done == [] and previews.sessions() == (session,) and session.is_stale
+    monkeypatch.setattr(previews, "is_interrupted", lambda: False)
+    assert not bpy.app.timers.is_registered(scene_events._read_again)
     update()
-    assert bpy.app.timers.is_registered(reactions._read_again), "nobody looks again"
-    reactions.catch_up(evaluated())
-    assert not session.is_stale and live.notice() == ""
+    assert bpy.app.timers.is_registered(scene_events._read_again), "nobody looks again"
+    scene_events.catch_up(evaluated())
+    assert not session.is_stale and previews.notice() == ""

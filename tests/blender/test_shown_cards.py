@@ -9,7 +9,7 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 
 from hairloom.addon.blender.base import latest_job  # noqa: E402
 from hairloom.addon.blender.engine.engine_hair import read_groom  # noqa: E402
-from hairloom.addon.blender.preview import live, reactions  # noqa: E402
+from hairloom.addon.blender.preview import previews, scene_events  # noqa: E402
 from hairloom.addon.blender.viewport import overlay  # noqa: E402
 
 pytestmark = pytest.mark.draws
@@ -22,9 +22,9 @@ def preview(new_hair, sphere, evaluated):
     hair.data.hairloom.cards.way = "guides"
     hair.data.hairloom.card_occlusion.rays = 4
     hair.data.hairloom.card_drawing.shown_as = "cards"
-    session = live.start(hair, evaluated())
+    session = previews.start(hair, evaluated())
     yield hair, sphere, session
-    live.stop_all()
+    previews.stop_all()
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_cards_go_with_the_head(preview, evaluated):
     head.location.x = 0.5
     head.rotation_euler.z = 1.0
     bpy.context.view_layer.update()
-    reactions.updated(evaluated())
+    scene_events.updated(evaluated())
     after = drawn(session).cards.mesh
     turn = np.array(head.matrix_world)
     expected = before.positions @ turn[:3, :3].T + turn[:3, 3]
@@ -96,7 +96,8 @@ def test_cards_swing_with_their_guides(preview, evaluated):
     head.location.x = 0.1
     bpy.context.view_layer.update()
     for _ in range(5):
-        live.attempt(session, evaluated(), lambda each: each.advance(evaluated(), 0.04))
+        session.advance(evaluated(), 0.04)
+        previews.publish(previews.previews[session.uid], evaluated())
     after = drawn(session).cards
     assert after.mesh.triangles is before.mesh.triangles
     moved = after.mesh.positions - before.mesh.positions
@@ -110,8 +111,8 @@ def test_undo_brings_strands_back(preview, evaluated):
     hair, _, session = preview
     hair.data.hairloom.card_drawing.shown_as = "strands"
     hair.data.hairloom.card_drawing.shown_as = "cards"
-    reactions.undone()
-    reactions.catch_up(evaluated())
+    scene_events.undone()
+    scene_events.catch_up(evaluated())
     assert drawn(session).cards is not None
 
 
@@ -202,8 +203,8 @@ def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_win
     position.data.foreach_set("vector", places * 1.1)
     hair.data.update_tag()
     bpy.context.view_layer.update()
-    reactions.updated(evaluated())
-    reactions.catch_up(evaluated())
+    scene_events.updated(evaluated())
+    scene_events.catch_up(evaluated())
     while session.is_pending:
         latest_job.take_steps()
     assert session.cards.is_pending

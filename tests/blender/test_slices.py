@@ -15,7 +15,7 @@ import bpy
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.pictures.skin_picture import IMAGE as SKIN_IMAGE
 from hairloom.addon.blender.pictures.slices import IMAGE, shown_image, shown_slices
-from hairloom.addon.blender.preview import live
+from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.shading.volume.settings import VolumeSettings
@@ -109,14 +109,14 @@ def test_the_skin_shadow_of_previewed_hair(new_hair: Any, sphere: Any) -> None:
         assert pixels[is_skin][:, 0].min() < 0.5 < 0.99 < pixels[is_skin][:, 0].max()
         hair.data.hairloom.skin.soft_shadow = False
         bpy.context.view_layer.update()
-        session = live.session_of(hair)
+        session = previews.session_of(hair)
         assert session is not None
         session.take_settings()
         with pytest.raises(RuntimeError, match="Soft Shadow on Skin"):
             bpy.ops.hairloom.show_skin_shadow()
     finally:
         bpy.ops.hairloom.preview()
-    assert live.session_of(hair) is None
+    assert previews.session_of(hair) is None
 
 
 def views() -> list[Any]:

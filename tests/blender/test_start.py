@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.blender.preview import live, reactions
+from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import particle_hair
 from hairloom.addon.blender.scene.curves import read_curves
@@ -35,7 +35,7 @@ def test_a_groom_is_grown_dressed_previewed_and_active(sphere):
     assert hair.data.hairloom.shading.base_color[:] == pytest.approx(look.base_color)
     assert hair.hairloom.dynamics.wind_speed == pytest.approx(motion.wind_speed)
     assert motion.wind_speed > 0.0, "nothing moves in still air"
-    (session,) = live.sessions()
+    (session,) = previews.sessions()
     assert session.rig.strands.strand_count == 150 and session.warnings == ()
 
 
@@ -88,11 +88,11 @@ def swing_of_new_hair(size):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.5 * size)
     bpy.ops.hairloom.add_groom("EXEC_DEFAULT", strand_count=60)
-    (session,) = live.sessions()
-    live.play(bpy.context.evaluated_depsgraph_get())
+    (session,) = previews.sessions()
+    previews.play(bpy.context.evaluated_depsgraph_get())
     at_first = session.strands.copy()
     for _ in range(12):
-        live.advance(bpy.context.evaluated_depsgraph_get(), 1.0 / 24.0)
+        previews.advance(bpy.context.evaluated_depsgraph_get(), 1.0 / 24.0)
     length = bpy.context.object.dimensions.z
     return np.linalg.norm(session.strands - at_first, axis=-1).max() / length
 
@@ -107,10 +107,10 @@ def test_hair_swings_in_a_breeze_whatever_the_size_of_its_mesh():
 def test_undo_takes_the_groom_and_its_preview_away(sphere):
     bpy.ops.ed.undo_push(message="before")
     bpy.ops.hairloom.add_groom("EXEC_DEFAULT", True, **FEW)
-    assert len(live.sessions()) == 1
+    assert len(previews.sessions()) == 1
     bpy.ops.ed.undo()
     assert [obj.type for obj in bpy.data.objects] == ["MESH"]
-    assert live.sessions() == () and live.notice() == ""
+    assert previews.sessions() == () and previews.notice() == ""
 
 
 def test_the_sample_scene_is_a_scene_of_its_own_that_moves():
@@ -121,7 +121,7 @@ def test_the_sample_scene_is_a_scene_of_its_own_that_moves():
     assert scene != before and [obj.name for obj in before.objects] == ["Cube"]
     assert scene.render.engine == "HAIRLOOM" and scene.camera is not None
     assert sum(obj.type == "LIGHT" for obj in scene.objects) == 3
-    (session,) = live.sessions()
+    (session,) = previews.sessions()
     assert session.warnings == () and session.head is not None
     first = session.strands
     for frame in range(1, 10):
@@ -139,7 +139,7 @@ def test_the_camera_of_the_sample_sees_all_of_its_hair():
     from mathutils import Vector
 
     bpy.ops.hairloom.sample_scene()
-    scene, (session,) = bpy.context.scene, live.sessions()
+    scene, (session,) = bpy.context.scene, previews.sessions()
     places = session.strands.reshape(-1, 3)[::97]
     seen = np.array([world_to_camera_view(scene, scene.camera, Vector(p)) for p in places])
     assert (seen[:, :2] > 0.0).all() and (seen[:, :2] < 1.0).all() and (seen[:, 2] > 0.0).all()
@@ -154,7 +154,7 @@ def test_empty_hair_of_blenders_gets_hair_a_look_and_a_preview(sphere):
     assert bpy.ops.hairloom.use_groom() == {"FINISHED"}
     hair = bpy.data.objects[name]
     assert len(hair.data.curves) > 1000 and hair.data.surface == sphere
-    assert not own_dynamics(hair) and len(live.sessions()) == 1
+    assert not own_dynamics(hair) and len(previews.sessions()) == 1
     blond = named_preset(preferences(bpy.context).look).settings
     assert hair.data.hairloom.shading.base_color[:] == pytest.approx(blond.base_color)
     assert len(bpy.data.hair_curves) == 1, "the empty curves are left"
@@ -198,18 +198,18 @@ def test_hair_of_a_scene_that_is_not_shown_waits_for_it():
     """Its head is not evaluated there: no vertex count fits, which is nobody's fault."""
     own = bpy.context.scene
     bpy.ops.hairloom.sample_scene()
-    sample, (session,) = bpy.context.scene, live.sessions()
+    sample, (session,) = bpy.context.scene, previews.sessions()
     assert overlay.drawing_of(session.uid).is_visible
     bpy.context.window.scene = own
     bpy.ops.mesh.primitive_cube_add()
     own.frame_set(3)
     bpy.context.view_layer.update()
-    assert live.sessions() == (session,) and live.notice() == ""
+    assert previews.sessions() == (session,) and previews.notice() == ""
     assert not overlay.drawing_of(session.uid).is_visible
     bpy.context.window.scene = sample
     sample.frame_set(2)
-    reactions.catch_up(bpy.context.evaluated_depsgraph_get())
-    assert live.sessions() == (session,) and not session.is_stale
+    scene_events.catch_up(bpy.context.evaluated_depsgraph_get())
+    assert previews.sessions() == (session,) and not session.is_stale
     assert overlay.drawing_of(session.uid).is_visible
 
 

@@ -9,7 +9,7 @@ from mathutils import Matrix
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.base.pace import MOST_AT_ONCE, Pace
-from hairloom.addon.blender.preview import live, timeline
+from hairloom.addon.blender.preview import previews
 
 LAST = 10
 
@@ -26,7 +26,7 @@ def swinging(new_hair, sphere, evaluated):
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.dynamics.form = "numpy"
     scene.frame_set(5)
-    return hair, sphere, live.start(hair, evaluated())
+    return hair, sphere, previews.start(hair, evaluated())
 
 
 def go(*frames):
@@ -133,39 +133,39 @@ def test_free_play_is_shaken_by_dragging_and_handed_over_to_playback(
 ):
     _, _, session = swinging
     go(1)
-    live.play(evaluated())
-    assert live.is_playing()
+    previews.play(evaluated())
+    assert previews.is_playing()
     go(4)
-    live.advance(evaluated(), 1 / 24)
-    assert live.is_playing() and lag(session) > 0.005
+    previews.advance(evaluated(), 1 / 24)
+    assert previews.is_playing() and lag(session) > 0.005
     monkeypatch.setattr(playback, "is_played", lambda: True)
     go(5)
-    assert not live.is_playing() and session.is_playing
+    assert not previews.is_playing() and session.is_playing
     assert lag(session) > 0.005, "it goes on from where it was"
-    live.play(evaluated())
-    assert live.is_playing() and lag(session) < 1e-5
+    previews.play(evaluated())
+    assert previews.is_playing() and lag(session) < 1e-5
 
 
 def test_paused_hair_holds_and_goes_on(swinging, evaluated):
     _, head, session = swinging
     head.animation_data_clear()
-    live.play(evaluated())
-    assert not bpy.ops.hairloom.pause.poll() or live.is_playing()
+    previews.play(evaluated())
+    assert not bpy.ops.hairloom.pause.poll() or previews.is_playing()
     head.location.x += 0.1
     bpy.context.view_layer.update()
-    live.advance(evaluated(), 1 / 24)
+    previews.advance(evaluated(), 1 / 24)
     held = session.strands
     assert bpy.ops.hairloom.pause() == {"FINISHED"}
-    live.advance(evaluated(), 1 / 24)
+    previews.advance(evaluated(), 1 / 24)
     np.testing.assert_array_equal(session.strands, held)
-    assert live.is_paused()
+    assert previews.is_paused()
     assert bpy.ops.hairloom.pause() == {"FINISHED"}
-    live.advance(evaluated(), 1 / 24)
+    previews.advance(evaluated(), 1 / 24)
     assert np.abs(session.strands - held).max() > 1e-4
     assert bpy.ops.hairloom.reset() == {"FINISHED"}
-    assert lag(session) < 1e-5 and live.is_playing()
-    live.rest(evaluated(), keep_playing=False)
-    assert not live.is_playing() and not bpy.ops.hairloom.pause.poll()
+    assert lag(session) < 1e-5 and previews.is_playing()
+    previews.rest(evaluated(), keep_playing=False)
+    assert not previews.is_playing() and not bpy.ops.hairloom.pause.poll()
 
 
 def test_another_form_in_the_middle_goes_on_from_where_the_hair_is(swinging):
@@ -196,12 +196,12 @@ def test_a_head_of_no_size_or_turned_inside_out_gives_no_nonsense(scale, swingin
     head.scale = (scale, scale, scale)
     bpy.context.view_layer.update()
     go(3, 4, 5)
-    assert live.session_of(hair) is session, live.notice()
+    assert previews.session_of(hair) is session, previews.notice()
     assert np.isfinite(session.strands).all()
-    assert scale or "scale is zero" in timeline.trouble(session.uid)
+    assert scale or "scale is zero" in previews.previews[session.uid].problems
     head.scale = (1.0, 1.0, 1.0)
     go(1, 2)
-    assert lag(session) < 0.05 and timeline.trouble(session.uid) == ""
+    assert lag(session) < 0.05 and previews.previews[session.uid].problems == ""
 
 
 @pytest.mark.parametrize("what", ["a vertex", "the object"])
@@ -210,7 +210,7 @@ def test_what_is_not_a_number_ends_the_preview_with_a_reason(what, when, swingin
     hair, head, _ = swinging
     go(1, 2)
     if when == "while it plays freely":
-        live.play(evaluated())
+        previews.play(evaluated())
     curves = np.array([point.position for point in hair.data.points])
     if what == "a vertex":
         head.data.vertices[7].co.x = math.nan
@@ -219,9 +219,9 @@ def test_what_is_not_a_number_ends_the_preview_with_a_reason(what, when, swingin
         head.matrix_world = Matrix(((math.nan,) * 4,) * 4)
     head.data.update()
     go(3)
-    live.advance(evaluated(), 1 / 24)
-    assert live.sessions() == ()
-    assert "Head" in live.notice() and "not a finite number" in live.notice()
+    previews.advance(evaluated(), 1 / 24)
+    assert previews.sessions() == ()
+    assert "Head" in previews.notice() and "not a finite number" in previews.notice()
     np.testing.assert_array_equal(curves, [point.position for point in hair.data.points])
 
 
@@ -231,24 +231,6 @@ def test_a_driver_that_gives_no_number_is_no_matter(swinging):
     head.driver_add("location", 1).driver.expression = "float('nan')"
     go(1, 2, 3, 4)
     assert lag(session) > 0.005
-
-
-@pytest.mark.parametrize(
-    ("before", "now", "is_played", "frames"),
-    [
-        (None, 7, False, None),
-        (6, 7, False, 1),
-        (7, 7, False, 0),
-        (5, 7, False, None),
-        (5, 7, True, 2),
-        (9, 7, True, None),
-        (9, 1, True, None),
-        (0, 1, False, None),
-        (7, 40, True, None),
-    ],
-)
-def test_what_a_frame_change_means(before, now, is_played, frames):
-    assert timeline.move(before, now, 1, is_played, 24.0) == frames
 
 
 def test_play_keeps_the_scenes_rate_and_drops_what_it_cannot_make_up_for():

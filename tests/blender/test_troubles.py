@@ -4,17 +4,17 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.blender.preview import live, troubles
+from hairloom.addon.blender.preview import diagnostics, previews
 from hairloom.addon.blender.scene.curves import read_curves
 
 
 def told(hair):
-    return [each.operator for each in troubles.troubles_of(hair, live.session_of(hair))]
+    return [each.operator for each in diagnostics.issues_of(hair, previews.session_of(hair))]
 
 
 def mend(hair):
     """Press the one button there is."""
-    (trouble,) = troubles.troubles_of(hair, live.session_of(hair))
+    (trouble,) = diagnostics.issues_of(hair, previews.session_of(hair))
     group, name = trouble.operator.split(".")
     assert getattr(getattr(bpy.ops, group), name)() == {"FINISHED"}
 
@@ -24,8 +24,8 @@ def read(hair):
 
 
 def preview(hair):
-    live.stop_all()
-    return live.start(hair, bpy.context.evaluated_depsgraph_get())
+    previews.stop_all()
+    return previews.start(hair, bpy.context.evaluated_depsgraph_get())
 
 
 def test_good_hair_has_none(new_hair, sphere):
@@ -41,7 +41,7 @@ def test_a_surface_is_set_and_the_hair_stays_where_it_is(new_hair, sphere):
     hair.location = (0.0, 0.0, 0.01)
     bpy.context.view_layer.update()
     before = read(hair).points
-    (trouble,) = troubles.troubles_of(hair, preview(hair))
+    (trouble,) = diagnostics.issues_of(hair, preview(hair))
     assert trouble.instead_of.startswith("Hair: it has no surface")
     mend(hair)
     bpy.context.view_layer.update()
@@ -57,7 +57,7 @@ def test_of_many_curves_some_are_asked(new_hair, sphere):
     hair = new_hair()
     hair.data.add_curves([3] * 500)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    assert troubles.surface_for(hair, [sphere], depsgraph) == sphere
+    assert diagnostics.surface_for(hair, [sphere], depsgraph) == sphere
     assert curves.read_curves(hair, depsgraph).strands.strand_count == 60, "the rest has no length"
 
 
@@ -83,7 +83,7 @@ def test_roots_in_the_air_are_counted_and_snapped(new_hair, sphere):
     points[: 20 * 8] *= 1.4  # twenty strands begin 4 cm above the sphere
     hair.data.position_data.foreach_set("vector", points.ravel())
     preview(hair)
-    (trouble,) = troubles.troubles_of(hair, live.session_of(hair))
+    (trouble,) = diagnostics.issues_of(hair, previews.session_of(hair))
     assert trouble.text.startswith("20 roots are not on Head")
     mend(hair)
     roots = np.linalg.norm(read(hair).roots, axis=1)
@@ -142,7 +142,7 @@ def test_blenders_dynamics_are_muted(sphere, extension):
 
 def test_instances_that_the_preview_leaves_out_are_told(new_hair, sphere):
     hair = new_hair(sphere)
-    assert troubles.instances_note(hair) == ""
+    assert diagnostics.instances_note(hair) == ""
     outer, inner = bpy.data.collections.new("Outer"), bpy.data.collections.new("Inner")
     outer.children.link(inner)
     inner.objects.link(sphere)  # an instance of the head alone is no matter
@@ -150,13 +150,13 @@ def test_instances_that_the_preview_leaves_out_are_told(new_hair, sphere):
     bpy.context.collection.objects.link(twin)
     twin.instance_type, twin.instance_collection = "COLLECTION", outer
     bpy.context.view_layer.update()
-    assert troubles.instances_note(hair) == ""
+    assert diagnostics.instances_note(hair) == ""
     inner.objects.link(hair)
     bpy.context.view_layer.update()
-    assert "no hair in the preview" in troubles.instances_note(hair)
+    assert "no hair in the preview" in diagnostics.instances_note(hair)
     twin.instance_type = "NONE"
     bpy.context.view_layer.update()
-    assert troubles.instances_note(hair) == ""
+    assert diagnostics.instances_note(hair) == ""
 
 
 @pytest.mark.parametrize("what", ["object", "collection"])
@@ -169,17 +169,17 @@ def test_instances_by_geometry_nodes_are_told_too(what, new_hair, sphere):
     bpy.context.collection.objects.link(many)
     info = instancing(many, what)
     bpy.context.view_layer.update()
-    assert troubles.instances_note(hair) == "", "they are of nothing"
+    assert diagnostics.instances_note(hair) == "", "they are of nothing"
     if what == "object":
         info.inputs["Object"].default_value = hair
     else:
         collection.objects.link(hair)
         info.inputs["Collection"].default_value = collection
     bpy.context.view_layer.update()
-    assert "no hair in the preview" in troubles.instances_note(hair)
+    assert "no hair in the preview" in diagnostics.instances_note(hair)
     many.hide_viewport = True
     bpy.context.view_layer.update()
-    assert troubles.instances_note(hair) == ""
+    assert diagnostics.instances_note(hair) == ""
 
 
 def instancing(obj, what):

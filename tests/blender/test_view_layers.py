@@ -3,8 +3,8 @@
 import bpy
 import pytest
 
-from hairloom.addon.blender.preview import live, reactions
-from hairloom.addon.blender.viewport import layers_shown
+from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.viewport import overlay
 
 
 @pytest.fixture
@@ -14,7 +14,7 @@ def layers(new_hair, sphere):
     found = [bpy.context.view_layer, bpy.context.scene.view_layers.new("Too")]
     update(found)
     yield found
-    reactions.clear()
+    scene_events.clear()
 
 
 def update(layers):
@@ -28,27 +28,27 @@ def displays(layers):
 
 
 def test_blenders_strands_go_and_come_in_every_view_layer(layers):
-    live.start(bpy.data.objects["Hair"], layers[0].depsgraph)
+    previews.start(bpy.data.objects["Hair"], layers[0].depsgraph)
     update(layers)
     assert displays(layers) == ["BOUNDS", "BOUNDS"]
-    live.stop_all()
+    previews.stop_all()
     assert displays(layers) == ["TEXTURED", "TEXTURED"]
 
 
 def test_a_layer_that_a_window_changes_to_is_evaluated(layers):
-    timer, window = layers_shown._evaluate, bpy.context.window_manager.windows[0]
-    layers_shown.forget()
-    layers_shown.look()
+    timer, window = overlay._evaluate, bpy.context.window_manager.windows[0]
+    overlay.forget_layers()
+    overlay.look_at_layers()
     assert bpy.app.timers.is_registered(timer)
     bpy.app.timers.unregister(timer)
-    layers_shown.look()
+    overlay.look_at_layers()
     assert not bpy.app.timers.is_registered(timer), "nothing is new"
     for layer in (layers[1], layers[0]):
         window.view_layer = layer
-        layers_shown.look()
+        overlay.look_at_layers()
         assert bpy.app.timers.is_registered(timer)
         bpy.app.timers.unregister(timer)
-    live.start(bpy.data.objects["Hair"], layers[0].depsgraph)
+    previews.start(bpy.data.objects["Hair"], layers[0].depsgraph)
     update(layers)
     layers[1].depsgraph.update()
     bpy.data.objects["Hair"].evaluated_get(layers[1].depsgraph).display_type = "TEXTURED"
@@ -56,6 +56,6 @@ def test_a_layer_that_a_window_changes_to_is_evaluated(layers):
     update(layers)
     assert displays(layers) == ["BOUNDS", "BOUNDS"]
     window.view_layer = layers[1]
-    layers_shown.look()
-    layers_shown.forget()
+    overlay.look_at_layers()
+    overlay.forget_layers()
     assert not bpy.app.timers.is_registered(timer), "a timer is left"

@@ -180,8 +180,8 @@ def test_a_transform_that_cannot_be_read_is_told_and_not_tried_again(
     scene.view_settings.view_transform = "AgX"
     assert display_of(shading(), scene) is None
     view_transform._make_wanted()
-    assert "no space left" in view_transform.trouble()
+    assert "no space left" in view_transform.problem()
     assert display_of(shading(), scene) is None
-    assert not view_transform._wanted
+    assert not view_transform._known.wanted
     view_transform.prepare()
-    assert view_transform.trouble() == ""
+    assert view_transform.problem() == ""

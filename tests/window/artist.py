@@ -161,7 +161,7 @@ def at_rest(label: str, look: Callable[[], np.ndarray], count: int = 3) -> Itera
 
 def hair_is_made() -> Iterator[int]:
     """Ticks until the hair of all previews is there: it is made in a thread."""
-    live = of_hairloom("live")
+    live = of_hairloom("previews")
     yield from until(lambda: all(each.is_made for each in live.sessions()), "no hair is made")
 
 

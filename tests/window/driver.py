@@ -30,18 +30,18 @@ EXTENSION = "bl_ext.user_default.hairloom"
 #: Where in the extension what sessions look at is. Each module is named here and nowhere else.
 MODULES = {
     "card_object": "blender.cards.object",
+    "diagnostics": "blender.preview.diagnostics",
     "engine": "blender.engine.engine",
     "export_check": "ui.operators_export_check",
     "fin_modifier": "blender.scene.fin_modifier",
     "groom_file": "exchange.groom",
     "hair_file": "exchange.hair_file",
-    "live": "blender.preview.live",
     "long_work": "ui.long_work",
-    "measures": "blender.sessions.measures",
     "overlay": "blender.viewport.overlay",
     "pipeline": "pipeline",
     "playback": "blender.bakes.playback",
     "preferences": "ui.preferences",
+    "previews": "blender.preview.previews",
     "presets": "blender.properties.presets",
     "preview_operators": "ui.operators_preview",
     "registration": "registration",
@@ -50,9 +50,7 @@ MODULES = {
     "strands": "strands",
     "suspension": "blender.base.suspension",
     "tables": "shading.marschner.tables",
-    "timeline": "blender.preview.timeline",
     "tressfx": "exchange.tressfx",
-    "troubles": "blender.preview.troubles",
     "view_transform": "blender.viewport.view_transform",
 }
 

@@ -66,8 +66,8 @@ def set_the_scene():
 
 
 def has_drawn():
-    passes = of_hairloom("overlay")._passes
-    return any(each.statistics.strands > 0 for each in passes.values())
+    overlay = of_hairloom("overlay")
+    return any(overlay.statistics_of(uid).strands > 0 for uid in overlay.drawn())
 
 
 def hair_shades_the_head():

@@ -36,7 +36,7 @@ failures: list[str] = []
 
 
 def live():
-    return of_hairloom("live")
+    return of_hairloom("previews")
 
 
 def session():

@@ -80,7 +80,7 @@ def nothing_selected():
     yield from click(*sidebar_button("hairloom.preview"))
     yield
     driver.screenshot("nothing-selected")
-    assert of_hairloom("live").sessions() == ()
+    assert of_hairloom("previews").sessions() == ()
 
 
 def set_the_scene():
@@ -120,7 +120,7 @@ def every_panel_draws():
         each.__name__ for each in of_hairloom("registration").CLASSES if "_PT_" in each.__name__
     } - drawn
     assert not missing, f"never drawn: {missing}"
-    (session,) = of_hairloom("live").sessions()
+    (session,) = of_hairloom("previews").sessions()
     assert session.source.dropped == {"fewer than two points": 3}
 
 
@@ -190,7 +190,7 @@ def what_acts_on_it():
 
 def duplicates_by_keys():
     """Shift-D and Alt-D while hair plays: it plays on, Blender shows the copy, Ctrl-Z takes it."""
-    live, hair = of_hairloom("live"), bpy.data.objects["Hair"]
+    live, hair = of_hairloom("previews"), bpy.data.objects["Hair"]
     choose(hair)
     bpy.ops.ed.undo_push(message="the scene")
     yield from click(*sidebar_button("hairloom.play"))
@@ -214,7 +214,7 @@ def duplicates_by_keys():
 
 
 def still_plays(where):
-    live = of_hairloom("live")
+    live = of_hairloom("previews")
     assert len(live.sessions()) == 1 and live.notice() == "", f"{where}: {live.notice()}"
     before = live.sessions()[0].strands
 
@@ -239,7 +239,7 @@ def choose(obj):
 
 def blenders_own_animation():
     """Space bar: hair that is not to be simulated goes with the head, drawn at every frame."""
-    live, head = of_hairloom("live"), bpy.data.objects["Head"]
+    live, head = of_hairloom("previews"), bpy.data.objects["Head"]
     bpy.data.objects["Hair"].hairloom.bake.follows = False
     for frame, x in ((1, 0.0), (40, 0.2)):
         head.location.x = x
@@ -259,7 +259,7 @@ def blenders_own_animation():
 
 def hair_without_a_surface():
     """A warning in the panel, no more."""
-    live = of_hairloom("live")
+    live = of_hairloom("previews")
     hair = bpy.data.objects["Hair"]
     live.stop_all()
     hair.data.surface, hair.parent = None, None
@@ -291,12 +291,12 @@ def a_failing_shader_is_told_once():
     assert len(calls) == 1, f"it was tried {len(calls)} times"
     hair = bpy.data.objects["Hair"].evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert hair.display_type == "TEXTURED", "neither our strands nor Blender's are to be seen"
-    assert "this GPU refuses" in of_hairloom("live").notice()
+    assert "this GPU refuses" in of_hairloom("previews").notice()
     strand_pass.draw = draw
     for _ in range(2):  # off and on again
         yield from click(*sidebar_button("hairloom.preview"))
         yield
-    assert overlay.failure() == "" and of_hairloom("live").notice() == ""
+    assert overlay.failure() == "" and of_hairloom("previews").notice() == ""
     driver.screenshot("drawn-again")
 
 

@@ -36,7 +36,7 @@ FILE = str(Path(bpy.app.tempdir) / "first_light.blend")
 
 
 def live():
-    return of_hairloom("live")
+    return of_hairloom("previews")
 
 
 def overlay():

@@ -29,7 +29,7 @@ from driver import of_hairloom, until
 
 
 def live():
-    return of_hairloom("live")
+    return of_hairloom("previews")
 
 
 def in_view():
@@ -110,7 +110,7 @@ def hair_on_a_mesh_of_ones_own():
     yield from until(lambda: np.abs(session.strands - at_first).max() > 1.0e-3, "nothing moves")
     grown = yield from picture("own-mesh")
     assert changed(bare, grown) > 0.02, "no hair is seen"
-    line = of_hairloom("measures").frame_line(session.uid)
+    line = session.times.line
     assert "simulation" in line and "drawing" in line, line
 
 
@@ -165,7 +165,7 @@ def a_warning_mends():
     yield from until(
         lambda: live().sessions() and live().sessions()[0].head is not None, "it has no head yet"
     )
-    troubles = of_hairloom("troubles").troubles_of(hair, live().sessions()[0])
+    troubles = of_hairloom("diagnostics").issues_of(hair, live().sessions()[0])
     driver.screenshot("mended")
     assert [trouble.operator for trouble in troubles] in ([], ["hairloom.snap_roots"])
 

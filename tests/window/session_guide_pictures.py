@@ -144,7 +144,7 @@ def sidebar():
 
 def the_sidebar():
     yield from picture("preview", sidebar)
-    live = of_hairloom("live")
+    live = of_hairloom("previews")
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
     live.stop_all()
     hair.data.surface, hair.parent = None, None
@@ -180,7 +180,7 @@ def choose(obj):
 
 def popups():
     """The presets, the check before an export, and the options of sorting cards."""
-    of_hairloom("live").stop_all()
+    of_hairloom("previews").stop_all()
     yield from popup("sort", "sort_cards")
     choose(bpy.data.objects["Hair"])
     yield from popup("presets", "choose_preset", section="shading")
@@ -266,7 +266,7 @@ def at_the_tab():
 
 def options_of_files():
     """The right of the file browser, format by format; those of strands beside each other."""
-    of_hairloom("live").stop_all()
+    of_hairloom("previews").stop_all()
     pictures = {}
     for name in (*EXPORTS, "import_strands"):
         settings = {"filepath": str(Path(bpy.app.tempdir) / "hair")} if name in EXPORTS else {}

@@ -36,7 +36,7 @@ NO_LIGHT = 0.0
 
 
 def session():
-    (one,) = of_hairloom("live").sessions()
+    (one,) = of_hairloom("previews").sessions()
     return one
 
 
@@ -99,7 +99,7 @@ def steps():
     yield from own_presets()
     yield from the_panels_of_both_models()
     assert of_hairloom("overlay").failure() == ""
-    assert of_hairloom("view_transform").trouble() == ""
+    assert of_hairloom("view_transform").problem() == ""
 
 
 def set_the_scene():

@@ -34,7 +34,7 @@ DRAGGED = 45
 
 
 def live():
-    return of_hairloom("live")
+    return of_hairloom("previews")
 
 
 def steps():

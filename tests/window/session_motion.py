@@ -26,7 +26,7 @@ FOLDER = Path(bpy.app.tempdir) / "bake"
 
 
 def session():
-    (one,) = of_hairloom("live").sessions()
+    (one,) = of_hairloom("previews").sessions()
     return one
 
 
@@ -79,7 +79,7 @@ def play_keeps_the_scenes_rate():
 
 
 def pause_resume_and_reset():
-    live, head = of_hairloom("live"), bpy.data.objects["Head"]
+    live, head = of_hairloom("previews"), bpy.data.objects["Head"]
     yield from click(*sidebar_button("hairloom.pause"))
     yield from until(live.is_paused, "it is not paused")
     held = session().strands
@@ -98,7 +98,7 @@ def pause_resume_and_reset():
 
 def playback_takes_over():
     """Space while hair plays: from now on each frame of the animation moves it."""
-    live = of_hairloom("live")
+    live = of_hairloom("previews")
     head, scene = bpy.data.objects["Head"], bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
     for frame, x in ((1, 0.0), (10, 0.1), (20, -0.1), (LAST, 0.0)):
@@ -142,8 +142,8 @@ def bake_in_the_window():
     assert scene.frame_current == 7
     cache = of_hairloom("playback").cache_of(bpy.data.objects["Hair"])
     assert cache.facts.frame_count == LAST
-    baked = of_hairloom("timeline").baked(session().uid)
-    assert baked.is_shown and baked.changed == (), baked
+    preview = of_hairloom("previews").previews[session().uid]
+    assert preview.phase.name == "BAKED" and preview.bake.changed == (), preview.bake
     driver.screenshot("baked")
     bpy.ops.screen.animation_play()
     yield from until(lambda: scene.frame_current not in (7, LAST), "Blender does not play")
@@ -190,7 +190,7 @@ def a_render_beside_the_window():
     cache = of_hairloom("playback").cache_of(hair)
     strands = of_hairloom("playback").strands_in(cache, 15)
     assert np.array_equal(points, strands.reshape(-1, 3))
-    assert len(of_hairloom("live").sessions()) == 1
+    assert len(of_hairloom("previews").sessions()) == 1
     driver.screenshot("rendered")
 
 
@@ -202,7 +202,7 @@ def loading_in_the_middle_of_a_bake():
     bpy.ops.wm.read_homefile(use_factory_startup=False)
     yield
     assert not is_baking() and not of_hairloom("suspension").is_suspended()
-    assert of_hairloom("live").sessions() == ()
+    assert of_hairloom("previews").sessions() == ()
     assert not FOLDER.with_name("bake.new").exists()
     assert (FOLDER / "cache.json").is_file()
 

@@ -28,18 +28,17 @@ GUIDES, CHILDREN = 300, 2000
 
 
 def session():
-    (one,) = of_hairloom("live").sessions()
+    (one,) = of_hairloom("previews").sessions()
     return one
 
 
 def statistics():
     """Of the last draw in the viewport."""
-    return of_hairloom("overlay")._passes[session().uid].statistics
+    return of_hairloom("overlay").statistics_of(session().uid)
 
 
 def has_drawn_some():
-    passes = of_hairloom("overlay")._passes
-    return session().uid in passes and statistics().strands > 0
+    return statistics().strands > 0
 
 
 def draws_all():
@@ -175,7 +174,7 @@ def far_and_near():
 
 
 def sliders_while_it_plays():
-    live, head = of_hairloom("live"), bpy.data.objects["Head"]
+    live, head = of_hairloom("previews"), bpy.data.objects["Head"]
     yield from click(*sidebar_button("hairloom.play"))
     yield from until(live.is_playing, "the Play button did nothing")
     children = hair().data.hairloom.children
@@ -207,7 +206,7 @@ def two_grooms():
     twin = bpy.data.objects.new("Twin", hair().data)
     bpy.context.collection.objects.link(twin)
     twin.hairloom.show_counts = True
-    live = of_hairloom("live")
+    live = of_hairloom("previews")
     live.start(twin, bpy.context.evaluated_depsgraph_get())
     look_from_front(1.2)
     yield from hair_is_made()
@@ -216,7 +215,7 @@ def two_grooms():
     assert len(live.sessions()) == 2
     live.stop_all()
     yield
-    assert of_hairloom("overlay")._handles == ()
+    assert of_hairloom("overlay")._overlay.handles == ()
 
 
 driver.play(steps())

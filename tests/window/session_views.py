@@ -149,7 +149,7 @@ def hair_pixels(found, shown, without):
 
 def instances_are_told():
     """An instance of the groom's collection has its head alone, and the panel says so."""
-    scene, note = bpy.context.scene, of_hairloom("troubles").instances_note
+    scene, note = bpy.context.scene, of_hairloom("diagnostics").instances_note
     twin = bpy.data.objects.new("Twin", None)
     twin.instance_type, twin.instance_collection = "COLLECTION", bpy.data.collections["Groom"]
     twin.location.x = 0.25

@@ -71,8 +71,8 @@ def of_gpu() -> Counter[str]:
 def of_previews() -> dict[str, Any]:
     """What only a preview, Play or long work keeps; all empty when nothing of them goes on."""
     return {
-        "previews": [each.name for each in of_hairloom("live").simulated()],
-        "draw handlers": of_hairloom("overlay")._handles,
+        "previews": [each.name for each in of_hairloom("previews").simulated()],
+        "draw handlers": of_hairloom("overlay")._overlay.handles,
         "drawn": sorted(of_hairloom("overlay").drawn()),
         "ticks": of_hairloom("preview_operators")._timer,
         "work": of_hairloom("long_work").running(),

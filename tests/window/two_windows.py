@@ -30,7 +30,7 @@ def set_the_scene():
 
 
 def live():
-    return of_hairloom("live")
+    return of_hairloom("previews")
 
 
 def hair():

@@ -12,7 +12,7 @@ from ...arrays import Floats
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ..cards.textures import chosen_pictures
-from ..preview import live
+from ..preview import previews
 from ..properties.groom_settings import GroomSettings
 from ..sessions.reading import Reading
 from ..sessions.session import Session
@@ -39,10 +39,10 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
     Raises:
         HairloomError: no hair that can be used, or of another scale than the head.
     """
-    session = live.session_of(hair)
+    session = previews.session_of(hair)
     if session is not None:
-        live.finish(session, depsgraph)
-        session = live.session_of(hair)
+        previews.finish(session, depsgraph)
+        session = previews.session_of(hair)
     if isinstance(session, Session):
         studio = _studio(hair, session.rig, session.settings)
         return ShownGroom(studio, session.solver.pose, session.strands, studio.warnings)

@@ -25,7 +25,7 @@ from ..scene.fin_modifier import clear, fin_modifier
 from ..scene.source import wanted_density
 from ..sessions.fins import FinSession
 from ..sessions.session import Session
-from . import live
+from . import previews
 
 
 @dataclass
@@ -187,7 +187,7 @@ class Bake:
         for part in self.parts:
             obj = part.handle.find()
             if obj is not None:
-                live.bake_changed(obj, depsgraph)
+                previews.bake_changed(obj, depsgraph)
 
 
 def simulated_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simulated:
@@ -196,7 +196,7 @@ def simulated_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simu
     Raises:
         HairloomError: it cannot be simulated.
     """
-    known = live.simulated_of(obj)
+    known = previews.simulated_of(obj)
     if known is None and obj.type == "MESH":
         return FinSession(obj, depsgraph)
     if known is None:
@@ -253,4 +253,4 @@ def free(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         clear(obj.data)
     if is_shared:
         obj.hairloom.bake.folder = ""
-    live.bake_changed(obj, depsgraph)
+    previews.bake_changed(obj, depsgraph)

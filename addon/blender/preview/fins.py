@@ -6,7 +6,7 @@ import bpy
 
 from ...errors import HairloomError
 from ..sessions.fins import FinSession, fins_in
-from . import live
+from . import previews
 
 
 def start(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> FinSession:
@@ -16,7 +16,7 @@ def start(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> FinSession:
         HairloomError: it is no fin, or cannot be cloth.
     """
     session = FinSession(obj, depsgraph)
-    live.add(session, depsgraph)
+    previews.add(session, depsgraph)
     return session
 
 
@@ -24,7 +24,7 @@ def start_enabled(depsgraph: bpy.types.Depsgraph) -> list[str]:
     """Preview all fins of the view layer that are to be simulated; returns warnings."""
     warnings = []
     for obj in fins_in(bpy.context.view_layer):
-        if obj.hairloom.fin.enabled and live.simulated_of(obj) is None:
+        if obj.hairloom.fin.enabled and previews.simulated_of(obj) is None:
             try:
                 start(obj, depsgraph)
             except HairloomError as error:

@@ -1,4 +1,4 @@
-"""Blender's events, handed on to the live grooms."""
+"""Blender's events, handed on to the previews."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from bpy.app.handlers import persistent
 from ..bakes import playback
 from ..base import suspension
 from ..properties import changed, library_overrides
-from . import live, reactions
-
-_is_reacting = False
+from . import previews as registry
+from . import scene_events
+from .previews import previews
 
 
 @persistent
 def on_load_pre(*_: Any) -> None:
-    live.forget_all()
+    registry.forget_all()
 
 
 @persistent
 def on_load_post(*_: Any) -> None:
-    live.forget_all()
+    registry.forget_all()
 
 
 @persistent
@@ -33,17 +33,17 @@ def on_save_pre(*_: Any) -> None:
 
 @persistent
 def on_undo_post(*_: Any) -> None:
-    reactions.undone()
+    scene_events.undone()
 
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    _react(reactions.updated, depsgraph)
+    _react(scene_events.updated, depsgraph)
 
 
 @persistent
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    _react(reactions.frame_changed, depsgraph)
+    _react(scene_events.frame_changed, depsgraph)
 
 
 @persistent
@@ -68,16 +68,15 @@ def on_render_end(*_: Any) -> None:
 
 def _react(reaction: Callable[[bpy.types.Depsgraph], None], depsgraph: bpy.types.Depsgraph) -> None:
     """Once at a time, and not for a render, which has its own copy of the scene and its thread."""
-    global _is_reacting
-    if _is_reacting or suspension.is_suspended() or not live.simulated():
+    if previews.is_reacting or suspension.is_suspended() or not previews:
         return
     if depsgraph.mode != "VIEWPORT":
         return
-    _is_reacting = True
+    previews.is_reacting = True
     try:
         reaction(depsgraph)
     finally:
-        _is_reacting = False
+        previews.is_reacting = False
 
 
 HANDLERS = (
@@ -97,13 +96,13 @@ HANDLERS = (
 
 def on_bake_changed(owner: bpy.types.ID) -> None:
     if not suspension.is_suspended():
-        live.bake_changed(owner, bpy.context.evaluated_depsgraph_get())
+        registry.bake_changed(owner, bpy.context.evaluated_depsgraph_get())
 
 
 #: properties that the artist changes, and what follows
 LISTENERS = (
-    ("settings", reactions.settings_changed),
-    ("display", reactions.display_changed),
+    ("settings", scene_events.settings_changed),
+    ("display", scene_events.display_changed),
     ("bake", on_bake_changed),
 )
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -28,6 +29,9 @@ from .hiders import Hiders
 
 #: Strands of the placeholder of a groom that is being made.
 _FEW = 32
+#: Roots farther from their surface than this part of its diagonal are not on it; those of grooms
+#: that fit lie within half of it.
+_LOOSE = 0.02
 #: Heads of more triangles take longer to search than an artist waits.
 _LARGE = 4000
 
@@ -74,6 +78,17 @@ class Made:
     rank: Floats | None = None
     hiders: Hiders | None = None
     is_whole: bool = True
+
+    @cached_property
+    def loose_roots(self) -> int:
+        """How many roots are too far from the surface to be on it."""
+        rig = self.rig
+        if rig.head is None or rig.rest_frames is None:
+            return 0
+        low, high = rig.head.bounds()
+        reach = _LOOSE * float(np.linalg.norm(high - low))
+        away = np.linalg.norm(rig.strands.roots - rig.rest_frames.origin, axis=1)
+        return int((away > reach).sum())
 
 
 def rig_of(order: Order) -> Rig:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import defaultdict, deque
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
@@ -12,37 +12,40 @@ from typing import Any
 
 import numpy as np
 
-#: What is told is the median of so many frames, and only of what is not older than this [s].
+#: What is reported is the median of so many frames, and only of what is not older than this [s].
 _KEPT, _LATEST = 15, 10.0
 
 #: of a frame
 PARTS = ("simulation", "drawing")
 
-_times: defaultdict[tuple[int, str], deque[tuple[float, float]]] = defaultdict(
-    lambda: deque(maxlen=_KEPT)
-)
 
+class FrameTimes:
+    """How long the parts of the last frames of one groom took."""
 
-@contextmanager
-def measured(uid: int, part: str) -> Iterator[None]:
-    """Time what runs inside, as a part of this groom's frame; of a GPU's work only its handing
-    over counts."""
-    begin = time.perf_counter()
-    yield
-    end = time.perf_counter()
-    _times[uid, part].append((end, end - begin))
+    def __init__(self) -> None:
+        self._times = {part: deque[tuple[float, float]](maxlen=_KEPT) for part in PARTS}
 
+    @contextmanager
+    def measured(self, part: str) -> Iterator[None]:
+        """Time what runs inside, as a part of a frame; of a GPU's work only its handing over
+        counts."""
+        begin = time.perf_counter()
+        yield
+        end = time.perf_counter()
+        self._times[part].append((end, end - begin))
 
-def milliseconds(uid: int, part: str) -> float | None:
-    """The median of the last frames; None where there were none lately."""
-    now = time.perf_counter()
-    recent = [spent for when, spent in _times.get((uid, part), ()) if now - when < _LATEST]
-    return 1000.0 * median(recent) if recent else None
+    def milliseconds(self, part: str) -> float | None:
+        """The median of the last frames; None where there were none lately."""
+        now = time.perf_counter()
+        recent = [spent for when, spent in self._times[part] if now - when < _LATEST]
+        return 1000.0 * median(recent) if recent else None
 
-
-def forget(uid: int) -> None:
-    for key in [key for key in _times if key[0] == uid]:
-        del _times[key]
+    @property
+    def line(self) -> str:
+        """Such as "simulation 4.1 ms   drawing 12.3 ms"; empty where nothing was measured
+        lately."""
+        parts = ((part, self.milliseconds(part)) for part in PARTS)
+        return "   ".join(f"{part} {spent:.1f} ms" for part, spent in parts if spent is not None)
 
 
 def array_bytes(*things: Any) -> int:
@@ -63,9 +66,3 @@ def _collect(thing: Any, seen: dict[int, int]) -> None:
             _collect(each, seen)
     elif is_dataclass(thing) and not isinstance(thing, type):
         _collect(tuple(getattr(thing, field.name) for field in fields(thing)), seen)
-
-
-def frame_line(uid: int) -> str:
-    """Such as "simulation 4.1 ms   drawing 12.3 ms"; empty where nothing was measured lately."""
-    parts = ((part, milliseconds(uid, part)) for part in PARTS)
-    return "   ".join(f"{part} {spent:.1f} ms" for part, spent in parts if spent is not None)

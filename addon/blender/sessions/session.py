@@ -24,7 +24,7 @@ from ..scene.wind import gravity_of, scene_wind
 from .groom import Groom
 from .groom_picture import GroomPicture
 from .making import Made, make
-from .measures import measured
+from .measures import FrameTimes
 from .solvers import Solver, computed_on, form_of, solver_of
 
 
@@ -46,6 +46,7 @@ class Session(Groom):
     ) -> None:
         tell = partial(arrived, self)
         super().__init__(hair, depsgraph, baked, is_drawn=is_drawn, blocking=blocking, arrived=tell)
+        self.times = FrameTimes()
         self.obstacles: Obstacles | None = None
         self.is_playing = False
         self.is_stale = False
@@ -259,7 +260,7 @@ class Session(Groom):
         Raises:
             HairloomError: as `rest`.
         """
-        with measured(self.uid, "simulation"):
+        with self.times.measured("simulation"):
             pose = self._pose(depsgraph)
             self.solver.advance(
                 pose,

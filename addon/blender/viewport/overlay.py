@@ -1,13 +1,14 @@
 """Strands in the 3D viewport, and their counts: drawn for all grooms, from snapshots only.
 
-Drawing never reads a data-block: all it asks Blender for is which view is being drawn.
+`read_drawing` reads what is drawn of a groom, and in which views: as Blender shows it and its head.
+Drawing itself never reads a data-block: all it asks Blender for is which view is being drawn.
 """
 
 from __future__ import annotations
 
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import bpy
@@ -22,13 +23,15 @@ from ...render.scene_pass import ONE_AT_A_TIME
 from ...render.snapshot import Snapshot
 from ...render.strand_pass import Statistics, StrandPass
 from ...shading.lights import Light, three_point_lights
-from ..base.lines import Lines, draw_lines
-from ..base.objects import LayerKey, layer_key
+from ..base.objects import LayerKey, is_solid, layer_key, layers_with, spaces_without
 from ..base.redraw import redraw_panels, redraw_views
+from ..cards.show import as_shown, without_strands
 from ..scene.lights import uses_scene_light
-from ..sessions.measures import forget, frame_line, measured
+from ..sessions.measures import FrameTimes
+from ..sessions.session import Session
 from ..sessions.shown import with_all_strands
-from . import layers_shown, view_transform
+from . import view_transform
+from .debug_lines import Lines, debug_lines_of, draw_lines
 from .overlay_text import card_counts_line, counts_line, write_lines
 
 
@@ -43,7 +46,8 @@ class Drawing:
     card_counts: cards, triangles and vertices where it is shown as cards.
     counts_of: the name under which its counts are written; empty: they are not.
     note: what else is written, with overlays or without.
-    aids: lines of what acts on it.
+    lines: of what acts on it.
+    times: of its frames.
     """
 
     snapshot: Snapshot
@@ -56,30 +60,88 @@ class Drawing:
     card_counts: tuple[int, ...] = ()
     counts_of: str = ""
     note: str = ""
-    aids: tuple[Lines, ...] = ()
+    lines: tuple[Lines, ...] = ()
+    times: FrameTimes = field(default_factory=FrameTimes)
 
 
 #: by which Blender knows our render engine
 ENGINE = "HAIRLOOM"
-_drawings: dict[int, Drawing] = {}
-_passes: dict[int, StrandPass] = {}
-_card_passes: dict[int, CardPass] = {}
-_shadows: dict[int, BodyShadow] = {}
-_handles: tuple[Any, ...] = ()
-_failure = ""
+
+
+@dataclass(eq=False)
+class Drawn:
+    """One groom that is drawn, and what draws it; without GPU until the first draw."""
+
+    drawing: Drawing
+    strand_pass: StrandPass = field(default_factory=StrandPass)
+    card_pass: CardPass = field(default_factory=CardPass)
+    shadow: BodyShadow = field(default_factory=BodyShadow)
+
+
+class _Overlay:
+    """All that is drawn.
+
+    drawn: by session number of the hair. handles: of the draw handlers, while there are any.
+    failure: why it has stopped drawing; empty while all is well.
+    layers: the view layers that windows showed when a view was drawn last.
+    """
+
+    def __init__(self) -> None:
+        self.drawn: dict[int, Drawn] = {}
+        self.handles: tuple[Any, ...] = ()
+        self.failure = ""
+        self.layers: frozenset[LayerKey] = frozenset()
+
+
+_overlay = _Overlay()
+
+
+def read_drawing(
+    session: Session, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, note: str = ""
+) -> Drawing:
+    """What is drawn of this groom now.
+
+    Args:
+        note: is written into the views.
+    """
+    snapshot, head = as_shown(session.snapshot), None
+    if not session.is_made:
+        snapshot = without_strands(snapshot)
+    if session.head is not None:
+        head = session.head.handle.find()
+    if head is None or not is_solid(head):
+        snapshot = with_all_strands(snapshot)
+    seen_in = layers_with(hair)
+    return Drawing(
+        snapshot,
+        is_visible=bool(seen_in),
+        is_made=session.is_made,
+        seen_in=seen_in,
+        hidden_in=spaces_without(hair),
+        bare_in=frozenset() if head is None else spaces_without(head),
+        guide_count=len(session.rig.guides),
+        card_counts=session.cards.counts if snapshot.cards is not None else (),
+        counts_of=hair.name if hair.hairloom.show_counts or snapshot.debug_view != "none" else "",
+        note=note,
+        lines=debug_lines_of(session, hair, depsgraph),
+        times=session.times,
+    )
 
 
 def show(uid: int, drawing: Drawing) -> None:
     """Draw this groom from now on, in place of what was drawn for it before."""
-    global _handles
-    _drawings[uid] = drawing
-    if not _handles and not _failure and not bpy.app.background:
+    known = _overlay.drawn.get(uid)
+    if known is None:
+        _overlay.drawn[uid] = Drawn(drawing)
+    else:
+        known.drawing = drawing
+    if not _overlay.handles and not _overlay.failure and not bpy.app.background:
         add = bpy.types.SpaceView3D.draw_handler_add
-        _handles = tuple(
+        _overlay.handles = tuple(
             add(_draw, (draw,), "WINDOW", kind)
             for draw, kind in (
                 (_draw_strands, "POST_VIEW"),
-                (_draw_aids, "POST_VIEW"),
+                (_draw_debug_lines, "POST_VIEW"),
                 (_draw_counts, "POST_PIXEL"),
             )
         )
@@ -89,43 +151,45 @@ def show(uid: int, drawing: Drawing) -> None:
 
 def hide(uid: int) -> None:
     """Not to be seen until it is shown again."""
-    drawing = _drawings.get(uid)
+    drawing = drawing_of(uid)
     if drawing is not None and drawing.is_visible:
         show(uid, replace(drawing, is_visible=False))
 
 
 def drop(uid: int) -> None:
     """No longer draw this groom; with the last one the draw handlers go."""
-    _drawings.pop(uid, None)
-    _passes.pop(uid, None)
-    _card_passes.pop(uid, None)
-    _shadows.pop(uid, None)
-    forget(uid)
-    if not _drawings:
+    _overlay.drawn.pop(uid, None)
+    if not _overlay.drawn:
         _remove_handlers()
     redraw_views()
 
 
+def drawn_of(uid: int) -> Drawn | None:
+    """A groom that is drawn, with its passes."""
+    return _overlay.drawn.get(uid)
+
+
 def drawing_of(uid: int) -> Drawing | None:
-    return _drawings.get(uid)
+    """What is drawn of a groom."""
+    drawn = _overlay.drawn.get(uid)
+    return None if drawn is None else drawn.drawing
 
 
 def failure() -> str:
     """Why the overlay has stopped drawing; empty while all is well."""
-    return _failure
+    return _overlay.failure
 
 
 def retry() -> None:
     """Draw again after a failure."""
-    global _failure
-    if _failure:
-        _failure = ""
+    if _overlay.failure:
+        _overlay.failure = ""
         bpy.context.workspace.status_text_set(None)
 
 
 def _draw(what: Callable[[Any], None]) -> None:
     """Called by Blender for each 3D view; an error is told once, not at every redraw."""
-    if _failure or is_rendered_by_us(bpy.context):
+    if _overlay.failure or is_rendered_by_us(bpy.context):
         return
     try:
         what(bpy.context)
@@ -134,38 +198,40 @@ def _draw(what: Callable[[Any], None]) -> None:
 
 
 def _draw_strands(context: Any) -> None:
-    layers_shown.look()
+    look_at_layers()
     space, view = context.space_data, context.region_data
     camera = Camera(np.array(view.view_matrix), np.array(view.window_matrix))
     address, studio = space.as_pointer(), three_point_lights(camera.view)
     display = view_transform.display_of(space.shading, context.scene)
     for uid, drawing in shown_in(context):
-        snapshot = drawing.snapshot
+        snapshot, drawn = drawing.snapshot, _overlay.drawn[uid]
         if is_seen_through(space.shading) or address in drawing.bare_in:
             snapshot = with_all_strands(snapshot)
         snapshot = lit(snapshot, space.shading, studio)
         shades_body = _shades_body(snapshot, space) and address not in drawing.bare_in
         # colours that stand for numbers are no light
         shown_by = display if snapshot.debug_view == "none" else None
-        with ONE_AT_A_TIME, measured(uid, "drawing"):
-            _draw_groom(uid, snapshot, camera, shown_by, shades_body=shades_body)
+        with ONE_AT_A_TIME, drawing.times.measured("drawing"):
+            _draw_groom(drawn, snapshot, camera, shown_by, shades_body=shades_body)
 
 
 def _draw_groom(
-    uid: int, snapshot: Snapshot, camera: Camera, display: Display | None, *, shades_body: bool
+    drawn: Drawn,
+    snapshot: Snapshot,
+    camera: Camera,
+    display: Display | None,
+    *,
+    shades_body: bool,
 ) -> None:
     """Into the view that is being drawn."""
     _, _, width, height = gpu.state.viewport_get()
-    strand_pass = _passes.setdefault(uid, StrandPass())
-    card_pass = _card_passes.setdefault(uid, CardPass())
-    maps = None
+    strand_pass, card_pass, maps = drawn.strand_pass, drawn.card_pass, None
     if snapshot.cards is not None:
         maps = card_pass.opacity(snapshot)
     if shades_body:
         maps = maps or strand_pass.opacity(snapshot)
         if maps is not None:
-            shadow = _shadows.setdefault(uid, BodyShadow())
-            shadow.draw(snapshot, maps, camera, width, height, display=display)
+            drawn.shadow.draw(snapshot, maps, camera, width, height, display=display)
     strand_pass.draw(snapshot, camera, width, height, output="viewport", display=display)
     card_pass.draw(
         snapshot,
@@ -178,11 +244,11 @@ def _draw_groom(
     )
 
 
-def _draw_aids(context: Any) -> None:
+def _draw_debug_lines(context: Any) -> None:
     """Through all that is in front of them, as Blender's own gizmos are."""
     if context.space_data.overlay.show_overlays:
         for _, drawing in shown_in(context):
-            for lines in drawing.aids:
+            for lines in drawing.lines:
                 draw_lines(lines.points, lines.color)
 
 
@@ -193,34 +259,35 @@ def _draw_counts(context: Any) -> None:
         write_lines(context, notes)
         return
     lines = [
-        "   ".join(filter(None, (_counts_of(drawing, strand_pass), frame_line(uid))))
+        "   ".join(filter(None, (_counts_of(_overlay.drawn[uid]), drawing.times.line)))
         for uid, drawing in shown_in(context)
-        if drawing.counts_of and (strand_pass := _passes.get(uid)) is not None
+        if drawing.counts_of
     ]
     write_lines(context, lines + notes)
 
 
-def _counts_of(drawing: Drawing, strand_pass: StrandPass) -> str:
+def _counts_of(drawn: Drawn) -> str:
+    drawing = drawn.drawing
     if drawing.card_counts:
         return card_counts_line(drawing.counts_of, drawing.guide_count, drawing.card_counts)
-    strand_count, drawn_now = drawing.snapshot.strand_count, strand_pass.statistics
+    strand_count, drawn_now = drawing.snapshot.strand_count, drawn.strand_pass.statistics
     return counts_line(drawing.counts_of, drawing.guide_count, strand_count, drawn_now)
 
 
 def statistics_of(uid: int) -> Statistics:
     """What was drawn of a groom in the last view; nothing before the first."""
-    strand_pass = _passes.get(uid)
-    return Statistics() if strand_pass is None else strand_pass.statistics
+    drawn = _overlay.drawn.get(uid)
+    return Statistics() if drawn is None else drawn.strand_pass.statistics
 
 
 def drawn() -> frozenset[int]:
     """Session numbers of the grooms that are drawn here, not by Blender."""
-    return frozenset(uid for uid, drawing in _drawings.items() if drawing.is_made)
+    return frozenset(uid for uid, each in _overlay.drawn.items() if each.drawing.is_made)
 
 
 def expected() -> frozenset[int]:
     """Session numbers of the grooms that are drawn here as soon as they are made."""
-    return frozenset(_drawings) - drawn()
+    return frozenset(_overlay.drawn) - drawn()
 
 
 def is_rendered_by_us(context: Any) -> bool:
@@ -235,7 +302,7 @@ def shown_in(context: Any) -> list[tuple[int, Drawing]]:
     layer = layer_key(context.scene, context.view_layer)
     return [
         (uid, drawing)
-        for uid, drawing in _drawings.items()
+        for uid, drawing in ((uid, each.drawing) for uid, each in _overlay.drawn.items())
         if drawing.is_visible
         and address not in drawing.hidden_in
         and (drawing.seen_in is None or layer in drawing.seen_in)
@@ -267,9 +334,8 @@ def lit(snapshot: Snapshot, shading: Any, studio: tuple[Light, ...]) -> Snapshot
 
 
 def _fail(error: Exception) -> None:
-    global _failure
-    _failure = f"Hairloom cannot draw here: {error}"
-    print(_failure)
+    _overlay.failure = f"Hairloom cannot draw here: {error}"
+    print(_overlay.failure)
     traceback.print_exc()
     bpy.app.timers.register(_tell_failure, first_interval=0.0)
 
@@ -277,14 +343,39 @@ def _fail(error: Exception) -> None:
 def _tell_failure() -> None:
     """Outside of drawing, where the handler may be removed and the window be told."""
     _remove_handlers()
-    bpy.context.workspace.status_text_set(_failure.splitlines()[0])
+    bpy.context.workspace.status_text_set(_overlay.failure.splitlines()[0])
     bpy.context.scene.update_tag()  # Blender's own strands are to be seen again
     redraw_panels()
 
 
 def _remove_handlers() -> None:
-    global _handles
-    for handle in _handles:
+    for handle in _overlay.handles:
         bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
-    _handles = ()
-    layers_shown.forget()
+    _overlay.handles = ()
+    forget_layers()
+
+
+def forget_layers() -> None:
+    """No view of ours is drawn any more."""
+    _overlay.layers = frozenset()
+    if bpy.app.timers.is_registered(_evaluate):
+        bpy.app.timers.unregister(_evaluate)
+
+
+def look_at_layers() -> None:
+    """While a view is drawn: a view layer that is new in any window is evaluated after it.
+
+    Each view layer has evaluated copies of its own, and nobody is told when a window begins to
+    show one: our strands are drawn there at once, but Blender's are among them until it evaluates
+    something.
+    """
+    windows = bpy.context.window_manager.windows
+    now = frozenset(layer_key(each.scene, each.view_layer) for each in windows)
+    if now - _overlay.layers and not bpy.app.timers.is_registered(_evaluate):
+        bpy.app.timers.register(_evaluate, first_interval=0.0)
+    _overlay.layers = now
+
+
+def _evaluate() -> None:
+    for scene in {window.scene for window in bpy.context.window_manager.windows}:
+        scene.update_tag()

@@ -54,9 +54,17 @@ class View:
     exposure: float = 0.0
 
 
-_tables: OrderedDict[View, DisplayTable] = OrderedDict()
-_wanted: dict[View, None] = {}
-_failed: dict[View, str] = {}
+class _Known:
+    """What Blender has been asked for: tables, the last used at the end; views that wait for
+    theirs, in order; and why a view cannot have one."""
+
+    def __init__(self) -> None:
+        self.tables: OrderedDict[View, DisplayTable] = OrderedDict()
+        self.wanted: dict[View, None] = {}
+        self.failed: dict[View, str] = {}
+
+
+_known = _Known()
 
 
 def display_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> Display | None:
@@ -69,13 +77,17 @@ def display_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> Disp
     view, gain, gamma = view_of(shading, scene)
     if (view, gain, gamma) == (View(), 1.0, 1.0):
         return None
-    if view in _failed:
+    if view in _known.failed:
         return None
-    if view in _tables:
-        _tables.move_to_end(view)
+    if view in _known.tables:
+        _known.tables.move_to_end(view)
     else:
         _want(view)
-    return Display(_tables[next(reversed(_tables))], gain, gamma) if _tables else None
+    return (
+        Display(_known.tables[next(reversed(_known.tables))], gain, gamma)
+        if _known.tables
+        else None
+    )
 
 
 def view_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> tuple[View, float, float]:
@@ -101,7 +113,7 @@ def view_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> tuple[V
 
 def prepare() -> None:
     """Make ready what the open 3D views need, so that the first draw has it."""
-    _failed.clear()
+    _known.failed.clear()
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
@@ -109,42 +121,42 @@ def prepare() -> None:
     _make_wanted()
 
 
-def trouble() -> str:
+def problem() -> str:
     """Why colours are shown by the plain "Standard" although another is set; mostly empty."""
-    return next(iter(_failed.values()), "")
+    return next(iter(_known.failed.values()), "")
 
 
 def forget() -> None:
     """Leave no table and no timer behind."""
-    _tables.clear()
-    _wanted.clear()
-    _failed.clear()
+    _known.tables.clear()
+    _known.wanted.clear()
+    _known.failed.clear()
     if bpy.app.timers.is_registered(_make_wanted):
         bpy.app.timers.unregister(_make_wanted)
 
 
 def _want(view: View) -> None:
-    _wanted[view] = None
+    _known.wanted[view] = None
     if not bpy.app.timers.is_registered(_make_wanted):
         bpy.app.timers.register(_make_wanted, first_interval=0.0)
 
 
 def _make_wanted() -> None:
     """A timer of Blender's: outside of drawing, where data may be made."""
-    if not _wanted:
+    if not _known.wanted:
         return
-    for view in tuple(_wanted):
+    for view in tuple(_known.wanted):
         try:
-            _tables[view] = DisplayTable(shown_by_blender(view, table_radiances()))
+            _known.tables[view] = DisplayTable(shown_by_blender(view, table_radiances()))
         except Exception as error:
             traceback.print_exc()
-            _failed[view] = (
+            _known.failed[view] = (
                 f"View transform {view.transform} cannot be read ({error}), hair is shown by "
                 "Standard. Stop the preview and start it again."
             )
-        del _wanted[view]
-    while len(_tables) > CAPACITY:
-        _tables.popitem(last=False)
+        del _known.wanted[view]
+    while len(_known.tables) > CAPACITY:
+        _known.tables.popitem(last=False)
     redraw_views()
 
 

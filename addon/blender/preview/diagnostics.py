@@ -1,26 +1,21 @@
-"""What is wrong with a groom and can be mended by one button, and the mending."""
+"""What is wrong with a groom and can be fixed by one button, and the fixing."""
 
 from __future__ import annotations
 
 import itertools
-import weakref
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from ...errors import HairloomError
-from ...pipeline import Rig
 from ..base.objects import head_of, objects_in
 from ..scene.curves import read_curves
 from ..scene.source import dynamics_warnings, own_dynamics
 from ..scene.surfaces import read_positions
 from ..sessions.session import Session
-from . import timeline
+from . import previews
 
-#: Roots farther from their surface than this part of its diagonal are not on it; those of grooms
-#: that fit lie within half of it.
-_LOOSE = 0.02
 #: Scales that differ by less are rounding.
 _UNEVEN = 1.01
 #: So many roots, evenly chosen, say which mesh they are on.
@@ -30,10 +25,10 @@ _MOST_INSTANCES = 10_000
 
 
 @dataclass(frozen=True)
-class Trouble:
+class Issue:
     """One thing that is wrong.
 
-    operator: what mends it, by its name. button: its text.
+    operator: what fixes it, by its name. button: its text.
     instead_of: the warning that says the same without a button.
     """
 
@@ -43,10 +38,7 @@ class Trouble:
     instead_of: str = ""
 
 
-_loose: dict[int, tuple[weakref.ref[Rig], int]] = {}
-
-
-def troubles_of(hair: bpy.types.Object, session: Session | None) -> tuple[Trouble, ...]:
+def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, ...]:
     """What is wrong with this groom, worst first; quick enough to ask at every redraw.
 
     Args:
@@ -57,7 +49,7 @@ def troubles_of(hair: bpy.types.Object, session: Session | None) -> tuple[Troubl
     found = []
     if own_dynamics(hair):
         found.append(
-            Trouble(
+            Issue(
                 "Blender's Hair Dynamics moves this hair as well",
                 "hairloom.mute_hair_dynamics",
                 "Mute Hair Dynamics",
@@ -66,21 +58,26 @@ def troubles_of(hair: bpy.types.Object, session: Session | None) -> tuple[Troubl
         )
     if head is None:
         text = "No surface: it follows its own object only, and collides with nothing"
-        found.append(Trouble(text, "hairloom.set_surface", "Set Surface", known))
+        found.append(Issue(text, "hairloom.set_surface", "Set Surface", known))
     elif head.data.uv_layers.active is None:
         text = f"{head.name} has no UVs: exported strands know no place on its texture"
-        found.append(Trouble(text, "hairloom.unwrap_surface", "Unwrap", known))
-    if head is not None and session is not None and (loose := loose_roots(session)):
+        found.append(Issue(text, "hairloom.unwrap_surface", "Unwrap", known))
+    if (
+        head is not None
+        and session is not None
+        and session.is_made
+        and (loose := session.made.loose_roots)
+    ):
         count = f"{loose:,} roots are" if loose > 1 else "1 root is"
         text = f"{count} not on {head.name}, and would hang in the air"
-        found.append(Trouble(text, "hairloom.snap_roots", "Snap to Surface"))
+        found.append(Issue(text, "hairloom.snap_roots", "Snap to Surface"))
     if is_unevenly_scaled(hair):
         text = "Its object is scaled unevenly, so strands are as wide as the mean of the scales"
-        found.append(Trouble(text, "hairloom.apply_scale", "Apply Scale"))
-    baked = timeline.baked(hair.session_uid)
+        found.append(Issue(text, "hairloom.apply_scale", "Apply Scale"))
+    baked = previews.bake_of(hair)
     if baked is not None and baked.changed:
         text = f"Its bake is out of date ({', '.join(baked.changed)})"
-        found.append(Trouble(text, "hairloom.bake", "Bake"))
+        found.append(Issue(text, "hairloom.bake", "Bake"))
     return tuple(found)
 
 
@@ -98,26 +95,6 @@ def instances_note(hair: bpy.types.Object) -> str:
 
 def _may_instance(obj: bpy.types.Object) -> bool:
     return obj.is_instancer or any(each.type == "NODES" for each in obj.modifiers)
-
-
-def loose_roots(session: Session) -> int:
-    """How many roots are too far from the surface to be on it; counted once for each rig."""
-    if not session.is_made:
-        return 0
-    rig = session.rig
-    known = _loose.get(session.uid)
-    if known is None or known[0]() is not rig:
-        known = _loose[session.uid] = weakref.ref(rig), _loose_in(rig)
-    return known[1]
-
-
-def _loose_in(rig: Rig) -> int:
-    if rig.head is None or rig.rest_frames is None:
-        return 0
-    low, high = rig.head.bounds()
-    reach = _LOOSE * float(np.linalg.norm(high - low))
-    away = np.linalg.norm(rig.strands.roots - rig.rest_frames.origin, axis=1)
-    return int((away > reach).sum())
 
 
 def is_unevenly_scaled(obj: bpy.types.Object) -> bool:

@@ -1,10 +1,12 @@
-"""What acts on the hair, as lines for the 3D view: colliders, wind and lights."""
+"""What acts on the hair, as thin lines in the 3D view: colliders, wind and lights."""
 
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import dataclass
 
 import bpy
+import gpu
 import numpy as np
 
 from ...arrays import Floats
@@ -20,7 +22,6 @@ from ...dynamics.wind import Air, air_of
 from ...errors import HairloomError
 from ...shading.lights import Light
 from ...strands.affine import moved
-from ..base.lines import Lines
 from ..properties.groups import AIDS
 from ..scene.wind import scene_wind
 from ..sessions.session import Session
@@ -41,7 +42,15 @@ _BRISK, _HEAD = 10.0, 0.2
 _AWAY = 1.6
 
 
-def aids_of(
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines of one colour. points: (2n, 3) float32 [m] world, two for each line."""
+
+    color: tuple[float, float, float, float]
+    points: Floats
+
+
+def debug_lines_of(
     session: Session, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Lines, ...]:
     """The lines that the artist wants to see of this groom."""
@@ -170,3 +179,22 @@ def _across(along: Floats) -> tuple[Floats, Floats]:
     side = np.cross(along, least)
     side /= np.linalg.norm(side)
     return side, np.cross(along, side)
+
+
+def draw_lines(points: Floats, color: tuple[float, float, float, float]) -> None:
+    """Into the view that is being drawn, in front of everything; leaves the state as it was."""
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    depth, blend = gpu.state.depth_test_get(), gpu.state.blend_get()
+    gpu.state.depth_test_set("NONE")
+    gpu.state.blend_set("ALPHA")
+    try:
+        shader.bind()
+        shader.uniform_float("color", color)
+        layout = gpu.types.GPUVertFormat()
+        layout.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
+        vertices = gpu.types.GPUVertBuf(layout, len(points))
+        vertices.attr_fill("pos", points)
+        gpu.types.GPUBatch(type="LINES", buf=vertices).draw(shader)
+    finally:
+        gpu.state.depth_test_set(depth)
+        gpu.state.blend_set(blend)

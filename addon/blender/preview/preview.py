@@ -1,0 +1,286 @@
+"""The record of one previewed groom or fin: its session, its phase, its bake, its problems.
+
+While Blender plays, no frame waits for what is being made:
+
+    hair that is not made yet         Blender's own strands are shown, and the frames go on
+    other hair is being made          the hair that is there plays on
+    a collider that is not made yet   the hair goes with its body, at rest
+
+It begins, from rest, at the frame at which all is there. The next round begins at the first frame,
+and is then what a bake is. To make up for what was missed would take the bodies of all frames
+before. Steps of a single frame, scripts, bakes and renders wait, those of the viewport too: what
+they show is exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from ...errors import HairloomError
+from ..bakes import playback
+from ..bakes.baked_rig import BakedRig
+from ..bakes.cache import Cache, Facts
+from ..bakes.fingerprints import RIG_PARTS, frame_rate, groom_fingerprint
+from ..bakes.simulated import Simulated, as_now, differences
+from ..base import latest_job
+from ..base.objects import Handle, head_of
+from ..colliders import fields
+from ..colliders.fields import NotMadeYetError
+from ..properties.groom_settings import GroomSettings
+from ..sessions.session import Session
+from .phases import SIMULATED, Action, Event, Phase, frame_event, next_phase
+
+#: More frames than those of this time [s] on are a jump, not frames that were dropped.
+_LONGEST_DROP = 1.0
+
+
+@dataclass(frozen=True)
+class Bake:
+    """The bake of a groom or fin, as it stands to the scene.
+
+    changed: what has changed since, in words; nothing: it is up to date.
+    frame_hash: hashes of the scene in the frame that is shown.
+    """
+
+    facts: Facts
+    changed: tuple[str, ...] = ()
+    frame_hash: str = ""
+
+
+class Preview:
+    """One previewed groom or fin.
+
+    frame: the scene frame up to which the timeline has brought it; None: it does not move it.
+    bake: None: it has none. rig_hash: of what the bake depends on beside the animation; "": it was
+        not asked for yet.
+    problem, bake_problem: why it is not simulated, or its bake not shown.
+    is_shaded_anew: whether its cards are to be shaded again once edits have settled.
+
+    Methods raise HairloomError when what it is made of is gone or broken.
+    """
+
+    def __init__(self, session: Simulated) -> None:
+        self.session = session
+        self.phase = Phase.REST
+        self.frame: int | None = None
+        self.bake: Bake | None = None
+        self.rig_hash = ""
+        self.problem = self.bake_problem = ""
+        self.is_shaded_anew = False
+
+    @property
+    def uid(self) -> int:
+        return self.session.uid
+
+    @property
+    def groom(self) -> Session | None:
+        """Its session, unless it is a fin."""
+        return self.session if isinstance(self.session, Session) else None
+
+    @property
+    def is_made(self) -> bool:
+        """Whether there is something to simulate."""
+        return self.groom is None or self.groom.is_made
+
+    @property
+    def is_deferred(self) -> bool:
+        """Whether it stands at rest while Blender plays."""
+        return self.phase is Phase.DEFERRED and not _is_exact()
+
+    @property
+    def problems(self) -> str:
+        """Why it is not simulated, or its bake not shown; empty while all is well."""
+        return " ".join(filter(None, (self.problem, self.bake_problem)))
+
+    def found(self) -> bpy.types.Object:
+        """Its object."""
+        obj = Handle(self.uid, self.session.name).find()
+        if obj is None:
+            raise HairloomError(
+                "this object is gone", place=self.session.name, remedy="Press Preview again"
+            )
+        return obj
+
+    def go(
+        self,
+        event: Event,
+        depsgraph: bpy.types.Depsgraph,
+        duration: float = 0.0,
+        *,
+        blocking: bool = True,
+    ) -> None:
+        """Do what this event asks for; what cannot be simulated just now only follows its body.
+
+        Args:
+            duration: of an advance [s].
+            blocking: False: do not wait for what is being made.
+        """
+        try:
+            self.act(event, depsgraph, duration, blocking=blocking)
+        except HairloomError as error:
+            self.act(Event.FAILED, depsgraph)
+            self.problem = str(error)
+
+    def act(
+        self,
+        event: Event,
+        depsgraph: bpy.types.Depsgraph,
+        duration: float = 0.0,
+        *,
+        blocking: bool = True,
+    ) -> None:
+        """As `go`, but a failure of the simulation is raised; it is at rest then."""
+        self.phase, action = next_phase(self.phase, event)
+        session = self.session
+        if self.phase not in SIMULATED:
+            session.is_playing = False
+        if action is not Action.NONE:
+            self.problem = ""
+        try:
+            match action:
+                case Action.BEGIN:
+                    # in playback colliders are not read at each frame just to find them unmade
+                    is_frame = self.phase is Phase.TIMELINE
+                    if is_frame and not blocking and not fields.are_made():
+                        raise NotMadeYetError
+                    session.play(depsgraph, blocking=blocking)
+                case Action.ADVANCE:
+                    session.advance(depsgraph, duration)
+                case Action.REST:
+                    session.rest(depsgraph)
+                case Action.STOP:
+                    session.stop(depsgraph)
+        except NotMadeYetError:
+            self.act(Event.UNMADE, depsgraph)
+        except HairloomError:
+            self.phase, session.is_playing = Phase.REST, False
+            raise
+
+    def release(self) -> None:
+        """The timeline moves it no longer, until it takes it up again."""
+        self.frame = None
+
+    def follow(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """The scene has gone to a frame."""
+        obj, scene = self.found(), depsgraph.scene
+        now, before = scene.frame_current, self.frame
+        if before is None and self.phase is Phase.FREE:
+            before = now - 1  # it was played freely until now
+        self.frame = now
+        if not self.is_made and not _is_exact():
+            self.go(Event.UNMADE, depsgraph)
+            return
+        rate, first = frame_rate(scene), _first_frame(scene)
+        if now == first:
+            self.check(depsgraph)
+        if self._show_baked(obj, depsgraph):
+            return
+        event, frames = frame_event(
+            before, now, first, is_played=playback.is_played(), longest=rate * _LONGEST_DROP
+        )
+        self.go(event, depsgraph, frames / rate, blocking=_is_exact())
+
+    def keep_or_rest(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Blender has evaluated the body again, within a frame; the hair rests if that moved."""
+        assert self.groom is not None
+        if self.phase is Phase.BAKED and self.bake is not None:
+            if self.session.moment(depsgraph) == self.bake.frame_hash:
+                return
+            facts = self.bake.facts
+            self.bake = Bake(facts, self._changed(facts, depsgraph))
+        elif not self.groom.has_moved(depsgraph):
+            return
+        self.go(Event.RESET, depsgraph)
+
+    def take_bake(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Find its bake, and show the scene's frame of it."""
+        self.check(depsgraph)
+        self.show_frame(depsgraph)
+
+    def check(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Find out again whether there is a bake, and whether it is up to date."""
+        obj = self.found()
+        self.rig_hash = self.session.fingerprint(depsgraph)
+        cache = self._cache_of(obj)
+        self.bake = None if cache is None else self._state(cache.facts, depsgraph)
+
+    def look_again(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """A setting was changed, which may make the bake out of date."""
+        if self.bake is not None:
+            self.bake = self._state(self.bake.facts, depsgraph)
+
+    def show_frame(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Show the scene's frame from the bake, if it is there; returns whether it is."""
+        return self._show_baked(self.found(), depsgraph)
+
+    def forget_bake(self) -> None:
+        """It was deleted, or another one put in its place."""
+        self.bake, self.bake_problem = None, ""
+
+    def _show_baked(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+        """What is wrong with a bake is reported in the panel; the hair is simulated then."""
+        frame = depsgraph.scene.frame_current
+        self.bake_problem = ""
+        cache = self._cache_of(obj) if obj.hairloom.bake.is_shown else None
+        if cache is None or not cache.holds(frame):
+            if self.phase is Phase.BAKED:
+                self.act(Event.SAME, depsgraph)
+            return False
+        try:
+            self.session.show_recorded(cache.frame(frame))
+        except HairloomError as error:
+            self.bake_problem = str(error)
+            return False
+        self.act(Event.IS_BAKED, depsgraph)
+        self.rig_hash = self.rig_hash or self.session.fingerprint(depsgraph)
+        self.bake = self._state(cache.facts, depsgraph)
+        return True
+
+    def _state(self, facts: Facts, depsgraph: bpy.types.Depsgraph) -> Bake:
+        frame_hash = self.session.moment(depsgraph)
+        return Bake(facts, self._changed(facts, depsgraph, frame_hash), frame_hash)
+
+    def _changed(
+        self, facts: Facts, depsgraph: bpy.types.Depsgraph, frame_hash: str = ""
+    ) -> tuple[str, ...]:
+        baked = facts.fingerprint
+        if self.groom is not None:
+            baked = as_now(baked, facts.moments)
+        changed = differences(baked, self.rig_hash or baked)
+        frame = depsgraph.scene.frame_current
+        if facts.first <= frame <= facts.last:
+            recorded = facts.moments[frame - facts.first]
+            changed += differences(recorded, frame_hash or self.session.moment(depsgraph))
+        return tuple(dict.fromkeys(changed))
+
+    def _cache_of(self, obj: bpy.types.Object) -> Cache | None:
+        try:
+            return playback.cache_of(obj)
+        except HairloomError as error:
+            self.bake_problem = str(error)
+            return None
+
+
+def rig_for(hair: bpy.types.Object, scene: bpy.types.Scene) -> BakedRig | None:
+    """The rig of the groom's bake, if that was made from the curves and the head as they are."""
+    try:
+        cache = playback.cache_of(hair)
+        if cache is None:
+            return None
+        now = groom_fingerprint(hair, head_of(hair), GroomSettings.of(hair), scene)
+        changed = differences(cache.facts.fingerprint, now)
+        return None if set(changed) & set(RIG_PARTS) else playback.rig_in(cache)
+    except HairloomError:  # reported when the bake is to be shown
+        return None
+
+
+def _first_frame(scene: bpy.types.Scene) -> int:
+    """Where playback begins."""
+    return int(scene.frame_preview_start if scene.use_preview_range else scene.frame_start)
+
+
+def _is_exact() -> bool:
+    """Whether a frame is not left before all of its hair is there."""
+    return latest_job.is_blocking() or not playback.is_played()

@@ -1,0 +1,365 @@
+"""All previewed grooms and fins: begun and ended by the artist, kept in step with Blender.
+
+See `scene_events` for what follows from Blender's events, `phases` for what a preview does.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable
+from functools import partial
+
+import bpy
+
+from ...errors import HairloomError
+from ...shading.volume.settings import VolumeSettings
+from ..bakes import playback
+from ..bakes.bake_settings import folder_of
+from ..bakes.simulated import Simulated
+from ..base import latest_job
+from ..base.gpu_context import is_interrupted
+from ..base.latest_job import ARRIVAL_TIME, unwatch, watch
+from ..base.objects import is_elsewhere, is_on_screen
+from ..base.originals import all_depsgraphs, refresh_views, show_originals
+from ..base.redraw import redraw_panels, redraw_views, refresh_panels
+from ..colliders import fields
+from ..sessions.session import Session
+from ..viewport import overlay
+from .phases import Event, Phase
+from .preview import Bake, Preview, rig_for
+
+#: What is reported of hair that is about to play, and of hair that is not there yet.
+WAITING, MAKING = "plays as soon as its collider is made", "is being made"
+
+
+class Previews(dict[int, Preview]):
+    """By session number of their objects.
+
+    notice: why one ended by itself, until the next one begins.
+    is_paused: whether all that plays freely is held where it is.
+    last_edit: when one was edited [s], by the clock that never goes back.
+    is_reacting: whether an event of Blender's is being followed.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.notice, self.is_paused = "", False
+        self.last_edit, self.is_reacting = 0.0, False
+
+
+previews = Previews()
+
+
+def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
+    """Preview this groom; where the scene's frame is baked, as it was baked.
+
+    In a window its hair is made in a thread: see `latest_job`.
+
+    Raises:
+        HairloomError: it cannot be previewed; says why and what to do.
+    """
+    baked = rig_for(hair, depsgraph.scene)
+    session = Session(
+        hair, depsgraph, baked=baked, blocking=latest_job.is_blocking(), arrived=_take_arrivals
+    )
+    overlay.retry()
+    add(session, depsgraph)
+    if not any(each.phase is Phase.WAITING for each in previews.values()):
+        fields.trim()
+    if not bpy.app.background:
+        session.make_fields(depsgraph)
+    refresh_views()
+    return session
+
+
+def add(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
+    """Let the timeline and Play move it from now on, in place of what was there for its object.
+
+    Raises:
+        HairloomError: it cannot be shown.
+    """
+    preview = Preview(session)
+    if preview.is_made:
+        preview.take_bake(depsgraph)
+    previews.notice = ""
+    before = previews.get(session.uid)
+    if before is not None and before.groom is not None:
+        before.groom.forget()
+    previews[session.uid] = preview
+    publish(preview, depsgraph)
+    redraw_panels()
+
+
+def end() -> None:
+    """Leave nothing behind: no preview, no bake in memory, no notice."""
+    stop_all()
+    playback.forget()
+    fields.forget()
+    previews.notice = ""
+
+
+def forget_all() -> None:
+    """As `stop_all` when the objects are about to go: touches none of them."""
+    for uid in tuple(previews):
+        _forget(uid)
+    playback.forget()
+
+
+def stop(session: Simulated) -> None:
+    """Preview it no longer."""
+    _forget(session.uid)
+    redraw_panels()
+    if not isinstance(session, Session):
+        return
+    hair = session.hair.handle.find()
+    if hair is not None:
+        for depsgraph in all_depsgraphs():
+            show_originals(hair, depsgraph, show=True)
+        refresh_views()
+
+
+def stop_all() -> None:
+    for session in simulated():
+        stop(session)
+
+
+def _forget(uid: int) -> None:
+    """As `stop` when its object is about to go: touches nothing of it."""
+    preview = previews.pop(uid, None)
+    unwatch((uid, "lines"))
+    if preview is not None and preview.groom is not None:
+        preview.groom.forget()
+    overlay.drop(uid)
+
+
+def sessions() -> tuple[Session, ...]:
+    """The grooms that are previewed."""
+    return tuple(each.groom for each in previews.values() if each.groom is not None)
+
+
+def simulated() -> tuple[Simulated, ...]:
+    """The grooms and fins that are previewed."""
+    return tuple(each.session for each in previews.values())
+
+
+def session_of(hair: bpy.types.Object | None) -> Session | None:
+    found = simulated_of(hair)
+    return found if isinstance(found, Session) else None
+
+
+def simulated_of(obj: bpy.types.Object | None) -> Simulated | None:
+    """The groom or fin of this object while it is previewed."""
+    found = None if obj is None else previews.get(obj.session_uid)
+    return None if found is None else found.session
+
+
+def bake_of(obj: bpy.types.Object) -> Bake | None:
+    """What is known of the bake of a previewed object."""
+    preview = previews.get(obj.session_uid)
+    return None if preview is None else preview.bake
+
+
+def notice() -> str:
+    """Why a preview ended by itself, or why drawing failed; empty while all is well."""
+    return overlay.failure() or previews.notice
+
+
+def is_playing() -> bool:
+    """Whether hair plays freely, by the clock, or is about to."""
+    return any(each.phase in (Phase.FREE, Phase.WAITING) for each in previews.values())
+
+
+def is_paused() -> bool:
+    return previews.is_paused and is_playing()
+
+
+def pause(is_paused: bool) -> None:
+    """Hold all hair that plays freely where it is, or let it go on."""
+    previews.is_paused = is_paused
+    redraw_panels()
+
+
+def play(depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> list[str]:
+    """Let all previewed grooms and fins play freely, from rest; returns warnings.
+
+    Args:
+        blocking: False: what lacks hair or a collider that is being made begins later, in
+            `advance`.
+    """
+    pause(False)
+    fields.trim()
+    warnings = []
+    for session in simulated():
+        try:
+            begin(session, depsgraph, blocking=blocking)
+        except HairloomError as error:
+            warnings.append(str(error))
+    return warnings
+
+
+def begin(session: Simulated, depsgraph: bpy.types.Depsgraph, *, blocking: bool) -> None:
+    """Let one play freely, now or as soon as its hair and its colliders are made; see `play`.
+
+    Raises:
+        HairloomError: as `Simulated.play`.
+    """
+    preview = previews[session.uid]
+    preview.release()
+    preview.act(Event.PLAY, depsgraph, blocking=blocking)
+    if preview.phase is Phase.WAITING:
+        publish(preview, depsgraph)
+
+
+def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
+    """Simulate the time [s] that has passed since the last call."""
+    for preview in tuple(previews.values()):
+        if preview.phase is Phase.WAITING and preview.is_made and fields.are_made():
+            attempt(preview, depsgraph, partial(_begin, preview, depsgraph))
+    for preview in tuple(previews.values()):
+        if preview.phase is Phase.FREE and not previews.is_paused:
+            attempt(preview, depsgraph, partial(preview.go, Event.TICK, depsgraph, duration))
+
+
+def _begin(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
+    preview.go(Event.PLAY, depsgraph, blocking=False)
+
+
+def rest(depsgraph: bpy.types.Depsgraph, *, keep_playing: bool) -> None:
+    """All hair back into its style; if it is to play no longer and is baked, to the baked frame."""
+    for preview in tuple(previews.values()):
+        back = partial(_put_back, preview, depsgraph, keep_playing)
+        attempt(preview, depsgraph, back)
+
+
+def _put_back(preview: Preview, depsgraph: bpy.types.Depsgraph, keep_playing: bool) -> None:
+    if keep_playing:
+        preview.act(Event.RESET, depsgraph)
+    else:
+        preview.act(Event.STOP, depsgraph)
+        preview.show_frame(depsgraph)
+
+
+def bake_changed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """A bake was made or deleted, or is to be shown or not."""
+    folder = folder_of(obj)
+    if folder is not None:
+        playback.drop(folder)
+    preview = previews.get(obj.session_uid)
+    if preview is None:
+        return
+    attempt(preview, depsgraph, partial(_take_other_bake, preview, depsgraph))
+    redraw_panels()
+
+
+def _take_other_bake(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
+    preview.forget_bake()
+    preview.release()
+    preview.act(Event.STOP, depsgraph)
+    preview.take_bake(depsgraph)
+
+
+def attempt(
+    preview: Preview,
+    depsgraph: bpy.types.Depsgraph,
+    action: Callable[[], object],
+    *,
+    needs_gpu: bool = True,
+) -> None:
+    """Do it and show the result; a groom that cannot go on is stopped, with a notice.
+
+    A defect of ours ends it as well, reported in full but once, not at every event from now on.
+
+    Args:
+        needs_gpu: where there is no GPU for a moment, do nothing but read it again later.
+    """
+    session = preview.session
+    if is_elsewhere(session.uid, session.name, depsgraph.scene):
+        if is_on_screen(session.uid, session.name):
+            return  # in another window: what happens here is nothing to it
+        session.is_stale = True  # until its scene is shown again, in which it is evaluated
+        overlay.hide(session.uid)
+        return
+    if needs_gpu and is_interrupted():
+        session.is_stale = True
+        redraw_views()
+        refresh_views()  # the update that follows has it read again
+        return
+    try:
+        action()
+        if previews.get(session.uid) is preview:  # it was not begun again by the action
+            publish(preview, depsgraph)
+    except Exception as error:
+        if not isinstance(error, HairloomError):
+            traceback.print_exc()
+        previews.notice = f"Preview of {session.name} ended. {error}"
+        print(f"Hairloom: {previews.notice}")
+        stop(session)
+
+
+def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
+    """Show a groom as it is; a fin shows itself.
+
+    Raises:
+        HairloomError: it is gone.
+    """
+    session = preview.groom
+    if session is None:
+        return
+    hair = session.hair.found()
+    note = "" if session.is_made else MAKING
+    if preview.phase is Phase.WAITING and not note:
+        note = WAITING
+    if note:
+        note = f"{hair.name}: {note}"
+    overlay.show(session.uid, overlay.read_drawing(session, hair, depsgraph, note))
+    lacks_lines = session.obstacles is None and "colliders" in hair.hairloom.shown_aids
+    if lacks_lines and not fields.are_made():
+        watch((session.uid, "lines"), partial(_show_lines, preview))
+    refresh_panels()
+    # our own strands come into the place of Blender's where nobody edits these, and not before
+    # they are made; an overlay that has failed shows nothing
+    is_replaced = hair.mode == "OBJECT" and not overlay.failure()
+    hides = is_replaced and hair.hairloom.hide_original and session.is_made
+    volume = session.settings[VolumeSettings]
+    has_own_shadow = volume.on_body and volume.shadows != "none"
+    show_originals(hair, depsgraph, show=not hides, has_own_shadow=has_own_shadow)
+
+
+def _show_lines(preview: Preview) -> float | None:
+    """A step of `latest_job`: the lines of colliders, once they are made."""
+    if not fields.are_made():
+        return ARRIVAL_TIME
+    attempt(preview, bpy.context.evaluated_depsgraph_get(), lambda: None)
+    redraw_panels()
+    return None
+
+
+def _take_arrivals(session: Session) -> None:
+    """Show hair and cards that were made beside the window's work."""
+    preview = previews.get(session.uid)
+    if preview is None or preview.session is not session:
+        return
+    if session.has_arrived:
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        attempt(preview, depsgraph, partial(_take_made, preview, session, depsgraph))
+        refresh_views()  # Blender's own strands, which were shown until now
+    elif session.cards.has_arrived:
+        attempt(preview, bpy.context.view_layer.depsgraph, session.take_cards)
+    redraw_panels()
+
+
+def finish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
+    """Wait for hair that is being made; one that cannot be made ends its preview."""
+    preview = previews[session.uid]
+    while session.is_pending and previews.get(session.uid) is preview:
+        take = partial(_take_made, preview, session, depsgraph)
+        attempt(preview, depsgraph, take, needs_gpu=False)
+
+
+def _take_made(preview: Preview, session: Session, depsgraph: bpy.types.Depsgraph) -> None:
+    was_made = session.is_made
+    session.take_made(depsgraph)
+    if was_made:
+        preview.check(depsgraph)
+    else:
+        preview.take_bake(depsgraph)

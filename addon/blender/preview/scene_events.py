@@ -1,0 +1,252 @@
+"""What follows from Blender's events for all previewed grooms and fins.
+
+Reactions only read; they write nothing into bpy.data. There are two exceptions. The evaluated copy
+of a previewed object is shown as a box, so that Blender's own strands do not stand among ours: that
+is no data of the artist's, neither saved nor undone nor rendered, and Blender makes a fresh copy
+when it evaluates the object again. And a fin shows itself by an attribute of its own mesh.
+"""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+
+import bpy
+
+from ..bakes import playback
+from ..base import latest_job
+from ..base.originals import refresh_views
+from ..base.redraw import redraw_panels
+from ..cards.occluders import shading_objects
+from ..sessions.session import Session
+from ..viewport import view_transform
+from . import previews as registry
+from .phases import Event, Phase
+from .preview import Preview
+from .previews import attempt, previews
+
+#: Edits come in bursts, as brush strokes do: read again when this long [s] nothing came.
+SETTLING_TIME = 0.2
+
+#: Shading is drawn by quick tables while a slider moves, by full ones when it rests this long [s].
+REFINING_TIME = 0.3
+
+#: what may light hair anew; a light that was hidden or deleted is reported as its scene's change
+_LIGHTING = (bpy.types.Light, bpy.types.World, bpy.types.Collection, bpy.types.Scene)
+
+
+def settings_changed(owner: bpy.types.ID) -> None:
+    """A slider was moved: what can act at once does."""
+    depsgraph = bpy.context.view_layer.depsgraph
+    for preview, session in _grooms():
+        hair = session.hair.handle.find()
+        if hair is not None and owner in (hair, hair.data):
+            attempt(preview, depsgraph, partial(_take_settings, preview, session, depsgraph))
+            if session.is_stale:
+                _read_again_soon()
+        elif is_shaded_anew(session, {owner.session_uid}, depsgraph.view_layer):
+            _shade_again_soon(preview)
+
+
+def _grooms() -> list[tuple[Preview, Session]]:
+    """The previewed grooms; a list, as an attempt may end one."""
+    return [(each, each.groom) for each in previews.values() if each.groom is not None]
+
+
+def _shade_again_soon(preview: Preview) -> None:
+    preview.is_shaded_anew = True
+    _read_again_soon()
+
+
+def _take_settings(preview: Preview, session: Session, depsgraph: bpy.types.Depsgraph) -> None:
+    session.take_settings()
+    _refine_soon(session)
+    preview.look_again(depsgraph)
+
+
+def display_changed(owner: bpy.types.ID) -> None:
+    """Whether Blender's own strands are to be seen has been changed."""
+    settings_changed(owner)
+    refresh_views()
+
+
+def updated(depsgraph: bpy.types.Depsgraph) -> None:
+    """Blender has evaluated the scene: follow what moved, read again what was edited."""
+    moved, edited, is_lit_anew = changes(depsgraph)
+    for preview, session in _grooms():
+        if is_edited(session, edited) or is_weighted_anew(session, edited):
+            session.is_stale = True
+            _read_again_soon()
+        elif session.is_stale and not bpy.app.timers.is_registered(_read_again):
+            _read_again_soon()  # its scene is shown again
+        if is_shaded_anew(session, moved, depsgraph.view_layer):
+            _shade_again_soon(preview)
+        follows = preview.phase is not Phase.FREE and is_among(session, moved)
+        update = partial(_update, preview, session, depsgraph, follows, is_lit_anew)
+        attempt(preview, depsgraph, update)
+
+
+def _update(
+    preview: Preview,
+    session: Session,
+    depsgraph: bpy.types.Depsgraph,
+    follows: bool,
+    is_lit_anew: bool,
+) -> None:
+    if is_lit_anew:
+        session.light(depsgraph)
+    if follows:
+        preview.keep_or_rest(depsgraph)
+
+
+def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
+    """The scene has gone to a frame: simulate it, show it as it was baked, or follow the body.
+
+    Animated settings and lights are taken over. Curves that are animated themselves are not read
+    again at every frame.
+    """
+    _, _, is_lit_anew = changes(depsgraph)
+    for preview in tuple(previews.values()):
+        attempt(preview, depsgraph, partial(_go, preview, depsgraph, is_lit_anew))
+
+
+def _go(preview: Preview, depsgraph: bpy.types.Depsgraph, is_lit_anew: bool) -> None:
+    session = preview.groom
+    if session is not None:
+        session.take_settings()
+        _refine_soon(session)
+        if is_lit_anew:
+            session.light(depsgraph)
+    is_free = preview.phase is Phase.FREE
+    if preview.found().hairloom.bake.follows:
+        # hair that plays freely swings when the playhead is dragged, and goes over to playback
+        if not is_free or playback.is_played():
+            preview.follow(depsgraph)
+    elif preview.phase is Phase.WAITING or not (is_free or preview.show_frame(depsgraph)):
+        preview.act(Event.RESET, depsgraph)
+
+
+def _refine_soon(session: Session) -> None:
+    """Once the slider rests; every move puts it off."""
+    if not session.is_coarse:
+        return
+    if bpy.app.timers.is_registered(_refine):
+        bpy.app.timers.unregister(_refine)
+    bpy.app.timers.register(_refine, first_interval=REFINING_TIME)
+
+
+def _refine() -> None:
+    """A timer of Blender's: the shading of a slider that is no longer moved, at its best."""
+    depsgraph = bpy.context.view_layer.depsgraph
+    for preview, session in _grooms():
+        if session.is_coarse:
+            attempt(preview, depsgraph, session.refine)
+
+
+def undone() -> None:
+    """Anything may be different after undo and redo: look again, once Blender has settled.
+
+    Hair whose making was undone is simply gone; nobody needs to be told.
+    """
+    for _, session in _grooms():
+        if session.hair.handle.find() is None:
+            registry.stop(session)
+    for preview in previews.values():
+        preview.session.is_stale = preview.is_shaded_anew = True
+    if previews:
+        _read_again_soon()
+
+
+def _read_again_soon() -> None:
+    previews.last_edit = time.monotonic()
+    if not bpy.app.timers.is_registered(_read_again):
+        bpy.app.timers.register(_read_again, first_interval=SETTLING_TIME)
+
+
+def _read_again() -> float | None:
+    """A timer of Blender's: reads what was edited once the edits have settled."""
+    pause = time.monotonic() - previews.last_edit
+    if pause < SETTLING_TIME:
+        return SETTLING_TIME - pause
+    catch_up(bpy.context.evaluated_depsgraph_get())
+    return None
+
+
+def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
+    """Read what was edited now; hair on another head is begun anew."""
+    for preview in tuple(previews.values()):
+        if preview.session.is_stale:
+            attempt(preview, depsgraph, partial(_read, preview, depsgraph))
+    for preview, session in _grooms():
+        if preview.is_shaded_anew:
+            preview.is_shaded_anew = False
+            attempt(preview, depsgraph, session.shade_cards_again)
+    redraw_panels()
+
+
+def _read(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
+    session = preview.groom
+    if session is None:
+        preview.act(Event.RESET, depsgraph)
+    elif session.has_another_head():
+        registry.start(session.hair.found(), depsgraph)
+    else:
+        session.read_again(depsgraph, blocking=latest_job.is_blocking())
+        preview.check(depsgraph)
+
+
+def clear() -> None:
+    """Leave nothing behind: no preview, no timer, no notice."""
+    registry.end()
+    view_transform.forget()
+    latest_job.unwatch_all()
+    for timer in (_read_again, _refine):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
+
+
+def changes(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
+    """Session numbers of what has moved or changed shape, of changed shapes; if lights changed."""
+    moved, edited, is_lit_anew = set(), set(), False
+    for update in depsgraph.updates:
+        changed = update.id.original  # the evaluated copy has no session number
+        if update.is_updated_geometry or update.is_updated_transform:
+            moved.add(changed.session_uid)
+        if update.is_updated_geometry:
+            edited.add(changed.session_uid)
+        is_light = isinstance(changed, bpy.types.Object) and changed.type == "LIGHT"
+        is_lit_anew |= is_light or isinstance(changed, _LIGHTING)
+    return moved, edited, is_lit_anew
+
+
+def is_edited(session: Session, edited: set[int]) -> bool:
+    """Whether the curves changed by themselves, not because modifiers carry them with the head."""
+    if session.uid not in edited:
+        return False
+    hair = session.hair.handle.find()
+    is_carried = session.head is not None and session.head.handle.uid in edited
+    return hair is not None and not (is_carried and len(hair.modifiers))
+
+
+def is_weighted_anew(session: Session, edited: set[int]) -> bool:
+    """Whether the head's own mesh changed, and with it maybe the weights that children grow by."""
+    if session.head is None or not session.settings.children_density:
+        return False
+    head = session.head.handle.find()
+    return head is not None and head.data.session_uid in edited
+
+
+def is_shaded_anew(session: Session, changed: set[int], layer: bpy.types.ViewLayer) -> bool:
+    """Whether other hair that shades the cards of this groom may have changed, come or gone."""
+    if not session.cards.is_shaded_by_others:
+        return False
+    others = shading_objects(session.hair.handle.find(), layer)
+    uids = {each.session_uid for each in others}
+    data = {each.data.session_uid for each in others}
+    return uids != session.cards.shaded_by or not changed.isdisjoint(uids | data)
+
+
+def is_among(session: Session, moved: set[int]) -> bool:
+    """Whether the groom or its head has moved."""
+    bodies = (session.hair, session.head)
+    return any(body is not None and body.handle.uid in moved for body in bodies)
