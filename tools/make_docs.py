@@ -1,4 +1,5 @@
-"""Makes what comes from the code: parameter tables, verbs, the texts to translate, the pictures.
+"""Makes what comes from the code: tables of parameters and verbs, the figure of the flows, the
+texts to translate, the pictures.
 
 python tools/make_docs.py [--check | --pictures]
 
@@ -16,6 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import flow_figure
 from extension_loader import PACKAGE, REPOSITORY, load_package
 
 PARAMETERS = REPOSITORY / "docs" / "parameters.md"
@@ -88,6 +90,7 @@ def main() -> int:
             print("docs/parameters.md is out of date: run make docs", file=sys.stderr)
         return 0 if current else 1
     PARAMETERS.write_text(text, encoding="utf-8")
+    flow_figure.FIGURE.write_text(flow_figure.figure(), encoding="utf-8")
     VERBS.write_text(verb_tables(), encoding="utf-8")
     TEXTS.write_text(texts_to_translate(), encoding="utf-8")
     if chosen.pictures:

@@ -94,6 +94,13 @@ def test_the_architecture_page_names_every_room() -> None:
     assert [room for room in rooms if f"`{room}`" not in text] == []
 
 
+def test_the_architecture_page_names_every_phase_of_a_preview() -> None:
+    page = (REPOSITORY / "docs" / "dev" / "architecture.md").read_text(encoding="utf-8")
+    source = (REPOSITORY / "addon/blender/preview/phases.py").read_text(encoding="utf-8")
+    (phases,) = re.findall(r'^Phase = Enum\("Phase", "([A-Z_ ]+)"\)', source, flags=re.M)
+    assert re.findall(r"^\| `([A-Z_]+)` \|", page, flags=re.M) == phases.split()
+
+
 def files_named_in(text: str) -> list[str]:
     """What in a page's `code` is a file of source."""
     return re.findall(r"`((?:[\w.*/-]+/)?[\w.*-]+\.(?:py|glsl|toml))`", text)
