@@ -285,16 +285,25 @@ WANTED = {
 }
 
 
-def files_that_list_sections(sections: list[str], addon: Path = ADDON) -> list[str]:
-    """Files that name nearly all sections of settings: a new one would have to be named there."""
+def files_that_list_sections(sections: dict[str, str], addon: Path = ADDON) -> list[str]:
+    """Files that name two of five sections of settings, or their classes: lists of them, in which
+    most new ones would have to stand too.
+
+    Args:
+        sections: section -> name of its class.
+    """
     found = []
     for file in sorted(addon.rglob("*.py")):
-        named = {
-            node.value if isinstance(node, ast.Constant) else node.attr
-            for node in ast.walk(_tree(file))
-            if isinstance(node, ast.Constant | ast.Attribute)
-        }
-        if len(named.intersection(sections)) > 0.6 * len(sections):
+        named: set[object] = set()
+        for node in ast.walk(_tree(file)):
+            if isinstance(node, ast.Constant):
+                named.add(node.value)
+            elif isinstance(node, ast.Attribute):
+                named.add(node.attr)
+            elif isinstance(node, ast.Name):
+                named.add(node.id)
+        count = max(len(named.intersection(each)) for each in (sections, sections.values()))
+        if count >= 0.4 * len(sections):
             found.append(str(file.relative_to(addon)))
     return found
 

@@ -1,7 +1,8 @@
 """Tells whether what a 3D view has drawn is on the screen: each drawing is numbered by a mark.
 
 Drawing and showing are two things: on Vulkan a picture may come to the screen later. So every 3D
-view draws a number into its lower left corner, eight squares that are black or white.
+view draws a number, eight squares that are black or white, at two places of its left edge, where
+the toolbar lies over it. A popup may cover one of them.
 """
 
 from collections.abc import Iterator
@@ -14,6 +15,8 @@ import screen
 from gpu_extras.batch import batch_for_shader
 
 BITS, SIDE = 8, 4
+#: where the marks are, as fractions of the view's height
+HEIGHTS = (0.0, 0.45)
 BLACK, WHITE = (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0)
 
 
@@ -37,38 +40,39 @@ class ViewMark:
         self._is_wanted = False
         return True
 
-    def _bits(self) -> list[int]:
-        return [self._number >> bit & 1 for bit in range(BITS)]
+    def _bits(self) -> list[bool]:
+        return [bool(self._number >> bit & 1) for bit in range(BITS)]
 
     def _is_marked(self, shown: np.ndarray, window: Any, region: Any) -> bool:
         x = window.x + region.x + SIDE // 2
-        row = len(shown) - 1 - (window.y + region.y + SIDE // 2)
-        if not (0 <= row < len(shown) and x >= 0 and x + BITS * SIDE <= shown.shape[1]):
+        rows = [
+            len(shown) - 1 - (window.y + region.y + int(height * region.height) + SIDE // 2)
+            for height in HEIGHTS
+        ]
+        if (
+            x < 0
+            or x + BITS * SIDE > shown.shape[1]
+            or not 0 <= min(rows) <= max(rows) < len(shown)
+        ):
             return True  # beyond the screen
-        return [
-            int(each[1] > 127) for each in shown[row, x : x + BITS * SIDE : SIDE]
-        ] == self._bits()
+        found = [shown[row, x : x + BITS * SIDE : SIDE, 1] > 127 for row in rows]
+        return any(each.tolist() == self._bits() for each in found)
 
     def _draw(self) -> None:
         if not self._is_wanted:
             return
         self._shader = self._shader or gpu.shader.from_builtin("FLAT_COLOR")
         corners, colours = [], []
-        for number, bit in enumerate(self._bits()):
-            left, right = number * SIDE, (number + 1) * SIDE
-            corners += [
-                (left, 0),
-                (right, 0),
-                (right, SIDE),
-                (left, 0),
-                (right, SIDE),
-                (left, SIDE),
-            ]
-            colours += [WHITE if bit else BLACK] * 6
+        for height in HEIGHTS:
+            low = int(height * bpy.context.region.height)
+            for number, bit in enumerate(self._bits()):
+                left, right, high = number * SIDE, (number + 1) * SIDE, low + SIDE
+                corners += [(left, low), (right, low), (right, high)]
+                corners += [(left, low), (right, high), (left, high)]
+                colours += [WHITE if bit else BLACK] * 6
+        batch = batch_for_shader(self._shader, "TRIS", {"pos": corners, "color": colours})
         gpu.state.blend_set("NONE")
-        batch_for_shader(self._shader, "TRIS", {"pos": corners, "color": colours}).draw(
-            self._shader
-        )
+        batch.draw(self._shader)
 
 
 def _views() -> Iterator[tuple[Any, Any]]:
