@@ -131,7 +131,7 @@ def prepare(
     bound = strands if head is None else bind_roots(strands, head, place=place).strands
     uniform = resample(bound, settings.cv_count)
     guides = choose_guides(uniform, settings)
-    if children is not None and children.way != "none":
+    if children is not None and children.method != "none":
         return _with_children(uniform.take(guides), head, children, density, place)
     grid, group = uniform.grid, uniform.group
     weights = guide_weights(

@@ -17,7 +17,7 @@ from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.pipeline import Rig
 
 #: 800 cards of clusters, an atlas of 2048 baked from the strands, 256 rays a vertex
-SETTINGS = (CardSettings(way="clusters"), AtlasSettings(), CardOcclusionSettings())
+SETTINGS = (CardSettings(source="clusters"), AtlasSettings(), CardOcclusionSettings())
 
 
 def sintel_rig() -> Rig:

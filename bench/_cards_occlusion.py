@@ -30,7 +30,7 @@ VERTICES, ROUNDS = 20_000, 3
 COMPARED, REFERENCE_RAYS = 150, 1600
 #: a ray goes on so far behind what it has met [m], and ends with less light than this
 STEP, DARK = 1.0e-5, 1.0e-3
-CARDS = CardSettings(way="clusters", card_count=800, error=0.001)
+CARDS = CardSettings(source="clusters", card_count=800, error=0.001)
 
 
 def occlusion_figures() -> dict[str, float]:

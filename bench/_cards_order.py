@@ -98,7 +98,9 @@ def cards_and_alpha(rig: Rig, way: str, source: str) -> tuple[CardMesh, np.ndarr
             alphas.append(baked_atlas(rig, build.plan, ShadingSettings(), STRANDS).alpha)
         return alphas[0]
 
-    settings = SettingsMap(CardSettings(way=way, levels=1), AtlasSettings(source=source), STRANDS)
+    settings = SettingsMap(
+        CardSettings(source=way, levels=1), AtlasSettings(source=source), STRANDS
+    )
     build = result_of(card_build_steps(rig, settings, alpha_of))
     return as_built(build.finest), alphas[0]
 

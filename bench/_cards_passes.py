@@ -37,7 +37,7 @@ SIZE, COST_SIZE = 288, 720
 VIEWS = ((-0.55, -1.0, 0.18), (0.9, 0.25, 0.3), (0.1, 1.0, 0.1))
 FIELD_OF_VIEW, MARGIN = np.radians(30.0), 0.85
 ROUNDS = 9
-CARDS = CardSettings(way="clusters", card_count=800)
+CARDS = CardSettings(source="clusters", card_count=800)
 WAYS = {
     "four": CardDrawingSettings(),
     "four_as_in_the_paper": CardDrawingSettings(skip_clear=False),

@@ -34,7 +34,7 @@ SHEET = REPOSITORY / "out" / "skin_sheet.png"
 SIZE, ROUNDS, PLACES = 512, 5, 17
 #: [m] no softness that could be seen
 HARD = 1e-6
-DEEP = VolumeSettings(shadows="deep", strand_share=1.0)
+DEEP = VolumeSettings(shadows="deep", strand_fraction=1.0)
 
 
 def skin_figures() -> dict[str, float]:

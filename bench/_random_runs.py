@@ -31,7 +31,7 @@ from hairloom.addon.params import Parameter
 CV_COUNTS = (2, 3, 4, 8, 16, 24)
 FRAME_RATES = (12.0, 24.0, 30.0, 60.0, 120.0)
 #: Left out: what no step reads.
-_NOT_DRAWN = {"form", "collider_resolution"}
+_NOT_DRAWN = {"device", "collider_resolution"}
 #: Sweeps over a segment in a second of simulation; with more of them a run takes minutes.
 _SWEEPS = 60_000
 #: Shorter than this a strand has no length to be compared with [m].

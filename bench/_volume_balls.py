@@ -31,8 +31,8 @@ ROWS = {
 #: each column's share of the stand-ins, and its shadows
 COLUMNS = {
     "stand_ins": (1.0, VolumeSettings(shadows="none")),
-    "single": (0.0, VolumeSettings(shadows="deep", strand_share=1.0, scattering=False)),
-    "dual": (0.0, VolumeSettings(shadows="deep", strand_share=1.0)),
+    "single": (0.0, VolumeSettings(shadows="deep", strand_fraction=1.0, scattering=False)),
+    "dual": (0.0, VolumeSettings(shadows="deep", strand_fraction=1.0)),
 }
 
 

@@ -51,7 +51,7 @@ BROWN = (0.63, 1.12, 2.4)
 COLORS = {"black": BLACK, "brown": BROWN, "blond": BLOND}
 DUAL = VolumeSettings(
     shadows="deep",
-    strand_share=1.0,
+    strand_fraction=1.0,
     extinction=1.0,
     resolution=512,
     layers=8,
@@ -171,7 +171,7 @@ def hair_settings(absorption: tuple[float, float, float], stand_ins: float) -> S
         shift_noise=0.0,
         sparkle=0.0,
         scattered=stand_ins,
-        volume_shade=stand_ins,
+        volume_shadow=stand_ins,
     )
     return settings_from(node, alike)[0]
 
@@ -191,7 +191,7 @@ def snapshot_of(
         ambient=(0.0, 0.0, 0.0),
         shading=hair_settings(absorption, stand_ins),
         strand_settings=StrandSettings(tip_width=1.0, minimum_width=0.0, transparency="none"),
-        detail=DetailSettings(culling="none", full_size=0.0),
+        detail=DetailSettings(culling="none", lod_height=0.0),
         volume=volume,
     )
 

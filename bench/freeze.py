@@ -78,7 +78,7 @@ def main() -> None:
     hairloom.register()
     latest_job.is_blocking = lambda: False  # as in a window
     scene, hair = add_sample_scene(())
-    hair.hairloom.dynamics.form = given.form
+    hair.hairloom.dynamics.device = given.form
     depsgraph = scene.view_layers[0].depsgraph
     stops = Stops()
     session = stops.timed("preview", lambda: previews.start(hair, depsgraph))
@@ -126,7 +126,7 @@ def main() -> None:
         drag(stops, hair, name, value)
         read_again(name)
     hair.data.hairloom.children.strand_count = given.children
-    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.method = "multi"
     read_again("children")
     for kind in ("comb", "comb again"):
         stops.timed(f"{kind}: Blender evaluates", lambda: comb(hair, scene))

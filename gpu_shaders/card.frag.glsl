@@ -32,7 +32,7 @@ void main()
   float alpha = texture_alpha;
   vec3 across = cross(dFdx(card_point), dFdy(card_point));
 #  if EVEN
-  alpha = even_alpha(alpha, across, tangent, to_eye);
+  alpha = view_compensated_alpha(alpha, across, tangent, to_eye);
 #  endif
   vec3 card_way = tangent, card_front = normal;
 #  if TANGENT_MAP
@@ -53,7 +53,7 @@ void main()
 #  if MARSCHNER
   vec3 colored = strand_absorption(fibre, along, 0.5, 1.5, shading);
   vec3 grey = strand_absorption(fibre, along, 0.5, -0.5, shading);
-  absorption = own_absorption(mix(colored, grey, shading.grey_share), base, fibre.root.w);
+  absorption = own_absorption(mix(colored, grey, shading.grey_fraction), base, fibre.root.w);
   vec3 hair = strand_color(fibre, absorption);
 #  else
   vec3 hair = card_base(along, shading) * base;

@@ -49,7 +49,7 @@ void main()
       Control control = segment_control(clip_before, clip_from, clip_to, clip_after);
 
 #if MODE == {{mode_adaptive}}
-      float wanted = wang_pieces(control, seen.picture.xy, detail.error, float(detail.most));
+      float wanted = wang_pieces(control, seen.picture.xy, detail.error, float(detail.max_subdivisions));
 #elif MODE == {{mode_heuristic}}
       float angle_to = angle_between(to - from, after - to);
       float wanted = heuristic_pieces(
@@ -58,7 +58,7 @@ void main()
 #else
       float wanted = float(detail.subdivisions);
 #endif
-      int pieces = wanted > 1.0 ? int(min(wanted, float(detail.most))) : 1;
+      int pieces = wanted > 1.0 ? int(min(wanted, float(detail.max_subdivisions))) : 1;
 #if MODE != {{mode_fixed}}
       pieces = is_outside(control) ? 1 : pieces;
 #endif

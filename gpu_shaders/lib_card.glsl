@@ -23,7 +23,7 @@ vec3 mapped_normal(vec3 texel, vec3 tangent, vec3 normal)
 
 // What a card covers that is seen at a slant, if alpha is what it covers on the mean of all turns about
 // its strands. `across`: normal of its plane, of any length.
-float even_alpha(float alpha, vec3 across, vec3 tangent, vec3 to_eye)
+float view_compensated_alpha(float alpha, vec3 across, vec3 tangent, vec3 to_eye)
 {
   float facing = turned_facing(across, tangent, to_eye);
   return 1.0 - pow(1.0 - alpha, {{mean_facing}} / max(facing, {{least_facing}}));
@@ -34,7 +34,7 @@ vec3 card_base(float along, ShadingSettings shading)
 {
   vec3 colored = strand_base(along, 0.5, 1.5, shading);
   vec3 grey = strand_base(along, 0.5, -0.5, shading);
-  return mix(colored, grey, shading.grey_share);
+  return mix(colored, grey, shading.grey_fraction);
 }
 
 // The absorption of strands whose colour is `base` times that of the card's mean. `color_factor`: by

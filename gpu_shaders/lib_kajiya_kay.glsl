@@ -83,6 +83,6 @@ vec3 kajiya_kay(vec3 tangent,
 vec3 strand_base(float along, float color_noise, float grey_noise, ShadingSettings shading)
 {
   vec3 color = mix(shading.base_color, shading.tip_color, tip_fraction(along, shading));
-  color = grey_noise < shading.grey_share ? GREY_COLOR : color;
+  color = grey_noise < shading.grey_fraction ? GREY_COLOR : color;
   return color * (1.0 + shading.color_variation * (2.0 * color_noise - 1.0));
 }

@@ -79,7 +79,7 @@ vec3 strand_absorption(
   vec3 mixed = mix(fibre.root.xyz, fibre.tip.xyz, tip_fraction(along, shading));
   float amount = 1.0 + shading.color_variation * (1.0 - 2.0 * color_noise);
   vec3 grey = vec3(fibre.tip.w * dot(mixed, vec3(1.0 / 3.0)));
-  return amount * (grey_noise < shading.grey_share ? grey : mixed);
+  return amount * (grey_noise < shading.grey_fraction ? grey : mixed);
 }
 
 // The colour of a mass of such hair, for light that comes from strand to strand.
@@ -121,7 +121,7 @@ float pixel_level(sampler3D longitudinal,
 // known, which is when it is negative, by how much the hair's volume faces the light.
 float straight_light(vec3 normal, vec3 to_light, float tau, ShadingSettings shading)
 {
-  return tau < 0.0 ? mix(1.0, diffuse_bias(normal, to_light), shading.volume_shade) : exp(-tau);
+  return tau < 0.0 ? mix(1.0, diffuse_bias(normal, to_light), shading.volume_shadow) : exp(-tau);
 }
 
 // S of a strand on its own, for angles of strand_angles: sparkle breaks up TRT alone.

@@ -49,7 +49,7 @@ class Shots:
         """Cards in this way, and how they are drawn."""
         settings, builds = self.settings, of_addon("blender.cards.build")
         chosen = of_addon("params").SettingsMap(
-            settings["cards"](way=way, card_count=CARDS, levels=levels),
+            settings["cards"](source=way, card_count=CARDS, levels=levels),
             settings["card_occlusion"](rays=64),
         )
         steps = builds.build_steps(builds.CardInputs(self.rig, chosen))

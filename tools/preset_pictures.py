@@ -48,7 +48,7 @@ def wig() -> Any:
     return replace(
         snapshot,
         meshes=(of_addon("render.snapshot").MeshSnapshot.of(head, occlusion=shaded),),
-        detail=settings["detail"](full_size=0.0),
+        detail=settings["detail"](lod_height=0.0),
         strand_settings=settings["strands"](width_scale=THICKER),
     )
 

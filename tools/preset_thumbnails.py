@@ -68,7 +68,7 @@ def main(folder: Path) -> None:
         of_addon("params").SettingsMap(
             shading,
             settings["strands"](width_scale=THICKER),
-            settings["detail"](full_size=0.0),
+            settings["detail"](lod_height=0.0),
         )
     )
     occlusion = pipeline.rest_occlusion(rig, ambient), pipeline.head_occlusion(rig, ambient)

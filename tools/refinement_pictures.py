@@ -37,7 +37,7 @@ def wig(children: str) -> Any:
         head,
         settings["guides"](guide_count=GUIDES, cv_count=9),
         place="the built-in groom",
-        children=settings["children"](way=children, strand_count=CHILDREN),
+        children=settings["children"](method=children, strand_count=CHILDREN),
     )
 
 

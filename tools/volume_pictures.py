@@ -105,7 +105,7 @@ def shadow_pictures(strands: Any) -> list[Any]:
         frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
         frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),
     )
-    volume = settings["volume"](shadows="slices", strand_share=1.0)
+    volume = settings["volume"](shadows="slices", strand_fraction=1.0)
     ways = (
         replace(volume, extinction=0.0),
         replace(volume, slices=15),
@@ -122,7 +122,7 @@ def shadow_pictures(strands: Any) -> list[Any]:
                 meshes=(ball,),
                 lights=(sun,),
                 ambient=(0.02, 0.02, 0.02),
-                shading=settings["shading"](volume_shade=0.0),
+                shading=settings["shading"](volume_shadow=0.0),
                 volume=way,
                 volume_center=np.zeros(3, np.float32),
             ),

@@ -25,10 +25,10 @@ class AtlasSettings(Settings):
     source: str = choice(
         "baked",
         (
-            ("made", "Made", "Strips of hair made by chance, as Card Texture has them"),
+            ("made", "Procedural", "Strips of hair made by chance, as Card Texture has them"),
             ("baked", "Baked", "The strands themselves, laid flat; of guides alone it is made"),
         ),
-        label="Shows",
+        label="Source",
         description="What hair the texture of the cards shows",
     )
     size: str = choice(

@@ -109,7 +109,7 @@ def card_steps(
     yield "Cards from strands"
     cards, plan = uncut_cards(groom, settings, atlas)
     yield "Levels of detail"
-    error = settings.error if settings.way == "clusters" else None
+    error = settings.error if settings.source == "clusters" else None
     levels = card_levels(cards, settings, error)
     meshes, errors = zip(*((level.mesh, level.error) for level in levels), strict=True)
     unsorted = tuple(mesh.triangles for mesh in meshes)
@@ -166,7 +166,7 @@ def card_of_strand(groom: CardGroom, settings: CardSettings) -> Ints:
     """The card that stands for each strand, (strand_count,). Crossed cards come again after all
     others, in the same order."""
     grid, group = groom.strands.grid, groom.strands.group
-    if settings.way == "guides":
+    if settings.source == "guides":
         return cluster_of_guides(grid, group, groom.guides)
     return cluster_of_strands(grid, group, settings)
 
@@ -200,7 +200,7 @@ def uncut_cards(
     cluster = card_of_strand(groom, settings)
     _, found, count = np.unique(cluster, return_index=True, return_counts=True)
     first: Ints = found
-    if settings.way == "guides":
+    if settings.source == "guides":
         first = guides
         is_baked &= len(grid) > len(guides)  # guides alone stand for tufts that nobody has made
         count = count if is_baked else np.ones_like(count)
@@ -277,7 +277,7 @@ def strand_shade(groom: CardGroom) -> CardShade:
     """
     strands, radius = groom.strands, groom.radius
     count = min(max(strands.strand_count // _STRANDS_PER_CARD, 1), _MOST_CARDS)
-    settings = CardSettings(way="clusters", card_count=count, fly_aways=0.0)
+    settings = CardSettings(source="clusters", card_count=count, fly_aways=0.0)
     cluster = cluster_of_strands(strands.grid, strands.group, settings)
     strips = fit_strips(strands.grid, radius, cluster, groom.root_normal, settings)
     covered = np.zeros(strips.width.shape)

@@ -55,7 +55,7 @@ class CardDrawingSettings(Settings):
     )
     skip_clear: bool = toggle(
         True,
-        label="Skip Clear Pixels",
+        label="Skip Transparent Pixels",
         description="Four passes: the last one tests alpha, so that clear pixels hide nothing; "
         "without it that pass is as in the paper, and quicker on some GPUs",
         panel="Drawing",

@@ -91,7 +91,7 @@ def fit_strips(
         cosine, sine = np.cos(turn + further)[:, None], np.sin(turn + further)[:, None]
         turned = normal * cosine[..., None] + side * sine[..., None]
         variance = _smoothed(np.maximum(_along(spread, cosine, sine), 0.0))
-        half = settings.cover * _COVERING * np.sqrt(variance) + thickness
+        half = settings.cluster_width * _COVERING * np.sqrt(variance) + thickness
         frames = CardFrames(center, tangent, turned, np.cross(tangent, turned))
         strips.append((frames, 2.0 * half))
     return _stacked(strips)

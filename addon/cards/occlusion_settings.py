@@ -49,7 +49,7 @@ class CardOcclusionSettings(Settings):
     )
     own_reach: float = number(
         0.02,
-        label="Own Card",
+        label="Self-occlusion Distance",
         description="From where on a card shades itself: a little more than its width, so that "
         "only what curls over itself does",
         unit="length",

@@ -15,13 +15,13 @@ class CardSettings(Settings):
     title = "Hair Cards"
     owner = "groom"
 
-    way: str = choice(
+    source: str = choice(
         "clusters",
         (
             ("clusters", "Clusters", "A card for each cluster of strands that lie together"),
             ("guides", "Guides", "A card along each guide"),
         ),
-        label="Cards From",
+        label="Source",
         description="What a card stands for",
     )
     card_count: int = integer(
@@ -30,7 +30,7 @@ class CardSettings(Settings):
         description="Clusters: how many cards are made",
         soft=(50, 2000),
         hard=(1, 20_000),
-        shown_when=when("cards.way", "clusters"),
+        shown_when=when("cards.source", "clusters"),
     )
     error: float = number(
         0.002,
@@ -40,22 +40,22 @@ class CardSettings(Settings):
         soft=(0.0005, 0.02),
         hard=(0.0, 10.0),
         unit="length",
-        shown_when=when("cards.way", "clusters"),
+        shown_when=when("cards.source", "clusters"),
     )
-    cover: float = number(
+    cluster_width: float = number(
         1.0,
-        label="Cover",
+        label="Width Factor",
         description="Clusters: width of a card, as a factor of how widely its strands lie",
         soft=(0.5, 2.0),
         hard=(0.01, 100.0),
-        shown_when=when("cards.way", "clusters"),
+        shown_when=when("cards.source", "clusters"),
     )
     crossed: bool = toggle(
         False,
         label="Crossed Pairs",
         description="Clusters: a second card through each, turned by a right angle, so that hair "
         "has body from all sides",
-        shown_when=when("cards.way", "clusters"),
+        shown_when=when("cards.source", "clusters"),
     )
     fly_aways: float = number(
         0.1,
@@ -65,7 +65,7 @@ class CardSettings(Settings):
         soft=(0.0, 0.5),
         hard=(0.0, 1.0),
         unit="factor",
-        shown_when=when("cards.way", "clusters"),
+        shown_when=when("cards.source", "clusters"),
     )
     layers: int = integer(
         3,
@@ -110,7 +110,7 @@ class CardSettings(Settings):
         description="Guides: width at the root, in mean distances between neighbouring guides",
         soft=(1.0, 6.0),
         hard=(0.01, 100.0),
-        shown_when=when("cards.way", "guides"),
+        shown_when=when("cards.source", "guides"),
     )
     tip_width: float = number(
         0.5,
@@ -118,7 +118,7 @@ class CardSettings(Settings):
         description="Guides: width at the tip as a part of the width at the root",
         soft=(0.0, 1.0),
         hard=(0.0, 10.0),
-        shown_when=when("cards.way", "guides"),
+        shown_when=when("cards.source", "guides"),
     )
     bend: float = number(
         0.1,

@@ -3,8 +3,8 @@
 A CV near a collider gets the plane of its nearest surface, moved out by the CV's own radius, which
 grows from root to tip (the "pearl" configuration of Nguyen and Donnelly 2005), so that no collider
 slips between two CVs. What a plane asks for is limited: a CV goes no deeper than it was, as seen
-from the moving collider, and is led out by no more than `push_speed`. So hair that starts inside
-comes out at a walk instead of exploding.
+from the moving collider, and is led out by no more than `depenetration_speed`. So hair that starts
+inside comes out at a walk instead of exploding.
 
 Friction is Coulomb's, on positions (Macklin et al. 2014, "Unified Particle Physics", section 6.1):
 the slip against the collider's own motion is reduced by up to mu times the push.

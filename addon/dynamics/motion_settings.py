@@ -47,7 +47,7 @@ class MotionSettings(Settings):
     )
     wind_speed: float = number(
         0.0,
-        label="Wind",
+        label="Wind Speed",
         description="Speed of the air, or of the current under water; the scene's wind force "
         "fields add to it",
         soft=(0.0, 20.0),
@@ -64,9 +64,9 @@ class MotionSettings(Settings):
         unit="angle",
         panel="Medium & Wind",
     )
-    wind_rise: float = number(
+    wind_elevation: float = number(
         0.0,
-        label="Wind Rise",
+        label="Wind Elevation",
         description="How steeply the wind blows upwards",
         soft=(-0.5 * math.pi, 0.5 * math.pi),
         hard=(-_MAX_TURNED, _MAX_TURNED),
@@ -108,9 +108,9 @@ class MotionSettings(Settings):
         source="Coulomb; position-based as in Macklin et al. 2014",
         panel="Collisions",
     )
-    push_speed: float = number(
+    depenetration_speed: float = number(
         0.5,
-        label="Push-out Speed",
+        label="Depenetration Speed",
         description="How fast what starts inside a collider is led out",
         soft=(0.05, 5.0),
         hard=(0.001, 100.0),
@@ -119,7 +119,7 @@ class MotionSettings(Settings):
     )
     collider_resolution: int = integer(
         56,
-        label="Collider Cells",
+        label="Collider Resolution",
         description="Cells along the longest side of a mesh collider's distance field",
         soft=(24, 96),
         hard=(8, 192),

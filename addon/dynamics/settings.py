@@ -21,14 +21,14 @@ class DynamicsSettings(MotionSettings):
     owner = "character"
     panels = ("Style", "Medium & Wind", "Lengths", "Collisions")
 
-    form: str = choice(
+    device: str = choice(
         "automatic",
         (
             ("automatic", "Automatic", "The GPU where Blender has one to compute with, else numpy"),
             ("numpy", "CPU (numpy)", "Needs no GPU; the same result to the last bit in every run"),
             ("compute", "GPU (compute)", "Fastest; guides stay on the GPU between frames"),
         ),
-        label="Computed On",
+        label="Device",
         description="What carries out the simulation; both give the same motion within rounding",
     )
     substep_rate: float = number(
@@ -57,7 +57,7 @@ class DynamicsSettings(MotionSettings):
     )
     weight_held: float = number(
         1.0,
-        label="Weight Held",
+        label="Sag Compensation",
         description="Fraction of the weight that the style already carries as it was combed; at 1 "
         "a groom does not sag when it comes to rest",
         soft=(0.0, 1.0),
@@ -94,7 +94,7 @@ class DynamicsSettings(MotionSettings):
     )
     style_damping: float = number(
         5.0,
-        label="Swing Damping",
+        label="Style Damping",
         description="How fast swinging about the style dies away, seen from the moving head",
         soft=(0.0, 20.0),
         hard=(0.0, 1000.0),

@@ -139,7 +139,9 @@ def _keep_outside(
     """
     settings, rest, touched = frame.settings, block.rest, None
     here, was = (rows.reshape(3, -1) for rows in (position, previous))
-    contacts = find_contacts(here, was, block.radius, poses, settings.push_speed * frame.dt)
+    contacts = find_contacts(
+        here, was, block.radius, poses, settings.depenetration_speed * frame.dt
+    )
     for _ in range(settings.contact_passes if frame.drive.colliders else 0):
         touching = [one.push_out(here, settings.friction) for one in contacts]
         touched = touched_by(contacts, touching)

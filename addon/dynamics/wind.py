@@ -59,7 +59,7 @@ def air_of(settings: MotionSettings, scene_wind: Floats) -> Air | None:
     Args:
         scene_wind: (3,) [m/s], world, from the scene's wind force fields.
     """
-    rise, turn = settings.wind_rise, settings.wind_direction
+    rise, turn = settings.wind_elevation, settings.wind_direction
     own = np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
     velocity = own * settings.wind_speed + np.asarray(scene_wind, np.float64)
     speed = float(np.linalg.norm(velocity))

@@ -82,7 +82,7 @@ def make_children(
 
 
 def _weights(roots: ChildRoots, guides: StrandSet, settings: ChildrenSettings) -> GuideWeights:
-    if settings.way != "single":
+    if settings.method != "single":
         return child_weights(roots.point, guides.roots, guides.group, guides.grid, settings.parting)
     nearest, _ = nearest_points(roots.point, guides.roots, 1)
     weight = np.zeros((len(nearest), GUIDES_PER_STRAND), np.float32)
@@ -106,7 +106,7 @@ def _root_uv(roots: ChildRoots, surface: Surface) -> Floats | None:
 
 
 def _notes(guides: StrandSet, settings: ChildrenSettings) -> tuple[str, ...]:
-    few = guides.strand_count < GUIDES_PER_STRAND and settings.way != "single"
+    few = guides.strand_count < GUIDES_PER_STRAND and settings.method != "single"
     if few:
         return ("There are fewer than three guides, so children are all alike. Draw more guides.",)
     return ()

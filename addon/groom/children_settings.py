@@ -9,7 +9,7 @@ from ..params import Settings, choice, curve, either, integer, number, when
 
 _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
 _TARIQ = "Tariq 2008, Real-time hair rendering on the GPU"
-_PARTS = either(when("children.way", "multi"), when("children.clump"))
+_PARTS = either(when("children.method", "multi"), when("children.clump"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,14 +20,14 @@ class ChildrenSettings(Settings):
     title = "Children"
     owner = "groom"
 
-    way: str = choice(
+    method: str = choice(
         "none",
         (
             ("none", "None", "The curves are all the hair there is"),
             ("multi", "Between Guides", "Each child is a mixture of the three guides around it"),
             ("single", "Around a Guide", "Each child runs beside one guide"),
         ),
-        label="Children",
+        label="Method",
         description="How strands are made from guides",
         source=_TARIQ,
     )
@@ -38,7 +38,7 @@ class ChildrenSettings(Settings):
         soft=(100, 20_000),
         hard=(0, 500_000),
         source=_NALU,
-        shown_when=when("children.way", "multi", "single"),
+        shown_when=when("children.method", "multi", "single"),
     )
     parting: float = number(
         math.radians(60.0),
@@ -47,7 +47,7 @@ class ChildrenSettings(Settings):
         unit="angle",
         soft=(math.radians(10.0), math.radians(90.0)),
         hard=(0.0, math.pi),
-        shown_when=when("children.way", "multi", "single"),
+        shown_when=when("children.method", "multi", "single"),
         active_when=_PARTS,
     )
     length_variation: float = number(
@@ -57,7 +57,7 @@ class ChildrenSettings(Settings):
         unit="factor",
         soft=(0.0, 0.9),
         hard=(0.0, 0.99),
-        shown_when=when("children.way", "multi", "single"),
+        shown_when=when("children.method", "multi", "single"),
     )
     clump: float = number(
         0.5,
@@ -66,23 +66,23 @@ class ChildrenSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
-        shown_when=when("children.way", "multi", "single"),
+        shown_when=when("children.method", "multi", "single"),
     )
     clump_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.25, 0.5, 0.75, 1.0),
         label="Clump Along",
         description="Fraction of the clump from root to tip",
         hard=(0.0, 1.0),
-        shown_when=when("children.way", "multi", "single"),
+        shown_when=when("children.method", "multi", "single"),
         active_when=when("children.clump"),
     )
     clump_size: int = integer(
         12,
-        label="Strands per Lock",
+        label="Strands per Clump",
         description="How many children make a lock, on average; 1 makes none",
         soft=(1, 100),
         hard=(1, 100_000),
-        shown_when=when("children.way", "multi", "single"),
+        shown_when=when("children.method", "multi", "single"),
         active_when=when("children.clump"),
     )
     frizz: float = number(
@@ -92,14 +92,14 @@ class ChildrenSettings(Settings):
         unit="length",
         soft=(0.0, 0.01),
         hard=(0.0, 1.0),
-        shown_when=when("children.way", "multi", "single"),
+        shown_when=when("children.method", "multi", "single"),
     )
     frizz_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.4, 0.7, 0.9, 1.0),
         label="Frizz Along",
         description="Fraction of the frizz from root to tip",
         hard=(0.0, 1.0),
-        shown_when=when("children.way", "multi", "single"),
+        shown_when=when("children.method", "multi", "single"),
         active_when=when("children.frizz"),
     )
     frizz_length: float = number(
@@ -109,7 +109,7 @@ class ChildrenSettings(Settings):
         unit="length",
         soft=(0.005, 0.2),
         hard=(0.0001, 100.0),
-        shown_when=when("children.way", "multi", "single"),
+        shown_when=when("children.method", "multi", "single"),
         active_when=when("children.frizz"),
     )
     width: float = number(
@@ -118,7 +118,7 @@ class ChildrenSettings(Settings):
         description="Width of children as a factor of their guides' width",
         soft=(0.1, 4.0),
         hard=(0.001, 1000.0),
-        shown_when=when("children.way", "multi", "single"),
+        shown_when=when("children.method", "multi", "single"),
     )
     seed: int = integer(
         1,
@@ -126,5 +126,5 @@ class ChildrenSettings(Settings):
         description="Another seed gives other children of the same kind",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
-        shown_when=when("children.way", "multi", "single"),
+        shown_when=when("children.method", "multi", "single"),
     )

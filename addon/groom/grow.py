@@ -50,7 +50,7 @@ def grow(
         HairloomError: the surface has no triangles, weights that do not fit it or are not finite,
             or nowhere to grow.
     """
-    if settings.way == "normals":
+    if settings.method == "normals":
         return grow_along_normals(surface, settings, density, length)
     return _grow_combed(
         surface,
@@ -145,7 +145,7 @@ def _fallen(
     direction = unit(settings.lift * normal + (1.0 - settings.lift) * comb)
     for cv in range(1, settings.cv_count):
         fraction = cv / (settings.cv_count - 1)
-        fall = min(fraction / settings.comb_share, 1.0) if settings.comb_share else 1.0
+        fall = min(fraction / settings.comb_fraction, 1.0) if settings.comb_fraction else 1.0
         aim = unit((1.0 - fall) * comb + fall * _DOWN)
         turn = 1.0 - (1.0 - settings.droop) ** (plan.segment[:, cv - 1] / _DROOP_STEP)
         direction = unit(direction + turn[:, None] * (aim - direction))

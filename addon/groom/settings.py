@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from ..params import Settings, both, choice, either, integer, number, toggle, when
 
 _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
-_HAS_THRESHOLD = both(when("grow.way", "normals"), when("grow.per_vertex"))
-_HAS_COUNT = either(when("grow.way", "combed"), when("grow.per_vertex", False))
+_HAS_THRESHOLD = both(when("grow.method", "normals"), when("grow.per_vertex"))
+_HAS_COUNT = either(when("grow.method", "combed"), when("grow.per_vertex", False))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,13 +18,13 @@ class GrowSettings(Settings):
     section = "grow"
     title = "Grow"
 
-    way: str = choice(
+    method: str = choice(
         "combed",
         (
             ("combed", "Combed", "A groom on an upright head, combed and fallen around it"),
             ("normals", "Along Normals", "Straight out of any mesh, as guides to be styled"),
         ),
-        label="Way",
+        label="Method",
         description="How hair leaves the mesh",
         source=_NALU,
     )
@@ -33,7 +33,7 @@ class GrowSettings(Settings):
         label="One per Vertex",
         description="Along the normals: one strand from each vertex instead of a number of strands",
         source=_NALU,
-        shown_when=when("grow.way", "normals"),
+        shown_when=when("grow.method", "normals"),
     )
     threshold: float = number(
         0.5,
@@ -92,7 +92,7 @@ class GrowSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
-        shown_when=when("grow.way", "combed"),
+        shown_when=when("grow.method", "combed"),
     )
     comb_back: float = number(
         0.7,
@@ -101,16 +101,16 @@ class GrowSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
-        shown_when=when("grow.way", "combed"),
+        shown_when=when("grow.method", "combed"),
     )
-    comb_share: float = number(
+    comb_fraction: float = number(
         0.45,
-        label="Combed Part",
+        label="Comb Fraction",
         description="Part of the strand that follows the comb before the hair falls",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
-        shown_when=when("grow.way", "combed"),
+        shown_when=when("grow.method", "combed"),
     )
     droop: float = number(
         0.45,
@@ -119,7 +119,7 @@ class GrowSettings(Settings):
         unit="factor",
         soft=(0.0, 0.9),
         hard=(0.0, 1.0),
-        shown_when=when("grow.way", "combed"),
+        shown_when=when("grow.method", "combed"),
     )
     clump: float = number(
         0.85,
@@ -128,15 +128,15 @@ class GrowSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
-        shown_when=when("grow.way", "combed"),
+        shown_when=when("grow.method", "combed"),
     )
     clump_size: int = integer(
         30,
-        label="Strands per Lock",
+        label="Strands per Clump",
         description="How many strands make a lock, on average",
         soft=(1, 100),
         hard=(1, 100_000),
-        shown_when=when("grow.way", "combed"),
+        shown_when=when("grow.method", "combed"),
     )
     wave: float = number(
         0.007,
@@ -145,7 +145,7 @@ class GrowSettings(Settings):
         unit="length",
         soft=(0.0, 0.02),
         hard=(0.0, 1.0),
-        shown_when=when("grow.way", "combed"),
+        shown_when=when("grow.method", "combed"),
     )
     wave_length: float = number(
         0.075,
@@ -154,7 +154,7 @@ class GrowSettings(Settings):
         unit="length",
         soft=(0.01, 0.3),
         hard=(0.001, 100.0),
-        shown_when=when("grow.way", "combed"),
+        shown_when=when("grow.method", "combed"),
     )
     frizz: float = number(
         0.001,
@@ -163,7 +163,7 @@ class GrowSettings(Settings):
         unit="length",
         soft=(0.0, 0.01),
         hard=(0.0, 1.0),
-        shown_when=when("grow.way", "combed"),
+        shown_when=when("grow.method", "combed"),
     )
     clearance: float = number(
         0.002,
@@ -172,7 +172,7 @@ class GrowSettings(Settings):
         unit="length",
         soft=(0.0, 0.02),
         hard=(0.0, 1.0),
-        shown_when=when("grow.way", "combed"),
+        shown_when=when("grow.method", "combed"),
     )
     volume: float = number(
         0.018,
@@ -181,7 +181,7 @@ class GrowSettings(Settings):
         unit="length",
         soft=(0.0, 0.05),
         hard=(0.0, 10.0),
-        shown_when=when("grow.way", "combed"),
+        shown_when=when("grow.method", "combed"),
     )
     radius: float = number(
         2.0e-4,

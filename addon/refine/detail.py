@@ -76,14 +76,14 @@ class PictureView:
 
 
 def detail_factors(points: Floats, view: PictureView, settings: DetailSettings) -> Ints:
-    """Pieces of each segment, (strand_count, cv_count - 1) int32 from 1 to `settings.most`.
+    """Pieces of each segment, (strand_count, cv_count - 1) int32 from 1 to max_subdivisions.
 
     Args:
         points: (strand_count, cv_count, 3) [m], world space.
     """
     segment_count = points.shape[1] - 1
     if settings.mode == "fixed":
-        pieces = min(settings.subdivisions, settings.most)
+        pieces = min(settings.subdivisions, settings.max_subdivisions)
         return np.full((len(points), segment_count), pieces, np.int32)
     factors = np.empty((len(points), segment_count), np.int32)
     with np.errstate(all="ignore"):  # points that are not finite end in one piece or in the most
@@ -113,7 +113,7 @@ def _factors(cvs: Floats, view: PictureView, settings: DetailSettings) -> Ints:
         wanted = wang_pieces(control, half_size, np.float32(settings.error))
     else:
         wanted = heuristic_pieces(cvs, clip, half_size, np.float32(settings.piece_length))
-    most = np.float32(settings.most)
+    most = np.float32(settings.max_subdivisions)
     pieces = np.where(wanted > 1.0, np.minimum(wanted, most), np.float32(1.0))
     return np.where(is_outside(control), 1, pieces).astype(np.int32)
 

@@ -41,7 +41,7 @@ class DetailSettings(Settings):
     )
     piece_length: float = number(
         8.0,
-        label="Piece Length",
+        label="Subdivision Length",
         description="By size and angle: length of a piece where hair bends by 45 degrees or more",
         soft=(2.0, 32.0),
         hard=(0.5, 1000.0),
@@ -51,15 +51,15 @@ class DetailSettings(Settings):
     )
     subdivisions: int = integer(
         2,
-        label="Pieces",
+        label="Subdivisions",
         description="Fixed: pieces of each segment",
         soft=(1, 8),
         hard=(1, 64),
         shown_when=when("detail.mode", "fixed"),
     )
-    most: int = integer(
+    max_subdivisions: int = integer(
         64,
-        label="Most Pieces",
+        label="Max Subdivisions",
         description="Pieces of a segment at most",
         soft=(1, 64),
         hard=(1, 64),
@@ -69,29 +69,29 @@ class DetailSettings(Settings):
     culling: str = choice(
         "hidden",
         (
-            ("none", "Nothing", "Every strand is drawn"),
+            ("none", "None", "Every strand is drawn"),
             ("hidden", "Hidden", "Strands that lie wholly behind the head are not drawn"),
             ("away", "Facing Away", "Strands whose root faces away from the eye are not drawn"),
         ),
-        label="Leave Out",
+        label="Culling",
         description="Which strands are left out because the head hides them",
         source=_SSALOD,
     )
-    full_size: float = number(
+    lod_height: float = number(
         300.0,
-        label="Full Size",
+        label="LOD Height",
         description="Height of the groom below which fewer strands are drawn, wider to "
         "make up for it; 0 draws all of them always",
         soft=(0.0, 1000.0),
         hard=(0.0, 100_000.0),
         unit="pixels",
     )
-    least_share: float = number(
+    min_density: float = number(
         0.125,
-        label="Least Share",
+        label="Min Density",
         description="Fraction of the strands that is drawn in any distance",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
-        shown_when=when("detail.full_size"),
+        shown_when=when("detail.lod_height"),
     )

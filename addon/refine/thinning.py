@@ -96,10 +96,10 @@ def drawn_fraction(height_px: float, settings: DetailSettings) -> float:
     Args:
         height_px: of the groom in the picture.
     """
-    if settings.full_size <= 0.0 or settings.least_share >= 1.0:
+    if settings.lod_height <= 0.0 or settings.min_density >= 1.0:
         return WHOLE
-    fraction = WHOLE * height_px / settings.full_size
-    return float(min(max(fraction, settings.least_share), WHOLE))
+    fraction = WHOLE * height_px / settings.lod_height
+    return float(min(max(fraction, settings.min_density), WHOLE))
 
 
 def width_factor(rank: Floats, fraction: float, widening: float = 1.0) -> Floats:

@@ -127,7 +127,7 @@ class DetailPass:
         self._asked, self._order, self._totals = (), None, None
 
     def _thinned(self, snapshot: Snapshot, view: PictureView) -> Thinning:
-        if snapshot.rank is None or snapshot.detail.full_size <= 0.0:
+        if snapshot.rank is None or snapshot.detail.lod_height <= 0.0:
             return Thinning()
         if self._extent is None or self._extent.rank is not snapshot.rank:
             self._extent = GroomExtent.of(snapshot)
@@ -209,7 +209,7 @@ def factor_texels(cv_count: int) -> int:
 
 def _even_order(snapshot: Snapshot) -> DetailOrder:
     """All strands in the pieces of the fixed mode, which no pass has to find out."""
-    subdivisions = min(snapshot.detail.subdivisions, snapshot.detail.most)
+    subdivisions = min(snapshot.detail.subdivisions, snapshot.detail.max_subdivisions)
     pieces = (snapshot.cv_count - 1) * subdivisions
     drawn = DetailClass(pieces, 0, snapshot.strand_count)
     return DetailOrder(None, None, (drawn,), pieces * snapshot.strand_count, subdivisions)

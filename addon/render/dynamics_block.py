@@ -79,7 +79,7 @@ def block_of(
         air_fraction(settings, dt),
         settings.drag,
         settings.friction,
-        settings.push_speed * dt,
+        settings.depenetration_speed * dt,
         speed_ratio,
         REACH,
     )

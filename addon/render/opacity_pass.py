@@ -100,7 +100,7 @@ class OpacityPass:
             ball, lights, casters: as in OpacityDrawing.maps.
         """
         strand_count, cv_count = shape
-        drawn = max(round(strand_count * settings.strand_share), 1)
+        drawn = max(round(strand_count * settings.strand_fraction), 1)
         feature = ShaderFeature(
             textures={"cv_points": ("FLOAT_2D", points)},
             integers={"cv_count": cv_count, "strand_count": strand_count},

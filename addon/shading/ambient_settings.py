@@ -42,7 +42,7 @@ class AmbientSettings(Settings):
     )
     open_sky: float = number(
         0.5,
-        label="Open Sky",
+        label="AO Bias",
         description="Fraction of the sky that counts as no shade at all: half of it is what the "
         "surface of a solid body sees",
         unit="factor",
@@ -59,7 +59,7 @@ class AmbientSettings(Settings):
     )
     cell_count: int = integer(
         56,
-        label="Cells",
+        label="Resolution",
         description="Cells of the grid along the longest side of the hair",
         soft=(16, 96),
         hard=(4, 256),

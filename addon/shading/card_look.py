@@ -19,7 +19,7 @@ from .volume.card_opacity import LEAST_FACING, MEAN_TURN, turned_facing
 #: depth (measured, Sintel).
 MEAN_FACING = 1.25 * MEAN_TURN
 #: both, by the names that sidecars have for them
-EVEN_ALPHA = {"mean_facing": MEAN_FACING, "least_facing": LEAST_FACING}
+VIEW_COMPENSATED_ALPHA = {"mean_facing": MEAN_FACING, "least_facing": LEAST_FACING}
 #: Darkest texel of a base texture of which an absorption is made.
 DARKEST = 1.0e-3
 
@@ -54,7 +54,9 @@ def mapped_normal(texel: Floats, tangent: Floats, normal: Floats) -> Floats:
     return np.where(length > 1.0e-6, bent / np.maximum(length, 1.0e-6), normal)
 
 
-def even_alpha(alpha: Floats, across: Floats, tangent: Floats, to_eye: Floats) -> Floats:
+def view_compensated_alpha(
+    alpha: Floats, across: Floats, tangent: Floats, to_eye: Floats
+) -> Floats:
     """What a card covers that is seen at a slant, (...).
 
     The slant narrows a card, but no strand: what it shows lies closer together. n layers of alpha
@@ -78,7 +80,7 @@ def card_base(along: Floats, shading: ShadingSettings) -> Floats:
     even = np.full(np.shape(along), 0.5)
     colored = strand_base(along, even, even + 1.0, shading)
     grey = strand_base(along, even, even - 1.0, shading)
-    return colored + (grey - colored) * shading.grey_share
+    return colored + (grey - colored) * shading.grey_fraction
 
 
 def own_absorption(absorption: Floats, base: Floats) -> Floats:

@@ -42,7 +42,7 @@ def strand_variation(seed: Ints, cv_count: int, shading: ShadingSettings) -> Flo
         own = strand_color(strand_absorption(shading, along, color_noise, grey_noise))
         even = np.full_like(along, 0.5)
         colored, grey = (strand_absorption(shading, along, even, even + s) for s in (1.0, -1.0))
-        mean = strand_color(colored + (grey - colored) * shading.grey_share)
+        mean = strand_color(colored + (grey - colored) * shading.grey_fraction)
     else:
         own = strand_base(along, color_noise, grey_noise, shading)
         mean = card_base(along, shading)

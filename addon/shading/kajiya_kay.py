@@ -94,6 +94,6 @@ def strand_base(
     """
     base, tip = np.array(shading.base_color), np.array(shading.tip_color)
     color = base + (tip - base) * tip_fraction(along, shading)[..., None]
-    color = np.where((grey_noise < shading.grey_share)[..., None], GREY_COLOR, color)
+    color = np.where((grey_noise < shading.grey_fraction)[..., None], GREY_COLOR, color)
     brightness = 1.0 + shading.color_variation * (2.0 * color_noise - 1.0)
     return color * brightness[..., None]

@@ -107,7 +107,7 @@ class SharedSettings(Settings):
     )
     tint_start: float = number(
         0.3,
-        label="Tint From",
+        label="Tint Start",
         description="Where between root and tip the colour begins to change",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -117,7 +117,7 @@ class SharedSettings(Settings):
     )
     tint_end: float = number(
         0.9,
-        label="Tint To",
+        label="Tint End",
         description="Where between root and tip the colour is that of the tips",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -134,7 +134,7 @@ class SharedSettings(Settings):
         unit="factor",
         panel="Variation",
     )
-    grey_share: float = number(
+    grey_fraction: float = number(
         0.0,
         label="Grey Strands",
         description="Fraction of the strands that have lost their colour",

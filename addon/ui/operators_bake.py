@@ -32,7 +32,7 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
             return False
         if chosen(context):
             return True
-        cls.poll_message_set("Select hair curves, or a mesh that is a fin, first")
+        cls.poll_message_set("Select hair curves, or a mesh that is cloth, first")
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:

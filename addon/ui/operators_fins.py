@@ -25,7 +25,7 @@ class HAIRLOOM_OT_fin_add(bpy.types.Operator):
     """Make the active mesh move as cloth, pinned by a vertex group"""
 
     bl_idname = "hairloom.fin_add"
-    bl_label = "Make Fin"
+    bl_label = "Make Cloth"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -158,7 +158,7 @@ def draw_switch(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
 class HAIRLOOM_PT_fin(bpy.types.Panel):
     """A mesh that moves as cloth"""
 
-    bl_label = "Hairloom Fin"
+    bl_label = "Hairloom Cloth"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "physics"
@@ -180,7 +180,7 @@ class HAIRLOOM_PT_fin(bpy.types.Panel):
 class HAIRLOOM_PT_sidebar_fin(bpy.types.Panel):
     """A mesh that moves as cloth"""
 
-    bl_label = "Fin"
+    bl_label = "Cloth"
     bl_parent_id = "HAIRLOOM_PT_sidebar"
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -218,7 +218,9 @@ def _needs_fin(operator: type[Any], context: bpy.types.Context) -> bool:
     obj = active_mesh(context)
     if obj is not None and fin_modifier(obj) is not None:
         return True
-    operator.poll_message_set("Select a fin (Make Fin, in the Physics tab of a mesh)")
+    operator.poll_message_set(
+        "Select a mesh that is cloth (Make Cloth, in the Physics tab of a mesh)"
+    )
     return False
 
 

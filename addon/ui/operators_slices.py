@@ -1,4 +1,4 @@
-"""Show Slices and Show Skin Shadow: what the maps of shadows hold, in an Image Editor."""
+"""Show Opacity Map and Show Skin Shadow: what the maps of shadows hold, in an Image Editor."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class HAIRLOOM_OT_show_slices(bpy.types.Operator):
     """Show what the hair lets through of each light, layer by layer, in an Image Editor"""
 
     bl_idname = "hairloom.show_slices"
-    bl_label = "Show Slices"
+    bl_label = "Show Opacity Map"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

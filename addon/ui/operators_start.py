@@ -209,8 +209,8 @@ def _begin(
     for hair in grooms:
         hair.hairloom.bake.follows = chosen.follows
         hair.hairloom.show_counts = chosen.show_counts
-        if chosen.form != "automatic":
-            hair.hairloom.dynamics.form = chosen.form
+        if chosen.device != "automatic":
+            hair.hairloom.dynamics.device = chosen.device
     make_active(context, grooms)
     start_preview(operator, context, grooms)
     if not plays or bpy.app.background:

@@ -28,7 +28,7 @@ UP_AXES = (
     ("Z", "Z Up", "The file's Z axis points up, as in Blender"),
 )
 GUIDES = (
-    ("LEAVE", "Leave Out", "Only the strands that are seen; of a file with guides alone, those"),
+    ("LEAVE", "Ignore", "Only the strands that are seen; of a file with guides alone, those"),
     ("APART", "Own Object", "Guides are hair curves of their own beside the strands"),
     ("AMONG", "With Strands", "Guides are among the strands, marked by the attribute groom_guide"),
 )

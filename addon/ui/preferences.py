@@ -50,7 +50,7 @@ NEW_GROOM: dict[str, Any] = {
         default=True,
     ),
 }
-_FORM = operator_properties("dynamics")["form"]
+_DEVICE = operator_properties("dynamics")["device"]
 
 
 class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
@@ -60,7 +60,7 @@ class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
 
     __annotations__ = {
         **NEW_GROOM,
-        "form": _FORM,
+        "device": _DEVICE,
         "follows": BoolProperty(
             name="Simulate on Playback",
             description="Simulate new grooms during Blender's playback. If off, only Play does",
@@ -116,7 +116,7 @@ def preferences(context: bpy.types.Context) -> Any:
         look=LOOK,
         motion=DYNAMICS,
         plays=True,
-        form="automatic",
+        device="automatic",
         follows=True,
         show_counts=False,
     )

@@ -75,10 +75,10 @@ def draw_shafts(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Where there are none, only how to get some."""
     groom = hair.data.hairloom
-    layout.prop(groom.children, "way")
-    if groom.children.way != "none":
+    layout.prop(groom.children, "method")
+    if groom.children.method != "none":
         layout.prop(hair.hairloom, "children_density")
-        draw_section(layout, groom, "children", leave_out={"way"})
+        draw_section(layout, groom, "children", leave_out={"method"})
 
 
 def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

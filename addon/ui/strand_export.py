@@ -36,7 +36,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         options={"HIDDEN"},
     )
     several: EnumProperty(
-        name="Several Hairs", description="Where more than one hair is chosen", items=SEVERAL
+        name="Multiple Objects", description="Where more than one hair is chosen", items=SEVERAL
     )
 
     @property

@@ -29,7 +29,7 @@ def swinging(new_hair, sphere, tmp_path):
         sphere.location.x = x
         sphere.keyframe_insert("location", frame=frame)
     hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     scene.frame_set(1)
     return hair, sphere
@@ -73,7 +73,7 @@ def test_a_bake_equals_playback_bit_for_bit(swinging, evaluated):
 def test_a_bake_on_the_gpu_equals_playback_on_the_gpu_bit_for_bit(swinging, evaluated):
     """Guides and what is drawn of them; the copy for renders is ridden on the CPU."""
     hair, _ = swinging
-    hair.hairloom.dynamics.form = "compute"
+    hair.hairloom.dynamics.device = "compute"
     session = previews.start(hair, evaluated())
     guides, strands = [], []
     for frame in range(1, LAST + 1):
@@ -143,7 +143,7 @@ def test_hair_without_a_head_is_baked(new_hair, evaluated, tmp_path):
         hair.rotation_euler.x = angle
         hair.keyframe_insert("rotation_euler", frame=frame)
     hair.hairloom.bake.folder = str(tmp_path / "bake")
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     scene.frame_set(1)
     previews.start(hair, evaluated())
     shown = played(hair, last=4)

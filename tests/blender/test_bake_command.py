@@ -24,7 +24,7 @@ def file(new_hair, sphere, tmp_path):
         sphere.location.x = x
         sphere.keyframe_insert("location", frame=frame)
     hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     path = tmp_path / "wig.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

@@ -36,11 +36,18 @@ SCHEMA = json.loads(
 )
 SMALL = (
     *("--set", "grow.strand_count=100", "--set", "guides.guide_count=10"),
-    *("--set", "card_occlusion.rays=16", "--set", "cards.way=guides"),
+    *("--set", "card_occlusion.rays=16", "--set", "cards.source=guides"),
     *("--set", "atlas.source=made"),
 )
 BAKED = (
-    *("--set", "cards.way=clusters", "--set", "cards.card_count=8", "--set", "atlas.source=baked"),
+    *(
+        "--set",
+        "cards.source=clusters",
+        "--set",
+        "cards.card_count=8",
+        "--set",
+        "atlas.source=baked",
+    ),
     *("--set", "atlas.size=512", "--set", "atlas.columns=4", "--set", "atlas.rows=2"),
 )
 
@@ -236,7 +243,7 @@ def grown(sphere: Any, name: str) -> Any:
     hair.name = name
     hair.data.hairloom.guides.guide_count = 10
     hair.data.hairloom.card_occlusion.rays = 16
-    hair.data.hairloom.cards.way, hair.data.hairloom.atlas.source = "guides", "made"
+    hair.data.hairloom.cards.source, hair.data.hairloom.atlas.source = "guides", "made"
     return hair
 
 

@@ -69,7 +69,7 @@ def test_pictures_that_were_never_saved_are_read_as_they_are() -> None:
 def hair(sphere: Any, new_hair: Any) -> Any:
     hair = new_hair(sphere)
     hair.data.hairloom.guides.guide_count = 12
-    hair.data.hairloom.cards.way, hair.data.hairloom.atlas.source = "guides", "made"
+    hair.data.hairloom.cards.source, hair.data.hairloom.atlas.source = "guides", "made"
     texture = hair.data.hairloom.card_texture
     texture.variant_width, texture.height, texture.strand_count = 16, 32, 4
     return hair
@@ -119,7 +119,7 @@ def test_a_picture_that_is_gone_is_told_and_replaced(
 def test_the_command_line_takes_pictures(write: Any, tmp_path: Path, gpu_context: Any) -> None:
     shift, tangent = values(1), values(3)
     arguments = ["cards", "--set", "grow.strand_count=60", "--set", "guides.guide_count=10"]
-    arguments += ["--set", "cards.way=guides", "--set", "atlas.source=made"]
+    arguments += ["--set", "cards.source=guides", "--set", "atlas.source=made"]
     arguments += ["--set", "card_texture.highlights=tangent", "--output", str(tmp_path / "c.glb")]
     for name, pixels in (("shift", shift), ("tangent", tangent)):
         file = write(f"{name}.exr", pixels, is_color=False)

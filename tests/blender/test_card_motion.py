@@ -37,7 +37,7 @@ from hairloom.addon.shading.texture_settings import TextureSettings  # noqa: E40
 FRAMES, RATE = 31, 30.0
 PANDA_MOTION = Path(__file__).parent / "panda_motion.py"
 SETTINGS = SettingsMap(
-    CardSettings(way="guides", levels=2),
+    CardSettings(source="guides", levels=2),
     AtlasSettings(source="made"),
     TextureSettings(variant_width=32, height=64),
 )

@@ -22,7 +22,7 @@ def test_the_command_line_writes_a_take(tmp_path: Path, capfd: Any) -> None:
     few += ["--set", "grow.length=0.06"]
     take = str(tmp_path / "take.npz")
     assert command_line.run(["simulate", *few, "--seconds", "0.2", "--output", take]) == 0
-    small = ["--set", "cards.way=guides", "--levels", "1", "--set", "atlas.source=made"]
+    small = ["--set", "cards.source=guides", "--levels", "1", "--set", "atlas.source=made"]
     arguments = ["cards", *few, *small, "--output", str(tmp_path / "hair.glb")]
     moving = ["--motion", "joints", "--chains", "4"]
     assert command_line.run([*arguments, *moving]) == 1
@@ -47,7 +47,7 @@ def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
     hair, scene = bpy.context.object, bpy.context.scene
     hair.data.hairloom.guides.guide_count = 8
     hair.data.hairloom.card_occlusion.rays = 8
-    hair.data.hairloom.cards.way, hair.data.hairloom.atlas.source = "guides", "made"
+    hair.data.hairloom.cards.source, hair.data.hairloom.atlas.source = "guides", "made"
     scene.frame_start, scene.frame_end = 3, 9
     for frame in (3, 6, 9):
         sphere.location.x = 0.03 * (frame % 2)
@@ -59,7 +59,7 @@ def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
     assert not path.parent.exists()
     scene.frame_set(3)
     hair.hairloom.bake.folder = str(tmp_path / "bake")
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
     list(Bake.of([hair], scene).steps())
     for chosen, first, count in (
@@ -85,7 +85,7 @@ def test_cancelled_in_its_midst_it_leaves_the_old_files(
     bpy.context.view_layer.objects.active = sphere
     bpy.ops.hairloom.grow(strand_count=40, length=0.05)
     hair, scene = bpy.context.object, bpy.context.scene
-    hair.data.hairloom.cards.way = "guides"
+    hair.data.hairloom.cards.source = "guides"
     hair.data.hairloom.card_occlusion.rays = 8
     hair.data.hairloom.atlas.source = "made"
     scene.frame_start, scene.frame_end = 1, 6
@@ -94,7 +94,7 @@ def test_cancelled_in_its_midst_it_leaves_the_old_files(
         sphere.keyframe_insert("location", frame=frame)
     scene.frame_set(1)
     hair.hairloom.bake.folder = str(tmp_path / "bake")
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
     list(Bake.of([hair], scene).steps())
     folder = tmp_path / "out"

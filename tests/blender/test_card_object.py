@@ -18,7 +18,7 @@ def hair(new_hair, sphere):
     """A hedgehog of 60 strands in two groups on a sphere, to be few cards of a small picture."""
     made = new_hair(sphere)
     cards, texture = made.data.hairloom.cards, made.data.hairloom.card_texture
-    cards.way, cards.card_count, cards.levels, cards.fly_aways = "clusters", 12, 3, 0.0
+    cards.source, cards.card_count, cards.levels, cards.fly_aways = "clusters", 12, 3, 0.0
     cards.segment_count, cards.error = 8, 0.0
     made.data.hairloom.atlas.source = "made"
     made.data.hairloom.card_occlusion.rays = 32
@@ -248,6 +248,6 @@ def test_the_panel_shows_only_what_acts_on_these_cards(hair):
     groom.atlas.source = "baked"
     assert "atlas_columns" not in shown(draw_strips) and "padding" in shown(draw_card_texture)
     assert "shift_cells" in drawn and "tip_length" not in drawn
-    groom.cards.way = "guides"
+    groom.cards.source = "guides"
     assert "width_factor" in shown(draw_strips) and "card_count" not in shown(draw_strips)
     assert {"source", "padding"} <= shown(draw_card_texture)

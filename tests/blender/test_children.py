@@ -29,8 +29,8 @@ def hair(new_hair, sphere):
     """60 curves on a head, with 200 children between them."""
     hair = new_hair(sphere)
     children = hair.data.hairloom.children
-    children.way, children.strand_count = "multi", 200
-    hair.hairloom.dynamics.form = "numpy"
+    children.method, children.strand_count = "multi", 200
+    hair.hairloom.dynamics.device = "numpy"
     return hair
 
 
@@ -75,7 +75,7 @@ def upper_half(head, name):
 
 @pytest.mark.parametrize("way", ["multi", "single"])
 def test_guides_come_first_and_children_after_them(way, hair, evaluated):
-    hair.data.hairloom.children.way = way
+    hair.data.hairloom.children.method = way
     session = previews.start(hair, evaluated())
     rig = session.rig
     assert (len(rig.guides), rig.strands.strand_count) == (60, 260)
@@ -135,7 +135,7 @@ def test_a_hundred_thousand_children_are_made(hair, evaluated):
 
 def test_without_a_surface_guides_are_shown_with_a_word(new_hair, evaluated):
     hair = new_hair()
-    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.guides.guide_count = 20
     session = previews.start(hair, evaluated())
     assert session.rig.strands.strand_count == len(session.rig.guides) == 20
@@ -216,9 +216,9 @@ def test_a_bake_of_children_plays_back_bit_for_bit(moving, evaluated):
 
 def test_a_bake_keeps_what_there_was_to_say(new_hair, evaluated, tmp_path):
     hair = new_hair()
-    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.method = "multi"
     hair.hairloom.bake.folder = str(tmp_path / "bake")
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     bpy.context.scene.frame_end = 2
     plan = Bake.of([hair], bpy.context.scene)
     list(plan.steps())
@@ -245,7 +245,7 @@ def test_a_bake_says_when_children_have_changed(moving, sphere, evaluated):
     moving.hairloom.children_density = "Top"
     assert changed() == ("children",)
     moving.hairloom.children_density = ""
-    children.way = "none"
+    children.method = "none"
     assert changed() == ("children",)
 
 
@@ -292,7 +292,7 @@ def test_undo_brings_the_children_back(hair, evaluated):
 
 
 def test_cards_are_one_a_guide_and_tressfx_holds_all(hair, evaluated, tmp_path, capfd):
-    hair.data.hairloom.cards.way = "guides"
+    hair.data.hairloom.cards.source = "guides"
     assert bpy.ops.hairloom.export_cards(filepath=str(tmp_path / "cards.glb")) == {"FINISHED"}
     assert "Wrote 60 cards" in capfd.readouterr().out
     plan = StrandExport.of([hair], evaluated(), TRESSFX, StrandOutput(up="Z"))
@@ -309,11 +309,11 @@ def on_the_command_line(sphere, tmp_path, verb, *more):
         "--head",
         sphere.name,
         "--set",
-        "children.way=multi",
+        "children.method=multi",
         "--report",
         str(report),
     ]
-    arguments += ["--set", "grow.way=normals", "--set", "grow.strand_count=80"]
+    arguments += ["--set", "grow.method=normals", "--set", "grow.strand_count=80"]
     code = command_line.run([*arguments, "--output", str(tmp_path / "hair.tfx"), *more])
     return code, json.loads(report.read_text()) if code == 0 else {}
 
@@ -338,14 +338,14 @@ def test_the_command_line_makes_children(sphere, tmp_path, capfd):
 def test_a_picture_of_children_says_what_was_drawn(sphere, tmp_path, gpu_context):
     report = tmp_path / "report.json"
     arguments = ["render", "--head", sphere.name, "--width", "96", "--height", "96"]
-    arguments += ["--set", "grow.way=normals", "--set", "grow.strand_count=80"]
-    arguments += ["--set", "children.way=multi", "--set", "children.strand_count=400"]
+    arguments += ["--set", "grow.method=normals", "--set", "grow.strand_count=80"]
+    arguments += ["--set", "children.method=multi", "--set", "children.strand_count=400"]
     arguments += ["--output", str(tmp_path / "still.png"), "--report", str(report)]
     drawn = {}
-    for full_size in (0, 300):
-        more = ["--set", f"detail.full_size={full_size}", "--set", "detail.culling=none"]
+    for lod_height in (0, 300):
+        more = ["--set", f"detail.lod_height={lod_height}", "--set", "detail.culling=none"]
         assert command_line.run([*arguments, *more]) == 0
-        drawn[full_size] = json.loads(report.read_text())["drawn"]
+        drawn[lod_height] = json.loads(report.read_text())["drawn"]
     assert drawn[0]["strands"] == 480 and drawn[0]["pieces"] >= 480 * 15
     assert drawn[300]["strands"] < 480 and drawn[300]["vertices"] < drawn[0]["vertices"]
 
@@ -353,7 +353,7 @@ def test_a_picture_of_children_says_what_was_drawn(sphere, tmp_path, gpu_context
 def test_the_command_line_says_what_is_missing(hair, sphere, tmp_path, capfd):
     hair.data.surface = hair.parent = None
     report = tmp_path / "report.json"
-    arguments = ["export", "--groom", "Hair", "--set", "children.way=multi"]
+    arguments = ["export", "--groom", "Hair", "--set", "children.method=multi"]
     arguments += ["--report", str(report), "--output", str(tmp_path / "hair.tfx")]
     assert command_line.run(arguments) == 0
     assert "Hair: Children need a surface" in capfd.readouterr().out

@@ -216,7 +216,7 @@ def test_hair_grows_where_and_as_long_as_the_groups_say(
         for weight in np.unique(value):
             chosen = np.flatnonzero(value == weight).tolist()
             group.add(chosen, float(weight), "REPLACE")
-    arguments = ["export", "--set", "grow.way=normals", "--set", "grow.length=0.1"]
+    arguments = ["export", "--set", "grow.method=normals", "--set", "grow.length=0.1"]
     arguments += ["--set", "grow.length_variation=0", "--set", "grow.strand_count=200"]
     arguments += ["--no-uv", "--output", str(tmp_path / "hair.tfx")]
     groups = ["--density-group", "Right", "--length-group", "Half"]

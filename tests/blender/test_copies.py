@@ -20,7 +20,7 @@ LINKED = pytest.mark.parametrize("linked", [False, True], ids=["Shift-D", "Alt-D
 def playing(new_hair, sphere, evaluated):
     """Hair on a head, which plays: its hair, head and session."""
     hair = new_hair(sphere)
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
     session = previews.start(hair, evaluated())
     assert previews.play(evaluated()) == []
@@ -52,7 +52,7 @@ def test_a_duplicate_beside_hair_that_plays_is_shown_by_blender(linked, playing,
     goes_on(playing)
     assert twin.evaluated_get(evaluated()).display_type == "TEXTURED"
     assert playing.hair.evaluated_get(evaluated()).display_type == "BOUNDS"
-    assert twin.hairloom.dynamics.form == "numpy"
+    assert twin.hairloom.dynamics.device == "numpy"
     twin.hairloom.dynamics.gusts, twin.data.hairloom.shading.ambient = 0.875, 0.25
     bpy.data.objects.remove(twin)
     bpy.context.view_layer.update()

@@ -49,7 +49,7 @@ def test_detail_acts_at_once(preview):
     hair, _, session = preview
     rig, before = session.rig, drawing(session).snapshot
     detail = hair.data.hairloom.detail
-    detail.mode, detail.subdivisions, detail.full_size = "fixed", 7, 0.0
+    detail.mode, detail.subdivisions, detail.lod_height = "fixed", 7, 0.0
     snapshot = drawing(session).snapshot
     assert (snapshot.detail.mode, snapshot.detail.subdivisions) == ("fixed", 7)
     assert session.rig is rig and not session.is_stale
@@ -67,7 +67,7 @@ def test_the_snapshot_knows_guides_groups_and_ranks(preview):
 
 def test_of_children_the_last_to_grow_are_the_first_to_go(new_hair, sphere, evaluated):
     hair = new_hair(sphere)
-    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 240
     rank = drawing(previews.start(hair, evaluated())).snapshot.rank
     assert (np.diff(rank[60:]) > 0.0).all() and rank[60] >= 60 / 300 and rank[-1] < 1.0
@@ -157,7 +157,7 @@ def test_the_counts_are_what_was_drawn(preview, gpu_context):
     hair.data.hairloom.detail.mode = "fixed"
     hair.data.hairloom.detail.subdivisions = 3
     hair.data.hairloom.detail.culling = "none"
-    hair.data.hairloom.detail.full_size = 0.0
+    hair.data.hairloom.detail.lod_height = 0.0
     shown, strand_pass = drawing(session).snapshot, StrandPass()
     low, high = shown.strands.min(axis=(0, 1)), shown.strands.max(axis=(0, 1))
     camera = frame_camera((low, high), (0.0, -1.0, 0.0), 0.5, 1.0)

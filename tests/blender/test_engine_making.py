@@ -96,7 +96,7 @@ def test_old_hair_stays_until_the_new_is_made(hair: Any, gate: Gate) -> None:
     view.read()
     view.arrive()
     gate.opened.clear()
-    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.method = "multi"
     for count in (300, 310, 320):
         hair.data.hairloom.children.strand_count = count
         (old,) = view.read({hair.data.session_uid})

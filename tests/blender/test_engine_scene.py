@@ -173,7 +173,7 @@ def test_hair_is_rendered_as_it_was_baked(
     for frame, x in ((1, -0.2), (4, 0.2)):
         sphere.location.x = x
         sphere.keyframe_insert("location", frame=frame)
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     hair.pass_index = 5
@@ -209,7 +209,7 @@ def test_a_bake_has_the_animated_settings_of_the_frame(
     for frame, width in ((1, 1.0), (3, 5.0)):
         strands.width_scale = width
         hair.data.keyframe_insert("hairloom.strands.width_scale", frame=frame)
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     stage.frame_start, stage.frame_end = 1, 3

@@ -98,7 +98,7 @@ def test_a_check_writes_nothing(
     run: Callable[..., Any],
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    source = ["--head", "Head", "--set", "grow.way=normals", "--set", "grow.strand_count=30"]
+    source = ["--head", "Head", "--set", "grow.method=normals", "--set", "grow.strand_count=30"]
     run(*source, "--preflight", output="hair.abc")
     text = capfd.readouterr().out
     assert "left-handed" in text and "Warning: All strands are in one group" in text
@@ -145,7 +145,7 @@ def test_hair_of_the_scene_leaves_with_its_bake(
 ) -> None:
     hair = new_hair(sphere)
     hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     for frame, x in ((1, 0.0), (4, 0.1)):
         sphere.location.x = x

@@ -43,8 +43,8 @@ def folder(sphere: Any, new_hair: Callable[..., Any], tmp_path: Path) -> Path:
     hair, scene = new_hair(sphere), bpy.context.scene
     scene.frame_start, scene.frame_end = 1, FRAMES
     hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.dynamics.form = "numpy"
-    hair.data.hairloom.cards.way = "guides"
+    hair.hairloom.dynamics.device = "numpy"
+    hair.data.hairloom.cards.source = "guides"
     hair.data.hairloom.atlas.source = "made"
     (tmp_path / "scenes").mkdir()
     for number, name in enumerate(CHARACTERS, start=1):

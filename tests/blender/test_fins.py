@@ -191,7 +191,7 @@ def test_a_modifier_above_that_makes_vertices_is_said(flag, evaluated, kind, pla
     flag.modifiers.new("Culprit", kind)
     flag.modifiers.move(1, place)
     update()
-    with pytest.raises(HairloomError, match=r"Culprit.*below Hairloom Fin"):
+    with pytest.raises(HairloomError, match=r"Culprit.*below Hairloom Cloth"):
         fins.start(flag, evaluated())
 
 
@@ -219,7 +219,7 @@ def change_topology(flag):
     [
         (change_topology, "Play again"),
         (lambda flag: bpy.ops.object.mode_set(mode="EDIT"), "Edit Mode"),
-        (lambda flag: flag.modifiers.clear(), "not a fin"),
+        (lambda flag: flag.modifiers.clear(), "not cloth"),
         (lambda flag: setattr(flag, "scale", (1.0, 0.0, 1.0)), "scale"),
         (lambda flag: bpy.data.objects.remove(flag), "gone"),
     ],

@@ -87,7 +87,7 @@ def test_a_preview_shows_blenders_strands_until_its_own_are_made(hair, evaluated
 
 
 def test_what_a_thread_makes_is_the_same_to_the_bit(hair, evaluated, in_window):
-    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 500
     session = previews.start(hair, evaluated())
     arrive(session)
@@ -149,7 +149,7 @@ def hold(monkeypatch):
 
 def test_old_hair_plays_until_the_new_is_made(playing, hair, evaluated, monkeypatch):
     opened = hold(monkeypatch)
-    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 300
     scene_events.catch_up(evaluated())
     assert playing.is_pending and not playing.is_stale
@@ -303,7 +303,7 @@ def rounds(session, *frames):
 
 
 def test_playback_goes_on_before_the_hair_is_made(hair, moving, evaluated, gate, monkeypatch):
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     session = previews.start(hair, evaluated())
     fields.field_of(session.source.head, session.settings[DynamicsSettings], place="Head")
     monkeypatch.setattr(playback, "is_played", lambda: True)

@@ -75,7 +75,7 @@ def test_guides_grow_along_the_normals_where_and_as_long_as_painted(sphere):
     attribute.data.foreach_set("value", np.full(len(weights), 0.5, np.float32))
     hair = grown(
         sphere,
-        way="normals",
+        method="normals",
         per_vertex=True,
         length=0.1,
         length_variation=0.0,
@@ -96,7 +96,7 @@ def test_a_group_is_read_after_the_modifiers(sphere):
     weights = paint_upper_half(sphere, "Scalp")
     modifier = sphere.modifiers.new("Mirror", "MIRROR")
     modifier.use_axis, modifier.use_mirror_merge = (True, False, False), False
-    hair = grown(sphere, way="normals", per_vertex=True, density_group="Scalp")
+    hair = grown(sphere, method="normals", per_vertex=True, density_group="Scalp")
     assert len(hair.data.curves) == 2 * (weights > 0.5).sum()
 
 
@@ -123,7 +123,7 @@ def test_a_group_that_cannot_be_used_is_named_and_grows_nothing(option, sphere, 
         ("broken", "not a finite number"),
     ):
         with pytest.raises(RuntimeError, match=message):
-            grown(sphere, way="normals", **{option: name})
+            grown(sphere, method="normals", **{option: name})
         told()
     assert [obj.name for obj in bpy.data.objects] == ["Head"]
     assert len(bpy.data.hair_curves) == 0
@@ -132,7 +132,7 @@ def test_a_group_that_cannot_be_used_is_named_and_grows_nothing(option, sphere, 
 def test_growing_is_undone_in_one_step(sphere):
     paint_upper_half(sphere, "Scalp")
     bpy.ops.ed.undo_push(message="before")
-    bpy.ops.hairloom.grow("EXEC_DEFAULT", True, way="normals", density_group="Scalp")
+    bpy.ops.hairloom.grow("EXEC_DEFAULT", True, method="normals", density_group="Scalp")
     assert len(bpy.data.hair_curves) == 1
     bpy.ops.ed.undo()
     assert [obj.name for obj in bpy.data.objects] == ["Head"]
@@ -150,7 +150,7 @@ def test_growing_on_a_mesh_without_faces_is_told(sphere, told):
     sphere.data.clear_geometry()
     for way in ("combed", "normals"):
         with pytest.raises(RuntimeError, match="no faces"):
-            grown(sphere, way=way)
+            grown(sphere, method=way)
     told()
 
 
@@ -189,7 +189,7 @@ def test_axes_and_scale_are_undone_by_their_own_inverse(groom_file):
 def test_cards_are_written_with_their_sidecar(sphere, tmp_path, told):
     hair = grown(sphere, strand_count=300, length=0.05)
     hair.data.hairloom.guides.guide_count = 20
-    hair.data.hairloom.cards.way, hair.data.hairloom.atlas.source = "guides", "made"
+    hair.data.hairloom.cards.source, hair.data.hairloom.atlas.source = "guides", "made"
     out = tmp_path / "cards.glb"
     data_blocks = {data.name_full for data in bpy.data.user_map()}
     assert bpy.ops.hairloom.export_cards(filepath=str(out)) == {"FINISHED"}

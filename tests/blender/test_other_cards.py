@@ -25,7 +25,7 @@ def hair(new_hair, sphere):
     """A hedgehog on a sphere, with cards, and a larger copy of them that is nobody's."""
     made = new_hair(sphere)
     groom = made.data.hairloom
-    groom.cards.way, groom.cards.card_count, groom.cards.levels = "clusters", 12, 2
+    groom.cards.source, groom.cards.card_count, groom.cards.levels = "clusters", 12, 2
     groom.atlas.source, groom.card_occlusion.rays = "made", 64
     groom.card_texture.height = groom.card_texture.variant_width = 32
     bpy.context.view_layer.update()

@@ -107,13 +107,13 @@ def saved_and_loaded(tmp_path):
 
 def test_groups_that_the_library_has_not_got_are_kept_on_overrides(override, tmp_path):
     override.data.hairloom.shafts.strength = 0.75  # nobody has looked at these in the library
-    override.data.hairloom.children.way = "multi"
+    override.data.hairloom.children.method = "multi"
     override.hairloom.bake.in_renders = not (before := override.hairloom.bake.in_renders)
     bpy.ops.ed.undo_push(message="Set")  # Blender compares with the library then, too
     hair = saved_and_loaded(tmp_path)
     assert hair.data.override_library is not None
     assert hair.data.hairloom.shafts.strength == 0.75
-    assert hair.data.hairloom.children.way == "multi"
+    assert hair.data.hairloom.children.method == "multi"
     assert hair.hairloom.bake.in_renders is not before
     assert settings(hair) == (2.0, 0.5), "the library's"
 
@@ -228,7 +228,7 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
     hair.hairloom.bake.follows = True
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     hair.hairloom.dynamics.gusts = 0.0
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 16
     session = previews.start(hair, evaluated())
     frames(scene, 6)

@@ -54,7 +54,7 @@ def scene(new_hair, sphere, tmp_path):
     scene.render.filepath = str(tmp_path / "pictures" / "still_")
     hair = bpy.data.objects["Hair"]
     hair.data.attributes["radius"].data.foreach_set("value", np.full(480, 0.004, np.float32))
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     scene.frame_set(1)

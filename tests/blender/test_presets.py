@@ -31,7 +31,7 @@ def hair(new_hair: Callable[..., bpy.types.Object]) -> bpy.types.Object:
 @pytest.mark.parametrize("name", [entry.name for entry in presets.shipped("volume")])
 def test_shadows_keep_key_fill_and_rim_light(name: str) -> None:
     """Occlusion, which stands in for a light without a map, is 30 % darker on blond hair."""
-    assert presets.named_preset(name).settings.most_lights >= 3
+    assert presets.named_preset(name).settings.max_lights >= 3
 
 
 @pytest.mark.parametrize("name", [entry.name for entry in presets.shipped("shading")])

@@ -19,7 +19,7 @@ from hairloom.addon.blender.command_line.run_job import OPERATORS
 from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.scene.fin_modifier import fin_modifier
 
-FEW = ["--set", "grow.way=normals", "--set", "grow.strand_count=40", "--set", "grow.length=0.05"]
+FEW = ["--set", "grow.method=normals", "--set", "grow.strand_count=40", "--set", "grow.length=0.05"]
 
 
 @pytest.fixture
@@ -152,7 +152,7 @@ def test_spheres_are_fitted_and_removed(scene: Path) -> None:
 
 
 def test_cards_are_made_as_objects_and_sorted(scene: Path, gpu_context: object) -> None:
-    small = ["--set", "cards.way=clusters", "--set", "atlas.size=512", "--set", "cards.levels=1"]
+    small = ["--set", "cards.source=clusters", "--set", "atlas.size=512", "--set", "cards.levels=1"]
     facts = run(scene, "run", "make_cards", "--object", "Hair", *small)
     (cards,) = [obj for obj in bpy.data.objects if obj.hairloom.card_object.groom]
     count = len(cards.data.polygons)
@@ -226,7 +226,7 @@ def test_bad_input_saves_nothing(
 def test_a_scene_that_moves_keeps_its_bakes(scene: Path, tmp_path: Path) -> None:
     """The folder of a bake is named as seen from the new place."""
     other = tmp_path / "shots" / "seven" / "wig.blend"
-    quick = ["--set", "dynamics.form=numpy", "--set", "dynamics.collider_resolution=8"]
+    quick = ["--set", "dynamics.device=numpy", "--set", "dynamics.collider_resolution=8"]
     bake = ["bake", "--scene", str(scene), "--frames", "1", "3", *quick]
     folder = tmp_path / "baked"
     assert command_line.run([*bake, "--output", str(folder), "--save-as", str(other)]) == 0
@@ -303,7 +303,7 @@ def test_hair_of_a_scene_is_taken_with_its_own_settings(scene: Path, tmp_path: P
     """What the artist has set goes into files; --set goes over it."""
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     groom = bpy.data.objects["Hair"].data.hairloom
-    groom.children.way, groom.children.strand_count = "single", 300
+    groom.children.method, groom.children.strand_count = "single", 300
     bpy.ops.wm.save_mainfile()
 
     def exported(*more: str) -> int:
@@ -314,5 +314,5 @@ def test_hair_of_a_scene_is_taken_with_its_own_settings(scene: Path, tmp_path: P
 
     assert exported("--groom", "Hair") == exported("--object", "Hair") == exported()
     assert exported() == pytest.approx(300, rel=0.3)
-    fewer = exported("--groom", "Hair", "--set", "children.way=none")
-    assert fewer == exported("--object", "Hair", "--set", "children.way=none") < exported()
+    fewer = exported("--groom", "Hair", "--set", "children.method=none")
+    assert fewer == exported("--object", "Hair", "--set", "children.method=none") < exported()

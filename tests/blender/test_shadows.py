@@ -58,7 +58,7 @@ def snapshot_of(frame: Any, strands: np.ndarray, **more: Any) -> Any:
         "ambient": (0.0, 0.0, 0.0),
         "shading": PLAIN,
         "strand_settings": WIDE,
-        "detail": DetailSettings(culling="none", full_size=0.0),
+        "detail": DetailSettings(culling="none", lod_height=0.0),
         # so that the hair's volume faces the light
         "volume_center": np.array([0.0, 0.0, -9.0], np.float32),
         "table_size": PREVIEW_SIZE,
@@ -67,7 +67,7 @@ def snapshot_of(frame: Any, strands: np.ndarray, **more: Any) -> Any:
 
 
 def of_form(form: str, **more: Any) -> VolumeSettings:
-    settings = {"resolution": 128, "strand_share": 1.0, "scattering": False}
+    settings = {"resolution": 128, "strand_fraction": 1.0, "scattering": False}
     return VolumeSettings(shadows=form, **{**settings, **more})
 
 

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.draws
 def preview(new_hair, sphere, evaluated):
     """Hair on the sphere, shown as cards."""
     hair = new_hair(sphere)
-    hair.data.hairloom.cards.way = "guides"
+    hair.data.hairloom.cards.source = "guides"
     hair.data.hairloom.card_occlusion.rays = 4
     hair.data.hairloom.card_drawing.shown_as = "cards"
     session = previews.start(hair, evaluated())
@@ -172,7 +172,7 @@ def test_cards_that_cannot_be_made_leave_strands_and_say_why(preview):
     groom = hair.data.hairloom
     groom.atlas.size, groom.atlas.columns, groom.atlas.rows = "512", 256, 256
     groom.cards.card_count = 60
-    groom.cards.way = "clusters"
+    groom.cards.source = "clusters"
     assert drawn(session).cards is None and drawn(session).strand_count == 60
     (warning,) = session.cards.warnings
     assert "no cards" in warning and "atlas" in warning.lower()
@@ -224,13 +224,13 @@ def test_cards_that_can_be_made_again_warn_of_nothing(preview):
     hair, _, session = preview
     groom = hair.data.hairloom
     groom.atlas.size, groom.atlas.columns, groom.atlas.rows = "512", 256, 256
-    groom.cards.way = "clusters"
+    groom.cards.source = "clusters"
     assert session.cards.warnings
     groom.card_drawing.shown_as = "strands"
     assert session.cards.warnings == ()
     groom.card_drawing.shown_as = "cards"
     assert session.cards.warnings
-    groom.cards.way = "guides"
+    groom.cards.source = "guides"
     groom.atlas.source = "made"
     assert not any("no cards" in each for each in session.cards.warnings)
     assert drawn(session).cards is not None

@@ -1,4 +1,4 @@
-"""Show Slices and Show Skin Shadow: maps as files of the command line and as images."""
+"""Show Opacity Map and Show Skin Shadow: maps as files of the command line and as images."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_render_writes_the_layers_side_by_side(
     assert command_line.run([*arguments, "--set", "volume.shadows=none"]) == 1
     assert "--slices" in capfd.readouterr().err and not picture.exists()
     arguments += ["--set", "volume.shadows=slices", "--set", "volume.resolution=64"]
-    arguments += ["--set", "volume.most_lights=2"]
+    arguments += ["--set", "volume.max_lights=2"]
     assert command_line.run(arguments) == 0
     image = bpy.data.images.load(str(slices))
     # one light below the other
@@ -82,7 +82,7 @@ def test_render_writes_the_skin_shadow(tmp_path: Path, capfd: pytest.CaptureFixt
     arguments += ["--set", "volume.resolution=64", "--set", "skin.skin_resolution=128"]
     assert command_line.run([*arguments, "--set", "skin.soft_shadow=false"]) == 1
     assert "Soft Shadow on Skin" in capfd.readouterr().err
-    assert command_line.run([*arguments, "--set", "volume.most_lights=2"]) == 0
+    assert command_line.run([*arguments, "--set", "volume.max_lights=2"]) == 0
     image = bpy.data.images.load(str(shadow))
     pixels = np.array(image.pixels[:]).reshape(*image.size[::-1], 4)
     assert max(image.size[0] / 2, image.size[1]) == 128

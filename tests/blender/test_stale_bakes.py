@@ -31,7 +31,7 @@ def baked(new_hair: Any, sphere: Any, tmp_path: Path) -> tuple[Any, Any]:
         sphere.location.x = x
         sphere.keyframe_insert("location", frame=frame)
     hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     scene.frame_set(1)
     list(Bake.of([hair], scene).steps())
@@ -64,7 +64,7 @@ def test_settings_are_told_in_any_frame(frame: int, baked: Any, changed: Any) ->
 
 
 def test_another_form_of_the_solver_is_no_change(baked: Any, changed: Any) -> None:
-    baked[0].hairloom.dynamics.form = "automatic"
+    baked[0].hairloom.dynamics.device = "automatic"
     assert changed() == ()
 
 

@@ -182,7 +182,7 @@ def test_children_are_strands_and_their_guides_are_marked(
 ) -> None:
     hair = new_hair(sphere)
     hair.data.hairloom.guides.guide_count = 60
-    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 200
     bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "a.abc"))
     (curves,) = curves_of(tmp_path / "a.abc").values()

@@ -40,7 +40,7 @@ def swinging(new_hair: Any, sphere: Any, tmp_path: Path) -> tuple[Any, Any]:
         sphere.location.x = x
         sphere.keyframe_insert("location", frame=frame)
     hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     scene.frame_set(1)
     return hair, sphere
@@ -158,7 +158,7 @@ def test_children_follow_guides_that_modifiers_move(
     """All points go up by as much, so the children between them do."""
     hair = new_hair(sphere)
     hair.data.hairloom.guides.guide_count = 60
-    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 100
     push_up(hair, 0.02, frame_driven=True)
     bpy.context.scene.frame_set(0)

@@ -22,7 +22,7 @@ from hairloom.addon.blender.base import interruption
 from hairloom.addon.blender.command_line import command_line
 
 REPOSITORY = Path(__file__).parents[2]
-QUICK = ["--set", "dynamics.form=numpy", "--set", "dynamics.collider_resolution=8"]
+QUICK = ["--set", "dynamics.device=numpy", "--set", "dynamics.collider_resolution=8"]
 
 
 @pytest.fixture

@@ -24,7 +24,7 @@ def swinging(new_hair, sphere, evaluated):
         sphere.location.x = x
         sphere.keyframe_insert("location", frame=frame)
     hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     scene.frame_set(5)
     return hair, sphere, previews.start(hair, evaluated())
 
@@ -170,10 +170,10 @@ def test_paused_hair_holds_and_goes_on(swinging, evaluated):
 
 def test_another_form_in_the_middle_goes_on_from_where_the_hair_is(swinging):
     hair, _, session = swinging
-    hair.hairloom.dynamics.form = "automatic"
+    hair.hairloom.dynamics.device = "automatic"
     go(1, 2, 3, 4)
     before = lag(session)
-    hair.hairloom.dynamics.form = "numpy"
+    hair.hairloom.dynamics.device = "numpy"
     assert session.solver.form == "numpy"
     assert lag(session) == pytest.approx(before, abs=1e-5)
     go(5)

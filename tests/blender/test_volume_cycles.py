@@ -66,8 +66,8 @@ def drawn(
         ambient=(0.0, 0.0, 0.0),
         shading=settings_from(node, alike)[0],
         strand_settings=StrandSettings(tip_width=1.0, minimum_width=0.0, transparency="none"),
-        detail=DetailSettings(culling="none", full_size=0.0),
-        volume=VolumeSettings(shadows="deep", strand_share=1.0, resolution=resolution),
+        detail=DetailSettings(culling="none", lod_height=0.0),
+        volume=VolumeSettings(shadows="deep", strand_fraction=1.0, resolution=resolution),
         volume_center=np.zeros(3, np.float32),
     )
     view = frame.look_at((0.0, 0.0, DISTANCE), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))

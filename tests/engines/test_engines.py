@@ -90,7 +90,7 @@ def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
         base_color=(0.5, 0.3, 0.15),
         tip_color=(0.3, 0.1, 0.05),
         tip_tint=0.6,
-        grey_share=0.1,
+        grey_fraction=0.1,
     )
     texture = TextureSettings(
         variant_width=16,
@@ -100,7 +100,7 @@ def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
     )
     rig = pipeline.prepare(curtain(), None, GuideSettings(), place="curtain")
     settings = SettingsMap(
-        CardSettings(way="clusters" if is_baked else "guides", width_factor=1.5, card_count=40),
+        CardSettings(source="clusters" if is_baked else "guides", width_factor=1.5, card_count=40),
         AtlasSettings(source="baked" if is_baked else "made", size="512", columns=8),
         texture,
         look,

@@ -51,7 +51,7 @@ def shadow(
         ambient=(ambient,) * 3,
         casters=(FLOOR,),
         strand_settings=StrandSettings(tip_width=1.0),
-        volume=VolumeSettings(shadows=shadows, resolution=16, strand_share=1.0),
+        volume=VolumeSettings(shadows=shadows, resolution=16, strand_fraction=1.0),
     )
     maps = StrandPass().opacity(snapshot)
     assert maps is not None
@@ -114,7 +114,7 @@ def test_a_mesh_that_is_there_already_is_covered_without_gaps() -> None:
     triangles = np.concatenate([np.stack(half, axis=1) for half in halves])
     body = Surface(hill.astype(np.float32), triangles.astype(np.int32))
     strands = curtain(50, 4.0e-3, 0.05)
-    volume = VolumeSettings(resolution=16, strand_share=1.0)
+    volume = VolumeSettings(resolution=16, strand_fraction=1.0)
     radius = np.full(strands.shape[:2], 2e-3, np.float32)
     snapshot = Snapshot(strands, radius, lights=(SUN,), volume=volume, casters=(body,))
     camera = Camera(look_at((0.2, -0.3, 0.3), (0.0, 0.0, 0.0)), perspective(0.6, 1.0, 0.01, 100.0))

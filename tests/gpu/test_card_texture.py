@@ -9,7 +9,7 @@ import pytest
 from mip_chains import mip_chain
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
-from hairloom.addon.shading.card_look import even_alpha
+from hairloom.addon.shading.card_look import view_compensated_alpha
 from hairloom.addon.shading.card_texture import LEVELS, card_texel, packed_levels, wanted_level
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.card_opacity import (
@@ -61,7 +61,9 @@ def test_level_and_slant(compute: Callable[..., np.ndarray]) -> None:
         textures={name: values.astype(np.float32) for name, values in textures.items()},
         settings=(ShadingSettings,),
     )
-    assert np.abs(found[..., 0] - even_alpha(alpha, normals, tangents, eyes)).max() < 1e-4
+    assert (
+        np.abs(found[..., 0] - view_compensated_alpha(alpha, normals, tangents, eyes)).max() < 1e-4
+    )
     level = wanted_level(steps[..., :2], steps[..., 2:], (96, 40))
     assert np.abs(found[..., 1] - level).max() < 1e-3
     assert (level > 1.0).mean() > 0.2

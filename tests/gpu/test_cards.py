@@ -118,7 +118,7 @@ LIGHTS = (
     Light.point((0.3, -0.9, 0.9), (0.5, 0.7, 1.0), 8.0),
 )
 AMBIENT = (0.1, 0.2, 0.3)
-LOOK = ShadingSettings(tip_tint=0.7, grey_share=0.2, shift_noise=0.5, sparkle=0.8)
+LOOK = ShadingSettings(tip_tint=0.7, grey_fraction=0.2, shift_noise=0.5, sparkle=0.8)
 
 
 @pytest.mark.parametrize("tangent_map", [False, True])
@@ -183,7 +183,7 @@ def test_marschner_shades_cards_as_strands(frame: Any, front: Any, color_noise: 
     from hairloom.addon.shading.marschner.tables import marschner_tables, shape_of
 
     look = dataclasses.replace(
-        LOOK, model="marschner", grey_share=0.0, tip_tint=0.0, color_variation=0.6
+        LOOK, model="marschner", grey_fraction=0.0, tip_tint=0.0, color_variation=0.6
     )
     half = np.array(0.5)
     own, mean = (

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 
 WIDTH, HEIGHT = 320, 240
 #: every strand in its own pieces, none left out
-BARE = DetailSettings(culling="none", full_size=0.0)
+BARE = DetailSettings(culling="none", lod_height=0.0)
 #: balls inside of the one that `curly` grows from
 HIDERS = np.array([[0.0, 0.0, 0.0, 0.095], [0.02, 0.0, 0.03, 0.06]], np.float32)
 FIXED_64 = dataclasses.replace(BARE, mode="fixed", subdivisions=64)
@@ -99,7 +99,9 @@ def test_factors_and_culling_are_those_of_numpy(
     Of a straight segment that passes the eye's plane within 2 cm rounding is all there is.
     """
     strands, camera = curly(700, cv_count), cameras(frame)[seen]
-    detail = DetailSettings(mode=mode, error=0.05, piece_length=2.0, subdivisions=7, most=60)
+    detail = DetailSettings(
+        mode=mode, error=0.05, piece_length=2.0, subdivisions=7, max_subdivisions=60
+    )
     found, order = computed(strands, camera, detail, hiders=HIDERS)
     view = PictureView(camera.view, camera.projection, WIDTH, HEIGHT)
     apart = np.abs(found - detail_factors(strands, view, detail))
@@ -259,7 +261,7 @@ def test_two_views_in_turn_and_nothing_computed_twice(frame: Any, monkeypatch: A
     assert shown(finer, other)[1] == 1
     moved = dataclasses.replace(finer, strands=finer.strands + np.float32(0.01))
     assert shown(moved, other)[1] == 1
-    culled = dataclasses.replace(moved, detail=DetailSettings(full_size=1e4), hiders=HIDERS[:0])
+    culled = dataclasses.replace(moved, detail=DetailSettings(lod_height=1e4), hiders=HIDERS[:0])
     assert shown(culled, one)[1] == 1
     for hiders in (HIDERS, HIDERS[::-1]):
         culled = dataclasses.replace(culled, hiders=hiders)
@@ -346,7 +348,7 @@ def test_an_eighth_of_the_strands_covers_as_much_as_all(frame: Any, shared_data:
     strands = groom.strands.grid
     rank = even_ranks(strands[:, 0])
     camera = frame.frame_camera(groom.strands.bounds(), (-0.55, -1, 0.18), np.radians(30), 4 / 3)
-    thinned = dataclasses.replace(BARE, full_size=1e5, least_share=0.125)
+    thinned = dataclasses.replace(BARE, lod_height=1e5, min_density=0.125)
     for height in (144, 72, 45):
         passes, covered = (frame.MeshPass(), frame.StrandPass()), []
         for detail in (BARE, thinned):
@@ -365,8 +367,8 @@ def test_thinned_strands_are_those_of_low_rank_and_fade(frame: Any) -> None:
     strands = curly(400, 5)
     rank = np.random.default_rng(7).permutation(400) / 400.0
     camera, shares = cameras(frame)["whole"], []
-    for full_size in (100.0, 250.0, 400.0, 1000.0):
-        detail = dataclasses.replace(BARE, full_size=full_size)
+    for lod_height in (100.0, 250.0, 400.0, 1000.0):
+        detail = dataclasses.replace(BARE, lod_height=lod_height)
         _, order = computed(strands, camera, detail, rank=rank)
         drawn = drawn_of(order)
         assert rank[drawn].max() < np.delete(rank, drawn).min(initial=1.0)

@@ -20,7 +20,7 @@ from hairloom.addon.strands import Surface
 
 SIZE = 128
 LOOK = StrandSettings(tip_width=1.0, transparency="none")
-VOLUME = VolumeSettings(resolution=256, layers=8, strand_share=1.0, bias=0.0, scattering=False)
+VOLUME = VolumeSettings(resolution=256, layers=8, strand_fraction=1.0, bias=0.0, scattering=False)
 SUN = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 3.0)
 CAMERA = Camera(
     look_at((0.0, -0.8, 0.9), (0.0, 0.0, 0.1), up=(0.0, 0.0, 1.0)), orthographic(0.6, 1.0, 0.0, 3.0)

@@ -47,7 +47,7 @@ def snapshot_of(shading: ShadingSettings, *, scattering: bool, is_skin: bool) ->
         ambient=(0.0, 0.0, 0.0),
         shading=shading,
         strand_settings=StrandSettings(tip_width=1.0),
-        volume=VolumeSettings(strand_share=1.0, scattering=scattering, resolution=32),
+        volume=VolumeSettings(strand_fraction=1.0, scattering=scattering, resolution=32),
         skin=SkinSettings(softness=1e-6 if is_skin else 0.0, skin_resolution=256),
         table_size=PREVIEW_SIZE,
     )

@@ -176,9 +176,9 @@ def test_light(compute: Callable[..., np.ndarray], settings: ShadingSettings) ->
 
 COLORS: dict[str, dict[str, Any]] = {
     "plain": {},
-    "tinted and grey": {"tip_tint": 0.8, "grey_share": 0.4, "pigment": "melanin"},
+    "tinted and grey": {"tip_tint": 0.8, "grey_fraction": 0.4, "pigment": "melanin"},
     "a hard step": {"tip_tint": 1.0, "tint_start": 0.5, "tint_end": 0.5, "color_variation": 1.0},
-    "back to front": {"tip_tint": 1.0, "tint_start": 0.9, "tint_end": 0.1, "grey_share": 1.0},
+    "back to front": {"tip_tint": 1.0, "tint_start": 0.9, "tint_end": 0.1, "grey_fraction": 1.0},
 }
 
 

@@ -81,7 +81,9 @@ def layers_of(maps: Any) -> np.ndarray:
 def test_sums_are_those_of_the_strands(gpu_context: Any, light: Light, shadows: str) -> None:
     """All coverage is there, and lies where it should, give or take a texel."""
     strands, radius = dome()
-    settings = VolumeSettings(shadows=shadows, slices=8, layers=8, resolution=64, strand_share=1.0)
+    settings = VolumeSettings(
+        shadows=shadows, slices=8, layers=8, resolution=64, strand_fraction=1.0
+    )
     maps, ball = drawn(strands, radius, light, settings)
     frame = light_frame(light, ball)
     assert frame is not None
@@ -155,7 +157,7 @@ def test_a_strand_finds_itself_in_the_map_as_often_as_is_taken_off(
 ) -> None:
     """Strands far apart, each a chord of the ball: all that a light path meets is the strand."""
     random = np.random.default_rng(8)
-    settings = VolumeSettings(shadows="deep", resolution=256, strand_share=1.0, bias=0.0)
+    settings = VolumeSettings(shadows="deep", resolution=256, strand_fraction=1.0, bias=0.0)
     for radius in (1e-4, 5e-4, 1.5e-3):
         found, expected = [], []
         for _ in range(12):
@@ -207,7 +209,7 @@ def test_strands_that_hide_less_shade_less(
 ) -> None:
     """Half of tau where they hide half; without transparency they hide all."""
     strands, radius = dome(300)
-    settings = VolumeSettings(shadows="deep", resolution=64, strand_share=1.0)
+    settings = VolumeSettings(shadows="deep", resolution=64, strand_fraction=1.0)
     look = StrandSettings(tip_width=1.0, transparency=transparency, opacity=opacity)
     maps, ball = drawn(strands, radius, LIGHTS["sun"], settings, look)
     frame = light_frame(LIGHTS["sun"], ball)
@@ -301,7 +303,7 @@ def test_more_layers_than_one_pass_can_draw(
     error = []
     for count in (8, 64):
         settings = VolumeSettings(
-            shadows="slices", slices=count, resolution=64, strand_share=1.0, bias=0.0
+            shadows="slices", slices=count, resolution=64, strand_fraction=1.0, bias=0.0
         )
         maps, ball = drawn(strands, radius, LIGHTS["sun"], settings)
         frame = light_frame(LIGHTS["sun"], ball)
@@ -383,7 +385,7 @@ def test_maps_too_large_for_memory_are_drawn_smaller_and_still_right(
     strands, radius = dome(300)
     lights = [Light.sun((np.sin(turn), np.cos(turn), -1.0), (1, 1, 1), 3.0) for turn in range(8)]
     settings = VolumeSettings(
-        shadows=shadows, slices=64, layers=64, resolution=2048, most_lights=8, strand_share=1.0
+        shadows=shadows, slices=64, layers=64, resolution=2048, max_lights=8, strand_fraction=1.0
     )
     points, ball, opacity = points_of(strands, radius), ball_around(strands), OpacityPass()
     maps = opacity.maps(points, 1, strands.shape[:2], ball, lights, settings, PLAIN)
@@ -405,7 +407,7 @@ def test_of_twenty_lights_the_strongest_throw_shadows(gpu_context: Any) -> None:
     points, ball = points_of(strands, radius), ball_around(strands)
     strength = np.random.default_rng(4).permutation(np.arange(1.0, 21.0))
     given = [Light.sun((0.1 * n, 1.0, -1.0), (1, 1, 1), e) for n, e in enumerate(strength)]
-    settings = VolumeSettings(shadows="slices", resolution=32, most_lights=3)
+    settings = VolumeSettings(shadows="slices", resolution=32, max_lights=3)
     kept = kept_lights(given)
     maps = OpacityPass().maps(points, 1, strands.shape[:2], ball, kept, settings, PLAIN)
     map_of = maps.values[128:160].reshape(8, 4)[:, 0]

@@ -56,7 +56,7 @@ def tile(picture: np.ndarray, number: int, columns: int, side: int) -> np.ndarra
 def test_sixteen_slices_lie_in_four_rows_as_the_map_holds_them() -> None:
     from hairloom.addon.render.textures import texture_to_array
 
-    settings = VolumeSettings(shadows="slices", resolution=64, extinction=2.0, strand_share=1.0)
+    settings = VolumeSettings(shadows="slices", resolution=64, extinction=2.0, strand_fraction=1.0)
     maps, picture = tiles_of(settings, SUN)
     assert picture.shape == (4 * 66, 4 * 66, 4) and (picture[..., 3] == 1.0).all()
     for number in range(16):
@@ -67,7 +67,7 @@ def test_sixteen_slices_lie_in_four_rows_as_the_map_holds_them() -> None:
 
 
 def test_deep_layers_have_their_starts_before_them() -> None:
-    settings = VolumeSettings(shadows="deep", resolution=64, layers=8, strand_share=1.0)
+    settings = VolumeSettings(shadows="deep", resolution=64, layers=8, strand_fraction=1.0)
     maps, picture = tiles_of(settings, SUN)
     assert picture.shape[:2] == (3 * 66, 3 * 66)
     starts = tile(picture, 0, 3, 64)

@@ -43,8 +43,8 @@ HAIR = np.concatenate([curtain(x, int(50 * x + 9)) for x in (-0.08, -0.04, 0.04,
 
 
 def of_form(form: str, **more: Any) -> VolumeSettings:
-    settings = {"resolution": 64, "strand_share": 1.0, "scattering": False, "bias": 0.002}
-    settings["most_lights"] = 2
+    settings = {"resolution": 64, "strand_fraction": 1.0, "scattering": False, "bias": 0.002}
+    settings["max_lights"] = 2
     return VolumeSettings(shadows=form, **{**settings, **more})
 
 
@@ -55,7 +55,7 @@ def snapshot_of(frame: Any, volume: VolumeSettings, *lights: Light, **more: Any)
         "ambient": (0.0, 0.0, 0.0),
         "shading": PLAIN,
         "strand_settings": StrandSettings(tip_width=1.0, minimum_width=0.0, transparency="none"),
-        "detail": DetailSettings(culling="none", full_size=0.0),
+        "detail": DetailSettings(culling="none", lod_height=0.0),
         "volume_center": np.array([-9.0, 0.0, 0.0], np.float32),
         "table_size": PREVIEW_SIZE,
     }
@@ -94,7 +94,7 @@ def test_a_lamp_amidst_the_hair_leaves_the_shadows_of_others_as_they_are(
     assert alone[..., 0].max() > 0.01 and unshaded[..., 0].max() > 0.01
     assert np.allclose(both[..., :3], (alone + unshaded)[..., :3], rtol=1e-3)
     # nor does it stand in the place of one that could throw a shadow
-    assert np.array_equal(both, drawn(frame, of_form(form, most_lights=1), *lights))
+    assert np.array_equal(both, drawn(frame, of_form(form, max_lights=1), *lights))
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -175,7 +175,7 @@ def test_of_twenty_lights_the_first_eight_shine_and_two_throw_shadows(
     eight = drawn(frame, of_form(form), *lights[:LIGHT_CAPACITY], from_x=-1.0)
     assert np.array_equal(found, eight)
     one, two = (
-        drawn(frame, of_form(form, most_lights=most), *lights, from_x=-1.0) for most in (1, 2)
+        drawn(frame, of_form(form, max_lights=most), *lights, from_x=-1.0) for most in (1, 2)
     )
     assert np.array_equal(found, two) and one[..., 0].sum() > two[..., 0].sum()
 

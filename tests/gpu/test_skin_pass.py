@@ -19,7 +19,7 @@ from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
-DEEP = VolumeSettings(shadows="deep", resolution=256, strand_share=1.0, scattering=False)
+DEEP = VolumeSettings(shadows="deep", resolution=256, strand_fraction=1.0, scattering=False)
 SUN = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 3.0)
 SIDES = 16
 

@@ -37,7 +37,7 @@ def rig_of(children: ChildrenSettings | None, head: Surface | None) -> pipeline.
 
 def test_none_is_as_without_the_setting() -> None:
     for head in (sheet(), None):
-        plain, none = rig_of(None, head), rig_of(ChildrenSettings(way="none"), head)
+        plain, none = rig_of(None, head), rig_of(ChildrenSettings(method="none"), head)
         np.testing.assert_array_equal(none.strands.points, plain.strands.points)
         np.testing.assert_array_equal(none.guides, plain.guides)
         np.testing.assert_array_equal(none.weights.weight, plain.weights.weight)
@@ -47,7 +47,7 @@ def test_none_is_as_without_the_setting() -> None:
 @pytest.mark.parametrize("way", ["multi", "single"])
 def test_guides_are_those_that_are_chosen_anyway(way: str) -> None:
     plain = rig_of(None, sheet())
-    rig = rig_of(ChildrenSettings(way=way, strand_count=200), sheet())
+    rig = rig_of(ChildrenSettings(method=way, strand_count=200), sheet())
     assert (len(rig.guides), rig.strands.strand_count) == (30, 230)
     np.testing.assert_array_equal(rig.strands.grid[:30], plain.strands.grid[plain.guides])
     assert rig.strands.root_uv is not None and rig.rest_frames is not None
@@ -56,7 +56,7 @@ def test_guides_are_those_that_are_chosen_anyway(way: str) -> None:
 
 
 def test_at_rest_nothing_moves_and_each_guide_moves_itself() -> None:
-    rig = rig_of(ChildrenSettings(way="multi", strand_count=200), sheet())
+    rig = rig_of(ChildrenSettings(method="multi", strand_count=200), sheet())
     guides = rig.strands.grid[:30]
     np.testing.assert_array_equal(pipeline.strands_at(rig, rig.rest_pose, guides), rig.strands.grid)
     moved = guides + np.random.default_rng(3).normal(0.0, 0.01, guides.shape)
@@ -67,12 +67,12 @@ def test_at_rest_nothing_moves_and_each_guide_moves_itself() -> None:
 
 
 def test_a_head_without_uvs_gives_children_without() -> None:
-    rig = rig_of(ChildrenSettings(way="multi", strand_count=20), sheet(has_uv=False))
+    rig = rig_of(ChildrenSettings(method="multi", strand_count=20), sheet(has_uv=False))
     assert rig.strands.root_uv is None and rig.strands.strand_count == 50
 
 
 def test_without_a_head_the_guides_are_all_there_is() -> None:
-    rig = rig_of(ChildrenSettings(way="multi"), None)
+    rig = rig_of(ChildrenSettings(method="multi"), None)
     assert rig.strands.strand_count == len(rig.guides) == 30
     (note,) = rig.notes
     assert "surface" in note and note.count(". ") == 1, "what is missing, and a remedy"
@@ -80,7 +80,7 @@ def test_without_a_head_the_guides_are_all_there_is() -> None:
 
 def test_low_ranks_are_an_even_sparser_groom() -> None:
     """A quarter of the strands reaches every quarter of the sheet in about its share."""
-    for children in (None, ChildrenSettings(way="multi", strand_count=970)):
+    for children in (None, ChildrenSettings(method="multi", strand_count=970)):
         rig = pipeline.prepare(curves(1000), sheet(), GUIDES, place="a wig", children=children)
         rank = pipeline.strand_ranks(rig)
         assert sorted(rank) == pytest.approx(np.arange(1000) / 1000, abs=1e-6)

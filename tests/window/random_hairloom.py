@@ -33,7 +33,7 @@ def add_groom(dice):
             radius=0.1,
         )
     select(dice.object("MESH"))
-    how = {"strand_count": dice.chance.randint(2, 150), "way": dice.pick(["combed", "normals"])}
+    how = {"strand_count": dice.chance.randint(2, 150), "method": dice.pick(["combed", "normals"])}
     clicked(dice, dice.pick(["hairloom.add_groom", "hairloom.grow"]), **how)
 
 

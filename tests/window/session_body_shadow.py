@@ -45,7 +45,7 @@ def set_the_scene():
     group = head.vertex_groups.new(name="Crown")
     crown = [each.index for each in head.data.vertices if each.co.z > 0.075]
     group.add(crown, 1.0, "REPLACE")
-    bpy.ops.hairloom.grow(way="normals", strand_count=3000, length=0.08, density_group="Crown")
+    bpy.ops.hairloom.grow(method="normals", strand_count=3000, length=0.08, density_group="Crown")
     bpy.context.object.name = "Hair"
     bpy.ops.object.light_add(type="SUN", rotation=(np.radians(25.0), 0.0, 0.0))
     bpy.context.object.data.energy = 4.0
@@ -80,7 +80,8 @@ def hair_shades_the_head():
     )
     bare = yield from pixels_at_rest("bare")
     assert np.quantile((shaded - bare).max(axis=2), 0.995) < 0.05, "it only darkens"
-    # with neither shadows of the light nor On Body it is the same: Blender's strands throw none
+    # with neither shadows of the light nor Shadow on Surface it is the same:
+    # Blender's strands throw none
     volume().on_body = False
     none = yield from pixels_at_rest("no_shadow_at_all")
     assert changed(bare, none, 0.05) < 5e-3

@@ -98,7 +98,7 @@ def set_the_scene():
     bpy.ops.hairloom.grow(strand_count=STRANDS, length=0.12)
     bpy.context.object.name = "Hair"
     cards = settings("cards")
-    cards.way, cards.card_count, cards.levels = "clusters", CARDS, 2
+    cards.source, cards.card_count, cards.levels = "clusters", CARDS, 2
     settings("atlas").size = "512"
     settings("strands").width_scale = 6.0  # few strands are seen all the same
     overlays = viewport().spaces.active.overlay

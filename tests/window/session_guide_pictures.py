@@ -83,7 +83,7 @@ def set_the_scene(distance):
     look_from_front(distance)
     for name in ("looks/brown", "cards/crowd", "dynamics/breeze"):
         bpy.ops.hairloom.apply_preset(name=name)
-    hair.data.hairloom.children.way = "multi"
+    hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.shafts.use_shafts = True
     bpy.ops.hairloom.preview()
     yield from until(lambda: is_drawn(hair), "the hair is not drawn")

@@ -69,7 +69,7 @@ def set_the_scene():
     hair = bpy.context.object
     hair.name = "Hair"
     groom = hair.data.hairloom
-    groom.cards.way, groom.cards.card_count, groom.cards.levels = "clusters", 300, 1
+    groom.cards.source, groom.cards.card_count, groom.cards.levels = "clusters", 300, 1
     groom.atlas.source = "made"
     assert bpy.ops.hairloom.make_cards() == {"FINISHED"}, "a script does not get all at once"
     look_from_front(0.9)
@@ -187,7 +187,7 @@ def cards_in_motion():
     hair.hairloom.bake.folder = str(Path(bpy.app.tempdir) / "bake")
     hair.hairloom.bake.use_own_range = True
     hair.hairloom.bake.first, hair.hairloom.bake.last = 1, MOVED
-    hair.hairloom.dynamics.form, hair.hairloom.dynamics.collider_resolution = "numpy", 8
+    hair.hairloom.dynamics.device, hair.hairloom.dynamics.collider_resolution = "numpy", 8
     scene.frame_set(1)
     choose(hair)
     assert bpy.ops.hairloom.bake() == {"FINISHED"}

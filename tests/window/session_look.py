@@ -229,7 +229,7 @@ def a_slider_is_refined():
     bpy.ops.object.light_add(type="SUN", rotation=(np.pi / 2.0, 0.0, 0.0))
     bpy.context.object.data.energy = 10.0
     look.model, look.base_color, look.tip_tint = "marschner", (0.25, 0.13, 0.06), 0.0
-    look.volume_shade = 0.0  # one strand has no side that faces away
+    look.volume_shadow = 0.0  # one strand has no side that faces away
     yield
     for width in (0.12, 0.14):
         look.width_r = width

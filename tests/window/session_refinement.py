@@ -75,7 +75,7 @@ def steps():
 def set_the_scene():
     new_head(keeps_light=True)
     bpy.ops.object.shade_smooth()
-    bpy.ops.hairloom.grow(way="normals", strand_count=GUIDES, length=0.08)
+    bpy.ops.hairloom.grow(method="normals", strand_count=GUIDES, length=0.08)
     bpy.context.object.name = "Hair"
     hair().data.hairloom.strands.width_scale = 3.0  # so few strands that pictures hardly show them
     overlays = viewport().spaces.active.overlay
@@ -89,7 +89,7 @@ def set_the_scene():
 def children_appear():
     before = yield from picture("guides")
     children = hair().data.hairloom.children
-    children.way, children.strand_count = "multi", CHILDREN
+    children.method, children.strand_count = "multi", CHILDREN
     yield from strands_come(GUIDES + CHILDREN)
     yield from until(lambda: changed(before, pixels("children")) > 0.05, "no children are seen")
 
@@ -134,7 +134,7 @@ def debug_views_and_counts():
 
 def what_the_head_hides():
     detail, shading = hair().data.hairloom.detail, viewport().spaces.active.shading
-    detail.full_size = 0.0
+    detail.lod_height = 0.0
     detail.culling = "none"
     yield from until(draws_all, "strands are missing")
     everything = yield from pixels_at_rest("nothing-left-out")
@@ -154,7 +154,7 @@ def what_the_head_hides():
     driver.screenshot("hidden-head")
     bpy.data.objects["Head"].hide_set(False)
     yield
-    detail.full_size = 300.0
+    detail.lod_height = 300.0
     yield
 
 
@@ -183,11 +183,11 @@ def sliders_while_it_plays():
         head.location.x = x
         yield from strands_come(GUIDES + count)
         assert live.is_playing()
-    children.way = "single"
+    children.method = "single"
     yield
-    children.way = "none"
+    children.method = "none"
     yield from strands_come(GUIDES)
-    children.way = "multi"
+    children.method = "multi"
     yield from strands_come(GUIDES + 1000)
     driver.screenshot("playing")
     bpy.ops.ed.undo_push(message="playing")

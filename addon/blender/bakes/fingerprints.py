@@ -38,7 +38,7 @@ def groom_fingerprint(
 ) -> str:
     """Named hashes, see `simulated.hashes`; their names are what an artist is told has changed."""
     grown: dict[str, tuple[Hashed, ...]] = {}
-    if settings[ChildrenSettings].way != "none":  # bakes of older versions know of no children
+    if settings[ChildrenSettings].method != "none":  # bakes of older versions know of no children
         grown["children"] = (
             settings[ChildrenSettings],
             _density_before_modifiers(head, settings),
@@ -80,7 +80,7 @@ def settings_part(hair: bpy.types.Object) -> str:
 
 def _dynamics(hair: bpy.types.Object) -> DynamicsSettings:
     """All forms of the solver give the same motion."""
-    return replace(GroomSettings.of(hair)[DynamicsSettings], form="automatic")
+    return replace(GroomSettings.of(hair)[DynamicsSettings], device="automatic")
 
 
 def collider_places(

@@ -87,7 +87,7 @@ def cards_key(groom: GroomSettings) -> Hashable:
     look = groom[ShadingSettings]
     return (
         groom.sections.only(*kinds, StrandSettings, AmbientSettings),
-        (look.model, look.color_variation, look.grey_share),
+        (look.model, look.color_variation, look.grey_fraction),
         groom.card_pictures,
     )
 

@@ -21,7 +21,7 @@ from ...exchange.cards.index_buffer import index_buffer
 from ...exchange.cards.sidecar import SUFFIX, CardFile, sidecar_text
 from ...exchange.files.file_set import written_together
 from ...params import Settings, SettingsMap
-from ...shading.card_look import EVEN_ALPHA
+from ...shading.card_look import VIEW_COMPENSATED_ALPHA
 from ...shading.kajiya_kay_settings import KajiyaKaySettings
 from ...shading.marschner.look import fibre_of, pack_fibre
 from ...shading.marschner.settings import MarschnerSettings
@@ -279,7 +279,7 @@ class _Writer:
             texture_files=texture_channels(written),
             base_gain=maps.base_gain,
             highlights=maps.highlights,
-            even_alpha=EVEN_ALPHA if maps.is_even else {},
+            view_compensated_alpha=VIEW_COMPENSATED_ALPHA if maps.is_even else {},
             material=material_of(shading, tables),
             indices=indices,
             motion=self.motion,

@@ -65,7 +65,7 @@ def _delete(objects: list[bpy.types.Object], report: Report) -> None:
 def _objects(names: list[str]) -> list[bpy.types.Object]:
     """Those that were named, else all hair and fins of the view layer that are to be simulated."""
     if names:
-        return named_objects(names, bakeable, "hair curves or a fin")
+        return named_objects(names, bakeable, "hair curves or cloth")
     return [o for o in objects_in(bpy.context.view_layer) if bakeable(o) and _is_wanted(o)]
 
 
@@ -97,7 +97,7 @@ def _tell(objects: list[bpy.types.Object], report: Report) -> None:
 def _add_options(parser: argparse.ArgumentParser) -> None:
     what = parser.add_argument_group("what to bake")
     add_object_option(
-        what, "hair curves or a fin; can be given again (default: all that are to be simulated)"
+        what, "hair curves or cloth; can be given again (default: all that are to be simulated)"
     )
     add_frames_option(what, "(default: those of the objects, else of the scene)")
     what.add_argument(

@@ -63,7 +63,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--children-density",
         default="",
         metavar="NAME",
-        help="the same for how densely children grow (--set children.way=multi)",
+        help="the same for how densely children grow (--set children.method=multi)",
     )
 
 

@@ -86,7 +86,7 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
         head, dropped, groom, notes = _read_head(head_name, sources), {}, None, ()
         assert head is not None, "the built-in one is always there"
         density = _weights(sources.density_group, head_name)
-        if density is None and grow_settings.way == "combed":
+        if density is None and grow_settings.method == "combed":
             density = scalp_density(head)
         strands = grow(head, grow_settings, density, _weights(sources.length_group, head_name))
     collider = head

@@ -53,7 +53,7 @@ def add_hair_options(parser: argparse.ArgumentParser) -> None:
         "--children-density",
         default="",
         metavar="NAME",
-        help="the same for how densely children grow (--set children.way=multi)",
+        help="the same for how densely children grow (--set children.method=multi)",
     )
     sources.add_argument("--no-uv", action="store_true", help="accept a head without UVs")
     sources.add_argument(

@@ -28,7 +28,7 @@ def shown_slices(snapshot: Snapshot, strand_pass: StrandPass) -> Floats:
     if maps is None:
         raise HairloomError(
             "there are no shadows whose layers could be shown",
-            place="Show Slices",
+            place="Show Opacity Map",
             remedy="Set Shadows to Deep Opacity or Opacity Slices",
         )
     return opacity_tiles(maps, len(layer_ends(snapshot.volume)))

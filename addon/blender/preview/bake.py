@@ -112,7 +112,7 @@ class Bake:
         """
         if not objects:
             raise HairloomError(
-                "there is nothing to bake", place=scene.name, remedy="Select hair curves or a fin"
+                "there is nothing to bake", place=scene.name, remedy="Select hair curves or cloth"
             )
         parts = []
         for obj in objects:

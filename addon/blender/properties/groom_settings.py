@@ -76,7 +76,7 @@ class GroomSettings:
     @property
     def of_rig(self) -> tuple[SettingsMap, str]:
         """What decides which strands and guides there are."""
-        if self[ChildrenSettings].way == "none":
+        if self[ChildrenSettings].method == "none":
             return self.sections.only(GuideSettings), ""
         return self.sections.only(GuideSettings, ChildrenSettings), self.children_density
 

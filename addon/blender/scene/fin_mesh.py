@@ -17,7 +17,7 @@ def check_usable(obj: bpy.types.Object, handle: Handle) -> None:
     """
     if obj.type != "MESH" or fin_modifier(obj) is None:
         raise HairloomError(
-            "it is not a fin", place=obj.name, remedy="Press Make Fin in its Physics tab"
+            "it is not cloth", place=obj.name, remedy="Press Make Cloth in its Physics tab"
         )
     if obj.mode == "EDIT":
         raise HairloomError(

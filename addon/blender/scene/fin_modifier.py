@@ -20,7 +20,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ..base.objects import Handle
 
-NAME = "Hairloom Fin"
+NAME = "Hairloom Cloth"
 POSITION = "hairloom_position"
 CARRIED = "hairloom_carried"
 INDEX = "hairloom_index"
@@ -141,7 +141,9 @@ def other_fin_with(mesh: bpy.types.Mesh, handle: Handle) -> bpy.types.Object | N
 def _not_evaluated(obj: bpy.types.Object) -> HairloomError:
     if fin_modifier(obj) is None:
         return HairloomError(
-            f"it has no modifier {NAME}", place=obj.name, remedy="Press Make Fin in its Physics tab"
+            f"it has no modifier {NAME}",
+            place=obj.name,
+            remedy="Press Make Cloth in its Physics tab",
         )
     return HairloomError(
         f"its modifier {NAME} is turned off, or the object hidden or edited",

@@ -75,7 +75,7 @@ def wanted_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Fl
         HairloomError: the head has no weights of this name, or none that can be used.
     """
     head, name = head_of(hair), hair.hairloom.children_density
-    if head is None or not name or hair.data.hairloom.children.way == "none":
+    if head is None or not name or hair.data.hairloom.children.method == "none":
         return None
     weights = read_weights(head, depsgraph, name)
     if np.isfinite(weights).all() and (weights > 0.0).any():

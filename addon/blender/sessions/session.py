@@ -93,7 +93,9 @@ class Session(Groom):
         goes_on = before is not None and self.is_playing and _same_guides(made.rig, before.rig)
         if not is_same:
             motion = self.solver.motion if goes_on else None
-            self.solver: Solver = solver_of(made.rig, self.settings[DynamicsSettings].form, motion)
+            self.solver: Solver = solver_of(
+                made.rig, self.settings[DynamicsSettings].device, motion
+            )
         self.picture.take_made(made, self.settings)
         self.light(depsgraph)
         if is_same or goes_on:
@@ -154,8 +156,8 @@ class Session(Groom):
         self.is_stale |= self._reading.take_settings()
         if self.picture.take_settings(self.rig, before, self.settings):
             self._show()
-        if self.settings[DynamicsSettings].form != before[DynamicsSettings].form:
-            self._change_form(self.settings[DynamicsSettings].form)
+        if self.settings[DynamicsSettings].device != before[DynamicsSettings].device:
+            self._change_form(self.settings[DynamicsSettings].device)
 
     def take_cards(self) -> None:
         """Show the cards that were built meanwhile."""

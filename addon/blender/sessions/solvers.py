@@ -95,7 +95,7 @@ def solver_of(rig: Rig, form: str, motion: Motion | None = None) -> Solver:
         raise HairloomError(
             f"the GPU cannot compute here ({compute_problem()})",
             place="dynamics",
-            remedy="Set Computed On to Automatic",
+            remedy="Set Device to Automatic",
         )
     return ComputeSolver(rig, motion)
 

@@ -122,7 +122,7 @@ def _drawn(shading: ShadingSettings, volume: VolumeSettings) -> str:
         snapshot_of(rig, pipeline.rest_occlusion(rig, ambient), None),
         shading=shading,
         volume=volume,
-        detail=DetailSettings(full_size=0.0),
+        detail=DetailSettings(lod_height=0.0),
     )
     points = rig.strands.points
     box = points.min(axis=0), points.max(axis=0)

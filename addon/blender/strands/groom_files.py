@@ -38,7 +38,7 @@ def grow_on(
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     density = read_weights(head, depsgraph, density_group) if density_group else None
     length = read_weights(head, depsgraph, length_group) if length_group else None
-    if density is None and settings.way == "combed":
+    if density is None and settings.method == "combed":
         density = scalp_density(surface)
     strands = grow(surface, settings, density, length)
     return write_curves(f"{head.name} Hair", strands, head, collection)

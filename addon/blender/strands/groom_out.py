@@ -70,7 +70,7 @@ def still_hair(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, wishes: W
         HairloomError: no hair that can be used, or one of another scale than its head.
     """
     source = read_source(hair, depsgraph)
-    if hair.data.hairloom.children.way != "none":
+    if hair.data.hairloom.children.method != "none":
         rig = rig_of(hair, source)
         groom = Groom(rig.strands, hair.name, group_names=group_names(hair))
         return _told(hair, source, _out(groom, rig, wishes, look_color(hair)), rig)
@@ -98,7 +98,7 @@ def baked_hair(
     """
     rig = playback.rig_in(cache).rig
     read, said = usable_curves(hair, depsgraph), dict[str, Any]()
-    is_plain = hair.data.hairloom.children.way == "none"
+    is_plain = hair.data.hairloom.children.method == "none"
     if is_plain and rig.strands.strand_count == read.strands.strand_count:
         said = _without_empty_marks(stored_groom(hair, depsgraph, read.kept))
         if "color" in said:

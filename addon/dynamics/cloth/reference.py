@@ -180,7 +180,7 @@ class _Cloth:
                     continue
                 way = ((new - old) @ local)[:3]
                 reached = distance - normal @ (x[v] - before[v] - way)
-                reached += settings.push_speed * self.dt
+                reached += settings.depenetration_speed * self.dt
                 offset = normal @ x[v] - distance + min(settings.radius, reached)
                 first = min(offset - normal @ way, normal @ before[v])
                 planes.append(_Plane(v, normal, way, first, offset))

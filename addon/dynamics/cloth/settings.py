@@ -17,7 +17,7 @@ class FinSettings(MotionSettings):
     """
 
     section = "fin"
-    title = "Fin"
+    title = "Cloth"
     owner = "character"
     panels = ("Cloth", "Medium & Wind", "Collisions", "Steps")
 
@@ -81,7 +81,7 @@ class FinSettings(MotionSettings):
     )
     edgewise: float = number(
         0.1,
-        label="Edgewise Share",
+        label="Edgewise Fraction",
         description="Fraction of damping and drag that acts on motion along the face, which slips "
         "through the air",
         soft=(0.0, 1.0),
@@ -123,7 +123,7 @@ class FinSettings(MotionSettings):
     )
     pin_pull: float = number(
         4.0,
-        label="Pin Pull",
+        label="Pin Stiffness",
         description="Pull of a vertex whose pin weight is one half to where the animation carries "
         "it, in swings a second; it grows without bound towards a weight of 1",
         soft=(0.0, 20.0),

@@ -183,7 +183,7 @@ def _substep(
     span: tuple[float, float],
 ) -> tuple[Floats, Floats]:
     """Motion with edges and contacts; returns the new position and that one small step before."""
-    steps, led_out = settings.small_steps, settings.push_speed * frame.dt
+    steps, led_out = settings.small_steps, settings.depenetration_speed * frame.dt
     fall, radius = frame.gravity * np.float32(frame.small**2), frame.radius
     poses = poses_through(frame.colliders, [span])[0] if fabric.pairs.size else []
     planes: list[MovingPlanes] = []

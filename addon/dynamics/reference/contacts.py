@@ -80,7 +80,7 @@ def planes_of(
             continue
         origin = previous[cv] + ((now - before) @ local)[:3]
         was = distance - normal @ (x[cv] - origin)
-        reached = was + settings.push_speed * moment.dt
+        reached = was + settings.depenetration_speed * moment.dt
         offset = float(normal @ x[cv]) - distance + min(radius, reached)
         planes.append(Plane(cv, normal, offset, origin, reached >= radius))
     return planes

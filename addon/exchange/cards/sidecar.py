@@ -95,7 +95,8 @@ class CardFile:
     textures: role -> {"file", "channels"} of those that lie beside it; texture_files: file -> what
         its channels hold. highlights: which of them breaks up the highlights, "shift" or "tangent".
     base_gain: what the base texture is to be multiplied by.
-    even_alpha: mean_facing and least_facing where alpha is that of baked strands, else empty.
+    view_compensated_alpha: mean_facing and least_facing where alpha is that of baked strands,
+        else empty.
     material: model, values, units, fibre and tables, see blender/cards/files.py.
     indices: the index buffer and its file, or None.
     motion: what moves, see exchange/cards/sidecar_motion.py; empty: nothing.
@@ -112,7 +113,7 @@ class CardFile:
     texture_files: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     base_gain: float = 1.0
     highlights: str = "shift"
-    even_alpha: Mapping[str, float] = field(default_factory=dict)
+    view_compensated_alpha: Mapping[str, float] = field(default_factory=dict)
     material: Mapping[str, Any] = field(default_factory=dict)
     indices: tuple[str, IndexBuffer] | None = None
     motion: Mapping[str, Any] = field(default_factory=dict)
@@ -216,5 +217,14 @@ def _textures(cards: CardFile) -> dict[str, Any]:
         space, meaning = texts.ROLES[role]
         gain = {"gain": cards.base_gain} if role == "base" else {}
         roles[role] = {**where, "color_space": space, **gain, "meaning": meaning}
-    even = {"even_alpha": {**cards.even_alpha, "is": texts.EVEN_ALPHA}} if cards.even_alpha else {}
+    even = (
+        {
+            "view_compensated_alpha": {
+                **cards.view_compensated_alpha,
+                "is": texts.VIEW_COMPENSATED_ALPHA,
+            }
+        }
+        if cards.view_compensated_alpha
+        else {}
+    )
     return {**texts.TEXTURES, "highlights_by": cards.highlights, **even, **roles}

@@ -41,7 +41,7 @@ TEXTURES = {
     "place": "the lowest row of a picture is v = 0, counted from below: the root",
     "shift_and_noise": "where they are textures of their own they repeat in u and v",
 }
-EVEN_ALPHA = (
+VIEW_COMPENSATED_ALPHA = (
     "alpha is what strands cover on the mean of all turns of a card about its tangent. Seen at a "
     "slant, when its shading is drawn, it covers 1 - (1 - alpha)^(mean_facing / max(f, "
     "least_facing)); f is |dot(n, e)| of the normal n of its plane and the way e to the eye made "

@@ -81,7 +81,7 @@ def strand_absorption(
     root, tip = root_absorption(settings), tip_absorption(settings)
     mixed = root + (tip - root) * tip_fraction(along, settings)[..., None]
     amount = 1.0 + settings.color_variation * (1.0 - 2.0 * np.asarray(color_noise))
-    is_grey = (np.asarray(grey_noise) < settings.grey_share)[..., None]
+    is_grey = (np.asarray(grey_noise) < settings.grey_fraction)[..., None]
     grey = GREY_LEFT * mixed.mean(axis=-1, keepdims=True)
     return np.where(is_grey, grey, mixed) * amount[..., None]
 
@@ -99,7 +99,7 @@ def straight_light(
     Where tau is not known, which is when it is negative, by how much the hair's volume faces the
     light: an approximation.
     """
-    facing = 1.0 + shading.volume_shade * (diffuse_bias(normal, to_light) - 1.0)
+    facing = 1.0 + shading.volume_shadow * (diffuse_bias(normal, to_light) - 1.0)
     return np.where(np.asarray(tau) < 0.0, facing, np.exp(-np.maximum(tau, 0.0)))
 
 

@@ -68,7 +68,7 @@ def settings_from(
     values = _pigment(hair, notes) | _shape(hair, notes)
     if hair.random_roughness > 0.0:
         notes.append("Random Roughness is left out: all strands are equally rough")
-    values |= {"model": "marschner", "tip_tint": 0.0, "grey_share": 0.0}
+    values |= {"model": "marschner", "tip_tint": 0.0, "grey_fraction": 0.0}
     return replace(before or ShadingSettings(), **_in_range(values, notes)), tuple(notes)
 
 

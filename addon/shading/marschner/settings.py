@@ -179,7 +179,7 @@ class MarschnerSettings(Settings):
     )
     strength_rest: float = number(
         1.0,
-        label="Rest Strength",
+        label="Higher-order Lobes",
         description="Factor of the light that was reflected inside twice or more; 1 is physical",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
@@ -189,7 +189,7 @@ class MarschnerSettings(Settings):
     )
     scattered: float = number(
         0.6,
-        label="Scattered",
+        label="Fake Scattering",
         description="Stands for light that comes from strand to strand, in the hair's own colour, "
         "where Shadows with Scattering do not give it",
         soft=(0.0, 2.0),
@@ -197,9 +197,9 @@ class MarschnerSettings(Settings):
         shown_when=when("shading.model", "marschner"),
         active_when=_HAS_NO_SCATTERING,
     )
-    volume_shade: float = number(
+    volume_shadow: float = number(
         1.0,
-        label="Volume Shade",
+        label="Volume Shadow Term",
         description="How much strands on the side of the groom that faces away are in the dark, "
         "for lights that throw no shadows",
         soft=(0.0, 1.0),

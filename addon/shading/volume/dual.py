@@ -122,7 +122,7 @@ def mean_forward(table: Floats, shading: ShadingSettings) -> Floats:
     theta = (np.arange(count) + 0.5) / count * 0.5 * np.pi
     along = (np.arange(count) + 0.5) / count
     found = np.zeros(3)
-    for grey_noise, fraction in ((0.0, shading.grey_share), (1.0, 1.0 - shading.grey_share)):
+    for grey_noise, fraction in ((0.0, shading.grey_fraction), (1.0, 1.0 - shading.grey_fraction)):
         noises = np.full(count, 0.5), np.full(count, grey_noise)
         absorption = strand_absorption(shading, along, *noises)
         # light that goes on leaves at the inclination at which it came

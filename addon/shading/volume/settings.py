@@ -93,18 +93,18 @@ class VolumeSettings(Settings):
         source=_KIM,
         shown_when=when("volume.shadows", "deep", "slices"),
     )
-    strand_share: float = number(
+    strand_fraction: float = number(
         0.5,
-        label="Strands",
+        label="Strand Fraction",
         description="Fraction of the strands that throw the shadow; each stands for more of them",
         soft=(0.05, 1.0),
         hard=(0.001, 1.0),
         unit="factor",
         shown_when=when("volume.shadows", "deep", "slices"),
     )
-    most_lights: int = integer(
+    max_lights: int = integer(
         3,
-        label="Lights",
+        label="Max Lights",
         description="Lights that throw shadows at most, the strongest first",
         soft=(0, 8),
         hard=(0, 8),
@@ -112,7 +112,7 @@ class VolumeSettings(Settings):
     )
     on_body: bool = toggle(
         False,
-        label="On Body",
+        label="Shadow on Surface",
         description="Where a 3D view goes by the scene's lights, hair as it moves shades the head "
         "that Blender draws, in place of Blender's own strands at rest, which shade all meshes",
         shown_when=when("volume.shadows", "deep", "slices"),
@@ -128,7 +128,7 @@ class VolumeSettings(Settings):
     )
     density: float = number(
         0.75,
-        label="Scatter Density",
+        label="Scattering Density",
         description="How closely strands around a place are packed: 0 is a single strand, 1 is "
         "full of hair",
         soft=(0.5, 1.0),

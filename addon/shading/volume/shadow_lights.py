@@ -52,9 +52,9 @@ def shadow_warnings(
     found += [note for index in asked for note in _light_warnings(lights[index], ball)]
     strengths = _strengths(lights, ball)
     left_out = 1.0 - float(strengths[asked].sum()) / max(float(strengths.sum()), 1e-30)
-    if settings.most_lights and len(lights) > len(asked) and left_out > _MUCH_LIGHT:
+    if settings.max_lights and len(lights) > len(asked) and left_out > _MUCH_LIGHT:
         found.append(
-            f"Shadows: only the {settings.most_lights} strongest of {len(lights)} lights throw "
+            f"Shadows: only the {settings.max_lights} strongest of {len(lights)} lights throw "
             f"shadows of hair; {left_out:.0%} of the light comes from the others. Raise Lights in "
             "Shadows, or hide those that add least."
         )
@@ -72,7 +72,7 @@ def _setting_warnings(ball: Ball, settings: VolumeSettings) -> Iterator[str]:
             f"Shadows: with an Extinction of {settings.extinction:g} a single strand takes all "
             "light. Set it to 1, which is what the strands' width asks for."
         )
-    if settings.most_lights == 0:
+    if settings.max_lights == 0:
         yield (
             "Shadows: no light throws any as long as Lights is 0. Raise it, or set Shadows to None."
         )
@@ -132,7 +132,7 @@ def _asked(
     lights: Sequence[Light], ball: Ball, settings: VolumeSettings
 ) -> Iterator[tuple[int, LightFrame | None]]:
     """The strongest lights, until as many have a map as may have one."""
-    strengths, left = _strengths(lights, ball), settings.most_lights
+    strengths, left = _strengths(lights, ball), settings.max_lights
     for index in sorted(range(len(lights)), key=lambda index: -strengths[index]):
         if left == 0:
             return

@@ -77,7 +77,7 @@ function materialOf(pass, sidecar, formulas, uniforms) {
       LEAST_ALPHA: leastAlpha(pass, sidecar).toFixed(6),
       NORMAL_MAP: sidecar.textures.normal ? 1 : 0,
       TANGENT_MAP: sidecar.textures.highlights_by === 'tangent' ? 1 : 0,
-      EVEN_ALPHA: sidecar.textures.even_alpha ? 1 : 0,
+      VIEW_COMPENSATED_ALPHA: sidecar.textures.view_compensated_alpha ? 1 : 0,
     },
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT.replace('#include <hair_shading>', formulas),
@@ -100,7 +100,7 @@ function leastAlpha(pass, sidecar) {
 
 async function uniformsOf(sidecar, address) {
   const { model, values, fibre, tables } = sidecar.material;
-  const even = sidecar.textures.even_alpha;
+  const even = sidecar.textures.view_compensated_alpha;
   const uniforms = {
     even_facing: { value: new THREE.Vector2(even?.mean_facing, even?.least_facing) },
     model: { value: model === 'marschner' ? 1 : 0 },
@@ -184,10 +184,10 @@ const FRAGMENT = /* glsl */ `
 
 uniform int model;
 uniform vec3 base_color, tip_color, primary_color, secondary_color;
-uniform float tip_tint, tint_start, tint_end, grey_share, shift_noise, sparkle, ambient;
+uniform float tip_tint, tint_start, tint_end, grey_fraction, shift_noise, sparkle, ambient;
 uniform float primary_strength, primary_exponent, primary_shift;
 uniform float secondary_strength, secondary_exponent, secondary_shift;
-uniform float scattered, volume_shade, base_gain;
+uniform float scattered, volume_shadow, base_gain;
 uniform vec2 even_facing;
 uniform vec4 fibre_root, fibre_tip, fibre_strengths;
 uniform sampler2D base_texture, alpha_texture, shift_texture, noise_texture, tangent_texture;
@@ -203,11 +203,11 @@ in vec3 card_tangent;
 out vec4 color;
 
 HairMaterial material() {
-  return HairMaterial(model, base_color, tip_color, tip_tint, tint_start, tint_end, grey_share,
+  return HairMaterial(model, base_color, tip_color, tip_tint, tint_start, tint_end, grey_fraction,
                       shift_noise, sparkle, ambient, primary_color, primary_strength,
                       primary_exponent, primary_shift, secondary_color, secondary_strength,
                       secondary_exponent, secondary_shift, fibre_root, fibre_tip,
-                      fibre_strengths, scattered, volume_shade);
+                      fibre_strengths, scattered, volume_shadow);
 }
 
 HairPlace place() {
@@ -234,11 +234,11 @@ HairPlace place() {
 
 void main() {
   float alpha = dot(texture(alpha_texture, card_uv), alpha_mask);
-#if EVEN_ALPHA && !IS_PRIME
+#if VIEW_COMPENSATED_ALPHA && !IS_PRIME
   vec3 to_eye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-card_point);
   vec3 across = cross(dFdx(card_point), dFdy(card_point));
   vec3 along = hair_unit(card_tangent, vec3(0.0, 0.0, 1.0));
-  alpha = hair_even_alpha(alpha, across, along, to_eye, even_facing);
+  alpha = hair_view_compensated_alpha(alpha, across, along, to_eye, even_facing);
 #endif
   if (alpha < LEAST_ALPHA) discard;
 #if IS_PRIME

@@ -57,7 +57,7 @@ def built(
     **changed: object,
 ) -> CardBuild:
     rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
-    settings = CardSettings(**{"way": "clusters", "card_count": 30, **changed})  # type: ignore[arg-type]
+    settings = CardSettings(**{"source": "clusters", "card_count": 30, **changed})  # type: ignore[arg-type]
     chosen = SettingsMap(settings, atlas, FEW_RAYS, DENSE)
     return result_of(card_flow.card_build_steps(rig, chosen, lambda _: alpha))
 
@@ -65,7 +65,7 @@ def built(
 @pytest.mark.parametrize("way", ["clusters", "guides"])
 @pytest.mark.parametrize("source", ["made", "baked"])
 def test_levels_share_one_atlas_and_all_that_is_known_of_cards(way: str, source: str) -> None:
-    build = built(falling(1500), AtlasSettings(source=source, columns=8, rows=2), way=way)
+    build = built(falling(1500), AtlasSettings(source=source, columns=8, rows=2), source=way)
     assert len(build.levels) == len(build.errors) == len(build.backs) == 3
     assert (build.plan is None) == (source == "made")
     finest = build.finest
@@ -93,14 +93,14 @@ def test_crossed_cards_have_the_tile_and_group_of_their_pair() -> None:
 
 def test_guides_keep_their_groups() -> None:
     strands = falling(600, groups=3)
-    build = built(strands, way="guides")
+    build = built(strands, source="guides")
     rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
     np.testing.assert_array_equal(build.finest.group, rig.strands.group[rig.guides])
 
 
 def test_guides_show_the_strands_that_lie_along_them() -> None:
     """Where no others are, tufts that are made by chance."""
-    groom, settings = _groom(falling(1500)), CardSettings(way="guides")
+    groom, settings = _groom(falling(1500)), CardSettings(source="guides")
     grid, guides = groom.strands.grid, groom.guides
     assert len(guides) < len(grid)
     baked, plan = uncut_cards(groom, settings, BAKED)
@@ -127,15 +127,17 @@ def test_guides_show_the_strands_that_lie_along_them() -> None:
 
 def test_the_lowest_layer_is_wider_by_choice_and_the_outermost_is_not() -> None:
     groom = _groom(falling(1500))
-    plain, _ = uncut_cards(groom, CardSettings(way="clusters", card_count=60), MADE)
-    wide, _ = uncut_cards(groom, CardSettings(way="clusters", card_count=60, base_width=1.6), MADE)
+    plain, _ = uncut_cards(groom, CardSettings(source="clusters", card_count=60), MADE)
+    wide, _ = uncut_cards(
+        groom, CardSettings(source="clusters", card_count=60, base_width=1.6), MADE
+    )
     factor = (wide.strips.width / plain.strips.width).mean(axis=1)
     for layer, expected in enumerate((1.6, 1.3, 1.0)):
         np.testing.assert_allclose(factor[plain.layer == layer], expected, rtol=1e-5)
 
 
 def test_single_strands_are_the_outermost_layer() -> None:
-    settings = CardSettings(way="clusters", card_count=60, fly_aways=0.2)
+    settings = CardSettings(source="clusters", card_count=60, fly_aways=0.2)
     cards, _ = uncut_cards(_groom(falling(1500)), settings, MADE)
     loose = cards.strand_count == 1
     assert loose.sum() >= 12
@@ -173,7 +175,7 @@ def _keys(mesh):  # type: ignore[no-untyped-def]
 @pytest.mark.parametrize("way", ["clusters", "guides"])
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_few_strands_give_a_few_cards(way: str, count: int) -> None:
-    build = built(falling(count, groups=1), way=way, card_count=800)
+    build = built(falling(count, groups=1), source=way, card_count=800)
     assert 1 <= build.finest.card_count <= count
     for mesh in build.levels:
         a, b, c = np.moveaxis(mesh.positions[mesh.triangles], 1, 0)
@@ -202,7 +204,7 @@ def test_an_atlas_that_is_too_small_says_by_how_much() -> None:
 
 def test_alpha_is_asked_for_once_and_darkens_less_than_opaque_cards() -> None:
     rig = pipeline.prepare(falling(900), None, GuideSettings(), place="hair")
-    settings = CardSettings(way="clusters", card_count=30, levels=1)
+    settings = CardSettings(source="clusters", card_count=30, levels=1)
     asked: list[CardBuild] = []
 
     def clear(build: CardBuild) -> np.ndarray:
@@ -219,7 +221,7 @@ def test_alpha_is_asked_for_once_and_darkens_less_than_opaque_cards() -> None:
 
 def test_every_step_says_how_far_it_is() -> None:
     rig = pipeline.prepare(falling(600), None, GuideSettings(), place="hair")
-    settings = CardSettings(way="clusters", card_count=30, levels=2)
+    settings = CardSettings(source="clusters", card_count=30, levels=2)
     groom = card_flow.card_groom(rig)  # so that rays find the occlusion
     steps = list(card_steps(groom, settings, MADE, FEW_RAYS, lambda _build: None))
     for name in ("Ambient occlusion", "Order of level 0", "Order of level 1"):
@@ -255,7 +257,7 @@ def test_cards_that_are_clear_stay_in_the_order_of_their_distance() -> None:
 
 def test_notes_go_by_how_wide_strands_are_drawn() -> None:
     rig = pipeline.prepare(falling(900), None, GuideSettings(), place="hair")
-    settings = CardSettings(way="clusters", card_count=30)
+    settings = CardSettings(source="clusters", card_count=30)
     atlas = AtlasSettings(size="512", columns=8, rows=2)
 
     def notes(scale: float) -> str:
@@ -274,5 +276,5 @@ def test_half_a_million_strands_become_cards() -> None:
     normal = np.tile(np.float32([0.0, 0.0, 1.0]), (500_000, 1))
     radius = strands.radius.reshape(500_000, -1)
     groom = CardGroom(strands, np.arange(0, 500_000, 500), radius, normal, None)
-    cards, _ = uncut_cards(groom, CardSettings(way="clusters"), replace(MADE))
+    cards, _ = uncut_cards(groom, CardSettings(source="clusters"), replace(MADE))
     assert len(cards) >= 800

@@ -204,7 +204,7 @@ def test_cards_of_a_rig_ride_as_its_strands_do() -> None:
         group=np.repeat([3, 7], 60),
     )
     rig = pipeline.prepare(strands, None, GuideSettings(guide_count=24), place="hair")
-    settings = CardSettings(way="clusters", card_count=10)
+    settings = CardSettings(source="clusters", card_count=10)
     made, occlusion = AtlasSettings(source="made"), CardOcclusionSettings(rays=16)
     steps = card_flow.card_build_steps(rig, SettingsMap(settings, made, occlusion))
     mesh = result_of(steps).finest

@@ -26,7 +26,7 @@ from tests.pure.cards.test_build import falling
 
 MADE = AtlasSettings(source="made")
 FEW_RAYS = CardOcclusionSettings(rays=32)
-CLUSTERS = CardSettings(way="clusters", card_count=40, levels=1)
+CLUSTERS = CardSettings(source="clusters", card_count=40, levels=1)
 
 
 def rig_of(count: int) -> Rig:
@@ -107,7 +107,7 @@ def test_each_card_is_as_open_as_its_own_strands(settings: CardSettings) -> None
 def test_guide_cards_have_that_of_the_strands_along_their_guides() -> None:
     rig = rig_of(300)
     groom = card_flow.card_groom(rig)
-    settings = replace(CLUSTERS, way="guides")
+    settings = replace(CLUSTERS, source="guides")
     cards = card_of_strand(groom, settings)
     assert np.bincount(cards).max() > 1
     shade = np.random.default_rng(1).random(len(groom.guides))
@@ -133,7 +133,7 @@ def test_other_grooms_shade_beside_that() -> None:
 @pytest.mark.parametrize("way", ["clusters", "guides"])
 def test_normals_are_those_of_strands_across_the_tangents_and_on_the_front(way: str) -> None:
     rig = rig_of(300)
-    settings = SettingsMap(replace(CLUSTERS, way=way, levels=2), MADE, FEW_RAYS)
+    settings = SettingsMap(replace(CLUSTERS, source=way, levels=2), MADE, FEW_RAYS)
     build = result_of(card_flow.card_build_steps(rig, settings))
     center = rig.strands.roots.mean(axis=0)
     for mesh in build.levels:

@@ -102,9 +102,9 @@ def test_hair_that_starts_inside_is_led_out(kit):
 
 
 def test_push_speed_is_the_limit(kit):
-    """A single free CV deep inside walks out along the normal at push_speed, and stays calm."""
+    """A single free CV deep inside walks out along the normal at this speed, and stays calm."""
     settings = DynamicsSettings(
-        **kit.LIMP | BARE | {"push_speed": 0.2, "friction": 0.0, "length_tolerance": 0.02}
+        **kit.LIMP | BARE | {"depenetration_speed": 0.2, "friction": 0.0, "length_tolerance": 0.02}
     )
     grid = kit.straight(1, 3, 200.0, (0.0, 1.0, 0.0))  # a long arm: nearly free to rise
     scene = kit.Scene(

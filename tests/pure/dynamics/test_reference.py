@@ -51,7 +51,7 @@ FEATURES = {
     "drag": {"drag": 8.0},
     "water": {"buoyancy": 0.8, "drag": 4.0, "damping": 2.0},
     "wind": {"wind_speed": 6.0, "gusts": 1.0, "damping": 4.0, "wind_direction": 1.0},
-    "wind with drag": {"wind_speed": 6.0, "drag": 2.0, "wind_rise": 0.4},
+    "wind with drag": {"wind_speed": 6.0, "drag": 2.0, "wind_elevation": 0.4},
     "relaxation": {"length_solver": "relaxation", "relaxations": 5},
     "relaxation alone": {"length_solver": "relaxation", "relaxations": 3, "long_range": False},
 }

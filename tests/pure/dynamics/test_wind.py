@@ -32,7 +32,7 @@ def test_still_air_is_none():
     [(0.0, 0.0, (3, 0, 0)), (np.pi / 2, 0.0, (0, 3, 0)), (0.4, np.pi / 2, (0, 0, 3))],
 )
 def test_direction(turn, rise, expected):
-    settings = DynamicsSettings(wind_speed=3.0, wind_direction=turn, wind_rise=rise, gusts=0.0)
+    settings = DynamicsSettings(wind_speed=3.0, wind_direction=turn, wind_elevation=rise, gusts=0.0)
     air = air_of(settings, STILL)
     np.testing.assert_allclose(air.at(anywhere(4), 1.3).T, np.tile(expected, (4, 1)), atol=1e-6)
 

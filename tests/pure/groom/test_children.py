@@ -20,7 +20,7 @@ from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.strands import StrandSet, Surface
 
 #: mixed, and nothing else
-PLAIN: dict[str, Any] = {"way": "multi", "length_variation": 0.0, "clump": 0.0, "frizz": 0.0}
+PLAIN: dict[str, Any] = {"method": "multi", "length_variation": 0.0, "clump": 0.0, "frizz": 0.0}
 
 
 def settings(**values: Any) -> ChildrenSettings:
@@ -81,7 +81,7 @@ def test_more_children_move_none(
     values = {"clump": 0.8, "clump_size": 5, "frizz": 0.002, "length_variation": 0.3}
 
     def children(count: int) -> Children:
-        chosen = settings(way=way, strand_count=count, **values)
+        chosen = settings(method=way, strand_count=count, **values)
         return make_children(groomed, egg, chosen, density, place="test")
 
     most = children(9000)
@@ -101,7 +101,7 @@ def test_more_children_move_none(
 
 def test_the_seed_decides_and_nothing_else_does(egg: Surface, groomed: StrandSet) -> None:
     def points(seed: int) -> Floats:
-        chosen = ChildrenSettings(way="multi", strand_count=50, seed=seed)
+        chosen = ChildrenSettings(method="multi", strand_count=50, seed=seed)
         return make_children(groomed, egg, chosen, place="test").strands.points
 
     assert (points(1) == points(1)).all()
@@ -112,7 +112,7 @@ def test_the_seed_decides_and_nothing_else_does(egg: Surface, groomed: StrandSet
 
 
 def test_children_are_bound_where_they_start(egg: Surface, groomed: StrandSet) -> None:
-    chosen = ChildrenSettings(way="multi", strand_count=500)
+    chosen = ChildrenSettings(method="multi", strand_count=500)
     strands = make_children(groomed, egg, chosen, place="test").strands
     assert strands.grid.shape == (500, 12, 3)
     assert strands.root_triangle is not None
@@ -240,7 +240,7 @@ def test_a_child_is_its_root_and_the_weighted_ways_of_its_guides(
 
 
 def test_single_strands_run_beside_their_nearest_guide(egg: Surface, groomed: StrandSet) -> None:
-    children = make_children(groomed, egg, settings(way="single"), place="test")
+    children = make_children(groomed, egg, settings(method="single"), place="test")
     weights, strands = children.weights, children.strands
     apart = np.linalg.norm(strands.roots[:, None] - groomed.roots[None], axis=2)
     assert (weights.guide == apart.argmin(axis=1)[:, None]).all()
@@ -251,7 +251,7 @@ def test_single_strands_run_beside_their_nearest_guide(egg: Surface, groomed: St
 
 @pytest.mark.parametrize("way", ["multi", "single"])
 def test_groups_are_never_mixed(egg: Surface, groomed: StrandSet, way: str) -> None:
-    chosen = ChildrenSettings(way=way, strand_count=2000, clump=1.0, frizz=0.0)
+    chosen = ChildrenSettings(method=way, strand_count=2000, clump=1.0, frizz=0.0)
     children = make_children(groomed, egg, chosen, place="test")
     group = groomed.group[children.weights.guide]
     assert set(children.strands.group.tolist()) == {3, 7}
@@ -274,7 +274,7 @@ def test_a_parting_stays(way: str) -> None:
     surface, guides = combed_apart()
 
     def least_sideways(**values: Any) -> float:
-        chosen = settings(way=way, strand_count=3000, clump_size=8, **values)
+        chosen = settings(method=way, strand_count=3000, clump_size=8, **values)
         grid = make_children(guides, surface, chosen, place="test").strands.grid
         return float(np.abs(grid[:, -1, 0] - grid[:, 0, 0]).min())
 
@@ -395,7 +395,7 @@ def test_frizz_strays_as_far_as_it_says_and_not_at_the_root(
 def test_frizz_is_smooth_and_of_the_length_it_says(egg: Surface) -> None:
     """Between CVs it turns little: it changes sides about twice a wave, and never at each CV."""
     straight = GrowSettings(
-        way="normals", strand_count=200, cv_count=32, length=0.3, segment_ratio=1.0
+        method="normals", strand_count=200, cv_count=32, length=0.3, segment_ratio=1.0
     )
     guides = grow(egg, straight)
     calm = make_children(guides, egg, settings(), place="test").strands.grid
@@ -463,7 +463,7 @@ def test_odd_guides_still_get_children(
     guides: Callable[[Surface], StrandSet], told: bool, way: str
 ) -> None:
     surface = sheet()
-    chosen = ChildrenSettings(way=way, strand_count=300)
+    chosen = ChildrenSettings(method=way, strand_count=300)
     children = make_children(guides(surface), surface, chosen, place="test")
     assert children.strands.strand_count == 300
     assert np.isfinite(children.strands.points).all()
@@ -490,7 +490,7 @@ def test_all_extremes_of_the_sliders_give_finite_children(
         for p in ChildrenSettings.parameters()
         if p.hard_range is not None and p.name not in ("strand_count", "clump_along", "frizz_along")
     }
-    chosen = ChildrenSettings.from_dict(values | {"strand_count": 300, "way": "multi"}, "test")
+    chosen = ChildrenSettings.from_dict(values | {"strand_count": 300, "method": "multi"}, "test")
     children = make_children(groomed, egg, chosen, place="test")
     assert children.strands.strand_count == 300
     assert np.isfinite(children.strands.points).all()

@@ -15,7 +15,7 @@ from hairloom.addon.strands import StrandSet, Surface
 
 SEMI_AXES = np.array([0.08, 0.1, 0.12])
 GUIDES = GrowSettings(
-    way="normals",
+    method="normals",
     strand_count=300,
     cv_count=12,
     length=0.1,
@@ -23,7 +23,12 @@ GUIDES = GrowSettings(
     segment_ratio=1.2,
 )
 PER_VERTEX = GrowSettings(
-    way="normals", per_vertex=True, cv_count=8, length=0.1, length_variation=0.0, segment_ratio=1.5
+    method="normals",
+    per_vertex=True,
+    cv_count=8,
+    length=0.1,
+    length_variation=0.0,
+    segment_ratio=1.5,
 )
 
 
@@ -104,7 +109,7 @@ def test_the_way_is_a_setting_of_grow(egg: Surface) -> None:
 
 @pytest.mark.parametrize("count", [0, 1, 2, 999])
 def test_the_count_is_exact(egg: Surface, count: int) -> None:
-    settings = GrowSettings(way="normals", strand_count=count, cv_count=5)
+    settings = GrowSettings(method="normals", strand_count=count, cv_count=5)
     strands = grow_along_normals(egg, settings, np.arange(len(egg.positions)))
     assert strands.strand_count == count
     assert strands.is_bound
@@ -113,7 +118,7 @@ def test_the_count_is_exact(egg: Surface, count: int) -> None:
 
 def test_the_seed_decides_and_nothing_else_does(egg: Surface) -> None:
     def points(seed: int) -> Floats:
-        return grow_along_normals(egg, GrowSettings(way="normals", seed=seed)).points
+        return grow_along_normals(egg, GrowSettings(method="normals", seed=seed)).points
 
     assert (points(1) == points(1)).all()
     assert (points(1) != points(2)).any()
@@ -158,7 +163,7 @@ def test_one_strand_a_vertex_above_the_threshold(sphere: Surface) -> None:
 def test_strands_follow_the_density_even_on_few_triangles() -> None:
     """Chi-square of the roots on a square of two triangles, density x: shares (2 i + 1) / 64."""
     square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-    settings = GrowSettings(way="normals", strand_count=6400)
+    settings = GrowSettings(method="normals", strand_count=6400)
     x, y, _ = grow_along_normals(square, settings, square.positions[:, 0]).roots.T
     counts = np.histogram(x, 8, (0.0, 1.0))[0]
     expected = 6400 * (2.0 * np.arange(8) + 1.0) / 64.0

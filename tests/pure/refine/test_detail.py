@@ -109,7 +109,7 @@ def test_the_line_is_everywhere_within_the_error_of_the_exact_curve(
     points = world.astype(np.float32)
     checked = 0
     for error in (0.5, 0.05):
-        settings = DetailSettings(error=error, most=MOST)
+        settings = DetailSettings(error=error, max_subdivisions=MOST)
         factors = detail_factors(points, view, settings)
         assert factors.min() >= 1 and factors.max() <= MOST
         for strand, pieces in zip(points, factors, strict=True):
@@ -209,7 +209,7 @@ def test_fixed_takes_the_same_everywhere_but_no_more_than_allowed() -> None:
     view = PictureView(np.eye(4), PROJECTIONS["usual"], WIDTH, HEIGHT)
     points = np.zeros((3, 4, 3), np.float32)
     assert (detail_factors(points, view, DetailSettings(mode="fixed", subdivisions=5)) == 5).all()
-    limited = DetailSettings(mode="fixed", subdivisions=9, most=6)
+    limited = DetailSettings(mode="fixed", subdivisions=9, max_subdivisions=6)
     assert (detail_factors(points, view, limited) == 6).all()
 
 
@@ -238,11 +238,11 @@ def test_the_heuristic_ignores_what_is_straight_and_survives_no_length() -> None
 def test_what_passes_the_eye_gets_all_pieces_and_broken_points_a_number() -> None:
     view = PictureView(look_at((0, 0, 0), (0, 1, 0)), PROJECTIONS["usual"], WIDTH, HEIGHT)
     through = np.array([[0.02, -1, 0], [0, -0.5, 0.01], [0.01, 0.5, 0], [0, 1, 0]], np.float32)
-    settings = DetailSettings(most=20)
+    settings = DetailSettings(max_subdivisions=20)
     assert detail_factors(through[None], view, settings)[0, 1] == 20
     broken = np.full((1, 4, 3), np.nan, np.float32)
     for mode in ("adaptive", "heuristic"):
-        factors = detail_factors(broken, view, DetailSettings(mode=mode, most=20))
+        factors = detail_factors(broken, view, DetailSettings(mode=mode, max_subdivisions=20))
         assert ((factors >= 1) & (factors <= 20)).all()
 
 

@@ -69,20 +69,20 @@ def test_ranks_hang_on_roots_and_seed_alone() -> None:
 
 def test_all_strands_are_drawn_from_the_full_size_on() -> None:
     ranks = np.linspace(0.0, 1.0, 101)
-    settings = DetailSettings(full_size=200.0)
+    settings = DetailSettings(lod_height=200.0)
     for height in (200.0, 1000.0, np.inf):
         assert drawn_fraction(height, settings) == WHOLE
     assert width_factor(ranks, WHOLE) == pytest.approx(1.0)
-    assert drawn_fraction(1.0, DetailSettings(full_size=0.0)) == WHOLE
-    assert drawn_fraction(1.0, DetailSettings(least_share=1.0)) == WHOLE
-    assert drawn_fraction(1.0, DetailSettings(least_share=0.125)) == 0.125
+    assert drawn_fraction(1.0, DetailSettings(lod_height=0.0)) == WHOLE
+    assert drawn_fraction(1.0, DetailSettings(min_density=1.0)) == WHOLE
+    assert drawn_fraction(1.0, DetailSettings(min_density=0.125)) == 0.125
     assert (width_factor(ranks, 0.125) > 0.0).tolist() == (ranks < 0.125).tolist()
 
 
 def test_a_strand_gets_thin_before_it_is_gone() -> None:
     """From pixel to pixel of the groom's height no width changes by more than a tenth."""
     ranks = np.linspace(0.0, 0.999, 500)
-    settings = DetailSettings(full_size=300.0, least_share=0.0)
+    settings = DetailSettings(lod_height=300.0, min_density=0.0)
     before = width_factor(ranks, drawn_fraction(310.0, settings))
     for height in np.arange(309.0, 60.0, -1.0):
         now = width_factor(ranks, drawn_fraction(height, settings))
@@ -114,7 +114,7 @@ def test_the_size_in_the_picture() -> None:
     assert groom_size(bounds, near) == pytest.approx((100.0, 100.0))  # the face at 4 m
     inside = PictureView(look_at((0, 0, 0), (0, 1, 0)), lens, 800, 400)
     assert groom_size(bounds, inside) == (np.inf, np.inf)
-    settings = DetailSettings(full_size=1000.0)
+    settings = DetailSettings(lod_height=1000.0)
     assert thinning(bounds, 100.0, 4e-5, 1.0, inside, settings) == Thinning()
 
 
@@ -130,7 +130,7 @@ def test_the_groom_covers_as_much_when_it_is_thinned(shared_data: Path, height: 
     tall = groom_size((low, high), metre)[1] / height
     seen = PictureView(view, orthographic(tall, 1.0, 0.01, 10.0), size, size)
     length = float(np.linalg.norm(np.diff(grid, axis=1), axis=2).sum())
-    settings = DetailSettings(full_size=1.25 * 8.0 * height)  # an eighth is left
+    settings = DetailSettings(lod_height=1.25 * 8.0 * height)  # an eighth is left
     thinned = thinning((low, high), length, 4e-5, 1.0, seen, settings)
     assert thinned.fraction == pytest.approx(0.125)
     factors = width_factor(even_ranks(grid[:, 0]), thinned.fraction, thinned.widening)

@@ -7,7 +7,7 @@ import pytest
 from mip_chains import mip_chain
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
-from hairloom.addon.shading.card_look import MEAN_FACING, even_alpha
+from hairloom.addon.shading.card_look import MEAN_FACING, view_compensated_alpha
 from hairloom.addon.shading.card_texture import (
     LEVELS,
     card_texel,
@@ -86,12 +86,16 @@ def test_slant_brings_strands_nearer() -> None:
     across = np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=-1)
     tangent, to_eye = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
     alpha = 0.01
-    shown = even_alpha(np.full(1000, alpha), across, tangent, to_eye) * np.abs(across[:, 0])
+    shown = view_compensated_alpha(np.full(1000, alpha), across, tangent, to_eye) * np.abs(
+        across[:, 0]
+    )
     turned = np.abs(across[:, 0]) > LEAST_FACING
     assert shown[turned] == pytest.approx(alpha * MEAN_FACING, rel=0.06)
     # nothing stays nothing, all stays all, whichever way a strand leans to the eye
     leaning = np.array([0.6, 0.0, 0.8])
-    assert (even_alpha(np.zeros(1000), across, tangent, leaning) == 0.0).all()
-    assert (even_alpha(np.ones(1000), across, tangent, leaning) == 1.0).all()
-    same = even_alpha(np.full(1000, alpha), across, tangent, leaning)
-    assert same == pytest.approx(even_alpha(np.full(1000, alpha), across, tangent, to_eye))
+    assert (view_compensated_alpha(np.zeros(1000), across, tangent, leaning) == 0.0).all()
+    assert (view_compensated_alpha(np.ones(1000), across, tangent, leaning) == 1.0).all()
+    same = view_compensated_alpha(np.full(1000, alpha), across, tangent, leaning)
+    assert same == pytest.approx(
+        view_compensated_alpha(np.full(1000, alpha), across, tangent, to_eye)
+    )

@@ -35,7 +35,7 @@ def test_strands_vary_about_the_mean(model: str) -> None:
 
 
 def test_grey_strands_are_grey_on_the_card_as_well() -> None:
-    shading = ShadingSettings(base_color=BROWN, color_variation=0.0, grey_share=0.25)
+    shading = ShadingSettings(base_color=BROWN, color_variation=0.0, grey_fraction=0.25)
     factor = strand_variation(np.arange(4000), 3, shading)
     colors = factor * card_base(np.linspace(0.0, 1.0, 3), shading)
     is_grey = np.isclose(colors, GREY_COLOR, rtol=1e-4).all(axis=(1, 2))
@@ -44,7 +44,7 @@ def test_grey_strands_are_grey_on_the_card_as_well() -> None:
 
 
 def test_grey_on_black_hair_stays_within_bounds() -> None:
-    shading = ShadingSettings(base_color=(0.0, 0.0, 0.0), grey_share=0.01)
+    shading = ShadingSettings(base_color=(0.0, 0.0, 0.0), grey_fraction=0.01)
     factor = strand_variation(np.arange(1000), 3, shading)
     assert np.isfinite(factor).all()
     assert 0.0 <= factor.min() <= factor.max() == 4.0
@@ -53,14 +53,14 @@ def test_grey_on_black_hair_stays_within_bounds() -> None:
 def test_a_base_texture_gives_strands_their_own_absorption() -> None:
     """That of the strand itself, from the mean of the card and how the strand's colour differs."""
     shading = ShadingSettings(
-        model="marschner", base_color=BROWN, tip_tint=0.8, color_variation=0.5, grey_share=0.2
+        model="marschner", base_color=BROWN, tip_tint=0.8, color_variation=0.5, grey_fraction=0.2
     )
     seeds, along = np.arange(200), np.linspace(0.0, 1.0, 6)[None, :]
     noises = [strand_noise(seeds, channel, np.zeros(1))[:, None] for channel in (2, 3)]
     own = strand_absorption(shading, along, *noises)
     half = np.full_like(along, 0.5)
     colored, grey = (strand_absorption(shading, along, half, half + s) for s in (1.0, -1.0))
-    mean = colored + (grey - colored) * shading.grey_share
+    mean = colored + (grey - colored) * shading.grey_fraction
     base = strand_variation(seeds, 6, shading)
     is_bounded = base < 4.0
     assert is_bounded.mean() > 0.75

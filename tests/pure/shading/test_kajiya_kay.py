@@ -175,7 +175,7 @@ def test_color_variation_keeps_the_mean() -> None:
 
 
 def test_tips_and_grey_strands_have_their_own_colours() -> None:
-    settings = ShadingSettings(color_variation=0.0, tip_tint=1.0, grey_share=0.25)
+    settings = ShadingSettings(color_variation=0.0, tip_tint=1.0, grey_fraction=0.25)
     along, middle = np.array([0.0, 0.6, 1.0, 1.0]), np.full(4, 0.5)
     base = strand_base(along, middle, np.array([0.9, 0.9, 0.25, 0.24]), settings)
     root, tip = np.array(settings.base_color), np.array(settings.tip_color)

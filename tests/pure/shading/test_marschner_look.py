@@ -86,7 +86,7 @@ def test_a_tint_that_ends_where_it_begins_is_a_step(start: float, end: float) ->
 
 
 def test_strands_differ_in_pigment_and_the_grey_ones_have_hardly_any() -> None:
-    settings = replace(PLAIN, color_variation=0.5, grey_share=0.25)
+    settings = replace(PLAIN, color_variation=0.5, grey_fraction=0.25)
     noise = np.linspace(0.0, 1.0, 11)
     found = strand_absorption(settings, np.zeros(11), noise, np.ones(11))
     assert (np.diff(found, axis=0) < 0.0).all()  # more noise, brighter, as with Kajiya-Kay
@@ -96,7 +96,7 @@ def test_strands_differ_in_pigment_and_the_grey_ones_have_hardly_any() -> None:
     neutral = np.full(3, GREY_LEFT * root.mean())
     assert grey == pytest.approx(np.where((noise < 0.25)[:, None], neutral, root))
     assert strand_color(grey[0]).min() > 0.4
-    none, everyone = replace(settings, grey_share=0.0), replace(settings, grey_share=1.0)
+    none, everyone = replace(settings, grey_fraction=0.0), replace(settings, grey_fraction=1.0)
     lowest, highest = np.array(0.0), np.array(1.0 - 2.0**-24)
     at = (np.array(0.0), np.array(0.5))
     assert strand_absorption(none, *at, lowest) == pytest.approx(root)
@@ -141,7 +141,7 @@ def test_the_side_away_from_the_light_is_in_the_dark(tables: MarschnerTables) ->
 
     settings = ShadingSettings(shift_noise=0.0, scattered=0.0)
     assert (seen(-x, settings) == 0.0).all()
-    bare = replace(settings, volume_shade=0.0)
+    bare = replace(settings, volume_shadow=0.0)
     assert seen(-x, bare) == pytest.approx(seen(x, bare))
     assert seen(x, bare) == pytest.approx(seen(x, settings))
     only_scattered = replace(
@@ -178,7 +178,7 @@ def ends() -> list[tuple[str, object]]:
 @pytest.mark.parametrize(("name", "value"), ends())
 def test_no_end_of_a_range_gives_anything_but_numbers(name: str, value: object) -> None:
     for pigment in ("color", "melanin", "absorption"):
-        settings = ShadingSettings(tip_tint=0.5, grey_share=0.3, pigment=pigment)
+        settings = ShadingSettings(tip_tint=0.5, grey_fraction=0.3, pigment=pigment)
         settings = replace(settings, **{name: value})
         found = light(marschner_tables(fibre_of(settings), 24), settings, 60)
         assert np.isfinite(found).all() and (found >= 0.0).all()

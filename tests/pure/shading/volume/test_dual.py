@@ -94,7 +94,7 @@ def test_shares_are_those_of_the_lobes(table: Shares) -> None:
 
 def test_what_hair_sends_on_is_the_mean_over_strands_that_lie_any_way(table: Shares) -> None:
     """Strands by chance, each of which meets as much light as it is broad."""
-    alike = ShadingSettings(color_variation=0.0, grey_share=0.0)
+    alike = ShadingSettings(color_variation=0.0, grey_fraction=0.0)
     absorption = strand_absorption(alike, np.zeros(1), np.full(1, 0.5), np.full(1, 0.5))
     random = np.random.default_rng(6)
     along = random.normal(size=(40_000, 3))
@@ -103,8 +103,8 @@ def test_what_hair_sends_on_is_the_mean_over_strands_that_lie_any_way(table: Sha
     sent = shares_at(table.forward, broad, absorption).sum(axis=-1)
     expected = (sent * broad[:, None]).sum(axis=0) / broad.sum()
     assert mean_forward(table.forward, alike) == pytest.approx(expected, rel=5e-3)
-    grey = mean_forward(table.forward, replace(alike, grey_share=1.0))
-    half = mean_forward(table.forward, replace(alike, grey_share=0.5))
+    grey = mean_forward(table.forward, replace(alike, grey_fraction=1.0))
+    half = mean_forward(table.forward, replace(alike, grey_fraction=0.5))
     assert half == pytest.approx(0.5 * (expected + grey), rel=5e-3)
 
 

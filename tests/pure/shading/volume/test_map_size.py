@@ -13,7 +13,7 @@ from hairloom.addon.shading.volume.map_size import (
 )
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
-LARGEST = VolumeSettings(shadows="slices", slices=64, resolution=2048, most_lights=8)
+LARGEST = VolumeSettings(shadows="slices", slices=64, resolution=2048, max_lights=8)
 
 
 def test_what_fits_is_drawn_as_asked() -> None:

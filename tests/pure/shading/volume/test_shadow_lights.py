@@ -15,7 +15,7 @@ from hairloom.addon.shading.volume.shadow_lights import shadow_frames, shadow_wa
 
 BALL = Ball(np.array([0.1, 0.0, 1.5]), 0.2)
 SUN = Light.sun((0.0, 0.0, -1.0), (1, 1, 1), 3.0)
-DEEP = VolumeSettings(shadows="deep", most_lights=2)
+DEEP = VolumeSettings(shadows="deep", max_lights=2)
 #: shines along +x
 CONE = Cone(((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)), 1.0, 0.1)
 
@@ -82,7 +82,7 @@ def test_lights_beyond_those_that_throw_shadows_are_told_where_they_are_much() -
     [
         ("extinction", 0.0, "throws none"),
         ("extinction", 1000.0, "1000"),
-        ("most_lights", 0, "Lights is 0"),
+        ("max_lights", 0, "Lights is 0"),
     ],
 )
 def test_settings_that_leave_no_shadow_are_told(name: str, value: float, word: str) -> None:
@@ -91,7 +91,7 @@ def test_settings_that_leave_no_shadow_are_told(name: str, value: float, word: s
 
 
 def test_maps_that_no_gpu_could_hold_are_told() -> None:
-    settings = VolumeSettings(shadows="slices", slices=64, resolution=2048, most_lights=8)
+    settings = VolumeSettings(shadows="slices", slices=64, resolution=2048, max_lights=8)
     (warning,) = told(*(point(1.0, turn, 1.5) for turn in range(8)), settings=settings)
     assert "2048 texels for 8 lights" in warning and "Lower Resolution" in warning
 
