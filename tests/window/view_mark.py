@@ -1,8 +1,8 @@
 """Tells whether what a 3D view has drawn is on the screen: each drawing is numbered by a mark.
 
 Drawing and showing are two things: on Vulkan a picture may come to the screen later. So every 3D
-view draws a number, eight squares that are black or white, at two places of its left edge, where
-the toolbar lies over it. A popup may cover one of them.
+view draws a number, eight squares that are black or white, one above the other at its left edge.
+Popups and the buttons of the toolbar leave that edge free.
 """
 
 from collections.abc import Iterator
@@ -15,8 +15,8 @@ import screen
 from gpu_extras.batch import batch_for_shader
 
 BITS, SIDE = 8, 4
-#: where the marks are, as fractions of the view's height
-HEIGHTS = (0.0, 0.45)
+#: where it is: pixels from the left edge of the view, and a fraction of its height
+LEFT, LOW = 2, 0.3
 BLACK, WHITE = (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0)
 
 
@@ -44,32 +44,24 @@ class ViewMark:
         return [bool(self._number >> bit & 1) for bit in range(BITS)]
 
     def _is_marked(self, shown: np.ndarray, window: Any, region: Any) -> bool:
-        x = window.x + region.x + SIDE // 2
-        rows = [
-            len(shown) - 1 - (window.y + region.y + int(height * region.height) + SIDE // 2)
-            for height in HEIGHTS
-        ]
-        if (
-            x < 0
-            or x + BITS * SIDE > shown.shape[1]
-            or not 0 <= min(rows) <= max(rows) < len(shown)
-        ):
+        column = window.x + region.x + LEFT + SIDE // 2
+        low = window.y + region.y + int(LOW * region.height) + SIDE // 2
+        rows = len(shown) - 1 - low - SIDE * np.arange(BITS)
+        if not (0 <= column < shown.shape[1] and rows.min() >= 0 and rows.max() < len(shown)):
             return True  # beyond the screen
-        found = [shown[row, x : x + BITS * SIDE : SIDE, 1] > 127 for row in rows]
-        return any(each.tolist() == self._bits() for each in found)
+        return (shown[rows, column, 1] > 127).tolist() == self._bits()
 
     def _draw(self) -> None:
         if not self._is_wanted:
             return
         self._shader = self._shader or gpu.shader.from_builtin("FLAT_COLOR")
-        corners, colours = [], []
-        for height in HEIGHTS:
-            low = int(height * bpy.context.region.height)
-            for number, bit in enumerate(self._bits()):
-                left, right, high = number * SIDE, (number + 1) * SIDE, low + SIDE
-                corners += [(left, low), (right, low), (right, high)]
-                corners += [(left, low), (right, high), (left, high)]
-                colours += [WHITE if bit else BLACK] * 6
+        corners, colours, right = [], [], LEFT + SIDE
+        for number, bit in enumerate(self._bits()):
+            low = int(LOW * bpy.context.region.height) + number * SIDE
+            high = low + SIDE
+            corners += [(LEFT, low), (right, low), (right, high)]
+            corners += [(LEFT, low), (right, high), (LEFT, high)]
+            colours += [WHITE if bit else BLACK] * 6
         batch = batch_for_shader(self._shader, "TRIS", {"pos": corners, "color": colours})
         gpu.state.blend_set("NONE")
         batch.draw(self._shader)
@@ -86,7 +78,7 @@ def _views() -> Iterator[tuple[Any, Any]]:
                 if (
                     area.type == "VIEW_3D"
                     and region.type == "WINDOW"
-                    and region.width > BITS * SIDE
+                    and region.height > 4 * BITS * SIDE
                 ):
                     yield window, region
 
