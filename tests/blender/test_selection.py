@@ -6,7 +6,8 @@ import pytest
 from hairloom.addon.blender.base.objects import objects_in
 from hairloom.addon.blender.cards.occluders import other_cards
 from hairloom.addon.blender.colliders.spheres import grown_on
-from hairloom.addon.blender.command_line import bake_job, mend_job, object_settings
+from hairloom.addon.blender.command_line import bake_job, object_settings
+from hairloom.addon.blender.preview.diagnostics import surface_for
 from hairloom.addon.blender.sessions.fins import fins_in
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.ui.selection import chosen_hair
@@ -47,7 +48,8 @@ def test_nor_for_a_job(hair):
 
 
 def test_nor_for_the_mesh_that_hair_grows_from(hair, sphere):
-    assert mend_job._surface(hair, "") == sphere
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    assert surface_for(hair, objects_in(bpy.context.view_layer), depsgraph) == sphere
 
 
 def test_hair_of_another_view_layer_is_not_selected_but_told(hair, sphere):
