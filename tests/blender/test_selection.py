@@ -4,7 +4,7 @@ import bpy
 import pytest
 
 from hairloom.addon.blender.base.objects import objects_in
-from hairloom.addon.blender.cards.occluders import other_cards
+from hairloom.addon.blender.cards.occluders import read_occluders
 from hairloom.addon.blender.colliders.spheres import grown_on
 from hairloom.addon.blender.command_line import bake_job, object_settings
 from hairloom.addon.blender.preview.diagnostics import surface_for
@@ -39,7 +39,7 @@ def test_an_object_that_was_just_removed_is_no_obstacle(hair, sphere):
 def test_nor_for_cards_beside_it(hair):
     """Cards that are shown are built with the depsgraph as it is."""
     depsgraph = bpy.context.view_layer.depsgraph
-    assert other_cards(CardOcclusionSettings(others=True), hair, depsgraph) == ((), ())
+    assert read_occluders(CardOcclusionSettings(others=True), hair, depsgraph).cards() == ((), ())
 
 
 def test_nor_for_a_job(hair):

@@ -29,7 +29,7 @@ from ..base.vertex_weights import weights_on
 from ..scene.surfaces import read_corner_uv, read_surface
 from .material import alpha_of
 from .mesh import CARD_ATTRIBUTES, OCCLUSION_LAYER, reorder_faces, set_uv_map
-from .occluders import other_cards
+from .occluders import read_occluders
 
 __all__ = [
     "ORDERS",
@@ -116,7 +116,7 @@ def sort_steps(
     order = orders.front
     if choices.occlusion is not None:
         bodies = [] if source.head is None else [source.head]
-        others, doubts = other_cards(choices.occlusion, obj, depsgraph)
+        others, doubts = read_occluders(choices.occlusion, obj, depsgraph).cards()
         problems += doubts
         shades = [CardShade(mesh, alpha), *others]
         shading = occlusion_steps(mesh, shades, bodies, choices.occlusion)

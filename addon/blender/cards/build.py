@@ -42,7 +42,7 @@ from ...shading.volume.card_opacity import StrandArea, card_shade
 from ..base.gpu_context import ensure_gpu
 from ..base.thread_work import ThreadWork
 from ..properties.groom_settings import GroomSettings
-from .occluders import OtherHair, read_other_hair
+from .occluders import Occluders, read_occluders
 from .textures import chosen_pictures
 
 #: Draws flat strands into an atlas of this size [pixels].
@@ -60,21 +60,21 @@ class CardInputs:
     """All that cards are built from.
 
     pictures: used instead of generated textures, see `textures.picture_as`.
-    others: hair of other grooms, which shades these, where it is while these are at rest.
+    occluders: hair of other grooms, which shades these, where it is while these are at rest.
     """
 
     rig: Rig
     settings: SettingsMap = field(default_factory=SettingsMap)
     pictures: Mapping[str, Floats] = field(default_factory=dict)
-    others: OtherHair = field(default_factory=OtherHair)
+    occluders: Occluders = field(default_factory=Occluders)
 
     @classmethod
     def of(cls, hair: bpy.types.Object, rig: Rig) -> tuple[CardInputs, tuple[str, ...]]:
         """What the groom's own settings say, and warnings of pictures that cannot be used."""
         pictures, warnings = chosen_pictures(hair.data.hairloom.card_images)
         settings = GroomSettings.of(hair).sections
-        others = read_other_hair(settings[CardOcclusionSettings], hair)
-        return cls(rig, settings, pictures, others), warnings
+        occluders = read_occluders(settings[CardOcclusionSettings], hair)
+        return cls(rig, settings, pictures, occluders), warnings
 
 
 def cards_key(groom: GroomSettings) -> Hashable:
@@ -147,7 +147,7 @@ def build_steps(
         return made[-1].textures.alpha
 
     yield "Other hair"
-    others, notes = inputs.others.shades()
+    others, notes = inputs.occluders.cards()
     build = yield from card_build_steps(inputs.rig, inputs.settings, alpha_of, others)
     return MappedCards(build, made[-1], (*build.notes, *notes))
 

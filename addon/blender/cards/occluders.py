@@ -47,12 +47,12 @@ class _Read(Protocol):
 
     @property
     def state(self) -> tuple[object, ...]:
-        """All that its shade hangs on."""
+        """All that its shade depends on."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
-class OtherHair:
+class Occluders:
     """All other hair that is to shade, read from the scene: arrays that a thread may use.
 
     uids: session numbers of the objects, those that cannot be used too.
@@ -63,7 +63,7 @@ class OtherHair:
     notes: tuple[str, ...] = ()
     _read: tuple[_Read, ...] = ()
 
-    def shades(self) -> tuple[tuple[CardShade, ...], tuple[str, ...]]:
+    def cards(self) -> tuple[tuple[CardShade, ...], tuple[str, ...]]:
         """The hair as cards, and what the artist should know of it."""
         found: list[CardShade] = []
         notes = list(self.notes)
@@ -74,7 +74,7 @@ class OtherHair:
                 notes.append(_shades_nothing(error))
         return tuple(found), tuple(notes)
 
-    def is_like(self, other: OtherHair) -> bool:
+    def is_like(self, other: Occluders) -> bool:
         """Whether both shade alike."""
         if (self.uids, self.notes) != (other.uids, other.notes):
             return False
@@ -114,12 +114,12 @@ class _ReadStrands:
         return *hair, head, source.density, self.name, self.settings
 
 
-def read_other_hair(
+def read_occluders(
     settings: CardOcclusionSettings,
     own: bpy.types.Object | None,
     depsgraph: bpy.types.Depsgraph | None = None,
     motion: Floats = _NO_MOTION,
-) -> OtherHair:
+) -> Occluders:
     """All other hair if it is to shade.
 
     Args:
@@ -129,12 +129,12 @@ def read_other_hair(
             they are where they would be if all of it were at rest.
     """
     if not settings.others:
-        return OtherHair()
+        return Occluders()
     back = _NO_MOTION if np.array_equal(motion, _NO_MOTION) else np.linalg.pinv(motion)
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
     read: list[_Read] = []
     notes: list[str] = []
-    objects = shading_objects(own, depsgraph.view_layer)
+    objects = occluder_objects(own, depsgraph.view_layer)
     for obj in objects:
         try:
             if obj.type == "CURVES":
@@ -145,16 +145,7 @@ def read_other_hair(
                 notes += [f"{obj.name}: {problem}" for problem in problems]
         except HairloomError as error:
             notes.append(_shades_nothing(error))
-    return OtherHair(frozenset(obj.session_uid for obj in objects), tuple(notes), tuple(read))
-
-
-def other_cards(
-    settings: CardOcclusionSettings,
-    own: bpy.types.Object | None,
-    depsgraph: bpy.types.Depsgraph | None = None,
-) -> tuple[tuple[CardShade, ...], tuple[str, ...]]:
-    """The same as cards, here and now, and what the artist should know of it."""
-    return read_other_hair(settings, own, depsgraph).shades()
+    return Occluders(frozenset(obj.session_uid for obj in objects), tuple(notes), tuple(read))
 
 
 def _read_mesh(
@@ -193,7 +184,7 @@ def _is_still(one: object, other: object) -> bool:
     return one.shape == other.shape and np.allclose(one, other, rtol=_STILL, atol=_STILL)
 
 
-def shading_objects(
+def occluder_objects(
     own: bpy.types.Object | None, layer: bpy.types.ViewLayer
 ) -> list[bpy.types.Object]:
     """The meshes of cards and the hair that shade what is not their own."""

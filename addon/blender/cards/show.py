@@ -24,7 +24,7 @@ from ..base import latest_job
 from ..base.latest_job import LatestJob, Work
 from ..properties.groom_settings import GroomSettings
 from .build import BuiltCards, CardInputs, cards_key, order_line
-from .occluders import OtherHair, read_other_hair
+from .occluders import Occluders, read_occluders
 from .textures import chosen_pictures
 
 
@@ -75,7 +75,7 @@ class ShownCards:
         self._built: BuiltCards | None = None
         self._wanted: tuple[Rig, GroomSettings] | None = None
         self._shown: CardSnapshot | None = None
-        self._others = OtherHair()
+        self._occluders = Occluders()
         self._motion: Floats = np.eye(4)
         self.warnings: tuple[str, ...] = ()
 
@@ -119,16 +119,16 @@ class ShownCards:
     @property
     def shaded_by(self) -> frozenset[int]:
         """Session numbers of the other hair that shades what is shown, or what is being built."""
-        return self._others.uids
+        return self._occluders.uids
 
     def shade_again(self) -> None:
         """The same cards once more if other hair is elsewhere or other hair now."""
         if self._wanted is None:
             return
-        others = self._read_others(self._wanted[1])
-        if not others.is_like(self._others):
+        occluders = self._read_occluders(self._wanted[1])
+        if not occluders.is_like(self._occluders):
             self._job.cancel()
-            self._build(others)
+            self._build(occluders)
 
     def collect(self) -> None:
         """Take over what was built meanwhile."""
@@ -157,32 +157,32 @@ class ShownCards:
         """Strands are shown; cards that are on their way are not waited for."""
         self._job.cancel()
         self._built = self._wanted = self._shown = None
-        self._others = OtherHair()
+        self._occluders = Occluders()
         self.warnings = ()
 
-    def _build(self, others: OtherHair | None = None) -> None:
+    def _build(self, occluders: Occluders | None = None) -> None:
         """Have what is wanted built; at once where nothing goes on until then."""
         assert self._wanted is not None
         rig, settings = self._wanted
         if latest_job.is_blocking():
-            self._take(lambda: BuiltCards.now(self._read(rig, settings, others)))
+            self._take(lambda: BuiltCards.now(self._read(rig, settings, occluders)))
         else:
-            self._job.want(self._wanted, lambda: self._begun(rig, settings, others))
+            self._job.want(self._wanted, lambda: self._begun(rig, settings, occluders))
 
     def _begun(
-        self, rig: Rig, settings: GroomSettings, others: OtherHair | None
+        self, rig: Rig, settings: GroomSettings, occluders: Occluders | None
     ) -> Work[BuiltCards]:
-        return partial(BuiltCards.in_thread, inputs=self._read(rig, settings, others))
+        return partial(BuiltCards.in_thread, inputs=self._read(rig, settings, occluders))
 
-    def _read(self, rig: Rig, settings: GroomSettings, others: OtherHair | None) -> CardInputs:
+    def _read(self, rig: Rig, settings: GroomSettings, occluders: Occluders | None) -> CardInputs:
         """With the chosen pictures and the other hair as they are now."""
-        self._others = others or self._read_others(settings)
+        self._occluders = occluders or self._read_occluders(settings)
         pictures, _ = chosen_pictures(self._hair().data.hairloom.card_images)
-        return CardInputs(rig, settings.sections, pictures, self._others)
+        return CardInputs(rig, settings.sections, pictures, self._occluders)
 
-    def _read_others(self, settings: GroomSettings) -> OtherHair:
+    def _read_occluders(self, settings: GroomSettings) -> Occluders:
         depsgraph = bpy.context.view_layer.depsgraph
-        return read_other_hair(
+        return read_occluders(
             settings[CardOcclusionSettings], self._hair(), depsgraph, self._motion
         )
 

@@ -20,7 +20,7 @@ from ..cards.build import CardInputs, order_line
 from ..cards.card_choices import motion_choices
 from ..cards.files import CardOutput, WrittenCards, write_cards
 from ..cards.motion import GuideMotion, baked_motion, take_motion
-from ..cards.occluders import read_other_hair
+from ..cards.occluders import read_occluders
 from ..cards.textures import TextureFiles, chosen_pictures, named_pictures
 from .card_options import add_card_options
 from .job_options import add_texture_option, frames_of_option
@@ -70,8 +70,8 @@ def written_cards(
     if levels is not None:
         settings = settings.with_settings(replace(settings[CardSettings], levels=levels))
     hair = bpy.data.objects.get(job.sources.groom or "")
-    others = read_other_hair(settings[CardOcclusionSettings], hair)
-    inputs = CardInputs(rig, settings, pictures, others)
+    occluders = read_occluders(settings[CardOcclusionSettings], hair)
+    inputs = CardInputs(rig, settings, pictures, occluders)
     written = write_cards(path, inputs, output, report.stage, motion)
     report.facts.update(
         cards=written.mesh.card_count,

@@ -30,7 +30,7 @@ from ..base.latest_job import LatestJob
 from ..base.objects import head_of
 from ..base.redraw import redraw_views
 from ..cards.build import BuiltCards, CardInputs, cards_key
-from ..cards.occluders import OtherHair, read_other_hair
+from ..cards.occluders import Occluders, read_occluders
 from ..cards.show import as_shown
 from ..cards.textures import chosen_pictures
 from ..properties.groom_settings import GroomSettings
@@ -50,10 +50,10 @@ class _Made:
     rig: Rig
     snapshot: Snapshot
     is_baked: bool
-    _cards: list[tuple[Hashable, BuiltCards, OtherHair]] = field(default_factory=list)
+    _cards: list[tuple[Hashable, BuiltCards, Occluders]] = field(default_factory=list)
 
     def cards(
-        self, owner: bpy.types.Object, settings: GroomSettings, others: OtherHair
+        self, owner: bpy.types.Object, settings: GroomSettings, others: Occluders
     ) -> BuiltCards:
         """Its cards; those of the last settings and other hair are kept, to the last colour.
 
@@ -165,7 +165,7 @@ def read_groom(
         strands, pose = made.snapshot.strands, made.rig.rest_pose
     snapshot = replace(made.snapshot, strands=strands)
     if settings.shows_cards:
-        others = read_other_hair(settings[CardOcclusionSettings], owner, depsgraph, pose.matrix)
+        others = read_occluders(settings[CardOcclusionSettings], owner, depsgraph, pose.matrix)
         built = made.cards(owner, settings, others)
         cards = built.at(pose, strands[made.rig.guides], settings.sections)
         snapshot = as_shown(replace(snapshot, cards=cards))

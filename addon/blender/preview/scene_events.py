@@ -17,7 +17,7 @@ from ..bakes import playback
 from ..base import latest_job
 from ..base.originals import refresh_views
 from ..base.redraw import redraw_panels
-from ..cards.occluders import shading_objects
+from ..cards.occluders import occluder_objects
 from ..sessions.session import Session
 from ..viewport import view_transform
 from . import previews as registry
@@ -240,7 +240,7 @@ def is_shaded_anew(session: Session, changed: set[int], layer: bpy.types.ViewLay
     """Whether other hair that shades the cards of this groom may have changed, come or gone."""
     if not session.cards.is_shaded_by_others:
         return False
-    others = shading_objects(session.hair.handle.find(), layer)
+    others = occluder_objects(session.hair.handle.find(), layer)
     uids = {each.session_uid for each in others}
     data = {each.data.session_uid for each in others}
     return uids != session.cards.shaded_by or not changed.isdisjoint(uids | data)

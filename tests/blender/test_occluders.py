@@ -13,7 +13,7 @@ from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.cards.adopt import SortChoices, sort_mesh
 from hairloom.addon.blender.cards.build import CardInputs
 from hairloom.addon.blender.cards.object import card_objects
-from hairloom.addon.blender.cards.occluders import other_cards
+from hairloom.addon.blender.cards.occluders import read_occluders
 from hairloom.addon.blender.engine.engine_hair import read_groom
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.viewport import overlay
@@ -70,9 +70,9 @@ def test_they_shade_what_is_made_and_only_while_they_are_seen(hair, other):
 
 def test_what_is_written_has_the_same_shade(hair, other):
     settings = hair.data.hairloom.card_occlusion
-    assert CardInputs.of(hair, None)[0].others.shades() == ((), ())
+    assert CardInputs.of(hair, None)[0].occluders.cards() == ((), ())
     settings.others = True
-    (shade,), notes = CardInputs.of(hair, None)[0].others.shades()
+    (shade,), notes = CardInputs.of(hair, None)[0].occluders.cards()
     assert notes == ()
     mesh = other.data
     assert len(shade.mesh.triangles) == len(mesh.polygons)
@@ -89,7 +89,7 @@ def test_grooms_without_cards_shade_by_their_strands(hair, new_hair, sphere):
     strands.data.hairloom.strands.width_scale = 20.0
     bpy.context.view_layer.update()
     on = CardOcclusionSettings(others=True)
-    (shade,), notes = other_cards(on, hair)
+    (shade,), notes = read_occluders(on, hair).cards()
     assert notes == () and shade.alpha is not None and (shade.alpha > 0.0).all()
     hair.data.hairloom.card_occlusion.others = True
     bpy.context.view_layer.objects.active = hair
@@ -99,7 +99,7 @@ def test_grooms_without_cards_shade_by_their_strands(hair, new_hair, sphere):
     bpy.context.view_layer.objects.active = strands
     strands.data.hairloom.atlas.source = "made"
     press()
-    (other,), _ = other_cards(on, hair)
+    (other,), _ = read_occluders(on, hair).cards()
     assert len(other.mesh.triangles) == len(card_objects(strands)[0].data.polygons)
 
 
@@ -108,7 +108,7 @@ def test_hair_that_cannot_be_used_shades_nothing_and_says_why(hair, new_hair, sp
     strands.name = "Bald"
     strands.data.remove_curves()
     bpy.context.view_layer.update()
-    shades, (note,) = other_cards(CardOcclusionSettings(others=True), hair)
+    shades, (note,) = read_occluders(CardOcclusionSettings(others=True), hair).cards()
     assert shades == () and "Bald" in note and "no curves" in note
 
 
@@ -268,8 +268,8 @@ def test_own_cards_and_coarser_levels_and_other_meshes_are_left_out(hair, sphere
     for obj in card_objects(hair):
         obj.hide_set(False)
         obj.hide_viewport = False
-    assert other_cards(on, hair) == ((), ())
-    (shade,), _ = other_cards(on, sphere)
+    assert read_occluders(on, hair).cards() == ((), ())
+    (shade,), _ = read_occluders(on, sphere).cards()
     assert len(shade.mesh.triangles) == len(card_objects(hair)[0].data.polygons)
 
 
@@ -285,13 +285,13 @@ def test_they_shade_what_is_sorted(hair, other, evaluated):
 def test_without_uvs_or_a_picture_they_are_opaque_and_without_faces_nothing(hair, other):
     on = CardOcclusionSettings(others=True)
     other.data.materials[0] = None
-    (shade,), notes = other_cards(on, hair)
+    (shade,), notes = read_occluders(on, hair).cards()
     assert shade.alpha is None and "Other: No material" in notes[0]
     for layer in list(other.data.uv_layers):
         other.data.uv_layers.remove(layer)
     bpy.context.view_layer.update()
-    (shade,), _ = other_cards(on, hair)
+    (shade,), _ = read_occluders(on, hair).cards()
     assert shade.alpha is None
     other.data.clear_geometry()
     bpy.context.view_layer.update()
-    assert other_cards(on, hair) == ((), ())
+    assert read_occluders(on, hair).cards() == ((), ())
