@@ -18,6 +18,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.draws)
 
 
+@pytest.fixture(scope="session")
+def frame(gpu_context: Any) -> Any:
+    """The module that draws a frame."""
+    from hairloom.addon.render import frame
+
+    return frame
+
+
 @pytest.fixture
 def compute(gpu_context: Any) -> Callable[..., np.ndarray]:
     """Run a compute shader of tests/gpu/shaders over a grid, back comes (height, width, 4)."""

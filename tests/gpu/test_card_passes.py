@@ -6,8 +6,10 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+import flat_cards
 import numpy as np
 import pytest
+from flat_cards import camera, card, constant
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.drawing_settings import CardDrawingSettings
@@ -17,7 +19,6 @@ from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.texture_settings import TextureSettings
 from hairloom.addon.shading.textures import HairTextures, hair_textures
-from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -49,39 +50,9 @@ PAPER = {
 }
 
 
-@pytest.fixture(scope="module")
-def frame() -> Any:
-    pytest.importorskip("gpu")
-    from hairloom.addon.render import frame
-
-    return frame
-
-
-def camera(frame: Any, y: float = -1.0) -> Any:
-    """Shows x and z from 0 to 1; looks along +y, or along -y from a greater y."""
-    return frame.Camera(
-        frame.look_at((0.5, y, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, -3.0, 5.0)
-    )
-
-
 def mesh_of(*cards: tuple[float, float, float, float, float]) -> CardMesh:
     """Rectangles (low x, low z, high x, high z, y) that face -y; a greater low x: that face +y."""
-    positions, triangles = [], []
-    for x0, z0, x1, z1, y in cards:
-        first = 4 * len(positions)
-        positions.append([[x0, y, z1], [x1, y, z1], [x0, y, z0], [x1, y, z0]])
-        triangles += [[first, first + 2, first + 3], [first, first + 3, first + 1]]
-    count = len(cards)
-    return CardMesh(
-        positions=np.concatenate(positions),
-        triangles=np.array(triangles),
-        uv=np.tile([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], (count, 1)),
-        along=np.tile([0.0, 0.0, 1.0, 1.0], count),
-        normal=np.tile([0.0, -1.0, 0.0], (4 * count, 1)),
-        tangent=np.tile([0.0, 0.0, -1.0], (4 * count, 1)),
-        occlusion=np.ones(4 * count),
-        card=np.repeat(np.arange(count), 2),
-    )
+    return flat_cards.mesh_of(*(card((x0, z0), (x1, z1), y) for x0, z0, x1, z1, y in cards))
 
 
 STACK = (
@@ -97,13 +68,6 @@ def hairy() -> HairTextures:
     return hair_textures(TextureSettings(variant_width=24, height=24, strand_count=6), 1)
 
 
-def constant(alpha: float = 1.0, **more: Any) -> HairTextures:
-    half = np.full((4, 4), 0.5, np.float32)
-    straight = np.broadcast_to(np.float32((0.5, 1.0, 0.5)), (4, 4, 3))
-    white = np.ones((4, 4, 3), np.float32)
-    return HairTextures(white, np.full((4, 4), np.float32(alpha)), half, half, straight, **more)
-
-
 def snapshot_of(
     mesh: CardMesh,
     textures: HairTextures,
@@ -112,15 +76,8 @@ def snapshot_of(
     back: Any = None,
     **more: Any,
 ) -> Any:
-    from hairloom.addon.render.card_snapshot import CardSnapshot
-    from hairloom.addon.render.snapshot import Snapshot
-
-    none = np.zeros((0, 2, 3), np.float32)
-    cards = CardSnapshot(
-        mesh, textures, back_triangles=back, drawing=drawing or CardDrawingSettings()
-    )
-    values = {"volume": VolumeSettings(shadows="none"), **LOOK, **more}
-    return Snapshot(none, none[..., 0], cards=cards, **values)
+    cards = {"back_triangles": back, "drawing": drawing or CardDrawingSettings()}
+    return flat_cards.snapshot_of(mesh, textures, cards=cards, **{**LOOK, **more})
 
 
 def painted(frame: Any, cards: list[Any], view: Any, textures: HairTextures) -> np.ndarray:
@@ -307,7 +264,7 @@ def test_clear_pixels_hide_what_comes_later_only_without_the_test(frame: Any) ->
         mesh, uv=np.repeat([[0.1, 0.5], [0.9, 0.5]], 4, axis=0).astype(np.float32)
     )
     alpha = np.repeat([[0.0, 0.0, 0.5, 0.5]], 4, axis=0).astype(np.float32)
-    textures = dataclasses.replace(constant(), alpha=alpha)
+    textures = dataclasses.replace(constant(noise=0.5), alpha=alpha)
     for skip_clear, expected in ((True, 0.5), (False, 0.0)):
         drawing = CardDrawingSettings(skip_clear=skip_clear)
         shown = snapshot_of(mesh, textures, drawing)
@@ -318,13 +275,13 @@ def test_clear_pixels_hide_what_comes_later_only_without_the_test(frame: Any) ->
 def test_a_normal_map_bends_the_normal(frame: Any) -> None:
     """The twin of `mapped_normal`, seen through the diffuse term."""
     texel = np.float32((0.8, 0.6, 0.85))
-    bent = constant(normal=np.broadcast_to(texel, (4, 4, 3)))
+    bent = constant(noise=0.5, normal=np.broadcast_to(texel, (4, 4, 3)))
     sun = Light.sun((-0.6, 0.7, -0.2), (1.0, 1.0, 1.0), 3.0)
     view, mesh = camera(frame), mesh_of((0.0, 0.0, 1.0, 1.0, 0.0))
     light = {"lights": (sun,), "ambient": (0.0, 0.0, 0.0)}
     flat, mapped = (
         frame.render_image(snapshot_of(mesh, textures, **light), view, 8, 8, 1)[4, 4, :3]
-        for textures in (constant(), bent)
+        for textures in (constant(noise=0.5), bent)
     )
     normal, tangent = np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, -1.0])
     to_light, to_eye = -np.array([-0.6, 0.7, -0.2]), np.array([0.0, -1.0, 0.0])
@@ -346,7 +303,7 @@ def test_what_the_viewport_is_given(frame: Any) -> None:
     from hairloom.addon.render.card_pass import CardPass
 
     dim = {"lights": (Light.sun((0.2, 0.7, -0.4), (1.0, 0.9, 0.8), 0.4),)}
-    shown = snapshot_of(mesh_of((0.0, 0.0, 1.0, 1.0, 0.0)), constant(0.5), **dim)
+    shown = snapshot_of(mesh_of((0.0, 0.0, 1.0, 1.0, 0.0)), constant(alpha=0.5, noise=0.5), **dim)
     linear = frame.render_image(shown, camera(frame), 8, 8, 1)[4, 4]
     offscreen = gpu.types.GPUOffScreen(8, 8, format="RGBA32F")
     with offscreen.bind():

@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+import flat_cards
 import numpy as np
 import pytest
+from flat_cards import camera, mesh_of, snapshot_of
 
-from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.textures import HairTextures
@@ -27,22 +28,8 @@ PLAIN = ShadingSettings(base_color=(0.5, 0.4, 0.3))
 
 def card(low: float, high: float, y: float, u: tuple[float, float] = (0.0, 1.0)) -> Any:
     """From x = low to high, z from 0 to 1; one whose low is the greater faces +y."""
-    way = np.array([0.0, -1.0 if low < high else 1.0, 0.0])
-    return {
-        "positions": np.array([[low, y, 1], [high, y, 1], [low, y, 0], [high, y, 0]]),
-        "triangles": np.array([[0, 2, 3], [0, 3, 1]]),
-        "uv": np.array([[u[0], 0.0], [u[1], 0.0], [u[0], 1.0], [u[1], 1.0]]),
-        "along": np.array([0.0, 0.0, 1.0, 1.0]),
-        "normal": np.repeat([way], 4, axis=0),
-        "tangent": np.repeat([[0.0, 0.0, -1.0]], 4, axis=0),
-        "occlusion": np.ones(4),
-    }
-
-
-def mesh_of(*cards: Any) -> CardMesh:
-    joined = {name: np.concatenate([each[name] for each in cards]) for name in cards[0]}
-    joined["triangles"] = joined["triangles"] + np.repeat(np.arange(len(cards)) * 4, 2)[:, None]
-    return CardMesh(**joined, card=np.repeat(np.arange(len(cards)), 2))
+    made = flat_cards.card((low, 0.0), (high, 1.0), y, u=u)
+    return made if low < high else {**made, "normal": -made["normal"]}
 
 
 def textures_of(alpha: Any) -> HairTextures:
@@ -53,27 +40,9 @@ def textures_of(alpha: Any) -> HairTextures:
     return HairTextures(white, alpha, half, half, np.full((2, 2, 3), 0.5, np.float32))
 
 
-def snapshot_of(mesh: CardMesh, textures: HairTextures, **more: Any) -> Any:
-    from hairloom.addon.render.card_snapshot import CardSnapshot
-    from hairloom.addon.render.snapshot import Snapshot
-
-    none = np.zeros((0, 2, 3), np.float32)
-    return Snapshot(none, none[..., 0], cards=CardSnapshot(mesh, textures), **more)
-
-
-@pytest.fixture(scope="module")
-def frame() -> Any:
-    pytest.importorskip("gpu")
-    from hairloom.addon.render import frame
-
-    return frame
-
-
 def behind(frame: Any) -> Any:
     """Sees the cards from the dark side: x from right to left."""
-    return frame.Camera(
-        frame.look_at((0.5, 3.0, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 5.0)
-    )
+    return camera(frame, 3.0)
 
 
 def drawn(frame: Any, mesh: Any, textures: Any, volume: VolumeSettings, **more: Any) -> np.ndarray:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from typing import Any
 
+import flat_cards
 import numpy as np
 import pytest
+from flat_cards import camera, constant, mesh_of, snapshot_of
 
-from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.shading.card_look import card_base, mapped_tangent
 from hairloom.addon.shading.kajiya_kay import kajiya_kay
 from hairloom.addon.shading.lights import Light, light_at, light_irradiance
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.texture_settings import TextureSettings
-from hairloom.addon.shading.textures import HairTextures, hair_textures
-from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.shading.textures import hair_textures
 from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -25,73 +26,12 @@ PLAIN = ShadingSettings(base_color=(1.0, 1.0, 1.0))
 
 
 @pytest.fixture(scope="module")
-def frame() -> Any:
-    pytest.importorskip("gpu")
-    from hairloom.addon.render import frame
-
-    return frame
-
-
-@pytest.fixture(scope="module")
 def front(frame: Any) -> Any:
-    """Shows x and z from 0 to 1, and looks along +y."""
-    return frame.Camera(
-        frame.look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 3.0)
-    )
+    return camera(frame)
 
 
-def card(
-    low: tuple[float, float], high: tuple[float, float], y: float, *, tilt: float = 0.0
-) -> dict[str, np.ndarray]:
-    """A rectangle from low to high (x, z) that faces the eye, its root at the top.
-
-    A card whose low x is the greater one shows its back.
-    """
-    (x0, z0), (x1, z1) = low, high
-    corners = np.array([[x0, y, z1], [x1, y, z1], [x0, y, z0], [x1, y, z0]])
-    lean = np.array([0.0, -np.cos(tilt), np.sin(tilt)])
-    return {
-        "positions": corners,
-        "triangles": np.array([[0, 2, 3], [0, 3, 1]]),
-        "uv": np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]),
-        "along": np.array([0.0, 0.0, 1.0, 1.0]),
-        "normal": np.repeat([lean], 4, axis=0),
-        "tangent": np.repeat([[0.0, -np.sin(tilt), -np.cos(tilt)]], 4, axis=0),
-        "occlusion": np.array([0.4, 0.6, 0.8, 1.0]),
-        "card": np.zeros(2, int),
-    }
-
-
-def mesh_of(*cards: dict[str, np.ndarray]) -> CardMesh:
-    joined = {name: np.concatenate([each[name] for each in cards]) for name in cards[0]}
-    joined["triangles"] = joined["triangles"] + np.repeat(np.arange(len(cards)) * 4, 2)[:, None]
-    joined["card"] = np.repeat(np.arange(len(cards)), 2)
-    return CardMesh(**joined)
-
-
-def constant(
-    base: Any = 1.0, alpha: float = 1.0, shift: float = 0.5, noise: float = 1.0, tangent: Any = None
-) -> HairTextures:
-    shape = (4, 4)
-    return HairTextures(
-        np.broadcast_to(np.float32(base), (*shape, 3)),
-        np.full(shape, alpha, np.float32),
-        np.full(shape, shift, np.float32),
-        np.full(shape, noise, np.float32),
-        np.broadcast_to(np.float32((0.5, 1.0, 0.5) if tangent is None else tangent), (*shape, 3)),
-    )
-
-
-def snapshot_of(mesh: CardMesh, textures: HairTextures, *, tangent_map: bool = False, **more: Any):
-    from hairloom.addon.render.card_snapshot import CardSnapshot
-    from hairloom.addon.render.snapshot import Snapshot
-
-    return Snapshot(
-        np.zeros((0, 2, 3), np.float32),
-        np.zeros((0, 2), np.float32),
-        cards=CardSnapshot(mesh, textures, tangent_map),
-        **{"volume": VolumeSettings(shadows="none"), **more},
-    )
+#: a rectangle whose corners are shut in by different amounts
+card = partial(flat_cards.card, occlusion=(0.4, 0.6, 0.8, 1.0))
 
 
 def sampled(texture: np.ndarray, u: np.ndarray, v: np.ndarray, *, repeats: bool) -> np.ndarray:
@@ -136,7 +76,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
     snapshot = snapshot_of(
         mesh_of(card((0.0, 0.0), (1.0, 1.0), 0.0, tilt=tilt)),
         textures,
-        tangent_map=tangent_map,
+        cards={"has_tangent_map": tangent_map},
         lights=LIGHTS,
         ambient=AMBIENT,
         shading=LOOK,

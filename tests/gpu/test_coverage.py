@@ -91,14 +91,6 @@ def _in_triangle(triangles: np.ndarray, point: np.ndarray) -> np.ndarray:
     return (np.min(signs, axis=0) >= 0.0) | (np.max(signs, axis=0) <= 0.0)
 
 
-@pytest.fixture(scope="module")
-def frame() -> Any:
-    pytest.importorskip("gpu")
-    from hairloom.addon.render import frame
-
-    return frame
-
-
 def curly_groom(strand_count: int) -> np.ndarray:
     """Strands that leave a ball and curl, so that they meet the camera at all angles."""
     random = np.random.default_rng(2)

@@ -24,14 +24,6 @@ HIDERS = np.array([[3.0, 3.0, 3.0, 0.1]], np.float32)
 
 
 @pytest.fixture(scope="module")
-def frame() -> Any:
-    pytest.importorskip("gpu")
-    from hairloom.addon.render import frame
-
-    return frame
-
-
-@pytest.fixture(scope="module")
 def front(frame: Any) -> Any:
     """An orthographic camera that shows x and z from -0.5 to 0.5 and looks along +y."""
     return frame.Camera(

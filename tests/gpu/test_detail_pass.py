@@ -30,14 +30,6 @@ HIDERS = np.array([[0.0, 0.0, 0.0, 0.095], [0.02, 0.0, 0.03, 0.06]], np.float32)
 FIXED_64 = dataclasses.replace(BARE, mode="fixed", subdivisions=64)
 
 
-@pytest.fixture(scope="module")
-def frame() -> Any:
-    pytest.importorskip("gpu")
-    from hairloom.addon.render import frame
-
-    return frame
-
-
 def curly(strand_count: int, cv_count: int) -> np.ndarray:
     """Strands of 20 cm from a ball of 10 cm, from nearly straight to tightly curled."""
     random = np.random.default_rng(cv_count)

@@ -27,14 +27,6 @@ RIBBON = StrandSettings(width_scale=1.0, tip_width=1.0, minimum_width=0.0)
 
 
 @pytest.fixture(scope="module")
-def frame() -> Any:
-    pytest.importorskip("gpu")
-    from hairloom.addon.render import frame
-
-    return frame
-
-
-@pytest.fixture(scope="module")
 def front(frame: Any) -> Any:
     """An orthographic camera that shows x and z from 0 to 1 and looks along +y."""
     return frame.Camera(

@@ -17,14 +17,6 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 SIZE, SAMPLES = 32, 64
 
 
-@pytest.fixture(scope="module")
-def frame() -> Any:
-    pytest.importorskip("gpu")
-    from hairloom.addon.render import frame
-
-    return frame
-
-
 def camera_of(frame: Any) -> Any:
     view = frame.look_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
     return frame.Camera(view, frame.orthographic(1.0, 1.0, 0.0, 3.0))

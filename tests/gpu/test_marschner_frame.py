@@ -29,14 +29,6 @@ RIBBON = StrandSettings(width_scale=1.0, tip_width=1.0, minimum_width=0.0)
 WHITE = (1.0, 1.0, 1.0)
 
 
-@pytest.fixture(scope="module")
-def frame() -> Any:
-    pytest.importorskip("gpu")
-    from hairloom.addon.render import frame
-
-    return frame
-
-
 BLOND = ShadingSettings(model="marschner", pigment="melanin", melanin=0.25)
 LOOKS = {
     "brown": ShadingSettings(model="marschner", noise_cells=7.0),

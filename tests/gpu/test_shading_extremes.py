@@ -52,14 +52,6 @@ OWN = {
 }
 
 
-@pytest.fixture(scope="module")
-def frame() -> Any:
-    pytest.importorskip("gpu")
-    from hairloom.addon.render import frame
-
-    return frame
-
-
 def ends(settings: Settings) -> Iterator[tuple[str, Any]]:
     """Each parameter's name with each of its extreme values."""
     for parameter in settings.parameters():

@@ -29,14 +29,6 @@ COLORED = replace(FLAT, tip_color=(0.1, 0.3, 1.0), tip_tint=1.0, tint_start=0.0,
 
 
 @pytest.fixture(scope="module")
-def frame() -> Any:
-    pytest.importorskip("gpu")
-    from hairloom.addon.render import frame
-
-    return frame
-
-
-@pytest.fixture(scope="module")
 def front(frame: Any) -> Any:
     """A pixel is a metre; x and z from 0 to SIZE, along +y."""
     middle = SIZE / 2
