@@ -11,7 +11,7 @@ import pytest
 from hairloom.addon import card_flow
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.cards.adopt import SortChoices, sort_mesh
-from hairloom.addon.blender.cards.build import CardInputs
+from hairloom.addon.blender.cards.build import read_inputs
 from hairloom.addon.blender.cards.object import card_objects
 from hairloom.addon.blender.cards.occluders import read_occluders
 from hairloom.addon.blender.engine.engine_hair import read_groom
@@ -70,9 +70,9 @@ def test_they_shade_what_is_made_and_only_while_they_are_seen(hair, other):
 
 def test_what_is_written_has_the_same_shade(hair, other):
     settings = hair.data.hairloom.card_occlusion
-    assert CardInputs.of(hair, None)[0].occluders.cards() == ((), ())
+    assert read_inputs(hair, bpy.context.evaluated_depsgraph_get())[0].occluders.cards() == ((), ())
     settings.others = True
-    (shade,), notes = CardInputs.of(hair, None)[0].occluders.cards()
+    (shade,), notes = read_inputs(hair, bpy.context.evaluated_depsgraph_get())[0].occluders.cards()
     assert notes == ()
     mesh = other.data
     assert len(shade.mesh.triangles) == len(mesh.polygons)

@@ -40,8 +40,11 @@ from ...shading.texture_settings import TextureSettings
 from ...shading.textures import TEXTURES, HairTextures, hair_textures
 from ...shading.volume.card_opacity import StrandArea, card_shade
 from ..base.gpu_context import ensure_gpu
+from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
 from ..properties.groom_settings import GroomSettings
+from ..scene.rigs import rig_from
+from ..scene.source import read_source
 from .occluders import Occluders, read_occluders
 from .textures import chosen_pictures
 
@@ -68,13 +71,29 @@ class CardInputs:
     pictures: Mapping[str, Floats] = field(default_factory=dict)
     occluders: Occluders = field(default_factory=Occluders)
 
-    @classmethod
-    def of(cls, hair: bpy.types.Object, rig: Rig) -> tuple[CardInputs, tuple[str, ...]]:
-        """What the groom's own settings say, and warnings of pictures that cannot be used."""
-        pictures, warnings = chosen_pictures(hair.data.hairloom.card_images)
-        settings = GroomSettings.of(hair).sections
-        occluders = read_occluders(settings[CardOcclusionSettings], hair)
-        return cls(rig, settings, pictures, occluders), warnings
+
+def read_inputs(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rig: Rig | None = None
+) -> tuple[CardInputs, tuple[str, ...], dict[str, int]]:
+    """A groom by its own settings; what the artist should know; what was dropped and why.
+
+    Args:
+        rig: of the groom's bake; None is that of its curves.
+
+    Raises:
+        HairloomError: no hair that can be used.
+    """
+    settings = GroomSettings.of(hair).sections
+    notes: tuple[str, ...] = ()
+    dropped: dict[str, int] = {}
+    if rig is None:
+        source = read_source(hair, depsgraph)
+        rig = rig_from(source, settings, place=hair.name)
+        notes, dropped = source.warnings, source.dropped
+    pictures, problems = chosen_pictures(hair.data.hairloom.card_images)
+    occluders = read_occluders(settings[CardOcclusionSettings], hair)
+    inputs = CardInputs(rig, settings, pictures, occluders)
+    return inputs, (*notes, *notes_of(hair, rig), *problems), dropped
 
 
 def cards_key(groom: GroomSettings) -> Hashable:

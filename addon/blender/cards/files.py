@@ -26,11 +26,9 @@ from ...shading.kajiya_kay_settings import KajiyaKaySettings
 from ...shading.marschner.look import fibre_of, pack_fibre
 from ...shading.marschner.settings import MarschnerSettings
 from ...shading.settings import ShadingSettings, SharedSettings
-from ..base.outcome import Outcome, notes_of
+from ..base.outcome import Outcome
 from ..base.report import hairloom_version
 from ..base.thread_work import ThreadWork
-from ..scene.rigs import rig_of
-from ..scene.source import read_source
 from .build import (
     CardInputs,
     CardMaps,
@@ -39,6 +37,7 @@ from .build import (
     build_steps,
     built_in_thread,
     order_line,
+    read_inputs,
     untimed,
 )
 from .exporters import CardLook, check_cards, check_exporter, level_names, write_card_mesh
@@ -357,18 +356,12 @@ class CardExport:
         """
         motion = None if output.motion.kind == "none" else baked_motion(hair, frames)
         check_output(path, output, motion)
-        dropped: dict[str, int] = {}
-        if motion is None:
-            source = read_source(hair, depsgraph)
-            rig, dropped = rig_of(hair, source), source.dropped
-            notes = (*source.warnings, *notes_of(hair, rig))
-        else:
-            rig, notes = motion.rig, (*notes_of(hair, motion.rig), *motion.notes)
-        inputs, warnings = CardInputs.of(hair, rig)
+        rig, stale = (None, ()) if motion is None else (motion.rig, motion.notes)
+        inputs, notes, dropped = read_inputs(hair, depsgraph, rig)
         if levels is not None:
             cards = replace(inputs.settings[CardSettings], levels=levels)
             inputs = replace(inputs, settings=inputs.settings.with_settings(cards))
-        return cls(path, output, inputs, motion, dropped, (*notes, *warnings))
+        return cls(path, output, inputs, motion, dropped, (*notes, *stale))
 
     def building(self) -> ThreadWork[MappedCards]:
         """Build the cards in a thread."""

@@ -17,11 +17,8 @@ from ...cards.card_mesh import OF_CARDS, CardMesh
 from ...errors import HairloomError
 from ...shading.settings import ShadingSettings
 from ..base.objects import Handle, head_of, matrix_of
-from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
-from ..scene.rigs import rig_of
-from ..scene.source import read_source
-from .build import CardInputs, MappedCards, built_in_thread, order_line
+from .build import MappedCards, built_in_thread, order_line, read_inputs
 from .material import Color, fill_image, new_material
 from .mesh import OCCLUSION_LAYER, fill_mesh
 
@@ -39,14 +36,10 @@ class CardObjectJob:
     def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         for obj in card_objects(hair):
             _check_editable(obj)
-        source = read_source(hair, depsgraph)
-        rig = rig_of(hair, source)
-        self._inputs, warnings = CardInputs.of(hair, rig)
+        self._inputs, self.notes, self.dropped = read_inputs(hair, depsgraph)
         self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)
         self.objects: list[bpy.types.Object] = []
         self.order = ""
-        self.notes = (*source.warnings, *notes_of(hair, rig), *warnings)
-        self.dropped = source.dropped
 
     def building(self) -> ThreadWork[MappedCards]:
         """Build the cards in a thread, which touches nothing of Blender's."""
