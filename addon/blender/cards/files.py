@@ -64,6 +64,8 @@ _UNITS = {
     "pixels": "px",
     "none": "1",
 }
+#: of Marschner's model alone, though both models share the panel that they are drawn in
+_PIGMENT = {"pigment", "melanin", "redness", "absorption"}
 _OF_KIND = {"color": "scene-linear Rec. 709", "choice": "name", "toggle": "true or false"}
 
 #: Tells what is being done, and which share of it is done; None where nobody knows.
@@ -305,9 +307,9 @@ def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str
         tables: name -> file of the tables that lie beside it, see `write_tables`.
     """
     own: type[Settings] = KajiyaKaySettings if shading.model == "kajiya_kay" else MarschnerSettings
-    parameters = [
-        each for each in (*SharedSettings.parameters(), *own.parameters()) if each.name != "model"
-    ]
+    left_out = {"model"} | (_PIGMENT if own is KajiyaKaySettings else set())
+    every = (*SharedSettings.parameters(), *own.parameters())
+    parameters = [each for each in every if each.name not in left_out]
     content: dict[str, Any] = {
         "model": shading.model,
         "values": {each.name: getattr(shading, each.name) for each in parameters},
