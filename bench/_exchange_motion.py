@@ -1,14 +1,14 @@
 """Sintel's cards on a head that shakes, as joints and as motion textures.
 
-It needs Blender, or Blender as a module, for the simulation of a take.
+It needs Blender, or Blender as a module, for its pictures.
 """
 
 from __future__ import annotations
 
 import tempfile
 import time
-from contextlib import nullcontext
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +17,11 @@ from extension_loader import load_package
 load_package()
 
 from _cards_groom import SETTINGS, sintel_rig  # noqa: E402
+from shaken import GRAVITY, MadeMotion, shaken_poses  # noqa: E402
 
-from hairloom.addon.blender.bakes.take import TakeDrive, shaken_poses, simulate  # noqa: E402
+from hairloom.addon import pipeline  # noqa: E402
 from hairloom.addon.blender.base.images import read_texture  # noqa: E402
 from hairloom.addon.blender.cards.motion import (  # noqa: E402
-    GuideMotion,
     MotionChoices,
     TextureMotion,
     joint_motion_steps,
@@ -29,8 +29,9 @@ from hairloom.addon.blender.cards.motion import (  # noqa: E402
 )
 from hairloom.addon.card_flow import card_build_steps  # noqa: E402
 from hairloom.addon.cards.steps import result_of  # noqa: E402
-from hairloom.addon.dynamics.colliders import DistanceField  # noqa: E402
+from hairloom.addon.dynamics.colliders import DistanceField, PosedCollider  # noqa: E402
 from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
+from hairloom.addon.dynamics.way import bow  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import GLB  # noqa: E402
 from hairloom.addon.params import SettingsMap  # noqa: E402
 from hairloom.addon.pipeline import Rig  # noqa: E402
@@ -83,20 +84,21 @@ def motion_figures(seconds: float) -> dict[str, float]:
     return figures
 
 
-def _shaken(rig: Rig, seconds: float) -> GuideMotion:
+def _shaken(rig: Rig, seconds: float) -> MadeMotion:
+    """Simulated by numpy through the shake."""
     assert rig.head is not None
     settings = DynamicsSettings()
     collider = DistanceField.from_surface(rig.head, settings, place="Sintel")
-    drive = TakeDrive(shaken_poses(rig, round(seconds * RATE) + 1, RATE), RATE)
-    take, _ = simulate(
-        rig, collider, drive, settings, lambda _stage: nullcontext(), lambda _frame: None
-    )
-    return GuideMotion(
-        rig,
-        range(take.frame_count),
-        RATE,
-        lambda frame: (take.pose(frame), take.guides[frame]),
-    )
+    poses = shaken_poses(rig, round(seconds * RATE) + 1, RATE)
+    motion = pipeline.begin(rig, poses[0])
+    guides, earlier = [motion.guides], None
+    for before, now in pairwise(poses):
+        bent = None if earlier is None else bow(earlier.matrix, before.matrix, now.matrix, 1.0)
+        posed = (PosedCollider(collider, before.matrix, now.matrix, bent),)
+        motion = pipeline.advance(rig, motion, now, posed, settings, GRAVITY, 1.0 / RATE)
+        guides.append(motion.guides)
+        earlier = before
+    return MadeMotion(rig, range(len(poses)), RATE, lambda frame: (poses[frame], guides[frame]))
 
 
 if __name__ == "__main__":

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from shaken import GRAVITY
 
-from hairloom.addon.blender.bakes.take import GRAVITY
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.dynamics.colliders import Collider, PosedCollider
 from hairloom.addon.dynamics.step import Drive

@@ -20,9 +20,9 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
+from shaken import GRAVITY, shaken_poses
 
 from hairloom.addon import pipeline
-from hairloom.addon.blender.bakes.take import GRAVITY, shaken_poses
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
 from hairloom.addon.dynamics.settings import DynamicsSettings

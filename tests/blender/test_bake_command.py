@@ -120,7 +120,7 @@ def test_a_baked_frame_is_drawn(file, tmp_path):
     """The verb render; what has changed since the bake is told."""
     assert command_line.run(["bake", "--scene", str(file), "--save"]) == 0
     picture, report = tmp_path / "hair.png", tmp_path / "report.json"
-    arguments = ["render", "--scene", str(file), "--groom", "Hair", "--baked", "--width", "96"]
+    arguments = ["render", "--scene", str(file), "--groom", "Hair", "--bake", "--width", "96"]
     arguments += ["--height", "72", "--samples", "1", "--output", str(picture)]
     drawn = {}
     for frame in (1, LAST):
@@ -139,7 +139,7 @@ def test_a_baked_frame_is_drawn(file, tmp_path):
 
 def test_a_picture_of_another_bake_is_not_skipped(file, tmp_path, capfd):
     assert command_line.run(["bake", "--scene", str(file), "--save"]) == 0
-    arguments = ["render", "--scene", str(file), "--groom", "Hair", "--baked", "--skip-existing"]
+    arguments = ["render", "--scene", str(file), "--groom", "Hair", "--bake", "--skip-existing"]
     arguments += ["--width", "32", "--height", "24", "--samples", "1", "--frame", str(LAST)]
     arguments += ["--output", str(tmp_path / "hair.png")]
 
@@ -157,13 +157,13 @@ def test_a_picture_of_another_bake_is_not_skipped(file, tmp_path, capfd):
     ("arguments", "message"),
     [
         (["--groom", "Hair"], "it has no bake"),
-        (["--groom", "Hair", "--take", "take.npz"], "give no take"),
+        (["--bake", "nowhere"], "there is no bake"),
         (["--groom", "Sphere"], "this is no hair object"),
         ([], "this is no hair object"),
     ],
 )
 def test_what_is_not_baked_is_not_drawn(arguments, message, file, tmp_path, capsys):
-    whole = ["render", "--scene", str(file), "--baked", "--output", str(tmp_path / "hair.png")]
+    whole = ["render", "--scene", str(file), "--bake", "--output", str(tmp_path / "hair.png")]
     assert command_line.run([*whole, *arguments]) == 1
     assert message in capsys.readouterr().err
     assert not (tmp_path / "hair.png").exists()

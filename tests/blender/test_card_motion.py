@@ -14,14 +14,15 @@ import numpy as np
 import pytest
 from glb_files import Glb, validated
 from glb_player import Player
+from shaken import MadeMotion, shaken_poses
 
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
 from hairloom.addon import pipeline  # noqa: E402
-from hairloom.addon.blender.bakes.take import shaken_poses  # noqa: E402
+from hairloom.addon.blender.bakes.guide_motion import GuideMotion  # noqa: E402
 from hairloom.addon.blender.cards.build import CardInputs  # noqa: E402
 from hairloom.addon.blender.cards.files import CardOutput, WrittenCards, write_cards  # noqa: E402
-from hairloom.addon.blender.cards.motion import GuideMotion, MotionChoices  # noqa: E402
+from hairloom.addon.blender.cards.motion import MotionChoices  # noqa: E402
 from hairloom.addon.blender.command_line.inputs import Sources, read_inputs  # noqa: E402
 from hairloom.addon.card_flow import bound_cards, cards_at  # noqa: E402
 from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
@@ -58,7 +59,7 @@ def motion() -> GuideMotion:
         wave = 0.006 * np.sin(phase) * along * min(frame / 5.0, 1.0)
         return poses[frame], (carried[frame] * (1 - along) + before * along + wave).astype("f4")
 
-    return GuideMotion(rig, range(FRAMES), RATE, moment)
+    return MadeMotion(rig, range(FRAMES), RATE, moment)
 
 
 def write(path: Path, motion: GuideMotion, **choices: Any) -> WrittenCards:
@@ -71,14 +72,14 @@ def simulated(motion: GuideMotion, written: WrittenCards, frame: int) -> list[np
     rig: Rig = motion.rig
     corners = []
     for level in written.levels:
-        mesh = cards_at(rig, bound_cards(rig, level), *motion.moment(frame))
+        mesh = cards_at(rig, bound_cards(rig, level), *motion.at(frame))
         corners.append(mesh.positions[mesh.triangles])
     return corners
 
 
 def head_matrix(motion: GuideMotion, frame: int) -> np.ndarray:
     """How the head has moved, which turns as one piece."""
-    return motion.moment(frame)[0].matrix
+    return motion.at(frame)[0].matrix
 
 
 @pytest.fixture(scope="module")
@@ -212,7 +213,7 @@ def test_a_motion_texture_holds_the_simulated_cards(
             mesh_now = cards_at(
                 motion.rig,
                 bound_cards(motion.rig, written.levels[level]),
-                *motion.moment(frame),
+                *motion.at(frame),
             )
             corners = mesh_now.triangles.reshape(-1)
             miss = np.abs(moved - GLB.placed(mesh_now.positions[corners]))

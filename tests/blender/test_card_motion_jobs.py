@@ -17,21 +17,22 @@ from hairloom.addon.blender.command_line import command_line  # noqa: E402
 from hairloom.addon.blender.preview.bake import Bake  # noqa: E402
 
 
-def test_the_command_line_writes_a_take(tmp_path: Path, capfd: Any) -> None:
+@pytest.mark.usefixtures("extension")
+def test_the_command_line_writes_a_bake(tmp_path: Path, capfd: Any) -> None:
     few = ["--set", "grow.strand_count=60", "--set", "guides.guide_count=12"]
     few += ["--set", "grow.length=0.06"]
-    take = str(tmp_path / "take.npz")
-    assert command_line.run(["simulate", *few, "--seconds", "0.2", "--output", take]) == 0
+    bake = str(tmp_path / "bake")
+    assert command_line.run(["simulate", *few, "--seconds", "0.2", "--output", bake]) == 0
     small = ["--set", "cards.source=guides", "--levels", "1", "--set", "atlas.source=made"]
     arguments = ["cards", *few, *small, "--output", str(tmp_path / "hair.glb")]
     moving = ["--motion", "joints", "--chains", "4"]
     assert command_line.run([*arguments, *moving]) == 1
-    assert "--take" in capfd.readouterr().err
-    assert command_line.run([*arguments, "--take", take]) == 1
+    assert "--bake" in capfd.readouterr().err
+    assert command_line.run([*arguments, "--bake", bake]) == 1
     assert "--motion" in capfd.readouterr().err
-    assert command_line.run([*arguments, *moving, "--take", take, "--frames", "2", "99"]) == 1
-    assert "from 0 to 12" in capfd.readouterr().err
-    assert command_line.run([*arguments, *moving, "--take", take, "--frames", "2", "9"]) == 0
+    assert command_line.run([*arguments, *moving, "--bake", bake, "--frames", "2", "99"]) == 1
+    assert "frames 0 to 12" in capfd.readouterr().err
+    assert command_line.run([*arguments, *moving, "--bake", bake, "--frames", "2", "9"]) == 0
     told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
     assert told["frames"] == {"first": 2, "count": 8, "rate": 60.0}
     assert told["chains"] <= 4

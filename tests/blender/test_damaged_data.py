@@ -1,14 +1,12 @@
 """What Hairloom keeps beside scenes, bakes and takes, read when it holds anything at all."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hairloom.addon.blender.bakes import cache
 from hairloom.addon.blender.bakes.cache import Cache, CacheWriter, Facts
-from hairloom.addon.blender.bakes.take import Take, read_take, write_take
 from hairloom.addon.blender.command_line.overrides import overrides
 from hairloom.addon.errors import HairloomError
 
@@ -82,48 +80,6 @@ def test_bytes_by_chance_in_a_bake_are_told_or_read(bake):
             assert error.remedy and str(bake) in error.place
         path.write_bytes(whole[path])
     assert 150 < told < 300
-
-
-def rig():
-    head = SimpleNamespace(positions=np.zeros((4, 3)))
-    strands = SimpleNamespace(grid=np.zeros((5, 8)))
-    return SimpleNamespace(head=head, guides=range(5), strands=strands)
-
-
-def take(**changes):
-    whole = {"guides": np.zeros((2, 5, 8, 3)), "heads": np.zeros((2, 4, 3)), "frame_rate": 24.0}
-    return Take(**(whole | changes))
-
-
-def test_a_take_is_read(tmp_path):
-    write_take(tmp_path / "a.npz", take())
-    assert read_take(tmp_path / "a.npz", rig()).frame_count == 2
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"guides": np.full((2, 5, 8, 3), np.nan)},
-        {"guides": np.full((2, 5, 8, 3), "x")},
-        {"guides": np.zeros(())},
-        {"guides": np.zeros((0, 5, 8, 3)), "heads": np.zeros((0, 4, 3))},
-        {"heads": np.zeros((3, 4, 3))},
-        {"heads": np.full((2, 4, 3), np.inf)},
-        {"frame_rate": np.array([1.0, 2.0])},
-        {"frame_rate": 0.0},
-        {"frame_rate": np.nan},
-    ],
-)
-def test_what_no_take_holds_is_told(tmp_path, change):
-    write_take(tmp_path / "a.npz", take(**change))
-    with pytest.raises(HairloomError, match=r"no take, or it is damaged.*hairloom simulate"):
-        read_take(tmp_path / "a.npz", rig())
-
-
-def test_a_take_of_another_groom_is_told(tmp_path):
-    write_take(tmp_path / "a.npz", take(guides=np.zeros((2, 6, 8, 3))))
-    with pytest.raises(HairloomError, match="of another groom"):
-        read_take(tmp_path / "a.npz", rig())
 
 
 @pytest.mark.parametrize("text", ["[" * 200_000, "9" * 5000, '{"a":' * 50_000])

@@ -110,20 +110,20 @@ def test_a_check_writes_nothing(
 
 
 @needs_usd
-def test_a_take_moves_in_usd(
+def test_a_simulation_moves_in_usd(
     extension: None, sphere: Any, tmp_path: Path, run: Callable[..., Any]
 ) -> None:
     write_usd(tmp_path / "in.usdc", on_sphere(coloured=False))
     source = ["--groom", str(tmp_path / "in.usdc"), "--head", "Head", *SMALL]
-    take = tmp_path / "take.npz"
-    shake = ["--seconds", "0.2", "--frame-rate", "30", "--output", str(take)]
+    bake = tmp_path / "bake"
+    shake = ["--seconds", "0.2", "--frame-rate", "30", "--output", str(bake)]
     assert command_line.run(["simulate", *source, *shake]) == 0
-    run(*source, "--take", str(take), "--frames", "2", "5", output="out.usdc")
+    run(*source, "--bake", str(bake), "--frames", "2", "5", output="out.usdc")
     stage, curves = stage_of(tmp_path / "out.usdc")
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (2.0, 5.0)
     assert stage.GetTimeCodesPerSecond() == 30.0
     for frame in (2, 5):
-        run(*source, "--take", str(take), "--frame", str(frame), output="still.hair")
+        run(*source, "--bake", str(bake), "--frame", str(frame), output="still.hair")
         still = read_hair_file(tmp_path / "still.hair").strands
         moving = np.array(curves.GetPointsAttr().Get(frame))
         np.testing.assert_allclose(moving, still.points, atol=1e-6)
@@ -131,11 +131,11 @@ def test_a_take_moves_in_usd(
     assert np.abs(last - first).max() > 1e-3
     for wanted in ("0 9", "5 3"):
         report = run(
-            *source, "--take", str(take), "--frames", *wanted.split(), output="no.usdc", code=1
+            *source, "--bake", str(bake), "--frames", *wanted.split(), output="no.usdc", code=1
         )
         assert report["status"] != "done"
     run(*source, "--frames", "0", "3", output="no.usdc", code=1)
-    run(*source, "--take", str(take), "--frames", "0", "3", output="no.tfx", code=1)
+    run(*source, "--bake", str(bake), "--frames", "0", "3", output="no.tfx", code=1)
     assert not list(tmp_path.glob("no.*"))
 
 

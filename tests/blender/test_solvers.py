@@ -11,9 +11,9 @@ import bpy
 import numpy as np
 import pytest
 from extension_loader import REPOSITORY
+from shaken import GRAVITY, shaken_poses
 
 from hairloom.addon import pipeline
-from hairloom.addon.blender.bakes.take import GRAVITY, shaken_poses
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.sessions import solvers
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver

@@ -26,6 +26,7 @@ from ...shading.kajiya_kay_settings import KajiyaKaySettings
 from ...shading.marschner.look import fibre_of, pack_fibre
 from ...shading.marschner.settings import MarschnerSettings
 from ...shading.settings import ShadingSettings, SharedSettings
+from ..bakes.guide_motion import BakedGuides, GuideMotion
 from ..base.outcome import Outcome
 from ..base.report import hairloom_version
 from ..base.thread_work import ThreadWork
@@ -42,11 +43,9 @@ from .build import (
 )
 from .exporters import CardLook, check_cards, check_exporter, level_names, write_card_mesh
 from .motion import (
-    GuideMotion,
     JointMotion,
     MotionChoices,
     TextureMotion,
-    baked_motion,
     check_motion,
     joint_motion_steps,
     moved_cards,
@@ -356,7 +355,7 @@ class CardExport:
         Raises:
             HairloomError: no hair that can be used, no bake, or a format that cannot be written.
         """
-        motion = None if output.motion.kind == "none" else baked_motion(hair, frames)
+        motion = None if output.motion.kind == "none" else BakedGuides.of(hair, frames)
         check_output(path, output, motion)
         rig, stale = (None, ()) if motion is None else (motion.rig, motion.notes)
         inputs, notes, dropped = read_inputs(hair, depsgraph, rig)

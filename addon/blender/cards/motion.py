@@ -1,13 +1,12 @@
-"""Cards in motion: from a take or a bake to joints or textures beside the mesh."""
+"""Cards in motion: from a bake to joints or textures beside the mesh."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
 
 from ...arrays import Floats
@@ -22,11 +21,7 @@ from ...errors import HairloomError
 from ...exchange.cards.card_formats import GLB, OBJ, CardFormat
 from ...exchange.cards.glb_skin import Skeleton, with_skeleton
 from ...exchange.cards.sidecar_motion import joint_motion, texture_motion
-from ...pipeline import Pose, Rig
-from ..bakes import playback
-from ..bakes.playback import check_frames
-from ..bakes.stale_bakes import stale_notes
-from ..bakes.take import read_take
+from ..bakes.guide_motion import GuideMotion
 from ..base.images import write_texture
 
 #: Share of the error by which joints may be off between keys.
@@ -50,73 +45,12 @@ class MotionChoices:
 
 
 @dataclass(frozen=True, eq=False)
-class GuideMotion:
-    """Guides over a range of frames.
-
-    rig: what they belong to.
-    moment: the pose, and the guides (guide_count, cv_count, 3) [m, world], at a frame.
-    notes: what the artist should know.
-    """
-
-    rig: Rig
-    frames: range
-    frame_rate: float
-    moment: Callable[[int], tuple[Pose, Floats]]
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
 class MovedCards:
     """tracks, and if they are wanted the normals and the tangents, as `CardTracks.moved`."""
 
     tracks: CardTracks
     normals: tuple[Floats, ...] = ()
     tangents: tuple[Floats, ...] = ()
-
-
-def take_motion(rig: Rig, path: Path, frames: range | None) -> GuideMotion:
-    """The motion of a take; its frames count from 0, None is all of them.
-
-    Raises:
-        HairloomError: not a take of this rig, or frames that it has not.
-    """
-    take = read_take(path, rig)
-    chosen = range(take.frame_count) if frames is None else frames
-    if not 0 <= chosen[0] <= chosen[-1] < take.frame_count:
-        raise HairloomError(
-            f"frames {chosen[0]} to {chosen[-1]} are not all in this take",
-            place=str(path),
-            remedy=f"Use frames from 0 to {take.frame_count - 1}",
-        )
-    return GuideMotion(
-        rig, chosen, take.frame_rate, lambda frame: (take.pose(frame), take.guides[frame])
-    )
-
-
-def baked_motion(hair: bpy.types.Object, frames: range | None) -> GuideMotion:
-    """The motion of a groom's bake; None is all of its frames.
-
-    Raises:
-        HairloomError: no bake, a damaged one, or frames that it has not.
-    """
-    cache = playback.cache_of(hair)
-    if cache is None:
-        raise HairloomError(
-            "it has no bake, so its cards cannot move",
-            place=hair.name,
-            remedy="Bake it (Hairloom > Bake), or write the cards without motion",
-        )
-    facts = cache.facts
-    chosen = range(facts.first, facts.last + 1) if frames is None else frames
-    check_frames(hair.name, chosen, cache)
-    baked = playback.rig_in(cache)
-
-    def moment(frame: int) -> tuple[Pose, Floats]:
-        arrays = cache.frame(frame)
-        return baked.pose(arrays), arrays["guides"]
-
-    notes = stale_notes(hair, cache, bpy.context.evaluated_depsgraph_get())
-    return GuideMotion(baked.rig, chosen, facts.frame_rate, moment, notes)
 
 
 def check_motion(choices: MotionChoices, motion: GuideMotion, file_format: CardFormat) -> None:
@@ -162,7 +96,7 @@ def moved_cards(
     carrier: Floats = np.tile(np.eye(4), (count, 1, 1))
     turn: Floats = np.eye(3)[None]
     for number, frame in enumerate(motion.frames):
-        pose, guides = motion.moment(frame)
+        pose, guides = motion.at(frame)
         now = guides[:, :1].astype(np.float64)
         turn, way = rigid_fits(roots, now, np.ones(len(roots)), turn)
         carrier[number, :3, :3], carrier[number, :3, 3] = turn[0], way[0]

@@ -41,17 +41,22 @@ def _bake(objects: list[bpy.types.Object], job: Job) -> None:
     plan = Bake.of(
         objects, bpy.context.scene, frames=frames_of_option(options.frames), folder=folder
     )
-    progress, steps = report.progress("baking", plan.frame_count), plan.steps()
+    write_bake(plan, report, "baking", "bake frame")
+    show_in_renders(objects, bpy.context.evaluated_depsgraph_get())
+    tell_notes(plan.notes, report)
+    _tell(objects, report)
+
+
+def write_bake(plan: Bake, report: Report, label: str, stage: str) -> None:
+    """Bake frame by frame, with progress under this label."""
+    progress, steps = report.progress(label, plan.frame_count), plan.steps()
     with closing(steps):  # an interrupted bake leaves the one before
         for _ in range(plan.frame_count):
-            with report.stage("bake frame"):
+            with report.stage(stage):
                 done = next(steps)
             progress.show(done)
         for _ in steps:  # what is left is to put the bakes in place
             raise AssertionError("a bake has as many steps as frames")
-    show_in_renders(objects, bpy.context.evaluated_depsgraph_get())
-    tell_notes(plan.notes, report)
-    _tell(objects, report)
 
 
 def _delete(objects: list[bpy.types.Object], report: Report) -> None:

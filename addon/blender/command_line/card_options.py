@@ -13,7 +13,7 @@ from ..cards.card_choices import (
     SPACE_ITEMS,
     TEXTURE_ITEMS,
 )
-from .job_options import add_frames_option
+from .job_options import add_bake_option, add_frames_option
 
 
 def add_card_options(job: Any) -> None:
@@ -64,11 +64,11 @@ def _add_motion_options(job: Any) -> None:
         "--motion",
         choices=[name for name, *_ in MOTION_ITEMS],
         default="none",
-        help="of --take, or of the bake of the object --groom, as joints with keys (GLB) or as "
+        help="of --bake, or of the bake of the object --groom, as joints with keys (GLB) or as "
         "vertex animation textures",
     )
-    job.add_argument("--take", help="a take written by 'simulate'")
-    add_frames_option(job, "of the motion; a take's count from 0 (default: all)")
+    add_bake_option(job)
+    add_frames_option(job, "of the motion (default: all)")
     job.add_argument(
         "--motion-space",
         choices=[name for name, *_ in SPACE_ITEMS],

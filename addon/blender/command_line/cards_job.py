@@ -15,16 +15,15 @@ from ...cards.settings import CardSettings
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import format_of
 from ...pipeline import Rig
-from ..bakes.bake_settings import folder_of
+from ..bakes.guide_motion import GuideMotion
 from ..cards.build import CardInputs, order_line
 from ..cards.card_choices import motion_choices
 from ..cards.files import CardOutput, WrittenCards, write_cards
-from ..cards.motion import GuideMotion, baked_motion, take_motion
 from ..cards.occluders import read_occluders
 from ..cards.textures import TextureFiles, chosen_pictures, named_pictures
 from .card_options import add_card_options
 from .job_options import add_texture_option, frames_of_option
-from .job_steps import Job, finish, read_rig, tell_notes
+from .job_steps import Job, finish, motion_of, read_rig, tell_notes
 from .verb import Verb
 
 
@@ -82,42 +81,26 @@ def written_cards(
     if written.motion:
         report.facts["card_motion"] = dict(written.motion)
     print(order_line(written.build.wrong_share), flush=True)
-    moving = () if motion is None else motion.notes
-    tell_notes([*written.notes, *moving], report)
+    tell_notes(list(written.notes), report)
     for file in written.files:
         report.add_output(file)
     return written
 
 
 def _moving(job: Job) -> tuple[Rig, GuideMotion | None]:
-    """The hair, and what moves it if motion is asked for: a take, or the bake of an object."""
+    """The hair, and what moves it if motion is asked for: the bake of a folder or of an object."""
     options = job.options
     frames = frames_of_option(options.frames)
-    if options.motion == "none":
-        if options.take or frames is not None:
-            raise HairloomError(
-                "a take and frames are for cards in motion",
-                place="--take" if options.take else "--frames",
-                remedy="Add --motion joints, or --motion texture",
-            )
-        return read_rig(job)[0], None
-    hair = bpy.data.objects.get(options.groom or "")
-    if options.take:
-        rig, _ = read_rig(job)
-        motion = take_motion(rig, Path(options.take), frames)
-        job.report.add_input(Path(options.take))
-        return rig, motion
-    if hair is None:
+    if options.motion != "none":
+        motion = motion_of(job, frames)
+        return motion.rig, motion
+    if options.bake is not None or frames is not None:
         raise HairloomError(
-            "this hair does not move",
-            place="--motion",
-            remedy="Give a take with --take, or a baked object of the scene with --groom",
+            "a bake and frames are for cards in motion",
+            place="--frames" if options.bake is None else "--bake",
+            remedy="Add --motion joints, or --motion texture",
         )
-    motion = baked_motion(hair, frames)
-    folder = folder_of(hair)
-    if folder is not None:
-        job.report.add_input(folder)
-    return motion.rig, motion
+    return read_rig(job)[0], None
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:

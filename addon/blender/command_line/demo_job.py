@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from ...exchange.tressfx import write_tfx
 from ...pipeline import Rig
@@ -14,9 +15,9 @@ from ..cards.textures import named_pictures
 from ..pictures.studio import Studio
 from .cards_job import written_cards
 from .job_options import add_motion_options, add_picture_options, add_texture_option
-from .job_steps import Job, open_studio, read_rig, rest_of
+from .job_steps import Job, Moment, open_studio, read_rig
 from .render_job import write_sheet, write_still
-from .simulate_job import simulated_take
+from .simulate_job import simulated
 from .verb import Verb
 
 
@@ -24,11 +25,12 @@ def demo(job: Job) -> None:
     """Do it all: simulate, stills, contact sheet, hair cards, strands and report.json."""
     report, folder = job.report, job.output
     pictures = named_pictures(job.options.texture)
-    rig, inputs = read_rig(job)
-    take = simulated_take(job, rig, inputs)
-    studio = open_studio(job, rig)
-    write_still(job, folder / "still.png", studio, *rest_of(rig))
-    write_sheet(job, folder / "motion.png", studio, rig, take)
+    rig, _ = read_rig(job)
+    with TemporaryDirectory() as bake:
+        motion = simulated(job, Path(bake) / "bake")
+        studio = open_studio(job, rig)
+        write_still(job, folder / "still.png", studio, Moment.of_rest(rig))
+        write_sheet(job, folder / "motion.png", studio, motion)
     written = written_cards(job, folder / "cards.glb", rig, pictures)
     _write_card_still(job, folder / "cards.png", studio, rig, written)
     with report.stage("write strands"):

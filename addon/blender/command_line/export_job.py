@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import bpy
 
-from ... import pipeline
 from ...arrays import Floats
 from ...errors import HairloomError
 from ...exchange.groom import Groom
@@ -20,9 +19,8 @@ from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat
 from ...exchange.strand_output import ENGINES, StrandOutput
 from ...pipeline import Rig
 from ...shading.settings import ShadingSettings
-from ..bakes.take import Take, read_take
 from ..strands.groom_motion import BakedMotion
-from ..strands.groom_out import HairOut, hair_of_rig
+from ..strands.groom_out import hair_of_rig
 from ..strands.strand_choices import BASES, COUNTS, PARTS, Items, path_in, strand_output
 from ..strands.strand_export import StrandExport, wishes_of
 from .inputs import Inputs
@@ -33,13 +31,13 @@ from .job_options import (
     add_object_option,
     frames_of_option,
 )
-from .job_steps import Job, moment_of, read_rig, tell_notes
+from .job_steps import Job, motion_of, read_hair, read_rig, tell_notes
 from .object_settings import named_grooms, put_settings
 from .verb import Verb
 
 
 def export(job: Job) -> None:
-    """Write the strands for an engine, at rest, at a frame of a take, or over frames."""
+    """Write the strands for an engine, at rest, at a frame of a bake, or over frames."""
     options, report = job.options, job.report
     path, kind = path_in(job.output, options.format)
     output, frames = strand_output(options), frames_of_option(options.frames, options.at_most)
@@ -63,25 +61,7 @@ def export(job: Job) -> None:
 
 def _is_of_scene(options: argparse.Namespace) -> bool:
     """Whether a scene was named, and nothing else that strands could come from: all its hair."""
-    return bool(options.scene and not (options.groom or options.head or options.take))
-
-
-@dataclass(frozen=True)
-class TakeMotion:
-    """Hair that goes by a take; its frames count from 0."""
-
-    out: HairOut
-    rig: Rig
-    take: Take
-    needs_scene: bool = False
-
-    @property
-    def rate(self) -> float:
-        return self.take.frame_rate
-
-    def at(self, frame: int, _depsgraph: bpy.types.Depsgraph) -> Floats:
-        pose = self.take.pose(frame)
-        return pipeline.strands_at(self.rig, pose, self.take.guides[frame]).reshape(-1, 3)
+    return bool(options.scene and not (options.groom or options.head or options.bake))
 
 
 def _of_objects(
@@ -89,11 +69,11 @@ def _of_objects(
 ) -> StrandExport:
     """Hair of the scene, as the artist's operators write it."""
     options = job.options
-    if options.groom or options.take:
+    if options.groom or options.bake is not None:
         raise HairloomError(
-            "hair of the scene has no take, and is no --groom",
+            "hair of the scene goes by its own bake, and is no --groom",
             place="--object",
-            remedy="Give --object alone, or --groom with --take",
+            remedy="Give --object alone, or --groom with --bake",
         )
     hair = named_grooms(options.object)
     for each in hair:
@@ -117,48 +97,42 @@ def _of_objects(
 def _of_rig(
     job: Job, kind: StrandFormat, output: StrandOutput, frames: range | None
 ) -> StrandExport:
-    """Hair of --groom, or hair that is grown here."""
-    rig, inputs = read_rig(job)
-    wishes, color = wishes_of(kind, output), job.settings[ShadingSettings].base_color
-    groom = _groom(job, rig, inputs)
-    plan = StrandExport(groom, output, kind, inputs.dropped, frames=frames)
+    """Hair of --groom, of --bake, or hair that is grown here."""
+    needs, color = wishes_of(kind, output), job.settings[ShadingSettings].base_color
+    if job.options.bake is None:
+        if frames is not None:
+            raise HairloomError(
+                "this hair does not move",
+                place="--frames",
+                remedy="Give a bake with --bake, or hair of the scene with --object",
+            )
+        rig, inputs = read_rig(job)
+        groom = hair_of_rig(rig, _groom(rig, inputs), needs, color).groom
+        return StrandExport(groom, output, kind, inputs.dropped)
+    at = frames if job.options.frame is None else range(job.options.frame, job.options.frame + 1)
+    motion = motion_of(job, at)
+    rig, read = motion.rig, read_hair(job) if job.sources.groom else None
+    groom = Groom(rig.strands, Path(motion.cache.facts.owner).stem)
+    if read is not None:
+        groom = replace(groom, name=Path(read.groom_name).stem)
+        if read.groom is not None and read.strands.strand_count == rig.strands.strand_count:
+            groom = replace(groom, **_of_strands(read.groom))
     if frames is None:
-        plan.groom = hair_of_rig(rig, groom, wishes, color).groom
-        return plan
-    take = _take(job, rig, frames)
-    moving = TakeMotion(hair_of_rig(rig, groom, wishes, color), rig, take)
-    plan.groom, plan.moving, plan.rate = moving.out.groom, (moving,), moving.rate
+        _, points = motion.strands(motion.frames[0])
+        groom = replace(groom, strands=rig.strands.with_points(points.reshape(-1, 3)))
+    moving = BakedMotion(hair_of_rig(rig, groom, needs, color), motion.cache)
+    plan = StrandExport(moving.out.groom, output, kind, frames=frames)
+    if frames is not None:
+        plan.moving, plan.rate = (moving,), moving.rate
     return plan
 
 
-def _groom(job: Job, rig: Rig, inputs: Inputs) -> Groom:
-    """The strands with their own points; those of the rig where they move or are children."""
+def _groom(rig: Rig, inputs: Inputs) -> Groom:
+    """The strands with their own points; those of the rig where they are children."""
     name = Path(inputs.groom_name).stem
-    is_whole = inputs.strands.strand_count == rig.strands.strand_count
-    if job.options.take or not is_whole:
-        _, points = moment_of(job, rig)
-        groom = Groom(rig.strands.with_points(points.reshape(-1, 3)), name)
-        if inputs.groom is not None and is_whole:
-            return replace(groom, **_of_strands(inputs.groom))
-        return groom
+    if inputs.strands.strand_count != rig.strands.strand_count:
+        return Groom(rig.strands, name)
     return Groom(inputs.strands, name) if inputs.groom is None else replace(inputs.groom, name=name)
-
-
-def _take(job: Job, rig: Rig, frames: range) -> Take:
-    if not job.options.take:
-        raise HairloomError(
-            "this hair does not move",
-            place="--frames",
-            remedy="Give a take with --take, or hair of the scene with --object",
-        )
-    take = read_take(Path(job.options.take), rig)
-    if not 0 <= frames[0] <= frames[-1] < take.frame_count:
-        raise HairloomError(
-            f"frames {frames[0]} to {frames[-1]} are not all in this take",
-            place=job.options.take,
-            remedy=f"Use frames from 0 to {take.frame_count - 1}",
-        )
-    return take
 
 
 def _of_strands(groom: Groom) -> dict[str, Any]:
@@ -194,7 +168,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
     )
     add_frames_option(
         hair,
-        "write the motion over these frames (Alembic, USD): of the bake of --object, or of --take",
+        "write the motion over these frames (Alembic, USD): of the bake of --object, or of --bake",
     )
     add_at_most_option(hair)
     hair.add_argument(

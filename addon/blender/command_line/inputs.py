@@ -114,6 +114,12 @@ def _read_head(name: str | None, sources: Sources) -> Surface | None:
     return None
 
 
+def head_of_sources(sources: Sources) -> Surface | None:
+    """The head that is named, or that hair curves of the scene name; None without one."""
+    name = sources.head or _surface_name(sources.groom)
+    return None if name is None else _read_mesh(name, need_uv=sources.need_uv)
+
+
 def _weights(group: str, head_name: str | None) -> Floats | None:
     """The weights of this name on the head, (vertex_count,); None without a name."""
     if not group:

@@ -126,16 +126,24 @@ def frames_of_option(given: list[int] | None, at_most: int | None = None) -> ran
     return frames if at_most is None else frames[:at_most]
 
 
-def add_moment_options(parser: argparse.ArgumentParser) -> None:
-    """At which moment of a take, see job_steps.moment_of."""
-    moment = parser.add_argument_group("when")
-    moment.add_argument(
-        "--take",
-        metavar="FILE.npz",
-        help="a take written by 'simulate' (default: the hair at rest)",
+def add_bake_option(parser: Any) -> None:
+    """--bake, alone or with a folder; see job_steps.motion_of."""
+    parser.add_argument(
+        "--bake",
+        nargs="?",
+        const="",
+        metavar="FOLDER",
+        help="the motion of a bake: the folder that 'simulate' or 'bake' has written (without a "
+        "folder: of the hair object --groom)",
     )
+
+
+def add_moment_options(parser: argparse.ArgumentParser) -> None:
+    """At which moment of a bake, see job_steps.moment_of."""
+    moment = parser.add_argument_group("when")
+    add_bake_option(moment)
     moment.add_argument(
-        "--frame", type=int, default=0, metavar="NUMBER", help="frame of the take, from 0"
+        "--frame", type=int, metavar="NUMBER", help="frame of the bake (default: its first)"
     )
 
 

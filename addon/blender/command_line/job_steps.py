@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
+
+import bpy
+import numpy as np
 
 from ... import pipeline
 from ...arrays import Floats
@@ -14,11 +18,11 @@ from ...groom.settings import GrowSettings, GuideSettings
 from ...params import SettingsMap
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
-from ..bakes.take import read_take
+from ..bakes.guide_motion import BakedGuides
 from ..base.report import Report
 from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
-from .inputs import Inputs, Sources, read_inputs
+from .inputs import Inputs, Sources, head_of_sources, read_inputs
 
 
 @dataclass(frozen=True)
@@ -33,14 +37,21 @@ class Job:
     report: Report
 
 
-def read_rig(job: Job) -> tuple[Rig, Inputs]:
-    """Read what the job names and make it ready to move."""
+def read_hair(job: Job) -> Inputs:
+    """Read what the job names."""
     report = job.report
     print("reading", job.sources.groom or "(a groom grown here)", flush=True)
     with report.stage("read inputs"):
         inputs = read_inputs(job.sources, job.settings[GrowSettings])
     _tell_drops(job, inputs)
     tell_notes(list(inputs.notes), report)
+    report.facts["dropped"] = inputs.dropped
+    return inputs
+
+
+def read_rig(job: Job) -> tuple[Rig, Inputs]:
+    """Read what the job names and make it ready to move."""
+    inputs, report = read_hair(job), job.report
     with report.stage("bind roots, choose guides"):
         rig = pipeline.prepare(
             inputs.strands,
@@ -52,7 +63,6 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
         )
     tell_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
     tell_rig(report, rig, inputs.groom_name)
-    report.facts["dropped"] = inputs.dropped
     return rig, inputs
 
 
@@ -90,23 +100,62 @@ def tell_notes(notes: list[str], report: Report) -> None:
     report.facts["notes"] = [*report.facts.get("notes", ()), *notes]
 
 
-def rest_of(rig: Rig) -> tuple[Pose, Floats]:
-    return rig.rest_pose, rig.strands.grid
+@dataclass(frozen=True)
+class Moment:
+    """Hair at one moment: all strands (strand_count, cv_count, 3) [m, world], and the pose."""
+
+    rig: Rig
+    pose: Pose
+    points: Floats
+
+    @classmethod
+    def of_rest(cls, rig: Rig) -> Self:
+        return cls(rig, rig.rest_pose, rig.strands.grid)
+
+    @classmethod
+    def of_motion(cls, motion: BakedGuides, rig: Rig, frame: int) -> Self:
+        return cls(rig, *motion.strands(frame))
 
 
-def moment_of(job: Job, rig: Rig) -> tuple[Pose, Floats]:
-    """The pose and all strands at the frame of the take that was asked for; else at rest."""
-    if not job.options.take:
-        return rest_of(rig)
-    take = read_take(Path(job.options.take), rig)
-    if not 0 <= job.options.frame < take.frame_count:
-        raise HairloomError(
-            f"frame {job.options.frame} is not in this take",
-            place=job.options.take,
-            remedy=f"Use a frame from 0 to {take.frame_count - 1}",
-        )
-    pose = take.pose(job.options.frame)
-    return pose, pipeline.strands_at(rig, pose, take.guides[job.options.frame])
+def motion_of(job: Job, frames: range | None = None) -> BakedGuides:
+    """The motion of --bake: of a folder, or of the hair object that --groom names.
+
+    Raises:
+        HairloomError: no bake, or frames that it does not hold.
+    """
+    if job.options.bake:
+        motion = BakedGuides.in_folder(Path(job.options.bake).resolve(), frames)
+    else:
+        hair = bpy.data.objects.get(job.sources.groom or "")
+        if hair is None or hair.type != "CURVES":
+            raise HairloomError(
+                "this is no hair object",
+                place=f"--groom {job.sources.groom or ''}".strip(),
+                remedy="Name the baked hair of the scene with --groom, or a folder with --bake",
+            )
+        motion = BakedGuides.of(hair, frames)
+    job.report.add_input(motion.cache.folder)
+    tell_notes(list(motion.notes), job.report)
+    tell_rig(job.report, motion.rig, motion.cache.facts.owner)
+    return motion
+
+
+def moment_of(job: Job) -> Moment:
+    """The hair at rest, or at --frame of --bake."""
+    if job.options.bake is None:
+        return Moment.of_rest(read_rig(job)[0])
+    frame = job.options.frame
+    motion = motion_of(job, None if frame is None else range(frame, frame + 1))
+    return Moment.of_motion(motion, with_uvs(motion.rig, job.sources), motion.frames[0])
+
+
+def with_uvs(rig: Rig, sources: Sources) -> Rig:
+    """A bake's rig with the UVs of the head, which bakes do not hold; the hair's shadow on the head
+    is laid out by them. Without where no head is named, or it has other triangles by now."""
+    now = head_of_sources(replace(sources, need_uv=False, need_head=False))
+    if rig.head is None or now is None or not np.array_equal(now.triangles, rig.head.triangles):
+        return rig
+    return replace(rig, head=replace(rig.head, corner_uv=now.corner_uv))
 
 
 def open_studio(job: Job, rig: Rig) -> Studio:

@@ -9,7 +9,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...parameters import ALL_SETTINGS
-from ...params import Settings
+from ...params import Settings, SettingsMap
 from ..base.objects import objects_in
 from ..properties.presets import named_preset
 from ..properties.properties import settings_of
@@ -95,8 +95,20 @@ def put_settings(obj: bpy.types.Object, presets: list[str], assignments: list[st
             continue
         own = settings_of(group, ALL_SETTINGS[section]) if settings is None else settings
         changed = type(own).from_dict(own.as_dict() | values, "--set")
-        for name, value in changed.as_dict().items():
-            setattr(group, name, value)
+        _write(group, changed)
+
+
+def put_map(obj: bpy.types.Object, chosen: SettingsMap) -> None:
+    """Have all of the object's own settings be these."""
+    for section, kind in ALL_SETTINGS.items():
+        group = _group(obj, section)
+        if group is not None:
+            _write(group, chosen[kind])
+
+
+def _write(group: Any, settings: Settings) -> None:
+    for name, value in settings.as_dict().items():
+        setattr(group, name, value)
 
 
 def _group(obj: bpy.types.Object, section: str) -> Any:

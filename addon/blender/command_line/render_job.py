@@ -1,60 +1,51 @@
-"""The verb `render`: a still, and what explains it: shadow maps, the shadow on skin, a take.
+"""The verb `render`: a still, and what explains it: shadow maps, the shadow on skin, the motion.
 
-At rest, or at a frame of a take or of a bake.
+At rest, or at a frame of a bake.
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
-import bpy
 import numpy as np
 
-from ... import pipeline
-from ...arrays import Floats
 from ...errors import HairloomError
-from ...pipeline import Pose, Rig
 from ...shading.volume.settings import VolumeSettings
-from ..bakes.bake_settings import folder_of
-from ..bakes.take import Take, read_take
+from ..bakes.guide_motion import BakedGuides
 from ..base.images import contact_sheet, write_png
-from ..base.objects import head_of
-from ..cards.motion import GuideMotion, baked_motion
 from ..pictures.studio import Studio
-from ..scene.surfaces import read_surface
 from .job_options import add_moment_options, add_picture_options
-from .job_steps import Job, finish, moment_of, open_studio, read_rig, tell_notes, tell_rig
+from .job_steps import Job, Moment, finish, moment_of, motion_of, open_studio
 from .verb import Verb
 
 SHEET_COLUMNS, SHEET_ROWS = 4, 3
 
 
 def render(job: Job) -> None:
-    """Draw a still, at rest or at a frame of a take or bake, and a contact sheet of the take."""
+    """Draw a still, at rest or at a frame of a bake, and a contact sheet of its motion."""
     options = job.options
     _check(job)
-    motion = _baked(job) if options.baked else None
-    rig = read_rig(job)[0] if motion is None else motion.rig
-    studio = open_studio(job, rig)
+    moment = moment_of(job)
+    studio = open_studio(job, moment.rig)
     if options.sheet:
-        write_sheet(job, Path(options.sheet), studio, rig, read_take(Path(options.take), rig))
-    pose, points = moment_of(job, rig) if motion is None else _moment(motion)
-    write_still(job, job.output, studio, pose, points)
+        write_sheet(job, Path(options.sheet), studio, motion_of(job))
+    write_still(job, job.output, studio, moment)
     if options.slices:
-        _write_slices(job, Path(options.slices), studio, pose, points)
+        _write_slices(job, Path(options.slices), studio, moment)
     if options.skin_shadow:
-        _write_skin_shadow(job, Path(options.skin_shadow), studio, pose, points)
+        _write_skin_shadow(job, Path(options.skin_shadow), studio, moment)
     finish(job, job.output)
 
 
-def write_still(job: Job, path: Path, studio: Studio, pose: Pose, points: Floats) -> None:
+def write_still(job: Job, path: Path, studio: Studio, moment: Moment) -> None:
     """One picture of the strands, and how much was drawn."""
     print("drawing the still", flush=True)
     options, report = job.options, job.report
     with report.stage("draw still"):
-        picture = studio.picture(pose, points, options.width, options.height, options.samples)
+        picture = studio.picture(
+            moment.pose, moment.points, options.width, options.height, options.samples
+        )
     drawn = studio.statistics
     report.facts["drawn"] = {
         "strands": drawn.strands,
@@ -66,14 +57,13 @@ def write_still(job: Job, path: Path, studio: Studio, pose: Pose, points: Floats
     report.add_output(path)
 
 
-def write_sheet(job: Job, path: Path, studio: Studio, rig: Rig, take: Take) -> None:
-    """Frames spread evenly over the take, as one picture."""
-    count = min(SHEET_COLUMNS * SHEET_ROWS, take.frame_count)
+def write_sheet(job: Job, path: Path, studio: Studio, motion: BakedGuides) -> None:
+    """Frames spread evenly over the motion, as one picture."""
+    count = min(SHEET_COLUMNS * SHEET_ROWS, len(motion.frames))
     progress, pictures = job.report.progress("drawing the contact sheet", count), []
-    for frame in np.linspace(0, take.frame_count - 1, count).round().astype(int):
-        pose = take.pose(frame)
+    for place in np.linspace(0, len(motion.frames) - 1, count).round().astype(int):
         with job.report.stage("interpolate strands"):
-            points = pipeline.strands_at(rig, pose, take.guides[frame])
+            pose, points = motion.strands(motion.frames[place])
         with job.report.stage("draw frame"):
             pictures.append(studio.picture(pose, points, 480, 360, samples=2))
         progress.show(len(pictures))
@@ -83,9 +73,9 @@ def write_sheet(job: Job, path: Path, studio: Studio, rig: Rig, take: Take) -> N
 
 def _check(job: Job) -> None:
     """Refuse what cannot be drawn before anything is read."""
-    if job.options.sheet and not job.options.take:
+    if job.options.sheet and job.options.bake is None:
         raise HairloomError(
-            "a contact sheet needs motion", place="--sheet", remedy="Give a take with --take"
+            "a contact sheet needs motion", place="--sheet", remedy="Give a bake with --bake"
         )
     if job.settings[VolumeSettings].shadows != "none":
         return
@@ -103,54 +93,18 @@ def _check(job: Job) -> None:
         )
 
 
-def _baked(job: Job) -> GuideMotion:
-    """The bake of the hair object that --groom names, at the one frame that is asked for."""
-    options, hair = job.options, bpy.data.objects.get(job.sources.groom or "")
-    if options.take or hair is None or hair.type != "CURVES":
-        raise HairloomError(
-            "it says already what moves the hair" if options.take else "this is no hair object",
-            place="--take" if options.take else f"--groom {job.sources.groom or ''}".strip(),
-            remedy="Name the baked hair of the scene with --groom, and give no take",
-        )
-    motion = baked_motion(hair, range(options.frame, options.frame + 1))
-    folder = folder_of(hair)
-    assert folder is not None, "it has a bake"
-    job.report.add_input(folder)
-    tell_notes(list(motion.notes), job.report)
-    tell_rig(job.report, motion.rig, hair.name)
-    return replace(motion, rig=_with_uvs(motion.rig, hair))
-
-
-def _with_uvs(rig: Rig, hair: bpy.types.Object) -> Rig:
-    """A bake's rig with the UVs of the head, which bakes have not; the hair's shadow on the head
-    is laid out by them. Without where the head has other triangles by now."""
-    head = head_of(hair)
-    if rig.head is None or head is None:
-        return rig
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    now = read_surface(head, depsgraph, need_uv=False, place=head.name)
-    if not np.array_equal(now.triangles, rig.head.triangles):
-        return rig
-    return replace(rig, head=replace(rig.head, corner_uv=now.corner_uv))
-
-
-def _moment(motion: GuideMotion) -> tuple[Pose, Floats]:
-    pose, guides = motion.moment(motion.frames[0])
-    return pose, pipeline.strands_at(motion.rig, pose, guides)
-
-
-def _write_slices(job: Job, path: Path, studio: Studio, pose: Pose, points: Floats) -> None:
+def _write_slices(job: Job, path: Path, studio: Studio, moment: Moment) -> None:
     """The layers of the shadow maps."""
     with job.report.stage("draw slices"):
-        picture = studio.slices(pose, points)
+        picture = studio.slices(moment.pose, moment.points)
     write_png(path, picture)
     job.report.add_output(path)
 
 
-def _write_skin_shadow(job: Job, path: Path, studio: Studio, pose: Pose, points: Floats) -> None:
+def _write_skin_shadow(job: Job, path: Path, studio: Studio, moment: Moment) -> None:
     """The map of the soft shadow on the head."""
     with job.report.stage("draw skin shadow"):
-        picture = studio.skin_shadow(pose, points)
+        picture = studio.skin_shadow(moment.pose, moment.points)
     write_png(path, picture)
     job.report.add_output(path)
 
@@ -158,11 +112,6 @@ def _write_skin_shadow(job: Job, path: Path, studio: Studio, pose: Pose, points:
 def _add_options(parser: argparse.ArgumentParser) -> None:
     add_moment_options(parser)
     add_picture_options(parser, 960, 720)
-    parser.add_argument(
-        "--baked",
-        action="store_true",
-        help="draw the bake of --groom, a hair object; --frame is a frame of the scene then",
-    )
     more = parser.add_argument_group("more pictures")
     more.add_argument(
         "--look-from-material",
@@ -180,7 +129,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="write the soft shadow on the head too, laid out as the head's UV map",
     )
     more.add_argument(
-        "--sheet", metavar="FILE.png", help="write a contact sheet of the take to this file too"
+        "--sheet", metavar="FILE.png", help="write a contact sheet of the bake to this file too"
     )
 
 

@@ -8,7 +8,7 @@ from ..base.images import write_png
 from ..pictures.sheet import Sheet
 from ..pictures.turntable import LIGHTS, Turntable, TurntableSettings
 from .job_options import add_moment_options, add_picture_options
-from .job_steps import Job, finish, moment_of, open_studio, read_rig, tell_notes
+from .job_steps import Job, finish, moment_of, open_studio, tell_notes
 from .verb import Verb
 
 
@@ -25,10 +25,9 @@ def turntable(job: Job) -> None:
         video=not options.no_video,
         frame_rate=options.frame_rate,
     )
-    rig, _ = read_rig(job)
-    studio = open_studio(job, rig)
-    pose, points = moment_of(job, rig)
-    turn = Turntable(studio, pose, points, chosen, job.output)
+    moment = moment_of(job)
+    studio = open_studio(job, moment.rig)
+    turn = Turntable(studio, moment.pose, moment.points, chosen, job.output)
     progress = report.progress("drawing the turntable", chosen.frames)
     with report.stage("draw turntable"):
         for done in turn.steps():
@@ -42,10 +41,10 @@ def turntable(job: Job) -> None:
 def sheet(job: Job) -> None:
     """Draw a contact sheet: the groom from all sides, or in all looks."""
     options, report = job.options, job.report
-    rig, _ = read_rig(job)
-    studio = open_studio(job, rig)
-    size = options.width, options.height
-    drawn = Sheet(studio, *moment_of(job, rig), size, options.samples, by_looks=options.looks)
+    moment = moment_of(job)
+    studio = open_studio(job, moment.rig)
+    size, samples = (options.width, options.height), options.samples
+    drawn = Sheet(studio, moment.pose, moment.points, size, samples, by_looks=options.looks)
     progress = report.progress("drawing the contact sheet", drawn.count)
     with report.stage("draw contact sheet"):
         for done in drawn.steps():

@@ -1,64 +1,196 @@
-"""The verb `simulate`: guides moved by a shake or by the scene, written as a take."""
+"""The verb `simulate`: hair of files or of the scene, moved by a shake or by the scene, as a bake.
+
+What comes from files goes into a scene of its own, which is baked as the button Bake does.
+"""
 
 from __future__ import annotations
 
-from ...dynamics.colliders import DistanceField
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ... import pipeline
+from ...arrays import Floats
+from ...dynamics.colliders import DistanceField, PosedCollider
+from ...dynamics.measure import deepest_penetration, max_stretch
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
-from ...pipeline import Rig
-from ..bakes.take import Take, TakeDrive, scene_drive, shaken_poses, write_take
-from ..bakes.take import simulate as simulate_take
+from ...strands import Surface
+from ..bakes.guide_motion import BakedGuides
+from ..base.attributes import set_attribute
+from ..preview.bake import Bake
+from ..scene.curves import write_curves
+from .bake_job import write_bake
 from .inputs import Inputs
 from .job_options import add_motion_options
-from .job_steps import Job, finish, read_rig
+from .job_steps import Job, finish, read_hair
+from .object_settings import put_map
 from .verb import Verb
+
+#: the shake: how far the head turns and sways, and how often
+SHAKE_ANGLE = np.radians(25.0)
+SHAKE_SWAY = 0.03  # [m]
+SHAKE_RATE = 1.0  # [1/s]
+_DENSITY = "children_density"
 
 
 def simulate(job: Job) -> None:
-    """Simulate the guides and write them as a take."""
-    rig, inputs = read_rig(job)
-    take = simulated_take(job, rig, inputs)
-    with job.report.stage("write take"):
-        write_take(job.output, take)
+    """Simulate the hair and write its motion as a bake."""
+    simulated(job, job.output)
     finish(job, job.output)
 
 
-def simulated_take(job: Job, rig: Rig, inputs: Inputs) -> Take:
-    """Run the dynamics under the scene's animation or the shake."""
-    with job.report.stage("collider"):
-        assert inputs.collider is not None, "simulate and demo refuse a groom without a head"
-        name = job.sources.collider or job.sources.head or "built-in head"
-        collider = DistanceField.from_surface(
-            inputs.collider, job.settings[DynamicsSettings], place=name
-        )
-    drive = _drive(job, rig, inputs)
-    progress = job.report.progress("simulating", len(drive.poses) - 1)
-    take, worst = simulate_take(
-        rig, collider, drive, job.settings[DynamicsSettings], job.report.stage, progress.show
-    )
-    job.report.facts.update(
-        frames=len(drive.poses),
-        frame_rate=drive.frame_rate,
-        stretch_max_percent=round(worst.stretch * 100.0, 4),
-        penetration_max_mm=round(worst.penetration * 1000.0, 4),
-    )
-    return take
+def simulated(job: Job, folder: Path) -> BakedGuides:
+    """Bake the hair under the scene's animation or the shake."""
+    scene, shown = bpy.context.scene, bpy.context.scene.frame_current
+    try:
+        if job.options.animated:  # rest is where everything is in the first frame
+            scene.frame_set(scene.frame_start)
+        inputs = read_hair(job)
+        with _scene_of(job, inputs) as hair:
+            put_map(hair, job.settings)
+            own = bpy.context.scene
+            frames = range(own.frame_start, own.frame_end + 1)
+            plan = Bake.of([hair], own, frames=frames, folder=folder.resolve())
+            write_bake(plan, job.report, "simulating", "simulate frame")
+    finally:
+        scene.frame_set(shown)
+    motion = BakedGuides.in_folder(folder.resolve())
+    _tell_worst(job, inputs, motion)
+    return motion
 
 
-def _drive(job: Job, rig: Rig, inputs: Inputs) -> TakeDrive:
-    """What moves the hair: the scene, when its animation is asked for, else the shake."""
-    if not job.options.animated:
+@contextmanager
+def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
+    """The hair object, in the open scene or in one of its own whose head is shaken."""
+    if job.options.animated:
+        yield _hair_of_open_scene(job, inputs)
+        return
+    window = bpy.context.window_manager.windows[0]
+    before, scene = window.scene, bpy.data.scenes.new("Hairloom Simulation")
+    window.scene = scene
+    try:
+        assert inputs.head is not None, "simulate and demo refuse hair without a head"
+        head = mesh_object("Head", inputs.head, scene)
+        hair = write_curves("Hair", inputs.strands, head, scene.collection)
+        if job.sources.collider is not None and inputs.collider is not None:
+            collider = mesh_object("Collider", inputs.collider, scene)
+            collider.parent = head
+            hair.hairloom.collider = collider
+        if inputs.density is not None:
+            set_attribute(head.data, _DENSITY, "POINT", inputs.density)
+            hair.hairloom.children_density = _DENSITY
+        low, high = inputs.head.bounds()
         rate = float(job.options.frame_rate)
-        return TakeDrive(shaken_poses(rig, round(job.options.seconds * rate) + 1, rate), rate)
+        shake(head, (low + high) / 2.0, round(job.options.seconds * rate), rate)
+        yield hair
+    finally:
+        window.scene = before
+        for obj in list(scene.collection.objects):
+            bpy.data.objects.remove(obj)
+        bpy.data.scenes.remove(scene)
+        bpy.data.orphans_purge(do_local_ids=True, do_linked_ids=False, do_recursive=False)
+
+
+def _hair_of_open_scene(job: Job, inputs: Inputs) -> bpy.types.Object:
+    """The object that --groom names; else its strands as a new object on the head."""
     if inputs.head_object is None:
         raise HairloomError(
             "only an object of the scene is animated",
             place="--animated",
             remedy="Name the head's object with --head, or leave out --animated",
         )
-    return scene_drive(inputs.head_object)
+    head, scene = bpy.data.objects[inputs.head_object], bpy.context.scene
+    hair = bpy.data.objects.get(job.sources.groom or "")
+    if hair is None:
+        hair = write_curves("Hair", inputs.strands, head, scene.collection)
+    hair.data.surface = head
+    if job.sources.collider is not None and inputs.collider is not None:
+        collider = bpy.data.objects.get(job.sources.collider)
+        if collider is None:
+            collider = mesh_object("Collider", inputs.collider, scene)
+            collider.parent = head
+            collider.matrix_parent_inverse = head.matrix_world.inverted_safe()
+        hair.hairloom.collider = collider
+    if job.sources.children_density:
+        hair.hairloom.children_density = job.sources.children_density
+    return hair
+
+
+def mesh_object(name: str, surface: Surface, scene: bpy.types.Scene) -> bpy.types.Object:
+    """A surface of world space as an object at the origin."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(surface.positions, [], surface.triangles)
+    if surface.corner_uv is not None:
+        layer = mesh.uv_layers.new(name="UVMap")
+        layer.uv.foreach_set("vector", surface.corner_uv.ravel())
+    obj = bpy.data.objects.new(name, mesh)
+    scene.collection.objects.link(obj)
+    return obj
+
+
+def shake(head: bpy.types.Object, centre: Floats, last: int, rate: float) -> None:
+    """Animate an object at the origin: it turns left and right and sways from frame 0 to `last`.
+
+    It eases in, so that frame 0 is at rest.
+    """
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 0, last
+    scene.render.fps = max(round(rate), 1)
+    scene.render.fps_base = scene.render.fps / rate
+    for frame in range(last + 1):
+        matrix = shake_matrix(centre, frame / rate)
+        head.location = matrix[:3, 3]
+        head.rotation_euler = (0.0, 0.0, np.arctan2(matrix[1, 0], matrix[0, 0]))
+        head.keyframe_insert("location", frame=frame)
+        head.keyframe_insert("rotation_euler", frame=frame)
+    scene.frame_set(0)
+
+
+def shake_matrix(centre: Floats, seconds: float) -> Floats:
+    """(4, 4), where the shake has the head at a time."""
+    phase = 2.0 * np.pi * SHAKE_RATE * seconds
+    ease = min(seconds / 0.25, 1.0)
+    angle = ease * SHAKE_ANGLE * np.sin(phase)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    matrix = np.eye(4)
+    matrix[:2, :2] = [[cosine, -sine], [sine, cosine]]
+    matrix[:3, 3] = centre - matrix[:3, :3] @ centre
+    matrix[0, 3] += ease * SHAKE_SWAY * np.sin(phase)
+    return matrix
+
+
+def _tell_worst(job: Job, inputs: Inputs, motion: BakedGuides) -> None:
+    """The worst stretch and penetration of all frames, measured in what was baked."""
+    assert inputs.collider is not None, "simulate and demo refuse hair without a head"
+    name = job.sources.collider or job.sources.head or "built-in head"
+    with job.report.stage("measure"):
+        settings = job.settings[DynamicsSettings]
+        collider = DistanceField.from_surface(inputs.collider, settings, place=name)
+        state = pipeline.begin(motion.rig, motion.at(motion.frames[0])[0]).dynamics
+        stretch, penetration = 0.0, 0.0
+        for frame in motion.frames[1:]:
+            pose, guides = motion.at(frame)
+            now = replace(state, position=np.ascontiguousarray(guides.transpose(2, 1, 0)))
+            posed = (PosedCollider(collider, pose.matrix, pose.matrix),)
+            stretch = max(stretch, max_stretch(now))
+            penetration = max(penetration, deepest_penetration(now, posed))
+    job.report.facts.update(
+        frames=len(motion.frames),
+        frame_rate=motion.frame_rate,
+        stretch_max_percent=round(stretch * 100.0, 4),
+        penetration_max_mm=round(penetration * 1000.0, 4),
+    )
 
 
 SIMULATE = Verb(
-    "simulate", simulate, add_motion_options, output="take to write (.npz)", needs_head=True
+    "simulate",
+    simulate,
+    add_motion_options,
+    output="folder to write the bake into",
+    needs_head=True,
 )

@@ -1,0 +1,96 @@
+"""Guides over a range of frames, as a bake has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol, Self
+
+import bpy
+
+from ... import pipeline
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...pipeline import Pose, Rig
+from . import playback
+from .cache import Cache
+from .stale_bakes import stale_notes
+
+
+class GuideMotion(Protocol):
+    """Guides over a range of frames.
+
+    rig: what they belong to. frame_rate: [1/s]. notes: what the artist should know.
+    """
+
+    @property
+    def rig(self) -> Rig: ...
+
+    @property
+    def frames(self) -> range: ...
+
+    @property
+    def frame_rate(self) -> float: ...
+
+    @property
+    def notes(self) -> tuple[str, ...]: ...
+
+    def at(self, frame: int) -> tuple[Pose, Floats]:
+        """The pose, and the guides (guide_count, cv_count, 3) [m, world]."""
+
+
+@dataclass(frozen=True, eq=False)
+class BakedGuides:
+    """The guides of a bake; its frames are those of the scene."""
+
+    cache: Cache
+    rig: Rig
+    frames: range
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, hair: bpy.types.Object, frames: range | None = None) -> Self:
+        """Those of a groom's bake; None is all of its frames.
+
+        Raises:
+            HairloomError: no bake, a damaged one, or frames that it does not hold.
+        """
+        cache = playback.cache_of(hair)
+        if cache is None:
+            raise HairloomError(
+                "it has no bake, so it does not move",
+                place=hair.name,
+                remedy="Bake it (Hairloom > Bake), or write it without motion",
+            )
+        notes = stale_notes(hair, cache, bpy.context.evaluated_depsgraph_get())
+        return cls._in(cache, hair.name, frames, notes)
+
+    @classmethod
+    def in_folder(cls, folder: Path, frames: range | None = None) -> Self:
+        """Those of the bake in a folder.
+
+        Raises:
+            HairloomError: as `of`.
+        """
+        return cls._in(Cache(folder), str(folder), frames)
+
+    @classmethod
+    def _in(
+        cls, cache: Cache, place: str, frames: range | None, notes: tuple[str, ...] = ()
+    ) -> Self:
+        chosen = range(cache.facts.first, cache.facts.last + 1) if frames is None else frames
+        playback.check_frames(place, chosen, cache)
+        return cls(cache, playback.rig_in(cache).rig, chosen, notes)
+
+    @property
+    def frame_rate(self) -> float:
+        return self.cache.facts.frame_rate
+
+    def at(self, frame: int) -> tuple[Pose, Floats]:
+        arrays = self.cache.frame(frame)
+        return playback.rig_in(self.cache).pose(arrays), arrays["guides"]
+
+    def strands(self, frame: int) -> tuple[Pose, Floats]:
+        """The pose, and all strands (strand_count, cv_count, 3) [m, world]."""
+        pose, guides = self.at(frame)
+        return pose, pipeline.strands_at(self.rig, pose, guides)
