@@ -56,7 +56,11 @@ def simulated(job: Job, folder: Path) -> BakedGuides:
             own = bpy.context.scene
             frames = range(own.frame_start, own.frame_end + 1)
             plan = Bake.of([hair], own, frames=frames, folder=folder.resolve())
-            write_bake(plan, job.report, "simulating", "simulate frame")
+            try:
+                write_bake(plan, job.report, "simulating", "simulate frame")
+            except HairloomError as error:
+                place = inputs.groom_name if error.place == hair.name else error.place
+                raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     finally:
         scene.frame_set(shown)
     motion = BakedGuides.in_folder(folder.resolve())
