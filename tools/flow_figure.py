@@ -43,7 +43,8 @@ ui/operators_preview.py start_preview
     "2. Curves to cards file": """
 ui/operators_card_export.py HAIRLOOM_OT_export_cards
   blender/cards/files.py CardExport
-    blender/scene/source.py read_source
+    blender/cards/build.py CardInputs
+      blender/scene/source.py read_source
     blender/cards/build.py build_steps
       card_flow.py card_build_steps
         cards/build.py card_steps

@@ -15,9 +15,9 @@ from .tfxbone import BoneWeights
 from .tressfx_layout import VERTEX_COUNTS
 from .usd.groom_usd import USD_SPACES
 
-#: format -> the engines that it knows, the usual one first
+#: format -> the engines that it knows, the usual one first; others know none
 ENGINES: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {ALEMBIC.name: tuple(PRESETS), USD.name: tuple(USD_SPACES), TRESSFX.name: (), HAIR.name: ()}
+    {ALEMBIC.name: tuple(PRESETS), USD.name: tuple(USD_SPACES)}
 )
 #: format -> up axis and metres in one unit where nothing else is asked for
 _SPACES = {TRESSFX.name: ("Y", 1.0), HAIR.name: ("Z", 1.0)}
@@ -96,7 +96,7 @@ def layout_of(kind: StrandFormat, output: StrandOutput) -> GroomPreset:
 
 def _engine(kind: StrandFormat, output: StrandOutput) -> str:
     """The engine that is asked for, or the format's usual one; "" where it knows none."""
-    known = ENGINES[kind.name]
+    known = ENGINES.get(kind.name, ())
     if not output.engine:
         return known[0] if known else ""
     if output.engine not in known:

@@ -41,8 +41,66 @@ facts["fell"] = float(guides[:, -1, 2].mean() - fast.grid[:, -1, 2].mean())
 facts["depth"] = float(-box.distance(points)[0].min())
 facts["difference"] = float(np.abs(fast.position - slow.position).max())
 """,
+    "A look parameter": """
+from hairloom.addon.parameters import ALL_SETTINGS
+from hairloom.addon.params.docs import table
+from hairloom.addon.params.glsl import struct_source
+
+shading = ALL_SETTINGS["shading"]
+facts["glsl"] = struct_source(shading, "ShadingSettings")
+facts["page"] = table(shading)
+facts["halo"] = shading.from_dict({"halo": 0.5}, "test").halo
+facts["is_property"] = "halo" in bpy.data.hair_curves.new("Hair").hairloom.shading.bl_rna.properties
+(row,) = (each for each in shading.parameters() if each.name == "halo")
+facts["panel"] = row.panel
+""",
+    "A settings section": """
+from hairloom.addon.blender.properties.groom_settings import GroomSettings
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.shading.glitter_settings import GlitterSettings
+
+data = bpy.data.hair_curves.new("Hair")
+hair = bpy.data.objects.new("Hair", data)
+bpy.context.collection.objects.link(hair)
+data.hairloom.glitter.amount = 0.25
+settings = GroomSettings.of(hair, bpy.context.evaluated_depsgraph_get())
+facts["amount"] = settings[GlitterSettings].amount
+facts["glsl"] = struct_source(GlitterSettings, "GlitterSettings")
+facts["page"] = table(GlitterSettings)
+facts["panels"] = [name for name in dir(bpy.types) if "glitter" in name.lower()]
+try:
+    GlitterSettings.from_dict({"amount": 2.0}, "a preset")
+except HairloomError as error:
+    facts["refused"] = str(error)
+""",
+    "A strand format": """
+from pathlib import Path
+from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.strands.groom_in import FILE_KINDS
+from hairloom.addon.exchange.strand_reading import read_strands
+from hairloom.addon.exchange.strand_writing import write_strands
+from hairloom.addon.exchange.strand_output import StrandOutput
+
+one, other = Path("one.strands"), Path("other.strands")
+facts["code"] = command_line.run(
+    ["export", "--set", "grow.strand_count=40", "--output", str(one)]
+)
+read = read_strands(one)
+write_strands(other, read.groom, StrandOutput())
+facts["strands"] = read.strands.strand_count
+facts["is_same"] = one.read_text() == other.read_text()
+facts["kinds"] = [title for title, _ in FILE_KINDS]
+""",
+    "A card format": """
+facts["code"] = command_line.run(
+    ["cards", "--set", "grow.strand_count=60", "--set", "cards.card_count=8"]
+    + ["--output", "cards.ply"]
+)
+facts["head"] = Path("cards.ply").read_bytes()[:3].decode()
+facts["sidecars"] = len(list(Path().glob("cards*.json")))
+""",
     "A verb": """
-from hairloom.addon.blender.command_line import command_line, verb_docs
+from hairloom.addon.blender.command_line import verb_docs
 
 report = "count.json"
 facts["code"] = command_line.run(["count", "--set", "grow.strand_count=50", "--report", report])
@@ -104,22 +162,64 @@ def test_every_recipe_is_walked() -> None:
     assert set(recipes()) == {*USES, "A force or constraint"}
 
 
+def test_every_block_fits_the_sources(tmp_path: Path) -> None:
+    copy_with_recipes(tmp_path)
+
+
 def test_the_places_of_a_force_are_complete() -> None:
-    others = {"addon/dynamics/constraints.py", "addon/ui/operators_fins.py", "addon/ui/sections.py"}
+    others = {"addon/dynamics/constraints.py", "addon/dynamics/settings.py"}
     assert listed_files("A force or constraint") - others == files_with("drag") - others
 
 
+def test_the_places_of_a_collider_shape_are_complete() -> None:
+    others = {"gpu_shaders/lib_collider.glsl", "addon/blender/colliders/obstacles.py"}
+    assert listed_files("A collider shape") - others == files_with("capsule") - others
+
+
+@pytest.mark.slow
 def test_a_collider_shape(facts: dict[str, dict[str, Any]]) -> None:
     found = facts["A collider shape"]
     assert found["fell"] > 0.02  # over the edge of the box
     assert found["depth"] < 2.0e-4
     assert found["difference"] < 1.0e-3
-    others = {"gpu_shaders/lib_collider.glsl", "addon/blender/colliders/obstacles.py"}
-    assert listed_files("A collider shape") - others == files_with("capsule") - others
 
 
+@pytest.mark.slow
 def test_a_verb(facts: dict[str, dict[str, Any]]) -> None:
     found = facts["A verb"]
     assert found["code"] == 0
     assert found["report"]["counted"] == found["report"]["strands"] > 0
     assert "Count the strands and guides of a groom." in found["page"]
+
+
+@pytest.mark.slow
+def test_a_look_parameter(facts: dict[str, dict[str, Any]]) -> None:
+    found = facts["A look parameter"]
+    assert "float halo;" in found["glsl"]
+    assert "Light around the silhouette" in found["page"]
+    assert found["halo"] == 0.5
+    assert found["is_property"]
+    assert found["panel"] == "Second Highlight"
+
+
+@pytest.mark.slow
+def test_a_settings_section(facts: dict[str, dict[str, Any]]) -> None:
+    found = facts["A settings section"]
+    assert found["amount"] == 0.25
+    assert "struct GlitterSettings" in found["glsl"]
+    assert "Fraction of the strands with a flake" in found["page"]
+    assert found["panels"]
+    assert "amount" in found["refused"]
+
+
+@pytest.mark.slow
+def test_a_strand_format(facts: dict[str, dict[str, Any]]) -> None:
+    found = facts["A strand format"]
+    assert (found["code"], found["is_same"]) == (0, True)
+    assert found["strands"] > 0
+    assert "Plain Text" in found["kinds"]
+
+
+@pytest.mark.slow
+def test_a_card_format(facts: dict[str, dict[str, Any]]) -> None:
+    assert facts["A card format"] == {"code": 0, "head": "ply", "sidecars": 1}
