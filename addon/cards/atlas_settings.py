@@ -25,11 +25,15 @@ class AtlasSettings(Settings):
     source: str = choice(
         "baked",
         (
-            ("made", "Procedural", "Strips of hair made by chance, as Card Texture has them"),
-            ("baked", "Baked", "The strands themselves, laid flat; of guides alone it is made"),
+            ("made", "Procedural", "Procedural strips of hair"),
+            (
+                "baked",
+                "Baked",
+                "The strands themselves, laid flat; procedural if there are only guides",
+            ),
         ),
         label="Source",
-        description="What hair the texture of the cards shows",
+        description="What the texture of the cards is made from",
     )
     size: str = choice(
         "2048",
@@ -57,7 +61,8 @@ class AtlasSettings(Settings):
     padding: int = integer(
         4,
         label="Padding",
-        description="Pixels left free on each side of a tile, so that no tile shows in another",
+        description="Empty pixels on each side of a tile, so that tiles do not bleed into each "
+        "other",
         soft=(0, 16),
         hard=(0, 256),
         shown_when=when("atlas.source", "baked"),
@@ -65,8 +70,8 @@ class AtlasSettings(Settings):
     strand_width: float = number(
         1.57,  # pi / 2: the mean of |cos| over all turns of a card is 2 / pi
         label="Strand Width",
-        description="Factor of the strands' width in the atlas; cards are mostly seen at a slant, "
-        "which makes what is on them narrower, and strands are not",
+        description="Factor on the strand width in the atlas, because cards are mostly seen at a "
+        "slant, which makes strands on them narrower",
         soft=(1.0, 2.0),
         hard=(0.01, 100.0),
         shown_when=when("atlas.source", "baked"),
@@ -74,7 +79,7 @@ class AtlasSettings(Settings):
     seed: int = integer(
         0,
         label="Seed",
-        description="Another number chooses other strands for the tiles",
+        description="Random seed for the strands in the tiles",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
         shown_when=when("atlas.source", "baked"),

@@ -19,20 +19,24 @@ class CardDrawingSettings(Settings):
     shown_as: str = choice(
         "strands",
         (
-            ("strands", "Strands", "Every strand as a ribbon"),
-            ("cards", "Cards", "The hair cards that stand for the strands"),
+            ("strands", "Strands", "Draw every strand as a ribbon"),
+            ("cards", "Cards", "Draw hair cards instead of the strands"),
         ),
         label="Show As",
-        description="As what the hair is drawn, in the viewport and in renders",
+        description="How hair is drawn, in the viewport and in renders",
     )
     passes: str = choice(
         "four",
         (
-            ("four", "Four", "Depth of opaque pixels first, so that hidden ones are not shaded"),
+            (
+                "four",
+                "Four",
+                "Draw the depth of opaque pixels first, so that hidden ones are not shaded",
+            ),
             ("three", "Three", "Opaque pixels, then both sides, with an alpha test in each pass"),
         ),
         label="Passes",
-        description="The scheme by which cards are drawn",
+        description="How many passes cards are drawn in",
         source="Scheuermann 2004, optimized scheme and its fall-back",
         panel="Drawing",
         active_when=when("card_drawing.shown_as", "cards"),
@@ -40,7 +44,7 @@ class CardDrawingSettings(Settings):
     order: str = choice(
         "static",
         (
-            ("static", "Static", "From the inside of the hair to the outside, sorted once"),
+            ("static", "Static", "From inside to outside, sorted once"),
             (
                 "view",
                 "For Each View",
@@ -48,7 +52,7 @@ class CardDrawingSettings(Settings):
             ),
         ),
         label="Order",
-        description="In which order cards are drawn over each other",
+        description="Order in which cards are drawn",
         source="Scheuermann 2004, rendering with approximate depth sorting",
         panel="Drawing",
         active_when=when("card_drawing.shown_as", "cards"),
@@ -56,8 +60,8 @@ class CardDrawingSettings(Settings):
     skip_clear: bool = toggle(
         True,
         label="Skip Transparent Pixels",
-        description="Four passes: the last one tests alpha, so that clear pixels hide nothing; "
-        "without it that pass is as in the paper, and quicker on some GPUs",
+        description="Test alpha in the last pass, so that transparent pixels hide nothing; "
+        "without it, the pass is as in the paper and faster on some GPUs",
         panel="Drawing",
         active_when=when("card_drawing.shown_as", "cards"),
         shown_when=when("card_drawing.passes", "four"),

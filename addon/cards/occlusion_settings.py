@@ -18,7 +18,7 @@ class CardOcclusionSettings(Settings):
     strength: float = number(
         1.0,
         label="Strength",
-        description="How much of the shade between the cards is stored",
+        description="Amount of ambient occlusion that is stored",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -26,23 +26,22 @@ class CardOcclusionSettings(Settings):
     extinction: float = number(
         2.0,
         label="Extinction",
-        description="How fast light dies in cards of other grooms, and in your own that are "
-        "sorted, as a power of what their alpha lets through; the same as in strands. Cards of a "
-        "groom have the occlusion of its strands",
+        description="Extinction of light in cards of other grooms and in cards that you sort, as "
+        "a power of their transparency. Cards of a groom have the occlusion of its strands",
         soft=(0.0, 10.0),
         hard=(0.0, 1_000.0),
     )
     rays: int = integer(
         256,
         label="Rays",
-        description="Directions from which light comes to each vertex; time grows with them",
+        description="Number of directions per vertex; time grows in proportion",
         soft=(64, 1024),
         hard=(1, 65_536),
     )
     reach: float = number(
         1.0,
         label="Reach",
-        description="How far away cards and bodies still shade",
+        description="Maximum distance at which cards and bodies occlude",
         unit="length",
         soft=(0.02, 2.0),
         hard=(0.0, 1_000.0),
@@ -50,8 +49,8 @@ class CardOcclusionSettings(Settings):
     own_reach: float = number(
         0.02,
         label="Self-occlusion Distance",
-        description="From where on a card shades itself: a little more than its width, so that "
-        "only what curls over itself does",
+        description="Distance from which a card occludes itself; a little more than its width, so "
+        "that only curls do",
         unit="length",
         soft=(0.0, 0.1),
         hard=(0.0, 1_000.0),
@@ -59,6 +58,6 @@ class CardOcclusionSettings(Settings):
     others: bool = toggle(
         False,
         label="Other Hair",
-        description="Hair of other grooms shades as well: their cards that Make Cards or Sort Hair "
-        "Cards has written, and the strands of those without",
+        description="Include hair of other grooms: their cards written by Make Cards or Sort Hair "
+        "Cards, or their strands if there are none",
     )

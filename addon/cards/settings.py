@@ -22,12 +22,12 @@ class CardSettings(Settings):
             ("guides", "Guides", "A card along each guide"),
         ),
         label="Source",
-        description="What a card stands for",
+        description="What each card is built from",
     )
     card_count: int = integer(
         800,
         label="Cards",
-        description="Clusters: how many cards are made",
+        description="Number of cards",
         soft=(50, 2000),
         hard=(1, 20_000),
         shown_when=when("cards.source", "clusters"),
@@ -35,8 +35,8 @@ class CardSettings(Settings):
     error: float = number(
         0.002,
         label="Error",
-        description="Clusters: how far a card's edges may be from the strands' own way; less "
-        "makes more segments",
+        description="Maximum distance of a card's edges from the path of its strands; less gives "
+        "more segments",
         soft=(0.0005, 0.02),
         hard=(0.0, 10.0),
         unit="length",
@@ -45,7 +45,7 @@ class CardSettings(Settings):
     cluster_width: float = number(
         1.0,
         label="Width Factor",
-        description="Clusters: width of a card, as a factor of how widely its strands lie",
+        description="Width of a card relative to the spread of its strands",
         soft=(0.5, 2.0),
         hard=(0.01, 100.0),
         shown_when=when("cards.source", "clusters"),
@@ -53,15 +53,14 @@ class CardSettings(Settings):
     crossed: bool = toggle(
         False,
         label="Crossed Pairs",
-        description="Clusters: a second card through each, turned by a right angle, so that hair "
-        "has body from all sides",
+        description="Add a second card through each at a right angle, so that hair has volume "
+        "from all sides",
         shown_when=when("cards.source", "clusters"),
     )
     fly_aways: float = number(
         0.1,
         label="Fly-aways",
-        description="Clusters: share of the cards that go to single strands which lie far from "
-        "all others",
+        description="Fraction of the cards used for single strands far from all others",
         soft=(0.0, 0.5),
         hard=(0.0, 1.0),
         unit="factor",
@@ -70,44 +69,45 @@ class CardSettings(Settings):
     layers: int = integer(
         3,
         label="Layers",
-        description="Into how many layers from the scalp to the surface the cards are told apart",
+        description="Number of layers of cards from the scalp to the surface",
         soft=(1, 5),
         hard=(1, 16),
     )
     base_width: float = number(
         1.0,
         label="Base Width",
-        description="How much wider the cards of the lowest layer are, so that the head does not "
-        "show through; the outermost layer is never widened",
+        description="Widening of the lowest layer, so that the head does not show through; the "
+        "outermost layer is never widened",
         soft=(1.0, 2.0),
         hard=(1.0, 10.0),
     )
     levels: int = integer(
         3,
         label="Levels of Detail",
-        description="How many meshes are made, each with about half the triangles of the one "
-        "before; all use the same textures",
+        description="Number of meshes, each with about half the triangles of the previous one; "
+        "all use the same textures",
         soft=(1, 5),
         hard=(1, 5),
     )
     segment_count: int = integer(
         12,
         label="Segments",
-        description="Pieces of a card from root to tip; with clusters, the most",
+        description="Segments of a card from root to tip; for clusters, the maximum",
         soft=(4, 32),
         hard=(1, 128),
     )
     column_count: int = integer(
         2,
         label="Columns",
-        description="Pieces of a card across; two or more can bend",
+        description="Segments across a card; two or more can bend",
         soft=(1, 4),
         hard=(1, 16),
     )
     width_factor: float = number(
         3.5,
         label="Width",
-        description="Guides: width at the root, in mean distances between neighbouring guides",
+        description="Width at the root, as a factor of the mean distance between neighbouring "
+        "guides",
         soft=(1.0, 6.0),
         hard=(0.01, 100.0),
         shown_when=when("cards.source", "guides"),
@@ -115,7 +115,7 @@ class CardSettings(Settings):
     tip_width: float = number(
         0.5,
         label="Tip Width",
-        description="Guides: width at the tip as a part of the width at the root",
+        description="Width at the tip relative to the root",
         soft=(0.0, 1.0),
         hard=(0.0, 10.0),
         shown_when=when("cards.source", "guides"),
@@ -123,22 +123,22 @@ class CardSettings(Settings):
     bend: float = number(
         0.1,
         label="Bend",
-        description="How far the edges fall behind the middle, as a part of the width",
+        description="Depth of the edges behind the middle, as a fraction of the width",
         soft=(0.0, 0.5),
         hard=(-1.0, 1.0),
     )
     roundness: float = number(
         0.0,
         label="Roundness",
-        description="How far the normals lean outwards at the edges, so that light wraps around "
-        "a card; 0 leaves them those of the strands",
+        description="Amount by which normals lean outwards at the edges, so that light wraps "
+        "around a card; 0 keeps the normals of the strands",
         soft=(0.0, 1.0),
         hard=(0.0, 4.0),
     )
     atlas_columns: int = integer(
         4,
         label="Variants",
-        description="Different strips of hair side by side in the texture; each card uses one",
+        description="Number of different strips of hair in the texture; each card uses one",
         soft=(1, 8),
         hard=(1, 64),
         shown_when=when("atlas.source", "made"),
@@ -149,19 +149,19 @@ class CardSettings(Settings):
             (
                 "pieces",
                 "Pieces",
-                "Pieces of cards that cross each other are sorted apart: fewest errors",
+                "Sort pieces of crossing cards separately: fewest errors",
             ),
-            ("cards", "Whole Cards", "All faces of a card stay together"),
-            ("distance", "Distance", "Whole cards by their distance from the head alone"),
+            ("cards", "Whole Cards", "Keep all faces of a card together"),
+            ("distance", "Distance", "Sort whole cards only by their distance from the head"),
         ),
         label="Order By",
-        description="What is sorted from the inside to the outside",
+        description="What is sorted from inside to outside",
         source="Scheuermann 2004",
     )
     seed: int = integer(
         0,
         label="Seed",
-        description="Another number gives the cards other strips of the texture",
+        description="Random seed for the strips that cards use",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
     )

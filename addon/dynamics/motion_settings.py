@@ -18,7 +18,7 @@ class MotionSettings(Settings):
     buoyancy: float = number(
         0.0,
         label="Buoyancy",
-        description="Share of the weight that the medium carries: 0 in air; at 1 it floats",
+        description="Fraction of the weight that the medium carries: 0 in air; at 1 it floats",
         soft=(0.0, 1.0),
         hard=(0.0, 2.0),
         source="Archimedes",
@@ -27,8 +27,8 @@ class MotionSettings(Settings):
     damping: float = number(
         0.5,
         label="Air Damping",
-        description="How fast still air, or water, takes the speed out of what moves, and how "
-        "fast wind gives it its own",
+        description="Rate at which still air or water slows motion down, and at which wind "
+        "carries it along",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -38,8 +38,7 @@ class MotionSettings(Settings):
     drag: float = number(
         0.0,
         label="Drag",
-        description="Braking by the square of the speed through air or water, for each metre of "
-        "way; in water a few",
+        description="Quadratic drag through air or water, per metre travelled; a few in water",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         source="Rayleigh's drag equation",
@@ -48,8 +47,8 @@ class MotionSettings(Settings):
     wind_speed: float = number(
         0.0,
         label="Wind Speed",
-        description="Speed of the air, or of the current under water; the scene's wind force "
-        "fields add to it",
+        description="Speed of the air, or of the current under water. Wind force fields of the "
+        "scene are added",
         soft=(0.0, 20.0),
         hard=(0.0, 200.0),
         unit="speed",
@@ -58,7 +57,7 @@ class MotionSettings(Settings):
     wind_direction: float = number(
         0.0,
         label="Wind Direction",
-        description="Where the wind blows to: 0 is world +X, a quarter turn +Y",
+        description="Direction that the wind blows towards: 0 is world +X, 90 degrees is +Y",
         soft=(-math.pi, math.pi),
         hard=(-_MAX_TURNED, _MAX_TURNED),
         unit="angle",
@@ -67,7 +66,7 @@ class MotionSettings(Settings):
     wind_elevation: float = number(
         0.0,
         label="Wind Elevation",
-        description="How steeply the wind blows upwards",
+        description="Angle by which the wind blows upwards",
         soft=(-0.5 * math.pi, 0.5 * math.pi),
         hard=(-_MAX_TURNED, _MAX_TURNED),
         unit="angle",
@@ -76,7 +75,7 @@ class MotionSettings(Settings):
     gusts: float = number(
         0.5,
         label="Gusts",
-        description="How strongly the wind swells and turns, as a share of its speed",
+        description="Strength of gusts, as a fraction of the wind speed",
         soft=(0.0, 2.0),
         hard=(0.0, 10.0),
         source="Random Fourier modes, Kraichnan 1970",
@@ -85,7 +84,7 @@ class MotionSettings(Settings):
     gust_size: float = number(
         0.5,
         label="Gust Size",
-        description="Length of a gust from one swell to the next",
+        description="Distance from one gust to the next",
         soft=(0.05, 5.0),
         hard=(0.01, 1000.0),
         unit="length",
@@ -94,7 +93,7 @@ class MotionSettings(Settings):
     gust_seed: int = integer(
         1,
         label="Gust Seed",
-        description="Another seed gives other gusts of the same kind",
+        description="Random seed of the gusts",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
         panel="Medium & Wind",
@@ -111,7 +110,7 @@ class MotionSettings(Settings):
     depenetration_speed: float = number(
         0.5,
         label="Depenetration Speed",
-        description="How fast what starts inside a collider is led out",
+        description="Speed at which points that start inside a collider are moved out of it",
         soft=(0.05, 5.0),
         hard=(0.001, 100.0),
         unit="speed",

@@ -24,17 +24,17 @@ class DynamicsSettings(MotionSettings):
     device: str = choice(
         "automatic",
         (
-            ("automatic", "Automatic", "The GPU where Blender has one to compute with, else numpy"),
+            ("automatic", "Automatic", "The GPU if Blender can compute on it, otherwise the CPU"),
             ("numpy", "CPU (numpy)", "Needs no GPU; the same result to the last bit in every run"),
             ("compute", "GPU (compute)", "Fastest; guides stay on the GPU between frames"),
         ),
         label="Device",
-        description="What carries out the simulation; both give the same motion within rounding",
+        description="Device that runs the simulation; both give the same motion within rounding",
     )
     substep_rate: float = number(
         180.0,
         label="Substeps",
-        description="Steps of the simulation in a second, whatever the frame rate",
+        description="Simulation steps per second, independent of the frame rate",
         soft=(60.0, 480.0),
         hard=(30.0, 2000.0),
         unit="rate",
@@ -43,7 +43,7 @@ class DynamicsSettings(MotionSettings):
     longest_frame: float = number(
         0.25,
         label="Longest Frame",
-        description="A longer pause between two frames is simulated as this much time",
+        description="Maximum time that is simulated between two frames",
         soft=(0.05, 1.0),
         hard=(0.01, 10.0),
         unit="time",
@@ -58,8 +58,8 @@ class DynamicsSettings(MotionSettings):
     weight_held: float = number(
         1.0,
         label="Sag Compensation",
-        description="Fraction of the weight that the style already carries as it was combed; at 1 "
-        "a groom does not sag when it comes to rest",
+        description="Fraction of the weight that the style compensates; at 1 a groom does not sag "
+        "when it comes to rest",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -67,7 +67,7 @@ class DynamicsSettings(MotionSettings):
     style_root: float = number(
         4.0,
         label="Root Stiffness",
-        description="Pull of the first points to their place in the style, in swings a second",
+        description="Stiffness that holds the first points to the style, in swings per second",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -77,7 +77,7 @@ class DynamicsSettings(MotionSettings):
     style_tip: float = number(
         1.2,
         label="Tip Stiffness",
-        description="Pull of the tip to its place in the style, in swings a second",
+        description="Stiffness that holds the tip to the style, in swings per second",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -87,15 +87,14 @@ class DynamicsSettings(MotionSettings):
     style_along: tuple[float, ...] = curve(
         (1.0, 0.75, 0.5, 0.25, 0.0),
         label="Stiffness Along",
-        description="How the style's stiffness goes along the strand, from that of the root (1) "
-        "to that of the tip (0)",
+        description="Style stiffness along the strand: 1 is that of the root, 0 that of the tip",
         hard=(0.0, 1.0),
         panel="Style",
     )
     style_damping: float = number(
         5.0,
         label="Style Damping",
-        description="How fast swinging about the style dies away, seen from the moving head",
+        description="Rate at which swinging about the style dies away, relative to the moving head",
         soft=(0.0, 20.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -104,8 +103,8 @@ class DynamicsSettings(MotionSettings):
     bend: float = number(
         1.5,
         label="Bend Stiffness",
-        description="How strongly waves and curls keep their form, in swings a second of a strand "
-        "held at its root",
+        description="Stiffness that keeps waves and curls in shape, in swings per second of a "
+        "strand held at its root",
         soft=(0.0, 5.0),
         hard=(0.0, 50.0),
         unit="rate",
@@ -122,22 +121,22 @@ class DynamicsSettings(MotionSettings):
     length_solver: str = choice(
         "direct",
         (
-            ("direct", "Direct", "All segments of a guide at once: no visible stretch"),
+            ("direct", "Direct", "Solve all segments of a guide at once: no visible stretch"),
             (
                 "relaxation",
                 "Relaxation",
-                "One segment after the other, again and again: stretches when jerked",
+                "Solve one segment after the other, repeatedly: stretches under jerks",
             ),
         ),
         label="Length Solver",
-        description="How segments keep their length",
+        description="Method that keeps segments at their length",
         source="Direct: Goldenthal et al. 2007. Relaxation: Jakobsen 2001",
         panel="Lengths",
     )
     relaxations: int = integer(
         8,
         label="Relaxations",
-        description="Sweeps along the guide in each substep, if lengths are kept by relaxation",
+        description="Sweeps along the guide in each substep",
         soft=(1, 32),
         hard=(1, 256),
         source="Jakobsen 2001",
@@ -146,15 +145,15 @@ class DynamicsSettings(MotionSettings):
     long_range: bool = toggle(
         True,
         label="Long Range",
-        description="With relaxation, no point goes farther from its root than its length along "
-        "the strand",
+        description="With relaxation, limit the distance of each point from its root to its "
+        "length along the strand",
         source="Kim, Chentanez and Mueller 2012",
         panel="Lengths",
     )
     length_tolerance: float = number(
         0.002,
         label="Length Tolerance",
-        description="Guides are solved again until no segment is off by more than this share",
+        description="Guides are solved until no segment is off by more than this fraction",
         soft=(0.0005, 0.01),
         hard=(0.0001, 0.02),
         panel="Lengths",
@@ -162,7 +161,8 @@ class DynamicsSettings(MotionSettings):
     length_iterations: int = integer(
         8,
         label="Length Iterations",
-        description="Newton steps at most of each substep's last solve for the segment lengths",
+        description="Maximum number of Newton steps in each substep's last solve for segment "
+        "lengths",
         soft=(1, 16),
         hard=(1, 64),
         source="Fast projection, Goldenthal et al. 2007",
@@ -171,7 +171,7 @@ class DynamicsSettings(MotionSettings):
     contact_passes: int = integer(
         2,
         label="Contact Passes",
-        description="How often contacts and lengths are solved in turn in each substep",
+        description="Number of times that contacts and lengths are solved in turn in each substep",
         soft=(1, 4),
         hard=(1, 16),
         panel="Collisions",
@@ -179,7 +179,7 @@ class DynamicsSettings(MotionSettings):
     radius_root: float = number(
         0.001,
         label="Root Radius",
-        description="Distance that the first points keep from colliders",
+        description="Distance of the first points from colliders",
         soft=(0.0, 0.01),
         hard=(0.0, 0.1),
         unit="length",
@@ -189,7 +189,7 @@ class DynamicsSettings(MotionSettings):
     radius_tip: float = number(
         0.004,
         label="Tip Radius",
-        description="Distance that the tip keeps from colliders, so that none slips between points",
+        description="Distance of the tip from colliders, so that none slips between points",
         soft=(0.0, 0.02),
         hard=(0.0, 0.1),
         unit="length",

@@ -24,17 +24,17 @@ class ChildrenSettings(Settings):
         "none",
         (
             ("none", "None", "The curves are all the hair there is"),
-            ("multi", "Between Guides", "Each child is a mixture of the three guides around it"),
-            ("single", "Around a Guide", "Each child runs beside one guide"),
+            ("multi", "Between Guides", "Blend the three guides around each child"),
+            ("single", "Around a Guide", "Place each child beside one guide"),
         ),
         label="Method",
-        description="How strands are made from guides",
+        description="How children are interpolated from guides",
         source=_TARIQ,
     )
     strand_count: int = integer(
         4095,
         label="Strands",
-        description="How many children there are; more adds some and moves none",
+        description="Number of children; a higher number adds children without moving the others",
         soft=(100, 20_000),
         hard=(0, 500_000),
         source=_NALU,
@@ -43,7 +43,7 @@ class ChildrenSettings(Settings):
     parting: float = number(
         math.radians(60.0),
         label="Parting",
-        description="Guides that go apart by more than this angle are not mixed",
+        description="Do not blend guides that diverge by more than this angle",
         unit="angle",
         soft=(math.radians(10.0), math.radians(90.0)),
         hard=(0.0, math.pi),
@@ -53,7 +53,7 @@ class ChildrenSettings(Settings):
     length_variation: float = number(
         0.2,
         label="Length Variation",
-        description="How much shorter than its guides a child may be",
+        description="Maximum amount by which a child is shorter than its guides",
         unit="factor",
         soft=(0.0, 0.9),
         hard=(0.0, 0.99),
@@ -62,7 +62,7 @@ class ChildrenSettings(Settings):
     clump: float = number(
         0.5,
         label="Clump",
-        description="How far children of a lock are drawn together",
+        description="Amount by which the children of a clump are drawn together",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -71,7 +71,7 @@ class ChildrenSettings(Settings):
     clump_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.25, 0.5, 0.75, 1.0),
         label="Clump Along",
-        description="Fraction of the clump from root to tip",
+        description="Fraction of Clump along the strand, from root to tip",
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
         active_when=when("children.clump"),
@@ -79,7 +79,7 @@ class ChildrenSettings(Settings):
     clump_size: int = integer(
         12,
         label="Strands per Clump",
-        description="How many children make a lock, on average; 1 makes none",
+        description="Average number of children in a clump; 1 turns clumps off",
         soft=(1, 100),
         hard=(1, 100_000),
         shown_when=when("children.method", "multi", "single"),
@@ -88,7 +88,7 @@ class ChildrenSettings(Settings):
     frizz: float = number(
         0.001,
         label="Frizz",
-        description="How far single children stray from their way",
+        description="Distance that single children stray from their path",
         unit="length",
         soft=(0.0, 0.01),
         hard=(0.0, 1.0),
@@ -97,7 +97,7 @@ class ChildrenSettings(Settings):
     frizz_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.4, 0.7, 0.9, 1.0),
         label="Frizz Along",
-        description="Fraction of the frizz from root to tip",
+        description="Fraction of Frizz along the strand, from root to tip",
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
         active_when=when("children.frizz"),
@@ -115,7 +115,7 @@ class ChildrenSettings(Settings):
     width: float = number(
         1.0,
         label="Width",
-        description="Width of children as a factor of their guides' width",
+        description="Width of children relative to their guides",
         soft=(0.1, 4.0),
         hard=(0.001, 1000.0),
         shown_when=when("children.method", "multi", "single"),
@@ -123,7 +123,7 @@ class ChildrenSettings(Settings):
     seed: int = integer(
         1,
         label="Seed",
-        description="Another seed gives other children of the same kind",
+        description="Random seed of the children",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
         shown_when=when("children.method", "multi", "single"),

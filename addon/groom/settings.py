@@ -21,24 +21,24 @@ class GrowSettings(Settings):
     method: str = choice(
         "combed",
         (
-            ("combed", "Combed", "A groom on an upright head, combed and fallen around it"),
+            ("combed", "Combed", "A groom on an upright head, combed and falling around it"),
             ("normals", "Along Normals", "Straight out of any mesh, as guides to be styled"),
         ),
         label="Method",
-        description="How hair leaves the mesh",
+        description="Direction in which hair grows from the mesh",
         source=_NALU,
     )
     per_vertex: bool = toggle(
         False,
         label="One per Vertex",
-        description="Along the normals: one strand from each vertex instead of a number of strands",
+        description="Grow one strand from each vertex instead of a given number of strands",
         source=_NALU,
         shown_when=when("grow.method", "normals"),
     )
     threshold: float = number(
         0.5,
         label="Threshold",
-        description="With one strand a vertex: density above which a vertex grows it",
+        description="Density above which a vertex grows a strand",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -47,7 +47,7 @@ class GrowSettings(Settings):
     strand_count: int = integer(
         4095,
         label="Strands",
-        description="How many strands grow",
+        description="Number of strands to grow",
         soft=(100, 20_000),
         hard=(0, 500_000),
         source=_NALU,
@@ -56,7 +56,7 @@ class GrowSettings(Settings):
     cv_count: int = integer(
         16,
         label="Points",
-        description="Points of each strand",
+        description="Number of points per strand",
         soft=(8, 32),
         hard=(4, 64),
         source=_NALU,
@@ -72,7 +72,7 @@ class GrowSettings(Settings):
     length_variation: float = number(
         0.25,
         label="Length Variation",
-        description="How much shorter than the longest a strand may be",
+        description="Maximum amount by which a strand is shorter than the longest",
         unit="factor",
         soft=(0.0, 0.9),
         hard=(0.0, 0.99),
@@ -80,7 +80,7 @@ class GrowSettings(Settings):
     segment_ratio: float = number(
         1.06,
         label="Segment Ratio",
-        description="Length of each segment as a factor of the one before it, root to tip",
+        description="Length of each segment relative to the previous one, from root to tip",
         soft=(1.0, 1.3),
         hard=(0.5, 2.0),
         source=_NALU,
@@ -88,7 +88,7 @@ class GrowSettings(Settings):
     lift: float = number(
         0.45,
         label="Lift",
-        description="How steeply hair leaves the scalp: 0 lies flat as combed, 1 stands up",
+        description="Angle at which hair leaves the scalp: 0 lies flat, 1 stands up",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -97,7 +97,7 @@ class GrowSettings(Settings):
     comb_back: float = number(
         0.7,
         label="Comb Back",
-        description="Hair is combed to the back of the head (world +Y) rather than to its sides",
+        description="Comb hair to the back of the head (world +Y) rather than to its sides",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -106,7 +106,7 @@ class GrowSettings(Settings):
     comb_fraction: float = number(
         0.45,
         label="Comb Fraction",
-        description="Part of the strand that follows the comb before the hair falls",
+        description="Fraction of the strand that follows the comb before the hair falls",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -115,7 +115,8 @@ class GrowSettings(Settings):
     droop: float = number(
         0.45,
         label="Droop",
-        description="How much each 2 cm of hair turn towards the direction in which it falls",
+        description="Amount by which each 2 cm of hair turn towards the direction in which it "
+        "falls",
         unit="factor",
         soft=(0.0, 0.9),
         hard=(0.0, 1.0),
@@ -124,7 +125,7 @@ class GrowSettings(Settings):
     clump: float = number(
         0.85,
         label="Clump",
-        description="How far the tips of a lock are drawn together",
+        description="Amount by which the tips of a clump are drawn together",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -133,7 +134,7 @@ class GrowSettings(Settings):
     clump_size: int = integer(
         30,
         label="Strands per Clump",
-        description="How many strands make a lock, on average",
+        description="Average number of strands in a clump",
         soft=(1, 100),
         hard=(1, 100_000),
         shown_when=when("grow.method", "combed"),
@@ -141,7 +142,7 @@ class GrowSettings(Settings):
     wave: float = number(
         0.007,
         label="Wave",
-        description="How far the locks swing to and fro",
+        description="Amplitude of the waves of clumps",
         unit="length",
         soft=(0.0, 0.02),
         hard=(0.0, 1.0),
@@ -150,7 +151,7 @@ class GrowSettings(Settings):
     wave_length: float = number(
         0.075,
         label="Wave Length",
-        description="Length of hair from one crest of the wave to the next",
+        description="Length of hair from one crest to the next",
         unit="length",
         soft=(0.01, 0.3),
         hard=(0.001, 100.0),
@@ -159,7 +160,7 @@ class GrowSettings(Settings):
     frizz: float = number(
         0.001,
         label="Frizz",
-        description="How far single strands stray from their lock",
+        description="Distance that single strands stray from their clump",
         unit="length",
         soft=(0.0, 0.01),
         hard=(0.0, 1.0),
@@ -168,7 +169,7 @@ class GrowSettings(Settings):
     clearance: float = number(
         0.002,
         label="Clearance",
-        description="Least distance of the hair from the surface, away from its roots",
+        description="Minimum distance of the hair from the surface, away from its roots",
         unit="length",
         soft=(0.0, 0.02),
         hard=(0.0, 1.0),
@@ -186,7 +187,8 @@ class GrowSettings(Settings):
     radius: float = number(
         2.0e-4,
         label="Radius",
-        description="Radius of the strands; wider than a hair where few strands stand for many",
+        description="Radius of the strands; use more than that of a real hair if there are few "
+        "strands",
         unit="length",
         soft=(1.0e-5, 5.0e-4),
         hard=(1.0e-7, 0.1),
@@ -194,7 +196,7 @@ class GrowSettings(Settings):
     seed: int = integer(
         1,
         label="Seed",
-        description="Another seed gives another groom of the same kind",
+        description="Random seed of the groom",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
     )
@@ -211,7 +213,8 @@ class GuideSettings(Settings):
     guide_count: int = integer(
         762,
         label="Guides",
-        description="How many strands are simulated; every group of strands gets at least one",
+        description="Number of strands that are simulated; every group of strands gets at least "
+        "one",
         soft=(50, 4000),
         hard=(1, 100_000),
         source=_NALU,
@@ -219,7 +222,7 @@ class GuideSettings(Settings):
     cv_count: int = integer(
         16,
         label="Points",
-        description="Points of each strand in simulation and drawing",
+        description="Number of points per strand in simulation and drawing",
         soft=(8, 32),
         hard=(4, 64),
         source=_NALU,
@@ -227,7 +230,7 @@ class GuideSettings(Settings):
     seed: int = integer(
         1,
         label="Seed",
-        description="Another seed chooses other strands as guides",
+        description="Random seed for choosing the guides",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
     )

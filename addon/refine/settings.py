@@ -21,18 +21,22 @@ class DetailSettings(Settings):
     mode: str = choice(
         "adaptive",
         (
-            ("adaptive", "Adaptive", "As few pieces as keep the curve within an error in pixels"),
-            ("heuristic", "By Size and Angle", "More pieces for long and for bent segments"),
+            (
+                "adaptive",
+                "Adaptive",
+                "The fewest pieces that keep the curve within an error in pixels",
+            ),
+            ("heuristic", "By Size and Angle", "More pieces for long and for curved segments"),
             ("fixed", "Fixed", "The same number of pieces everywhere"),
         ),
         label="Detail",
-        description="How many straight pieces each segment of a strand is drawn with",
+        description="How segments of a strand are subdivided",
         source=_SSALOD,
     )
     error: float = number(
         0.5,
         label="Error",
-        description="Adaptive: how far from its curve a strand may be drawn",
+        description="Maximum distance of a drawn strand from its curve",
         soft=(0.1, 2.0),
         hard=(0.01, 100.0),
         unit="pixels",
@@ -42,7 +46,7 @@ class DetailSettings(Settings):
     piece_length: float = number(
         8.0,
         label="Subdivision Length",
-        description="By size and angle: length of a piece where hair bends by 45 degrees or more",
+        description="Length of a piece where hair bends by 45 degrees or more",
         soft=(2.0, 32.0),
         hard=(0.5, 1000.0),
         unit="pixels",
@@ -52,7 +56,7 @@ class DetailSettings(Settings):
     subdivisions: int = integer(
         2,
         label="Subdivisions",
-        description="Fixed: pieces of each segment",
+        description="Pieces per segment",
         soft=(1, 8),
         hard=(1, 64),
         shown_when=when("detail.mode", "fixed"),
@@ -60,7 +64,7 @@ class DetailSettings(Settings):
     max_subdivisions: int = integer(
         64,
         label="Max Subdivisions",
-        description="Pieces of a segment at most",
+        description="Maximum number of pieces per segment",
         soft=(1, 64),
         hard=(1, 64),
         source=_SSALOD,
@@ -69,19 +73,19 @@ class DetailSettings(Settings):
     culling: str = choice(
         "hidden",
         (
-            ("none", "None", "Every strand is drawn"),
-            ("hidden", "Hidden", "Strands that lie wholly behind the head are not drawn"),
-            ("away", "Facing Away", "Strands whose root faces away from the eye are not drawn"),
+            ("none", "None", "Draw every strand"),
+            ("hidden", "Hidden", "Skip strands that lie entirely behind the head"),
+            ("away", "Facing Away", "Skip strands whose root faces away from the camera"),
         ),
         label="Culling",
-        description="Which strands are left out because the head hides them",
+        description="Which strands are not drawn because the head hides them",
         source=_SSALOD,
     )
     lod_height: float = number(
         300.0,
         label="LOD Height",
-        description="Height of the groom below which fewer strands are drawn, wider to "
-        "make up for it; 0 draws all of them always",
+        description="Height of the groom in the picture below which fewer but wider strands are "
+        "drawn; 0 always draws all",
         soft=(0.0, 1000.0),
         hard=(0.0, 100_000.0),
         unit="pixels",
@@ -89,7 +93,7 @@ class DetailSettings(Settings):
     min_density: float = number(
         0.125,
         label="Min Density",
-        description="Fraction of the strands that is drawn in any distance",
+        description="Minimum fraction of the strands that is drawn at any distance",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),

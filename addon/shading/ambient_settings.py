@@ -18,7 +18,7 @@ class AmbientSettings(Settings):
     strength: float = number(
         1.0,
         label="Strength",
-        description="How much of the shade between the strands is shown",
+        description="Amount of ambient occlusion between strands",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -26,8 +26,8 @@ class AmbientSettings(Settings):
     extinction: float = number(
         2.0,
         label="Extinction",
-        description="How fast light dies in the hair, as a factor of what the strands' radius "
-        "gives; raise it where few strands stand for many",
+        description="Factor on the extinction given by the strand radius; raise it if there are "
+        "few strands",
         soft=(0.0, 10.0),
         hard=(0.0, 10_000.0),
         source="Kajiya and Kay 1989, section 2; Kim and Neumann 2001, opacity shadow maps",
@@ -35,7 +35,7 @@ class AmbientSettings(Settings):
     upper_fraction: float = number(
         0.4,
         label="Light from Above",
-        description="0: the sky shines from all sides alike, 1: from straight above only",
+        description="0: light comes evenly from all sides, 1: only from straight above",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -43,8 +43,8 @@ class AmbientSettings(Settings):
     open_sky: float = number(
         0.5,
         label="AO Bias",
-        description="Fraction of the sky that counts as no shade at all: half of it is what the "
-        "surface of a solid body sees",
+        description="Fraction of the sky that counts as unoccluded; the surface of a solid body "
+        "sees half of it",
         unit="factor",
         soft=(0.25, 1.0),
         hard=(0.05, 1.0),
@@ -52,8 +52,8 @@ class AmbientSettings(Settings):
     scalp_extinction: float = number(
         12.0,
         label="Scalp Extinction",
-        description="How fast light dies in hair on its way to the skin; higher than Extinction, "
-        "so that a scalp does not shine through strands that stand for many",
+        description="Extinction of light on its way to the skin; higher than Extinction, so that "
+        "the scalp does not show through if there are few strands",
         soft=(0.0, 30.0),
         hard=(0.0, 10_000.0),
     )

@@ -24,7 +24,7 @@ class KajiyaKaySettings(Settings):
     primary_strength: float = number(
         9.0,
         label="First Strength",
-        description="Brightness of the first highlight, as a factor of the diffuse light",
+        description="Brightness of the first highlight relative to diffuse light",
         soft=(0.0, 20.0),
         hard=(0.0, 100.0),
         source=_SOURCE,
@@ -44,7 +44,8 @@ class KajiyaKaySettings(Settings):
     primary_shift: float = number(
         0.1,
         label="First Shift",
-        description="Moves the first highlight to the tips, or to the roots when negative",
+        description="Shift of the first highlight towards the tips, or towards the roots if "
+        "negative",
         soft=(-0.5, 0.5),
         hard=(-2.0, 2.0),
         source=_SOURCE,
@@ -62,7 +63,7 @@ class KajiyaKaySettings(Settings):
     secondary_strength: float = number(
         5.0,
         label="Second Strength",
-        description="Brightness of the second highlight, as a factor of the diffuse light",
+        description="Brightness of the second highlight relative to diffuse light",
         soft=(0.0, 20.0),
         hard=(0.0, 100.0),
         source=_SOURCE,
@@ -82,7 +83,8 @@ class KajiyaKaySettings(Settings):
     secondary_shift: float = number(
         -0.14,
         label="Second Shift",
-        description="Moves the second highlight to the tips, or to the roots when negative",
+        description="Shift of the second highlight towards the tips, or towards the roots if "
+        "negative",
         soft=(-0.5, 0.5),
         hard=(-2.0, 2.0),
         source=_SOURCE,

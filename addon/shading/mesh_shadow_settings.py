@@ -18,13 +18,13 @@ class MeshShadowSettings(Settings):
     mesh_shadows: bool = toggle(
         True,
         label="Mesh Shadows",
-        description="Meshes throw shadows on meshes everywhere; without, only around hair",
+        description="Meshes cast shadows on meshes everywhere; if off, only around hair",
     )
     mesh_resolution: int = integer(
         2048,
         label="Resolution",
-        description="Texels along a side of each light's map of all meshes; a lamp amidst them has "
-        "up to six such maps",
+        description="Texels along each side of a light's shadow map; a lamp among the meshes has "
+        "up to six maps",
         soft=(512, 4096),
         hard=(16, 8192),
     )

@@ -18,22 +18,22 @@ class PictureSettings(Settings):
     samples: int = integer(
         32,
         label="Render Samples",
-        description="Samples of each pixel in a render, each a little beside the others",
+        description="Samples per pixel in a render",
         soft=(1, 256),
         hard=(1, 65536),
     )
     viewport_samples: int = integer(
         32,
         label="Viewport Samples",
-        description="Samples of each pixel that the viewport adds up while nothing moves",
+        description="Samples per pixel that the viewport accumulates while nothing moves",
         soft=(1, 64),
         hard=(1, 65536),
     )
     motion_steps: int = integer(
         16,
         label="Motion Steps",
-        description="Moments in the time that the shutter is open, among which a render's samples "
-        "are shared out; the scene is evaluated for each",
+        description="Number of times that the scene is evaluated while the shutter is open; the "
+        "samples of a render are divided among them",
         soft=(2, 64),
         hard=(1, 1024),
     )

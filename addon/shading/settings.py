@@ -11,19 +11,23 @@ from .marschner.settings import MarschnerSettings
 _PIGMENT = "Chiang et al. 2016; Blender's Principled Hair"
 
 MODELS = (
-    ("kajiya_kay", "Kajiya-Kay", "Two shifted highlights by Scheuermann: quick, and free to shape"),
-    ("marschner", "Marschner", "Light reflected and refracted by a fibre: as real hair has it"),
+    (
+        "kajiya_kay",
+        "Kajiya-Kay",
+        "Two shifted highlights by Scheuermann: fast and easy to art-direct",
+    ),
+    ("marschner", "Marschner", "Light reflected and refracted by a fibre: physically based"),
 )
 
 PIGMENTS = (
-    ("color", "Colour", "What absorbs light so much that a mass of hair has the colour above"),
+    ("color", "Colour", "Absorption that gives a mass of hair this colour"),
     ("melanin", "Melanin", "The pigments of natural hair"),
-    ("absorption", "Absorption", "Set outright"),
+    ("absorption", "Absorption", "Set absorption directly"),
 )
 
 TRANSPARENCIES = (
-    ("layers", "Layers", "Strands cover as much of each pixel as they are wide, in their order"),
-    ("hashed", "Hashed", "The same on average, by chance: no memory, but noise"),
+    ("layers", "Layers", "Blend strands by their coverage of each pixel, sorted by depth"),
+    ("hashed", "Hashed", "Stochastic coverage: needs no memory, but is noisy"),
     ("none", "None", "Opaque strands with hard edges, no thinner than the minimum width"),
 )
 _IS_MARSCHNER = when("shading.model", "marschner")
@@ -40,13 +44,13 @@ class SharedSettings(Settings):
         "kajiya_kay",
         MODELS,
         label="Model",
-        description="How the light on a strand becomes its colour",
+        description="Shading model of the strands",
     )
     pigment: str = choice(
         "color",
         PIGMENTS,
         label="Pigment",
-        description="What says how much light is absorbed inside the hair",
+        description="How absorption inside the hair is set",
         source=_PIGMENT,
         panel="Colour",
         shown_when=when("shading.model", "marschner"),
@@ -54,7 +58,7 @@ class SharedSettings(Settings):
     base_color: tuple[float, float, float] = color(
         (0.055, 0.03, 0.018),
         label="Colour",
-        description="Colour of the hair; it tints the highlights as well",
+        description="Colour of the hair; also tints the highlights",
         panel="Colour",
         shown_when=_HAS_COLOR,
     )
@@ -72,7 +76,7 @@ class SharedSettings(Settings):
     redness: float = number(
         0.3,
         label="Redness",
-        description="Share of the pigment that is red",
+        description="Fraction of the pigment that is red",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -83,7 +87,7 @@ class SharedSettings(Settings):
     absorption: tuple[float, float, float] = color(
         (0.25, 0.42, 0.83),
         label="Absorption",
-        description="How much red, green and blue hair absorbs inside, on the length of its radius",
+        description="Absorption of red, green and blue inside the hair, per length of its radius",
         maximum=100.0,
         source=_PIGMENT,
         panel="Colour",
@@ -92,7 +96,7 @@ class SharedSettings(Settings):
     tip_tint: float = number(
         0.0,
         label="Tip Tint",
-        description="How much the tips have their own colour",
+        description="Amount of Tip Colour at the tips",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -101,14 +105,14 @@ class SharedSettings(Settings):
     tip_color: tuple[float, float, float] = color(
         (0.23, 0.145, 0.065),
         label="Tip Colour",
-        description="Colour at the tips, as far as Tip Tint lets it through",
+        description="Colour of the tips, blended in by Tip Tint",
         panel="Colour",
         active_when=when("shading.tip_tint"),
     )
     tint_start: float = number(
         0.3,
         label="Tint Start",
-        description="Where between root and tip the colour begins to change",
+        description="Position between root and tip at which the colour begins to change",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -118,7 +122,7 @@ class SharedSettings(Settings):
     tint_end: float = number(
         0.9,
         label="Tint End",
-        description="Where between root and tip the colour is that of the tips",
+        description="Position between root and tip from which the colour is that of the tips",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -128,7 +132,7 @@ class SharedSettings(Settings):
     color_variation: float = number(
         0.3,
         label="Colour Variation",
-        description="How much strands differ in brightness",
+        description="Variation of brightness between strands",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -137,7 +141,7 @@ class SharedSettings(Settings):
     grey_fraction: float = number(
         0.0,
         label="Grey Strands",
-        description="Fraction of the strands that have lost their colour",
+        description="Fraction of the strands that are grey",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -146,7 +150,7 @@ class SharedSettings(Settings):
     shift_noise: float = number(
         0.2,
         label="Shift Noise",
-        description="How much the shift differs from strand to strand, which breaks up the bands",
+        description="Variation of the highlight shift between strands, which breaks up the bands",
         soft=(0.0, 1.0),
         hard=(0.0, 4.0),
         source="Scheuermann 2004, specular shift texture",
@@ -155,7 +159,7 @@ class SharedSettings(Settings):
     sparkle: float = number(
         0.6,
         label="Sparkle",
-        description="How much noise breaks up the second highlight",
+        description="Amount of noise that breaks up the second highlight",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -173,7 +177,7 @@ class SharedSettings(Settings):
     ambient: float = number(
         1.0,
         label="Ambient",
-        description="Factor of the light that comes evenly from the world",
+        description="Factor on ambient light from the world",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
     )
@@ -207,14 +211,14 @@ class StrandSettings(Settings):
     width_scale: float = number(
         1.0,
         label="Width Scale",
-        description="Factor of the strands' radius; raise it where few strands stand for many",
+        description="Factor on the strand radius; raise it if there are few strands",
         soft=(0.1, 10.0),
         hard=(0.0, 1000.0),
     )
     tip_width: float = number(
         0.5,
         label="Tip Width",
-        description="Width at the tip, as a factor of the width at the root",
+        description="Width at the tip relative to the root",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -223,14 +227,14 @@ class StrandSettings(Settings):
         "layers",
         TRANSPARENCIES,
         label="Transparency",
-        description="How strands that are thinner than a pixel are drawn, and the edges of all",
+        description="How strands thinner than a pixel, and the edges of all strands, are drawn",
         source="Yang et al. 2010, lists of each pixel; Wyman and McGuire 2017, hashed alpha",
     )
     opacity: float = number(
         1.0,
         label="Opacity",
-        description="How much a strand hides of what lies behind it, in its full width, and how "
-        "much light it takes from that; with transparency only",
+        description="Opacity of a strand over its full width, for what lies behind it and for "
+        "light; needs transparency",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -238,7 +242,7 @@ class StrandSettings(Settings):
     minimum_width: float = number(
         1.0,
         label="Minimum Width",
-        description="Without transparency, strands are never drawn thinner than this at the root",
+        description="Minimum width at the root if transparency is off",
         soft=(0.0, 4.0),
         hard=(0.0, 100.0),
         unit="pixels",

@@ -21,14 +21,14 @@ class ShaftSettings(Settings):
     use_shafts: bool = toggle(
         False,
         label="Light Shafts",
-        description="In pictures that Hairloom renders: light in the air or the water around a "
-        "light, with shafts behind the hair that it shines through",
+        description="In renders: light scattered in air or water around a light, with shafts "
+        "behind the hair",
         source=_NGUYEN,
     )
     strength: float = number(
         0.4,
         label="Strength",
-        description="How bright the haze is, as a fraction of matt white in the same light",
+        description="Brightness of the haze, relative to a matt white surface in the same light",
         soft=(0.0, 1.0),
         hard=(0.0, 1000.0),
         source=_NGUYEN,
@@ -37,8 +37,8 @@ class ShaftSettings(Settings):
     length: float = number(
         math.radians(10.0),
         label="Length",
-        description="How far a shaft goes on behind what has cut it, as an angle of the view; "
-        "the haze reaches twice as far from the light",
+        description="Length of a shaft behind its occluder, as an angle of view; the haze reaches "
+        "twice as far from the light",
         soft=(0.0, math.radians(45.0)),
         hard=(0.0, math.radians(86.0)),
         unit="angle",
@@ -48,7 +48,7 @@ class ShaftSettings(Settings):
     samples: int = integer(
         256,
         label="Samples",
-        description="Steps on the way out from a light; more show finer strands",
+        description="Number of steps outwards from a light; more resolve finer strands",
         soft=(32, 512),
         hard=(2, 4096),
         source=_NGUYEN,
@@ -57,6 +57,6 @@ class ShaftSettings(Settings):
     tint: tuple[float, float, float] = color(
         (1.0, 1.0, 1.0),
         label="Tint",
-        description="Colour of the haze, times that of the light",
+        description="Colour of the haze, multiplied by that of the light",
         active_when=when("shafts.use_shafts"),
     )

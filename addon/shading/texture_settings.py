@@ -39,7 +39,7 @@ class TextureSettings(Settings):
     contrast: float = number(
         0.45,
         label="Contrast",
-        description="How much darker than full the darkest strand is",
+        description="Amount by which the darkest strand is darker than the brightest",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -49,7 +49,8 @@ class TextureSettings(Settings):
     edge_width: float = number(
         0.3,
         label="Edge Width",
-        description="Part of the width, from each side, in which the strip dissolves into strands",
+        description="Fraction of the width, from each side, in which the strip dissolves into "
+        "strands",
         unit="factor",
         soft=(0.05, 0.5),
         hard=(0.001, 0.5),
@@ -58,7 +59,7 @@ class TextureSettings(Settings):
     root_length: float = number(
         0.04,
         label="Root Length",
-        description="Part of the length in which the strip gathers from strands at the root",
+        description="Fraction of the length in which strands join into the strip at the root",
         unit="factor",
         soft=(0.0, 0.3),
         hard=(0.0, 1.0),
@@ -67,7 +68,8 @@ class TextureSettings(Settings):
     tip_length: float = number(
         0.6,
         label="Tip Length",
-        description="Part of the length, from the tip, in which the strip dissolves into strands",
+        description="Fraction of the length, from the tip, in which the strip dissolves into "
+        "strands",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -76,7 +78,7 @@ class TextureSettings(Settings):
     softness: float = number(
         0.25,
         label="Softness",
-        description="How softly a strand ends; the less, the harder its edges",
+        description="Softness of strand ends; lower values give harder edges",
         unit="factor",
         soft=(0.05, 1.0),
         hard=(0.001, 1.0),
@@ -85,7 +87,7 @@ class TextureSettings(Settings):
     wander: float = number(
         0.04,
         label="Wander",
-        description="How far strands stray to the sides on their way, as a part of the width",
+        description="Distance that strands stray sideways, as a fraction of the width",
         soft=(0.0, 0.1),
         hard=(0.0, 0.1),
     )
@@ -108,8 +110,8 @@ class TextureSettings(Settings):
     highlights: str = choice(
         "shift",
         (
-            ("shift", "Shift Texture", "Each strand moves the highlights along the hair"),
-            ("tangent", "Tangent Map", "The map says which way each strand runs"),
+            ("shift", "Shift Texture", "Each strand shifts the highlights along the hair"),
+            ("tangent", "Tangent Map", "The map holds the direction of each strand"),
         ),
         label="Highlights By",
         description="What breaks up the highlights",
@@ -119,7 +121,7 @@ class TextureSettings(Settings):
     seed: int = integer(
         0,
         label="Seed",
-        description="Another number gives other strands",
+        description="Random seed of the strands",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
     )

@@ -24,7 +24,8 @@ class FinSettings(MotionSettings):
     substep_rate: float = number(
         240.0,
         label="Substeps",
-        description="How often in a second air, bending and colliders act, whatever the frame rate",
+        description="Steps per second for air, bending and colliders, independent of the frame "
+        "rate",
         soft=(60.0, 480.0),
         hard=(30.0, 2000.0),
         unit="rate",
@@ -34,8 +35,8 @@ class FinSettings(MotionSettings):
     small_steps: int = integer(
         10,
         label="Small Steps",
-        description="Steps of the motion and its edges in each substep; twice as many stretch a "
-        "quarter as much",
+        description="Steps of motion and edges in each substep; twice as many stretch a quarter "
+        "as much",
         soft=(1, 24),
         hard=(1, 256),
         source="Macklin et al. 2019",
@@ -44,7 +45,7 @@ class FinSettings(MotionSettings):
     longest_frame: float = number(
         0.25,
         label="Longest Frame",
-        description="A longer pause between two frames is simulated as this much time",
+        description="Maximum time that is simulated between two frames",
         soft=(0.05, 1.0),
         hard=(0.01, 10.0),
         unit="time",
@@ -61,8 +62,8 @@ class FinSettings(MotionSettings):
     damping: float = number(
         3.0,
         label="Air Damping",
-        description="How fast still air, or water, takes the speed out of a face that moves "
-        "broadside, and how fast wind gives it its own",
+        description="Rate at which still air or water slows down a face that moves broadside, and "
+        "at which wind carries it along",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -72,8 +73,8 @@ class FinSettings(MotionSettings):
     drag: float = number(
         0.0,
         label="Drag",
-        description="Braking by the square of the broadside speed, for each metre of way; thin "
-        "cloth in air about 3, in water hundreds",
+        description="Quadratic drag on broadside motion, per metre travelled; about 3 for thin "
+        "cloth in air, hundreds in water",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         source="Rayleigh's drag equation",
@@ -82,8 +83,7 @@ class FinSettings(MotionSettings):
     edgewise: float = number(
         0.1,
         label="Edgewise Fraction",
-        description="Fraction of damping and drag that acts on motion along the face, which slips "
-        "through the air",
+        description="Fraction of damping and drag that acts on motion along the face",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -92,8 +92,8 @@ class FinSettings(MotionSettings):
     stretch: float = number(
         0.0,
         label="Stretch",
-        description="How much of its length a hanging sheet of one metre gains at its upper edge "
-        "by its own weight",
+        description="Stretch at the upper edge of a hanging sheet of one metre under its own "
+        "weight",
         soft=(0.0, 0.1),
         hard=(0.0, 10.0),
         unit="factor",
@@ -103,7 +103,7 @@ class FinSettings(MotionSettings):
     bend: float = number(
         1.0,
         label="Bend Stiffness",
-        description="How strongly two faces keep their fold, in swings a second of their outer "
+        description="Stiffness of the fold between two faces, in swings per second of their outer "
         "vertices against each other",
         soft=(0.0, 20.0),
         hard=(0.0, 1000.0),
@@ -114,7 +114,8 @@ class FinSettings(MotionSettings):
     shape: float = number(
         0.0,
         label="Shape Stiffness",
-        description="Pull of each vertex to where the animation carries it, in swings a second",
+        description="Stiffness that holds each vertex to its animated position, in swings per "
+        "second",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -124,8 +125,8 @@ class FinSettings(MotionSettings):
     pin_pull: float = number(
         4.0,
         label="Pin Stiffness",
-        description="Pull of a vertex whose pin weight is one half to where the animation carries "
-        "it, in swings a second; it grows without bound towards a weight of 1",
+        description="Stiffness that holds a vertex of pin weight 0.5 to its animated position, in "
+        "swings per second; it grows without bound towards a weight of 1",
         soft=(0.0, 20.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -134,15 +135,15 @@ class FinSettings(MotionSettings):
     long_range: bool = toggle(
         True,
         label="Long Range",
-        description="No vertex goes farther from its nearest pinned vertex than its way along "
-        "the edges",
+        description="Limit the distance of each vertex from its nearest pinned vertex to its "
+        "distance along the edges",
         source="Kim, Chentanez and Mueller 2012",
         panel="Cloth",
     )
     radius: float = number(
         0.003,
         label="Collision Radius",
-        description="Distance that vertices keep from colliders",
+        description="Distance of vertices from colliders",
         soft=(0.0, 0.02),
         hard=(0.0, 0.1),
         unit="length",

@@ -17,15 +17,15 @@ class SphereFitSettings(Settings):
     sphere_count: int = integer(
         60,
         label="Spheres",
-        description="How many spheres stand for the mesh",
+        description="Number of spheres that approximate the mesh",
         soft=(4, 200),
         hard=(1, 1000),
     )
     overshoot: float = number(
         0.01,
         label="Overshoot",
-        description="How far spheres may stick out, as a fraction of the mesh's longest side; more "
-        "leaves smaller gaps between them",
+        description="Distance by which spheres may stick out, as a fraction of the mesh's longest "
+        "side; more leaves smaller gaps",
         soft=(0.0, 0.05),
         hard=(0.0, 0.5),
         unit="factor",

@@ -20,7 +20,7 @@ class MarschnerSettings(Settings):
     index_of_refraction: float = number(
         1.55,
         label="IOR",
-        description="Index of refraction of the hair against what surrounds it; 1.17 under water",
+        description="Index of refraction relative to the surrounding medium; 1.17 under water",
         soft=(1.2, 1.8),
         hard=(1.0, 4.0),
         source=_MARSCHNER,
@@ -30,8 +30,8 @@ class MarschnerSettings(Settings):
     cuticle_tilt: float = number(
         float(np.radians(3.0)),
         label="Separation",
-        description="Tilt of the scales: the first highlight moves to the tips by this angle, "
-        "the second by twice as much to the roots",
+        description="Tilt of the cuticle scales: shifts the first highlight towards the tips by "
+        "this angle, the second towards the roots by twice as much",
         soft=(0.0, float(np.radians(10.0))),
         hard=(-float(np.radians(30.0)), float(np.radians(30.0))),
         unit="angle",
@@ -42,7 +42,7 @@ class MarschnerSettings(Settings):
     eccentricity: float = number(
         1.0,
         label="Eccentricity",
-        description="One axis of the cross-section over the other; round hair has 1",
+        description="Ratio of the axes of the cross-section; 1 is round",
         soft=(0.8, 1.25),
         hard=(0.5, 2.0),
         source=f"{_MARSCHNER}, section 5.2.3",
@@ -52,7 +52,7 @@ class MarschnerSettings(Settings):
     strength_r: float = number(
         1.0,
         label="First Strength",
-        description="Factor of the light reflected at the surface; 1 is physical",
+        description="Factor on light reflected at the surface; 1 is physical",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         source=_MARSCHNER,
@@ -62,8 +62,8 @@ class MarschnerSettings(Settings):
     width_r: float = number(
         float(np.radians(5.0)),
         label="First Width",
-        description="How wide the first highlight is along the hair: standard deviation of the "
-        "half angle",
+        description="Width of the first highlight along the hair: standard deviation of the half "
+        "angle",
         soft=(float(np.radians(1.0)), float(np.radians(20.0))),
         hard=(0.0, _WIDEST),
         unit="angle",
@@ -74,7 +74,7 @@ class MarschnerSettings(Settings):
     offset_r: float = number(
         0.0,
         label="First Offset",
-        description="Moves the first highlight to the tips, beyond Separation",
+        description="Additional shift of the first highlight towards the tips",
         soft=(-float(np.radians(10.0)), float(np.radians(10.0))),
         hard=(-float(np.radians(45.0)), float(np.radians(45.0))),
         unit="angle",
@@ -84,7 +84,7 @@ class MarschnerSettings(Settings):
     strength_tt: float = number(
         1.0,
         label="Rim Strength",
-        description="Factor of the light that passes through, seen against the light",
+        description="Factor on transmitted light, seen against the light",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         source=_MARSCHNER,
@@ -94,8 +94,8 @@ class MarschnerSettings(Settings):
     width_tt: float = number(
         float(np.radians(3.0)),
         label="Rim Width",
-        description="How wide the light that passes through is along the hair: standard deviation "
-        "of the half angle",
+        description="Width of the transmitted light along the hair: standard deviation of the "
+        "half angle",
         soft=(float(np.radians(1.0)), float(np.radians(20.0))),
         hard=(0.0, _WIDEST),
         unit="angle",
@@ -106,7 +106,7 @@ class MarschnerSettings(Settings):
     offset_tt: float = number(
         0.0,
         label="Rim Offset",
-        description="Moves the light that passes through to the tips, beyond Separation",
+        description="Additional shift of the transmitted light towards the tips",
         soft=(-float(np.radians(10.0)), float(np.radians(10.0))),
         hard=(-float(np.radians(45.0)), float(np.radians(45.0))),
         unit="angle",
@@ -116,7 +116,7 @@ class MarschnerSettings(Settings):
     strength_trt: float = number(
         1.0,
         label="Second Strength",
-        description="Factor of the light reflected inside; 1 is physical",
+        description="Factor on light reflected inside the hair; 1 is physical",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         source=_MARSCHNER,
@@ -126,8 +126,8 @@ class MarschnerSettings(Settings):
     width_trt: float = number(
         float(np.radians(8.0)),
         label="Second Width",
-        description="How wide the second highlight is along the hair: standard deviation of the "
-        "half angle",
+        description="Width of the second highlight along the hair: standard deviation of the half "
+        "angle",
         soft=(float(np.radians(1.0)), float(np.radians(20.0))),
         hard=(0.0, _WIDEST),
         unit="angle",
@@ -138,7 +138,7 @@ class MarschnerSettings(Settings):
     offset_trt: float = number(
         0.0,
         label="Second Offset",
-        description="Moves the second highlight to the tips, beyond Separation",
+        description="Additional shift of the second highlight towards the tips",
         soft=(-float(np.radians(10.0)), float(np.radians(10.0))),
         hard=(-float(np.radians(45.0)), float(np.radians(45.0))),
         unit="angle",
@@ -148,7 +148,7 @@ class MarschnerSettings(Settings):
     glint_strength: float = number(
         1.0,
         label="Glint Strength",
-        description="Factor of the glints beside the second highlight; 1 is physical",
+        description="Factor on the glints beside the second highlight; 1 is physical",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         source=f"{_MARSCHNER}, appendix A",
@@ -158,7 +158,7 @@ class MarschnerSettings(Settings):
     glint_width: float = number(
         float(np.radians(10.0)),
         label="Glint Width",
-        description="How far around the hair a glint is blurred",
+        description="Azimuthal blur of glints",
         soft=(float(np.radians(2.0)), float(np.radians(25.0))),
         hard=(float(np.radians(0.5)), float(np.radians(90.0))),
         unit="angle",
@@ -169,7 +169,7 @@ class MarschnerSettings(Settings):
     azimuthal_width: float = number(
         0.0,
         label="Width Around",
-        description="How far a rough surface spreads light around the hair",
+        description="Azimuthal spread of light by a rough surface",
         soft=(0.0, float(np.radians(40.0))),
         hard=(0.0, _WIDEST),
         unit="angle",
@@ -180,7 +180,7 @@ class MarschnerSettings(Settings):
     strength_rest: float = number(
         1.0,
         label="Higher-order Lobes",
-        description="Factor of the light that was reflected inside twice or more; 1 is physical",
+        description="Factor on light reflected inside the hair twice or more; 1 is physical",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         source="d'Eon et al. 2011; Chiang et al. 2016",
@@ -190,8 +190,8 @@ class MarschnerSettings(Settings):
     scattered: float = number(
         0.6,
         label="Fake Scattering",
-        description="Stands for light that comes from strand to strand, in the hair's own colour, "
-        "where Shadows with Scattering do not give it",
+        description="Approximates light scattered between strands if Shadows with Scattering are "
+        "off",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         shown_when=when("shading.model", "marschner"),
@@ -200,8 +200,7 @@ class MarschnerSettings(Settings):
     volume_shadow: float = number(
         1.0,
         label="Volume Shadow Term",
-        description="How much strands on the side of the groom that faces away are in the dark, "
-        "for lights that throw no shadows",
+        description="Darkens the side of the groom that faces away from lights without shadows",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",

@@ -22,14 +22,14 @@ class SkinSettings(Settings):
     soft_shadow: bool = toggle(
         True,
         label="Soft Shadow on Skin",
-        description="With shadows: light spreads under the skin of a head that has UVs, so that "
-        "the shadow on it has soft edges",
+        description="Diffuse light under the skin of a head with UVs, so that the hair's shadow "
+        "has soft edges; needs shadows",
         source=_GREEN,
     )
     softness: float = number(
         0.003,
         label="Softness",
-        description="How far light spreads along the skin",
+        description="Distance that light spreads along the skin",
         soft=(0.0, 0.02),
         hard=(0.0, 1.0),
         unit="length",
@@ -39,7 +39,7 @@ class SkinSettings(Settings):
     skin_resolution: int = integer(
         512,
         label="Skin Resolution",
-        description="Texels along the longer side of the head's UV map, for the shadow on it",
+        description="Texels along the longer side of the head's UV map",
         soft=(128, 2048),
         hard=(64, 4096),
         active_when=_IS_SOFT,

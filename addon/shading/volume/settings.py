@@ -11,8 +11,8 @@ _YUKSEL = "Yuksel and Keyser 2008, deep opacity maps"
 _ZINKE = "Zinke et al. 2008, dual scattering"
 
 SHADOWS = (
-    ("deep", "Deep Opacity", "Layers that follow the side of the hair that faces the light"),
-    ("slices", "Opacity Slices", "Even slices through the whole of the hair"),
+    ("deep", "Deep Opacity", "Layers that follow the lit side of the hair"),
+    ("slices", "Opacity Slices", "Evenly spaced slices through the hair"),
     ("none", "None", "Ambient occlusion replaces shadows"),
 )
 _CAN_SCATTER = when("shading.model", "marschner")
@@ -31,14 +31,13 @@ class VolumeSettings(Settings):
         "deep",
         SHADOWS,
         label="Shadows",
-        description="How the hair's shadow on itself is kept",
+        description="How the shadow of hair on itself is stored",
         source=f"{_KIM}; {_YUKSEL}",
     )
     extinction: float = number(
         1.0,
         label="Extinction",
-        description="How much light a strand keeps from what lies behind it; 1 is what its width "
-        "asks for",
+        description="Factor on the light that a strand blocks; 1 matches its width",
         soft=(0.0, 4.0),
         hard=(0.0, 1000.0),
         source=_KIM,
@@ -47,7 +46,7 @@ class VolumeSettings(Settings):
     resolution: int = integer(
         512,
         label="Resolution",
-        description="Texels along a side of each light's map",
+        description="Texels along each side of a light's shadow map",
         soft=(128, 1024),
         hard=(16, 2048),
         shown_when=when("volume.shadows", "deep", "slices"),
@@ -55,7 +54,7 @@ class VolumeSettings(Settings):
     slices: int = integer(
         16,
         label="Slices",
-        description="Opacity slices: even layers through the hair, away from the light",
+        description="Number of slices through the hair, away from the light",
         soft=(4, 64),
         hard=(4, 64),
         source=_KIM,
@@ -64,8 +63,8 @@ class VolumeSettings(Settings):
     layers: int = integer(
         8,
         label="Layers",
-        description="Deep opacity: layers behind the first hair that the light meets, thicker "
-        "from one to the next",
+        description="Number of layers behind the first lit hair, each thicker than the previous "
+        "one",
         soft=(4, 16),
         hard=(2, 64),
         source=_YUKSEL,
@@ -74,8 +73,8 @@ class VolumeSettings(Settings):
     layer_depth: float = number(
         0.25,
         label="Layer Depth",
-        description="Deep opacity: how deep the first half of the layers reach, as a fraction of "
-        "the hair there; 0.5 makes all equally thick",
+        description="Depth of the first half of the layers, as a fraction of the hair there; 0.5 "
+        "makes all equally thick",
         soft=(0.05, 0.5),
         hard=(0.001, 0.9),
         unit="factor",
@@ -85,7 +84,7 @@ class VolumeSettings(Settings):
     bias: float = number(
         0.01,
         label="Bias",
-        description="How far in front of a place strands must be to shade it, as a fraction of the "
+        description="Minimum distance at which strands shade each other, as a fraction of the "
         "hair's size",
         soft=(0.0, 0.05),
         hard=(0.0, 1.0),
@@ -96,7 +95,8 @@ class VolumeSettings(Settings):
     strand_fraction: float = number(
         0.5,
         label="Strand Fraction",
-        description="Fraction of the strands that throw the shadow; each stands for more of them",
+        description="Fraction of the strands that cast shadows; each is weighted to represent the "
+        "rest",
         soft=(0.05, 1.0),
         hard=(0.001, 1.0),
         unit="factor",
@@ -105,7 +105,7 @@ class VolumeSettings(Settings):
     max_lights: int = integer(
         3,
         label="Max Lights",
-        description="Lights that throw shadows at most, the strongest first",
+        description="Maximum number of lights that cast shadows, the strongest first",
         soft=(0, 8),
         hard=(0, 8),
         shown_when=when("volume.shadows", "deep", "slices"),
@@ -113,15 +113,15 @@ class VolumeSettings(Settings):
     on_body: bool = toggle(
         False,
         label="Shadow on Surface",
-        description="Where a 3D view goes by the scene's lights, hair as it moves shades the head "
-        "that Blender draws, in place of Blender's own strands at rest, which shade all meshes",
+        description="In 3D views with scene lights, moving hair shades the head that Blender "
+        "draws, instead of Blender's own strands at rest, which shade all meshes",
         shown_when=when("volume.shadows", "deep", "slices"),
     )
     scattering: bool = toggle(
         True,
         label="Scattering",
-        description="With shadows and in the model Marschner: light that has passed from strand to "
-        "strand, without which light hair is brown",
+        description="Multiple scattering between strands, without which light hair looks brown; "
+        "needs shadows and the model Marschner",
         source=_ZINKE,
         shown_when=when("volume.shadows", "deep", "slices"),
         active_when=_CAN_SCATTER,
@@ -129,8 +129,7 @@ class VolumeSettings(Settings):
     density: float = number(
         0.75,
         label="Scattering Density",
-        description="How closely strands around a place are packed: 0 is a single strand, 1 is "
-        "full of hair",
+        description="Density of the surrounding hair: 0 is a single strand, 1 is full of hair",
         soft=(0.5, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
