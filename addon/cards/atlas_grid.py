@@ -13,7 +13,7 @@ from ..arrays import Floats, Ints
 class AtlasGrid:
     """Tiles are counted along rows from the lowest left one.
 
-    padding: share of a tile's width, and of its height, that is left free on each of its sides.
+    padding: fraction of a tile's width, and of its height, that is left free on each of its sides.
     """
 
     columns: int = 1

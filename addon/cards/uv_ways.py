@@ -26,13 +26,13 @@ _KNOWN: dict[str, tuple[int, bool]] = {
 
 #: An island that is so many times as long along one axis decides for itself.
 _CLEAR_LENGTH = 2.0
-#: So does one whose ends differ by this, as a share of its length.
+#: So does one whose ends differ by this, as a fraction of its length.
 _CLEAR_END = 0.3
 #: A difference of ends below this says nothing.
 _NO_END = 0.05
 #: How much being higher counts beside being nearer to the head.
 _HEIGHT_WEIGHT = 0.2
-#: Share of the way between the ends of an island that counts as one of its ends.
+#: Fraction of the way between the ends of an island that counts as one of its ends.
 _END_SHARE = 0.25
 
 

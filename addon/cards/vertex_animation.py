@@ -35,7 +35,7 @@ class MotionLayout:
 
     @property
     def frame_step(self) -> float:
-        """How far the next frame is, as a share of the height, downwards."""
+        """How far the next frame is, as a fraction of the height, downwards."""
         return self.rows / self.height
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Floats
 from .camera import Camera
 
-#: left, bottom, right, top; shares of the picture
+#: left, bottom, right, top; fractions of the picture
 type Window = tuple[float, float, float, float]
 
 

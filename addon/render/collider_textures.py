@@ -83,7 +83,7 @@ class ColliderTextures:
         points within reach.
 
         Args:
-            spans: (substep_count, 2) begin and end of each substep as shares of the frame.
+            spans: (substep_count, 2) begin and end of each substep as fractions of the frame.
             reach: [m] from a collider in which contacts may be.
         """
         table = np.zeros((len(spans), len(posed), COLLIDER_TEXELS, 4), np.float32)

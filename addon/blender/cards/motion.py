@@ -24,7 +24,7 @@ from ...exchange.cards.sidecar_motion import joint_motion, texture_motion
 from ..bakes.guide_motion import GuideMotion
 from ..base.images import write_texture
 
-#: Share of the error by which joints may be off between keys.
+#: Fraction of the error by which joints may be off between keys.
 _KEY_SHARE = 0.5
 #: Motion of one frame says nothing.
 _FEWEST_FRAMES = 2
@@ -132,7 +132,7 @@ class JointMotion:
 
     @property
     def share(self) -> float:
-        """The error as a share of the hair's length."""
+        """The error as a fraction of the hair's length."""
         return self.error.mean_square_root / self.tracks.hair_length
 
     @property

@@ -57,7 +57,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--length-group",
         default="",
         metavar="NAME",
-        help="the same for how long hair grows, as a share of grow.length",
+        help="the same for how long hair grows, as a fraction of grow.length",
     )
     what.add_argument(
         "--children-density",

@@ -47,7 +47,7 @@ def add_hair_options(parser: argparse.ArgumentParser) -> None:
         "--length-group",
         default="",
         metavar="NAME",
-        help="the same for how long hair grows, as a share of grow.length",
+        help="the same for how long hair grows, as a fraction of grow.length",
     )
     sources.add_argument(
         "--children-density",

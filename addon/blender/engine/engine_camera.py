@@ -119,7 +119,7 @@ def _border(owner: Any, name: str) -> Floats:
 
 
 def _camera_frame(camera: bpy.types.Object, scene: bpy.types.Scene, region: Any) -> Floats:
-    """Lower left and upper right corner of what a camera sees, as shares of its 3D view."""
+    """Lower left and upper right corner of what a camera sees, as fractions of its 3D view."""
     frame = np.array([(*corner, 1.0) for corner in camera.data.view_frame(scene=scene)])
     clip = frame @ np.array(region.window_matrix).T
     places = 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
@@ -137,7 +137,7 @@ def _view_matrix(matrix: Floats) -> Floats:
 def _fit_share(
     camera: bpy.types.Camera, render: bpy.types.RenderSettings, width: int, height: int
 ) -> float:
-    """The side that a shift is a share of, as a share of the picture's width."""
+    """The side that a shift is a fraction of, as a fraction of the picture's width."""
     wide, high = width * render.pixel_aspect_x, height * render.pixel_aspect_y
     is_by_width = camera.sensor_fit == "HORIZONTAL" or (
         camera.sensor_fit == "AUTO" and wide >= high

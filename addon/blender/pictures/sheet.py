@@ -27,7 +27,7 @@ VIEWS = (
 )
 CLOSE_UP = "Close-up"
 COLUMNS = 3
-#: of a close-up: how much of the groom it shows, and which share of all strands is near the eye
+#: of a close-up: how much of the groom it shows, and which fraction of all strands is near the eye
 _CLOSE_SHARE, _NEAREST_SHARE = 0.2, 0.1
 
 
