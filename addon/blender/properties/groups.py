@@ -15,7 +15,6 @@ from ..base.vertex_weights import weight_names
 from . import changed
 from .bake_group import HAIRLOOM_PG_bake
 from .card_group import HAIRLOOM_PG_card_images, HAIRLOOM_PG_card_object
-from .fin_group import FIN_PROPERTIES
 from .properties import OVERRIDABLE, property_annotations, property_group
 
 #: Shapes that the artist can choose from; "automatic" is what an object looks like.
@@ -89,7 +88,20 @@ SECTION_GROUPS = {
     for section, kind in ALL_SETTINGS.items()
     if kind.owner != "job"
 }
-SECTION_GROUPS["fin"].__annotations__ |= FIN_PROPERTIES
+SECTION_GROUPS["fin"].__annotations__ |= {
+    "enabled": BoolProperty(
+        name="Simulate",
+        description="Simulate this cloth when Play is pressed, in playback and in bakes",
+        default=True,
+        override=OVERRIDABLE,
+    ),
+    "pin_group": StringProperty(
+        name="Pin Group",
+        description="Vertex group that holds the mesh to its animation: at weight 1 firmly, below "
+        "softly. If empty, nothing is pinned and the mesh falls",
+        override=OVERRIDABLE,
+    ),
+}
 
 
 def operator_properties(section: str) -> dict[str, Any]:
