@@ -37,9 +37,8 @@ class Shots:
         )
         groom = of_addon("blender.properties.groom_settings").GroomSettings()
         ambient = settings["ambient"]()
-        occlusion = self._pipeline.rest_occlusion(self.rig, ambient)
-        under = self._pipeline.head_occlusion(self.rig, ambient)
-        self._studio = studio.Studio(self.rig, occlusion, under, groom)
+        prepared = of_addon("blender.sessions.prepared_groom").prepared(self.rig, ambient)
+        self._studio = studio.Studio(prepared, groom)
 
     def strands(self) -> Any:
         rig = self.rig

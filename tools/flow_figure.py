@@ -30,13 +30,12 @@ FLOWS = {
 ui/operators_preview.py start_preview
   blender/preview/previews.py start
     blender/sessions/session.py Session
-      blender/sessions/groom.py Groom
-        blender/sessions/reading.py Reading
-          blender/scene/source.py read_source
-        blender/sessions/making.py make
-          pipeline.py prepare
-            groom/guides.py choose_guides
-            groom/weights.py guide_weights
+      blender/sessions/groom_source.py GroomSource
+        blender/scene/source.py read_source
+      blender/sessions/prepared_groom.py build
+        pipeline.py prepare
+          groom/guides.py choose_guides
+          groom/weights.py guide_weights
     blender/viewport/overlay.py show
       render/strand_pass.py StrandPass
 """,

@@ -41,13 +41,11 @@ def wig() -> Any:
     strands = grow.grow(head, grown, grow.scalp_density(head))
     rig = pipeline.prepare(strands, head, settings["guides"](), place="the built-in groom")
     ambient = settings["ambient"]()
-    snapshot = of_addon("blender.sessions.shown").snapshot_of(
-        rig, pipeline.rest_occlusion(rig, ambient), None
-    )
-    shaded = pipeline.head_occlusion(rig, ambient)
+    groom = of_addon("blender.sessions.prepared_groom").prepared(rig, ambient, with_occluders=False)
+    snapshot = of_addon("blender.sessions.snapshots").snapshot_of(groom)
     return replace(
         snapshot,
-        meshes=(of_addon("render.snapshot").MeshSnapshot.of(head, occlusion=shaded),),
+        meshes=(of_addon("render.snapshot").MeshSnapshot.of(head, occlusion=groom.head_occlusion),),
         detail=settings["detail"](lod_height=0.0),
         strand_settings=settings["strands"](width_scale=THICKER),
     )

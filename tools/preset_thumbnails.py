@@ -59,7 +59,7 @@ def moved(rig: Any, dynamics: Any) -> tuple[Any, Any]:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    presets, pipeline = of_addon("blender.properties.presets"), of_addon("pipeline")
+    presets = of_addon("blender.properties.presets")
     settings, studio_of = of_addon("parameters").ALL_SETTINGS, of_addon("blender.pictures.studio")
     images = of_addon("blender.base.images")
     rig, ambient = wig(), settings["ambient"]()
@@ -71,8 +71,9 @@ def main(folder: Path) -> None:
             settings["detail"](lod_height=0.0),
         )
     )
-    occlusion = pipeline.rest_occlusion(rig, ambient), pipeline.head_occlusion(rig, ambient)
-    studio = studio_of.Studio(rig, *occlusion, plain)
+    studio = studio_of.Studio(
+        of_addon("blender.sessions.prepared_groom").prepared(rig, ambient), plain
+    )
 
     def look_and_motion(preset: Any) -> tuple[Any, tuple[Any, Any]]:
         at_rest = rig.rest_pose, rig.strands.grid

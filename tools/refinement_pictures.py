@@ -47,9 +47,8 @@ def picture(rig: Any, look: dict[str, Any], camera: Any = None, samples: int = S
     Args:
         look: detail settings, and debug_view.
     """
-    settings, pipeline, studio = (
+    settings, studio = (
         of_addon("parameters").ALL_SETTINGS,
-        of_addon("pipeline"),
         of_addon("blender.pictures.studio"),
     )
     ambient = settings["ambient"]()
@@ -57,8 +56,7 @@ def picture(rig: Any, look: dict[str, Any], camera: Any = None, samples: int = S
     sections = of_addon("params").SettingsMap(settings["detail"](**look))
     groom_settings = of_addon("blender.properties.groom_settings")
     chosen = groom_settings.GroomSettings(sections, debug_view=view)
-    occlusion = pipeline.rest_occlusion(rig, ambient)
-    made = studio.Studio(rig, occlusion, pipeline.head_occlusion(rig, ambient), chosen)
+    made = studio.Studio(of_addon("blender.sessions.prepared_groom").prepared(rig, ambient), chosen)
     return made.picture(rig.rest_pose, rig.strands.grid, WIDTH, HEIGHT, samples, camera)
 
 

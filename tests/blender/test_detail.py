@@ -11,7 +11,7 @@ import pytest
 from mathutils import Matrix
 
 from hairloom.addon.blender.preview import previews
-from hairloom.addon.blender.sessions.hiders import Hiders
+from hairloom.addon.blender.sessions.occluder_spheres import OccluderSpheres
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.blender.viewport.overlay_text import counts_line, free_corner
 from hairloom.addon.pipeline import Pose
@@ -101,7 +101,7 @@ def test_balls_inside_the_head_follow_it(preview):
 def test_balls_stay_inside_a_head_that_bends(sphere):
     """Its front is pressed in by more and more; what is pressed in is never in a ball."""
     surface = surface_of(sphere)
-    hiders = Hiders(surface, surface.positions)
+    hiders = OccluderSpheres(surface, surface.positions)
     radius = hiders.at(Pose(surface.positions, np.eye(4)))[:, 3].sum()
     for depth in (0.01, 0.03, 0.08):
         bent = surface.positions.copy()

@@ -9,7 +9,7 @@ import bpy
 import pytest
 
 from hairloom.addon.blender.preview import previews, scene_events
-from hairloom.addon.blender.sessions import groom_picture
+from hairloom.addon.blender.sessions import snapshots
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.shading.kajiya_kay_settings import KajiyaKaySettings
 from hairloom.addon.shading.marschner.settings import MarschnerSettings
@@ -37,7 +37,7 @@ def window(monkeypatch: pytest.MonkeyPatch) -> None:
     class Blender:
         app = App
 
-    monkeypatch.setattr(groom_picture, "bpy", Blender)
+    monkeypatch.setattr(snapshots, "bpy", Blender)
 
 
 def table_size(session: Any) -> int:

@@ -16,9 +16,9 @@ from hairloom.addon.blender.pictures.showing import shown_groom
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import simulated_for
 from hairloom.addon.blender.preview.phases import Phase
-from hairloom.addon.blender.sessions import making
-from hairloom.addon.blender.sessions.making import Order, make
-from hairloom.addon.blender.sessions.reading import Reading
+from hairloom.addon.blender.sessions import prepared_groom
+from hairloom.addon.blender.sessions.groom_source import GroomSource
+from hairloom.addon.blender.sessions.prepared_groom import BuildRequest, build
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -91,7 +91,7 @@ def test_what_a_thread_makes_is_the_same_to_the_bit(hair, evaluated, in_window):
     hair.data.hairloom.children.strand_count = 500
     session = previews.start(hair, evaluated())
     arrive(session)
-    alone = make(Reading(hair, evaluated()).ordered, is_drawn=True)
+    alone = build(GroomSource(hair, evaluated()).request, is_drawn=True)
     assert np.array_equal(session.rig.strands.points, alone.rig.strands.points)
     assert np.array_equal(session.rig.weights.weight, alone.rig.weights.weight)
     assert np.array_equal(session.snapshot.occlusion, alone.occlusion)
@@ -204,7 +204,7 @@ def test_edits_while_hair_is_made_arrive_too(playing, hair, evaluated, monkeypat
         scene_events.catch_up(evaluated())
     opened.set()
     arrive(playing)
-    wanted = make(Reading(hair, evaluated()).ordered, is_drawn=False).rig.strands
+    wanted = build(GroomSource(hair, evaluated()).request, is_drawn=False).rig.strands
     length = np.linalg.norm(np.diff(wanted.grid, axis=1), axis=2).sum()
     now = np.linalg.norm(np.diff(playing.rig.strands.grid, axis=1), axis=2).sum()
     assert now == pytest.approx(length, rel=1e-3)
@@ -271,12 +271,12 @@ def test_pictures_are_of_whole_hair(hair, evaluated, in_window):
 
 
 def test_orders_tell_whether_they_give_the_same_rig(hair, evaluated, extension):
-    reading = Reading(hair, evaluated())
-    order = reading.ordered
+    reading = GroomSource(hair, evaluated())
+    order = reading.request
     assert order.gives_rig_of(order) and reading.read_again(evaluated()) is None
     hair.data.hairloom.guides.guide_count = 5
     other = reading.read_again(evaluated())
-    assert isinstance(other, Order) and not other.gives_rig_of(order)
+    assert isinstance(other, BuildRequest) and not other.gives_rig_of(order)
     assert reading.settings[GuideSettings].guide_count != 5, "it is not shown yet"
     reading.accept(other)
     assert reading.settings[GuideSettings].guide_count == 5
@@ -379,18 +379,18 @@ def test_a_step_of_a_frame_waits_to_be_exact(hair, moving, evaluated, gate):
 def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, evaluated, monkeypatch):
     bpy.ops.mesh.primitive_ico_sphere_add(radius=0.1, subdivisions=5)
     hair = new_hair(bpy.context.object)
-    order = Reading(hair, evaluated()).ordered
+    order = GroomSource(hair, evaluated()).request
     head, searched, bind = order.source.head, [], pipeline.bind_roots
-    assert len(head.triangles) > making._LARGE
+    assert len(head.triangles) > prepared_groom._LARGE
 
     def noted(strands, surface, *, place):
         searched.append(len(surface.triangles))
         return bind(strands, surface, place=place)
 
     monkeypatch.setattr(pipeline, "bind_roots", noted)
-    made = making.placeholder(order)
+    made = prepared_groom.placeholder(order)
     assert len(searched) == 1 and searched[0] < len(head.triangles) / 10
-    assert made.rig.head is head and not made.is_whole
+    assert made.rig.head is head and made.is_placeholder
     wanted = bind(made.rig.strands, head, place="Hair").strands
     assert np.array_equal(made.rig.strands.root_triangle, wanted.root_triangle)
     carried = pipeline.carried(made.rig, made.rig.rest_pose)
@@ -399,11 +399,11 @@ def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, evaluate
 
 def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, evaluated):
     bpy.ops.mesh.primitive_ico_sphere_add(radius=0.1, subdivisions=5)
-    order = Reading(new_hair(bpy.context.object), evaluated()).ordered
+    order = GroomSource(new_hair(bpy.context.object), evaluated()).request
     large = order.source.strands.transformed(np.diag([1000.0, 1000.0, 1000.0, 1.0]))
     order = replace(order, source=replace(order.source, strands=large))
     told = []
-    for make_it in (making.placeholder, making.rig_of):
+    for make_it in (prepared_groom.placeholder, prepared_groom.rig_of):
         with pytest.raises(HairloomError) as error:
             make_it(order)
         told.append(str(error.value))

@@ -45,7 +45,7 @@ def test_what_is_wrong_is_told_and_the_rest_goes_on(monkeypatch, capfd):
     ("change", "told"),
     [
         (lambda picture: np.zeros_like(picture), "covers 0%"),
-        (lambda picture: np.full_like(picture, np.nan), "no numbers"),
+        (lambda picture: np.full_like(picture, np.nan), "not numbers"),
         (lambda picture: np.ones_like(picture), "covers 100%"),
         (lambda picture: picture * np.float32([0, 0, 0, 1]), "black"),
     ],

@@ -22,6 +22,7 @@ from ..bakes.guide_motion import BakedGuides
 from ..base.report import Report
 from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
+from ..sessions.prepared_groom import prepared
 from .inputs import Inputs, Sources, head_of_sources, read_inputs
 
 
@@ -161,9 +162,8 @@ def with_uvs(rig: Rig, sources: Sources) -> Rig:
 def open_studio(job: Job, rig: Rig) -> Studio:
     """What draws this job's hair in its look."""
     with job.report.stage("ambient occlusion"):
-        occlusion = pipeline.rest_occlusion(rig, job.settings[AmbientSettings])
-        head_occlusion = pipeline.head_occlusion(rig, job.settings[AmbientSettings])
-    studio = Studio(rig, occlusion, head_occlusion, GroomSettings(job.settings))
+        groom = prepared(rig, job.settings[AmbientSettings])
+    studio = Studio(groom, GroomSettings(job.settings))
     tell_notes(list(studio.warnings), job.report)
     return studio
 

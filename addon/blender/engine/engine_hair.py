@@ -14,7 +14,6 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ... import pipeline
 from ...arrays import Floats
 from ...cards.follow import moved_mesh
 from ...cards.occlusion_settings import CardOcclusionSettings
@@ -34,8 +33,9 @@ from ..cards.occluders import Occluders, read_occluders
 from ..cards.show import as_shown
 from ..cards.textures import chosen_pictures
 from ..properties.groom_settings import GroomSettings
-from ..sessions.reading import Reading
-from ..sessions.shown import snapshot_of, with_all_strands, with_settings
+from ..sessions.groom_source import GroomSource
+from ..sessions.prepared_groom import prepared, rig_of
+from ..sessions.snapshots import snapshot_of, with_all_strands, with_settings
 
 
 class HairNotMadeYetError(Exception):
@@ -236,8 +236,8 @@ def _of_curves(
     *,
     blocking: bool,
 ) -> _Made:
-    reading = Reading(hair, depsgraph)
-    source = reading.source
+    request = GroomSource(hair, depsgraph).request
+    source = request.source
     made_from = (
         source.strands.points,
         source.strands.offsets,
@@ -248,23 +248,24 @@ def _of_curves(
         settings.of_rig,
         settings[AmbientSettings],
     )
-    return _made(hair, made_from, settings, reading.rig, is_baked=False, blocking=blocking)
+    return _made(
+        hair, made_from, settings, lambda: rig_of(request), is_baked=False, blocking=blocking
+    )
 
 
 def _made(
     owner: bpy.types.Object,
     made_from: tuple[Any, ...],
     settings: GroomSettings,
-    rig: Any,
+    rig: Callable[[], Rig],
     *,
     is_baked: bool,
     blocking: bool,
 ) -> _Made:
     def make() -> _Made:
-        made = rig()
-        occlusion = pipeline.rest_occlusion(made, settings[AmbientSettings])
-        snapshot = snapshot_of(made, occlusion, pipeline.strand_ranks(made))
-        return _Made(made_from, made, snapshot, is_baked)
+        # a render leaves no strand out, so that nothing need hide any
+        groom = prepared(rig(), settings[AmbientSettings], with_occluders=False)
+        return _Made(made_from, groom.rig, snapshot_of(groom), is_baked)
 
     kept = _kept.setdefault(owner.session_uid, _Kept())
     made = kept.have(made_from, make, blocking=blocking)

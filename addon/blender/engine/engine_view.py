@@ -22,7 +22,7 @@ from ...shading.picture_settings import PictureSettings
 from ..base import latest_job
 from ..properties.properties import settings_of
 from ..scene.lights import uses_scene_light
-from ..sessions.shown import with_all_strands
+from ..sessions.snapshots import with_all_strands
 from ..viewport import overlay
 from . import engine_hair
 from .engine_camera import view_rectangle

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import bpy
 
-from ... import pipeline
 from ...arrays import Floats
-from ...pipeline import Pose, Rig
+from ...pipeline import Pose
 from ...shading.ambient_settings import AmbientSettings
 from ..cards.textures import chosen_pictures
 from ..preview import previews
 from ..properties.groom_settings import GroomSettings
-from ..sessions.reading import Reading
+from ..sessions.groom_source import GroomSource
+from ..sessions.prepared_groom import PreparedGroom, prepared, rig_of
 from ..sessions.session import Session
 from .studio import Studio
 
@@ -44,12 +44,12 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
         previews.finish(session, depsgraph)
         session = previews.session_of(hair)
     if isinstance(session, Session):
-        studio = _studio(hair, session.rig, session.settings)
+        studio = _studio(hair, session.groom, session.settings)
         return ShownGroom(studio, session.solver.pose, session.strands, studio.warnings)
-    reading = Reading(hair, depsgraph)
-    rig = reading.rig()
-    studio = _studio(hair, rig, reading.settings)
-    notes = (*reading.source.warnings, *rig.notes, *studio.warnings)
+    request = GroomSource(hair, depsgraph).request
+    rig, settings = rig_of(request), request.settings
+    studio = _studio(hair, prepared(rig, settings[AmbientSettings]), settings)
+    notes = (*request.source.warnings, *rig.notes, *studio.warnings)
     return ShownGroom(studio, rig.rest_pose, rig.strands.grid, notes)
 
 
@@ -58,8 +58,6 @@ def file_name(name: str) -> str:
     return re.sub(r"[^\w .-]+", "_", name).strip(" .") or "groom"
 
 
-def _studio(hair: bpy.types.Object, rig: Rig, settings: GroomSettings) -> Studio:
-    ambient = settings[AmbientSettings]
+def _studio(hair: bpy.types.Object, groom: PreparedGroom, settings: GroomSettings) -> Studio:
     pictures, _ = chosen_pictures(hair.data.hairloom.card_images)
-    occlusion = pipeline.rest_occlusion(rig, ambient), pipeline.head_occlusion(rig, ambient)
-    return Studio(rig, *occlusion, settings, pictures)
+    return Studio(groom, settings, pictures)

@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ... import pipeline
 from ...arrays import Floats
-from ...pipeline import Pose, Rig
+from ...pipeline import Pose
 from ...render.camera import Camera, frame_camera
 from ...render.card_pass import CardPass
 from ...render.card_snapshot import CardSnapshot
@@ -26,8 +25,8 @@ from ..base.gpu_context import ensure_gpu
 from ..cards.build import BuiltCards, CardInputs, cards_key
 from ..cards.show import as_shown
 from ..properties.groom_settings import GroomSettings
-from ..sessions.hiders import Hiders
-from ..sessions.shown import snapshot_of, with_settings
+from ..sessions.prepared_groom import PreparedGroom
+from ..sessions.snapshots import snapshot_of, with_settings
 from .skin_picture import shown_skin_shadow
 from .slices import shown_slices
 
@@ -47,31 +46,25 @@ class Studio:
     """Draws moments of one groom, always with the same framing, so that pictures compare.
 
     Args:
-        occlusion: (strand_count, cv_count) in [0, 1], at rest.
-        head_occlusion: (vertex_count,) in [0, 1], at rest; None without a head.
         card_pictures: what takes the place of textures where cards are shown.
     """
 
     def __init__(
         self,
-        rig: Rig,
-        occlusion: Floats,
-        head_occlusion: Floats | None,
+        groom: PreparedGroom,
         settings: GroomSettings,
         card_pictures: Mapping[str, Floats] | None = None,
     ) -> None:
         ensure_gpu()
-        self._rig, self._head_occlusion = rig, head_occlusion
+        self._groom, self._rig, self._snapshot = groom, groom.rig, snapshot_of(groom)
         self._passes, self._card_pass = (MeshPass(), StrandPass()), CardPass()
         self._cards: tuple[Hashable, BuiltCards] | None = None
         self._card_pictures = card_pictures or {}
-        self._hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
-        self._groom = snapshot_of(rig, occlusion, pipeline.strand_ranks(rig))
         self.settings = settings
 
     @property
     def _at_rest(self) -> Snapshot:
-        return with_settings(self._groom, self.settings)
+        return with_settings(self._snapshot, self.settings)
 
     def picture(
         self,
@@ -94,13 +87,13 @@ class Studio:
             lights: in place of three that hang on the camera.
             background: premultiplied.
         """
-        camera = camera or self._camera(width / height)
+        camera, occluders = camera or self._camera(width / height), self._groom.occluders
         snapshot = replace(
             self._at_rest,
             strands=points,
             meshes=self._meshes(pose),
             lights=three_point_lights(camera.view) if lights is None else lights,
-            hiders=None if self._hiders is None else self._hiders.at(pose),
+            hiders=None if occluders is None else occluders.at(pose),
             cards=self._cards_at(pose, points),
         )
         return render_image(
@@ -217,4 +210,4 @@ class Studio:
             return ()
         head = self._rig.head
         surface = Surface(pose.head_positions, head.triangles, head.corner_uv)
-        return (MeshSnapshot.of(surface, occlusion=self._head_occlusion, is_skin=True),)
+        return (MeshSnapshot.of(surface, occlusion=self._groom.head_occlusion, is_skin=True),)

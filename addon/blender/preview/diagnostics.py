@@ -66,7 +66,7 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
         head is not None
         and session is not None
         and session.is_made
-        and (loose := session.made.loose_roots)
+        and (loose := session.groom.loose_roots)
     ):
         count = f"{loose:,} roots are" if loose > 1 else "1 root is"
         text = f"{count} not on {head.name}, and would hang in the air"

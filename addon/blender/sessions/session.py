@@ -12,27 +12,44 @@ import numpy as np
 from ...arrays import Floats
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
-from ...pipeline import Rig
+from ...pipeline import Pose, Rig
 from ...render.snapshot import Snapshot
-from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays
+from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays
 from ..bakes.simulated import Arrays
-from ..cards.show import ShownCards
+from ..base.latest_job import LatestJob
+from ..base.thread_work import ThreadWork
 from ..colliders.fields import NotMadeYetError
 from ..colliders.obstacles import Obstacles
-from ..scene.source import dynamics_warnings, refuse_own_dynamics
+from ..properties.groom_settings import GroomSettings
+from ..scene.source import Source, dynamics_warnings, refuse_own_dynamics
 from ..scene.wind import gravity_of, scene_wind
-from .groom import Groom
-from .groom_picture import GroomPicture
-from .making import Made, make
+from .groom_source import GroomSource
 from .measures import FrameTimes
+from .prepared_groom import BuildRequest, PreparedGroom, build, placeholder
+from .snapshots import GroomPicture
 from .solvers import Solver, computed_on, form_of, solver_of
 
 
-class Session(Groom):
+class Session:
     """One groom while it is previewed or baked; fulfils `simulated.Simulated`.
 
-    Args and errors are those of `Groom`.
+    uid, name, hair, head: of its objects.
+    groom: what it was made into; a placeholder until the first hair is made in a thread.
+
+    Args:
+        hair: a hair curves object.
+        baked: the rig of a bake of this very groom, to be the same to the bit.
+        is_drawn: False leaves out what only drawing needs.
+        blocking: False: the hair is made in a thread, with a few strands as its placeholder.
+        arrived: is called with this session when hair or cards can be taken over that were made
+            in a thread.
+
+    Raises:
+        HairloomError: no hair curves, none that can be used, or of another scale than the head.
     """
+
+    groom: PreparedGroom
+    solver: Solver
 
     def __init__(
         self,
@@ -44,23 +61,91 @@ class Session(Groom):
         blocking: bool = True,
         arrived: Callable[[Session], None] = lambda session: None,
     ) -> None:
-        tell = partial(arrived, self)
-        super().__init__(hair, depsgraph, baked, is_drawn=is_drawn, blocking=blocking, arrived=tell)
+        self._source = GroomSource(hair, depsgraph)
+        self._source.use_bake(baked)
+        self.hair, self.head = self._source.hair, self._source.head
+        self.uid, self.name = self.hair.handle.uid, self._source.name
+        self._is_drawn = is_drawn
+        self._job = LatestJob[BuildRequest, tuple[BuildRequest, PreparedGroom]](
+            "hair", partial(arrived, self)
+        )
         self.times = FrameTimes()
         self.obstacles: Obstacles | None = None
         self.is_playing = False
         self.is_stale = False
-        self.picture = GroomPicture(self.hair.found, is_drawn=is_drawn, arrived=tell)
-        self._take(self.made, None, depsgraph)
+        self.picture = GroomPicture(
+            self.hair.found, is_drawn=is_drawn, arrived=partial(arrived, self)
+        )
+        self.cards = self.picture.cards
+        request = self._source.request
+        made = build(request, is_drawn=is_drawn) if blocking else placeholder(request)
+        self._take(request, made, None, depsgraph)
+        if not blocking:
+            self._begin()
+
+    @property
+    def source(self) -> Source:
+        """What was read of the hair that is shown."""
+        return self._source.source
+
+    @property
+    def settings(self) -> GroomSettings:
+        """What the artist has set, as far as it is taken over."""
+        return self._source.settings
+
+    @property
+    def rig(self) -> Rig:
+        return self.groom.rig
+
+    @property
+    def is_made(self) -> bool:
+        """Whether there is hair to be shown; False until the first one is made."""
+        return not self.groom.is_placeholder
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether hair is being made, the first or other hair."""
+        return self._job.is_pending
+
+    @property
+    def has_arrived(self) -> bool:
+        """Whether the hair that was being made can be taken over."""
+        return self._job.has_arrived
+
+    def has_another_head(self) -> bool:
+        """Whether the artist has set another surface since the session began."""
+        return self._source.has_another_head()
+
+    def constants(self) -> Arrays:
+        """See `baked_rig.rig_arrays`."""
+        return rig_arrays(self.rig, self._source.rests)
+
+    def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """See `simulated.Simulated`."""
+        return self._source.fingerprint(depsgraph)
+
+    def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """See `simulated.Simulated`."""
+        return self._source.moment(self._pose(depsgraph), depsgraph)
+
+    def _pose(self, depsgraph: bpy.types.Depsgraph) -> Pose:
+        return self._source.pose(self.rig, depsgraph)
+
+    def _begin(self) -> None:
+        """Have made what was requested last, once nothing else is being made."""
+        request = self._source.request
+        self._job.want(
+            request, lambda: partial(_build_in_thread, request=request, before=self._before)
+        )
+
+    @property
+    def _before(self) -> tuple[BuildRequest, PreparedGroom]:
+        return self._made_from, self.groom
 
     @property
     def snapshot(self) -> Snapshot:
         """What is drawn."""
         return self.picture.snapshot
-
-    @property
-    def cards(self) -> ShownCards:
-        return self.picture.cards
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -82,21 +167,25 @@ class Session(Groom):
         """All strands as they are shown, (strand_count, cv_count, 3) [m]; reads back from a GPU."""
         return self.solver.strands()
 
-    def _take(self, made: Made, before: Made | None, depsgraph: bpy.types.Depsgraph) -> None:
-        """Everything that hangs on the strands and on the choice of guides.
+    def _take(
+        self,
+        request: BuildRequest,
+        groom: PreparedGroom,
+        before: PreparedGroom | None,
+        depsgraph: bpy.types.Depsgraph,
+    ) -> None:
+        """Everything that depends on the strands and on the choice of guides.
 
         Hair that plays goes on, unless its guides are others now.
         """
-        self.made = made
-        self._reading.accept(made.order)
-        is_same = before is not None and before.rig is made.rig
-        goes_on = before is not None and self.is_playing and _same_guides(made.rig, before.rig)
+        self._made_from, self.groom = request, groom
+        self._source.accept(request)
+        is_same = before is not None and before.rig is groom.rig
+        goes_on = before is not None and self.is_playing and _same_guides(groom.rig, before.rig)
         if not is_same:
             motion = self.solver.motion if goes_on else None
-            self.solver: Solver = solver_of(
-                made.rig, self.settings[DynamicsSettings].device, motion
-            )
-        self.picture.take_made(made, self.settings)
+            self.solver = solver_of(groom.rig, self.settings[DynamicsSettings].device, motion)
+        self.picture.take_groom(groom, self.settings)
         self.light(depsgraph)
         if is_same or goes_on:
             self._show()
@@ -111,7 +200,7 @@ class Session(Groom):
         """
         made = self._job.take()
         if made is not None:
-            self._take(made, self.made, depsgraph)
+            self._take(*made, self.groom, depsgraph)
 
     def finish(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Wait for the hair that is being made, and show it.
@@ -133,14 +222,14 @@ class Session(Groom):
         Args:
             blocking: False: other hair is made in a thread, and what was shown is shown until then.
         """
-        order = self._reading.read_again(depsgraph)
+        request = self._source.read_again(depsgraph)
         self.is_stale = False
-        if order is not None and blocking and not self.is_pending:
-            made = make(order, self.made, is_drawn=self._is_drawn)
-            self._take(made, self.made, depsgraph)
+        if request is not None and blocking and not self.is_pending:
+            groom = build(request, self._before, is_drawn=self._is_drawn)
+            self._take(request, groom, self.groom, depsgraph)
             return
         self.take_settings()
-        if order is not None:
+        if request is not None:
             self._begin()
         if blocking:
             self.finish(depsgraph)
@@ -153,7 +242,7 @@ class Session(Groom):
             HairloomError: the form of computing that was chosen is not to be had here.
         """
         before = self.settings
-        self.is_stale |= self._reading.take_settings()
+        self.is_stale |= self._source.take_settings()
         if self.picture.take_settings(self.rig, before, self.settings):
             self._show()
         if self.settings[DynamicsSettings].device != before[DynamicsSettings].device:
@@ -247,7 +336,7 @@ class Session(Groom):
             self.settings[DynamicsSettings],
             depsgraph,
             self.obstacles,
-            self.made.used,
+            self.groom.used,
             blocking=blocking,
         )
 
@@ -276,7 +365,7 @@ class Session(Groom):
 
     def recorded(self) -> Arrays:
         """See `baked_rig.frame_arrays`."""
-        return frame_arrays(self.solver.pose, self.solver.guides(), self.made.used)
+        return frame_arrays(self.solver.pose, self.solver.guides(), self.groom.used)
 
     def show_recorded(self, frame: Arrays) -> None:
         """Hair as it was recorded, on the head as that was.
@@ -285,8 +374,8 @@ class Session(Groom):
             HairloomError: the frame is of another groom.
         """
         rig = self.rig
-        baked = BakedRig(rig, RestMatrices(self.hair.rest, None), self.made.used)
-        shapes = [len(rig.guides), rig.strands.grid.shape[1], 3], len(self.made.used)
+        baked = BakedRig(rig, RestMatrices(self.hair.rest, None), self.groom.used)
+        shapes = [len(rig.guides), rig.strands.grid.shape[1], 3], len(self.groom.used)
         found = list(frame["guides"].shape), len(frame.get("head", ()))
         if found != shapes:
             raise HairloomError(
@@ -299,6 +388,14 @@ class Session(Groom):
 
     def _show(self) -> None:
         self.picture.show(self.rig, self.solver, self.settings)
+
+
+def _build_in_thread(
+    work: ThreadWork[tuple[BuildRequest, PreparedGroom]],
+    request: BuildRequest,
+    before: tuple[BuildRequest, PreparedGroom],
+) -> tuple[BuildRequest, PreparedGroom]:
+    return request, build(request, before, is_drawn=True, report=work.report)
 
 
 def _same_guides(one: Rig, other: Rig) -> bool:

@@ -28,7 +28,8 @@ from ...strands import StrandSet
 from ..base.gpu_context import ensure_gpu
 from ..base.images import write_png
 from ..base.report import environment
-from ..sessions.shown import snapshot_of
+from ..sessions.prepared_groom import prepared
+from ..sessions.snapshots import snapshot_of
 from ..sessions.solvers import compute_problem
 
 type Outcome = Literal["passed", "absent", "failed"]
@@ -117,9 +118,8 @@ def _looks() -> dict[str, tuple[ShadingSettings, VolumeSettings]]:
 def _drawn(shading: ShadingSettings, volume: VolumeSettings) -> str:
     """Draw a brush of hair: it must be visible and finite, and leave the corners clear."""
     rig = _brush()
-    ambient = AmbientSettings()
     snapshot = replace(
-        snapshot_of(rig, pipeline.rest_occlusion(rig, ambient), None),
+        snapshot_of(prepared(rig, AmbientSettings(), with_occluders=False)),
         shading=shading,
         volume=volume,
         detail=DetailSettings(lod_height=0.0),

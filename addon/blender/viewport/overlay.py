@@ -29,7 +29,7 @@ from ..cards.show import as_shown, without_strands
 from ..scene.lights import uses_scene_light
 from ..sessions.measures import FrameTimes
 from ..sessions.session import Session
-from ..sessions.shown import with_all_strands
+from ..sessions.snapshots import with_all_strands
 from . import view_transform
 from .debug_lines import Lines, debug_lines_of, draw_lines
 from .overlay_text import card_counts_line, counts_line, write_lines
@@ -162,11 +162,6 @@ def drop(uid: int) -> None:
     if not _overlay.drawn:
         _remove_handlers()
     redraw_views()
-
-
-def drawn_of(uid: int) -> Drawn | None:
-    """A groom that is drawn, with its passes."""
-    return _overlay.drawn.get(uid)
 
 
 def drawing_of(uid: int) -> Drawing | None:

@@ -25,7 +25,9 @@ from ..bakes.baked_rig import used_vertices
 from ..properties.groom_settings import GroomSettings
 from ..scene.rigs import rig_from
 from ..scene.source import Source
-from .hiders import Hiders
+from .occluder_spheres import OccluderSpheres
+
+type Report = Callable[[str], None]
 
 #: Strands of the placeholder of a groom that is being made.
 _FEW = 32
@@ -37,7 +39,7 @@ _LARGE = 4000
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class BuildRequest:
     """What a groom is to be made from.
 
     name: of the groom, in messages. rig: that of its bake; None: it is to be made.
@@ -48,7 +50,7 @@ class Order:
     settings: GroomSettings
     rig: Rig | None = None
 
-    def gives_rig_of(self, other: Order) -> bool:
+    def gives_rig_of(self, other: BuildRequest) -> bool:
         """Whether both give the same rig, as far as can be told without making it."""
         one, two = self.source, other.source
         return (
@@ -60,24 +62,29 @@ class Order:
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class PreparedGroom:
     """A groom made ready to be shown.
 
     used: the head's vertices that carry roots.
-    occlusion: (strand_count, cv_count) in [0, 1], at rest.
-    rank: (strand_count,), see `pipeline.strand_ranks`.
-    hiders: what of the head hides hair.
-    is_whole: whether this is all the hair, not its placeholder, which is not seen.
-    Without what only drawing needs, the last three before are None.
+    ambient: what its occlusion was made by.
+    occlusion: (strand_count, cv_count) in [0, 1], at rest; None where it was left out.
+    rank: (strand_count,), see `pipeline.strand_ranks`; None where it was left out.
+    occluders: spheres in the head that hide hair; None where it has none, or they were left out.
+    is_placeholder: whether these are a few of its strands only, which are not seen.
     """
 
-    order: Order
     rig: Rig
     used: Ints
+    ambient: AmbientSettings
     occlusion: Floats | None = None
     rank: Floats | None = None
-    hiders: Hiders | None = None
-    is_whole: bool = True
+    occluders: OccluderSpheres | None = None
+    is_placeholder: bool = False
+
+    @cached_property
+    def head_occlusion(self) -> Floats | None:
+        """(vertex_count,) in [0, 1], at rest; None without a head."""
+        return pipeline.head_occlusion(self.rig, self.ambient)
 
     @cached_property
     def loose_roots(self) -> int:
@@ -91,71 +98,91 @@ class Made:
         return int((away > reach).sum())
 
 
-def rig_of(order: Order) -> Rig:
+def rig_of(request: BuildRequest) -> Rig:
     """The groom made ready to move.
 
     Raises:
         HairloomError: the groom is of another scale than the head.
     """
-    if order.rig is not None:
-        return order.rig
-    return rig_from(order.source, order.settings.sections, place=order.name)
+    if request.rig is not None:
+        return request.rig
+    return rig_from(request.source, request.settings.sections, place=request.name)
 
 
-def make(
-    order: Order,
-    before: Made | None = None,
+def build(
+    request: BuildRequest,
+    before: tuple[BuildRequest, PreparedGroom] | None = None,
     *,
     is_drawn: bool,
-    report: Callable[[str], None] = lambda stage: None,
-) -> Made:
+    report: Report = lambda stage: None,
+) -> PreparedGroom:
     """Make a groom; what nothing changes is taken from before.
 
     Args:
+        before: what was made last, and what it was made from.
         is_drawn: False leaves out what only drawing needs.
-        report: is called before each stage with its name; may end it all by an exception.
+        report: see `prepared`.
 
     Raises:
         HairloomError: as `rig_of`.
     """
     report("strands")
-    is_same_rig = before is not None and before.is_whole and order.gives_rig_of(before.order)
-    rig = before.rig if before is not None and is_same_rig else rig_of(order)
-    used = used_vertices(rig)
+    known = None if before is None or before[1].is_placeholder else before[1]
+    is_same = before is not None and known is not None and request.gives_rig_of(before[0])
+    rig = known.rig if known is not None and is_same else rig_of(request)
+    ambient = request.settings[AmbientSettings]
     if not is_drawn:
-        return Made(order, rig, used)
+        return PreparedGroom(rig, used_vertices(rig), ambient)
+    return prepared(rig, ambient, known, report=report)
+
+
+def prepared(
+    rig: Rig,
+    ambient: AmbientSettings,
+    known: PreparedGroom | None = None,
+    *,
+    with_occluders: bool = True,
+    report: Report = lambda stage: None,
+) -> PreparedGroom:
+    """All that drawing a rig needs, for a preview, a render and a picture alike.
+
+    Args:
+        known: what was made before; other guides on the same hair leave its shade and its head as
+            they are.
+        with_occluders: False leaves out the spheres, which take a search through the head.
+        report: is called before each stage with its name; may end it all by an exception.
+    """
     report("ambient occlusion")
-    # other guides on the same hair leave its shade and its head as they are
-    known = before if before is not None and _same_hair(before.rig, rig) else None
-    ambient = order.settings[AmbientSettings]
-    is_lit_alike = known is not None and known.order.settings[AmbientSettings] == ambient
-    if known is not None and known.occlusion is not None and is_lit_alike:
+    if known is not None and not _same_hair(known.rig, rig):
+        known = None
+    if known is not None and known.occlusion is not None and known.ambient == ambient:
         occlusion = known.occlusion
     else:
         occlusion = pipeline.rest_occlusion(rig, ambient)
     report("what the head hides")
-    if known is not None and known.hiders is not None:
-        hiders: Hiders | None = known.hiders
-    else:
-        hiders = None if rig.head is None else Hiders(rig.head, rig.strands.roots)
-    return Made(order, rig, used, occlusion, pipeline.strand_ranks(rig), hiders)
+    occluders = None if known is None else known.occluders
+    if occluders is None and rig.head is not None and with_occluders:
+        occluders = OccluderSpheres(rig.head, rig.strands.roots)
+    rank = pipeline.strand_ranks(rig)
+    return PreparedGroom(rig, used_vertices(rig), ambient, occlusion, rank, occluders)
 
 
-def placeholder(order: Order) -> Made:
+def placeholder(request: BuildRequest) -> PreparedGroom:
     """What a session moves until its groom is made: a few of its strands.
 
     Raises:
         HairloomError: as `rig_of`.
     """
-    rig = order.rig
+    rig = request.rig
     if rig is None:
-        source, count = order.source, order.source.strands.strand_count
+        source, count = request.source, request.source.strands.strand_count
         few = source.strands.take(np.arange(0, count, max(count // _FEW, 1)))
-        rig = _quickly_bound(few, source.head, order)
-    return Made(order, rig, used_vertices(rig), is_whole=False)
+        rig = _quickly_bound(few, source.head, request)
+    ambient = request.settings[AmbientSettings]
+    return PreparedGroom(rig, used_vertices(rig), ambient, is_placeholder=True)
 
 
-def _quickly_bound(few: StrandSet, head: Surface | None, order: Order) -> Rig:
+def _quickly_bound(few: StrandSet, head: Surface | None, request: BuildRequest) -> Rig:
     """A few strands on a head of any size; of a large one the triangles near their roots will do.
 
     Raises:
@@ -167,10 +194,10 @@ def _quickly_bound(few: StrandSet, head: Surface | None, order: Order) -> Rig:
         part = replace(head, triangles=head.triangles[near], corner_uv=uv)
         # roots that seem far away may be near to the rest of the head
         with suppress(HairloomError):
-            rig = pipeline.prepare(few, part, order.settings[GuideSettings], place=order.name)
+            rig = pipeline.prepare(few, part, request.settings[GuideSettings], place=request.name)
             bound = replace(rig.strands, root_triangle=near[rig.strands.root_triangle])
             return replace(rig, strands=bound, head=head)
-    return pipeline.prepare(few, head, order.settings[GuideSettings], place=order.name)
+    return pipeline.prepare(few, head, request.settings[GuideSettings], place=request.name)
 
 
 def _triangles_near(points: Floats, surface: Surface) -> Ints:

@@ -1,17 +1,21 @@
-"""What is drawn of one groom while it is previewed, in step with its settings, motion and light."""
+"""What is drawn of a groom: a snapshot, by its rig and by what the artist has set; and, while it is
+previewed, in step with settings, motion and light."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import bpy
+import numpy as np
 
 from ...pipeline import Pose, Rig
 from ...refine.settings import DetailSettings
 from ...render.hair_ball import HairBall
-from ...render.snapshot import Snapshot
-from ...shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
+from ...render.snapshot import SECTIONS, Snapshot
+from ...shading.marschner.look import fibre_of
+from ...shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE, shape_of
 from ...shading.settings import ShadingSettings
 from ...shading.volume.settings import VolumeSettings
 from ...shading.volume.shadow_lights import shadow_warnings
@@ -25,9 +29,44 @@ from ..scene.lights import (
     read_lights,
     scene_lights_are_shown,
 )
-from .making import Made
-from .shown import shapes_alike, snapshot_of, with_settings, with_tables
+from .prepared_groom import PreparedGroom
 from .solvers import Solver
+
+
+def snapshot_of(groom: PreparedGroom) -> Snapshot:
+    """The groom at rest, with all that does not change while it moves."""
+    strands = groom.rig.strands
+    return Snapshot(
+        strands=strands.grid,
+        radius=strands.radius.reshape(strands.strand_count, -1),
+        occlusion=groom.occlusion,
+        guide=np.ascontiguousarray(groom.rig.weights.guide[:, 0]),
+        group=strands.group,
+        rank=groom.rank,
+    )
+
+
+def with_settings(snapshot: Snapshot, settings: GroomSettings) -> Snapshot:
+    """The same groom by these settings."""
+    sections: dict[str, Any] = {name: settings[kind] for name, kind in SECTIONS.items()}
+    return replace(snapshot, debug_view=settings.debug_view, **sections)
+
+
+def with_tables(snapshot: Snapshot, size: int) -> Snapshot:
+    """The same by look-up tables of this size, for hair that needs any."""
+    return snapshot if snapshot.table_size == size else replace(snapshot, table_size=size)
+
+
+def shapes_alike(one: ShadingSettings, other: ShadingSettings) -> bool:
+    """Whether the same look-up tables serve both; a change of colour needs no others."""
+    if other.model != "marschner":
+        return True
+    return one.model == other.model and shape_of(fibre_of(one)) == shape_of(fibre_of(other))
+
+
+def with_all_strands(snapshot: Snapshot) -> Snapshot:
+    """The same where nothing hides hair, so that none is left out."""
+    return replace(snapshot, hiders=None, detail=replace(snapshot.detail, culling="none"))
 
 
 class GroomPicture:
@@ -50,7 +89,7 @@ class GroomPicture:
     ) -> None:
         self._is_drawn = is_drawn
         self._ball = HairBall()
-        self._made: Made | None = None
+        self._groom: PreparedGroom | None = None
         self._light_warnings: tuple[str, ...] = ()
         self.cards = ShownCards(hair, arrived)
 
@@ -67,12 +106,12 @@ class GroomPicture:
         lights = snapshot.lights if scene_lights_are_shown() else ()
         return shadow_warnings(lights, self._ball.of(snapshot), snapshot.volume)
 
-    def take_made(self, made: Made, settings: GroomSettings) -> None:
+    def take_groom(self, groom: PreparedGroom, settings: GroomSettings) -> None:
         """All that hangs on the strands; it stands at rest, without light."""
-        self._made = made
-        snapshot = snapshot_of(made.rig, made.occlusion, made.rank)
+        self._groom = groom
+        snapshot = snapshot_of(groom)
         self.snapshot = with_settings(snapshot, settings)
-        self._want_cards(made.rig, settings)
+        self._want_cards(groom.rig, settings)
 
     def take_settings(self, rig: Rig, was: GroomSettings, now: GroomSettings) -> bool:
         """Take over what acts at once; whether hair has to be shown again where it is."""
@@ -87,7 +126,7 @@ class GroomPicture:
 
     def _want_cards(self, rig: Rig, settings: GroomSettings) -> bool:
         """Have cards built if they are to be shown; whether what is shown of them changes now."""
-        is_whole = self._made is not None and self._made.is_whole
+        is_whole = self._groom is not None and not self._groom.is_placeholder
         if not (self._is_drawn and is_whole and settings.shows_cards):
             self.cards.forget()
             return self.snapshot.cards is not None
@@ -115,7 +154,7 @@ class GroomPicture:
     def show(self, rig: Rig, solver: Solver, settings: GroomSettings) -> None:
         """The hair where the solver has it."""
         pose, hiders = solver.pose, None
-        known = None if self._made is None else self._made.hiders
+        known = None if self._groom is None else self._groom.occluders
         if known is not None and settings[DetailSettings].culling == "hidden":
             hiders = known.at(pose)
         self.snapshot = replace(

@@ -24,7 +24,7 @@ _RIGID = 1.0e-3
 _ENOUGH = 300
 
 
-class Hiders:
+class OccluderSpheres:
     """The balls of one head.
 
     Args:

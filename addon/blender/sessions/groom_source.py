@@ -20,14 +20,14 @@ from ..base.objects import Body, head_of, matrix_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.poses import check_finite, read_pose
 from ..scene.source import read_density, read_source, usable_curves
-from .making import Order, rig_of
+from .prepared_groom import BuildRequest, rig_of
 
 
-class Reading:
+class GroomSource:
     """One groom as it was read.
 
     source, settings: of the hair that is shown.
-    ordered: what was read last, from which hair is being made unless it is shown already.
+    request: what was read last, from which hair is being made unless it is shown already.
 
     Args:
         hair: a hair curves object.
@@ -44,7 +44,7 @@ class Reading:
         self.head = Body.at_rest(head, depsgraph) if uses_head else None
         self._head_uid = head and head.session_uid
         self.settings = GroomSettings.of(hair, depsgraph)
-        self.ordered = Order(self.name, self.source, self.settings)
+        self.request = BuildRequest(self.name, self.source, self.settings)
         check_finite(hair.name, self.hair.rest)
 
     @property
@@ -61,13 +61,13 @@ class Reading:
         Raises:
             HairloomError: the groom is of another scale than the head.
         """
-        return rig_of(self.ordered)
+        return rig_of(self.request)
 
     def use_bake(self, baked: BakedRig | None) -> None:
-        """Order the rig of a bake of this very groom, to be the same to the bit."""
+        """Request the rig of a bake of this very groom, to be the same to the bit."""
         if baked is not None and (baked.rests.head is None) == (self.head is None):
             rig = self._rig_of(baked)
-            self.ordered = Order(self.name, self.source, self.settings, rig)
+            self.request = BuildRequest(self.name, self.source, self.settings, rig)
 
     def _rig_of(self, baked: BakedRig) -> Rig:
         """The rig of a bake; rest is where hair and head were then."""
@@ -84,7 +84,7 @@ class Reading:
         head = head_of(self.hair.found())
         return (head and head.session_uid) != self._head_uid
 
-    def read_again(self, depsgraph: bpy.types.Depsgraph) -> Order | None:
+    def read_again(self, depsgraph: bpy.types.Depsgraph) -> BuildRequest | None:
         """Read edited curves, weights and settings; what is to be made of them, None where nothing
         is.
 
@@ -93,7 +93,7 @@ class Reading:
         Raises:
             HairloomError: the hair is gone, or none that can be used is left.
         """
-        hair, known = self.hair.found(), self.ordered
+        hair, known = self.hair.found(), self.request
         before = known.source
         read = usable_curves(hair, depsgraph)
         back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
@@ -108,26 +108,26 @@ class Reading:
             density=density,
             density_warning=warning,
         )
-        order = Order(self.name, source, GroomSettings.of(hair))
+        request = BuildRequest(self.name, source, GroomSettings.of(hair))
         if (
-            order.gives_rig_of(known)
-            and order.settings[AmbientSettings] == known.settings[AmbientSettings]
+            request.gives_rig_of(known)
+            and request.settings[AmbientSettings] == known.settings[AmbientSettings]
         ):
             self.source = replace(self.source, dropped=read.dropped, density_warning=warning)
             return None
-        self.ordered = order
-        return order
+        self.request = request
+        return request
 
-    def accept(self, order: Order) -> None:
+    def accept(self, request: BuildRequest) -> None:
         """Its hair is shown from now on; what acts at once is as it is set now."""
-        self.source = order.source
-        self.settings = GroomSettings.of(self.hair.found()).at_once(order.settings)
+        self.source = request.source
+        self.settings = GroomSettings.of(self.hair.found()).at_once(request.settings)
 
     def take_settings(self) -> bool:
-        """Take over what acts at once; whether there is more, for which hair is to be made anew."""
+        """Take over what acts at once; whether there is more, which needs other hair."""
         settings = GroomSettings.of(self.hair.found())
         self.settings = settings.at_once(self.settings)
-        return not settings.acts_at_once(self.ordered.settings)
+        return not settings.acts_at_once(self.request.settings)
 
     def pose(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Pose:
         """Where the body is now; see `poses.read_pose`."""
