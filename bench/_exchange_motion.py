@@ -22,12 +22,12 @@ from shaken import GRAVITY, MadeMotion, shaken_poses  # noqa: E402
 from hairloom.addon import pipeline  # noqa: E402
 from hairloom.addon.blender.base.images import read_texture  # noqa: E402
 from hairloom.addon.blender.cards.motion import (  # noqa: E402
-    MotionChoices,
     TextureMotion,
     joint_motion_steps,
     moved_cards,
 )
 from hairloom.addon.card_flow import card_build_steps  # noqa: E402
+from hairloom.addon.cards.export_settings import CardExportSettings  # noqa: E402
 from hairloom.addon.cards.steps import result_of  # noqa: E402
 from hairloom.addon.dynamics.colliders import DistanceField, PosedCollider  # noqa: E402
 from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
@@ -54,7 +54,7 @@ def motion_figures(seconds: float) -> dict[str, float]:
     begin = time.perf_counter()
     moved = result_of(moved_cards(motion, levels, space="head", with_directions=True))
     ridden = time.perf_counter()
-    joints = result_of(joint_motion_steps(moved.tracks, MotionChoices("joints")))
+    joints = result_of(joint_motion_steps(moved.tracks, CardExportSettings(motion="joints")))
     fitted = time.perf_counter()
     length, told = moved.tracks.hair_length, joints.facts
     figures = {
@@ -67,7 +67,7 @@ def motion_figures(seconds: float) -> dict[str, float]:
         "motion_ride_seconds": ridden - begin,
         "joint_seconds": fitted - ridden,
     }
-    texture = TextureMotion.of(moved, MotionChoices("texture"), GLB, "bench")
+    texture = TextureMotion.of(moved, CardExportSettings(motion="texture"), GLB, "bench")
     with tempfile.TemporaryDirectory() as folder:
         files = texture.write(Path(folder) / "cards.glb")
         figures["vat_seconds"] = time.perf_counter() - fitted

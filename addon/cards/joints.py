@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from .card_mesh import CardMesh
+from .export_settings import CardExportSettings
 from .follow import card_lines
 from .joint_chains import Chains, card_chains, reach_of, rest_joints
 from .joint_solve import INFLUENCES, Skin, best_weights, first_joints, move_joints, skinned
@@ -59,17 +60,6 @@ class CardTracks:
         return len(self.carrier)
 
 
-@dataclass(frozen=True)
-class JointChoices:
-    """chains: at most; 127 of two joints each, and the root, are as many as a byte can number.
-    joints: at most, in a chain, 2 to 16. error: root mean square, a share of the hair's length.
-    """
-
-    chains: int = 127
-    joints: int = 16
-    error: float = 0.01
-
-
 @dataclass(frozen=True, eq=False)
 class JointRig:
     """Joints and what hangs on them, in the space of `CardTracks`; chain after chain.
@@ -101,16 +91,18 @@ class FitError:
     worst: float
 
 
-def joint_steps(tracks: CardTracks, choices: JointChoices) -> Generator[float, None, JointRig]:
+def joint_steps(
+    tracks: CardTracks, settings: CardExportSettings
+) -> Generator[float, None, JointRig]:
     """The fewest joints that stay under the error; where none do, the nearest ones.
 
     Yields the share that is done.
     """
-    learnt = _Learnt.of(tracks, choices.chains)
+    learnt = _Learnt.of(tracks, settings.chains)
     yield 0.1
-    allowed = FIT_SHARE * choices.error * tracks.hair_length
+    allowed = FIT_SHARE * settings.joint_error / 100.0 * tracks.hair_length
     best, least = None, np.inf
-    for count in (each for each in _COUNTS if each <= choices.joints):
+    for count in (each for each in _COUNTS if each <= settings.joints):
         fit, error = learnt.fitted(count)
         if error > least * (1.0 - _WORTH):
             break

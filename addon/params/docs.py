@@ -14,6 +14,7 @@ _UNIT_SYMBOLS = {
     "speed": "m/s",
     "acceleration": "m/s²",
     "factor": "0 to 1",
+    "percent": "%",
     "pixels": "px",
     "none": "",
 }

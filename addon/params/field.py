@@ -14,7 +14,16 @@ from .curve import PLACES, Curve
 Kind = Literal["number", "integer", "toggle", "color", "choice", "curve"]
 #: length [m], angle [rad], time [s], rate [1/s], speed [m/s], factor [0..1], acceleration [m/s^2]
 Unit = Literal[
-    "none", "length", "angle", "time", "rate", "speed", "factor", "acceleration", "pixels"
+    "none",
+    "length",
+    "angle",
+    "time",
+    "rate",
+    "speed",
+    "factor",
+    "percent",
+    "acceleration",
+    "pixels",
 ]
 Range = tuple[float, float]
 #: What keeps a set of parameters: the groom (Blender's Curves), the character (the Object), the

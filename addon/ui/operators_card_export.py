@@ -7,25 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes import playback
 from ..blender.bakes.stale_bakes import stale_notes
 from ..blender.base.outcome import Outcome
 from ..blender.cards.card_choices import (
-    DEPTH_ITEMS,
     FORMAT_ITEMS,
-    MOTION_ITEMS,
-    PACKING_ITEMS,
-    SPACE_ITEMS,
     SUFFIXES,
-    TEXTURE_ITEMS,
     card_output,
     file_stem,
     suffix_of,
 )
 from ..blender.cards.files import CardExport, FileSteps
+from ..blender.properties.groups import operator_properties
 from ..errors import HairloomError
 from .long_work import LongWork, Progress, Steps, threaded
 from .messages import draw_lines
@@ -66,67 +62,12 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         min=1,
         max=5,
     )
-    packing: EnumProperty(
-        name="Packing",
-        description="What the channels of the textures hold",
-        items=PACKING_ITEMS,
-    )
-    textures: EnumProperty(
-        name="Textures", description="Format of the textures", items=TEXTURE_ITEMS
-    )
-    attributes: BoolProperty(
-        name="Custom Attributes",
-        description="Write ambient occlusion as the attribute _AO beside the second UV map, which "
-        "some engines refuse",
-        default=False,
-    )
-    index_buffer: BoolProperty(
-        name="Index Buffer",
-        description="Write the sorted indices as a file of their own too, for engines that keep "
-        "their own vertices",
-        default=False,
-    )
-    motion: EnumProperty(
-        name="Motion",
-        description="How the motion of the hair's bake is written",
-        items=MOTION_ITEMS,
-    )
     own_frames: BoolProperty(
         name="Other Frames", description="Write a part of the bake", default=False
     )
     first_frame: IntProperty(name="First", description="First frame that is written", default=1)
     last_frame: IntProperty(name="Last", description="Last frame that is written", default=250)
-    motion_space: EnumProperty(
-        name="Space", description="What the motion is measured against", items=SPACE_ITEMS
-    )
-    chains: IntProperty(
-        name="Chains",
-        description="How many chains of joints there are at most; cards that move alike share one",
-        default=127,
-        min=1,
-        max=2048,
-        soft_max=256,
-    )
-    joints: IntProperty(
-        name="Joints",
-        description="How many joints a chain has at most; as few as stay under the error",
-        default=16,
-        min=2,
-        max=16,
-    )
-    joint_error: FloatProperty(
-        name="Error",
-        description="Root mean square distance of cards from the simulation, of the mean length of "
-        "the hair",
-        default=1.0,
-        min=0.01,
-        max=100.0,
-        soft_max=10.0,
-        subtype="PERCENTAGE",
-    )
-    motion_depth: EnumProperty(
-        name="Depth", description="Numbers in the textures", items=DEPTH_ITEMS
-    )
+    __annotations__ |= operator_properties("cards_export")
 
     @property
     def filename_ext(self) -> str:

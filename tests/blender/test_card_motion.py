@@ -22,11 +22,10 @@ from hairloom.addon import pipeline  # noqa: E402
 from hairloom.addon.blender.bakes.guide_motion import GuideMotion  # noqa: E402
 from hairloom.addon.blender.cards.build import CardInputs  # noqa: E402
 from hairloom.addon.blender.cards.files import CardOutput, WrittenCards, write_cards  # noqa: E402
-from hairloom.addon.blender.cards.motion import MotionChoices  # noqa: E402
 from hairloom.addon.blender.command_line.inputs import Sources, read_inputs  # noqa: E402
 from hairloom.addon.card_flow import bound_cards, cards_at  # noqa: E402
 from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
-from hairloom.addon.cards.joints import JointChoices  # noqa: E402
+from hairloom.addon.cards.export_settings import CardExportSettings  # noqa: E402
 from hairloom.addon.cards.settings import CardSettings  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import FBX, GLB, USD  # noqa: E402
@@ -62,8 +61,8 @@ def motion() -> GuideMotion:
     return MadeMotion(rig, range(FRAMES), RATE, moment)
 
 
-def write(path: Path, motion: GuideMotion, **choices: Any) -> WrittenCards:
-    output = CardOutput(motion=MotionChoices(**choices))
+def write(path: Path, motion: GuideMotion, kind: str, **more: Any) -> WrittenCards:
+    output = CardOutput(settings=CardExportSettings(motion=kind, **more))
     return write_cards(path, CardInputs(motion.rig, SETTINGS), output, motion=motion)
 
 
@@ -87,7 +86,7 @@ def joints(
     motion: GuideMotion, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, WrittenCards]:
     path = tmp_path_factory.mktemp("joints") / "hair.glb"
-    return path, write(path, motion, kind="joints", joints=JointChoices(40, 16, 0.01))
+    return path, write(path, motion, kind="joints", chains=40)
 
 
 def off(found: list[np.ndarray], expected: list[np.ndarray]) -> np.ndarray:
@@ -122,7 +121,7 @@ def test_the_head_is_in_the_root_joint_where_it_is_asked_for(
     motion: GuideMotion, tmp_path: Path
 ) -> None:
     path = tmp_path / "hair.glb"
-    written = write(path, motion, kind="joints", space="world", joints=JointChoices(40, 16, 0.01))
+    written = write(path, motion, kind="joints", motion_space="world", chains=40)
     player = Player(path)
     wrong = [off(player.corners(f / RATE), simulated(motion, written, f)) for f in range(FRAMES)]
     assert np.sqrt(np.mean(np.square(wrong))) < 0.01 * written.motion["error"]["hair_length"]
@@ -188,7 +187,7 @@ def test_a_motion_texture_holds_the_simulated_cards(
     """From the GLB's texels, the sidecar and the EXR alone, as a vertex shader reads them."""
     library = pytest.importorskip("OpenImageIO")
     path = tmp_path / "hair.glb"
-    written = write(path, motion, kind="texture", space="world", depth=depth)
+    written = write(path, motion, kind="texture", motion_space="world", motion_depth=depth)
     told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
     pictures = {}
     for name, texture in told["textures"].items():

@@ -12,9 +12,9 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
 from hairloom.addon.blender.cards.files import CardExport, CardOutput  # noqa: E402
-from hairloom.addon.blender.cards.motion import MotionChoices  # noqa: E402
 from hairloom.addon.blender.command_line import command_line  # noqa: E402
 from hairloom.addon.blender.preview.bake import Bake  # noqa: E402
+from hairloom.addon.cards.export_settings import CardExportSettings  # noqa: E402
 
 
 @pytest.mark.usefixtures("extension")
@@ -107,7 +107,7 @@ def test_cancelled_in_its_midst_it_leaves_the_old_files(
         hair,
         bpy.context.evaluated_depsgraph_get(),
         folder / "hair.glb",
-        CardOutput(motion=MotionChoices(kind)),
+        CardOutput(settings=CardExportSettings(motion=kind)),
     )
     making = plan.building()
     while not making.run_main_thread_steps():

@@ -23,6 +23,7 @@ from hairloom.addon import pipeline
 from hairloom.addon.blender.cards.build import CardInputs
 from hairloom.addon.blender.cards.files import CardOutput, WrittenCards, write_cards
 from hairloom.addon.cards.atlas_settings import AtlasSettings
+from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.exchange.textures.texture_files import read_texture
 from hairloom.addon.groom.settings import GuideSettings
@@ -105,9 +106,8 @@ def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
         texture,
         look,
     )
-    written = write_cards(
-        folder / "cards.glb", CardInputs(rig, settings), CardOutput(index_buffer=True)
-    )
+    output = CardOutput(settings=CardExportSettings(index_buffer=True))
+    written = write_cards(folder / "cards.glb", CardInputs(rig, settings), output)
     view = {
         "eye": glb_axes(EYE),
         "target": glb_axes(TARGET),

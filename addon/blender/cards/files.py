@@ -13,6 +13,7 @@ import bpy
 from ...arrays import Floats, Ints
 from ...cards.build import CardBuild
 from ...cards.card_mesh import CardMesh
+from ...cards.export_settings import CardExportSettings
 from ...cards.settings import CardSettings
 from ...cards.steps import result_of, retold
 from ...cards.vertex_animation import motion_layout
@@ -44,13 +45,12 @@ from .build import (
 from .exporters import CardLook, check_cards, check_exporter, level_names, write_card_mesh
 from .motion import (
     JointMotion,
-    MotionChoices,
     TextureMotion,
     check_motion,
     joint_motion_steps,
     moved_cards,
 )
-from .textures import TextureFiles, texture_channels, texture_roles, write_tables, write_textures
+from .textures import texture_channels, texture_roles, write_tables, write_textures
 
 _UNITS = {
     "length": "m",
@@ -77,17 +77,11 @@ class CardOutput:
 
     format: one of exchange.card_formats by name; None goes by the file's suffix.
     name: of the hair in the file; None is the file's.
-    portable: without custom attributes, which some engines refuse.
-    index_buffer: whether the sorted indices are written as they are, too.
-    motion: how it is written where there is some.
     """
 
     format: str | None = None
     name: str | None = None
-    portable: bool = True
-    index_buffer: bool = False
-    textures: TextureFiles = field(default_factory=TextureFiles)
-    motion: MotionChoices = field(default_factory=MotionChoices)
+    settings: CardExportSettings = field(default_factory=CardExportSettings)
 
 
 @dataclass(frozen=True)
@@ -148,7 +142,7 @@ def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> 
     path, file_format = format_of(path, output.format)
     check_exporter(file_format, str(path))
     if motion is not None:
-        check_motion(output.motion, motion, file_format)
+        check_motion(output.settings, motion, file_format)
 
 
 def file_steps(
@@ -194,11 +188,11 @@ class _Writer:
         build = self.made.build
         parts = map(CardMesh.without_loose, build.levels, build.backs)
         levels, backs = zip(*parts, strict=True)
-        if motion is None or self.output.motion.kind == "none":
+        if motion is None or self.output.settings.motion == "none":
             yield "Writing", None
             self._write(levels, backs)
             return ()
-        if self.output.motion.kind == "texture":
+        if self.output.settings.motion == "texture":
             yield from self._write_with_texture(levels, backs, motion)
             return ()
         return (yield from self._write_with_joints(levels, backs, motion))
@@ -206,13 +200,13 @@ class _Writer:
     def _write_with_joints(
         self, levels: Sequence[CardMesh], backs: Sequence[Ints], motion: GuideMotion
     ) -> FileSteps[tuple[str, ...]]:
-        wanted = self.output.motion
+        settings = self.output.settings
         with self.stage("move cards"):
             steps = moved_cards(motion, levels, space="head", with_directions=False)
             moved = yield from retold(steps, lambda share: ("Moving the cards", share))
         with self.stage("fit joints"):
             joints: JointMotion = yield from retold(
-                joint_motion_steps(moved.tracks, wanted), lambda share: ("Fitting joints", share)
+                joint_motion_steps(moved.tracks, settings), lambda share: ("Fitting joints", share)
             )
         self.motion = joints.facts
         yield "Writing", None
@@ -223,14 +217,14 @@ class _Writer:
     def _write_with_texture(
         self, levels: Sequence[CardMesh], backs: Sequence[Ints], motion: GuideMotion
     ) -> FileSteps[None]:
-        wanted = self.output.motion
+        settings = self.output.settings
         count = sum(len(mesh.positions) for mesh in levels)
         motion_layout(count, len(motion.frames), str(self.path))  # refused before the work
         with self.stage("move cards"):
-            steps = moved_cards(motion, levels, space=wanted.space, with_directions=True)
+            steps = moved_cards(motion, levels, space=settings.motion_space, with_directions=True)
             moved = yield from retold(steps, lambda share: ("Moving the cards", share))
         yield "Writing", None
-        texture = TextureMotion.of(moved, wanted, self.file_format, str(self.path))
+        texture = TextureMotion.of(moved, settings, self.file_format, str(self.path))
         with self.stage("write motion texture"):
             self.motion = texture.facts(texture.write(self.path))
         self._write(levels, backs, texture.texels)
@@ -246,11 +240,12 @@ class _Writer:
         texels: Sequence[Floats] = (),
     ) -> None:
         """Textures, mesh, indices, and the sidecar last."""
-        path, build, maps, output = self.path, self.made.build, self.made.maps, self.output
+        path, build, maps = self.path, self.made.build, self.made.maps
+        settings = self.output.settings
         shading = self.settings[ShadingSettings]
         with self.stage("write textures"):
             grid = build.finest.atlas
-            written = write_textures(path.parent, path.stem, maps.by_name, grid, output.textures)
+            written = write_textures(path.parent, path.stem, maps.by_name, grid, settings)
             tables = write_tables(path.parent, path.stem, shading)
         roles = texture_roles(written, maps.by_name)
         look = _look(maps, roles, shading)
@@ -261,11 +256,11 @@ class _Writer:
                 self.file_format,
                 look,
                 name=self._name,
-                portable=output.portable,
+                portable=not settings.attributes,
                 texels=texels,
             )
         indices = None
-        if output.index_buffer:
+        if settings.index_buffer:
             indices = f"{path.stem}.indices.bin", index_buffer(levels, backs)
             path.with_name(indices[0]).write_bytes(indices[1].content)
         sidecar = CardFile(
@@ -274,7 +269,7 @@ class _Writer:
             tuple(levels),
             level_names(self._name, len(levels)),
             errors=build.errors,
-            portable=output.portable,
+            portable=not settings.attributes,
             textures=roles,
             texture_files=texture_channels(written),
             base_gain=maps.base_gain,
@@ -355,7 +350,7 @@ class CardExport:
         Raises:
             HairloomError: no hair that can be used, no bake, or a format that cannot be written.
         """
-        motion = None if output.motion.kind == "none" else BakedGuides.of(hair, frames)
+        motion = None if output.settings.motion == "none" else BakedGuides.of(hair, frames)
         check_output(path, output, motion)
         rig, stale = (None, ()) if motion is None else (motion.rig, motion.notes)
         inputs, notes, dropped = read_inputs(hair, depsgraph, rig)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,10 @@ import numpy as np
 from ...arrays import Floats
 from ...card_flow import bound_cards, cards_at
 from ...cards.card_mesh import CardMesh
+from ...cards.export_settings import CardExportSettings
 from ...cards.joint_keys import between_keys, chain_keys, keys_of
 from ...cards.joint_solve import rigid_fits
-from ...cards.joints import CardTracks, FitError, JointChoices, joint_steps, keyed_error
+from ...cards.joints import CardTracks, FitError, joint_steps, keyed_error
 from ...cards.steps import result_of
 from ...cards.vertex_animation import MotionLayout, motion_layout, motion_texture, vertex_texels
 from ...errors import HairloomError
@@ -30,20 +31,6 @@ _KEY_SHARE = 0.5
 _FEWEST_FRAMES = 2
 
 
-@dataclass(frozen=True)
-class MotionChoices:
-    """How motion is written.
-
-    kind: "none", "joints" or "texture". space: "head" leaves the head's own motion out.
-    depth: of textures, "half" or "float".
-    """
-
-    kind: str = "none"
-    space: str = "head"
-    depth: str = "half"
-    joints: JointChoices = field(default_factory=JointChoices)
-
-
 @dataclass(frozen=True, eq=False)
 class MovedCards:
     """tracks, and if they are wanted the normals and the tangents, as `CardTracks.moved`."""
@@ -53,7 +40,9 @@ class MovedCards:
     tangents: tuple[Floats, ...] = ()
 
 
-def check_motion(choices: MotionChoices, motion: GuideMotion, file_format: CardFormat) -> None:
+def check_motion(
+    settings: CardExportSettings, motion: GuideMotion, file_format: CardFormat
+) -> None:
     """Refuse what cannot be written, before any work is done.
 
     Raises:
@@ -63,7 +52,7 @@ def check_motion(choices: MotionChoices, motion: GuideMotion, file_format: CardF
         raise HairloomError(
             "one frame is no motion", place="frame range", remedy="Choose two frames or more"
         )
-    if choices.kind == "joints" and file_format != GLB:
+    if settings.motion == "joints" and file_format != GLB:
         raise HairloomError(
             f"joints are written to GLB, not to {file_format.title}",
             place="motion",
@@ -128,7 +117,7 @@ class JointMotion:
     tracks: CardTracks
     skeleton: Skeleton
     error: FitError
-    choices: MotionChoices
+    settings: CardExportSettings
 
     @property
     def share(self) -> float:
@@ -138,7 +127,7 @@ class JointMotion:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the artist should know."""
-        wanted = self.choices.joints.error
+        wanted = self.settings.joint_error / 100.0
         if self.share <= wanted:
             return ()
         return (
@@ -148,7 +137,7 @@ class JointMotion:
 
     @property
     def facts(self) -> dict[str, Any]:
-        return joint_motion(self.tracks, self.skeleton, self.error, self.choices.space)
+        return joint_motion(self.tracks, self.skeleton, self.error, self.settings.motion_space)
 
     def complete(self, path: Path, nodes: Sequence[str]) -> None:
         """Put the skeleton into the GLB that lies there."""
@@ -158,26 +147,25 @@ class JointMotion:
 
 
 def joint_motion_steps(
-    tracks: CardTracks, choices: MotionChoices
+    tracks: CardTracks, settings: CardExportSettings
 ) -> Generator[float, None, JointMotion]:
     """Fit joints and keys; yields the share that is done."""
-    wanted = choices.joints
-    rig = yield from joint_steps(tracks, wanted)
-    keys = result_of(chain_keys(rig, wanted.error * tracks.hair_length * _KEY_SHARE))
+    allowed = settings.joint_error / 100.0 * tracks.hair_length * _KEY_SHARE
+    rig = yield from joint_steps(tracks, settings)
+    keys = result_of(chain_keys(rig, allowed))
     yield 0.95
     turn, place = zip(*(between_keys(each, tracks.frame_count) for each in keys), strict=True)
     error = keyed_error(tracks, rig, np.stack(turn), np.stack(place))
     root_keys = None
-    if choices.space == "world":
+    if settings.motion_space == "world":
         carried = tracks.carrier[:, :3, :3] @ tracks.root + tracks.carrier[:, :3, 3]
         size = np.ptp(tracks.levels[0].positions, axis=0).max()
-        near = wanted.error * tracks.hair_length * _KEY_SHARE
         reach = np.array([float(size)])
         # of the root joint's rest, which is no more than a place
-        root_keys = keys_of(tracks.carrier[None, :, :3, :3], carried[None], reach, near)
+        root_keys = keys_of(tracks.carrier[None, :, :3, :3], carried[None], reach, allowed)
     skeleton = Skeleton(rig, keys, tracks.root, root_keys, tracks.frame_rate)
     yield 1.0
-    return JointMotion(tracks, skeleton, error, choices)
+    return JointMotion(tracks, skeleton, error, settings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,16 +174,16 @@ class TextureMotion:
 
     moved: MovedCards
     layout: MotionLayout
-    choices: MotionChoices
+    settings: CardExportSettings
     file_format: CardFormat
 
     @classmethod
     def of(
-        cls, moved: MovedCards, choices: MotionChoices, file_format: CardFormat, place: str
+        cls, moved: MovedCards, settings: CardExportSettings, file_format: CardFormat, place: str
     ) -> TextureMotion:
         tracks = moved.tracks
         count = sum(len(mesh.positions) for mesh in tracks.levels)
-        return cls(moved, motion_layout(count, tracks.frame_count, place), choices, file_format)
+        return cls(moved, motion_layout(count, tracks.frame_count, place), settings, file_format)
 
     @property
     def texels(self) -> tuple[Floats, ...]:
@@ -219,7 +207,7 @@ class TextureMotion:
                 path.with_name(files[name]),
                 motion_texture(values, self.layout),
                 is_color=False,
-                depth=self.choices.depth,
+                depth=self.settings.motion_depth,
             )
         return files
 
@@ -227,7 +215,12 @@ class TextureMotion:
         tracks = self.moved.tracks
         low: Floats = np.stack([each.min(axis=(0, 1)) for each in tracks.moved]).min(axis=0)
         high: Floats = np.stack([each.max(axis=(0, 1)) for each in tracks.moved]).max(axis=0)
-        bounds, choices = (low, high), self.choices
         return texture_motion(
-            tracks, self.file_format, self.layout, files, choices.depth, bounds, choices.space
+            tracks,
+            self.file_format,
+            self.layout,
+            files,
+            self.settings.motion_depth,
+            (low, high),
+            self.settings.motion_space,
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...cards.atlas_grid import AtlasGrid
+from ...cards.export_settings import CardExportSettings
 from ...errors import HairloomError
 from ...exchange.textures.card_textures import WrittenTexture, write_card_textures
 from ...exchange.textures.texture_files import has_openimageio
@@ -63,20 +63,12 @@ def named_pictures(arguments: list[str]) -> dict[str, Floats]:
     return pictures
 
 
-@dataclass(frozen=True)
-class TextureFiles:
-    """How the textures are written.
-
-    packing: one of exchange.texture_packing.PRESETS.
-    format: one of exchange.card_textures.FORMATS.
-    """
-
-    packing: str = "hairloom"
-    format: str = "png"
-
-
 def write_textures(
-    folder: Path, stem: str, maps: Mapping[str, Floats], grid: AtlasGrid, files: TextureFiles
+    folder: Path,
+    stem: str,
+    maps: Mapping[str, Floats],
+    grid: AtlasGrid,
+    settings: CardExportSettings,
 ) -> list[WrittenTexture]:
     """Write all textures of a preset.
 
@@ -88,12 +80,12 @@ def write_textures(
     """
     return [
         texture
-        for those in _together(maps, files)
+        for those in _together(maps, settings)
         for texture in write_card_textures(
             folder / stem,
             _of_one_size(those),
-            files.packing,
-            file_format=files.format,
+            settings.packing,
+            file_format=settings.textures,
             grid=grid,
             write=write_texture,
         )
@@ -129,11 +121,13 @@ def texture_channels(written: Iterable[WrittenTexture]) -> dict[str, dict[str, A
     }
 
 
-def _together(maps: Mapping[str, Floats], files: TextureFiles) -> list[Mapping[str, Floats]]:
+def _together(
+    maps: Mapping[str, Floats], settings: CardExportSettings
+) -> list[Mapping[str, Floats]]:
     """Maps that must be of one size. Those that have a file each need not be, but for mip maps,
     which alpha weighs.
     """
-    if files.packing == "hairloom" and not files.format.startswith("dds"):
+    if settings.packing == "hairloom" and not settings.textures.startswith("dds"):
         return [{name: image} for name, image in maps.items()]
     return [maps]
 

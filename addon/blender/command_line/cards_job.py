@@ -10,6 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...arrays import Floats
+from ...cards.export_settings import CardExportSettings
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...errors import HairloomError
@@ -17,12 +18,11 @@ from ...exchange.cards.card_formats import format_of
 from ...pipeline import Rig
 from ..bakes.guide_motion import GuideMotion
 from ..cards.build import CardInputs, order_line
-from ..cards.card_choices import motion_choices
 from ..cards.files import CardOutput, WrittenCards, write_cards
 from ..cards.occluders import read_occluders
-from ..cards.textures import TextureFiles, chosen_pictures, named_pictures
+from ..cards.textures import chosen_pictures, named_pictures
 from .card_options import add_card_options
-from .job_options import add_texture_option, frames_of_option
+from .job_options import add_texture_option, frames_of_option, parameters_of
 from .job_steps import Job, finish, motion_of, read_rig, tell_notes
 from .verb import Verb
 
@@ -32,14 +32,9 @@ def cards(job: Job) -> None:
     options = job.options
     pictures = _own_pictures(job) | named_pictures(options.texture)
     path, _ = format_of(job.output, options.format)
-    output = CardOutput(
-        options.format,
-        portable=options.portable,
-        index_buffer=options.index_buffer,
-        textures=TextureFiles(options.packing, options.textures),
-        motion=motion_choices(options),
-    )
-    rig, motion = _moving(job)
+    settings = parameters_of(options, job.settings[CardExportSettings])
+    output = CardOutput(options.format, settings=settings)
+    rig, motion = _moving(job, settings)
     written_cards(job, path, rig, pictures, output, motion)
     finish(job, path)
 
@@ -87,11 +82,11 @@ def written_cards(
     return written
 
 
-def _moving(job: Job) -> tuple[Rig, GuideMotion | None]:
+def _moving(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | None]:
     """The hair, and what moves it if motion is asked for: the bake of a folder or of an object."""
     options = job.options
     frames = frames_of_option(options.frames)
-    if options.motion != "none":
+    if settings.motion != "none":
         motion = motion_of(job, frames)
         return motion.rig, motion
     if options.bake is not None or frames is not None:

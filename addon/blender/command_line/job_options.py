@@ -214,6 +214,34 @@ def add_settings_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_parameter_options(parser: Any, kind: type[Settings]) -> None:
+    """An option for each parameter of a section, over --set; see `parameters_of`."""
+    for parameter in kind.parameters():
+        name = "--" + parameter.name.replace("_", "-")
+        about = parameter.description.replace("%", "%%")
+        if parameter.kind == "toggle":
+            parser.add_argument(name, action="store_true", default=None, help=about)
+            continue
+        choices = [identifier for identifier, *_ in parameter.choices] or None
+        parser.add_argument(
+            name,
+            type=str if choices else float if parameter.kind == "number" else int,
+            choices=choices,
+            metavar=None if choices else {"percent": "PERCENT"}.get(parameter.unit, "N"),
+            help=f"{about} (default: {parameter.default})",
+        )
+
+
+def parameters_of[S: Settings](options: argparse.Namespace, settings: S) -> S:
+    """A section with what its own options say, see `add_parameter_options`."""
+    given = {
+        parameter.name: value
+        for parameter in settings.parameters()
+        if (value := getattr(options, parameter.name, None)) is not None
+    }
+    return type(settings).from_dict(settings.as_dict() | given, "the command line")
+
+
 def add_farm_options(parser: argparse.ArgumentParser, *, can_skip: bool) -> None:
     """What whoever started the job is told, and what a second run does again."""
     job = parser.add_argument_group("the job")

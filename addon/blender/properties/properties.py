@@ -24,6 +24,7 @@ _SHOWN_AS = {
     "speed": {"unit": "VELOCITY"},
     "acceleration": {"unit": "ACCELERATION"},
     "factor": {"subtype": "FACTOR"},
+    "percent": {"subtype": "PERCENTAGE"},
     "pixels": {"subtype": "PIXEL"},
 }
 #: decimals that a field shows; lengths of hair are fractions of a millimetre

@@ -10,6 +10,7 @@ import pytest
 from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh
+from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.cards.joint_chains import card_chains
 from hairloom.addon.cards.joint_keys import (
     between_keys,
@@ -22,7 +23,6 @@ from hairloom.addon.cards.joint_keys import (
 from hairloom.addon.cards.joint_solve import Skin, best_weights, rigid_fits, skinned
 from hairloom.addon.cards.joints import (
     CardTracks,
-    JointChoices,
     JointRig,
     joint_names,
     joint_steps,
@@ -153,7 +153,7 @@ def bent(mesh: CardMesh, curl: float) -> np.ndarray:
 
 
 def fitted(tracks: CardTracks, **choices: Any) -> JointRig:
-    return result_of(joint_steps(tracks, JointChoices(**choices)))
+    return result_of(joint_steps(tracks, CardExportSettings(**choices)))
 
 
 def test_rigid_cards_are_exact_with_the_fewest_joints() -> None:
@@ -170,7 +170,7 @@ def test_what_bends_more_has_more_joints_and_stays_under_the_error() -> None:
     for curl in (0.1, 1.5, 3.0):
         mesh = curtain()
         tracks = tracks_of(mesh, bent(mesh, curl))
-        rig = fitted(tracks, chains=2, error=0.003)
+        rig = fitted(tracks, chains=2, joint_error=0.3)
         counts.append(rig.joints)
         assert keyed_error(tracks, rig, rig.turn, rig.place).mean_square_root < 0.003 * 0.1
     assert counts == sorted(counts)
@@ -181,7 +181,7 @@ def test_the_error_is_what_skinning_by_hand_gives() -> None:
     """From the rest matrices and the joints, as an engine does it."""
     mesh = curtain(6)
     tracks = tracks_of(mesh, bent(mesh, 2.0))
-    rig = fitted(tracks, chains=2, joints=3, error=1e-6)
+    rig = fitted(tracks, chains=2, joints=3, joint_error=0.01)
     assert (rig.chains, rig.joints) == (2, 3)
     joints = np.zeros((rig.chains * rig.joints, FRAMES, 4, 4))
     joints[..., :3, :3] = rig.turn.reshape(-1, FRAMES, 3, 3)
@@ -203,7 +203,7 @@ def test_the_error_is_what_skinning_by_hand_gives() -> None:
 
 def test_joints_lie_along_their_chain_at_rest() -> None:
     mesh = curtain()
-    rig = fitted(tracks_of(mesh, bent(mesh, 2.0)), chains=4, joints=4, error=1e-6)
+    rig = fitted(tracks_of(mesh, bent(mesh, 2.0)), chains=4, joints=4, joint_error=0.01)
     height = rig.rest[..., 2, 3]
     np.testing.assert_allclose(height[:, 0], 0.0, atol=1e-6)
     assert (np.diff(height, axis=1) < -0.02).all()

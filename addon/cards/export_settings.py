@@ -1,0 +1,119 @@
+"""How hair cards are written to files: for the window, the command line and the docs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..params import Owner, Settings, choice, integer, number, toggle
+
+
+@dataclass(frozen=True, kw_only=True)
+class CardExportSettings(Settings):
+    """What an artist chooses beside the file and its format."""
+
+    section: ClassVar[str] = "cards_export"
+    title: ClassVar[str] = "Card Files"
+    owner: ClassVar[Owner] = "job"
+
+    packing: str = choice(
+        "hairloom",
+        (
+            ("hairloom", "One Each", "A file for each map, as Hairloom's own shaders read them"),
+            ("gltf", "glTF", "Base colour with alpha, occlusion, normal, anisotropy"),
+            ("unreal", "Unreal", "The default layout of Unreal's card textures"),
+            ("unreal_compact", "Unreal Compact", "The compact layout of Unreal's card textures"),
+            ("unity_hdrp", "Unity HDRP", "As Unity's hair material in HDRP reads them"),
+            ("godot", "Godot", "As Godot's standard material reads them"),
+        ),
+        label="Packing",
+        description="What the channels of the textures hold",
+    )
+    textures: str = choice(
+        "png",
+        (
+            ("png", "PNG", "8 bits, and 16 where steps would be seen"),
+            ("exr", "OpenEXR", "Half floats"),
+            ("dds", "DDS", "Compressed for GPUs (BC4, BC5, BC7), with all mip maps"),
+            ("dds_plain", "DDS, Plain", "Not compressed, with all mip maps"),
+        ),
+        label="Textures",
+        description="Format of the textures",
+    )
+    attributes: bool = toggle(
+        False,
+        label="Custom Attributes",
+        description="Write ambient occlusion as the attribute _AO beside the second UV map, which "
+        "some engines refuse",
+    )
+    index_buffer: bool = toggle(
+        False,
+        label="Index Buffer",
+        description="Write the sorted indices as a file of their own too, NAME.indices.bin, for "
+        "engines that keep their own vertices",
+    )
+    motion: str = choice(
+        "none",
+        (
+            ("none", "None", "The cards at rest"),
+            (
+                "joints",
+                "Joints",
+                "GLB: chains of joints that cards are skinned to, with keys; every engine plays "
+                "them",
+            ),
+            (
+                "texture",
+                "Vertex Textures",
+                "GLB, FBX, USD: where each vertex is in each frame, for a vertex shader; exact",
+            ),
+        ),
+        label="Motion",
+        description="How the motion of the hair's bake is written",
+    )
+    motion_space: str = choice(
+        "head",
+        (
+            (
+                "head",
+                "With the Head",
+                "Without the head's own motion: attach the hair to the head",
+            ),
+            ("world", "World", "With the head's own motion"),
+        ),
+        label="Space",
+        description="What the motion is measured against",
+    )
+    motion_depth: str = choice(
+        "half",
+        (
+            ("half", "Half", "16 bits: within a two thousandth of how far a vertex moves"),
+            ("float", "Float", "32 bits"),
+        ),
+        label="Depth",
+        description="Numbers in the textures of motion",
+    )
+    # 127 chains of two joints each, and the root, are as many as a byte can number
+    chains: int = integer(
+        127,
+        label="Chains",
+        description="Maximum number of chains of joints; cards that move alike share one",
+        soft=(1, 256),
+        hard=(1, 2048),
+    )
+    joints: int = integer(
+        16,
+        label="Joints",
+        description="Maximum number of joints in a chain; as few as stay under the error",
+        soft=(2, 16),
+        hard=(2, 16),
+    )
+    joint_error: float = number(
+        1.0,
+        label="Error",
+        description="Root mean square distance of cards from the simulation, of the mean length of "
+        "the hair",
+        soft=(0.01, 10.0),
+        hard=(0.01, 100.0),
+        unit="percent",
+    )
