@@ -11,6 +11,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes import playback
+from ..blender.bakes.bake_settings import frame_range
 from ..blender.bakes.stale_bakes import stale_notes
 from ..blender.base.outcome import Outcome
 from ..blender.cards.card_choices import (
@@ -113,13 +114,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     def _frames(self, hair: bpy.types.Object) -> range | None:
         if not self.own_frames or self.motion == "none":
             return None
-        if self.last_frame < self.first_frame:
-            raise HairloomError(
-                f"the last frame, {self.last_frame}, comes before the first, {self.first_frame}",
-                place=hair.name,
-                remedy="Correct the frame range",
-            )
-        return range(self.first_frame, self.last_frame + 1)
+        return frame_range(self.first_frame, self.last_frame, hair.name)
 
     def _hair(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         if not self.collection:

@@ -10,6 +10,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
+from ..blender.bakes.bake_settings import frame_range
 from ..blender.base.outcome import Outcome
 from ..blender.strands.strand_choices import FORMATS, FRAMES, SEVERAL, file_of, strand_output
 from ..blender.strands.strand_export import StrandExport
@@ -109,13 +110,7 @@ class StrandExportOperator(LongWork, ExportHelper):
             return None
         own = frames == "own"
         first, last = (self.first, self.last) if own else (scene.frame_start, scene.frame_end)
-        if last < first:
-            raise HairloomError(
-                f"the last frame, {last}, comes before the first, {first}",
-                place="Frames",
-                remedy="Correct the frame range",
-            )
-        return range(first, last + 1)
+        return frame_range(first, last, "Frames")
 
     def _hair(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         if not self.collection:

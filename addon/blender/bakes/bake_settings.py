@@ -24,10 +24,19 @@ def frames_of(obj: bpy.types.Object, scene: bpy.types.Scene) -> range:
     bake = obj.hairloom.bake
     own = bake.use_own_range
     first, last = (bake.first, bake.last) if own else (scene.frame_start, scene.frame_end)
+    return frame_range(first, last, obj.name)
+
+
+def frame_range(first: int, last: int, place: str) -> range:
+    """All frames from the first to the last one.
+
+    Raises:
+        HairloomError: the last one comes before the first.
+    """
     if last < first:
         raise HairloomError(
             f"the last frame, {last}, comes before the first, {first}",
-            place=obj.name,
+            place=place,
             remedy="Correct the frame range",
         )
     return range(first, last + 1)

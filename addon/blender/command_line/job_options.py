@@ -13,6 +13,7 @@ from ...errors import HairloomError
 from ...exchange.strand_formats import SUFFIXES
 from ...parameters import ALL_SETTINGS
 from ...params import Settings, SettingsMap
+from ..bakes.bake_settings import frame_range
 from ..base.report import STYLES
 from ..properties.presets import named_preset
 from ..scene.principled import look_from_named
@@ -116,13 +117,7 @@ def frames_of_option(given: list[int] | None, at_most: int | None = None) -> ran
     if given is None:
         return None
     first, last = given
-    if last < first:
-        raise HairloomError(
-            f"the last frame, {last}, comes before the first, {first}",
-            place="--frames",
-            remedy="Give the first frame, then the last",
-        )
-    frames = range(first, last + 1)
+    frames = frame_range(first, last, "--frames")
     return frames if at_most is None else frames[:at_most]
 
 
