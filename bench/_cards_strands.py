@@ -96,7 +96,7 @@ def _cards(rig: Rig, made: MappedCards, look: str, width: float) -> CardSnapshot
         maps.has_tangent_map,
         build.backs[0],
         thickness=area.shade(settings[StrandSettings]) / shade,
-        is_even=maps.is_even,
+        is_view_compensated=maps.is_view_compensated,
     )
 
 

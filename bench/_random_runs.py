@@ -25,7 +25,7 @@ from hairloom.addon.dynamics.colliders import (
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState
 from hairloom.addon.dynamics.step import Drive
-from hairloom.addon.dynamics.way import bow
+from hairloom.addon.dynamics.trajectory import curvature
 from hairloom.addon.params import Parameter
 
 CV_COUNTS = (2, 3, 4, 8, 16, 24)
@@ -98,7 +98,7 @@ class RandomRun:
 
     def _posed(self, collider: Collider, way: Way, moments: list[float]) -> PosedCollider:
         matrices = [way.matrix(time) for time in moments]
-        bent = bow(*matrices, 1.0) if self.is_bent and len(matrices) == 3 else None
+        bent = curvature(*matrices, 1.0) if self.is_bent and len(matrices) == 3 else None
         return PosedCollider(collider, matrices[-2], matrices[-1], bent)
 
 

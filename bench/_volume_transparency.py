@@ -106,7 +106,7 @@ def sorted_picture(strands: np.ndarray, brightness: np.ndarray, camera: Camera) 
     alphas[(share < 0.0) | (share > 1.0)] = 0.0
     colors = np.broadcast_to(brightness[:, None], (*alphas.shape, 3))
     depths = between(clip[..., 2] / clip[..., 3])
-    shares = layer_fractions(depths, alphas, layers=RIBBONS, unseen_share=0.0)
+    shares = layer_fractions(depths, alphas, layers=RIBBONS, unseen_fraction=0.0)
     light = np.einsum("pn,pnc->pc", shares, colors)
     exact = np.column_stack([light, 1.0 - np.prod(1.0 - alphas, axis=-1)])
     return exact.reshape(SIZE, SIZE, 4)

@@ -8,11 +8,11 @@ void main()
 #if SPARSE
   uint column = uint(gl_FragCoord.x) + uint(first_column);
   uint row = uint(gl_FragCoord.y) + uint(first_row);
-  if (!is_counted(column, row, uint(strand_number), depth_and_share.y)) {
+  if (!is_counted(column, row, uint(strand_number), depth_and_fraction.y)) {
     discard;
   }
 #endif
-  sample_place = vec4(along_and_side.x, strand_id, depth_and_share.x, base_and_occlusion.w);
-  sample_way = vec4(unit_of(strand_tangent, vec3(0.0, 1.0, 0.0)), along_and_side.y);
+  sample_place = vec4(along_and_side.x, strand_id, depth_and_fraction.x, base_and_occlusion.w);
+  sample_tangent = vec4(unit_of(strand_tangent, vec3(0.0, 1.0, 0.0)), along_and_side.y);
   sample_base = vec4(base_and_occlusion.xyz, 1.0);
 }

@@ -10,7 +10,7 @@ void main()
   int strand = first_strand + gl_InstanceID;
   ivec2 texel = strand_texel(strand, station, cv_count);
   vec4 where = texelFetch(cv_places, texel, 0);  // xy place, zw half
-  vec4 way = texelFetch(cv_ways, texel, 0);      // xyz tangent, w depth
+  vec4 tangent = texelFetch(cv_tangents, texel, 0);      // xyz tangent, w depth
   vec4 look = texelFetch(cv_looks, texel, 0);    // xyz base, w occlusion
   vec4 rest = texelFetch(cv_rest, texel, 0);     // x share, y strand_id
 
@@ -18,8 +18,8 @@ void main()
   strand_number = strand;
   strand_id = rest.y;
   along_and_side = vec2(float(station) / float(cv_count - 1), side);
-  depth_and_share = vec2(way.w, rest.x);
-  strand_tangent = way.xyz;
+  depth_and_fraction = vec2(tangent.w, rest.x);
+  strand_tangent = tangent.xyz;
   base_and_occlusion = look;
-  gl_Position = vec4(2.0 * place - 1.0, 1.0 - 2.0 * way.w, 1.0);
+  gl_Position = vec4(2.0 * place - 1.0, 1.0 - 2.0 * tangent.w, 1.0);
 }

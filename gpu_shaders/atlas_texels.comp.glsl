@@ -17,11 +17,11 @@ void main()
       ivec2 from = texel * {{atlas_samples}} + ivec2(x + texel.y, y);  // samples lean, see Block
       vec4 base = texelFetch(sample_base, from, 0);
       vec4 place = texelFetch(sample_place, from, 0) * base.w;
-      vec4 way = texelFetch(sample_way, from, 0);
+      vec4 tangent = texelFetch(sample_tangent, from, 0);
       base_sum += base;
       place_sum += place;
-      tangent_sum += way.xyz * base.w;
-      normal_sum += fibre_normal(way.xyz, way.w) * base.w;
+      tangent_sum += tangent.xyz * base.w;
+      normal_sum += fibre_normal(tangent.xyz, tangent.w) * base.w;
       bool is_outer = base.w > 0.0 && place.z > outermost;
       outermost = is_outer ? place.z : outermost;
       strand_id = is_outer ? place.y : strand_id;

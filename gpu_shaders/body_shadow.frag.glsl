@@ -25,10 +25,10 @@ void main()
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, mesh_point, to_light, irradiance);
-    vec3 way = way_of_light_to_mesh(index, mesh_point, normal);
+    vec3 path = shadow_path_to_mesh(index, mesh_point, normal);
     vec3 arriving = irradiance * max(0.0, dot(normal, to_light)) / LIGHT_PI;
-    all_light += arriving * way.z;
-    left += arriving * light_left(way, hair_forward);
+    all_light += arriving * path.z;
+    left += arriving * light_left(path, hair_forward);
   }
   // where there is no light at all hair takes none
   color = vec4(vec3(0.0), 1.0 - (shown(left) + NO_LIGHT) / (shown(all_light) + NO_LIGHT));

@@ -31,10 +31,10 @@ void main()
   float texture_alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
   float alpha = texture_alpha;
   vec3 across = cross(dFdx(card_point), dFdy(card_point));
-#  if EVEN
+#  if VIEW_COMPENSATED
   alpha = view_compensated_alpha(alpha, across, tangent, to_eye);
 #  endif
-  vec3 card_way = tangent, card_front = normal;
+  vec3 card_axis = tangent, card_front = normal;
 #  if TANGENT_MAP
   vec3 texel = card_texel(tangent_texture, card_uv, steps, atlas_tiles).xyz;
   tangent = mapped_tangent(texel, tangent, normal, shading.shift_noise);
@@ -44,7 +44,7 @@ void main()
 #  endif
 #  if NORMAL_MAP
   normal = mapped_normal(card_texel(normal_texture, card_uv, steps, atlas_tiles).xyz,
-                         card_way,
+                         card_axis,
                          normal);
 #  endif
   vec3 base = card_texel(base_texture, card_uv, steps, atlas_tiles).xyz;
@@ -63,9 +63,9 @@ void main()
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, card_point, to_light, irradiance);
-    vec3 way = way_of_light_to_card(
-        index, card_point, texture_alpha, to_light, across, card_way, card_front);
-    irradiance *= way.x < 0.0 ? card_occlusion : way.z;
+    vec3 path = shadow_path_to_card(
+        index, card_point, texture_alpha, to_light, across, card_axis, card_front);
+    irradiance *= path.x < 0.0 ? card_occlusion : path.z;
     float level = 0.0;
 #  if MARSCHNER
     level = pixel_level(
@@ -80,7 +80,7 @@ void main()
                                         hair,
                                         absorption,
                                         level,
-                                        way);
+                                        path);
   }
   float covered = is_opaque == 1 ? 1.0 : alpha;
 #  if CLIPPED

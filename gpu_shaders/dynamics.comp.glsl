@@ -19,17 +19,17 @@
 #endif
 
 vec3 style_before[CV_COUNT];
-vec3 style_way[CV_COUNT];
-vec3 style_bow[CV_COUNT];
+vec3 style_displacement[CV_COUNT];
+vec3 style_curvature[CV_COUNT];
 vec3 twist_before;
-vec3 twist_way;
-vec3 twist_bow;
+vec3 twist_displacement;
+vec3 twist_curvature;
 vec3 fall[FREE_SIZE];  // [m] that gravity adds to each free CV in a substep
 
-// How the way of a point is bent, times r (r + 1); twin of bow in addon/dynamics/way.py.
-vec3 bow_of(vec3 earlier, vec3 before, vec3 way)
+// How the path of a point is bent, times r (r + 1); twin of curvature in addon/dynamics/trajectory.py.
+vec3 curvature_of(vec3 earlier, vec3 before, vec3 displacement)
 {
-  return earlier - before + way * frame.fall.w;
+  return earlier - before + displacement * frame.fall.w;
 }
 
 void load_guide(int guide)
@@ -43,8 +43,8 @@ void load_guide(int guide)
       previous[cv] = position[cv] - (position[cv] - previous[cv]) * frame.speed_ratio;
     }
     style_before[cv] = texelFetch(styles_before, texel, 0).xyz;
-    style_way[cv] = texelFetch(styles_now, texel, 0).xyz - style_before[cv];
-    style_bow[cv] = bow_of(texelFetch(styles_earlier, texel, 0).xyz, style_before[cv], style_way[cv]);
+    style_displacement[cv] = texelFetch(styles_now, texel, 0).xyz - style_before[cv];
+    style_curvature[cv] = curvature_of(texelFetch(styles_earlier, texel, 0).xyz, style_before[cv], style_displacement[cv]);
   }
 #ifdef TIPS_HELD
   tip_is_held = texelFetch(rest_lengths, strand_texel(guide, CV_COUNT - 1, CV_COUNT), 0).x > 0.0;
@@ -64,33 +64,33 @@ void load_guide(int guide)
   int twist_cv = int(texelFetch(rest_shapes, strand_texel(guide, 0, CV_COUNT), 0).x);
   ivec2 texel = strand_texel(guide, twist_cv, CV_COUNT);
   twist_before = texelFetch(styles_before, texel, 0).xyz;
-  twist_way = texelFetch(styles_now, texel, 0).xyz - twist_before;
-  twist_bow = bow_of(texelFetch(styles_earlier, texel, 0).xyz, twist_before, twist_way);
+  twist_displacement = texelFetch(styles_now, texel, 0).xyz - twist_before;
+  twist_curvature = curvature_of(texelFetch(styles_earlier, texel, 0).xyz, twist_before, twist_displacement);
 }
 
 void find_fall()
 {
   vec3 middle[FREE_SIZE];
   for (int i = 0; i < FREE; i++) {
-    middle[i] = style_before[i + 2] + 0.5 * style_way[i + 2];
+    middle[i] = style_before[i + 2] + 0.5 * style_displacement[i + 2];
   }
-  vec3 root = style_before[1] + 0.5 * style_way[1];
+  vec3 root = style_before[1] + 0.5 * style_displacement[1];
   weight_on_style(frame.combed.xyz, root, middle, fall);
   for (int i = 0; i < FREE; i++) {
     fall[i] = frame.fall.xyz - fall[i];
   }
 }
 
-void predict(vec4 moment, vec3 air_way)
+void predict(vec4 moment, vec3 air_displacement)
 {
   for (int i = 0; i < FREE; i++) {
     vec3 here = position[i + 2];
     vec3 before = previous[i + 2];
     if (frame.drag > 0.0) {
-      before = braked(here, before, frame.drag, air_way);
+      before = braked(here, before, frame.drag, air_displacement);
     }
-    vec3 impulse = style_way[i + 2] * moment.z + style_bow[i + 2] * moment.w;
-    impulse += fall[i] + air_way * frame.air_fraction;
+    vec3 impulse = style_displacement[i + 2] * moment.z + style_curvature[i + 2] * moment.w;
+    impulse += fall[i] + air_displacement * frame.air_fraction;
     position[i + 2] = (here - before) * frame.kept + here + impulse;
     previous[i + 2] = here;
   }
@@ -100,9 +100,9 @@ void predict(vec4 moment, vec3 air_way)
 void pin_tip()
 {
 #ifdef TIPS_HELD
-  vec3 way = style[CV_COUNT - 1] - style[1];
-  float share = min(tip_reach / max(length(way), TINY), 1.0);
-  position[CV_COUNT - 1] = tip_is_held ? style[1] + way * share : position[CV_COUNT - 1];
+  vec3 displacement = style[CV_COUNT - 1] - style[1];
+  float fraction = min(tip_reach / max(length(displacement), TINY), 1.0);
+  position[CV_COUNT - 1] = tip_is_held ? style[1] + displacement * fraction : position[CV_COUNT - 1];
 #endif
 }
 
@@ -177,15 +177,15 @@ void do_substep(int number)
   for (int i = 0; i < {{wind_modes}} / 4; i++) {
     turns[i] = texelFetch(moments, ivec2(1 + i, number), 0);
   }
-  vec3 air_way = air_at(position[0], turns) * frame.dt;
+  vec3 air_displacement = air_at(position[0], turns) * frame.dt;
 #else
-  vec3 air_way = vec3(0.0);
+  vec3 air_displacement = vec3(0.0);
 #endif
   for (int cv = 0; cv < CV_COUNT; cv++) {
-    style[cv] = style_before[cv] + style_way[cv] * moment.x + style_bow[cv] * moment.y;
+    style[cv] = style_before[cv] + style_displacement[cv] * moment.x + style_curvature[cv] * moment.y;
   }
-  style_twist = twist_before + twist_way * moment.x + twist_bow * moment.y;
-  predict(moment, air_way);
+  style_twist = twist_before + twist_displacement * moment.x + twist_curvature * moment.y;
+  predict(moment, air_displacement);
   pin();
   restore_style();
   pin_tip();

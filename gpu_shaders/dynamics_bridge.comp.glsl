@@ -12,6 +12,6 @@ void main()
   }
   ivec2 root = strand_texel(id.y, 0, cv_count);
   ivec2 texel = strand_texel(id.y, id.x, cv_count);
-  vec3 root_way = texelFetch(styles_now, root, 0).xyz - texelFetch(positions, root, 0).xyz;
-  imageStore(bridged, texel, vec4(texelFetch(positions, texel, 0).xyz + root_way, 0.0));
+  vec3 root_displacement = texelFetch(styles_now, root, 0).xyz - texelFetch(positions, root, 0).xyz;
+  imageStore(bridged, texel, vec4(texelFetch(positions, texel, 0).xyz + root_displacement, 0.0));
 }

@@ -13,10 +13,10 @@ vec3 fibre_normal(vec3 tangent, float side)
 
 // Whether a sample of a ribbon that was widened counts: `share` of them do, evenly spread by the R2
 // sequence of Roberts 2018.
-bool is_counted(uint column, uint row, uint strand, float share)
+bool is_counted(uint column, uint row, uint strand, float fraction)
 {
   uint place = column * {{sparse_step_x}}u + row * {{sparse_step_y}}u + strand * {{sparse_step_z}}u;
-  return float(place & {{sparse_mask}}u) < share * float({{sparse_mask}}u + 1u);
+  return float(place & {{sparse_mask}}u) < fraction * float({{sparse_mask}}u + 1u);
 }
 
 // Where a place of the atlas, in 0..1, is among the samples of a block of it: Block.leaning.

@@ -7,18 +7,18 @@
 // The way of a strand by a texel of a tangent map.
 vec3 mapped_tangent(vec3 texel, vec3 tangent, vec3 normal, float shift_noise)
 {
-  vec3 way = 2.0 * texel - 1.0;
+  vec3 direction = 2.0 * texel - 1.0;
   vec3 side = cross(tangent, normal);
-  vec3 strand = way.x * side + way.y * tangent + way.z * (shift_noise * normal);
+  vec3 strand = direction.x * side + direction.y * tangent + direction.z * (shift_noise * normal);
   return unit_or(strand, tangent);
 }
 
 // The normal by a texel of a normal map.
 vec3 mapped_normal(vec3 texel, vec3 tangent, vec3 normal)
 {
-  vec3 way = 2.0 * texel - 1.0;
+  vec3 direction = 2.0 * texel - 1.0;
   vec3 side = cross(tangent, normal);
-  return unit_or(way.x * side + way.y * tangent + way.z * normal, normal);
+  return unit_or(direction.x * side + direction.y * tangent + direction.z * normal, normal);
 }
 
 // What a card covers that is seen at a slant, if alpha is what it covers on the mean of all turns about

@@ -5,30 +5,30 @@
 // tau that light meets in a card of thickness 1.
 float card_optical_depth(float alpha)
 {
-  return -log(1.0 - min(alpha, {{most_alpha}}));
+  return -log(1.0 - min(alpha, {{max_alpha}}));
 }
 
 // |cos| of the turn about its strands by which a card faces a way. `across`: normal of its plane, of any
 // length.
-float turned_facing(vec3 across, vec3 tangent, vec3 way)
+float turned_facing(vec3 across, vec3 tangent, vec3 direction)
 {
-  vec3 turned = way - dot(way, tangent) * tangent;
+  vec3 turned = direction - dot(direction, tangent) * tangent;
   float size = length(across) * length(turned);
   return size > 0.0 ? abs(dot(across, turned)) / size : 1.0;
 }
 
 // Factor of the tau that light from a way meets in an even card.
-float even_depth(vec3 across, vec3 tangent, vec3 way)
+float view_compensated_depth(vec3 across, vec3 tangent, vec3 direction)
 {
-  return {{mean_turn}} / max(turned_facing(across, tangent, way), {{least_facing}});
+  return {{mean_turn}} / max(turned_facing(across, tangent, direction), {{least_facing}});
 }
 
 // How much hair lies before and beyond the strand of an even card that is seen; `way`: before and beyond
 // its plane by the map.
-vec2 among_strands(vec2 way, float scale, float tau, float share, float front)
+vec2 among_strands(vec2 direction, float scale, float tau, float fraction, float front)
 {
-  float few = max(tau, {{least_tau}});
+  float few = max(tau, {{min_tau}});
   float others = scale * (few / (1.0 - exp(-few)) - 1.0);
-  vec2 rest = max(way - scale * tau * vec2(share, 1.0 - share), 0.0);
+  vec2 rest = max(direction - scale * tau * vec2(fraction, 1.0 - fraction), 0.0);
   return rest + others * vec2(1.0 - front, front);
 }

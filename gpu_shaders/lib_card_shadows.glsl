@@ -7,7 +7,7 @@
 #if SHADOWS
 // How much of a card at a point counts towards tau there, since tau grows evenly through the layer
 // in which the card lies.
-float own_share(int light, vec3 point)
+float own_fraction(int light, vec3 point)
 {
   vec3 place = map_place(opacity, light, point);
   float depth = min(place.z, 1.0), bias = opacity.bias;
@@ -34,21 +34,21 @@ float own_share(int light, vec3 point)
 
 // As way_of_light, for a place of a card whose texture covers alpha. `across`: normal of its plane, of any
 // length. EVEN: for the foremost of its strands.
-vec3 way_of_light_to_card(
+vec3 shadow_path_to_card(
     int index, vec3 point, float alpha, vec3 to_light, vec3 across, vec3 tangent, vec3 normal)
 {
-  vec3 way = way_of_light(index, point);
+  vec3 path = shadow_path(index, point);
 #if SHADOWS
-  if (way.x >= 0.0) {
-    float share = own_share(index, point), tau = card_optical_depth(alpha);
+  if (path.x >= 0.0) {
+    float fraction = own_fraction(index, point), tau = card_optical_depth(alpha);
     float scale = opacity.extinction * card_thickness;
-#  if EVEN
-    scale *= even_depth(across, tangent, to_light);
-    way.xy = among_strands(way.xy, scale, tau, share, 0.5 + 0.5 * dot(normal, to_light));
+#  if VIEW_COMPENSATED
+    scale *= view_compensated_depth(across, tangent, to_light);
+    path.xy = among_strands(path.xy, scale, tau, fraction, 0.5 + 0.5 * dot(normal, to_light));
 #  else
-    way.x = max(way.x - scale * share * tau, 0.0);
+    path.x = max(path.x - scale * fraction * tau, 0.0);
 #  endif
   }
 #endif
-  return way;
+  return path;
 }

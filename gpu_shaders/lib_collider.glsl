@@ -29,16 +29,16 @@ Round round_at(int index)
 vec3 outward_of(Round solid, vec3 point)
 {
   vec3 outward = point - solid.start;
-  float share = clamp(dot(outward, solid.axis) * solid.inverse_square, 0.0, 1.0);
-  return outward - solid.axis * share;
+  float fraction = clamp(dot(outward, solid.axis) * solid.inverse_square, 0.0, 1.0);
+  return outward - solid.axis * fraction;
 }
 
 Found distance_from(vec3 outward, float radius)
 {
-  float way = length(outward);
-  vec3 gradient = outward / max(way, 1.0e-9);
-  gradient.z = way < 1.0e-9 ? 1.0 : gradient.z;  // on the very axis any way out is as good
-  return Found(way - radius, gradient);
+  float reach = length(outward);
+  vec3 gradient = outward / max(reach, 1.0e-9);
+  gradient.z = reach < 1.0e-9 ? 1.0 : gradient.z;  // on the very axis any way out is as good
+  return Found(reach - radius, gradient);
 }
 #endif
 

@@ -157,8 +157,8 @@ void find_contacts(int substep)
 #else
   float squared = 0.0;
   for (int i = 0; i < FREE; i++) {
-    vec3 way = position[i + 2] - position[1];
-    squared = max(squared, dot(way, way));
+    vec3 span = position[i + 2] - position[1];
+    squared = max(squared, dot(span, span));
   }
   float guide_radius = sqrt(squared);
   int collider = next_near(0, substep, guide_radius);

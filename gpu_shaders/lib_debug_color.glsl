@@ -13,9 +13,9 @@ vec3 hue_color(float hue)
 // A detail factor of 1 to 64 by its logarithm: from dark blue over green and yellow to red.
 vec3 detail_color(int pieces)
 {
-  float share = clamp(log2(float(pieces)) / 6.0, 0.0, 1.0);
-  vec3 color = hue_color(0.66 * (1.0 - share));
-  return color * mix(0.5, 1.0, sqrt(share));
+  float fraction = clamp(log2(float(pieces)) / 6.0, 0.0, 1.0);
+  vec3 color = hue_color(0.66 * (1.0 - fraction));
+  return color * mix(0.5, 1.0, sqrt(fraction));
 }
 
 // Of a guide or a group: neighbours in number are far apart in hue, a golden section each.

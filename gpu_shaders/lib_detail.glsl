@@ -68,8 +68,8 @@ float angle_between(vec3 one, vec3 two)
 // clip space, half_size and piece_length in pixels.
 float heuristic_pieces(vec4 from, vec4 to, float angle, vec2 half_size, float piece_length)
 {
-  vec2 way = to.xy / max(to.w, NEAREST) - from.xy / max(from.w, NEAREST);
-  return ceil(length(half_size * way) / piece_length * min(angle / FULL_ANGLE, 1.0));
+  vec2 step = to.xy / max(to.w, NEAREST) - from.xy / max(from.w, NEAREST);
+  return ceil(length(half_size * step) / piece_length * min(angle / FULL_ANGLE, 1.0));
 }
 
 // Whether all control points, in clip space, lie beyond one plane of the frustum.

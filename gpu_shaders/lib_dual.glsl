@@ -12,13 +12,13 @@ const float DUAL_MAX = 0.999, DUAL_MAX_KEPT = 0.9999;
 const float DUAL_MIN_LIGHT = 1.0e-3, DUAL_DIFFUSIVITY = 1.66;
 
 // What a fibre sends on, or back, at cos theta_d, by colour and lobe.
-mat3x4 shares_at(sampler2D shares, float cos_d, vec3 absorption)
+mat3x4 fractions_at(sampler2D fractions, float cos_d, vec3 absorption)
 {
-  vec2 size = vec2(textureSize(shares, 0));
-  vec3 row = absorption / (absorption + {{half_way_absorption}});
-  return mat3x4(textureLod(shares, table_place(vec2(cos_d, row.r), size), 0.0),
-                textureLod(shares, table_place(vec2(cos_d, row.g), size), 0.0),
-                textureLod(shares, table_place(vec2(cos_d, row.b), size), 0.0));
+  vec2 size = vec2(textureSize(fractions, 0));
+  vec3 row = absorption / (absorption + {{midpoint_absorption}});
+  return mat3x4(textureLod(fractions, table_place(vec2(cos_d, row.r), size), 0.0),
+                textureLod(fractions, table_place(vec2(cos_d, row.g), size), 0.0),
+                textureLod(fractions, table_place(vec2(cos_d, row.b), size), 0.0));
 }
 
 vec3 sum_of_lobes(mat3x4 lobes)
@@ -133,8 +133,8 @@ vec3 off_the_skin(float phi,
 vec3 scattering_light(sampler3D longitudinal,
                       sampler2D azimuthal,
                       sampler2D paths,
-                      sampler2D shares_forward,
-                      sampler2D shares_backward,
+                      sampler2D fractions_forward,
+                      sampler2D fractions_backward,
                       vec3 tangent,
                       vec3 normal,
                       vec3 to_light,
@@ -154,8 +154,8 @@ vec3 scattering_light(sampler3D longitudinal,
   vec3 single = single_scattering(
       longitudinal, azimuthal, paths, angles, sparkle_noise, absorption, fibre, shading, level);
   float cos_d = cos(0.5 * (angles.y - angles.x));
-  mat3x4 forward = shares_at(shares_forward, cos_d, absorption);
-  mat3x4 backward = shares_at(shares_backward, cos_d, absorption);
+  mat3x4 forward = fractions_at(fractions_forward, cos_d, absorption);
+  mat3x4 backward = fractions_at(fractions_backward, cos_d, absorption);
   float straight = straight_light(normal, to_light, tau, shading);
   float passed = tau < 0.0 ? -log(max(straight, DUAL_MIN_LIGHT)) : tau;
   vec3 scattered = dual_scattering(

@@ -5,11 +5,11 @@
 #include "lib_guide.glsl"
 
 // Drag by the square of the speed, implicitly; changes `previous`, which holds the speed.
-vec3 braked(vec3 here, vec3 before, float drag, vec3 air_way)
+vec3 braked(vec3 here, vec3 before, float drag, vec3 air_displacement)
 {
-  vec3 way = here - before - air_way;
-  way /= length(way) * drag + 1.0;
-  return here - (way + air_way);
+  vec3 displacement = here - before - air_displacement;
+  displacement /= length(displacement) * drag + 1.0;
+  return here - (displacement + air_displacement);
 }
 
 // The part of gravity that the tension of the carried segments cannot hold, for each free CV.

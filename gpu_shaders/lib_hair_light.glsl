@@ -21,14 +21,14 @@ vec3 hair_light(vec3 tangent,
                 vec3 hair,
                 vec3 absorption,
                 float level,
-                vec3 way)
+                vec3 path)
 {
 #if SCATTERING
   return scattering_light(longitudinal,
                           azimuthal,
                           paths,
-                          shares_forward,
-                          shares_backward,
+                          fractions_forward,
+                          fractions_backward,
                           tangent,
                           normal,
                           to_light,
@@ -39,8 +39,8 @@ vec3 hair_light(vec3 tangent,
                           fibre,
                           shading,
                           level,
-                          way.x,
-                          way.y,
+                          path.x,
+                          path.y,
                           scatter_density,
                           skin_color);
 #elif MARSCHNER
@@ -57,9 +57,9 @@ vec3 hair_light(vec3 tangent,
                          fibre,
                          shading,
                          level,
-                         way.x);
+                         path.x);
 #else
-  return (way.x < 0.0 ? 1.0 : exp(-way.x)) * hair / LIGHT_PI *
+  return (path.x < 0.0 ? 1.0 : exp(-path.x)) * hair / LIGHT_PI *
          kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
 #endif
 }

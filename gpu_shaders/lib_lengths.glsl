@@ -126,7 +126,7 @@ void hold_within_reach()
   float reach = 0.0;
   for (int i = 0; i < FREE; i++) {
     reach += segment_length[i];
-    vec3 way = position[i + 2] - position[1];
-    position[i + 2] = position[1] + way * min(reach / max(length(way), TINY), 1.0);
+    vec3 offset = position[i + 2] - position[1];
+    position[i + 2] = position[1] + offset * min(reach / max(length(offset), TINY), 1.0);
   }
 }

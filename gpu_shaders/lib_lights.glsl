@@ -71,8 +71,8 @@ vec3 panel_row(Lights lights, int index, float height, float v, float low, float
     float sine = middle + (node % 2 == 0 ? -half_width : half_width) * PANEL_NODES[node / 2];
     float cosine = sqrt(max(1.0 - sine * sine, 1e-12));
     float shade = panel_shade(lights, index, length(vec2(reach * sine / cosine, v)) / height);
-    vec3 way = vec3(sine, v / reach * cosine, -height / reach * cosine);
-    total += PANEL_WEIGHTS[node / 2] * half_width * shade * way;
+    vec3 direction = vec3(sine, v / reach * cosine, -height / reach * cosine);
+    total += PANEL_WEIGHTS[node / 2] * half_width * shade * direction;
   }
   return total;
 }
@@ -110,10 +110,10 @@ vec3 panel_four_points(Lights lights, int index, bool is_round, vec2 half_sides,
   vec3 total = vec3(0.0);
   for (int corner = 0; corner < 4; corner++) {
     vec2 aside = vec2(corner % 2 == 0 ? -place.x : place.x, corner < 2 ? -place.y : place.y);
-    vec3 way = vec3(aside, 0.0) - offset;
-    float squared = dot(way, way);
-    float shade = panel_shade(lights, index, length(way.xy) / offset.z);
-    total += way * (offset.z * shade / (4.0 * LIGHT_PI * squared * squared));
+    vec3 direction = vec3(aside, 0.0) - offset;
+    float squared = dot(direction, direction);
+    float shade = panel_shade(lights, index, length(direction.xy) / offset.z);
+    total += direction * (offset.z * shade / (4.0 * LIGHT_PI * squared * squared));
   }
   return total;
 }
@@ -154,9 +154,9 @@ float cone_fraction(Lights lights, int index, vec3 away, float width)
   off_axis += 0.25 * width * (1.0 - off_axis);
   float rim = lights.along[index].w;
   float half_width = sqrt(rim * rim + 1.25 * width * aside / squared);
-  float share = 0.5 * (lights.upward[index].w + half_width - off_axis) / half_width;
-  share = clamp(share, 0.0, 1.0);
-  return share * share * (3.0 - 2.0 * share);
+  float fraction = 0.5 * (lights.upward[index].w + half_width - off_axis) / half_width;
+  fraction = clamp(fraction, 0.0, 1.0);
+  return fraction * fraction * (3.0 - 2.0 * fraction);
 }
 
 // What comes from one light: the unit vector towards it (to a panel, whence most light comes), and

@@ -57,12 +57,12 @@ float mesh_light(int light, vec3 point, vec3 normal)
   float depth = dot(mesh_shadows.map_depth[map], vec4(point, 1.0));
   vec2 own = (0.5 * place.xy + 0.5) * mesh_shadows.resolution - 0.5;
   vec2 scaled = own + mesh_shadows.shift;
-  vec2 low = floor(scaled), share = scaled - low;
+  vec2 low = floor(scaled), fraction = scaled - low;
   float lit = 0.0;
   for (int corner = 0; corner < 4; corner++) {
     vec2 step_of = vec2(corner & 1, corner >> 1);
     vec2 texel = low + step_of;
-    vec2 weights = mix(1.0 - share, share, step_of);
+    vec2 weights = mix(1.0 - fraction, fraction, step_of);
     float there = min(depth + dot(slope.xy, texel - own), 1.0) - {{mesh_bias}} * slope.z;
     ivec2 at = clamp(ivec2(texel), ivec2(0), ivec2(mesh_shadows.resolution) - 1);
     float first = texelFetch(mesh_depths, ivec3(at, map), 0).x;

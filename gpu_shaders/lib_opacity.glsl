@@ -88,7 +88,7 @@ float start_depth(uint kept)
 float kept_thickness(uint first, uint last)
 {
   float end = 1.0 - start_depth(last);
-  return last > uint({{start_scale}}) ? 1.0 : max(end - start_depth(first), {{least_thickness}});
+  return last > uint({{start_scale}}) ? 1.0 : max(end - start_depth(first), {{min_thickness}});
 }
 
 // Of a texel's deep layers: x where they start, y one over how thick they are together.

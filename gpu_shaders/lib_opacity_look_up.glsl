@@ -63,14 +63,14 @@ vec3 light_path(int light, vec3 point)
   }
   float depth = min(place.z, 1.0) - opacity.bias;
   vec2 scaled = place.xy * float(opacity.resolution) - 0.5;
-  vec2 share = scaled - floor(scaled);
+  vec2 fraction = scaled - floor(scaled);
   ivec2 low = ivec2(floor(scaled));
   vec2 tau = vec2(0.0);
   float lit = 0.0, nearest = 1.0;
   for (int corner = 0; corner < 4; corner++) {
     ivec2 step_of = ivec2(corner & 1, corner >> 1);
     ivec2 texel = clamp(low + step_of, ivec2(0), ivec2(opacity.resolution - 1));
-    vec2 weights = mix(1.0 - share, share, vec2(step_of));
+    vec2 weights = mix(1.0 - fraction, fraction, vec2(step_of));
     float weight = weights.x * weights.y;
     float mesh = texelFetch(opacity_meshes, ivec3(texel, map), 0).x;
     lit += depth <= mesh ? weight : 0.0;

@@ -9,7 +9,7 @@
 
 // x how many strands a light passes on its way to a point, -1 where nothing is known of it, y how
 // many lie behind the point, z the fraction of the light that no mesh is in the way of.
-vec3 way_of_light(int index, vec3 point)
+vec3 shadow_path(int index, vec3 point)
 {
 #if SHADOWS
   if (opacity.light[index].x >= 0.0) {
@@ -22,45 +22,45 @@ vec3 way_of_light(int index, vec3 point)
 // As way_of_light, for a place of a mesh and the normal of its triangle. Meshes reach beyond the map of
 // hair: towards its border the map of all meshes takes over what they are in the way of, or else their
 // shadows fade, or they would end at a line.
-vec3 way_of_light_to_mesh(int index, vec3 point, vec3 normal)
+vec3 shadow_path_to_mesh(int index, vec3 point, vec3 normal)
 {
-  vec3 way = way_of_light(index, point);
+  vec3 path = shadow_path(index, point);
   float beyond = 1.0;
 #ifdef MESH_SHADOWS
   beyond = mesh_light(index, point, normal);
 #endif
 #if SHADOWS
-  if (way.x >= 0.0) {
+  if (path.x >= 0.0) {
     vec3 place = map_place(opacity, index, point);
     float within = within_map(place.xy);
 #  ifdef MESH_SHADOWS
     // depths before and behind all hair are not distinguished
     within = min(within, within_map(vec2(0.5, place.z - opacity.bias)));
 #  endif
-    way.z = mix(beyond, way.z, within);
-    return way;
+    path.z = mix(beyond, path.z, within);
+    return path;
   }
 #endif
-  return vec3(way.xy, beyond);
+  return vec3(path.xy, beyond);
 }
 
 // The fraction of a light that hair and meshes in its way leave, by colour: of what strands take they
 // send `forward` on.
-vec3 light_left(vec3 way, vec3 forward)
+vec3 light_left(vec3 path, vec3 forward)
 {
-  return way.z * exp(-max(way.x, 0.0) * (1.0 - forward));
+  return path.z * exp(-max(path.x, 0.0) * (1.0 - forward));
 }
 
 // As way_of_light, for a place of a strand of this radius [m] and opacity, which is in the maps as
 // well: it does not lie behind itself.
-vec3 way_of_light_to_strand(int index, vec3 point, vec3 tangent, float radius, float hides)
+vec3 shadow_path_to_strand(int index, vec3 point, vec3 tangent, float radius, float hides)
 {
-  vec3 way = way_of_light(index, point);
+  vec3 path = shadow_path(index, point);
 #if SHADOWS
-  if (way.x >= 0.0) {
+  if (path.x >= 0.0) {
     float own = hides * own_depth_at(opacity, index, point, tangent, radius);
-    way.y = max(way.y - opacity.extinction * own, 0.0);
+    path.y = max(path.y - opacity.extinction * own, 0.0);
   }
 #endif
-  return way;
+  return path;
 }

@@ -39,12 +39,12 @@ ivec2 skin_texel_around(sampler2D texels, vec2 place, int corner)
 vec4 skin_looked_up(
     sampler2D values, sampler2D texels, vec2 place, float island, out float known)
 {
-  vec2 share = place - 0.5 - floor(place - 0.5);
+  vec2 fraction = place - 0.5 - floor(place - 0.5);
   vec4 total = vec4(0.0);
   known = 0.0;
   for (int corner = 0; corner < 4; corner++) {
     ivec2 at = skin_texel_around(texels, place, corner);
-    vec2 weights = mix(1.0 - share, share, vec2(corner & 1, corner >> 1));
+    vec2 weights = mix(1.0 - fraction, fraction, vec2(corner & 1, corner >> 1));
     bool is_own = island >= 0.0 && texelFetch(texels, at, 0).w == island;
     float weight = is_own ? weights.x * weights.y : 0.0;
     total += weight * texelFetch(values, at, 0);
@@ -56,8 +56,8 @@ vec4 skin_looked_up(
 // Where on an edge the place nearest to a point lies, 0 at its start and 1 at its end.
 float skin_along_border(vec2 point, vec2 start, vec2 end)
 {
-  vec2 way = end - start;
-  return clamp(dot(point - start, way) / max(dot(way, way), 1e-18), 0.0, 1.0);
+  vec2 edge = end - start;
+  return clamp(dot(point - start, edge) / max(dot(edge, edge), 1e-18), 0.0, 1.0);
 }
 
 float skin_distance(vec2 place, vec2 start, vec2 end)
@@ -112,14 +112,14 @@ vec4 skin_soft_shadow(sampler2D values,
     start = start.zwxy;
     end = end.zwxy;
   }
-  float share = skin_along_border(place, start.xy, end.xy);
-  vec4 on_seam = mix(start, end, share);
+  float fraction = skin_along_border(place, start.xy, end.xy);
+  vec4 on_seam = mix(start, end, fraction);
   float is_here, is_known;
   vec4 here = skin_looked_up(values, texels, on_seam.xy, island, is_here);
   vec4 across = skin_looked_up(values, texels, on_seam.zw, islands.y, is_known);
   vec4 shift = mix(texelFetch(shifts, skin_seam_texel(seam, 0, 2), 0),
                    texelFetch(shifts, skin_seam_texel(seam, 1, 2), 0),
-                   share);
+                   fraction);
   float nearness = clamp(1.0 - distance(place, on_seam.xy) / {{skin_closing}}, 0.0, 1.0);
   float fade = is_known > 0.0 ? nearness * nearness * (3.0 - 2.0 * nearness) : 0.0;
   // where the two sides lie on the same texels both take what lies between them

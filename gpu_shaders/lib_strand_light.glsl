@@ -54,11 +54,11 @@ vec3 strand_radiance(vec3 point,
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, point, to_light, irradiance);
-    vec3 way = way_of_light_to_strand(index, point, tangent, radius, strands.opacity);
-#ifdef OTHERS
-    way.x += way.x >= 0.0 && index < {{others_lights}} ? between[index] : 0.0;
+    vec3 path = shadow_path_to_strand(index, point, tangent, radius, strands.opacity);
+#ifdef OTHER_TAU
+    path.x += path.x >= 0.0 && index < {{other_tau_lights}} ? between[index] : 0.0;
 #endif
-    irradiance *= way.x < 0.0 ? occlusion : way.z;
+    irradiance *= path.x < 0.0 ? occlusion : path.z;
     float level = 0.0;
 #if MARSCHNER
     level = strand_level(tangent, bend, normal, to_light, to_eye, shift_noise);
@@ -72,7 +72,7 @@ vec3 strand_radiance(vec3 point,
                                         hair,
                                         absorption,
                                         level,
-                                        way);
+                                        path);
   }
   return radiance;
 }

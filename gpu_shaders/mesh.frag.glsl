@@ -73,27 +73,27 @@ void main()
                                known);
 #endif
   vec3 radiance = base * lights.ambient_and_count.xyz * mesh_occlusion;
-#ifdef OTHERS
-  vec4 between = texelFetch(hair_between, ivec2(gl_FragCoord.xy), 0);
+#ifdef OTHER_TAU
+  vec4 between = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
 #endif
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, mesh_point, to_light, irradiance);
-    vec3 way = way_of_light_to_mesh(index, mesh_point, facet);
-    vec3 reaching = vec3(mesh_occlusion * way.z);
+    vec3 path = shadow_path_to_mesh(index, mesh_point, facet);
+    vec3 reaching = vec3(mesh_occlusion * path.z);
 #if SHADOWS
-    reaching = way.x < 0.0 ? reaching : light_left(way, hair_forward);
+    reaching = path.x < 0.0 ? reaching : light_left(path, hair_forward);
 #endif
 #ifdef SKIN
     // what is not known of the skin is as it is without: where the head's UVs overlap
     int map = int(opacity.light[index].x);
     if (map >= 0 && map < {{skin_lights}}) {
-      vec3 colored = skin_colored(soft[map], way.x, hair_forward);
+      vec3 colored = skin_colored(soft[map], path.x, hair_forward);
       reaching = mix(reaching, colored, min(4.0 * known, 1.0));
     }
 #endif
-#ifdef OTHERS
-    reaching *= exp((index < {{others_lights}} ? -between[index] : 0.0) * (1.0 - hair_forward));
+#ifdef OTHER_TAU
+    reaching *= exp((index < {{other_tau_lights}} ? -between[index] : 0.0) * (1.0 - hair_forward));
 #endif
     irradiance *= reaching / LIGHT_PI;
     float facing = max(0.0, dot(normal, to_light));

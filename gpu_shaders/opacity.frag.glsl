@@ -15,9 +15,9 @@ void main()
   vec4 steps = vec4(dFdx(card_uv), dFdy(card_uv));
   float alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
   float strand_weight = card_thickness * card_optical_depth(alpha);
-#  if EVEN
+#  if VIEW_COMPENSATED
   vec3 across = cross(dFdx(card_point), dFdy(card_point));
-  strand_weight *= even_depth(across, normalize(card_tangent), normalize(light_way));
+  strand_weight *= view_compensated_depth(across, normalize(card_tangent), normalize(light_direction));
 #  endif
 #endif
   float behind = strand_depth;

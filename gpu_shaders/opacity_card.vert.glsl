@@ -11,7 +11,7 @@ void main()
   card_tangent = tangent;
   // along it the place in the map stays the same
   vec2 here = vec2(dot(opacity.map_x[light_index], at), dot(opacity.map_y[light_index], at)) / w;
-  light_way = cross(opacity.map_x[light_index].xyz - here.x * opacity.map_w[light_index].xyz,
+  light_direction = cross(opacity.map_x[light_index].xyz - here.x * opacity.map_w[light_index].xyz,
                     opacity.map_y[light_index].xyz - here.y * opacity.map_w[light_index].xyz);
   strand_depth = depth;
   gl_Position = vec4(dot(opacity.map_x[light_index], at), dot(opacity.map_y[light_index], at),

@@ -24,9 +24,9 @@ void main()
       at = clamp(at, ivec2(0), size - 1);
       if (is_inside && texelFetch(skin_texels, at, 0).w == island) {
         float along = float(away) / sigma;
-        float share = exp(-0.5 * along * along);
-        total += share * texelFetch(skin_shadow, at, 0);
-        weight += share;
+        float fraction = exp(-0.5 * along * along);
+        total += fraction * texelFetch(skin_shadow, at, 0);
+        weight += fraction;
       }
     }
   }

@@ -27,8 +27,8 @@ void main()
     for (int index = 0; index < light_count; index++) {
       int map = int(opacity.light[index].x);
       if (map >= 0 && map < {{skin_lights}}) {
-        vec3 way = way_of_light_to_mesh(index, point, facet);
-        lit[map] = light_left(way, vec3(skin_forward(hair_forward))).x;
+        vec3 path = shadow_path_to_mesh(index, point, facet);
+        lit[map] = light_left(path, vec3(skin_forward(hair_forward))).x;
       }
     }
   }

@@ -50,8 +50,8 @@ void main()
 #else
   vec2 place = strand_along_and_occlusion;
   vec4 between = vec4(0.0);
-#  ifdef OTHERS
-  between = strand_between;
+#  ifdef OTHER_TAU
+  between = strand_other_tau;
 #  endif
   vec3 radiance = strand_radiance(
       strand_point, tangent, vec3(0.0), strand_radius, place.x, place.y, between, seed);

@@ -64,9 +64,9 @@ void main()
   strand_along_and_occlusion = vec2(along, mix(from_look.x, to_look.x, u));
   strand_radius = radius * taper;
   strand_seed = int(from_look.y);
-#  ifdef OTHERS
-  strand_between = mix(texelFetch(cv_between, strand_texel(strand, segment, cv_count), 0),
-                       texelFetch(cv_between, strand_texel(strand, segment + 1, cv_count), 0),
+#  ifdef OTHER_TAU
+  strand_other_tau = mix(texelFetch(cv_other_tau, strand_texel(strand, segment, cv_count), 0),
+                       texelFetch(cv_other_tau, strand_texel(strand, segment + 1, cv_count), 0),
                        u);
 #  endif
 #endif

@@ -115,7 +115,7 @@ uint sorted_layers(uint number)
 uint first_kept = 0u, last_kept = 0u, kept_count = 0u;
 uvec4 last_node;
 
-void keep_layer(uint number, uvec4 node, float share)
+void keep_layer(uint number, uvec4 node, float fraction)
 {
   if (last_kept == 0u) {
     first_kept = number;
@@ -124,7 +124,7 @@ void keep_layer(uint number, uvec4 node, float share)
     imageStore(layer_nodes, layer_texel(last_kept), uvec4(number, last_node.yzw));
   }
   last_kept = number;
-  last_node = uvec4(0u, floatBitsToUint(share), node.zw);
+  last_node = uvec4(0u, floatBitsToUint(fraction), node.zw);
   kept_count++;
 }
 
@@ -145,7 +145,7 @@ vec2 hidden_by(uint sorted)
 
 // What one of LAYERS layers stands for: those that have more of the light count by what they have, and
 // the others share out what is left.
-float share_of_one(uint sorted, float covered)
+float fraction_of_one(uint sorted, float covered)
 {
   float threshold = covered / float(LAYERS);
   int large = 0, before = 0;
@@ -173,7 +173,7 @@ float share_of_one(uint sorted, float covered)
 // middle of one share after the other.
 void keep_some(uint sorted, float covered)
 {
-  float threshold = share_of_one(sorted, covered);
+  float threshold = fraction_of_one(sorted, covered);
   float through = 1.0, passed = 0.5;
   uint number = sorted;
   while (number != 0u) {
@@ -215,19 +215,19 @@ void main()
     number = node.x;
   }
 
-  float shares[LAYERS];
+  float fractions[LAYERS];
   float through = 1.0, front = 2.0;
   int seen = 0;
   for (int i = 0; i < LAYERS; i++) {
-    bool is_seen = nearest[i].x != 0u && (i == 0 || through - behind_all >= {{unseen_share}});
+    bool is_seen = nearest[i].x != 0u && (i == 0 || through - behind_all >= {{unseen_fraction}});
     float alpha = is_seen ? layer_alpha(nearest[i].w) : 0.0;
-    shares[i] = through * alpha;
+    fractions[i] = through * alpha;
     through *= 1.0 - alpha;
     bool is_front = is_seen && front > 1.0 && through <= 0.5;
     front = is_front ? uintBitsToFloat(nearest[i].y) : front;
     seen = is_seen ? i + 1 : seen;
   }
-  if (count > LAYERS && through - behind_all >= {{unseen_share}}) {
+  if (count > LAYERS && through - behind_all >= {{unseen_fraction}}) {
     uint sorted = sorted_layers(head);
     vec2 hidden = hidden_by(sorted);
     behind_all = hidden.x;
@@ -237,7 +237,7 @@ void main()
   else {
     for (int i = 0; i < LAYERS; i++) {
       if (i < seen) {
-        keep_layer(nearest[i].x, nearest[i], shares[i] / max(1.0 - through, 1.0e-6));
+        keep_layer(nearest[i].x, nearest[i], fractions[i] / max(1.0 - through, 1.0e-6));
       }
     }
   }

@@ -41,9 +41,9 @@ vec3 layer_radiance(int strand, float along)
   float radius = mix(root_side.w, tip_side.w, u) * strands.width_scale *
                  mix(1.0, strands.tip_width, along);
   vec4 between = vec4(0.0);
-#ifdef OTHERS
-  between = mix(texelFetch(cv_between, strand_texel(strand, segment, cv_count), 0),
-                texelFetch(cv_between, strand_texel(strand, segment + 1, cv_count), 0),
+#ifdef OTHER_TAU
+  between = mix(texelFetch(cv_other_tau, strand_texel(strand, segment, cv_count), 0),
+                texelFetch(cv_other_tau, strand_texel(strand, segment + 1, cv_count), 0),
                 u);
 #endif
   uint seed = uint(from_look.y);

@@ -22,12 +22,12 @@ from ..strands.closest_point import closest_point
 from ..strands.vectors import unit_or
 from .card_mesh import CardMesh
 from .sort import connected_components
-from .uv_ways import UvWays, Way, coordinate_gradients, island_bounds, uv_ways
+from .uv_directions import Heading, UvAxes, coordinate_gradients, island_bounds, uv_axes
 
 #: A triangle of less than this share of the square of its longest edge has no area.
 _FLAT = 1.0e-7
 #: A card looks away from the head, or towards it, when its mean cosine is at least this.
-_LEAST_FACING = 0.25
+_MIN_FACING = 0.25
 #: the normal where nothing says another, and vectors too short to say it
 _DOWN, _SHORTEST = (0.0, 0.0, -1.0), 1.0e-20
 
@@ -52,7 +52,7 @@ def adopt_cards(
     head: Surface | None,
     *,
     group: Ints | None = None,
-    way: Way = "auto",
+    heading: Heading = "auto",
     place: str,
 ) -> AdoptedCards:
     """Read cards out of a mesh.
@@ -75,22 +75,22 @@ def adopt_cards(
     toward = _away_from(source.positions, head)
     corners = source.corners.astype(np.float64)
     distance = toward.distance[source.triangles]
-    ways = uv_ways(corners, uv[triangles], distance, island, way)
+    axes = uv_axes(corners, uv[triangles], distance, island, heading)
     normal, is_turned, is_mixed = _facing(source, card, toward.direction)
-    along = _along(uv[triangles], island, ways)
+    along = _along(uv[triangles], island, axes)
     mesh = CardMesh(
         positions=source.positions[vertex],
         triangles=np.where(is_turned[:, None], triangles[:, ::-1], triangles),
         uv=uv,
         along=_at_vertices(triangles, along, len(vertex)),
         normal=normal[vertex],
-        tangent=_tangents(corners, uv, triangles, along, island, ways),
+        tangent=_tangents(corners, uv, triangles, along, island, axes),
         occlusion=np.ones(len(vertex), np.float32),
         card=card,
         group=_groups(source.triangles, card, group),
     )
     notes = (
-        *_direction_notes(ways, island, card, head if way == "auto" else source),
+        *_direction_notes(axes, island, card, head if heading == "auto" else source),
         *_shape_notes(source, card, is_mixed),
         *_uv_notes(uv),
     )
@@ -164,8 +164,8 @@ def _looks_inwards(centers: Floats, outward: Floats, ahead: Floats, card: Ints) 
     middle = np.stack([np.bincount(card, area * part) for part in centers.T], axis=1)
     from_middle = centers - (middle / total[:, None])[card]
     volume = np.bincount(card, np.einsum("ti,ti->t", outward, from_middle))
-    share = np.bincount(card, ahead) / total
-    is_inward: Bools = np.where(np.abs(share) > _LEAST_FACING, share, volume) < 0.0
+    fraction = np.bincount(card, ahead) / total
+    is_inward: Bools = np.where(np.abs(fraction) > _MIN_FACING, fraction, volume) < 0.0
     return is_inward
 
 
@@ -180,23 +180,23 @@ def _disagreeing(triangles: Ints, card: Ints) -> Bools:
     return found
 
 
-def _along(uv: Floats, island: Ints, ways: UvWays) -> Floats:
+def _along(uv: Floats, island: Ints, axes: UvAxes) -> Floats:
     """0 at the roots to 1 at the tips of each island, (triangle_count, 3)."""
-    axis = ways.axis[island]
+    axis = axes.axis[island]
     coordinate = np.take_along_axis(uv, axis[:, None, None], axis=2)[:, :, 0]
     low, high = (bound[island, None] for bound in island_bounds(coordinate, island))
     size = high - low
-    share = np.divide(coordinate - low, size, out=np.zeros_like(coordinate), where=size > 0.0)
-    return np.where(ways.is_down[island, None], 1.0 - share, share)
+    fraction = np.divide(coordinate - low, size, out=np.zeros_like(coordinate), where=size > 0.0)
+    return np.where(axes.is_down[island, None], 1.0 - fraction, fraction)
 
 
 def _tangents(
-    corners: Floats, uv: Floats, triangles: Ints, along: Floats, island: Ints, ways: UvWays
+    corners: Floats, uv: Floats, triangles: Ints, along: Floats, island: Ints, axes: UvAxes
 ) -> Floats:
     """Unit vectors along the way, (vertex_count, 3); from root to tip where UVs do not tell."""
     gradients = coordinate_gradients(corners, uv[triangles])
-    chosen = np.take_along_axis(gradients, ways.axis[island][:, None, None], axis=1)[:, 0]
-    chosen *= np.where(ways.is_down[island], -1.0, 1.0)[:, None]
+    chosen = np.take_along_axis(gradients, axes.axis[island][:, None, None], axis=1)[:, 0]
+    chosen *= np.where(axes.is_down[island], -1.0, 1.0)[:, None]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = np.linalg.norm(np.cross(one, two), axis=1)
     chosen = unit_or(chosen, _DOWN, _SHORTEST) * area[:, None]
@@ -227,10 +227,10 @@ def _groups(triangles: Ints, card: Ints, group: Ints | None) -> Ints:
     return names[votes.argmax(axis=1)].astype(np.int32)
 
 
-def _direction_notes(ways: UvWays, island: Ints, card: Ints, head: Surface | None) -> Iterator[str]:
+def _direction_notes(axes: UvAxes, island: Ints, card: Ints, head: Surface | None) -> Iterator[str]:
     if head is None:
         yield "There is no head, so the higher end of the cards was taken for their roots"
-    doubtful = len(np.unique(card[ways.is_doubtful[island]]))
+    doubtful = len(np.unique(card[axes.is_doubtful[island]]))
     if doubtful:
         yield f"The UVs of {_cards(doubtful)} run another way than most, or leave the root open"
 

@@ -20,7 +20,7 @@ from .clusters import shared_out
 from .strip import CardFrames, Strips
 
 #: How many strands a tile holds at most, as a factor of its width in pixels.
-_MOST_STRANDS = 2
+_MAX_STRANDS = 2
 #: How far a card may be widened or narrowed so that it covers as much as its own strands.
 _WIDTH_RANGE = (0.5, 2.0)
 #: A way aside that counts like another card being twice as wide: the sine of its angle.
@@ -122,7 +122,7 @@ class _CardShapes:
 
     strand_count: Ints
     covered: Floats
-    pace: Floats
+    spacing: Floats
     features: Floats
 
 
@@ -134,19 +134,19 @@ def _card_shapes(strips: Strips, grid: Floats, radius: Floats, cluster: Ints) ->
     fill = np.stack(thick, axis=1) / width
     # n strands anywhere across, each of which covers fill / n of the width
     covered = 1.0 - (1.0 - np.clip(fill / count[:, None], 0.0, 1.0)) ** count[:, None]
-    pace = np.gradient(strips.frames.center, axis=1)
-    pace = np.linalg.norm(pace, axis=-1)
-    scales = (width.mean(axis=1), pace.sum(axis=1), fill.mean(axis=1), count)
+    spacing = np.gradient(strips.frames.center, axis=1)
+    spacing = np.linalg.norm(spacing, axis=-1)
+    scales = (width.mean(axis=1), spacing.sum(axis=1), fill.mean(axis=1), count)
     octaves = [np.log2(np.maximum(scale, _TINY)) for scale in scales]
     wave = np.bincount(cluster, _asides(strips.frames, grid, cluster), card_count) / count
-    return _CardShapes(count, covered, pace, np.stack([*octaves, wave / _WAVE], axis=1))
+    return _CardShapes(count, covered, spacing, np.stack([*octaves, wave / _WAVE], axis=1))
 
 
 def _asides(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
     """The sine of the angle between each strand and its strip, (strand_count,), on the mean."""
-    way = np.diff(grid, axis=1)
-    ahead = np.einsum("sri,sri->sr", way, frames.tangent[cluster, :-1])
-    length = np.linalg.norm(way, axis=-1)
+    step = np.diff(grid, axis=1)
+    ahead = np.einsum("sri,sri->sr", step, frames.tangent[cluster, :-1])
+    length = np.linalg.norm(step, axis=-1)
     aside = np.sqrt(np.maximum(length**2 - ahead**2, 0.0))
     mean: Floats = aside.sum(axis=1) / np.maximum(length.sum(axis=1), _TINY)
     return mean
@@ -221,7 +221,7 @@ def _baked_strands(
     """Strands, tile after tile, where each tile begins, and for how many each of its stands."""
     order = np.argsort(cluster, kind="stable")
     ends = np.cumsum(np.bincount(cluster))
-    most = max(int(_MOST_STRANDS * settings.side / settings.columns), 1)
+    most = max(int(_MAX_STRANDS * settings.side / settings.columns), 1)
     tiles, crowding = [], []
     for card in medoid:
         own = order[ends[card - 1] if card else 0 : ends[card]]
@@ -234,7 +234,7 @@ def _baked_strands(
 
 def _width_factors(shapes: _CardShapes, width: Floats, tile: Ints, medoid: Ints) -> Floats:
     """How much wider each card must be to cover as much as with its own strands, (card_count,)."""
-    area = width * shapes.pace
+    area = width * shapes.spacing
     own = (shapes.covered * area).sum(axis=1)
     shown = (shapes.covered[medoid[tile]] * area).sum(axis=1)
     return np.clip(np.where(shown > 0.0, own / np.maximum(shown, _TINY**2), 1.0), *_WIDTH_RANGE)
@@ -256,16 +256,16 @@ def _size_notes(
     """What is smaller than a pixel of the atlas."""
     tile = np.repeat(np.arange(len(strips)), np.diff(offsets))
     across, along = settings.inner_tile
-    pace = np.linalg.norm(np.diff(strips.frames.center, axis=1), axis=-1).sum(axis=1)
-    wide, high = strips.width.mean(axis=1)[tile] / across, pace[tile] / along
+    spacing = np.linalg.norm(np.diff(strips.frames.center, axis=1), axis=-1).sum(axis=1)
+    wide, high = strips.width.mean(axis=1)[tile] / across, spacing[tile] / along
     length = np.linalg.norm(np.diff(grid, axis=1), axis=-1).sum(axis=1)
     notes = []
-    share = float(np.median(2.0 * radius.mean(axis=1) / np.maximum(wide, _TINY)))
-    if share < 1.0:
-        larger = settings.side / max(share, _TINY)
+    fraction = float(np.median(2.0 * radius.mean(axis=1) / np.maximum(wide, _TINY)))
+    if fraction < 1.0:
+        larger = settings.side / max(fraction, _TINY)
         fitting = next((f"an atlas of {size}" for size in SIZES if size >= larger), "fewer columns")
         notes.append(
-            f"strands are {share:.2g} pixels of the atlas wide and show as fainter lines; "
+            f"strands are {fraction:.2g} pixels of the atlas wide and show as fainter lines; "
             f"{fitting} would show them as they are"
         )
     short = int((length < high).sum())

@@ -68,26 +68,26 @@ _EMPTY: dict[str, float | tuple[float, ...]] = {
 
 def dilated(maps: AtlasMaps, grid: AtlasGrid) -> AtlasMaps:
     """The same maps, going on where alpha is 0; alpha stays as it is."""
-    left, right, share = hair_beside(maps.alpha > 0.0, grid)
+    left, right, fraction = hair_beside(maps.alpha > 0.0, grid)
     is_free = maps.alpha == 0.0
-    left, right, share = left[is_free], right[is_free], share[is_free]
+    left, right, fraction = left[is_free], right[is_free], fraction[is_free]
     done: dict[str, Any] = {}
     for name in MAPS:
         if name != "alpha":
             image = getattr(maps, name).copy()
-            values = _between(name, image.reshape(-1, *image.shape[2:]), left, right, share)
+            values = _between(name, image.reshape(-1, *image.shape[2:]), left, right, fraction)
             values[left < 0] = _EMPTY[name]
             image[is_free] = values
             done[name] = image
     return replace(maps, **done)
 
 
-def _between(name: str, texels: Floats, left: Ints, right: Ints, share: Floats) -> Floats:
+def _between(name: str, texels: Floats, left: Ints, right: Ints, fraction: Floats) -> Floats:
     """What goes over from one texel to the other, (n, ...)."""
     if name == "strand_id":  # a number between two is a third strand's
-        return texels[np.where(share < 0.5, left, right)]
+        return texels[np.where(fraction < 0.5, left, right)]
     mixed = texels[left]
-    mixed += (texels[right] - mixed) * share.reshape(-1, *[1] * (texels.ndim - 1))
+    mixed += (texels[right] - mixed) * fraction.reshape(-1, *[1] * (texels.ndim - 1))
     if name in ("normal", "tangent"):
         way = mixed - 0.5
         length = np.sqrt(np.einsum("ni,ni->n", way, way))
@@ -108,18 +108,18 @@ def hair_beside(is_hair: Bools, grid: AtlasGrid) -> tuple[Ints, Ints, Floats]:
     """
     height, width = is_hair.shape
     beside = np.full((2, height, width), -1, np.int32)
-    share = np.zeros((height, width), np.float32)
+    fraction = np.zeros((height, width), np.float32)
     for low, high in pairwise(tile_edges(height, grid.rows)):
         for first, last in pairwise(tile_edges(width, grid.columns)):
             tile = is_hair[low:high, first:last]
             with_hair = np.flatnonzero(tile.any(axis=1))
             if len(with_hair):
-                columns, shares = _beside_in_rows(tile[with_hair])
+                columns, fractions = _beside_in_rows(tile[with_hair])
                 texels = (low + with_hair)[:, None] * width + first + columns
                 nearest = _nearest_of(with_hair, high - low)
                 beside[:, low:high, first:last] = texels[:, nearest]
-                share[low:high, first:last] = shares[nearest]
-    return beside[0], beside[1], share
+                fraction[low:high, first:last] = fractions[nearest]
+    return beside[0], beside[1], fraction
 
 
 def _beside_in_rows(is_hair: Bools) -> tuple[Ints, Floats]:
@@ -130,8 +130,8 @@ def _beside_in_rows(is_hair: Bools) -> tuple[Ints, Floats]:
     right = np.where(is_hair, column, count)[:, ::-1]
     right = np.minimum.accumulate(right, axis=1)[:, ::-1]
     left, right = np.where(left < 0, right, left), np.where(right == count, left, right)
-    share = (column - left) / np.maximum(right - left, 1)
-    return np.stack([left, right]), np.clip(share, 0.0, 1.0).astype(np.float32)
+    fraction = (column - left) / np.maximum(right - left, 1)
+    return np.stack([left, right]), np.clip(fraction, 0.0, 1.0).astype(np.float32)
 
 
 def _nearest_of(places: Ints, count: int) -> Ints:

@@ -11,7 +11,7 @@ from .atlas_grid import AtlasGrid
 #: Sizes that engines take: powers of two, so that each mip map halves it.
 SIZES = (512, 1024, 2048, 4096)
 #: What a tile must have left between its padding, across and along [pixels].
-LEAST_TILE = (4, 8)
+MIN_TILE = (4, 8)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,14 +105,14 @@ class AtlasSettings(Settings):
             HairloomError: the padding leaves too little of a tile; it says how large the atlas
                 would have to be.
         """
-        if any(there < least for there, least in zip(self.inner_tile, LEAST_TILE, strict=True)):
+        if any(there < least for there, least in zip(self.inner_tile, MIN_TILE, strict=True)):
             raise self._too_small()
-        share = self.padding / self.side
-        return AtlasGrid(self.columns, self.rows, (share * self.columns, share * self.rows))
+        fraction = self.padding / self.side
+        return AtlasGrid(self.columns, self.rows, (fraction * self.columns, fraction * self.rows))
 
     def _too_small(self) -> HairloomError:
         across, along = (self.side / count for count in (self.columns, self.rows))
-        parts = zip((self.columns, self.rows), LEAST_TILE, strict=True)
+        parts = zip((self.columns, self.rows), MIN_TILE, strict=True)
         needed = max(count * (least + 2 * self.padding) for count, least in parts)
         return HairloomError(
             f"{self.columns} x {self.rows} tiles of {across:g} x {along:g} pixels with "

@@ -30,14 +30,14 @@ SAMPLES = 4
 SPARSE_STEPS = (12664745, 9560333, 10368890)
 SPARSE_RANGE = 1 << 24
 #: Samples that are held at a time.
-_MOST_SAMPLES = 1 << 20
+_MAX_SAMPLES = 1 << 20
 #: Texels across that are made at a time, so that leaning samples fit a texture.
-_MOST_ACROSS = 2048
+_MAX_ACROSS = 2048
 _EDGES = np.array([[-1.0], [1.0]])
 _TINY = 1e-12
 
 
-def at_least_a_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
+def min_one_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
     """Half widths of ribbons a sample wide at least, and the share of their samples that counts.
 
     So a strand thinner than a sample still covers as much as it is wide, see `is_counted`.
@@ -49,25 +49,25 @@ def at_least_a_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
         half as in FlatStrands, and share (n, cv_count) in [0, 1].
     """
     side = size * SAMPLES
-    way = np.gradient(flat.place, axis=1) * side
-    length = np.linalg.norm(way, axis=-1)
+    direction = np.gradient(flat.place, axis=1) * side
+    length = np.linalg.norm(direction, axis=-1)
     half = flat.half * side
-    across = np.abs(half[..., 0] * way[..., 1] - half[..., 1] * way[..., 0])
+    across = np.abs(half[..., 0] * direction[..., 1] - half[..., 1] * direction[..., 0])
     across = np.where(length > _TINY, across / np.maximum(length, _TINY), 0.0)
-    share = np.clip(across / 0.5, 0.0, 1.0)
-    is_thin = share < 1.0
+    fraction = np.clip(across / 0.5, 0.0, 1.0)
+    is_thin = fraction < 1.0
     # what has no width at all lies across its way
-    turned = np.stack([way[..., 1], -way[..., 0]], axis=-1)
+    turned = np.stack([direction[..., 1], -direction[..., 0]], axis=-1)
     turned = 0.5 * turned / np.maximum(length, _TINY)[..., None]
     wide = np.where(is_thin[..., None], turned, half) / side
-    return wide.astype(np.float32), share.astype(np.float32)
+    return wide.astype(np.float32), fraction.astype(np.float32)
 
 
-def is_counted(column: Ints, row: Ints, strand: int, share: Floats) -> Bools:
+def is_counted(column: Ints, row: Ints, strand: int, fraction: Floats) -> Bools:
     """Whether a sample of a ribbon that was widened counts: `share` of them do, evenly spread."""
     x, y, z = SPARSE_STEPS
     place = (column * x + row * y + strand * z) % SPARSE_RANGE
-    counted: Bools = place < share * SPARSE_RANGE
+    counted: Bools = place < fraction * SPARSE_RANGE
     return counted
 
 
@@ -117,18 +117,18 @@ class Block:
 
 def blocks_of(size: int) -> list[Block]:
     """The blocks of an atlas, all of one size but for those at the top."""
-    width = min(size, _MOST_ACROSS)
-    height = max(min(_MOST_SAMPLES // (width * SAMPLES**2), size), 1)
+    width = min(size, _MAX_ACROSS)
+    height = max(min(_MAX_SAMPLES // (width * SAMPLES**2), size), 1)
     starts = range(0, size, height), range(0, size, width)
     return [Block(x, y, width, min(height, size - y)) for y in starts[0] for x in starts[1]]
 
 
 def sampled_maps(flat: FlatStrands, size: int) -> AtlasMaps:
     """The maps of an atlas, with zeros where no strand is."""
-    half, share = at_least_a_sample(flat, size)
+    half, fraction = min_one_sample(flat, size)
     maps: dict[str, Any] = {}
     for block in blocks_of(size):
-        for name, part in _sampled_block(flat, half, share, size, block).items():
+        for name, part in _sampled_block(flat, half, fraction, size, block).items():
             whole = maps.setdefault(name, np.zeros((size, size, *part.shape[2:]), np.float32))
             rows = slice(block.low, block.low + block.height)
             whole[rows, block.left : block.left + block.width] = part
@@ -136,7 +136,7 @@ def sampled_maps(flat: FlatStrands, size: int) -> AtlasMaps:
 
 
 def _sampled_block(
-    flat: FlatStrands, half: Floats, share: Floats, size: int, block: Block
+    flat: FlatStrands, half: Floats, fraction: Floats, size: int, block: Block
 ) -> dict[str, Any]:
     """The maps of its texels."""
     shape = block.height * SAMPLES, block.samples_across
@@ -147,7 +147,7 @@ def _sampled_block(
         edges = flat.place[strand, :, None] + half[strand, :, None] * _EDGES
         corners = block.leaning(edges, size).reshape(-1, 2)
         for row, column, vertices, weights in _samples(corners, shape):
-            seen = weights @ _vertex_values(flat, share, strand, vertices)
+            seen = weights @ _vertex_values(flat, fraction, strand, vertices)
             place = column + block.left * SAMPLES, row + block.low * SAMPLES
             counts = is_counted(*place, int(strand), seen[:, 0])
             # the later one of two that lie equally far outside shows
@@ -194,13 +194,13 @@ def _samples(corners: Floats, shape: tuple[int, int]) -> Iterator[tuple[Ints, In
         yield row[inside], column[inside], vertices, weights[inside]
 
 
-def _vertex_values(flat: FlatStrands, share: Floats, strand: int, vertices: Ints) -> Floats:
+def _vertex_values(flat: FlatStrands, fraction: Floats, strand: int, vertices: Ints) -> Floats:
     """share, side, along, id, depth, occlusion, tangent, base of the vertices, (3, 12)."""
     cv, sign = vertices // 2, 2.0 * (vertices % 2) - 1.0
     along = cv / (flat.place.shape[1] - 1)
     number = np.full(3, flat.strand_id[strand])
     depth, occlusion = flat.depth[strand, cv], flat.occlusion[strand, cv]
-    single = np.stack([share[strand, cv], sign, along, number, depth, occlusion], axis=1)
+    single = np.stack([fraction[strand, cv], sign, along, number, depth, occlusion], axis=1)
     return np.concatenate([single, flat.tangent[strand, cv], flat.base[strand, cv]], axis=1)
 
 

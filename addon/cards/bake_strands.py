@@ -68,16 +68,16 @@ def flat_strands(
     aside, ahead, outside = (np.einsum("sri,sri->sr", away, axis[tile]) for axis in axes)
     width: Floats = np.maximum(strips.width[tile], _TINY)
     row_count = points.shape[1]
-    pace = np.linalg.norm(np.gradient(frames.center, axis=1), axis=-1)[tile] * (row_count - 1)
-    pace = np.maximum(pace, _TINY)
+    spacing = np.linalg.norm(np.gradient(frames.center, axis=1), axis=-1)[tile] * (row_count - 1)
+    spacing = np.maximum(spacing, _TINY)
     radii = radius[plan.strands] * plan.thickness[tile, None] / width
     shade, gain = _shades(plan, base, points.shape)
     at_cvs = (
         aside / width,
-        _within(np.linspace(0.0, 1.0, row_count) + ahead / pace),
+        _within(np.linspace(0.0, 1.0, row_count) + ahead / spacing),
         np.clip(0.5 + outside / np.maximum(strips.width.mean(axis=1), _TINY)[tile, None], 0.0, 1.0),
         radii,
-        width / pace,
+        width / spacing,
         _occlusion(plan, aside / width, radii, outside),
     )
     fine = [_finer(value[..., None])[..., 0] for value in at_cvs]
@@ -108,9 +108,9 @@ def _half_width(across: Floats, along: Floats, thick: Floats, shape: Floats) -> 
         across, along: place in the tile. thick: radius in widths of the card.
         shape: width of the card in its lengths.
     """
-    way = np.gradient(np.stack([across * shape, along], axis=-1), axis=1)
-    way /= np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), _TINY)
-    half = np.stack([way[..., 1], -way[..., 0] * shape], axis=-1) * thick[..., None]
+    slope = np.gradient(np.stack([across * shape, along], axis=-1), axis=1)
+    slope /= np.maximum(np.linalg.norm(slope, axis=-1, keepdims=True), _TINY)
+    half = np.stack([slope[..., 1], -slope[..., 0] * shape], axis=-1) * thick[..., None]
     clipped: Floats = np.clip(half, -0.5, 0.5)
     return clipped
 
@@ -147,11 +147,11 @@ def _squeezed(across: Floats, half: Floats, plan: AtlasPlan) -> Floats:
 
 
 def _tangents(points: Floats, side: Floats, tangent: Floats, normal: Floats) -> Floats:
-    way = np.gradient(points, axis=1)
-    parts = [np.einsum("sri,sri->sr", way, axis) for axis in (side, tangent, normal)]
-    ways = _finer(np.stack(parts, axis=-1))
-    length = np.linalg.norm(ways, axis=-1, keepdims=True)
-    return np.where(length > _TINY, ways / np.maximum(length, _TINY), (0.0, 1.0, 0.0))
+    slope = np.gradient(points, axis=1)
+    parts = [np.einsum("sri,sri->sr", slope, axis) for axis in (side, tangent, normal)]
+    slopes = _finer(np.stack(parts, axis=-1))
+    length = np.linalg.norm(slopes, axis=-1, keepdims=True)
+    return np.where(length > _TINY, slopes / np.maximum(length, _TINY), (0.0, 1.0, 0.0))
 
 
 def _shades(plan: AtlasPlan, base: Floats | None, shape: tuple[int, ...]) -> tuple[Floats, float]:

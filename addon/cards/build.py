@@ -20,10 +20,10 @@ from .layers import card_layers
 from .levels import card_levels
 from .occlusion import CardShade, occlusion_steps
 from .occlusion_settings import CardOcclusionSettings
-from .order_check import wrong_share
+from .order_check import wrong_fraction
 from .settings import CardSettings
 from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, in_order, order_steps
-from .steps import retold
+from .steps import map_progress
 from .strand_occlusion import strands_occlusion
 from .strip import Strips, UncutCards, guide_strips, scattered_tiles, strip_mesh
 
@@ -32,7 +32,7 @@ _COARSER_VIEWS = 16
 #: Views in which it is counted how often the order is wrong.
 _CHECKED_VIEWS = 8
 #: Cards are enough that stand for so many strands each; so many there are at most.
-_STRANDS_PER_CARD, _MOST_CARDS = 12, 600
+_STRANDS_PER_CARD, _MAX_CARDS = 12, 600
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class CardBuild:
     backs: tuple[Ints, ...]
     errors: tuple[float, ...]
     plan: AtlasPlan | None
-    wrong_share: float = 0.0
+    wrong_fraction: float = 0.0
 
     @property
     def finest(self) -> CardMesh:
@@ -117,12 +117,12 @@ def card_steps(
     yield "Atlas"
     alpha = alpha_of(build)
     shading = _occlusion_steps(groom, settings, build.finest, alpha, others, occlusion)
-    finest = build.finest.with_occlusion((yield from _told("Ambient occlusion", shading)))
+    finest = build.finest.with_occlusion((yield from _reported("Ambient occlusion", shading)))
     shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))
     orders = yield from _orders(shaded, groom.head, settings, alpha)
     yield "Check of the order"
     first = orders[0]
-    wrong = wrong_share(
+    wrong = wrong_fraction(
         finest,
         groom.head,
         front=first.front,
@@ -135,7 +135,7 @@ def card_steps(
         build,
         levels=tuple(in_order(mesh, each.front) for mesh, each in pairs),
         backs=tuple(mesh.triangles[each.back] for mesh, each in pairs),
-        wrong_share=wrong,
+        wrong_fraction=wrong,
     )
 
 
@@ -181,14 +181,16 @@ def _orders(
         view_count = _COARSER_VIEWS if number else VIEW_COUNT
         steps = order_steps(mesh, head, by, view_count=view_count, alpha=alpha)
         name = f"Order of level {number}" if len(levels) > 1 else "Order"
-        orders.append((yield from _told(name, steps)))
+        orders.append((yield from _reported(name, steps)))
     return orders
 
 
-def _told[Result](name: str, steps: Generator[float, None, Result]) -> Generator[str, None, Result]:
+def _reported[Result](
+    name: str, steps: Generator[float, None, Result]
+) -> Generator[str, None, Result]:
     """What is done, and how much of it."""
     yield name
-    return (yield from retold(steps, lambda share: f"{name}, {100.0 * share:.0f} %"))
+    return (yield from map_progress(steps, lambda fraction: f"{name}, {100.0 * fraction:.0f} %"))
 
 
 def uncut_cards(
@@ -276,7 +278,7 @@ def strand_shade(groom: CardGroom) -> CardShade:
     where cards take a minute. A row of texels is a row of all cards, and a column a card.
     """
     strands, radius = groom.strands, groom.radius
-    count = min(max(strands.strand_count // _STRANDS_PER_CARD, 1), _MOST_CARDS)
+    count = min(max(strands.strand_count // _STRANDS_PER_CARD, 1), _MAX_CARDS)
     settings = CardSettings(source="clusters", card_count=count, fly_aways=0.0)
     cluster = cluster_of_strands(strands.grid, strands.group, settings)
     strips = fit_strips(strands.grid, radius, cluster, groom.root_normal, settings)

@@ -16,7 +16,7 @@ _STATIONS = 6
 #: How much more than another place the root counts: cards shall not reach over a parting.
 _ROOT_WEIGHT = 2.0
 #: Strands that the means are found from; the others only join the nearest.
-_MOST_LEARNT = 20_000
+_MAX_LEARNT = 20_000
 _ROUNDS = 12
 #: Strands that are compared with all means at once.
 _CHUNK = 2048
@@ -68,9 +68,9 @@ def cluster_of_guides(grid: Floats, group: Ints, guides: Ints) -> Ints:
 
 def shared_out(count: int, sizes: Ints) -> Ints:
     """`count` split by size, one at least and no more than the size, (n,): largest remainders."""
-    share = count * sizes / max(int(sizes.sum()), 1)
-    parts = np.floor(share).astype(np.int64)
-    over = np.argsort(parts - share, kind="stable")[: max(count - int(parts.sum()), 0)]
+    fraction = count * sizes / max(int(sizes.sum()), 1)
+    parts = np.floor(fraction).astype(np.int64)
+    over = np.argsort(parts - fraction, kind="stable")[: max(count - int(parts.sum()), 0)]
     parts[over] += 1
     return np.clip(parts, 1, sizes)
 
@@ -86,8 +86,8 @@ def _features(grid: Floats) -> Floats:
 
 def _k_means(features: Floats, count: int, random: np.random.Generator) -> Ints:
     learnt = features
-    if len(features) > _MOST_LEARNT:
-        chosen = random.choice(len(features), max(_MOST_LEARNT, count), replace=False)
+    if len(features) > _MAX_LEARNT:
+        chosen = random.choice(len(features), max(_MAX_LEARNT, count), replace=False)
         learnt = features[np.sort(chosen)]
     means = _far_apart(learnt, count, random)
     for _ in range(_ROUNDS):

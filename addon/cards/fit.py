@@ -23,7 +23,7 @@ _COVERING = 1.8
 _FACING_WEIGHT = 0.35
 _TURNS = 72
 #: Least width of a row, as a share of the median; a single strand's card has it throughout.
-_LEAST_WIDTH = 0.25
+_MIN_WIDTH = 0.25
 #: How far a card reaches beyond the mean tip, in standard deviations of where its strands end.
 _TIP_REACH = 1.3
 #: And before the mean root: sqrt(3) holds evenly spread roots, so that no parting is bald.
@@ -129,7 +129,7 @@ def _before_root(
 def _stacked(strips: Sequence[tuple[CardFrames, Floats]]) -> Strips:
     """All of them, no row of which is much narrower than most are."""
     width = np.concatenate([each for _, each in strips])
-    width = np.maximum(width, _LEAST_WIDTH * np.median(width))
+    width = np.maximum(width, _MIN_WIDTH * np.median(width))
     names = ("center", "tangent", "normal", "side")
     parts = (np.concatenate([getattr(frames, name) for frames, _ in strips]) for name in names)
     return Strips(CardFrames(*(part.astype(np.float32) for part in parts)), width)

@@ -50,12 +50,12 @@ class CardBinding:
     guide: Ints
     weight: Floats
     root: Floats
-    way: Floats
+    heading: Floats
     side: Floats
     row: Ints
     row_card: Ints
     row_cv: Ints
-    row_share: Floats
+    row_fraction: Floats
     local: Floats
 
 
@@ -69,12 +69,12 @@ def card_lines(mesh: CardMesh) -> tuple[Ints, Floats]:
     np.minimum.at(first, owner, mesh.along)
     lines = np.empty((len(used), 4, 3), np.float32)
     for third in range(4):
-        share = np.maximum(1.0 - np.abs(3.0 * mesh.along - third), 1.0e-6)
+        fraction = np.maximum(1.0 - np.abs(3.0 * mesh.along - third), 1.0e-6)
         if not third:
-            share = mesh.along <= first[owner] + _ROOT_ROW
-        whole = np.bincount(owner, weights=share, minlength=count)[used]
+            fraction = mesh.along <= first[owner] + _ROOT_ROW
+        whole = np.bincount(owner, weights=fraction, minlength=count)[used]
         for axis in range(3):
-            placed = share * mesh.positions[:, axis]
+            placed = fraction * mesh.positions[:, axis]
             lines[:, third, axis] = (
                 np.bincount(owner, weights=placed, minlength=count)[used] / whole
             )
@@ -102,14 +102,14 @@ def bind_cards(mesh: CardMesh, guides: Floats, guide: Ints, weight: Floats) -> C
     along = np.ascontiguousarray(rows[:, 1], np.int32).view(np.float32)
     at = np.clip(along, 0.0, 1.0) * (bone.shape[1] - 1)
     before = np.minimum(at.astype(np.int64), bone.shape[1] - 2)
-    ways = _ways(bone)
-    side = _across(ways[:, 0])
+    headings = _headings(bone)
+    side = _across(headings[:, 0])
     binding = CardBinding(
         mesh,
         guide,
         np.asarray(weight, np.float32),
         root,
-        ways[:, 0],
+        headings[:, 0],
         side,
         row.reshape(-1),
         rows[:, 0].astype(np.int64),
@@ -117,7 +117,7 @@ def bind_cards(mesh: CardMesh, guides: Floats, guide: Ints, weight: Floats) -> C
         (at - before).astype(np.float32),
         np.zeros((3, 3, 0), np.float32),
     )
-    places, frame = _rows(binding, bone, ways, side, np.ones(len(used), np.float32))
+    places, frame = _rows(binding, bone, headings, side, np.ones(len(used), np.float32))
     arms = mesh.positions.T - places[:, binding.row]
     vectors = np.stack([arms, mesh.normal.T, mesh.tangent.T])
     local = np.einsum("fav,cav->cfv", frame[:, :, binding.row], vectors)
@@ -137,11 +137,11 @@ def follow_guides(binding: CardBinding, guides: Floats, turn: Floats) -> CardMes
     volume = np.linalg.det(first)
     bone = _mixed(guides, binding.guide, binding.weight)
     bone += np.einsum("nij,jn->in", first, binding.root)[:, None]
-    ways = _ways(bone)
-    was = unit_rows(np.einsum("nij,jn->in", first, binding.way))
+    headings = _headings(bone)
+    was = unit_rows(np.einsum("nij,jn->in", first, binding.heading))
     side = np.einsum("nij,jn->in", first, binding.side)
-    side = _perpendicular(_turned(side, was, ways[:, 0]), ways[:, 0])
-    places, frame = _rows(binding, bone, ways, side, np.sign(volume))
+    side = _perpendicular(_turned(side, was, headings[:, 0]), headings[:, 0])
+    places, frame = _rows(binding, bone, headings, side, np.sign(volume))
     at = np.take(places, binding.row, axis=1, mode="clip")
     frame = np.take(frame, binding.row, axis=2, mode="clip")
     size = np.cbrt(np.abs(volume))[binding.row_card][binding.row]
@@ -181,17 +181,17 @@ def _placed(frame: Floats, local: Floats) -> Floats:
 
 
 def _rows(
-    binding: CardBinding, bone: Floats, ways: Floats, side: Floats, hand: Floats
+    binding: CardBinding, bone: Floats, headings: Floats, side: Floats, hand: Floats
 ) -> tuple[Floats, Floats]:
     """Places of all rows (3, row_count), and their frames: way, side and up, (3, 3, row_count).
 
     Args:
         bone, ways: (3, cv_count, n). side: (3, n) at the root. hand: (n,) -1 for mirrored cards.
     """
-    way = unit_rows(_on_rows(ways, binding))
-    across = _perpendicular(_on_rows(_transported(ways, side), binding), way)
-    up = cross_rows(way, across) * hand[binding.row_card].astype(np.float32)
-    return _on_rows(bone, binding), np.stack([way, across, up])
+    heading = unit_rows(_on_rows(headings, binding))
+    across = _perpendicular(_on_rows(_transported(headings, side), binding), heading)
+    up = cross_rows(heading, across) * hand[binding.row_card].astype(np.float32)
+    return _on_rows(bone, binding), np.stack([heading, across, up])
 
 
 def _on_rows(of_cvs: Floats, binding: CardBinding) -> Floats:
@@ -202,20 +202,20 @@ def _on_rows(of_cvs: Floats, binding: CardBinding) -> Floats:
     values = np.take(flat, before, axis=1, mode="clip")
     further = np.take(flat, before + count, axis=1, mode="clip")
     further -= values
-    further *= binding.row_share
+    further *= binding.row_fraction
     values += further
     return values
 
 
-def _transported(ways: Floats, side: Floats) -> Floats:
+def _transported(headings: Floats, side: Floats) -> Floats:
     """The side at the root carried along without twist, (3, cv_count, n), as
     strands.frames.transported_normals does.
     """
-    sides = np.empty_like(ways)
+    sides = np.empty_like(headings)
     sides[:, 0] = side
-    for cv in range(1, ways.shape[1]):
-        turned = _turned(sides[:, cv - 1], ways[:, cv - 1], ways[:, cv])
-        sides[:, cv] = _perpendicular(turned, ways[:, cv])
+    for cv in range(1, headings.shape[1]):
+        turned = _turned(sides[:, cv - 1], headings[:, cv - 1], headings[:, cv])
+        sides[:, cv] = _perpendicular(turned, headings[:, cv])
     return sides
 
 
@@ -223,8 +223,8 @@ def _turned(vector: Floats, one: Floats, other: Floats) -> Floats:
     """Vectors across `one`, by the least turn that takes `one` to `other`: v - (v . b)(a + b) /
     (1 + a . b), which is Rodrigues' formula for them; (3, n) each.
     """
-    share = dot_rows(vector, other) / (1.0 + dot_rows(one, other) + np.float32(_REVERSED))
-    return vector - (one + other) * share
+    fraction = dot_rows(vector, other) / (1.0 + dot_rows(one, other) + np.float32(_REVERSED))
+    return vector - (one + other) * fraction
 
 
 def _mixed(guides: Floats, guide: Ints, weight: Floats) -> Floats:
@@ -236,33 +236,33 @@ def _mixed(guides: Floats, guide: Ints, weight: Floats) -> Floats:
     return mixed
 
 
-def _ways(bone: Floats) -> Floats:
+def _headings(bone: Floats) -> Floats:
     """Unit directions from root to tip at the CVs, (3, cv_count, n): those of strands.frames."""
     step = bone[:, 1:] - bone[:, :-1]
-    ways = np.concatenate([step[:, :1], step[:, 1:] + step[:, :-1], step[:, -1:]], axis=1)
-    length = np.sqrt(dot_rows(ways, ways))
+    headings = np.concatenate([step[:, :1], step[:, 1:] + step[:, :-1], step[:, -1:]], axis=1)
+    length = np.sqrt(dot_rows(headings, headings))
     is_short = length < _SHORTEST
-    ways /= np.maximum(length, np.float32(_SHORTEST))
+    headings /= np.maximum(length, np.float32(_SHORTEST))
     if is_short.any():
-        ways[:, 0, is_short[0]] = np.array([[0.0], [0.0], [1.0]], np.float32)
-        for cv in range(1, ways.shape[1]):
-            ways[:, cv, is_short[cv]] = ways[:, cv - 1, is_short[cv]]
-    return ways
+        headings[:, 0, is_short[0]] = np.array([[0.0], [0.0], [1.0]], np.float32)
+        for cv in range(1, headings.shape[1]):
+            headings[:, cv, is_short[cv]] = headings[:, cv - 1, is_short[cv]]
+    return headings
 
 
-def _perpendicular(vector: Floats, way: Floats) -> Floats:
+def _perpendicular(vector: Floats, heading: Floats) -> Floats:
     """The unit part across unit vectors, (3, n); any one across where they are parallel."""
-    across = vector - way * dot_rows(vector, way)
+    across = vector - heading * dot_rows(vector, heading)
     length = np.sqrt(dot_rows(across, across))
     is_short = length < np.float32(1.0e-5)
     across /= np.maximum(length, np.float32(1.0e-5))
     if is_short.any():
-        across[:, is_short] = _across(way[:, is_short])
+        across[:, is_short] = _across(heading[:, is_short])
     return across
 
 
-def _across(way: Floats) -> Floats:
+def _across(heading: Floats) -> Floats:
     """Unit vectors across unit vectors, (3, n)."""
-    axis = np.zeros_like(way)
-    axis[np.abs(way).argmin(axis=0), np.arange(way.shape[1])] = 1.0
-    return unit_rows(axis - way * dot_rows(axis, way))
+    axis = np.zeros_like(heading)
+    axis[np.abs(heading).argmin(axis=0), np.arange(heading.shape[1])] = 1.0
+    return unit_rows(axis - heading * dot_rows(axis, heading))

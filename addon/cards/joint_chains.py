@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from .joint_solve import Skin
 
-#: How much cards that lie apart are told apart, beside how they move.
+#: How much cards that lie apart are separated, beside how they move.
 _PLACE = 0.75
 _ROUNDS = 20
 _SMALLEST = 1.0e-12
@@ -36,11 +36,11 @@ def card_chains(places: Floats, moved: Floats, most: int) -> Chains:
         places: (n, row_count, 3) of each card at rest [m].
         moved: (n, row_count, frame_count, 3) the same in motion.
     """
-    ways = (moved - places[:, :, None]).reshape(len(places), -1)
+    motions = (moved - places[:, :, None]).reshape(len(places), -1)
     middle = places - places.mean(axis=(0, 1))
     size = np.sqrt((middle * middle).mean())
-    share = _PLACE * np.sqrt((ways * ways).mean()) / max(float(size), _SMALLEST)
-    vectors = np.concatenate([ways, middle.reshape(len(places), -1) * share], axis=1)
+    fraction = _PLACE * np.sqrt((motions * motions).mean()) / max(float(size), _SMALLEST)
+    vectors = np.concatenate([motions, middle.reshape(len(places), -1) * fraction], axis=1)
     own, centres = _k_means(vectors, min(most, len(places)))
     used, own = np.unique(own, return_inverse=True)
     return Chains(own, _partners(vectors, own, centres[used]), len(used))
@@ -84,8 +84,8 @@ def _partners(vectors: Floats, own: Ints, centres: Floats) -> Ints:
     from_own = to_centres[np.arange(len(own)), own]
     # (v - a) (b - a) for all b, a being its own centre
     toward = to_centres - from_own[:, None] - grid[own] + square[own][:, None]
-    share = np.clip(toward / between, 0.0, 0.5)
-    gain = 2.0 * share * toward - share * share * between
+    fraction = np.clip(toward / between, 0.0, 0.5)
+    gain = 2.0 * fraction * toward - fraction * fraction * between
     gain[np.arange(len(own)), own] = -1.0
     return gain.argmax(axis=1)
 
@@ -111,31 +111,31 @@ def rest_joints(lines: Floats, chains: Chains, joints: int) -> Floats:
     middle /= members
     at = np.linspace(0.0, middle.shape[1] - 1.0, joints)
     before = np.minimum(at.astype(int), middle.shape[1] - 2)
-    share = (at - before)[:, None]
+    fraction = (at - before)[:, None]
     rest = np.tile(np.eye(4), (count, joints, 1, 1))
-    rest[..., :3, 3] = middle[:, before] * (1.0 - share) + middle[:, before + 1] * share
+    rest[..., :3, 3] = middle[:, before] * (1.0 - fraction) + middle[:, before + 1] * fraction
     rest[..., :3, :3] = _turned_to(np.gradient(rest[..., :3, 3], axis=1))
     return rest
 
 
-def _turned_to(way: Floats) -> Floats:
+def _turned_to(direction: Floats) -> Floats:
     """The least turns (..., 3, 3) that take y to these ways; Rodrigues' formula."""
-    length = np.linalg.norm(way, axis=-1, keepdims=True)
+    length = np.linalg.norm(direction, axis=-1, keepdims=True)
     y = np.array([0.0, 1.0, 0.0])
-    unit = np.where(length > 1.0e-9, way / np.maximum(length, 1.0e-9), y)
+    unit = np.where(length > 1.0e-9, direction / np.maximum(length, 1.0e-9), y)
     axis, cosine = np.cross(y, unit), unit[..., 1]
-    cross = np.zeros((*way.shape, 3))
+    cross = np.zeros((*direction.shape, 3))
     cross[..., 0, 1], cross[..., 1, 0] = -axis[..., 2], axis[..., 2]
     cross[..., 0, 2], cross[..., 2, 0] = axis[..., 1], -axis[..., 1]
     cross[..., 1, 2], cross[..., 2, 1] = -axis[..., 0], axis[..., 0]
-    share = 1.0 / np.maximum(1.0 + cosine, 1.0e-6)
-    turns = np.eye(3) + cross + cross @ cross * share[..., None, None]
+    fraction = 1.0 / np.maximum(1.0 + cosine, 1.0e-6)
+    turns = np.eye(3) + cross + cross @ cross * fraction[..., None, None]
     turns[cosine < -1.0 + 1.0e-6] = np.diag([1.0, -1.0, -1.0])
     return turns
 
 
 def reach_of(points: Floats, skin: Skin, rest: Floats) -> Floats:
-    """Root mean square distance of what hangs on each joint from it, (chains, joints) [m]."""
+    """Root mean square distance of what each joint moves from it, (chains, joints) [m]."""
     places = rest.reshape(-1, 4, 4)[:, :3, 3]
     square = np.square(points[:, None] - places[skin.joint]).sum(axis=-1)
     whole = np.bincount(skin.joint.ravel(), skin.weight.ravel(), len(places))

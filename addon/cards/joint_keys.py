@@ -36,7 +36,7 @@ def chain_keys(rig: JointRig, near: float) -> Generator[float, None, tuple[Chain
     """The keys of all chains; yields the share of them that is done.
 
     Args:
-        near: how far a joint, and what hangs on it, may be from its way between two keys [m].
+        near: how far a joint, and what it moves, may be from its path between two keys [m].
     """
     keys = []
     for chain in range(rig.chains):
@@ -80,10 +80,10 @@ def between_keys(keys: ChainKeys, frame_count: int) -> tuple[Floats, Floats]:
     after = np.searchsorted(keys.frame, frames).clip(1 if len(keys.frame) > 1 else 0)
     before = np.maximum(after - 1, 0)
     length = np.maximum(keys.frame[after] - keys.frame[before], 1)
-    share = ((frames - keys.frame[before]) / length)[:, None]
+    fraction = ((frames - keys.frame[before]) / length)[:, None]
     one, other = keys.translation[:, before], keys.translation[:, after]
-    place = one + (other - one) * share
-    turn = matrices(slerp(keys.rotation[:, before], keys.rotation[:, after], share))
+    place = one + (other - one) * fraction
+    turn = matrices(slerp(keys.rotation[:, before], keys.rotation[:, after], fraction))
     for joint in range(1, len(turn)):
         place[joint] = np.einsum("fab,fb->fa", turn[joint - 1], place[joint]) + place[joint - 1]
         turn[joint] = turn[joint - 1] @ turn[joint]
@@ -121,7 +121,7 @@ def matrices(quaternion: Floats) -> Floats:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def slerp(one: Floats, other: Floats, share: Floats) -> Floats:
+def slerp(one: Floats, other: Floats, fraction: Floats) -> Floats:
     """Evenly from one unit quaternion to the other, the shorter way round, (..., 4)."""
     cosine = (one * other).sum(axis=-1, keepdims=True)
     other = np.where(cosine < 0.0, -other, other)
@@ -129,8 +129,8 @@ def slerp(one: Floats, other: Floats, share: Floats) -> Floats:
     angle = np.arccos(np.minimum(cosine, _NEAR))
     is_near = cosine > _NEAR
     sine = np.sin(angle)
-    first = np.where(is_near, 1.0 - share, np.sin((1.0 - share) * angle) / sine)
-    second = np.where(is_near, share, np.sin(share * angle) / sine)
+    first = np.where(is_near, 1.0 - fraction, np.sin((1.0 - fraction) * angle) / sine)
+    second = np.where(is_near, fraction, np.sin(fraction * angle) / sine)
     mixed = one * first + other * second
     unit: Floats = mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
     return unit

@@ -57,42 +57,42 @@ def rigid_fits(
     return turn, goal - turn @ middle
 
 
-def placed(points: Floats, turn: Floats, way: Floats) -> Floats:
+def placed(points: Floats, turn: Floats, shift: Floats) -> Floats:
     """Points (n, 3) in each frame of a rigid motion, (n, frame_count, 3)."""
-    flat = points @ turn.reshape(-1, 3).T + way.reshape(-1)
+    flat = points @ turn.reshape(-1, 3).T + shift.reshape(-1)
     return flat.reshape(len(points), -1, 3)
 
 
-def skinned(points: Floats, skin: Skin, turn: Floats, way: Floats) -> Floats:
+def skinned(points: Floats, skin: Skin, turn: Floats, shift: Floats) -> Floats:
     """Points (n, 3) moved by their joints, (n, frame_count, 3): linear blend skinning.
 
     Args:
         turn, way: (joint_count, frame_count, 3, 3) and (joint_count, frame_count, 3).
     """
-    result = np.zeros((len(points), *way.shape[1:]), way.dtype)
+    result = np.zeros((len(points), *shift.shape[1:]), shift.dtype)
     for joint in range(len(turn)):
         for column in range(INFLUENCES):
             own = np.flatnonzero((skin.joint[:, column] == joint) & (skin.weight[:, column] > 0.0))
             if len(own):
-                share = skin.weight[own, column, None, None]
-                result[own] += share * placed(points[own], turn[joint], way[joint])
+                fraction = skin.weight[own, column, None, None]
+                result[own] += fraction * placed(points[own], turn[joint], shift[joint])
     return result
 
 
 def first_joints(points: Floats, targets: Floats, skin: Skin, count: int) -> tuple[Floats, Floats]:
-    """`turn` and `way` of each joint as if what hangs on it hung on it alone."""
+    """`turn` and `shift` of each joint as if it alone moved what it has a weight in."""
     still = np.tile(np.eye(3), (targets.shape[1], 1, 1))
-    turn, way = np.tile(still, (count, 1, 1, 1)), np.zeros((count, *targets.shape[1:]))
+    turn, shift = np.tile(still, (count, 1, 1, 1)), np.zeros((count, *targets.shape[1:]))
     for joint in range(count):
-        share = np.where(skin.joint == joint, skin.weight, 0.0).sum(axis=1)
-        own = np.flatnonzero(share > 0.0)
+        fraction = np.where(skin.joint == joint, skin.weight, 0.0).sum(axis=1)
+        own = np.flatnonzero(fraction > 0.0)
         if len(own):
-            turn[joint], way[joint] = rigid_fits(points[own], targets[own], share[own], still)
-    return turn, way
+            turn[joint], shift[joint] = rigid_fits(points[own], targets[own], fraction[own], still)
+    return turn, shift
 
 
 def move_joints(
-    points: Floats, targets: Floats, skin: Skin, turn: Floats, way: Floats, rounds: int
+    points: Floats, targets: Floats, skin: Skin, turn: Floats, shift: Floats, rounds: int
 ) -> None:
     """Better `turn` and `way`, in place: joint by joint against what the others leave (eq. 8).
 
@@ -100,24 +100,24 @@ def move_joints(
         targets: (n, frame_count, 3).
         turn, way: as of `skinned`.
     """
-    left = targets - skinned(points, skin, turn, way)
+    left = targets - skinned(points, skin, turn, shift)
     count = len(turn)
     members = [np.flatnonzero((skin.joint == joint).any(axis=1)) for joint in range(count)]
     for _ in range(rounds):
         for joint, own in enumerate(members):
-            share = np.where(skin.joint[own] == joint, skin.weight[own], 0.0).sum(axis=1)
-            own, share = own[share > 0.0], share[share > 0.0]
+            fraction = np.where(skin.joint[own] == joint, skin.weight[own], 0.0).sum(axis=1)
+            own, fraction = own[fraction > 0.0], fraction[fraction > 0.0]
             if not len(own):
                 continue
-            before = placed(points[own], turn[joint], way[joint])
-            goal = before + left[own] / np.maximum(share, 1.0e-3)[:, None, None]
-            fit = rigid_fits(points[own], goal, share * share, turn[joint])
+            before = placed(points[own], turn[joint], shift[joint])
+            goal = before + left[own] / np.maximum(fraction, 1.0e-3)[:, None, None]
+            fit = rigid_fits(points[own], goal, fraction * fraction, turn[joint])
             after = placed(points[own], *fit)
-            left[own] += share[:, None, None] * (before - after)
-            turn[joint], way[joint] = fit
+            left[own] += fraction[:, None, None] * (before - after)
+            turn[joint], shift[joint] = fit
 
 
-def best_weights(points: Floats, targets: Floats, first: Skin, turn: Floats, way: Floats) -> Skin:
+def best_weights(points: Floats, targets: Floats, first: Skin, turn: Floats, shift: Floats) -> Skin:
     """The weights of the same joints that bring points nearest to targets (eq. 5).
 
     Every set of joints that may remain is tried, so that the best weights that are not negative
@@ -129,7 +129,7 @@ def best_weights(points: Floats, targets: Floats, first: Skin, turn: Floats, way
     """
     shown = np.stack(
         [
-            _of_joints(points, first.joint[:, column], turn, way) - targets
+            _of_joints(points, first.joint[:, column], turn, shift) - targets
             for column in range(INFLUENCES)
         ],
         axis=1,
@@ -150,15 +150,15 @@ def best_weights(points: Floats, targets: Floats, first: Skin, turn: Floats, way
     return Skin(first.joint, weight)
 
 
-def _of_joints(points: Floats, joint: Ints, turn: Floats, way: Floats) -> Floats:
+def _of_joints(points: Floats, joint: Ints, turn: Floats, shift: Floats) -> Floats:
     """Each point moved by a joint of its own, (n, frame_count, 3)."""
-    result = np.empty((len(points), *way.shape[1:]))
+    result = np.empty((len(points), *shift.shape[1:]))
     order = np.argsort(joint, kind="stable")
     ends = np.searchsorted(joint[order], np.arange(len(turn) + 1))
     for number, (begin, end) in enumerate(pairwise(ends)):
         own = order[begin:end]
         if len(own):
-            result[own] = placed(points[own], turn[number], way[number])
+            result[own] = placed(points[own], turn[number], shift[number])
     return result
 
 

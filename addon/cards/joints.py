@@ -1,8 +1,8 @@
 """Chains of joints that move cards as their guides do: for engines that know skinned meshes.
 
-Cards that move alike share a chain (`joint_chains`), a vertex hangs on two neighbouring joints of
-its own chain and two of another one, and joints and weights are fitted to the motion in turns
-(`joint_solve`).
+Cards that move alike share a chain (`joint_chains`), a vertex is weighted to two neighbouring
+joints of its own chain and two of another one, and joints and weights are fitted to the
+motion in turns (`joint_solve`).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _COUNTS = (2, 3, 4, 6, 8, 12, 16)
 #: Joints go on being added while each step takes at least this share of the error away.
 _WORTH = 0.03
 #: Share of the error that the joints may take; the rest is for the keys that are left out.
-FIT_SHARE = 0.9
+FIT_FRACTION = 0.9
 #: Frames from which weights are learnt, and vertices from which joints are.
 _LEARNT_FRAMES = 24
 _LEARNT_VERTICES = 12_000
@@ -62,12 +62,12 @@ class CardTracks:
 
 @dataclass(frozen=True, eq=False)
 class JointRig:
-    """Joints and what hangs on them, in the space of `CardTracks`; chain after chain.
+    """Joints and what they move, in the space of `CardTracks`; chain after chain.
 
     chains, joints: how many chains, and joints in each.
     rest: (chains, joints, 4, 4) rigid [m]; the y axis is along the chain.
     turn, place: (chains, joints, frame_count, 3, 3) and (..., 3) [m], of the joints themselves.
-    reach: (chains, joints) how far what hangs on it lies from it [m].
+    reach: (chains, joints) how far what it moves lies from it [m].
     skins: of each level; a joint's number is chain * joints + number in the chain.
     """
 
@@ -100,7 +100,7 @@ def joint_steps(
     """
     learnt = _Learnt.of(tracks, settings.chains)
     yield 0.1
-    allowed = FIT_SHARE * settings.joint_error / 100.0 * tracks.hair_length
+    allowed = FIT_FRACTION * settings.joint_error / 100.0 * tracks.hair_length
     best, least = None, np.inf
     for count in (each for each in _COUNTS if each <= settings.joints):
         fit, error = learnt.fitted(count)
@@ -141,10 +141,10 @@ def joint_moves(rest: Floats, turn: Floats, place: Floats) -> tuple[Floats, Floa
     """
     shape = turn.shape[2:]
     moves = (turn @ rest[:, :, None, :3, :3].swapaxes(-1, -2)).reshape(-1, *shape)
-    ways = place.reshape(-1, shape[0], 3) - np.einsum(
+    shifts = place.reshape(-1, shape[0], 3) - np.einsum(
         "jfab,jb->jfa", moves, rest.reshape(-1, 4, 4)[:, :3, 3]
     )
-    return moves, ways
+    return moves, shifts
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,9 +166,9 @@ class _Learnt:
         few = min(tracks.frame_count, _LEARNT_FRAMES)
         frames = np.linspace(0, tracks.frame_count - 1, few).round().astype(int)
         _, lines = card_lines(mesh)
-        ways = [card_lines(replace(mesh, positions=moved[:, frame]))[1] for frame in frames]
+        shifts = [card_lines(replace(mesh, positions=moved[:, frame]))[1] for frame in frames]
         lines = lines.astype(np.float64)
-        chains = card_chains(lines, np.stack(ways, axis=2).astype(np.float64), most)
+        chains = card_chains(lines, np.stack(shifts, axis=2).astype(np.float64), most)
         count = min(len(mesh.positions), _LEARNT_VERTICES)
         picked = np.sort(np.random.default_rng(0).permutation(len(mesh.positions))[:count])
         return cls(
@@ -188,41 +188,41 @@ class _Learnt:
         before = np.minimum(at.astype(np.int64), joints - 2)
         own = self.chains.own[card] * joints + before
         other = self.chains.other[card] * joints + before
-        share = at - before
+        fraction = at - before
         weight = np.zeros((len(card), INFLUENCES))
-        weight[:, 0], weight[:, 1] = 1.0 - share, share
+        weight[:, 0], weight[:, 1] = 1.0 - fraction, fraction
         return Skin(np.stack([own, own + 1, other, other + 1], axis=1), weight)
 
     def fitted(self, joints: int) -> tuple[tuple[Skin, Floats, Floats], float]:
         """The skin of the learnt vertices, the joints' motion, and the error [m]."""
         skin = self.first_skin(self.card, self.along, joints)
         count = self.chains.count * joints
-        turn, way = first_joints(self.points, self.moved, skin, count)
+        turn, shift = first_joints(self.points, self.moved, skin, count)
         for _ in range(_TURNS):
-            move_joints(self.points, self.moved, skin, turn, way, 2)
-            skin = best_weights(self.points, self.moved, skin, turn, way)
-        move_joints(self.points, self.moved, skin, turn, way, 1)
-        miss = skinned(self.points, skin, turn, way) - self.moved
-        return (skin, turn, way), float(np.sqrt((miss * miss).sum(axis=-1).mean()))
+            move_joints(self.points, self.moved, skin, turn, shift, 2)
+            skin = best_weights(self.points, self.moved, skin, turn, shift)
+        move_joints(self.points, self.moved, skin, turn, shift, 1)
+        miss = skinned(self.points, skin, turn, shift) - self.moved
+        return (skin, turn, shift), float(np.sqrt((miss * miss).sum(axis=-1).mean()))
 
 
 def _on_all(
-    tracks: CardTracks, learnt: _Learnt, joints: int, skin: Skin, turn: Floats, way: Floats
+    tracks: CardTracks, learnt: _Learnt, joints: int, skin: Skin, turn: Floats, shift: Floats
 ) -> Generator[float, None, JointRig]:
     """The learnt joints in all frames, and with all vertices."""
     chains, frame_count = learnt.chains.count, tracks.frame_count
     turns = np.empty((chains * joints, frame_count, 3, 3))
-    ways = np.empty((chains * joints, frame_count, 3))
+    shifts = np.empty((chains * joints, frame_count, 3))
     for begin in range(0, frame_count, _FRAMES_AT_ONCE):
         part = slice(begin, begin + _FRAMES_AT_ONCE)
         moved = tracks.moved[0][learnt.picked, part].astype(np.float64)
         block = first_joints(learnt.points, moved, skin, chains * joints)
         move_joints(learnt.points, moved, skin, *block, rounds=3)
-        turns[:, part], ways[:, part] = block
+        turns[:, part], shifts[:, part] = block
         yield 0.5 + 0.3 * min(begin + _FRAMES_AT_ONCE, frame_count) / frame_count
     skins = []
     for mesh, now in zip(tracks.levels, tracks.moved, strict=True):
-        skins.append(_skin_of(mesh, now, tracks.levels[0], learnt, joints, turn, way))
+        skins.append(_skin_of(mesh, now, tracks.levels[0], learnt, joints, turn, shift))
         yield 0.8 + 0.1 * len(skins) / len(tracks.levels)
     rest = rest_joints(learnt.lines, learnt.chains, joints)
     flat: Floats = rest.reshape(-1, 4, 4)
@@ -233,7 +233,7 @@ def _on_all(
         joints,
         rest,
         (turns @ flat[:, None, :3, :3]).reshape(*shape, 3, 3),
-        (place + ways).reshape(*shape, 3),
+        (place + shifts).reshape(*shape, 3),
         reach_of(tracks.levels[0].positions, skins[0], rest),
         tuple(skins),
     )
@@ -246,7 +246,7 @@ def _skin_of(
     learnt: _Learnt,
     joints: int,
     turn: Floats,
-    way: Floats,
+    shift: Floats,
 ) -> Skin:
     """The weights of all vertices of a level, heaviest first."""
     card = _card_places(mesh, finest)
@@ -255,8 +255,8 @@ def _skin_of(
         part = slice(begin, begin + _VERTICES_AT_ONCE)
         first = learnt.first_skin(card[part], mesh.along[part], joints)
         points = mesh.positions[part].astype(np.float64)
-        ways = moved[part][:, learnt.frames].astype(np.float64)
-        parts.append(best_weights(points, ways, first, turn, way))
+        shifts = moved[part][:, learnt.frames].astype(np.float64)
+        parts.append(best_weights(points, shifts, first, turn, shift))
     joint = np.concatenate([each.joint for each in parts])
     weight = np.concatenate([each.weight for each in parts])
     order = np.argsort(-weight, axis=1, kind="stable")

@@ -15,7 +15,7 @@ from .strip import Strips
 #: Places along a card at which its neighbours are counted.
 _STATIONS = 5
 #: Places of other cards that are looked at, at most.
-_MOST_OTHERS = 4096
+_MAX_OTHERS = 4096
 #: How many of them a look goes through where cards lie in one sheet.
 _SEEN = 6.0
 #: Cosine between the normals of two cards that belong to the same side of the head.
@@ -42,9 +42,9 @@ def card_depths(strips: Strips) -> Floats:
     place = strips.frames.center[:, rows].reshape(-1, 3)
     normal = strips.frames.normal[:, rows].reshape(-1, 3)
     card = np.repeat(np.arange(len(strips)), len(rows))
-    others = np.linspace(0, len(place) - 1, min(len(place), _MOST_OTHERS)).round().astype(int)
+    others = np.linspace(0, len(place) - 1, min(len(place), _MAX_OTHERS)).round().astype(int)
     reach = _SEEN * _area(strips) / (np.pi * len(others))
-    share = np.empty(len(place))
+    fraction = np.empty(len(place))
     for start in range(0, len(place), _CHUNK):
         chosen = slice(start, start + _CHUNK)
         below, above = _counted(
@@ -52,8 +52,8 @@ def card_depths(strips: Strips) -> Floats:
             (place[others], normal[others], card[others]),
             reach,
         )
-        share[chosen] = below / np.maximum(below + above, 1)
-    return share.reshape(len(strips), -1).mean(axis=1)
+        fraction[chosen] = below / np.maximum(below + above, 1)
+    return fraction.reshape(len(strips), -1).mean(axis=1)
 
 
 def _counted(

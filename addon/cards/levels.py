@@ -20,10 +20,10 @@ from .settings import CardSettings
 from .strip import Strips, UncutCards, strip_mesh
 
 #: Share of the triangles that a level keeps of the one before, at most, to be worth having.
-_MOST_KEPT = 0.6
+_MAX_KEPT = 0.6
 #: Where no error is allowed, levels start from this share of the cards' usual width; and from this
 #: one on rows stay: straighter cards would run through the head.
-_LEAST_ERROR, _MOST_ERROR = 0.05, 0.4
+_MIN_ERROR, _MAX_ERROR = 0.05, 0.4
 _BISECTIONS = 24
 #: Share of the places on the edges of all cards, in percent, that a level's error holds for.
 _HELD = 90.0
@@ -59,7 +59,7 @@ class _Cut:
     errors: Floats
     columns: int
     error: float
-    most_error: float
+    max_error: float
 
     @property
     def triangle_count(self) -> int:
@@ -78,7 +78,7 @@ def card_levels(
     cuts = [_finest(cards, settings, error)]
     while cuts[-1].triangle_count and len(cuts) < settings.levels:
         coarser = _coarser(cuts[-1], cards.group, settings.segment_count)
-        if coarser.triangle_count > _MOST_KEPT * cuts[-1].triangle_count:
+        if coarser.triangle_count > _MAX_KEPT * cuts[-1].triangle_count:
             break
         cuts.append(coarser)
     return tuple(
@@ -94,15 +94,15 @@ def _finest(cards: UncutCards, settings: CardSettings, error: float | None) -> _
         segments = fewest_segments(errors, error, most)
     median = float(np.median(cards.strips.width)) if len(cards) else 0.0
     numbers = np.arange(len(cards), dtype=np.int32)
-    columns, allowed = settings.column_count, error or _LEAST_ERROR * median
-    most_allowed = max(allowed, _MOST_ERROR * median)
+    columns, allowed = settings.column_count, error or _MIN_ERROR * median
+    max_allowed = max(allowed, _MAX_ERROR * median)
     strips, count = cards.strips, cards.strand_count
-    return _Cut(strips, count, numbers, segments, errors, columns, allowed, most_allowed)
+    return _Cut(strips, count, numbers, segments, errors, columns, allowed, max_allowed)
 
 
 def _coarser(cut: _Cut, group: Ints, most: int) -> _Cut:
     """Half the triangles, or as near as may be."""
-    half, allowed = cut.triangle_count / 2.0, min(2.0 * cut.error, cut.most_error)
+    half, allowed = cut.triangle_count / 2.0, min(2.0 * cut.error, cut.max_error)
     if _fewer_rows(cut, allowed, most).triangle_count > half and cut.columns > 1:
         cut = replace(cut, columns=(cut.columns + 1) // 2)
     least = _fewer_rows(cut, allowed, most)

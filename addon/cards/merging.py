@@ -49,15 +49,15 @@ def with_joined(strips: Strips, strand_count: Ints, pairs: Ints) -> tuple[Strips
     """
     kept, joined = pairs.T
     frames, width = strips.frames, strips.width
-    share = (strand_count[joined] / (strand_count[kept] + strand_count[joined]))[:, None, None]
-    center = frames.center[kept] * (1.0 - share) + frames.center[joined] * share
+    fraction = (strand_count[joined] / (strand_count[kept] + strand_count[joined]))[:, None, None]
+    center = frames.center[kept] * (1.0 - fraction) + frames.center[joined] * fraction
     tangent = tangents(center)
     normal = frames.normal[kept]
     normal = unit(normal - tangent * np.einsum("cri,cri->cr", normal, tangent)[..., None])
     side = np.cross(tangent, normal)
     squared = sum(
         part * _squared_width(strips, each, center, side)
-        for part, each in ((1.0 - share[..., 0], kept), (share[..., 0], joined))
+        for part, each in ((1.0 - fraction[..., 0], kept), (fraction[..., 0], joined))
     )
     spread, both = np.sqrt(squared), width[kept] + width[joined]
     covering = np.sqrt(spread * np.maximum(both, spread))

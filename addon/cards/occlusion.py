@@ -105,9 +105,9 @@ def occlusion_steps(
         for first in range(0, len(axes), _DIRECTIONS_PER_STEP):
             part = axes[first : first + _DIRECTIONS_PER_STEP]
             # in order, so that the sums are the same every time
-            for share, transmittance in threads.map(scene.seen_along, part):
-                light += share * transmittance
-                whole += share
+            for fraction, transmittance in threads.map(scene.seen_along, part):
+                light += fraction * transmittance
+                whole += fraction
             yield (first + len(part)) / len(axes)
     openness = np.divide(light, whole, out=np.ones(count), where=whole > 0.0)
     shown: Floats = (1.0 - settings.strength * (1.0 - openness)).astype(np.float32)

@@ -21,7 +21,7 @@ from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
 from .card_mesh import CardMesh
 from .order_views import (
-    LEAST_ALPHA,
+    MIN_ALPHA,
     OPAQUE_ALPHA,
     Fragments,
     View,
@@ -32,7 +32,7 @@ from .order_views import (
     view_directions,
 )
 
-#: Two colours that differ by more can be told apart in 8 bits.
+#: Two colours that differ by more can be distinguished in 8 bits.
 VISIBLE = 1.0 / 255.0
 #: Without a texture, cards cover this much everywhere.
 _PLAIN_ALPHA = 0.5
@@ -50,7 +50,7 @@ class SeenCards:
     alpha: Floats
 
 
-def wrong_share(
+def wrong_fraction(
     mesh: CardMesh,
     head: Surface | None,
     *,
@@ -99,7 +99,7 @@ def seen_cards(
     is_opaque = covers >= OPAQUE_ALPHA
     np.maximum.at(hidden, met.pixel[is_opaque], met.near[is_opaque])
     # of opaque ones at one depth the first is drawn
-    is_seen = (covers >= LEAST_ALPHA) & (met.near >= hidden[met.pixel])
+    is_seen = (covers >= MIN_ALPHA) & (met.near >= hidden[met.pixel])
     met, covers = met[is_seen], np.where(is_opaque, 1.0, covers)[is_seen]
     order = np.lexsort((met.near, met.pixel))
     return SeenCards(met[order], covers[order])

@@ -13,8 +13,8 @@ from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
 from .card_mesh import CardMesh
 from .order_views import (
-    LEAST_ALPHA,
     LOWEST,
+    MIN_ALPHA,
     OPAQUE_ALPHA,
     Fragments,
     View,
@@ -30,8 +30,8 @@ from .order_views import (
 #: that hardly show.
 OPACITY = 0.4
 #: A pair that changes its pixel's colour by less than this share is left out.
-LEAST_WEIGHT = 0.004
-#: Weights are whole numbers, so that their sums do not hang on the order of adding.
+MIN_WEIGHT = 0.004
+#: Weights are whole numbers, so that their sums do not depend on the order of adding.
 _UNIT = 1000
 #: Views at work at the same time; numpy lets other threads run most of the time.
 _THREADS = min(4, os.cpu_count() or 1)
@@ -71,8 +71,8 @@ def pairs_by_view(
         alpha = seen_from_afar(alpha, mesh, 2.0 * radius / size)
 
     def seen(direction: Floats) -> Pairs:
-        both_ways = _both_ways(mesh, head, direction, size, alpha)
-        return all_pairs([pairs_of(met, covers) for met, covers in both_ways])
+        both_directions = _both_directions(mesh, head, direction, size, alpha)
+        return all_pairs([pairs_of(met, covers) for met, covers in both_directions])
 
     with ThreadPoolExecutor(_THREADS) as threads:
         yield from threads.map(seen, view_directions(view_count))
@@ -83,7 +83,7 @@ def all_pairs(found: Sequence[Pairs]) -> Pairs:
     return Pairs(*(np.concatenate([getattr(one, name) for one in found]) for name in _NAMES))
 
 
-def _both_ways(
+def _both_directions(
     mesh: CardMesh, head: Surface | None, direction: Floats, size: int, alpha: Floats | None
 ) -> Iterator[tuple[Fragments, Floats]]:
     """What is seen from there and, unless that is from too far below, from the opposite side; and
@@ -108,14 +108,14 @@ def _both_ways(
         np.maximum.at(limit, met.pixel[is_opaque], near[is_opaque])
         if body is not None:
             np.maximum.at(limit, body.pixel, np.float32(sign) * body.near)
-        is_seen = (near > limit[met.pixel]) & (covers >= LEAST_ALPHA) & ~is_opaque
-        seen, share = met[is_seen], covers[is_seen]
+        is_seen = (near > limit[met.pixel]) & (covers >= MIN_ALPHA) & ~is_opaque
+        seen, fraction = met[is_seen], covers[is_seen]
         if sign > 0.0:
-            yield seen, share
+            yield seen, fraction
         else:
             back = seen[np.arange(len(seen.pixel))[::-1]]
             turned = replace(back, near=-back.near, is_front=~back.is_front)
-            yield turned, share[::-1]
+            yield turned, fraction[::-1]
 
 
 def pairs_of(met: Fragments, covers: Floats) -> Pairs:
@@ -142,7 +142,7 @@ def pairs_of(met: Fragments, covers: Floats) -> Pairs:
         before = behind + apart
         others = np.exp(through[behind]) / (1.0 - covers[before])
         weight = covers[behind] * covers[before] * others
-        matters = weight >= LEAST_WEIGHT
+        matters = weight >= MIN_WEIGHT
         found.append((behind[matters], before[matters], weight[matters]))
     behind, before, weight = (np.concatenate(each) for each in zip(*found, strict=True))
     facing = np.where(met.is_front[behind] == met.is_front[before], met.is_front[behind], 2)

@@ -58,7 +58,7 @@ def wishes(count: int, before: Ints, after: Ints, weight: Ints) -> Wishes:
     return Wishes(count, lower, higher, total[total != 0])
 
 
-def least_broken(wished: Wishes, start: Ints, most_moves: int = 20) -> Ints:
+def min_broken(wished: Wishes, start: Ints, max_moves: int = 20) -> Ints:
     """The rank of each thing, (count,), in an order from which no single move is better.
 
     A thing is looked at again when one that it has wishes with has moved. Things without wishes
@@ -72,7 +72,7 @@ def least_broken(wished: Wishes, start: Ints, most_moves: int = 20) -> Ints:
     place[start] = np.arange(wished.count)
     firsts, others, weights = _by_thing(wished)
     random = np.random.default_rng(0)
-    waiting, looks = np.ones(wished.count, bool), most_moves * wished.count
+    waiting, looks = np.ones(wished.count, bool), max_moves * wished.count
     while looks > 0 and waiting.any():
         todo = random.permutation(np.flatnonzero(waiting))
         waiting[:] = False

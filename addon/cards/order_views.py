@@ -18,7 +18,7 @@ LOWEST, HIGHEST = -20.0, 65.0
 #: Points nearer to the eye than the rest of its distance from the middle count as behind it.
 _BEFORE_EYE = 0.99
 #: From this alpha on a pixel is opaque, and below the other it is clear: as in the passes.
-OPAQUE_ALPHA, LEAST_ALPHA = 0.99, 0.004
+OPAQUE_ALPHA, MIN_ALPHA = 0.99, 0.004
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 
@@ -154,8 +154,8 @@ def far_to_near(met: Fragments) -> Fragments:
 def alpha_at(mesh: CardMesh, met: Fragments, alpha: Floats) -> Floats:
     """The nearest texel of each fragment, (fragment_count,); alpha: (height, width)."""
     first = 1.0 - met.second - met.third
-    shares = np.stack([first, met.second, met.third], axis=1)
-    uv = np.einsum("nc,nci->ni", shares, mesh.uv[mesh.triangles[met.triangle]])
+    fractions = np.stack([first, met.second, met.third], axis=1)
+    uv = np.einsum("nc,nci->ni", fractions, mesh.uv[mesh.triangles[met.triangle]])
     height, width = alpha.shape
     row = np.clip((uv[:, 1] * height).astype(int), 0, height - 1)
     column = np.clip((uv[:, 0] * width).astype(int), 0, width - 1)

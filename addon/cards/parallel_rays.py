@@ -19,7 +19,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 
 #: Cells at most: so their numbers fit 16 bits, which numpy sorts fastest; and rows of them.
-_MOST_CELLS, _MOST_ROWS = 1 << 16, 250
+_MAX_CELLS, _MAX_ROWS = 1 << 16, 250
 #: Rows that a triangle of typical height crosses.
 _ROWS_PER_TRIANGLE = 3.0
 #: Pairs of points and triangles tested at once: they stay in the processor's cache.
@@ -70,9 +70,9 @@ def point_grid(places: Floats, triangle_height: float) -> PointGrid:
     """
     low = places.min(axis=1)
     width, height = np.maximum(places.max(axis=1) - low, 1e-9)
-    row_height = max(height / (_MOST_ROWS - 1), triangle_height / _ROWS_PER_TRIANGLE)
+    row_height = max(height / (_MAX_ROWS - 1), triangle_height / _ROWS_PER_TRIANGLE)
     row_count = int(height / row_height) + 2
-    column_count = _MOST_CELLS // row_count
+    column_count = _MAX_CELLS // row_count
     cell = np.array([width / (column_count - 2), row_height], np.float32)
     column, row = ((places - low[:, None]) / cell[:, None]).astype(np.int64)
     number = row * column_count + column

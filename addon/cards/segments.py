@@ -69,6 +69,6 @@ def interpolated(rows: Floats, along: Floats) -> Floats:
     """Rows at these places from 0 to 1, linearly between, (card_count, len(along), ...)."""
     place = along * (rows.shape[1] - 1)
     left = np.minimum(place.astype(int), rows.shape[1] - 2)
-    share = (place - left).astype(np.float32).reshape(1, -1, *[1] * (rows.ndim - 2))
-    mixed: Floats = rows[:, left] * (1.0 - share) + rows[:, left + 1] * share
+    fraction = (place - left).astype(np.float32).reshape(1, -1, *[1] * (rows.ndim - 2))
+    mixed: Floats = rows[:, left] * (1.0 - fraction) + rows[:, left + 1] * fraction
     return mixed

@@ -27,7 +27,7 @@ from ..strands import Surface
 from ..strands.closest_point import closest_point
 from .card_mesh import OF_CARDS, OF_VERTICES, CardMesh
 from .order_pairs import Pairs, all_pairs, pairs_by_view
-from .order_search import Wishes, least_broken, wishes
+from .order_search import Wishes, min_broken, wishes
 from .steps import result_of
 
 #: Vertices of a card whose distance from the head is measured; more hardly change the order.
@@ -35,11 +35,11 @@ SAMPLE_COUNT = 7
 #: Directions from which pairs are collected, and pixels across.
 VIEW_COUNT, VIEW_SIZE = 48, 96
 #: The search looks at so many pieces; where there are more triangles, a piece has several.
-MOST_PIECES = 30_000
+MAX_PIECES = 30_000
 #: With more triangles than this the distance decides alone.
-MOST_TRIANGLES = 250_000
+MAX_TRIANGLES = 250_000
 #: Views looked at in a step, and how much of the time they take.
-_VIEWS_PER_STEP, _SHARE_OF_VIEWS = 8, 0.6
+_VIEWS_PER_STEP, _FRACTION_OF_VIEWS = 8, 0.6
 
 #: A group dangles where its middle card is so many times as far from the head as nearly all cards
 #: of the groups that lie nearer and do not dangle.
@@ -120,20 +120,20 @@ def _canonical_orders(
     section = _section_of_cards(mesh, distance, apart)
     inside_out = np.lexsort((distance, section))
     outside_in = np.lexsort((-distance, section))
-    if by == "distance" or len(mesh.triangles) > MOST_TRIANGLES:
+    if by == "distance" or len(mesh.triangles) > MAX_TRIANGLES:
         return CardOrders(_triangles_of(mesh, inside_out), _triangles_of(mesh, outside_in))
     found = []
     for seen in pairs_by_view(mesh, head, view_count, VIEW_SIZE, alpha):
         found.append(seen)
         if len(found) % _VIEWS_PER_STEP == 0:
-            yield _SHARE_OF_VIEWS * len(found) / view_count
+            yield _FRACTION_OF_VIEWS * len(found) / view_count
     pairs = all_pairs(found)
     own = section[mesh.card]
     pairs = pairs[own[pairs.behind] == own[pairs.before]]
     piece = pieces(mesh) if by == "pieces" else None
-    yield _SHARE_OF_VIEWS
+    yield _FRACTION_OF_VIEWS
     front = _learnt(mesh, pairs[pairs.facing == 1], inside_out, piece)
-    yield (1.0 + _SHARE_OF_VIEWS) / 2.0
+    yield (1.0 + _FRACTION_OF_VIEWS) / 2.0
     back = _learnt(mesh, pairs[pairs.facing == 0], outside_in, piece)
     # what was moved to an end of its own section may have passed others
     front, back = (order[np.argsort(own[order], kind="stable")] for order in (front, back))
@@ -152,7 +152,7 @@ def _learnt(mesh: CardMesh, pairs: Pairs, cards: Ints, piece: Ints | None) -> In
 
 def _improved(wished: Wishes, thing: Ints, start: Ints) -> Ints:
     """All triangles in an order of what they belong to, (triangle_count,), better than `start`."""
-    rank = least_broken(wished.of_whole(thing, len(start)), start)
+    rank = min_broken(wished.of_whole(thing, len(start)), start)
     return np.argsort(rank[thing], kind="stable")
 
 
@@ -287,7 +287,7 @@ def pieces(mesh: CardMesh) -> Ints:
     A triangle each, or so many that follow each other in a card that there are not too many.
     """
     count = len(mesh.triangles)
-    together = -(-count // MOST_PIECES) if count else 1
+    together = -(-count // MAX_PIECES) if count else 1
     order = np.argsort(mesh.card, kind="stable")
     starts = np.flatnonzero(np.diff(mesh.card[order], prepend=-1))
     place = np.arange(count) - np.repeat(starts, np.diff(np.append(starts, count)))
@@ -321,9 +321,9 @@ def card_distances(mesh: CardMesh, head: Surface | None) -> Floats:
     vertices = np.argsort(owner, kind="stable")
     counts = np.bincount(owner, minlength=int(mesh.card.max()) + 1)
     starts = np.cumsum(counts) - counts
-    share = (np.arange(SAMPLE_COUNT) + 0.5) / SAMPLE_COUNT
+    fraction = (np.arange(SAMPLE_COUNT) + 0.5) / SAMPLE_COUNT
     used = np.flatnonzero(counts)
-    picks = vertices[starts[used, None] + (counts[used, None] * share).astype(np.int64)]
+    picks = vertices[starts[used, None] + (counts[used, None] * fraction).astype(np.int64)]
     points = mesh.positions[picks.ravel()]
     if head is None:
         distance = np.linalg.norm(points - mesh.positions.mean(axis=0), axis=1)

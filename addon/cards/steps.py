@@ -16,10 +16,10 @@ def result_of[Result](steps: Generator[Any, None, Result]) -> Result:
             return result
 
 
-def retold[Step, Told, Result](
-    steps: Generator[Step, None, Result], tell: Callable[[Step], Told]
-) -> Generator[Told, None, Result]:
-    """The same work, each step told in another way."""
+def map_progress[Step, Progress, Result](
+    steps: Generator[Step, None, Result], tell: Callable[[Step], Progress]
+) -> Generator[Progress, None, Result]:
+    """The same work, each step reported in another form."""
     try:
         while True:
             yield tell(next(steps))

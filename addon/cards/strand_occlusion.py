@@ -17,7 +17,7 @@ from .sort import card_of_vertex
 #: Pairs of vertices and strands at work at the same time.
 _PAIRS = 1 << 20
 #: Columns that lie closer count as this far apart [m].
-_LEAST_WIDTH = 1.0e-6
+_MIN_WIDTH = 1.0e-6
 
 
 def strands_occlusion(mesh: CardMesh, grid: Floats, occlusion: Floats, card: Ints) -> Floats:
@@ -60,9 +60,9 @@ def _at(values: Floats, strand: Ints, along: Floats) -> Floats:
     """Values of CVs between them, (n, m, channels): strands (n, m) at (n,) parts of their way."""
     place = along * (values.shape[1] - 1)
     low = np.minimum(place.astype(np.int64), values.shape[1] - 2)
-    share = (place - low)[:, None, None]
-    between: Floats = values[strand, low[:, None]] * (1.0 - share)
-    return between + values[strand, low[:, None] + 1] * share
+    fraction = (place - low)[:, None, None]
+    between: Floats = values[strand, low[:, None]] * (1.0 - fraction)
+    return between + values[strand, low[:, None] + 1] * fraction
 
 
 def _rows(mesh: CardMesh) -> tuple[Floats, Floats]:
@@ -75,8 +75,8 @@ def _rows(mesh: CardMesh) -> tuple[Floats, Floats]:
     first = np.flatnonzero(begins)
     last = np.append(first[1:], len(order)) - 1
     across = mesh.positions[order[last]] - mesh.positions[order[first]]
-    width = np.maximum(np.linalg.norm(across, axis=1), _LEAST_WIDTH)
+    width = np.maximum(np.linalg.norm(across, axis=1), _MIN_WIDTH)
     row = np.empty(len(order), np.int64)
     row[order] = np.cumsum(begins) - 1
-    reach = np.maximum(width / np.maximum(last - first, 1), _LEAST_WIDTH)
+    reach = np.maximum(width / np.maximum(last - first, 1), _MIN_WIDTH)
     return (across / width[:, None])[row], reach[row]

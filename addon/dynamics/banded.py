@@ -3,7 +3,7 @@
 Rows are CVs or segments, so a sweep down the band is a Python loop of whole-row numpy calls.
 Only +, -, *, / are used, which IEEE 754 rounds alike everywhere: no BLAS. For some hundred guides
 the calls cost more than the numbers, so arrays are taken apart into rows once, and functions that
-are told where to write stand for operators, which take longer.
+are given where to write stand for operators, which take longer.
 """
 
 from __future__ import annotations

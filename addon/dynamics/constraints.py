@@ -74,10 +74,12 @@ def pin(position: Floats, carried: Floats, length: Floats, tip_held: Floats | No
     position[:, :PINNED] = carried[:, :PINNED]
     if tip_held is not None:
         root = carried[:, PINNED - 1]
-        way = carried[:, -1] - root
+        displacement = carried[:, -1] - root
         reach = length[PINNED - 1 :].sum(axis=0)
-        way *= np.minimum(reach / np.maximum(np.sqrt(dot_rows(way, way)), TINY), np.float32(1.0))
-        np.copyto(position[:, -1], root + way, where=tip_held > 0.0)
+        displacement *= np.minimum(
+            reach / np.maximum(np.sqrt(dot_rows(displacement, displacement)), TINY), np.float32(1.0)
+        )
+        np.copyto(position[:, -1], root + displacement, where=tip_held > 0.0)
 
 
 def keep_lengths(
@@ -120,11 +122,13 @@ def hold_within_reach(position: Floats, length: Floats) -> None:
     """No CV farther from the last pinned one than its length along the strand (Kim, Chentanez and
     Mueller 2012, "Long Range Attachments")."""
     root = position[:, PINNED - 1 : PINNED]
-    way = position[:, PINNED:] - root
+    displacement = position[:, PINNED:] - root
     reach = np.cumsum(length[PINNED - 1 :], axis=0)
-    way *= np.minimum(reach / np.maximum(np.sqrt(dot_rows(way, way)), TINY), np.float32(1.0))
-    way += root
-    position[:, PINNED:] = way
+    displacement *= np.minimum(
+        reach / np.maximum(np.sqrt(dot_rows(displacement, displacement)), TINY), np.float32(1.0)
+    )
+    displacement += root
+    position[:, PINNED:] = displacement
 
 
 def finish_lengths(
@@ -169,8 +173,8 @@ def _laid_out(position: Floats, length: Floats, tip_held: Floats | None) -> Floa
         from_tip = position[:, -1:] - from_tip
         np.copyto(position[:, PINNED:-1], from_tip[:, 1:], where=tip_held > 0.0)
     direction, _ = directions(position[:, PINNED - 1 :])
-    way = np.cumsum(direction * length[PINNED - 1 :], axis=1)
-    position[:, PINNED:] = position[:, PINNED - 1 : PINNED] + way
+    displacement = np.cumsum(direction * length[PINNED - 1 :], axis=1)
+    position[:, PINNED:] = position[:, PINNED - 1 : PINNED] + displacement
     return position
 
 

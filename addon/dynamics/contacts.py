@@ -151,7 +151,7 @@ def _contacts_with(
     index, distance = index.take(close), distance.take(close)
     local, normal = chosen(local, close), chosen(normal, close)
     here, origin = chosen(position, index), chosen(previous, index)
-    origin += transform_points(pose.way, local)
+    origin += transform_points(pose.displacement, local)
     reached = distance - dot_rows(normal, here - origin)
     reached += np.float32(led_out)
     own_radius = radius.take(index)

@@ -34,7 +34,7 @@ def air_fraction(settings: DynamicsSettings, dt: float) -> float:
     return (1.0 - speed_kept(settings, dt)) * settings.damping / both if both else 0.0
 
 
-def brake(position: Floats, previous: Floats, drag: float, air_way: Floats | None) -> None:
+def brake(position: Floats, previous: Floats, drag: float, air_displacement: Floats | None) -> None:
     """Drag by the square of the speed, implicitly: v_rel / (1 + drag |v_rel| dt), in place.
 
     Changes `previous`, which holds the speed.
@@ -42,16 +42,16 @@ def brake(position: Floats, previous: Floats, drag: float, air_way: Floats | Non
     Args:
         air_way: (3, guide_count), what the air goes in a substep [m]; None when it stands still.
     """
-    way = position - previous
-    if air_way is not None:
-        way -= air_way[:, None]
-    length = np.sqrt(dot_rows(way, way))
+    displacement = position - previous
+    if air_displacement is not None:
+        displacement -= air_displacement[:, None]
+    length = np.sqrt(dot_rows(displacement, displacement))
     length *= np.float32(drag)
     length += np.float32(1.0)
-    way /= length
-    if air_way is not None:
-        way += air_way[:, None]
-    np.subtract(position, way, out=previous)
+    displacement /= length
+    if air_displacement is not None:
+        displacement += air_displacement[:, None]
+    np.subtract(position, displacement, out=previous)
 
 
 def predict(position: Floats, previous: Floats, impulse: Floats, kept: float, out: Floats) -> None:

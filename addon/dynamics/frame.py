@@ -15,8 +15,8 @@ from .forces import carried_fraction, felt_gravity
 from .settings import DynamicsSettings
 from .state import DynamicsState, Rest, StyleRows, as_rows, checked_grid
 from .style import StyleBand, style_band
+from .trajectory import at, curvature
 from .turn import rotation_from, sample
-from .way import at, bow
 from .wind import Air, air_of
 
 
@@ -28,8 +28,8 @@ class Drive:
         at the frame's begin and end.
     colliders: with their way during the frame.
     gravity: (3,) world [m/s^2].
-    target_earlier: where that style was one frame earlier, so that its way is bent, see `way.bow`;
-        None: straight.
+    target_earlier: where that style was one frame earlier, so that its path is bent, see
+        `trajectory.curvature`; None: straight.
     scene_wind: (3,) world [m/s], in addition to that of the settings.
     earlier_ratio: duration of that frame, over that of this one.
 
@@ -52,11 +52,13 @@ class Drive:
         return tuple(target for target in known if target is not None)
 
     @cached_property
-    def target_bow(self) -> Floats | None:
+    def target_curvature(self) -> Floats | None:
         """How the way of the style is bent, in the shape of the targets [m]; None: straight."""
         if self.target_earlier is None:
             return None
-        return bow(self.target_earlier, self.target_before, self.target_now, self.earlier_ratio)
+        return curvature(
+            self.target_earlier, self.target_before, self.target_now, self.earlier_ratio
+        )
 
 
 def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = ()) -> None:
@@ -135,7 +137,7 @@ class Frame:
         begin = (number * self.dt - self.time_left) / self.duration
         return begin, begin + self.dt / self.duration
 
-    def air_way(self, roots: Floats, number: int) -> Floats | None:
+    def air_displacement(self, roots: Floats, number: int) -> Floats | None:
         """What the air at the roots (3, n) goes in a substep [m]; None when it stands still."""
         if self.air is None:
             return None
@@ -155,10 +157,10 @@ class Block:
     previous: Floats
     rest: Rest
     style_before: Floats
-    style_way: Floats
-    style_bow: Floats | None
+    style_displacement: Floats
+    style_curvature: Floats | None
     impulse: Floats
-    impulse_bow: Floats | None
+    impulse_curvature: Floats | None
     radius: Floats
 
     @classmethod
@@ -170,10 +172,10 @@ class Block:
         """
         drive, settings, dt = frame.drive, frame.settings, frame.dt
         now, before, *earlier = (style.rows[:, :, guides] for style in styles)
-        way = now - before
-        bent = bow(earlier[0], before, now, drive.earlier_ratio) if earlier else None
-        middle = before + way * np.float32(0.5)
-        impulse = way * np.float32(frame.carried_fraction)
+        displacement = now - before
+        bent = curvature(earlier[0], before, now, drive.earlier_ratio) if earlier else None
+        middle = before + displacement * np.float32(0.5)
+        impulse = displacement * np.float32(frame.carried_fraction)
         impulse += felt_gravity(drive.gravity, settings, frame.turn, middle) * np.float32(dt * dt)
         position, previous = state.position[:, :, guides].copy(), state.previous[:, :, guides]
         if state.substep and state.substep != dt:
@@ -183,7 +185,7 @@ class Block:
             previous.copy(),
             state.rest.part(guides),
             before,
-            way,
+            displacement,
             bent,
             impulse,
             None if bent is None else bent * np.float32(frame.carried_fraction),
@@ -191,12 +193,12 @@ class Block:
         )
 
     def style_at(self, moment: float) -> Floats:
-        return at(self.style_before, self.style_way, self.style_bow, moment)
+        return at(self.style_before, self.style_displacement, self.style_curvature, moment)
 
     def impulse_at(self, span: tuple[float, float]) -> Floats:
         """[m] that gravity and the moving style add to each CV in a substep; not to be written."""
-        if self.impulse_bow is None:
+        if self.impulse_curvature is None:
             return self.impulse
-        impulse = self.impulse_bow * np.float32(span[0] + span[1] - 1.0)
+        impulse = self.impulse_curvature * np.float32(span[0] + span[1] - 1.0)
         impulse += self.impulse
         return impulse

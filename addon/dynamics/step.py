@@ -95,11 +95,11 @@ def _advance_block(
     for number, span in enumerate(spans):
         style = block.style_at(span[1])
         impulse = block.impulse_at(span)
-        air_way = frame.air_way(position[:, 0], number)
+        air_displacement = frame.air_displacement(position[:, 0], number)
         if settings.drag:
-            brake(position, previous, settings.drag, air_way)
-        if air_way is not None:
-            impulse = impulse + air_way[:, None] * np.float32(blown)
+            brake(position, previous, settings.drag, air_displacement)
+        if air_displacement is not None:
+            impulse = impulse + air_displacement[:, None] * np.float32(blown)
         predict(position, previous, impulse, kept, out=spare)
         previous, position, spare = position, spare, previous
         pin(position, style, rest.length, rest.tip_held)
@@ -115,8 +115,8 @@ def grid_at_frame_end(state: DynamicsState, drive: Drive) -> Floats:
 
     Bridges the time that is left over: each guide is moved as a whole to where its root is now.
     """
-    root_way = drive.target_now[:, :1] - state.position[:, 0].T[:, None]
-    return (state.grid + root_way).astype(np.float32)
+    root_displacement = drive.target_now[:, :1] - state.position[:, 0].T[:, None]
+    return (state.grid + root_displacement).astype(np.float32)
 
 
 def _keep_lengths(

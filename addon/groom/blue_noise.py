@@ -19,7 +19,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from ..strands import Surface
-from .darts import DartCells, Darts, first_come
+from .dart_throwing import SampleCells, Samples, first_come
 from .grown import checked_weights
 
 #: Roots of the first level; each level is to have more by the next factor.
@@ -28,7 +28,7 @@ _FIRST_COUNT, _GROWTH = 8.0, 2.0**0.5
 #: is covered by those of half the radius (Feder 1980), 0.547 x 4 / pi.
 _PACKING = 0.697
 #: Darts of a level as a factor of the roots it is to have, and the batches they come in.
-_DARTS, _BATCHES = 3.0, 3
+_SAMPLES, _BATCHES = 3.0, 3
 #: A level that gets less than this part of its roots shows that the surface is full, unless it is
 #: one of the first, where chance could show the same.
 _FULL, _FIRST_SURE = 0.02, 500.0
@@ -53,14 +53,14 @@ def spread_roots(
             fit it or is not finite.
     """
     target = _Target.of(surface, checked_weights(density, surface, "density"))
-    roots, level = Darts.none(), 0
+    roots, level = Samples.none(), 0
     is_full = False
     while len(roots) < count and not is_full:
         roots, is_full = _filled(target, roots, level, seed, count)
         level += 1
     batch = 0
     while len(roots) < count:
-        roots = roots.and_also(target.darts(_PLAIN, [seed, 1, batch]))
+        roots = roots.and_also(target.samples(_PLAIN, [seed, 1, batch]))
         batch += 1
     return roots.triangle[:count], roots.barycentric[:count]
 
@@ -103,7 +103,7 @@ class _Target:
     def mass(self) -> float:
         return float(self.reached[-1])
 
-    def darts(self, count: int, stream: list[int]) -> Darts:
+    def samples(self, count: int, stream: list[int]) -> Samples:
         """Random points by area x density.
 
         A density linear between corners is the sum of three that fall from 1 at a corner to 0;
@@ -121,22 +121,24 @@ class _Target:
         barycentric[rows, (corner + 2) % 3] = 1.0 - last_cut
         point = np.einsum("nk,nkj->nj", barycentric, self.corners[triangle])
         density = np.einsum("nk,nk->n", barycentric, self.density[triangle])
-        return Darts(triangle, barycentric, point, np.maximum(density, _THINNEST) ** -0.5)
+        return Samples(triangle, barycentric, point, np.maximum(density, _THINNEST) ** -0.5)
 
 
-def _filled(target: _Target, roots: Darts, level: int, seed: int, count: int) -> tuple[Darts, bool]:
+def _filled(
+    target: _Target, roots: Samples, level: int, seed: int, count: int
+) -> tuple[Samples, bool]:
     """The roots and those of one more level, until there are `count`; and whether it is full."""
     wanted = _FIRST_COUNT * _GROWTH**level
     radius = float(np.sqrt(_PACKING * target.mass / wanted))
-    dart_count = int(np.ceil(_DARTS * wanted / _BATCHES))
+    dart_count = int(np.ceil(_SAMPLES * wanted / _BATCHES))
     before = len(roots)
-    old = DartCells(roots, radius)
+    old = SampleCells(roots, radius)
     for batch in range(_BATCHES):
         if len(roots) >= count:
             return roots, False
-        darts = target.darts(dart_count, [seed, 0, level, batch])
-        darts = darts.take(~old.covers(darts))
-        new = DartCells(roots.take(np.arange(before, len(roots))), radius)
-        darts = darts.take(~new.covers(darts))
-        roots = roots.and_also(darts.take(first_come(darts, radius)))
+        samples = target.samples(dart_count, [seed, 0, level, batch])
+        samples = samples.take(~old.covers(samples))
+        new = SampleCells(roots.take(np.arange(before, len(roots))), radius)
+        samples = samples.take(~new.covers(samples))
+        roots = roots.and_also(samples.take(first_come(samples, radius)))
     return roots, wanted >= _FIRST_SURE and len(roots) - before < _FULL * wanted

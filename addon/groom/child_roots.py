@@ -11,8 +11,8 @@ from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
 from .blue_noise import require_area, spread_roots
 from .grown import checked_weights
-from .near import nearest_points
-from .pieces import Pieces
+from .nearest import nearest_points
+from .triangle_subdivision import Pieces
 
 #: How far from its nearest guide a root may be that guides surround, in their spacings there.
 _REACH = 1.75

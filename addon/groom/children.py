@@ -17,11 +17,11 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
-from .child_locks import clump
+from .child_clumps import clump
 from .child_roots import ChildRoots, child_roots
 from .child_shape import frizz, mixed, shorten
 from .children_settings import ChildrenSettings
-from .near import nearest_points
+from .nearest import nearest_points
 from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights
 
 

@@ -16,12 +16,12 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import StrandSet, Surface
 from ..strands.vectors import unit
+from .clumps import assign_clumps, style_clumps
 from .grown import at_roots, bound_strands, checked_weights, segment_fractions
-from .locks import assign_locks, style_locks
 from .normal_growth import grow_along_normals, somewhere
 from .scalp import find_cranium, sample_roots, scalp_density
 from .settings import GrowSettings
-from .skin import Skin
+from .surface_points import GrowthSurface
 
 __all__ = ["grow", "scalp_density"]
 
@@ -69,14 +69,14 @@ def _grow_combed(
     triangle, barycentric = sample_roots(surface, settings.strand_count, where, random)
     corners = surface.corners[triangle].astype(np.float64)
     root = np.einsum("sk,skj->sj", barycentric, corners)
-    lock = assign_locks(root, settings, random)
+    lock = assign_clumps(root, settings, random)
     factor = None if length is None else at_roots(length, surface, triangle, barycentric)
     plan = _plan(surface, lock, factor, settings, random)
 
     normal = plan.skin.normal(triangle, barycentric)
     comb = _combed(surface, root, normal, settings)
     grid = _fallen(root, normal, comb, plan, settings)
-    grid = _laid(style_locks(grid, lock, settings, random), plan)
+    grid = _laid(style_clumps(grid, lock, settings, random), plan)
     return bound_strands(grid, triangle, barycentric, surface, settings.radius)
 
 
@@ -88,7 +88,7 @@ class _Plan:
 
     segment: Floats
     height: Floats
-    skin: Skin
+    skin: GrowthSurface
 
     def step(self, cv: int, start: Floats, direction: Floats) -> Floats:
         """Where the segment that leads to this CV ends, (strand_count, 3)."""
@@ -106,7 +106,9 @@ def _plan(
     if factor is not None:
         segment *= factor[:, None]
     height = _heights(lock, settings, random)
-    return _Plan(segment, height, Skin(surface, reach=float((segment + height).max(initial=0.0))))
+    return _Plan(
+        segment, height, GrowthSurface(surface, reach=float((segment + height).max(initial=0.0)))
+    )
 
 
 def _segments(lock: Ints, settings: GrowSettings, random: np.random.Generator) -> Floats:

@@ -40,15 +40,15 @@ def fitting_factor(roots: Floats, search: ClosestPointSearch) -> float | None:
     return best.factor if fits and best.factor != 1.0 else None
 
 
-def better_fit(ways: Mapping[str, Floats], search: ClosestPointSearch) -> RootFit | None:
+def better_fit(readings: Mapping[str, Floats], search: ClosestPointSearch) -> RootFit | None:
     """The way that lies clearly nearer to the surface than the first one as it is, if one does.
 
     Args:
         ways: name -> roots, (root_count, 3); the first are the roots as they were read.
     """
-    name, roots = next(iter(ways.items()))
+    name, roots = next(iter(readings.items()))
     as_read = _best_fit(name, roots, search, (1.0,))
-    fits = [_best_fit(name, roots, search, _UNIT_FACTORS) for name, roots in ways.items()]
+    fits = [_best_fit(name, roots, search, _UNIT_FACTORS) for name, roots in readings.items()]
     best = min(fits, key=lambda fit: fit.distance)
     if best.distance > IMPLAUSIBLE_DISTANCE or best.distance * _CLEARLY >= as_read.distance:
         return None

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .near import nearest_points
+from .nearest import nearest_points
 
 GUIDES_PER_STRAND = 3
 #: Guide spacings that a difference of 60 degrees in direction counts for.
@@ -68,15 +68,18 @@ def guide_weights(
     """
     guide = np.zeros((len(root), GUIDES_PER_STRAND), np.int32)
     weight = np.zeros((len(root), GUIDES_PER_STRAND), np.float32)
-    strand_way, guide_way = directions(strand_grid, root), directions(guide_grid, guide_root)
+    strand_direction, guide_direction = (
+        directions(strand_grid, root),
+        directions(guide_grid, guide_root),
+    )
     for strands, guides in by_group(group, guide_group):
         assert len(guides), "a group without a guide"
         spread = _SPACINGS_PER_TURN * _spacing(guide_root[guides])
-        features = np.concatenate([guide_root[guides], spread * guide_way[guides]], axis=1)
+        features = np.concatenate([guide_root[guides], spread * guide_direction[guides]], axis=1)
         for chunk in np.array_split(strands, -(-len(strands) // _CHUNK)):
-            own = np.concatenate([root[chunk], spread * strand_way[chunk]], axis=1)
+            own = np.concatenate([root[chunk], spread * strand_direction[chunk]], axis=1)
             candidates = _nearest(own, features, GUIDES_PER_STRAND + 1)
-            alike = likeness(strand_way[chunk, None], guide_way[guides][candidates])
+            alike = likeness(strand_direction[chunk, None], guide_direction[guides][candidates])
             gap = np.linalg.norm(own[:, None] - features[candidates], axis=2)
             chosen, weight[chunk] = _weigh(gap.astype(np.float64), alike)
             guide[chunk] = guides[np.take_along_axis(candidates, chosen, axis=1)]
@@ -99,13 +102,13 @@ def child_weights(
     """
     guide = np.zeros((len(root), GUIDES_PER_STRAND), np.int32)
     weight = np.zeros((len(root), GUIDES_PER_STRAND), np.float32)
-    guide_way = directions(guide_grid, guide_root)
+    guide_direction = directions(guide_grid, guide_root)
     for children, guides in by_group(_nearest_group(root, guide_root, guide_group), guide_group):
         near, gap = nearest_points(root[children], guide_root[guides], _CHILD_CANDIDATES)
         near = guides[near]
-        alike = likeness(guide_way[near[:, :1]], guide_way[near], parting)
+        alike = likeness(guide_direction[near[:, :1]], guide_direction[near], parting)
         mixable, away, alike = _usable_first(near, gap, alike)
-        alike = _agreeing(guide_way[mixable], alike, parting)
+        alike = _agreeing(guide_direction[mixable], alike, parting)
         chosen, weight[children] = _weigh(away, alike)
         guide[children] = np.take_along_axis(mixable, chosen, axis=1)
     return GuideWeights(guide, weight)
@@ -164,7 +167,9 @@ def _nearest(own: Floats, features: Floats, count: int) -> Ints:
     return nearest
 
 
-def likeness(own_way: Floats, other_way: Floats, parting: float | None = None) -> Floats:
+def likeness(
+    own_direction: Floats, other_direction: Floats, parting: float | None = None
+) -> Floats:
     """1 for strands that go the same way, 0 for those that diverge, smooth between.
 
     Args:
@@ -174,9 +179,12 @@ def likeness(own_way: Floats, other_way: Floats, parting: float | None = None) -
     divergent, alike = _DIVERGENT, _ALIKE
     if parting is not None:
         divergent, alike = np.cos(parting), np.cos(_SURELY_TOGETHER * parting)
-    least = np.ones(np.broadcast_shapes(own_way.shape, other_way.shape)[:2])
-    for chord in range(0, own_way.shape[2], 3):
-        parts = (own_way[..., axis] * other_way[..., axis] for axis in range(chord, chord + 3))
+    least = np.ones(np.broadcast_shapes(own_direction.shape, other_direction.shape)[:2])
+    for chord in range(0, own_direction.shape[2], 3):
+        parts = (
+            own_direction[..., axis] * other_direction[..., axis]
+            for axis in range(chord, chord + 3)
+        )
         np.minimum(least, sum(parts), out=least)
     x = np.clip((least - divergent) / max(alike - divergent, 1e-6), 0.0, 1.0)
     return x * x * (3.0 - 2.0 * x)
@@ -194,12 +202,12 @@ def _usable_first(near: Ints, gap: Floats, alike: Floats) -> tuple[Ints, Floats,
     return near, np.where(alike > 0.0, gap, 2.0 * farthest), alike
 
 
-def _agreeing(way: Floats, alike: Floats, parting: float) -> Floats:
+def _agreeing(direction: Floats, alike: Floats, parting: float) -> Floats:
     """Likeness (n, k), less for a guide that goes apart from a nearer one that is mixed."""
     agreed = alike.copy()
     for later in range(2, alike.shape[1]):
         for earlier in range(1, later):
-            both = likeness(way[:, [later]], way[:, [earlier]], parting)[:, 0]
+            both = likeness(direction[:, [later]], direction[:, [earlier]], parting)[:, 0]
             is_mixed = agreed[:, earlier] > 0.0
             agreed[:, later] = np.where(
                 is_mixed, np.minimum(agreed[:, later], both), agreed[:, later]

@@ -156,8 +156,8 @@ def heuristic_pieces(cvs: Floats, clip: Floats, half_size: Floats, length: np.fl
         half_size: (2, ...) [pixels].
         length: of a piece [pixels].
     """
-    way = np.diff(cvs, axis=2)
-    bend = _angle(way[:, :, :-1], way[:, :, 1:])
+    step = np.diff(cvs, axis=2)
+    bend = _angle(step[:, :, :-1], step[:, :, 1:])
     angle = np.maximum(bend[:, :-1], bend[:, 1:])
     seen = clip[:2] / np.maximum(clip[3], NEAREST)
     size = _length(half_size * np.diff(seen[:, :, 1:-1], axis=2))

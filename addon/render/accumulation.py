@@ -92,7 +92,7 @@ class Accumulation:
 
 
 class Target:
-    """A colour texture with a depth buffer, made anew when its size changes."""
+    """A colour texture with a depth buffer, made again when its size changes."""
 
     def __init__(self) -> None:
         self._size = (0, 0)

@@ -24,7 +24,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..cards.atlas_maps import AtlasMaps
-from ..cards.bake import SAMPLES, Block, at_least_a_sample, blocks_of
+from ..cards.bake import SAMPLES, Block, blocks_of, min_one_sample
 from ..cards.bake_strands import FlatStrands
 from ..cards.steps import result_of
 from .shader_program import ShaderProgram, ShaderRecipe, program
@@ -32,9 +32,9 @@ from .textures import drawing_into, drawing_state, strand_rows, texture_from, te
 
 #: Texels that a compute group works on, along each side.
 _GROUP = 8
-_SAMPLES_OF = ("sample_place", "sample_way", "sample_base")
+_SAMPLES_OF = ("sample_place", "sample_tangent", "sample_base")
 _TEXELS_OF = ("texel_place", "texel_base", "texel_tangent", "texel_normal")
-_CVS = ("cv_places", "cv_ways", "cv_looks", "cv_rest")
+_CVS = ("cv_places", "cv_tangents", "cv_looks", "cv_rest")
 
 
 def atlas_recipe(*, is_sparse: bool) -> ShaderRecipe:
@@ -54,7 +54,7 @@ def atlas_recipe(*, is_sparse: bool) -> ShaderRecipe:
             ("flat", "INT", "strand_number"),
             ("flat", "FLOAT", "strand_id"),
             ("smooth", "VEC2", "along_and_side"),
-            ("smooth", "VEC2", "depth_and_share"),
+            ("smooth", "VEC2", "depth_and_fraction"),
             ("smooth", "VEC3", "strand_tangent"),
             ("smooth", "VEC4", "base_and_occlusion"),
         ),
@@ -122,19 +122,19 @@ class _Bake:
 
     @classmethod
     def of(cls, flat: FlatStrands, size: int) -> _Bake:
-        half, share = at_least_a_sample(flat, size)
-        number = np.broadcast_to(flat.strand_id[:, None], share.shape)
+        half, fraction = min_one_sample(flat, size)
+        number = np.broadcast_to(flat.strand_id[:, None], fraction.shape)
         values = (
             np.concatenate([flat.place, half], axis=-1),
             np.concatenate([flat.tangent, flat.depth[..., None]], axis=-1),
             np.concatenate([flat.base, flat.occlusion[..., None]], axis=-1),
-            np.stack([share, number], axis=-1),
+            np.stack([fraction, number], axis=-1),
         )
         textures = {
             name: texture_from(strand_rows(value), "RG32F" if name == "cv_rest" else "RGBA32F")
             for name, value in zip(_CVS, values, strict=True)
         }
-        return cls(flat, half, size, textures, is_sparse=bool((share < 1.0).any()))
+        return cls(flat, half, size, textures, is_sparse=bool((fraction < 1.0).any()))
 
 
 def _blocks(bake: _Bake) -> Iterator[tuple[Block, Floats]]:

@@ -15,7 +15,7 @@ import gpu
 import numpy as np
 
 from ..cards.card_mesh import CardMesh
-from ..exchange.cards.sidecar import LEAST_ALPHA
+from ..exchange.cards.sidecar import MIN_ALPHA
 from ..shading.lights import kept_lights
 from ..shading.volume.light_frame import Ball, ball_around
 from ..shading.volume.map_size import START_TEXELS
@@ -33,7 +33,7 @@ _VARYINGS = (
     ("smooth", "FLOAT", "strand_depth"),
     ("smooth", "VEC3", "card_point"),
     ("smooth", "VEC3", "card_tangent"),
-    ("smooth", "VEC3", "light_way"),
+    ("smooth", "VEC3", "light_direction"),
 )
 _LAYERS_RECIPE = ShaderRecipe(
     name="opacity_cards",
@@ -74,15 +74,15 @@ class _Cards:
     alpha: Any
     tiles: tuple[float, float]
     thickness: float
-    is_even: bool
+    is_view_compensated: bool
 
     @property
     def feature(self) -> ShaderFeature:
         return ShaderFeature(
-            name="even" if self.is_even else "",
+            name="even" if self.is_view_compensated else "",
             textures={"alpha_texture": ("FLOAT_2D", self.alpha)},
             numbers={"atlas_tiles": ("VEC2", self.tiles)},
-            defines={"EVEN": int(self.is_even)},
+            defines={"VIEW_COMPENSATED": int(self.is_view_compensated)},
         )
 
     def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
@@ -113,7 +113,7 @@ class _Cards:
         target = gpu.types.GPUFrameBuffer(depth_slot=depths)
         with drawing_into(target), drawing_state(depth_test=depth_test):
             target.clear(depth=none)
-            features, numbers = [place, self.feature], {"least_alpha": LEAST_ALPHA}
+            features, numbers = [place, self.feature], {"least_alpha": MIN_ALPHA}
             shader = bound(_DEPTH_RECIPE, features, self.blocks, numbers=numbers)
             self.batch.draw(shader.shader)
         return depths
@@ -143,9 +143,11 @@ class CardOpacity:
         mesh = cards.mesh
         if self._extent[0] is not mesh:
             self._extent = mesh, ball_around(mesh.positions)
-        state = self._serial, cards.thickness, cards.is_even
+        state = self._serial, cards.thickness, cards.is_view_compensated
         tiles = tiles_of(mesh.atlas)
-        hair = _Cards(state, self._blocks, batch, alpha, tiles, cards.thickness, cards.is_even)
+        hair = _Cards(
+            state, self._blocks, batch, alpha, tiles, cards.thickness, cards.is_view_compensated
+        )
         lights = kept_lights(snapshot.lights)
         return self._drawing.maps(
             hair, self._extent[1], lights, snapshot.volume, snapshot.all_casters

@@ -82,7 +82,13 @@ _SHADED_RECIPE = ShaderRecipe(
     ),
     outputs=(("VEC4", "color"),),
     defines=(
-        *(("PRIME", 0), ("CLIPPED", 0), ("EVEN", 0), ("TANGENT_MAP", 0), ("NORMAL_MAP", 0)),
+        *(
+            ("PRIME", 0),
+            ("CLIPPED", 0),
+            ("VIEW_COMPENSATED", 0),
+            ("TANGENT_MAP", 0),
+            ("NORMAL_MAP", 0),
+        ),
         *(("MARSCHNER", 0), ("SHADOWS", 0), ("SCATTERING", 0)),
     ),
 )
@@ -192,7 +198,7 @@ class CardPass:
         yield self._maps_feature(cards)
         yield ShaderFeature(
             blocks={"shading": ("ShadingSettings", struct_values(snapshot.shading))},
-            defines={"EVEN": int(cards.is_even)},
+            defines={"VIEW_COMPENSATED": int(cards.is_view_compensated)},
         )
         is_marschner = snapshot.shading.model == "marschner"
         if is_marschner:

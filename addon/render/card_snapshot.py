@@ -33,5 +33,5 @@ class CardSnapshot:
     back_triangles: Ints | None = None
     drawing: CardDrawingSettings = field(default_factory=CardDrawingSettings)
     thickness: float = 1.0
-    is_even: bool = False
+    is_view_compensated: bool = False
     device: Any = None

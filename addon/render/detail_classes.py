@@ -70,8 +70,8 @@ def _slabs(depths: Floats) -> Ints:
     """Which of _SLABS equal parts of all depths each lies in, 0 the nearest."""
     depths = np.nan_to_num(depths, nan=0.0, posinf=0.0, neginf=0.0)
     span = max(float(np.ptp(depths)), 1.0e-30)
-    share = (depths - depths.min()) / span
-    return np.minimum((share * _SLABS).astype(np.int64), _SLABS - 1)
+    fraction = (depths - depths.min()) / span
+    return np.minimum((fraction * _SLABS).astype(np.int64), _SLABS - 1)
 
 
 @lru_cache(maxsize=64)

@@ -122,7 +122,7 @@ class DetailPass:
         return self._order
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next order is computed anew."""
+        """Let go of all that lies on the GPU; the next order is computed again."""
         self._blocks = {name: UniformBlock() for _, name in _BLOCKS}
         self._asked, self._order, self._totals = (), None, None
 
@@ -196,7 +196,7 @@ class GroomExtent:
             (self.low + roots, self.high + roots),
             self.total_length,
             self.radius * settings.width_scale,
-            settings.least_width,
+            settings.min_width,
             view,
             snapshot.detail,
         )

@@ -103,11 +103,11 @@ class Display:
         """
         place = shaped(self.gain * np.asarray(radiance, np.float64)) * (SIZE - 1)
         before = np.minimum(place.astype(int), SIZE - 2)
-        share = place - before
+        fraction = place - before
         red, green, blue = np.moveaxis(before, -1, 0)
         found = np.zeros(place.shape)
         for corner in np.ndindex(2, 2, 2):
-            weight = np.prod(np.where(np.array(corner) == 1, share, 1.0 - share), axis=-1)
+            weight = np.prod(np.where(np.array(corner) == 1, fraction, 1.0 - fraction), axis=-1)
             codes = self.table.codes[blue + corner[2], green + corner[1], red + corner[0]]
             found += weight[..., None] * codes
         return found ** (1.0 / self.gamma)

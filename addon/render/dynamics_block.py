@@ -2,9 +2,9 @@
 and a table of moments, one row a substep.
 
 A row of the table, texels of RGBA32F:
-    0     x the substep's end s as a share of the frame, y s (s - 1); z and w shares of the style's
-          way and bow that swing damping gives to each CV. y and w are over r (r + 1) with the ratio
-          r of `way.bow`, or 0 where the way is straight
+    0     x the substep's end s as a fraction of the frame, y s (s - 1); z and w fractions of the
+          style's displacement and curvature that swing damping gives to each CV. y and w are over
+          r (r + 1) with the ratio r of `trajectory.curvature`, or 0 where the style moves straight
     1, 2  phases of the gusts' modes [rad]
     then  COLLIDER_TEXELS for each collider, see collider_textures.py
 """
@@ -22,7 +22,7 @@ from ..dynamics.forces import air_fraction, carried_fraction, speed_kept
 from ..dynamics.frame import Frame
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.style import style_band
-from ..dynamics.way import held_ratio
+from ..dynamics.trajectory import clamped_ratio
 from ..dynamics.wind import MODES
 from .shader_source import MOMENT_TEXELS
 
@@ -42,7 +42,7 @@ def moments_of(frame: Frame, first: int, spans: Floats) -> Floats:
     table[:, 0, 0] = end
     table[:, 0, 2] = part = carried_fraction(frame.settings, frame.dt) * (end - begin)
     if frame.drive.target_earlier is not None:
-        ratio = held_ratio(frame.drive.earlier_ratio)
+        ratio = clamped_ratio(frame.drive.earlier_ratio)
         table[:, 0, 1] = end * (end - 1.0) / (ratio * (ratio + 1.0))
         table[:, 0, 3] = part * (begin + end - 1.0) / (ratio * (ratio + 1.0))
     if frame.air is not None and len(frame.air.phase):
@@ -93,7 +93,7 @@ def _fill_forces(vectors: Floats, frame: Frame) -> None:
     pull = np.asarray(frame.drive.gravity, np.float32) * np.float32(settings.gravity)
     square = np.float32(frame.dt * frame.dt)
     vectors[0, :3] = pull * np.float32(1.0 - settings.buoyancy) * square
-    vectors[0, 3] = held_ratio(frame.drive.earlier_ratio)
+    vectors[0, 3] = clamped_ratio(frame.drive.earlier_ratio)
     combed = (frame.turn @ pull.astype(np.float64)).astype(np.float32)
     vectors[1, :3] = combed * (np.float32(settings.weight_held) * square)
     if air is not None:

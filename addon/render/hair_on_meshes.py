@@ -7,8 +7,8 @@ from typing import Any
 
 from .accumulation import Target
 from .camera import Camera
-from .hair_between import HairBetween
 from .hashed_alpha import shifts
+from .inter_groom_shadow import InterGroomShadow
 from .mesh_places import MeshPlaces, Placed
 from .opacity_maps import OpacityMaps
 from .shader_program import released_with_shaders
@@ -30,7 +30,7 @@ class HairOnMeshes:
 
     def release(self) -> None:
         """See shader_program.released_with_shaders."""
-        self._places, self._between = MeshPlaces(), HairBetween()
+        self._places, self._between = MeshPlaces(), InterGroomShadow()
 
     def at(
         self,

@@ -27,9 +27,9 @@ def shifts(number: int, sample: int) -> tuple[float, float]:
 
 def _halton(index: int, base: int) -> float:
     """The digits of a number behind the point, in reverse."""
-    value, share = 0.0, 1.0
+    value, fraction = 0.0, 1.0
     while index:
         index, digit = divmod(index, base)
-        share /= base
-        value += share * digit
+        fraction /= base
+        value += fraction * digit
     return value

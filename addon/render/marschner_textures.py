@@ -14,7 +14,7 @@ from ..arrays import Floats
 from ..shading.marschner.look import fibre_of, pack_fibre
 from ..shading.marschner.tables import MarschnerTables, marschner_tables, shape_of
 from ..shading.settings import ShadingSettings
-from ..shading.volume.dual import Shares, mean_forward, shares
+from ..shading.volume.dual import Fractions, fractions, mean_forward
 from .opacity_maps import OpacityMaps
 from .shader_feature import ShaderFeature
 from .shader_program import released_with_shaders
@@ -30,12 +30,12 @@ MARSCHNER_TEXTURES = (
     ("FLOAT_2D", "paths"),
 )
 #: samplers of shares_at() in lib_dual.glsl
-SHARES_TEXTURES = (("FLOAT_2D", "shares_forward"), ("FLOAT_2D", "shares_backward"))
+FRACTIONS_TEXTURES = (("FLOAT_2D", "fractions_forward"), ("FLOAT_2D", "fractions_backward"))
 
 
 @dataclass(frozen=True)
 class _Tables:
-    shares: Shares
+    fractions: Fractions
     textures: dict[str, Any]
 
 
@@ -51,21 +51,21 @@ class MarschnerTextures:
         kept = self._of(shading, size).textures
         return {name: kept[name] for _, name in MARSCHNER_TEXTURES}
 
-    def shares(self, shading: ShadingSettings, size: int) -> dict[str, Any]:
+    def fractions(self, shading: ShadingSettings, size: int) -> dict[str, Any]:
         """Textures by the names of SHARES_TEXTURES, made of tables `size` texels across."""
         kept = self._of(shading, size).textures
-        return {name: kept[name] for _, name in SHARES_TEXTURES}
+        return {name: kept[name] for _, name in FRACTIONS_TEXTURES}
 
     def forward(self, shading: ShadingSettings, size: int) -> Floats:
         """The share of light that a strand sends on, by colour, (3,)."""
-        return mean_forward(self._of(shading, size).shares.forward, shading)
+        return mean_forward(self._of(shading, size).fractions.forward, shading)
 
     def _of(self, shading: ShadingSettings, size: int) -> _Tables:
         shape = shape_of(fibre_of(shading))
         key = (shape, size)
         if key not in self._kept:
             tables = marschner_tables(shape, size)
-            sides = shares(tables)
+            sides = fractions(tables)
             self._kept[key] = _Tables(sides, _textures(tables, sides))
             while len(self._kept) > CAPACITY:
                 self._kept.popitem(last=False)
@@ -95,10 +95,10 @@ def marschner_feature(snapshot: Snapshot) -> ShaderFeature:
 
 def scattering_feature(snapshot: Snapshot) -> ShaderFeature:
     """What a program has that adds light from strand to strand, in Marschner's model."""
-    textures = MARSCHNER.shares(snapshot.shading, snapshot.table_size)
+    textures = MARSCHNER.fractions(snapshot.shading, snapshot.table_size)
     return ShaderFeature(
         name="scattering",
-        textures={name: (kind, textures[name]) for kind, name in SHARES_TEXTURES},
+        textures={name: (kind, textures[name]) for kind, name in FRACTIONS_TEXTURES},
         numbers={
             "scatter_density": ("FLOAT", snapshot.volume.density),
             "skin_color": ("VEC3", snapshot.skin_color),
@@ -124,10 +124,10 @@ def hair_forward(snapshot: Snapshot) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _textures(tables: MarschnerTables, sides: Shares) -> dict[str, Any]:
+def _textures(tables: MarschnerTables, sides: Fractions) -> dict[str, Any]:
     return {
-        "shares_forward": texture_from(sides.forward, "RGBA32F"),
-        "shares_backward": texture_from(sides.backward, "RGBA32F"),
+        "fractions_forward": texture_from(sides.forward, "RGBA32F"),
+        "fractions_backward": texture_from(sides.backward, "RGBA32F"),
         "longitudinal": volume_from(tables.longitudinal),
         "azimuthal": texture_from(tables.azimuthal, "RGBA32F"),
         "paths": texture_from(tables.paths, "RGBA32F"),

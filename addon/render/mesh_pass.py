@@ -92,7 +92,7 @@ class MeshPass:
             is_blended = mesh.transparency == "blended"
             # a pixel stands for what lies behind all that is blended
             if between is not None and opacity is not None and not is_blended:
-                features.append(_between_feature(between))
+                features.append(_inter_groom_feature(between))
             if mesh.transparency == "hashed":
                 features.append(_hashed_feature(number, camera.sample))
             blend = "ALPHA_PREMULT" if is_blended else "NONE"
@@ -145,12 +145,12 @@ class MeshPass:
         ]
 
 
-def _between_feature(between: Any) -> ShaderFeature:
+def _inter_groom_feature(between: Any) -> ShaderFeature:
     """What a program has that knows of more hair in the way than the maps hold, by pixel."""
     return ShaderFeature(
         name="others",
-        textures={"hair_between": ("FLOAT_2D", between)},
-        defines={"OTHERS": 1},
+        textures={"inter_groom_shadow": ("FLOAT_2D", between)},
+        defines={"OTHER_TAU": 1},
     )
 
 

@@ -64,7 +64,7 @@ class MeshShadowPass:
         released_with_shaders(self)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw makes it anew."""
+        """Let go of all that lies on the GPU; the next draw makes it again."""
         self._casters = MeshDepths()
         self._extents: list[tuple[Caster, Extent]] = []
         self._drawn: tuple[Any, ...] = ()

@@ -29,13 +29,13 @@ def jitters(count: int, filter_size: float) -> Floats:
         filter_size: width of the filter [pixels], Blender's default is 1.5.
     """
     steps = np.arange(count)[:, None] * np.array([1.0 / _PLASTIC, 1.0 / _PLASTIC**2])
-    return filter_size * _share_to_place((0.5 + steps) % 1.0)
+    return filter_size * _fraction_to_place((0.5 + steps) % 1.0)
 
 
-def _share_to_place(share: Floats) -> Floats:
+def _fraction_to_place(fraction: Floats) -> Floats:
     """Where so large a share of the filter's weight lies to the left, in -0.5 to 0.5."""
     edges = np.linspace(0.0, 1.0, _TABLE + 1)
     middles = (edges[:-1] + edges[1:]) / 2.0
     weights = sum(a * np.cos(2.0 * np.pi * k * middles) for k, a in enumerate(_HARRIS))
     total = np.concatenate([[0.0], np.cumsum(weights)])
-    return np.interp(share, total / total[-1], edges - 0.5)
+    return np.interp(fraction, total / total[-1], edges - 0.5)

@@ -1,4 +1,4 @@
-"""Where strands hang on the head, as the GPU wants it.
+"""How strands are attached to the head, as the GPU wants it.
 
 Pure numpy: importable without gpu.
 """
@@ -17,7 +17,7 @@ class RootHolds:
     Args:
         strands: bound to the head.
 
-    vertices: (n,) indices of the head's vertices that any root hangs on.
+    vertices: (n,) indices of the head's vertices that any root is attached to.
     texels: (strand_count, 2, 4) as root_holds, triangles by place in `vertices`.
     rest_positions: (vertex_count, 3) [m] of the head.
     """
@@ -31,14 +31,14 @@ class RootHolds:
         self.texels = np.zeros((len(corners), 2, 4), np.float32)
         self.texels[:, 0, :3] = place
         self.texels[:, 1, :2] = weight = strands.root_barycentric[:, 1:]
-        shares = np.column_stack([1.0 - weight.sum(axis=1, dtype=np.float64), weight])
-        self._share = np.bincount(place.ravel(), shares.ravel()) / max(len(corners), 1)
-        surface_mean = self._share @ head.positions[self.vertices]
+        fractions = np.column_stack([1.0 - weight.sum(axis=1, dtype=np.float64), weight])
+        self._fraction = np.bincount(place.ravel(), fractions.ravel()) / max(len(corners), 1)
+        surface_mean = self._fraction @ head.positions[self.vertices]
         self._lift = strands.roots.mean(axis=0, dtype=np.float64) - surface_mean
 
     def center(self, head_positions: Floats) -> Floats:
         """The middle of all roots (3,) [m]; how far they stand off the surface does not turn."""
-        middle = self._share @ head_positions[self.vertices] + self._lift
+        middle = self._fraction @ head_positions[self.vertices] + self._lift
         return np.asarray(middle, np.float32)
 
 

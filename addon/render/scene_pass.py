@@ -14,9 +14,9 @@ from .accumulation import Target
 from .camera import Camera
 from .camera_window import view_depth
 from .card_pass import CardPass
-from .hair_between import may_shade
 from .hair_on_meshes import HairOnMeshes
 from .holdout import Holdout
+from .inter_groom_shadow import may_shade
 from .mesh_pass import MeshPass
 from .mesh_places import MeshPlaces, Placed
 from .mesh_shadows import MeshShadowPass

@@ -86,7 +86,7 @@ def shaded_by(meshes: tuple[MeshSnapshot, ...], centers: Floats) -> list[int]:
 
 
 def _nearest(meshes: tuple[MeshSnapshot, ...], center: Floats) -> MeshSnapshot | None:
-    """The mesh that hair around this place grows from, as far as that can be told; of those whose
+    """The mesh that hair around this place grows from, as far as that is known; of those whose
     box holds the place, the smallest.
     """
 

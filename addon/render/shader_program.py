@@ -128,7 +128,7 @@ class ShaderProgram:
 
 
 class Releasable(Protocol):
-    """Something that keeps GPU objects, and can let go of them and make them anew."""
+    """Something that keeps GPU objects, and can let go of them and make them again."""
 
     def release(self) -> None: ...
 

@@ -26,13 +26,13 @@ from ..shading.card_texture import LEVELS, SLACK
 from ..shading.lights import LIGHT_CAPACITY, NEAREST_DISTANCE
 from ..shading.skin.diffusion import KERNEL_REACH, KERNEL_TAPS, SKIN_LIGHTS
 from ..shading.skin.layout import CLOSING
-from ..shading.volume.card_opacity import LEAST_FACING, LEAST_TAU, MEAN_TURN, MOST_ALPHA
-from ..shading.volume.dual import HALF_WAY, UNKNOWN_BEYOND
+from ..shading.volume.card_opacity import MAX_ALPHA, MEAN_TURN, MIN_FACING, MIN_TAU
+from ..shading.volume.dual import MIDPOINT, UNKNOWN_BEYOND
 from ..shading.volume.map_size import START_TEXELS
 from ..shading.volume.mesh_frames import MESH_FRAME_CAPACITY
 from ..shading.volume.mesh_light import EDGE_ON, MESH_BIAS, STEEPEST
-from ..shading.volume.opacity import LEAST_THICKNESS, MAP_BORDER
-from ..shading.volume.transparency import UNSEEN_SHARE
+from ..shading.volume.opacity import MAP_BORDER, MIN_THICKNESS
+from ..shading.volume.transparency import UNSEEN_FRACTION
 
 SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
 
@@ -59,7 +59,7 @@ TILE_GAP = 2
 #: masks hold what covers more of a pixel than this, as Cycles has it
 COVERS = 0.5
 #: the strongest lights, for which one groom shades others: a channel of a texture each
-OTHERS_LIGHTS = 4
+OTHER_TAU_LIGHTS = 4
 #: how a pass writes its colour; see encoded() in lib_output.glsl
 OUTPUTS = ("scene_linear", "viewport")
 #: what strands may be coloured by in place of their shading, see lib_debug_color.glsl
@@ -90,19 +90,19 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "map_border": repr(MAP_BORDER),
         "mesh_frame_capacity": str(MESH_FRAME_CAPACITY),
         "covers": repr(COVERS),
-        "others_lights": str(OTHERS_LIGHTS),
+        "other_tau_lights": str(OTHER_TAU_LIGHTS),
         "mesh_bias": repr(MESH_BIAS),
         "steepest": repr(STEEPEST),
         "edge_on": repr(EDGE_ON),
         "start_texels": str(START_TEXELS),
         "tile_gap": str(TILE_GAP),
-        "half_way_absorption": repr(HALF_WAY),
-        "most_alpha": repr(MOST_ALPHA),
+        "midpoint_absorption": repr(MIDPOINT),
+        "max_alpha": repr(MAX_ALPHA),
         "unknown_beyond": repr(UNKNOWN_BEYOND),
         "start_scale": repr(START_SCALE),
-        "least_thickness": repr(LEAST_THICKNESS),
+        "min_thickness": repr(MIN_THICKNESS),
         "layer_row": str(LAYER_ROW),
-        "unseen_share": repr(UNSEEN_SHARE),
+        "unseen_fraction": repr(UNSEEN_FRACTION),
         "list_digits": str(LIST_DIGITS),
         "skin_triangles_across": str(SKIN_TRIANGLES_ACROSS),
         "skin_seams_across": str(SKIN_SEAMS_ACROSS),
@@ -114,9 +114,9 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "atlas_samples": str(SAMPLES),
         "mean_facing": repr(MEAN_FACING),
         "darkest": repr(DARKEST),
-        "least_facing": repr(LEAST_FACING),
+        "least_facing": repr(MIN_FACING),
         "mean_turn": repr(MEAN_TURN),
-        "least_tau": repr(LEAST_TAU),
+        "min_tau": repr(MIN_TAU),
         "card_texture_levels": str(LEVELS),
         "card_texture_slack": str(SLACK),
         "sparse_mask": str(SPARSE_RANGE - 1),

@@ -141,7 +141,7 @@ class SkinPass:
         self.release()
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw makes it anew."""
+        """Let go of all that lies on the GPU; the next draw makes it again."""
         self._heads: list[_Head] = []
         self._blocks = UniformBlocks()
 

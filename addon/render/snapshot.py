@@ -52,7 +52,7 @@ class MeshPictures:
 
     Hand the same array on where nothing changed. Row 0 is at v = 0.
 
-    color: (height, width, 4) scene-linear, straight alpha, in the place of the mesh's own colour.
+    color: (height, width, 4) scene-linear, straight alpha, instead of the mesh's own colour.
     normal: (height, width, 4) normals in tangent space, 0 to 1; bump: how strong they are.
     """
 
@@ -149,7 +149,7 @@ class Snapshot:
     strands: (strand_count, cv_count, 3) float32 [m], world space, root first.
     radius: (strand_count, cv_count) float32 [m].
     occlusion: (strand_count, cv_count) ambient light that arrives, 0 to 1; None is 1 everywhere.
-    seed: (strand_count,) whole numbers below 2^24, which the noise of a strand hangs on; None is
+    seed: (strand_count,) whole numbers below 2^24, which the noise of a strand depends on; None is
         each strand's index.
     ambient: the world's colour [W/(m^2 sr)].
     volume_center: (3,) [m], what strands look away from; None is the middle of all roots.

@@ -60,7 +60,7 @@ class StrandLayers:
         released_with_shaders(self)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw makes it anew."""
+        """Let go of all that lies on the GPU; the next draw makes it again."""
         self._size = 0, 0
         self._count: Any = None
         self._heads: Any = None

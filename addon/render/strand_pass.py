@@ -27,7 +27,7 @@ from .camera import Camera
 from .detail_pass import DetailPass
 from .display import Display
 from .hair_ball import HairBall
-from .hair_between import NOBODY, HairBetween
+from .inter_groom_shadow import NOBODY, InterGroomShadow
 from .marschner_textures import marschner_feature, scattering_feature
 from .opacity_maps import OpacityMaps
 from .opacity_pass import OpacityPass
@@ -163,7 +163,7 @@ class StrandPass:
         """Let go of all that lies on the GPU; the next draw uploads again."""
         self._blocks = UniformBlocks()
         self._opacity.release()
-        self._ball, self._between = HairBall(), HairBetween()
+        self._ball, self._between = HairBall(), InterGroomShadow()
         self._textures: dict[str, Any] = {}
         self._uploaded: dict[str, tuple[Any, ...]] = {}
         self._ribbons: dict[int, Any] = {}
@@ -203,17 +203,19 @@ class StrandPass:
         if is_marschner and snapshot.volume.scattering:
             yield scattering_feature(snapshot)
         if others:
-            yield self._between_feature(others, len(snapshot.lights))
+            yield self._inter_groom_feature(others, len(snapshot.lights))
 
-    def _between_feature(self, others: Sequence[OpacityMaps], light_count: int) -> ShaderFeature:
+    def _inter_groom_feature(
+        self, others: Sequence[OpacityMaps], light_count: int
+    ) -> ShaderFeature:
         """What a program has that knows of more hair in the way than its maps hold, by CV."""
         points, grooms = self._textures["cv_points"], [(NOBODY, other) for other in others]
         between = self._between.at(points, self._points_serial, grooms, light_count)
         return ShaderFeature(
             name="others",
-            textures={"cv_between": ("FLOAT_2D", between)},
-            varyings=(("smooth", "VEC4", "strand_between"),),
-            defines={"OTHERS": 1},
+            textures={"cv_other_tau": ("FLOAT_2D", between)},
+            varyings=(("smooth", "VEC4", "strand_other_tau"),),
+            defines={"OTHER_TAU": 1},
         )
 
     def _debug_feature(self, debug_view: str) -> ShaderFeature:
@@ -243,7 +245,7 @@ class StrandPass:
             self._take("debug_numbers", shown, lambda: _numbers_texture(snapshot))
 
     def _take(self, name: str, sources: tuple[Any, ...], make: Callable[[], Any]) -> bool:
-        """Make a texture anew if a source is another object than before; tuples count by value."""
+        """Make a texture again if a source is another object than before; tuples count by value."""
         before = self._uploaded.get(name, ())
         if len(before) == len(sources) and all(
             old is new or (isinstance(old, tuple) and old == new)

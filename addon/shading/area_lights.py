@@ -200,8 +200,8 @@ def _row(
         cosine = np.sqrt(np.maximum(1.0 - sine * sine, 1e-12))
         u = distance * sine / cosine
         fraction = weight * half * _shade(panel, np.hypot(u, v) / height)
-        way = np.stack([sine, v / distance * cosine, -height / distance * cosine], axis=-1)
-        total += fraction[..., None] * way
+        direction = np.stack([sine, v / distance * cosine, -height / distance * cosine], axis=-1)
+        total += fraction[..., None] * direction
     return total
 
 

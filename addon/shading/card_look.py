@@ -12,14 +12,14 @@ from ..arrays import Floats
 from .kajiya_kay import strand_base
 from .marschner.pigment import COLOR_FACTOR
 from .settings import ShadingSettings
-from .volume.card_opacity import LEAST_FACING, MEAN_TURN, turned_facing
+from .volume.card_opacity import MEAN_TURN, MIN_FACING, turned_facing
 
 #: How dense a card is that faces the eye, in what it is on the mean of all turns: 2 / pi, the mean
 #: of |cos|; and a quarter more, for what is lost behind cards that are nearly clear and still write
 #: depth (measured, Sintel).
 MEAN_FACING = 1.25 * MEAN_TURN
 #: both, by the names that sidecars have for them
-VIEW_COMPENSATED_ALPHA = {"mean_facing": MEAN_FACING, "least_facing": LEAST_FACING}
+VIEW_COMPENSATED_ALPHA = {"mean_facing": MEAN_FACING, "least_facing": MIN_FACING}
 #: Darkest texel of a base texture of which an absorption is made.
 DARKEST = 1.0e-3
 
@@ -32,10 +32,10 @@ def mapped_tangent(texel: Floats, tangent: Floats, normal: Floats, shift_noise: 
         tangent, normal: (..., 3) of the card, unit vectors.
         shift_noise: how much the map tilts strands.
     """
-    way = 2.0 * texel - 1.0
+    direction = 2.0 * texel - 1.0
     side = np.cross(tangent, normal)
-    strand = way[..., 0:1] * side + way[..., 1:2] * tangent
-    strand = strand + way[..., 2:3] * (shift_noise * normal)
+    strand = direction[..., 0:1] * side + direction[..., 1:2] * tangent
+    strand = strand + direction[..., 2:3] * (shift_noise * normal)
     length = np.linalg.norm(strand, axis=-1, keepdims=True)
     return np.where(length > 1.0e-6, strand / np.maximum(length, 1.0e-6), tangent)
 
@@ -47,9 +47,9 @@ def mapped_normal(texel: Floats, tangent: Floats, normal: Floats) -> Floats:
         texel: (..., 3) of the map.
         tangent, normal: (..., 3) of the card, unit vectors.
     """
-    way = 2.0 * texel - 1.0
+    direction = 2.0 * texel - 1.0
     side = np.cross(tangent, normal)
-    bent = way[..., 0:1] * side + way[..., 1:2] * tangent + way[..., 2:3] * normal
+    bent = direction[..., 0:1] * side + direction[..., 1:2] * tangent + direction[..., 2:3] * normal
     length = np.linalg.norm(bent, axis=-1, keepdims=True)
     return np.where(length > 1.0e-6, bent / np.maximum(length, 1.0e-6), normal)
 
@@ -68,7 +68,7 @@ def view_compensated_alpha(
         tangent, to_eye: (..., 3) unit vectors.
     """
     facing = turned_facing(across, tangent, to_eye)
-    even: Floats = 1.0 - (1.0 - alpha) ** (MEAN_FACING / np.maximum(facing, LEAST_FACING))
+    even: Floats = 1.0 - (1.0 - alpha) ** (MEAN_FACING / np.maximum(facing, MIN_FACING))
     return even
 
 

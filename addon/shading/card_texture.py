@@ -69,7 +69,7 @@ def wanted_level(to_right: Floats, to_top: Floats, size: tuple[int, int]) -> Flo
         to_right, to_top: (..., 2) from pixel to pixel in the texture.
     """
     longest = np.maximum(
-        *(((way * np.array(size)) ** 2).sum(axis=-1) for way in (to_right, to_top))
+        *(((step * np.array(size)) ** 2).sum(axis=-1) for step in (to_right, to_top))
     )
     level: Floats = np.clip(0.5 * np.log2(np.maximum(longest, 1.0)), 0.0, LEVELS - 1.0)
     return level

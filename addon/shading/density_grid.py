@@ -64,13 +64,13 @@ def hair_depth(strands: StrandSet, grid: Grid) -> Floats:
 
 def _area_in_cells(strands: StrandSet, start: Ints, grid: Grid) -> Floats:
     """Seen area of the segments that begin at these CVs in each cell, (cell_count,) [m^2]."""
-    way = strands.points[start + 1] - strands.points[start]
-    length = np.linalg.norm(way, axis=1)
+    step = strands.points[start + 1] - strands.points[start]
+    length = np.linalg.norm(step, axis=1)
     piece_count = np.maximum(1, np.ceil(length / (0.7 * grid.cell))).astype(np.int64)
     segment = np.repeat(np.arange(len(start)), piece_count)
     first = np.repeat(np.cumsum(piece_count) - piece_count, piece_count)
     along = (np.arange(len(segment)) - first + 0.5) / piece_count[segment]
-    middle = strands.points[start][segment] + way[segment] * along[:, None].astype(np.float32)
+    middle = strands.points[start][segment] + step[segment] * along[:, None].astype(np.float32)
 
     radius = 0.5 * (strands.radius[start] + strands.radius[start + 1])
     area = (np.pi / 4.0) * 2.0 * radius * length / piece_count

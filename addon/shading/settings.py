@@ -249,7 +249,7 @@ class StrandSettings(Settings):
     )
 
     @property
-    def least_width(self) -> float:
+    def min_width(self) -> float:
         """What every strand covers at the root, however thin it is [pixels]."""
         return self.minimum_width if self.transparency == "none" else 0.0
 

@@ -52,7 +52,7 @@ def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         row.prop(obj, "hide_viewport", text="", emboss=False)
     if not objects:
         return
-    column.label(text=order_line(objects[0].hairloom.card_object.wrong_share), icon="SORTSIZE")
+    column.label(text=order_line(objects[0].hairloom.card_object.wrong_fraction), icon="SORTSIZE")
     image = objects[0].hairloom.card_object.image
     if image is not None:
         column.label(text=f"Texture {image.size[0]} x {image.size[1]}", icon="TEXTURE")

@@ -135,7 +135,7 @@ def by_hairloom(written: WrittenCards, look: ShadingSettings) -> np.ndarray:
             written.mesh,
             written.maps.textures,
             written.maps.has_tangent_map,
-            is_even=written.maps.is_even,
+            is_view_compensated=written.maps.is_view_compensated,
         ),
         lights=(Light.sun(tuple(-x for x in TO_SUN), (1.0, 1.0, 1.0), IRRADIANCE),),
         ambient=(0.0, 0.0, 0.0),

@@ -72,8 +72,8 @@ def test_blocks_join_without_a_seam(baked_maps: Any, monkeypatch: pytest.MonkeyP
     """Many small blocks, the upper ones less high, show what one shows."""
     flat, size = wavy(12, 0.02), 80
     whole = baked_maps(flat, size)
-    monkeypatch.setattr(bake, "_MOST_ACROSS", 40)
-    monkeypatch.setattr(bake, "_MOST_SAMPLES", 40 * 16 * 24)
+    monkeypatch.setattr(bake, "_MAX_ACROSS", 40)
+    monkeypatch.setattr(bake, "_MAX_SAMPLES", 40 * 16 * 24)
     assert len(bake.blocks_of(size)) == 8
     parted = baked_maps(flat, size)
     differs = np.abs(parted.alpha - whole.alpha) > 1e-6

@@ -13,7 +13,7 @@ from flat_cards import camera, mesh_of, snapshot_of
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.textures import HairTextures
-from hairloom.addon.shading.volume.card_opacity import MOST_ALPHA
+from hairloom.addon.shading.volume.card_opacity import MAX_ALPHA
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
@@ -74,7 +74,7 @@ def test_a_card_behind_cards_has_the_light_that_they_leave(
         drawn(frame, mesh_of(*cards), textures, of_form(form), shading=look)[16, :, 0]
         for cards in ((*fronts, back), (back,))
     )
-    left = (1.0 - min(alpha, MOST_ALPHA)) ** 2
+    left = (1.0 - min(alpha, MAX_ALPHA)) ** 2
     assert alone.min() > 0.01
     # seen from behind, x runs to the left
     assert found[20:30] / alone[20:30] == pytest.approx(left, rel=0.02, abs=1e-3)
@@ -127,7 +127,7 @@ def test_even_cards_shade_as_much_from_all_sides_of_their_strands(
             ambient=(0.0, 0.0, 0.0),
             shading=PLAIN,
         )
-        even = dataclasses.replace(snapshot.cards, is_even=True)
+        even = dataclasses.replace(snapshot.cards, is_view_compensated=True)
         shown = dataclasses.replace(snapshot, cards=even)
         found.append(frame.render_image(shown, behind(frame), SIZE, SIZE, 1)[16, 14:18, 0])
     left = 0.4 ** (2.0 / np.pi / np.cos(turn))

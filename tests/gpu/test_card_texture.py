@@ -15,7 +15,7 @@ from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.card_opacity import (
     among_strands,
     card_optical_depth,
-    even_depth,
+    view_compensated_depth,
 )
 
 SHAPE = (40, 96)
@@ -68,7 +68,7 @@ def test_level_and_slant(compute: Callable[..., np.ndarray]) -> None:
     assert np.abs(found[..., 1] - level).max() < 1e-3
     assert (level > 1.0).mean() > 0.2
     tau, parts = card_optical_depth(alpha), np.minimum(steps[..., 2:], 1.0)
-    scale = even_depth(normals, tangents, eyes)
+    scale = view_compensated_depth(normals, tangents, eyes)
     among = among_strands(steps[..., 0], steps[..., 1], scale, tau, parts[..., 0], parts[..., 1])
     assert found[..., 2:] == pytest.approx(np.stack(among, axis=-1), rel=1e-3, abs=1e-3)
     assert np.ptp(among[0]) > 1.0

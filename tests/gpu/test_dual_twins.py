@@ -14,9 +14,9 @@ from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tabl
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.dual import (
     dual_scattering,
+    fractions,
+    fractions_at,
     scattering_light,
-    shares,
-    shares_at,
 )
 
 SHAPE = (64, 200)
@@ -32,7 +32,7 @@ def test_dual_scattering(compute: Callable[..., np.ndarray], settings: ShadingSe
     """Over all angles, from clear hair to black, from the outside to deep inside."""
     random = np.random.default_rng(11)
     fibre = fibre_of(settings)
-    table = shares(marschner_tables(fibre, PREVIEW_SIZE))
+    table = fractions(marschner_tables(fibre, PREVIEW_SIZE))
     theta_i, theta_r = random.uniform(-1.5, 1.5, (2, *SHAPE))
     phi = random.uniform(0.0, np.pi, SHAPE)
     tau = 10.0 ** random.uniform(-3.0, 1.5, SHAPE)
@@ -62,7 +62,7 @@ def test_dual_scattering(compute: Callable[..., np.ndarray], settings: ShadingSe
     for each in (0.0, np.float32(0.7), 1.0):
         chosen = packed[1][..., 3] == each
         sides = [
-            shares_at(part, cos_d[chosen], absorption[chosen])
+            fractions_at(part, cos_d[chosen], absorption[chosen])
             for part in (table.forward, table.backward)
         ]
         expected[chosen] = dual_scattering(
@@ -86,7 +86,7 @@ def test_scattering_light(compute: Callable[..., np.ndarray], settings: ShadingS
     """From directions to light, where tau is known and where it is not."""
     random = np.random.default_rng(12)
     tables = marschner_tables(fibre_of(settings), PREVIEW_SIZE)
-    table = shares(tables)
+    table = fractions(tables)
     ways = random.normal(size=(4, *SHAPE, 3))
     ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
     ways[1] = strand_normal(ways[1], ways[0], np.zeros(3))

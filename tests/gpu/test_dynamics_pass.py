@@ -22,7 +22,7 @@ from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
-from hairloom.addon.dynamics.way import bow
+from hairloom.addon.dynamics.trajectory import curvature
 from hairloom.addon.errors import HairloomError
 
 #: [m] of difference in half a second, in free air and at colliders. Both forms round to float32 but
@@ -99,7 +99,7 @@ class Scene:
 
     def colliders(self, frame: int) -> tuple[PosedCollider, ...]:
         earlier, before, now = (shaking((frame + k) / self.fps) for k in (-1, 0, 1))
-        bent = bow(earlier, before, now, 1.0) if self.is_bent and frame else None
+        bent = curvature(earlier, before, now, 1.0) if self.is_bent and frame else None
         still = np.eye(4)
         return (
             *(PosedCollider(one, before, now, bent) for one in self.on_head),

@@ -14,7 +14,7 @@ from hairloom.addon.shading.marschner.look import fibre_of
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tables
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.skin.settings import SkinSettings
-from hairloom.addon.shading.volume.dual import mean_forward, shares
+from hairloom.addon.shading.volume.dual import fractions, mean_forward
 from hairloom.addon.shading.volume.opacity import transmittance, within_map
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
@@ -71,7 +71,7 @@ def test_skin_under_hair_has_what_hair_sends_on(*, is_skin: bool) -> None:
     found = left_on_the_floor(snapshot_of(BLOND, scattering=True, is_skin=is_skin))
     assert np.ptp(straight, axis=1).max() < 1e-6
     assert straight.min() < 0.2 and straight.max() > 0.6
-    sides = shares(marschner_tables(fibre_of(BLOND), PREVIEW_SIZE))
+    sides = fractions(marschner_tables(fibre_of(BLOND), PREVIEW_SIZE))
     forward = mean_forward(sides.forward, BLOND)
     assert forward[0] > forward[1] + 0.03 > forward[2] + 0.06
     expected = transmittance(-np.log(straight), 1.0, forward)

@@ -19,7 +19,7 @@ from hairloom.addon.shading.volume.light_frame import (
 )
 from hairloom.addon.shading.volume.map_size import MEMORY_LIMIT
 from hairloom.addon.shading.volume.opacity import (
-    LEAST_THICKNESS,
+    MIN_THICKNESS,
     coverage,
     layer_ends,
     look_up,
@@ -133,7 +133,7 @@ def spans_of(maps: Any) -> tuple[np.ndarray, np.ndarray]:
     kept = np.asarray(maps.starts.read()).reshape(side // 4, -1) / float(1 << 24)
     first, last = np.split(kept, 2, axis=1)
     starts = np.minimum(first, 1.0)
-    thickness = np.where(last > 1.0, 1.0, np.maximum(1.0 - last - starts, LEAST_THICKNESS))
+    thickness = np.where(last > 1.0, 1.0, np.maximum(1.0 - last - starts, MIN_THICKNESS))
     blown_up = [np.kron(found, np.ones((4, 4))) for found in (starts, thickness)]
     return blown_up[0], blown_up[1]
 

@@ -160,7 +160,7 @@ def test_crossing_strands_are_those_sorted_in_numpy(
     tint = np.clip(tint, 0.0, 1.0)[..., None]
     colors = brightness[:, None] * (1.0 + tint * (np.array(COLORED.tip_color) - 1.0))
     count = alpha.shape[1]
-    exact = over_layers(depth, alpha, colors, layers=count, unseen_share=0.0)
+    exact = over_layers(depth, alpha, colors, layers=count, unseen_fraction=0.0)
     assert ((alpha > 0.0).sum(axis=1) > 8).any(), "more than are kept"
     assert np.abs(found - exact).mean() < 0.02
     assert opacity < 1.0 or np.abs(found - exact).mean() < 0.004
@@ -226,7 +226,7 @@ def test_layers_that_are_shaded_stand_for_all_of_them() -> None:
     random = np.random.default_rng(15)
     depths, alphas = random.random((500, 60)), 0.3 * random.random((500, 60)) ** 2
     alphas[:, 7] = 0.6
-    exact = layer_fractions(depths, alphas, layers=60, unseen_share=0.0)
+    exact = layer_fractions(depths, alphas, layers=60, unseen_fraction=0.0)
     shares = layer_fractions(depths, alphas)
     covered = 1.0 - np.prod(1.0 - alphas, axis=1)
     assert ((shares > 0.0).sum(axis=1) <= LAYERS).all()

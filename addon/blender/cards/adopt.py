@@ -20,8 +20,8 @@ from ...cards.occlusion import CardShade, occlusion_steps
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...cards.sort import SortBy, order_steps
-from ...cards.steps import result_of, retold
-from ...cards.uv_ways import Way
+from ...cards.steps import map_progress, result_of
+from ...cards.uv_directions import Heading
 from ...errors import HairloomError
 from ...strands import Surface
 from ..base.attributes import set_attribute
@@ -54,7 +54,7 @@ class SortChoices:
 
     head: what the hair grows from and is shaded by, or None.
     by: see cards.sort.
-    way: see cards.uv_ways.
+    way: see cards.uv_directions.
     dangling: a vertex group, whose cards are drawn after all others; "" for none.
     occlusion: None leaves ambient occlusion as it is.
     alpha: a picture that says where cards are clear; None takes that of their material.
@@ -62,7 +62,7 @@ class SortChoices:
 
     head: bpy.types.Object | None = None
     by: SortBy = "pieces"
-    way: Way = "auto"
+    way: Heading = "auto"
     dangling: str = ""
     occlusion: CardOcclusionSettings | None = field(default_factory=CardOcclusionSettings)
     alpha: bpy.types.Image | None = None
@@ -112,7 +112,7 @@ def sort_steps(
     needs_alpha = choices.by != "distance" or choices.occlusion is not None
     alpha, problems = alpha_of(obj, choices.alpha) if needs_alpha else (None, [])
     ordering = order_steps(mesh, source.head, choices.by, apart, alpha=alpha)
-    orders = yield from retold(ordering, lambda share: share / part_count)
+    orders = yield from map_progress(ordering, lambda share: share / part_count)
     order = orders.front
     if choices.occlusion is not None:
         bodies = [] if source.head is None else [source.head]
@@ -120,7 +120,7 @@ def sort_steps(
         problems += doubts
         shades = [CardShade(mesh, alpha), *others]
         shading = occlusion_steps(mesh, shades, bodies, choices.occlusion)
-        openness = yield from retold(shading, lambda share: (1.0 + share) / 2.0)
+        openness = yield from map_progress(shading, lambda share: (1.0 + share) / 2.0)
         corner = np.zeros(len(obj.data.loops), np.int32)
         corner[source.corner] = source.cards.corner
         problems += _write_occlusion(obj.data, source.cards.vertex, corner, openness, mesh.along)
@@ -151,7 +151,7 @@ def read_cards(
         surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     source, polygon, corner, notes = _read_faces(obj, depsgraph)
     group = _dangling(obj, choices.dangling)
-    cards = adopt_cards(source, surface, group=group, way=choices.way, place=obj.name)
+    cards = adopt_cards(source, surface, group=group, heading=choices.way, place=obj.name)
     return CardSource(cards, surface, polygon, corner, (*notes, *_shared(obj.data), *cards.notes))
 
 

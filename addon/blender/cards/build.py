@@ -27,7 +27,7 @@ from ...cards.drawing_settings import CardDrawingSettings
 from ...cards.follow import CardBinding
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
-from ...cards.steps import result_of, retold
+from ...cards.steps import map_progress, result_of
 from ...params import SettingsMap
 from ...pipeline import Pose, Rig
 from ...render.atlas_pass import baked_maps, baking
@@ -126,7 +126,7 @@ class CardMaps:
     textures: HairTextures
     highlights: str
     base_gain: float = 1.0
-    is_even: bool = False
+    is_view_compensated: bool = False
 
     @property
     def has_tangent_map(self) -> bool:
@@ -182,12 +182,12 @@ def built_in_thread(work: ThreadWork[Any], inputs: CardInputs) -> MappedCards:
     def draw(flat: FlatStrands, size: int) -> AtlasMaps:
         return work.on_main_thread(drawing_maps(flat, size))
 
-    return result_of(retold(build_steps(inputs, draw), work.report))
+    return result_of(map_progress(build_steps(inputs, draw), work.report))
 
 
-def order_line(wrong_share: float) -> str:
+def order_line(wrong_fraction: float) -> str:
     """How often the order of cards is wrong, such as "Order: 18 % of pixels wrong"."""
-    return f"Order: {100.0 * wrong_share:.0f} % of pixels wrong"
+    return f"Order: {100.0 * wrong_fraction:.0f} % of pixels wrong"
 
 
 def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps:
@@ -212,7 +212,7 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
     names = ("alpha", "shift", "noise", "tangent", "normal")
     shown = {name: by_name[name] for name in names}
     textures = HairTextures(base=by_name["base"] * gain, **shown)
-    return CardMaps(by_name, textures, "tangent", gain, is_even="alpha" not in pictures)
+    return CardMaps(by_name, textures, "tangent", gain, is_view_compensated="alpha" not in pictures)
 
 
 def drawn_maps(flat: FlatStrands, size: int) -> AtlasMaps:
@@ -270,7 +270,7 @@ class BuiltCards:
     rest: CardSnapshot
     strand_area: StrandArea
     card_shade: float
-    wrong_share: float
+    wrong_fraction: float
     notes: tuple[str, ...]
 
     @classmethod
@@ -281,11 +281,15 @@ class BuiltCards:
             rig,
             bound_cards(rig, mesh),
             CardSnapshot(
-                mesh, textures, maps.has_tangent_map, build.backs[0], is_even=maps.is_even
+                mesh,
+                textures,
+                maps.has_tangent_map,
+                build.backs[0],
+                is_view_compensated=maps.is_view_compensated,
             ),
             StrandArea.of(strands.grid, strands.radius.reshape(strands.strand_count, -1)),
             card_shade(mesh.positions, mesh.triangles, mesh.uv, textures.alpha),
-            build.wrong_share,
+            build.wrong_fraction,
             cards.notes,
         )
 

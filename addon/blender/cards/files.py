@@ -15,7 +15,7 @@ from ...cards.build import CardBuild
 from ...cards.card_mesh import CardMesh
 from ...cards.export_settings import CardExportSettings
 from ...cards.settings import CardSettings
-from ...cards.steps import result_of, retold
+from ...cards.steps import map_progress, result_of
 from ...cards.vertex_animation import motion_layout
 from ...exchange.cards.card_formats import CardFormat, format_of
 from ...exchange.cards.index_buffer import index_buffer
@@ -203,9 +203,9 @@ class _Writer:
         settings = self.output.settings
         with self.stage("move cards"):
             steps = moved_cards(motion, levels, space="head", with_directions=False)
-            moved = yield from retold(steps, lambda share: ("Moving the cards", share))
+            moved = yield from map_progress(steps, lambda share: ("Moving the cards", share))
         with self.stage("fit joints"):
-            joints: JointMotion = yield from retold(
+            joints: JointMotion = yield from map_progress(
                 joint_motion_steps(moved.tracks, settings), lambda share: ("Fitting joints", share)
             )
         self.motion = joints.facts
@@ -222,7 +222,7 @@ class _Writer:
         motion_layout(count, len(motion.frames), str(self.path))  # refused before the work
         with self.stage("move cards"):
             steps = moved_cards(motion, levels, space=settings.motion_space, with_directions=True)
-            moved = yield from retold(steps, lambda share: ("Moving the cards", share))
+            moved = yield from map_progress(steps, lambda share: ("Moving the cards", share))
         yield "Writing", None
         texture = TextureMotion.of(moved, settings, self.file_format, str(self.path))
         with self.stage("write motion texture"):
@@ -274,7 +274,7 @@ class _Writer:
             texture_files=texture_channels(written),
             base_gain=maps.base_gain,
             highlights=maps.highlights,
-            view_compensated_alpha=VIEW_COMPENSATED_ALPHA if maps.is_even else {},
+            view_compensated_alpha=VIEW_COMPENSATED_ALPHA if maps.is_view_compensated else {},
             material=material_of(shading, tables),
             indices=indices,
             motion=self.motion,
@@ -374,7 +374,7 @@ class CardExport:
         result = (
             f"Wrote {written.mesh.card_count:,} cards in {len(written.levels)} levels of detail "
             f"to {first}, with {len(beside)} files beside it. "
-            f"{order_line(written.build.wrong_share)}"
+            f"{order_line(written.build.wrong_fraction)}"
         )
         return Outcome(
             f"{result}{_motion_line(written)}", self.dropped, (*self.notes, *written.notes)

@@ -62,7 +62,7 @@ class CardObjectJob:
         self.notes += tuple(f"{hair.name}: {note}." for note in made.notes)
         color = self._inputs.settings[ShadingSettings].base_color
         self.objects = _write(hair, build, made.maps.textures.card, color, self._matrix)
-        self.order = order_line(build.wrong_share)
+        self.order = order_line(build.wrong_fraction)
 
 
 def card_objects(hair: bpy.types.Object) -> list[bpy.types.Object]:
@@ -112,7 +112,7 @@ def _write(
             obj.data.materials.append(material)
         obj.hairloom.card_object.image = image
         obj.hairloom.card_object.card_count = cards.card_count
-        obj.hairloom.card_object.wrong_share = build.wrong_share
+        obj.hairloom.card_object.wrong_fraction = build.wrong_fraction
         _fill(obj.data, cards, matrix)
         objects.append(obj)
     return objects

@@ -103,7 +103,7 @@ class ShownCards:
         if self._built is None or self._shown is None:
             return ("Cards are being built",) if self.is_pending else ()
         cards, triangles, _ = self.counts
-        return f"{cards:,} cards, {triangles:,} triangles", order_line(self._built.wrong_share)
+        return f"{cards:,} cards, {triangles:,} triangles", order_line(self._built.wrong_fraction)
 
     def want(self, rig: Rig, settings: GroomSettings) -> None:
         """Cards of this rig by these settings from now on; nothing is built twice."""

@@ -17,7 +17,7 @@ from ...dynamics.colliders import (
     SphereCollider,
 )
 from ...dynamics.settings import DynamicsSettings
-from ...dynamics.way import bow
+from ...dynamics.trajectory import curvature
 from ...strands import Surface
 from ...strands.affine import moved
 from .carriers import Carrier, scales_of
@@ -76,7 +76,7 @@ class Track:
         assert self.before is not None
         bent = None
         if self.earlier is not None and duration:
-            bent = bow(self.earlier, self.before, matrix, self.duration / duration)
+            bent = curvature(self.earlier, self.before, matrix, self.duration / duration)
         posed = PosedCollider(collider, self.before, matrix, bent)
         self.earlier, self.before, self.duration = self.before, matrix, duration
         return posed

@@ -71,11 +71,11 @@ def written_cards(
         cards=written.mesh.card_count,
         card_triangles=len(written.mesh.triangles),
         card_levels=[len(level.triangles) for level in written.levels],
-        card_order_wrong=round(written.build.wrong_share, 4),
+        card_order_wrong=round(written.build.wrong_fraction, 4),
     )
     if written.motion:
         report.facts["card_motion"] = dict(written.motion)
-    print(order_line(written.build.wrong_share), flush=True)
+    print(order_line(written.build.wrong_fraction), flush=True)
     tell_notes(list(written.notes), report)
     for file in written.files:
         report.add_output(file)

@@ -37,7 +37,7 @@ class HAIRLOOM_PG_card_object(bpy.types.PropertyGroup):
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
-        "wrong_share": FloatProperty(
+        "wrong_fraction": FloatProperty(
             name="Wrong Order",
             description="Share of the pixels that the finest level draws in a wrong order, from "
             "all sides",

@@ -64,21 +64,21 @@ def ways_along_edges(
         (vertex_count,), -1 where none.
     """
     beside: list[list[tuple[int, float]]] = [[] for _ in range(vertex_count)]
-    for (one, other), way in zip(edges.tolist(), length.tolist(), strict=True):
-        beside[one].append((other, way))
-        beside[other].append((one, way))
+    for (one, other), displacement in zip(edges.tolist(), length.tolist(), strict=True):
+        beside[one].append((other, displacement))
+        beside[other].append((one, displacement))
     best = [np.inf] * vertex_count
     nearest = [-1] * vertex_count
     queue = [(0.0, seed, seed) for seed in seeds.tolist()]
     heapq.heapify(queue)
     while queue:
-        way, vertex, seed = heapq.heappop(queue)
-        if way >= best[vertex]:
+        displacement, vertex, seed = heapq.heappop(queue)
+        if displacement >= best[vertex]:
             continue
-        best[vertex], nearest[vertex] = way, seed
+        best[vertex], nearest[vertex] = displacement, seed
         for other, step in beside[vertex]:
-            if way + step < best[other]:
-                heapq.heappush(queue, (way + step, other, seed))
+            if displacement + step < best[other]:
+                heapq.heappush(queue, (displacement + step, other, seed))
     return np.array(best), np.array(nearest)
 
 

@@ -28,16 +28,16 @@ def keep_distances(position: Floats, color: Color, fraction: Floats) -> None:
     """
     vertices = color.vertices
     here = position if vertices is None else position.take(vertices, axis=1)
-    way = position.take(color.mates, axis=1)
-    way -= here
-    part = np.einsum("ij,ij->j", way, way)
+    displacement = position.take(color.mates, axis=1)
+    displacement -= here
+    part = np.einsum("ij,ij->j", displacement, displacement)
     np.sqrt(part, out=part)
     np.maximum(part, TINY, out=part)
     np.divide(color.length, part, out=part)
     np.subtract(np.float32(1.0), part, out=part)
     part *= fraction
-    way *= part
-    here += way
+    displacement *= part
+    here += displacement
     if vertices is not None:
         position[:, vertices] = here
 
@@ -48,13 +48,13 @@ def hold_in_reach(position: Floats, fabric: Fabric) -> None:
     Kim, Chentanez and Mueller 2012, "Long Range Attachments".
     """
     anchor = position.take(fabric.anchor, axis=1)
-    way = position - anchor
-    part = np.einsum("ij,ij->j", way, way)
+    displacement = position - anchor
+    part = np.einsum("ij,ij->j", displacement, displacement)
     np.sqrt(part, out=part)
     np.maximum(part, np.maximum(fabric.reach, TINY), out=part)
     np.divide(fabric.reach, part, out=part)
-    way *= part
-    np.add(anchor, way, out=position)
+    displacement *= part
+    np.add(anchor, displacement, out=position)
 
 
 def pull_of(fabric: Fabric, settings: FinSettings, small: float) -> Floats:

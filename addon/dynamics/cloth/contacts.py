@@ -30,15 +30,15 @@ class MovingPlanes:
 
     contacts: Contacts
     begin: Floats
-    way: Floats
+    displacement: Floats
 
     @classmethod
     def of(cls, contacts: Contacts, before: Floats) -> MovingPlanes:
         """before: (3, n) world [m], vertices at the substep's begin."""
         here = before.take(contacts.index, axis=1)
-        way = contacts.origin - here
-        begin = contacts.offset - dot_rows(contacts.normal, way)
-        return cls(contacts, np.minimum(begin, dot_rows(contacts.normal, here)), way)
+        displacement = contacts.origin - here
+        begin = contacts.offset - dot_rows(contacts.normal, displacement)
+        return cls(contacts, np.minimum(begin, dot_rows(contacts.normal, here)), displacement)
 
     def press(
         self, position: Floats, previous: Floats, number: int, steps: int, friction: float
@@ -47,7 +47,7 @@ class MovingPlanes:
         known = self.contacts
         fraction = np.float32((number + 1) / steps)
         origin = previous.take(known.index, axis=1)
-        origin += self.way * np.float32(1.0 / steps)
+        origin += self.displacement * np.float32(1.0 / steps)
         now = replace(
             known,
             offset=self.begin + (known.offset - self.begin) * fraction,

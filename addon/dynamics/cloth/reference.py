@@ -43,7 +43,7 @@ class _Plane:
 
     vertex: int
     normal: Floats
-    way: Floats
+    displacement: Floats
     first: float
     last: float
 
@@ -95,15 +95,15 @@ class _Cloth:
             wind: Floats = np.zeros(3)
             if self.air is not None:
                 wind = self.air.at(self.x[v][:, None].astype(np.float32), time)[:, 0] * self.small
-            way = self.x[v] - self.previous[v] - wind
-            across = normal @ way
-            along = way - normal * across
+            displacement = self.x[v] - self.previous[v] - wind
+            across = normal @ displacement
+            along = displacement - normal * across
             broadside = math.exp(-settings.damping * self.dt)
             broadside /= 1.0 + settings.drag * abs(across) * ratio
             edgewise = math.exp(-settings.damping * settings.edgewise * self.dt)
             edgewise /= 1.0 + settings.drag * settings.edgewise * np.linalg.norm(along) * ratio
-            way = normal * (across * broadside) + along * edgewise
-            self.previous[v] = self.x[v] - way - wind
+            displacement = normal * (across * broadside) + along * edgewise
+            self.previous[v] = self.x[v] - displacement - wind
 
     def _normals(self) -> list[Floats]:
         total = [np.zeros(3) for _ in self.x]
@@ -134,8 +134,8 @@ class _Cloth:
             self.previous[v] = self.x[v]
             before, now = (np.float64(t[v]) for t in (drive.target_before, drive.target_now))
             carried = before + (now - before) * moment
-            if drive.target_bow is not None:
-                carried = carried + np.float64(drive.target_bow[v]) * moment * (moment - 1.0)
+            if drive.target_curvature is not None:
+                carried = carried + np.float64(drive.target_curvature[v]) * moment * (moment - 1.0)
             weight = float(self.fabric.pin[v])
             if self.pinned[v]:
                 self.x[v] = carried
@@ -157,10 +157,10 @@ class _Cloth:
             for v, (anchor, reach) in enumerate(
                 zip(self.fabric.anchor, self.fabric.reach, strict=True)
             ):
-                way = self.x[v] - self.x[anchor]
-                far = float(np.linalg.norm(way))
+                displacement = self.x[v] - self.x[anchor]
+                far = float(np.linalg.norm(displacement))
                 if far > reach:
-                    self.x[v] = self.x[anchor] + way * float(reach) / far
+                    self.x[v] = self.x[anchor] + displacement * float(reach) / far
 
     def _planes(
         self, x: list[Floats], before: list[Floats], begin: float, end: float
@@ -178,19 +178,19 @@ class _Cloth:
                 normal, distance = outward / steepness, float(found[0]) / steepness
                 if self.pinned[v] or distance >= settings.radius + REACH:
                     continue
-                way = ((new - old) @ local)[:3]
-                reached = distance - normal @ (x[v] - before[v] - way)
+                displacement = ((new - old) @ local)[:3]
+                reached = distance - normal @ (x[v] - before[v] - displacement)
                 reached += settings.depenetration_speed * self.dt
                 offset = normal @ x[v] - distance + min(settings.radius, reached)
-                first = min(offset - normal @ way, normal @ before[v])
-                planes.append(_Plane(v, normal, way, first, offset))
+                first = min(offset - normal @ displacement, normal @ before[v])
+                planes.append(_Plane(v, normal, displacement, first, offset))
         return planes
 
     def _press(self, plane: _Plane, fraction: float) -> None:
         """In one small step: push out, rub, and do not bounce."""
         v, normal = plane.vertex, plane.normal
         offset = plane.first + (plane.last - plane.first) * fraction
-        origin = self.previous[v] + plane.way * self.small / self.dt
+        origin = self.previous[v] + plane.displacement * self.small / self.dt
         bounce = self._push(plane, offset, origin)
         self.previous[v] = self.previous[v] + normal * bounce
 
@@ -198,7 +198,7 @@ class _Cloth:
         free, bounce = [x.copy() for x in self.x], [np.zeros(3) for _ in self.x]
         for plane in self._planes(self.x, before, begin, end):
             v = plane.vertex
-            one = self._push(plane, plane.last, before[v] + plane.way)
+            one = self._push(plane, plane.last, before[v] + plane.displacement)
             bounce[v] = bounce[v] + plane.normal * one
         fraction = self.small / self.dt
         for v in range(len(self.x)):

@@ -11,7 +11,7 @@ from ..settings import DynamicsSettings
 
 @dataclass(frozen=True, kw_only=True)
 class FinSettings(MotionSettings):
-    """How a mesh moves as cloth: what hangs on its edges, on the air and on colliders.
+    """How a mesh moves as cloth: what depends on its edges, on the air and on colliders.
 
     Each vertex weighs the same. What hair has too has the same name and means the same.
     """

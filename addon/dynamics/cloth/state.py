@@ -126,7 +126,7 @@ def start_cloth(
     pinned = pin >= PINNED_FROM
 
     length = distances(position, pairs)
-    way, nearest = ways_along_edges(pairs, length, np.flatnonzero(pinned), count)
+    displacement, nearest = ways_along_edges(pairs, length, np.flatnonzero(pinned), count)
     tied = nearest >= 0
     moving = ~pinned[pairs].all(axis=1)
     pairs, length = pairs[moving], length[moving]
@@ -141,7 +141,7 @@ def start_cloth(
         _colors(position, pairs),
         _colors(position, folds),
         np.where(tied, nearest, np.arange(count)),
-        np.where(tied, way, 0.0).astype(np.float32),
+        np.where(tied, displacement, 0.0).astype(np.float32),
     )
     return ClothState(position, position, fabric)
 
@@ -163,8 +163,8 @@ def vertex_rows(positions: Floats) -> Floats:
 
 def distances(position: Floats, pairs: Ints) -> Floats:
     """[m] between the two vertices of each pair (n, 2), (n,)."""
-    way = position[:, pairs[:, 1]] - position[:, pairs[:, 0]]
-    length: Floats = np.sqrt(np.einsum("ij,ij->j", way, way))
+    displacement = position[:, pairs[:, 1]] - position[:, pairs[:, 0]]
+    length: Floats = np.sqrt(np.einsum("ij,ij->j", displacement, displacement))
     return length
 
 

@@ -36,7 +36,7 @@ from ..colliders import PosedCollider, poses_through
 from ..contacts import find_contacts
 from ..schedule import due_substeps
 from ..step import Drive
-from ..way import at
+from ..trajectory import at
 from ..wind import Air, air_of
 from .constraints import edge_fractions, fold_fractions, hold_in_reach, keep_distances, pull_of
 from .contacts import MovingPlanes, planes_ahead, push_out_at_end, seen_from
@@ -53,8 +53,8 @@ class _Frame:
 
     origin: Floats
     before: Floats
-    way: Floats
-    bow: Floats | None
+    displacement: Floats
+    curvature: Floats | None
     colliders: tuple[PosedCollider, ...]
     gravity: Floats  # (3, 1) [m/s^2]
     air: Air | None
@@ -67,8 +67,8 @@ class _Frame:
     radius: Floats  # (n,) [m]
 
     def carried(self, moment: float, chosen: Ints | slice) -> Floats:
-        bow = None if self.bow is None else self.bow[:, chosen]
-        return at(self.before[:, chosen], self.way[:, chosen], bow, moment)
+        curvature = None if self.curvature is None else self.curvature[:, chosen]
+        return at(self.before[:, chosen], self.displacement[:, chosen], curvature, moment)
 
 
 def advance_cloth(
@@ -77,7 +77,8 @@ def advance_cloth(
     """The state after a frame of `duration` seconds; the state given stays as it is.
 
     Args:
-        drive: its targets and bow are (vertex_count, 3), where the animation carries the mesh.
+        drive: its targets and their curvature are (vertex_count, 3), where the animation carries
+            the mesh.
 
     Raises:
         HairloomError: a drive that does not fit the state or is not finite, or a bad duration.
@@ -113,12 +114,12 @@ def cloth_at_frame_end(state: ClothState, drive: Drive) -> Floats:
     Bridges the time that is left over: each goes on as its pinned vertex does, or else as it flew.
     """
     fabric, position = state.fabric, state.position
-    way = (vertex_rows(drive.target_now) - position)[:, fabric.anchor]
+    displacement = (vertex_rows(drive.target_now) - position)[:, fabric.anchor]
     if state.small_step:
         loose = ~fabric.pinned[fabric.anchor]
         flight = (position - state.previous) * (state.time_left / state.small_step)
-        way[:, loose] = flight[:, loose]
-    return np.ascontiguousarray((position + way).T)
+        displacement[:, loose] = flight[:, loose]
+    return np.ascontiguousarray((position + displacement).T)
 
 
 def _feel_air(
@@ -136,27 +137,27 @@ def _feel_air(
     """
     if not settings.damping and not settings.drag:
         return
-    way = position - previous
+    displacement = position - previous
     if frame.air is not None:
-        air_way = frame.air.at(position + frame.origin.astype(np.float32), time) * np.float32(
-            frame.small
-        )
-        way -= air_way
+        air_displacement = frame.air.at(
+            position + frame.origin.astype(np.float32), time
+        ) * np.float32(frame.small)
+        displacement -= air_displacement
     normal = broadside_normals(position, fabric.triangles)
-    across = dot_rows(normal, way)
+    across = dot_rows(normal, displacement)
     broadside = normal * across
-    way -= broadside
+    displacement -= broadside
     per_step = np.float32(settings.drag * frame.dt / frame.small)
-    along = np.sqrt(dot_rows(way, way))
+    along = np.sqrt(dot_rows(displacement, displacement))
     broadside *= math.exp(-settings.damping * frame.dt) / (1.0 + per_step * np.abs(across))
     slip = np.float32(settings.edgewise)
-    way *= math.exp(-settings.damping * settings.edgewise * frame.dt) / (
+    displacement *= math.exp(-settings.damping * settings.edgewise * frame.dt) / (
         1.0 + per_step * slip * along
     )
-    way += broadside
+    displacement += broadside
     if frame.air is not None:
-        way += air_way
-    np.subtract(position, way, out=previous)
+        displacement += air_displacement
+    np.subtract(position, displacement, out=previous)
 
 
 def _hold_folds(
@@ -189,7 +190,7 @@ def _substep(
     planes: list[MovingPlanes] = []
     if poses:
         planes = planes_ahead(position, previous, fall, steps, radius, poses, led_out)
-    before, spare, way = position.copy(), np.empty_like(position), np.empty_like(position)
+    before, spare, displacement = position.copy(), np.empty_like(position), np.empty_like(position)
     pinned, is_pulled = np.flatnonzero(fabric.pinned), bool(frame.pull.any())
     for number in range(steps):
         moment = span[0] + (span[1] - span[0]) * (number + 1) / steps
@@ -199,9 +200,9 @@ def _substep(
         previous, position, spare = position, spare, previous
         position[:, pinned] = frame.carried(moment, pinned)
         if is_pulled:
-            np.subtract(frame.carried(moment, slice(None)), position, out=way)
-            way *= frame.pull * frame.mobility
-            position += way
+            np.subtract(frame.carried(moment, slice(None)), position, out=displacement)
+            displacement *= frame.pull * frame.mobility
+            position += displacement
         _keep_edges(position, fabric, frame, settings)
         for one in planes:
             one.press(position, previous, number, steps, settings.friction)
@@ -236,12 +237,16 @@ def _prepare(state: ClothState, drive: Drive, settings: FinSettings, dt: float) 
     pull = pull_of(fabric, settings, small)
     mobility = np.where(fabric.pinned, 0.0, 1.0 / (1.0 + pull)).astype(np.float32)
     origin = state.position.mean(axis=1, keepdims=True)
-    bow = None if drive.target_bow is None else vertex_rows(drive.target_bow).astype(np.float32)
+    curvature = (
+        None
+        if drive.target_curvature is None
+        else vertex_rows(drive.target_curvature).astype(np.float32)
+    )
     return _Frame(
         origin=origin,
         before=(before - origin).astype(np.float32),
-        way=(now - before).astype(np.float32),
-        bow=bow,
+        displacement=(now - before).astype(np.float32),
+        curvature=curvature,
         colliders=tuple(seen_from(origin, posed) for posed in drive.colliders),
         gravity=(gravity * np.float32(settings.gravity * (1.0 - settings.buoyancy)))[:, None],
         air=air_of(settings, drive.scene_wind),

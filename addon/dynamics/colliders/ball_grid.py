@@ -83,9 +83,9 @@ def ball_distances(points: Floats, centers: Floats, radii: Floats) -> Floats:
     """Signed distance [m] of every ball to every point (3, m), (n, m)."""
     squared = np.zeros((len(radii), points.shape[1]), np.float32)
     for axis, row in enumerate(points):
-        way = row - centers[:, axis, None]
-        way *= way
-        squared += way
+        displacement = row - centers[:, axis, None]
+        displacement *= displacement
+        squared += displacement
     distance: Floats = np.sqrt(squared, out=squared)
     distance -= radii[:, None]
     return distance
@@ -110,9 +110,9 @@ def _pair_distances(corner: Floats, offset: Floats, centers: Floats, radii: Floa
     from its corner (3, n), (m, n)."""
     squared = np.zeros((offset.shape[1], len(radii)), np.float32)
     for axis in range(3):
-        way = (corner[axis] - centers[:, axis]) + offset[axis, :, None]
-        way *= way
-        squared += way
+        displacement = (corner[axis] - centers[:, axis]) + offset[axis, :, None]
+        displacement *= displacement
+        squared += displacement
     distance: Floats = np.sqrt(squared, out=squared)
     distance -= radii
     return distance

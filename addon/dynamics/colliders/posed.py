@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
-from ..way import at
+from ..trajectory import at
 
 #: A collider that turns around within a frame is flat on its way; then it holds nothing out. A
 #: fraction of the largest scale.
@@ -36,7 +36,8 @@ class PosedCollider:
     """A collider and its way during one frame.
 
     matrix_before, matrix_now: (4, 4) affine, object to world, at the frame's begin and end.
-    matrix_bow: (4, 4), how the way between them is bent, see `way.bow`; None: straight.
+    matrix_curvature: (4, 4), how the path between them is bent, see `trajectory.curvature`; None:
+        straight.
 
     Raises:
         HairloomError: a matrix that is not finite or flattens the collider.
@@ -45,23 +46,23 @@ class PosedCollider:
     collider: Collider
     matrix_before: Floats
     matrix_now: Floats
-    matrix_bow: Floats | None = None
+    matrix_curvature: Floats | None = None
 
     def __post_init__(self) -> None:
-        for name in ("matrix_before", "matrix_now", "matrix_bow"):
+        for name in ("matrix_before", "matrix_now", "matrix_curvature"):
             if getattr(self, name) is None:
                 continue
             matrix = np.asarray(getattr(self, name), np.float64)
             object.__setattr__(self, name, matrix)
             if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
                 raise _broken("its matrix is not a finite 4 by 4 matrix")
-            if name != "matrix_bow" and np.linalg.cond(matrix[:3, :3]) > 1.0e6:
+            if name != "matrix_curvature" and np.linalg.cond(matrix[:3, :3]) > 1.0e6:
                 raise _broken("its scale is zero")
 
     def matrix_at(self, moment: float) -> Floats:
         """Object to world (4, 4) float64 at `moment`, 0 the frame's begin and 1 its end."""
-        way = self.matrix_now - self.matrix_before
-        return at(self.matrix_before, way, self.matrix_bow, moment)
+        displacement = self.matrix_now - self.matrix_before
+        return at(self.matrix_before, displacement, self.matrix_curvature, moment)
 
     def poses(self, spans: list[tuple[float, float]]) -> list[Pose | None]:
         """Where it is after each substep; None where it is flat.
@@ -75,13 +76,15 @@ class PosedCollider:
         centers = (now[:, :3, :3] @ center + now[:, :3, 3]).astype(np.float32)
         scales = np.linalg.svd(now[:, :3, :3], compute_uv=False)
         is_flat = scales[:, -1] <= FLAT * scales[:, 0]
-        ways = (now - before).astype(np.float32)
+        displacements = (now - before).astype(np.float32)
         now[is_flat] = np.eye(4)
         inverses = np.linalg.inv(now).astype(np.float32)
         return [
             None
             if is_flat[i]
-            else Pose(self.collider, inverses[i], ways[i], centers[i], radius * largest, smallest)
+            else Pose(
+                self.collider, inverses[i], displacements[i], centers[i], radius * largest, smallest
+            )
             for i, (largest, _, smallest) in enumerate(scales.tolist())
         ]
 
@@ -98,7 +101,7 @@ class Pose:
 
     collider: Collider
     inverse: Floats
-    way: Floats
+    displacement: Floats
     center: Floats
     radius: float
     scale: float
@@ -108,9 +111,9 @@ def poses_through(
     colliders: tuple[PosedCollider, ...], spans: list[tuple[float, float]]
 ) -> list[list[Pose]]:
     """The poses of all colliders after each substep, but of those that are flat then."""
-    ways = [posed.poses(spans) for posed in colliders]
+    found = [posed.poses(spans) for posed in colliders]
     return [
-        [pose for pose in (way[number] for way in ways) if pose is not None]
+        [pose for pose in (poses[number] for poses in found) if pose is not None]
         for number in range(len(spans))
     ]
 

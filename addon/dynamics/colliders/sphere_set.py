@@ -51,8 +51,8 @@ class SphereSetCollider:
     def bounds(self) -> tuple[Floats, float]:
         low, high = box_of(self.centers, self.radii)
         middle = (low + high) / np.float32(2.0)
-        way = np.sqrt(((self.centers - middle) ** 2).sum(axis=1))
-        return middle, float((way + self.radii).max())
+        displacement = np.sqrt(((self.centers - middle) ** 2).sum(axis=1))
+        return middle, float((displacement + self.radii).max())
 
     def near(self, points: Floats, reach: Floats | float) -> Ints:
         """By the cell of each point, or the cell nearest to it: all balls lie within the grid's
@@ -101,9 +101,9 @@ class SphereSetCollider:
         ball = self._grid.ball.take(np.arange(int(count.sum())) + np.repeat(first - start, count))
         squared = np.zeros(len(ball), np.float32)
         for axis, row in enumerate(points):
-            way = np.repeat(row, count)
-            way -= self.centers[:, axis].take(ball)
-            squared += way * way
+            displacement = np.repeat(row, count)
+            displacement -= self.centers[:, axis].take(ball)
+            squared += displacement * displacement
         distance = np.sqrt(squared)
         distance -= self.radii.take(ball)
         if not len(start):

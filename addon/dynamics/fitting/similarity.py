@@ -35,8 +35,8 @@ class Similarity:
 def fit_similarity(before: Floats, now: Floats) -> Similarity | None:
     """The similarity that brings points (n, 3) nearest to where they are now, (n, 3) [m].
 
-    None where it cannot be found: fewer than three points, points in a line or in one place, before
-    or now, or points that are not finite.
+    None where it cannot be found: fewer than three points, points in a line or in one place,
+    before or now, or points that are not finite.
     """
     before, now = np.asarray(before, np.float64), np.asarray(now, np.float64)
     if len(before) < 3 or not (np.isfinite(before).all() and np.isfinite(now).all()):

@@ -93,8 +93,8 @@ def medial_balls(
     for _ in range(_SHRINKS):
         center = point[going] + inward[going] * radius[going, None]
         found = search.closest(center)
-        way = found.point - point[going]
-        smaller = _tangent_radius(way, inward[going], radius[going])
+        displacement = found.point - point[going]
+        smaller = _tangent_radius(displacement, inward[going], radius[going])
         shrinks = (found.distance < radius[going] * (1.0 - _SETTLED)) & (smaller < radius[going])
         radius[going[shrinks]] = smaller[shrinks]
         going = going[shrinks]
@@ -116,11 +116,11 @@ def _first_radii(samples: SurfaceSamples, widest: float) -> Floats:
     return radius
 
 
-def _tangent_radius(way: Floats, inward: Floats, widest: Floats) -> Floats:
+def _tangent_radius(displacement: Floats, inward: Floats, widest: Floats) -> Floats:
     """Radius (n,) of the ball that touches a place, with its center inwards (3,) or (n, 3), and
     goes through another one, `way` (n, 3) from there; `widest` (n,) where none does."""
-    along = (way * inward).sum(axis=1)
-    squared = np.einsum("ij,ij->i", way, way)
+    along = (displacement * inward).sum(axis=1)
+    squared = np.einsum("ij,ij->i", displacement, displacement)
     return np.divide(squared, 2.0 * along, out=widest.copy(), where=along > 0.0)
 
 
@@ -132,8 +132,12 @@ def _distinct(centers: Floats, radii: Floats, alike: float) -> tuple[Floats, Flo
     kept = np.ones(len(radii), bool)
     for one in range(len(radii)):
         if kept[one]:
-            way = centers[one + 1 :] - centers[one]
-            apart = np.sqrt(np.einsum("ij,ij->i", way, way)) + radii[one] - radii[one + 1 :]
+            displacement = centers[one + 1 :] - centers[one]
+            apart = (
+                np.sqrt(np.einsum("ij,ij->i", displacement, displacement))
+                + radii[one]
+                - radii[one + 1 :]
+            )
             kept[one + 1 :] &= apart > alike
     return centers[kept], radii[kept]
 
@@ -142,8 +146,8 @@ def _gaps(points: Floats, centers: Floats, radii: Floats) -> Floats:
     """Squared gap of every sample to every ball, (ball_count, sample_count) float32."""
     gap = np.empty((len(radii), len(points)), np.float32)
     for row, center, radius in zip(gap, centers, radii, strict=True):
-        way = points - center
-        distance = np.sqrt(np.einsum("ij,ij->i", way, way)) - radius
+        displacement = points - center
+        distance = np.sqrt(np.einsum("ij,ij->i", displacement, displacement)) - radius
         row[:] = np.maximum(distance, 0.0) ** 2
     return gap
 

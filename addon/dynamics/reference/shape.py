@@ -25,8 +25,8 @@ def jacobian_of(x: Floats) -> Floats:
     free = len(x) - PINNED
     jacobian = np.zeros((free, 3 * free))
     for row in range(free):
-        way = x[row + PINNED] - x[row + PINNED - 1]
-        unit = way / np.linalg.norm(way)
+        displacement = x[row + PINNED] - x[row + PINNED - 1]
+        unit = displacement / np.linalg.norm(displacement)
         jacobian[row, 3 * row : 3 * row + 3] = unit
         if row:
             jacobian[row, 3 * row - 3 : 3 * row] = -unit

@@ -65,9 +65,13 @@ class _Guide:
         held = state.rest.tip_held
         self.is_held = held is not None and bool(held[guide])
         self.before = drive.target_before[guide].astype(np.float64)
-        self.way = drive.target_now[guide].astype(np.float64) - self.before
-        bow = drive.target_bow
-        self.bow = np.zeros_like(self.way) if bow is None else bow[guide].astype(np.float64)
+        self.displacement = drive.target_now[guide].astype(np.float64) - self.before
+        curvature = drive.target_curvature
+        self.curvature = (
+            np.zeros_like(self.displacement)
+            if curvature is None
+            else curvature[guide].astype(np.float64)
+        )
         middle = (drive.target_before + drive.target_now).transpose(2, 1, 0) / 2.0
         self.gravity = self._felt_gravity(
             drive, settings, best_rotation(state.rest.position, middle)
@@ -97,7 +101,11 @@ class _Guide:
             plane.absorb(self.x, self.previous)
 
     def _style_at(self, fraction: float) -> Floats:
-        return self.before + self.way * fraction + self.bow * fraction * (fraction - 1.0)
+        return (
+            self.before
+            + self.displacement * fraction
+            + self.curvature * fraction * (fraction - 1.0)
+        )
 
     def _air(self, drive: Drive, settings: DynamicsSettings, moment: Moment) -> Floats:
         """Velocity of the air at the root, (3,)."""
@@ -116,10 +124,10 @@ class _Guide:
         both = settings.damping + settings.style_damping
         kept = math.exp(-both * moment.dt)
         lost = (1.0 - kept) / both if both else 0.0
-        style_way = self._style_at(moment.end) - self._style_at(moment.begin)
+        style_displacement = self._style_at(moment.end) - self._style_at(moment.begin)
         for cv in range(len(self.x)):
             moved = (self.x[cv] - self.previous[cv]) * kept
-            moved = moved + style_way[cv] * lost * settings.style_damping
+            moved = moved + style_displacement[cv] * lost * settings.style_damping
             moved = moved + air * moment.dt * lost * settings.damping
             moved = moved + self.gravity[cv] * moment.dt**2
             self.previous[cv], self.x[cv] = self.x[cv].copy(), self.x[cv] + moved
@@ -127,9 +135,11 @@ class _Guide:
     def _pin(self, style: Floats) -> None:
         self.x[:PINNED] = style[:PINNED]
         if self.is_held:
-            way = style[-1] - style[PINNED - 1]
+            displacement = style[-1] - style[PINNED - 1]
             reach = sum(self.length[PINNED - 1 :])
-            self.x[-1] = style[PINNED - 1] + way * min(reach / np.linalg.norm(way), 1.0)
+            self.x[-1] = style[PINNED - 1] + displacement * min(
+                reach / np.linalg.norm(displacement), 1.0
+            )
 
     def _felt_gravity(self, drive: Drive, settings: DynamicsSettings, turn: Floats) -> Floats:
         pull = np.asarray(drive.gravity, np.float64) * settings.gravity
@@ -139,7 +149,7 @@ class _Guide:
             return felt
         # the part of the combed weight across all length constraints, by projection
         combed = np.tile(turn @ pull, free)
-        jacobian = jacobian_of(self.before + self.way / 2.0)
+        jacobian = jacobian_of(self.before + self.displacement / 2.0)
         tension = np.linalg.solve(jacobian @ jacobian.T, jacobian @ combed)
         felt[PINNED:] -= settings.weight_held * (combed - jacobian.T @ tension).reshape(free, 3)
         return felt
@@ -190,8 +200,8 @@ class _Guide:
     def _relax(self) -> None:
         last = len(self.x) - 1
         for cv in range(PINNED, last + 1):
-            way = self.x[cv] - self.x[cv - 1]
-            excess = way * (1.0 - self.length[cv - 1] / np.linalg.norm(way))
+            displacement = self.x[cv] - self.x[cv - 1]
+            excess = displacement * (1.0 - self.length[cv - 1] / np.linalg.norm(displacement))
             lower = 0.0 if cv == PINNED else 0.5
             upper = 1.0 - lower
             if self.is_held and cv == last:
@@ -203,8 +213,8 @@ class _Guide:
         root, reach = self.x[PINNED - 1], 0.0
         for cv in range(PINNED, len(self.x)):
             reach += self.length[cv - 1]
-            way = self.x[cv] - root
-            self.x[cv] = root + way * min(reach / float(np.linalg.norm(way)), 1.0)
+            displacement = self.x[cv] - root
+            self.x[cv] = root + displacement * min(reach / float(np.linalg.norm(displacement)), 1.0)
 
     def _newton_step(self, normals: dict[int, Floats]) -> None:
         free = len(self.x) - PINNED
@@ -247,9 +257,14 @@ class _Guide:
 
     def _segments(self) -> Floats:
         """With their directions and the lengths that they should have."""
-        ways = np.diff(self.x, axis=0)
-        lengths = zip(ways, self.length, strict=True)
-        return np.array([way / np.linalg.norm(way) * length for way, length in lengths])
+        displacements = np.diff(self.x, axis=0)
+        lengths = zip(displacements, self.length, strict=True)
+        return np.array(
+            [
+                displacement / np.linalg.norm(displacement) * length
+                for displacement, length in lengths
+            ]
+        )
 
     def _lengths(self) -> Floats:
         return np.array([np.linalg.norm(b - a) for a, b in pairwise(self.x[PINNED - 1 :])])

@@ -31,7 +31,7 @@ SUFFIX = ".hairloom.json"
 #: From this alpha on a pixel counts as opaque: nearly 1, for textures that were compressed.
 OPAQUE_ALPHA = 0.99
 #: Below it a pixel cannot be seen in 8 bits, and must not hide what is drawn after it.
-LEAST_ALPHA = 0.004
+MIN_ALPHA = 0.004
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class DrawPass:
         """Alpha of what it draws, from the first to below the second; None without a test."""
         if self.pixels == "all":
             return None
-        least = {_OPAQUE: OPAQUE_ALPHA, _REST: 0.0}.get(self.pixels, LEAST_ALPHA)
+        least = {_OPAQUE: OPAQUE_ALPHA, _REST: 0.0}.get(self.pixels, MIN_ALPHA)
         return least, OPAQUE_ALPHA if _REST in self.pixels else math.inf
 
     def as_dict(self) -> dict[str, Any]:
@@ -148,7 +148,7 @@ def description(cards: CardFile) -> dict[str, Any]:
         },
         "draw_order": {**texts.DRAW_ORDER, **_back_order(cards)},
         "opaque_alpha": OPAQUE_ALPHA,
-        "least_alpha": LEAST_ALPHA,
+        "least_alpha": MIN_ALPHA,
         "passes": [each.as_dict() for each in FOUR_PASSES],
         "passes_fallback": [each.as_dict() for each in THREE_PASSES],
         "textures": _textures(cards),

@@ -121,8 +121,8 @@ def _seam_at(layout: SkinLayout, place: Floats, island: Ints) -> Ints:
 def _distance(place: Floats, edge: Floats) -> Floats:
     """From places (n, 2) to an edge each, start and end (n, 2, 2), (n,)."""
     fraction = along_border(place, edge[:, 0], edge[:, 1])[:, None]
-    way = edge[:, 0] * (1.0 - fraction) + edge[:, 1] * fraction - place
-    distance: Floats = np.linalg.norm(way, axis=1)
+    offset = edge[:, 0] * (1.0 - fraction) + edge[:, 1] * fraction - place
+    distance: Floats = np.linalg.norm(offset, axis=1)
     return distance
 
 

@@ -165,8 +165,8 @@ def _corner_stretch(surface: Surface, chart: Chart, triangle_island: Ints) -> Fl
     mapped = np.flatnonzero(chart.is_mapped)
     edges = np.moveaxis(chart.place[mapped, 1:] - chart.place[mapped, :1], 1, 2)
     corners = surface.corners[mapped].astype(np.float64)
-    ways = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 2)
-    stretch = np.linalg.norm(ways @ np.linalg.inv(edges), axis=1)
+    sides = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 2)
+    stretch = np.linalg.norm(sides @ np.linalg.inv(edges), axis=1)
     area = np.abs(np.linalg.det(edges))
 
     vertex = surface.triangles[mapped].astype(np.int64)

@@ -55,9 +55,9 @@ def along_border(points: Floats, start: Floats, end: Floats) -> Floats:
 
     All are (n, 2).
     """
-    way = end - start
-    squared = np.maximum(np.einsum("ij,ij->i", way, way), 1e-18)
-    fraction: Floats = np.clip(np.einsum("ij,ij->i", points - start, way) / squared, 0.0, 1.0)
+    edge = end - start
+    squared = np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-18)
+    fraction: Floats = np.clip(np.einsum("ij,ij->i", points - start, edge) / squared, 0.0, 1.0)
     return fraction
 
 

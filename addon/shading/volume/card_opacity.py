@@ -24,37 +24,37 @@ from ...arrays import Floats, Ints
 from ..settings import StrandSettings
 
 #: a card lets at least as much light through as this leaves: four strands are as good as a wall
-MOST_ALPHA = 0.98
+MAX_ALPHA = 0.98
 #: mean of |cos| over all turns of a card about its strands
 MEAN_TURN = 2.0 / np.pi
 #: where a card is nearly on edge, it counts as this far turned to the eye, or to the light
-LEAST_FACING = 0.1
+MIN_FACING = 0.1
 #: fewer strands than that are as good as none [1]
-LEAST_TAU = 1.0e-3
+MIN_TAU = 1.0e-3
 
 
 def card_optical_depth(alpha: Floats) -> Floats:
     """tau that light meets in a card of thickness 1, (...)."""
-    return -np.log1p(-np.minimum(alpha, MOST_ALPHA))
+    return -np.log1p(-np.minimum(alpha, MAX_ALPHA))
 
 
-def turned_facing(across: Floats, tangent: Floats, way: Floats) -> Floats:
+def turned_facing(across: Floats, tangent: Floats, direction: Floats) -> Floats:
     """|cos| of the turn about its strands by which a card faces a way, (...).
 
     Args:
         across: (..., 3) normal of its plane, of any length.
         tangent, way: (..., 3) unit vectors.
     """
-    turned = way - np.sum(way * tangent, axis=-1, keepdims=True) * tangent
+    turned = direction - np.sum(direction * tangent, axis=-1, keepdims=True) * tangent
     size = np.linalg.norm(across, axis=-1) * np.linalg.norm(turned, axis=-1)
     facing = np.abs(np.sum(across * turned, axis=-1)) / np.maximum(size, 1.0e-30)
     return np.where(size > 0.0, facing, 1.0)
 
 
-def even_depth(across: Floats, tangent: Floats, way: Floats) -> Floats:
+def view_compensated_depth(across: Floats, tangent: Floats, direction: Floats) -> Floats:
     """Factor of the tau that light from a way meets in an even card, (...): its mean over all
     turns of the card, times |cos|, is that of a flat card; arguments of `turned_facing`."""
-    factor: Floats = MEAN_TURN / np.maximum(turned_facing(across, tangent, way), LEAST_FACING)
+    factor: Floats = MEAN_TURN / np.maximum(turned_facing(across, tangent, direction), MIN_FACING)
     return factor
 
 
@@ -70,7 +70,7 @@ def among_strands(
         scale: what one strand of the card counts there. tau: of the card.
         fraction: see own_share. front: fraction of its other strands that the light meets later.
     """
-    few = np.maximum(tau, LEAST_TAU)
+    few = np.maximum(tau, MIN_TAU)
     others = scale * (few / -np.expm1(-few) - 1.0)
     met = np.maximum(before - scale * tau * fraction, 0.0) + others * (1.0 - front)
     left = np.maximum(beyond - scale * tau * (1.0 - fraction), 0.0) + others * front
@@ -136,7 +136,7 @@ def _coarser(alpha: Floats, axis: int) -> Floats:
     return means
 
 
-def own_share(depth: Floats, bias: float, ends: Floats) -> Floats:
+def own_fraction(depth: Floats, bias: float, ends: Floats) -> Floats:
     """How much of a card counts towards tau at the card itself, (...).
 
     It is part of the sum of the layer in which it lies, and tau grows evenly through that. A card

@@ -41,9 +41,9 @@ from ..settings import ShadingSettings
 #: strands that are taken to lie behind a place where nothing is known of it
 UNKNOWN_BEYOND = 4.0
 #: Texels of the table of shares: cos theta_d from 0 to 1, and absorption from 0 to infinity.
-SHARES_SIZE = 32
+FRACTIONS_SIZE = 32
 #: Absorption in the middle of that axis.
-HALF_WAY = 0.5
+MIDPOINT = 0.5
 #: share that hair may send on at most, so that sums have bounds
 _MAX = 0.999
 _MAX_KEPT = 0.9999
@@ -56,7 +56,7 @@ _MIN_LIGHT = 1e-3
 
 
 @dataclass(frozen=True)
-class Shares:
+class Fractions:
     """What a fibre sends on and back, by lobe: R, TT, TRT and the rest.
 
     forward, backward: (SHARES_SIZE, SHARES_SIZE, 4) float32; row by absorption, see
@@ -67,7 +67,7 @@ class Shares:
     backward: Floats
 
 
-def shares(tables: MarschnerTables, size: int = SHARES_SIZE) -> Shares:
+def fractions(tables: MarschnerTables, size: int = FRACTIONS_SIZE) -> Fractions:
     """From the lobes around the fibre, for all absorptions.
 
     Light that comes from anywhere in half a circle, and leaves by phi, goes on into the other half
@@ -86,21 +86,21 @@ def shares(tables: MarschnerTables, size: int = SHARES_SIZE) -> Shares:
         lit = clear * kept * weight
         forward[row] = (lit * turn).sum(axis=0)
         backward[row] = (lit * (1.0 - turn)).sum(axis=0)
-    return Shares(forward, backward)
+    return Fractions(forward, backward)
 
 
 def absorption_place(absorption: Floats) -> Floats:
     """Where an absorption lies in the table, 0 to 1."""
-    return absorption / (absorption + HALF_WAY)
+    return absorption / (absorption + MIDPOINT)
 
 
 def place_absorption(place: Floats | float) -> Floats:
     """The absorption at a place of the table; its end stands for all that is black."""
     inside = np.minimum(place, 1.0 - 1e-3)
-    return np.asarray(HALF_WAY * inside / (1.0 - inside))
+    return np.asarray(MIDPOINT * inside / (1.0 - inside))
 
 
-def shares_at(table: Floats, cos_d: Floats, absorption: Floats) -> Floats:
+def fractions_at(table: Floats, cos_d: Floats, absorption: Floats) -> Floats:
     """Shares by colour and lobe, (..., 3, 4), from the forward or the backward table.
 
     Args:
@@ -126,7 +126,7 @@ def mean_forward(table: Floats, shading: ShadingSettings) -> Floats:
         noises = np.full(count, 0.5), np.full(count, grey_noise)
         absorption = strand_absorption(shading, along, *noises)
         # light that goes on leaves at the inclination at which it came
-        sent = shares_at(table, np.cos(theta)[:, None], absorption).sum(axis=-1).mean(axis=1)
+        sent = fractions_at(table, np.cos(theta)[:, None], absorption).sum(axis=-1).mean(axis=1)
         found += fraction * np.average(sent, axis=0, weights=np.cos(theta) ** 2)
     return np.minimum(found, _MAX)
 
@@ -289,7 +289,7 @@ def off_the_skin(
 
 def scattering_light(
     tables: MarschnerTables,
-    sides: Shares,
+    sides: Fractions,
     tangent: Floats,
     normal: Floats,
     to_light: Floats,
@@ -321,8 +321,8 @@ def scattering_light(
     passed_by = np.where(
         np.asarray(tau) < 0.0, -np.log(np.maximum(straight, _MIN_LIGHT)), np.asarray(tau)
     )
-    forward = shares_at(sides.forward, cos_d, absorption)
-    backward = shares_at(sides.backward, cos_d, absorption)
+    forward = fractions_at(sides.forward, cos_d, absorption)
+    backward = fractions_at(sides.backward, cos_d, absorption)
     scattered = dual_scattering(
         single,
         theta_i,

@@ -9,8 +9,8 @@ as a flat picture can, a point's towards the middle of the hair, a spot's and a 
 shine; depth begins at the light. Hair beside and behind it gets no shadow. Only a point light
 amidst the hair has no map at all.
 
-The frame depends on light and hair alone, not on the camera. Its centre and
-size move in steps, so that hair which sways does not make the map's texels swim.
+The frame depends on light and hair alone, not on the camera. Its centre
+and size move in steps, so that hair which sways does not make the map's texels swim.
 """
 
 from __future__ import annotations
@@ -81,8 +81,8 @@ class LightFrame:
         Args:
             points: (..., 3) its middle [m]. along: (..., 3) from its one end to the other [m].
         """
-        way, breadth = self._seen(points, along)
-        return np.linalg.norm(way, axis=-1) * breadth
+        projected, breadth = self._seen(points, along)
+        return np.linalg.norm(projected, axis=-1) * breadth
 
     def strand_breadth(self, points: Floats, along: Floats) -> Floats:
         """How broad a strand of the width 1 m is, as a fraction of the map's side, (...).
@@ -102,13 +102,13 @@ class LightFrame:
         w = clip[..., 3, None, None]
         # how places change with the point
         turn = (self.to_map[:2, :3] - clip[..., :2, None] / w * self.to_map[3, :3]) / (2.0 * w)
-        way = np.einsum("...ij,...j->...i", turn, along)
-        length = np.linalg.norm(way, axis=-1, keepdims=True)
+        projected = np.einsum("...ij,...j->...i", turn, along)
+        length = np.linalg.norm(projected, axis=-1, keepdims=True)
         # a strand along the ray is as broad whichever way it is seen
         is_seen = length > SEEN_FROM_ITS_END
-        unit = np.where(is_seen, way, [1.0, 0.0]) / np.where(is_seen, length, 1.0)
+        unit = np.where(is_seen, projected, [1.0, 0.0]) / np.where(is_seen, length, 1.0)
         across = np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
-        return way, np.linalg.norm(np.einsum("...i,...ij->...j", across, turn), axis=-1)
+        return projected, np.linalg.norm(np.einsum("...i,...ij->...j", across, turn), axis=-1)
 
 
 def ball_around(points: Floats) -> Ball:

@@ -49,8 +49,8 @@ def mesh_light(
         texel = low + step
         weights = np.where(step == 1, fraction, 1.0 - fraction).prod(axis=1)
         column, row = np.clip(texel, 0, size - 1).astype(int).T
-        way = texel - (places * size - 0.5)
-        there = np.minimum(depth + (slope * way).sum(axis=1), 1.0) - MESH_BIAS * unit
+        offset = texel - (places * size - 0.5)
+        there = np.minimum(depth + (slope * offset).sum(axis=1), 1.0) - MESH_BIAS * unit
         lit += weights * (there <= depths[row, column])
     is_inside = ((places >= 0.0) & (places <= 1.0)).all(axis=1)
     return np.where(is_inside, lit, 1.0)

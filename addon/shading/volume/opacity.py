@@ -28,7 +28,7 @@ from .light_frame import LightFrame
 from .settings import VolumeSettings
 
 #: deep layers together are at least so thick
-LEAST_THICKNESS = 1.0 / 1024.0
+MIN_THICKNESS = 1.0 / 1024.0
 #: fraction of a map's side over which the shadows of meshes on meshes fade to its border
 MAP_BORDER = 0.06
 #: pieces into which the reference cuts strands, in texels
@@ -186,7 +186,7 @@ class Coverage:
         first, last = np.ones(side**2), np.full(side**2, -1.0)
         np.minimum.at(first, of_piece, self.depth)
         np.maximum.at(last, of_piece, self.depth)
-        thickness = np.where(last < 0.0, 1.0, np.maximum(last - first, LEAST_THICKNESS))
+        thickness = np.where(last < 0.0, 1.0, np.maximum(last - first, MIN_THICKNESS))
         blown_up = (found.reshape(side, side) for found in (first, thickness))
         starts, thick = (np.kron(found, np.ones((block, block))).ravel() for found in blown_up)
         return starts, thick

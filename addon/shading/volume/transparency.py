@@ -25,7 +25,7 @@ from ...arrays import Floats
 LAYERS = 8
 #: Layers are shaded until no more than this fraction of the pixel's light comes from behind them,
 #: where that are not more of them.
-UNSEEN_SHARE = 0.03
+UNSEEN_FRACTION = 0.03
 
 
 def fraction_below(distance: Floats, normal: Floats) -> Floats:
@@ -59,7 +59,7 @@ def layer_fractions(
     depths: Floats,
     alphas: Floats,
     layers: int = LAYERS,
-    unseen_share: float = UNSEEN_SHARE,
+    unseen_fraction: float = UNSEEN_FRACTION,
 ) -> Floats:
     """The light of each layer that is shaded, (pixel_count, n): their sum is what all cover.
 
@@ -76,7 +76,7 @@ def layer_fractions(
     through = np.cumprod(1.0 - alphas, axis=-1)
     before = np.column_stack([np.ones(len(alphas)), through[:, :-1]])
     weights, covered = before * alphas, 1.0 - through[:, -1:]
-    is_seen = (alphas > 0.0) & (before - through[:, -1:] >= unseen_share)
+    is_seen = (alphas > 0.0) & (before - through[:, -1:] >= unseen_fraction)
     is_seen[:, 0] = alphas[:, 0] > 0.0
     nearest = np.where(is_seen, weights, 0.0)
     nearest *= covered / np.maximum(nearest.sum(axis=-1, keepdims=True), 1e-6)

@@ -9,7 +9,7 @@ void main()
       across.w, across.xyz, texelFetch(tangents, pixel, 0).xyz, texelFetch(eyes, pixel, 0).xyz);
   vec4 steps = texelFetch(steps_of, pixel, 0);
   ivec2 size = ivec2(96, 40);
-  float scale = even_depth(
+  float scale = view_compensated_depth(
       across.xyz, texelFetch(tangents, pixel, 0).xyz, texelFetch(eyes, pixel, 0).xyz);
   vec2 among = among_strands(
       steps.xy, scale, card_optical_depth(across.w), min(steps.z, 1.0), min(steps.w, 1.0));

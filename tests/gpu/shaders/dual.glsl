@@ -10,8 +10,8 @@ void main()
   vec4 angles = texelFetch(angles_and_tau, at, 0);
   vec4 absorption = texelFetch(absorption_and_density, at, 0);
   float cos_d = cos(0.5 * (angles.y - angles.x));
-  mat3x4 onward = shares_at(forward, cos_d, absorption.xyz);
-  mat3x4 back = shares_at(backward, cos_d, absorption.xyz);
+  mat3x4 onward = fractions_at(forward, cos_d, absorption.xyz);
+  mat3x4 back = fractions_at(backward, cos_d, absorption.xyz);
   vec4 single = texelFetch(singles_and_beyond, at, 0);
   vec3 found = dual_scattering(
       single.xyz, angles.xyz, onward, back, angles.w, single.w, fibre, absorption.w);

@@ -18,7 +18,7 @@ from hairloom.addon.cards.build import (
     with_occlusion_of,
 )
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
-from hairloom.addon.cards.order_check import wrong_share
+from hairloom.addon.cards.order_check import wrong_fraction
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
@@ -240,9 +240,9 @@ def test_the_order_is_the_one_that_was_chosen_and_its_faults_are_told(by: str) -
     assert (runs == mesh.card_count) == (by != "pieces")
     index = {tuple(corners): n for n, corners in enumerate(mesh.triangles.tolist())}
     back = np.array([index[tuple(corners)] for corners in build.backs[0].tolist()])
-    again = wrong_share(mesh, None, back=back, view_count=8)
-    assert 0.0 < build.wrong_share < 1.0
-    assert build.wrong_share == pytest.approx(again)
+    again = wrong_fraction(mesh, None, back=back, view_count=8)
+    assert 0.0 < build.wrong_fraction < 1.0
+    assert build.wrong_fraction == pytest.approx(again)
 
 
 def test_cards_that_are_clear_stay_in_the_order_of_their_distance() -> None:

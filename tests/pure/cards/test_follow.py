@@ -11,8 +11,8 @@ from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.follow import (
     CardBinding,
+    _headings,
     _transported,
-    _ways,
     bind_cards,
     card_lines,
     follow_guides,
@@ -156,7 +156,7 @@ def test_a_helix_does_not_wring_its_card() -> None:
 def test_frames_are_those_of_strands() -> None:
     _, guides, _ = hair()
     planes = guides.transpose(2, 1, 0).copy()
-    ways = _ways(planes)
+    ways = _headings(planes)
     np.testing.assert_allclose(ways.transpose(2, 1, 0), tangents(guides), atol=1e-6)
     side = transported_normals(tangents(guides), np.tile(np.float32([1, 0, 0]), (30, 1)))
     np.testing.assert_allclose(

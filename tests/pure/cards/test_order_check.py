@@ -12,8 +12,8 @@ from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.order_check import (
     seen_cards,
     views_of,
+    wrong_fraction,
     wrong_pixels,
-    wrong_share,
 )
 from hairloom.addon.cards.order_views import View
 from hairloom.addon.strands import Surface
@@ -89,7 +89,7 @@ def test_alpha_is_read_where_the_texture_says() -> None:
 @pytest.mark.parametrize("cards", [0, 1])
 def test_nothing_to_sort_is_never_wrong(cards: int) -> None:
     mesh = sheets((0.1,) * cards) if cards else no_cards()
-    assert wrong_share(mesh, None, view_count=3, size=32) == 0.0
+    assert wrong_fraction(mesh, None, view_count=3, size=32) == 0.0
 
 
 def no_cards() -> CardMesh:

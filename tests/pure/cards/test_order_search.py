@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from hairloom.addon.cards.order_search import Wishes, least_broken, wishes
+from hairloom.addon.cards.order_search import Wishes, min_broken, wishes
 
 
 def random_wishes(random: np.random.Generator, count: int) -> np.ndarray:
@@ -69,7 +69,7 @@ def test_what_is_found_is_nearly_the_best_of_all_orders(count: int) -> None:
     trials, best_of_all, found_of_all = (40 if count < 7 else 8), 0, 0
     for _ in range(trials):
         table = random_wishes(random, count)
-        order = order_of(least_broken(as_wishes(table), random.permutation(count)))
+        order = order_of(min_broken(as_wishes(table), random.permutation(count)))
         best = min(broken(table, each) for each in itertools.permutations(range(count)))
         found = broken(table, order)
         best_of_all, found_of_all = best_of_all + best, found_of_all + found
@@ -87,28 +87,26 @@ def test_wishes_without_contradiction_are_fulfilled() -> None:
     before, after = np.where(is_first, one, two), np.where(is_first, two, one)
     wished = wishes(300, before, after, np.ones(4000, np.int64))
     assert wished.broken(np.argsort(random.permutation(300))) > 1000
-    assert wished.broken(least_broken(wished, random.permutation(300))) < 40
+    assert wished.broken(min_broken(wished, random.permutation(300))) < 40
     near = np.argsort(truth + random.normal(0.0, 10.0, 300))
     assert wished.broken(np.argsort(near)) > 50
-    assert wished.broken(least_broken(wished, near)) < 10
+    assert wished.broken(min_broken(wished, near)) < 10
 
 
 def test_things_without_wishes_stay_where_they_were() -> None:
     start = np.random.default_rng(2).permutation(12)
     none = np.zeros(0, np.int64)
-    np.testing.assert_array_equal(
-        order_of(least_broken(wishes(12, none, none, none), start)), start
-    )
+    np.testing.assert_array_equal(order_of(min_broken(wishes(12, none, none, none), start)), start)
     one = wishes(12, start[9:10], start[8:9], np.array([3]))
     expected = start.copy()
     expected[[8, 9]] = start[[9, 8]]
-    np.testing.assert_array_equal(order_of(least_broken(one, start)), expected)
-    assert len(least_broken(wishes(0, none, none, none), none)) == 0
+    np.testing.assert_array_equal(order_of(min_broken(one, start)), expected)
+    assert len(min_broken(wishes(0, none, none, none), none)) == 0
 
 
 def test_a_search_without_end_is_cut_short() -> None:
     table = random_wishes(np.random.default_rng(3), 30)
     start = np.arange(30)
-    np.testing.assert_array_equal(order_of(least_broken(as_wishes(table), start, 0)), start)
-    once = least_broken(as_wishes(table), start, 1)
+    np.testing.assert_array_equal(order_of(min_broken(as_wishes(table), start, 0)), start)
+    once = min_broken(as_wishes(table), start, 1)
     assert broken(table, order_of(once)) < broken(table, start)

@@ -10,7 +10,7 @@ import pytest
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.order_check import seen_cards
 from hairloom.addon.cards.order_pairs import (
-    LEAST_WEIGHT,
+    MIN_WEIGHT,
     all_pairs,
     pairs_by_view,
     pairs_of,
@@ -145,7 +145,7 @@ def test_pairs_are_those_of_a_double_loop() -> None:
                 through = np.prod([1.0 - covers[at] for at in others if at != two])
                 weight = covers[one] * covers[two] * through
                 facing = int(met.is_front[one]) if met.is_front[one] == met.is_front[two] else 2
-                if weight >= LEAST_WEIGHT:
+                if weight >= MIN_WEIGHT:
                     expected.append((met.triangle[one], met.triangle[two], weight, facing))
     pairs = pairs_of(met, covers)
     found = list(zip(pairs.behind, pairs.before, pairs.weight / 1000, pairs.facing, strict=True))

@@ -10,11 +10,11 @@ import pytest
 from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import OF_CARDS, OF_VERTICES, CardMesh, joined
-from hairloom.addon.cards.order_check import wrong_share
+from hairloom.addon.cards.order_check import wrong_fraction
 from hairloom.addon.cards.order_pairs import all_pairs, pairs_by_view
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import (
-    MOST_PIECES,
+    MAX_PIECES,
     VIEW_SIZE,
     SortBy,
     card_distances,
@@ -228,7 +228,7 @@ def test_nested_cubes_are_exactly_right_from_everywhere(by: SortBy) -> None:
         np.testing.assert_array_equal(cube[orders.back], np.sort(cube))
 
     def share(front: np.ndarray, back: np.ndarray) -> float:
-        return wrong_share(mesh, None, front=front, back=back, view_count=12, size=96)
+        return wrong_fraction(mesh, None, front=front, back=back, view_count=12, size=96)
 
     assert share(orders.front, orders.back) < 1e-3  # pixels at an edge belong to both sides
     assert share(orders.front, orders.front) > 0.6  # far sides the wrong way round
@@ -240,10 +240,14 @@ def test_what_is_learnt_is_better_than_the_distance() -> None:
     share = {}
     for by in WAYS:
         orders = card_orders(mesh, sphere(), by)
-        share[by] = wrong_share(mesh, sphere(), front=orders.front, back=orders.back, view_count=12)
+        share[by] = wrong_fraction(
+            mesh, sphere(), front=orders.front, back=orders.back, view_count=12
+        )
     assert 0.0 < share["pieces"] < 0.7 * share["cards"]
     assert (
-        share["cards"] < 0.8 * share["distance"] < 0.8 * wrong_share(mesh, sphere(), view_count=12)
+        share["cards"]
+        < 0.8 * share["distance"]
+        < 0.8 * wrong_fraction(mesh, sphere(), view_count=12)
     )
 
 
@@ -315,7 +319,7 @@ def test_none_and_one_card(by: SortBy, count: int) -> None:
         orders = card_orders(mesh, head, by)
         for order in (orders.front, orders.back, order_from(mesh, np.array([1.0, 0.0, 0.0, 1.0]))):
             np.testing.assert_array_equal(np.sort(order), np.arange(len(mesh.triangles)))
-        assert wrong_share(mesh, head, view_count=2) <= 1.0
+        assert wrong_fraction(mesh, head, view_count=2) <= 1.0
 
 
 def test_cards_without_area_and_with_gaps_in_their_numbers() -> None:
@@ -345,10 +349,10 @@ def test_pieces_are_triangles_unless_there_are_too_many() -> None:
     mesh = crossing_cards(5)
     np.testing.assert_array_equal(pieces(mesh), np.arange(len(mesh.triangles)))
     random = np.random.default_rng(0)
-    card = random.integers(0, 9_000, 2 * MOST_PIECES + 5)
+    card = random.integers(0, 9_000, 2 * MAX_PIECES + 5)
     known = {name: np.zeros(9_000) for name in ("group", "layer", "tile")}
     piece = pieces(replace(mesh, triangles=np.zeros((len(card), 3)), card=card, **known))
-    assert piece.max() + 1 == len(np.unique(piece)) < MOST_PIECES
+    assert piece.max() + 1 == len(np.unique(piece)) < MAX_PIECES
     for number in random.integers(0, piece.max(), 50).tolist():
         own = np.flatnonzero(piece == number)
         assert len(np.unique(card[own])) == 1

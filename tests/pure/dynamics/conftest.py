@@ -13,7 +13,7 @@ from hairloom.addon.dynamics.colliders import Collider, PosedCollider
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive, advance
-from hairloom.addon.dynamics.way import bow
+from hairloom.addon.dynamics.trajectory import curvature
 from hairloom.addon.strands import Surface
 
 EARTH = np.array([0.0, 0.0, -9.81])
@@ -155,7 +155,7 @@ class Scene:
     def colliders(self, before: float, now: float) -> tuple[PosedCollider, ...]:
         matrices = self.motion(before), self.motion(now)
         still = np.eye(4)
-        bend = bow(self.motion(2 * before - now), *matrices, 1.0) if self.bowed else None
+        bend = curvature(self.motion(2 * before - now), *matrices, 1.0) if self.bowed else None
         return tuple(PosedCollider(one, *matrices, bend) for one in self.on_head) + tuple(
             PosedCollider(one, still, still) for one in self.standing
         )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.arrays import Floats
-from hairloom.addon.groom.near import nearest_points
+from hairloom.addon.groom.nearest import nearest_points
 from hairloom.addon.groom.weights import child_weights, guide_weights
 
 

@@ -37,7 +37,7 @@ def test_angles_are_shown_in_degrees() -> None:
 
 def test_a_factor_without_those_limits_is_not_called_one_from_0_to_1() -> None:
     @dataclass(frozen=True, kw_only=True)
-    class Shares(Settings):
+    class Fractions(Settings):
         share: float = number(
             0.5,
             label="Share",
@@ -50,7 +50,7 @@ def test_a_factor_without_those_limits_is_not_called_one_from_0_to_1() -> None:
             0.5, label="Stretch", description="Any", unit="factor", soft=(0.0, 1.0), hard=(0.0, 9.0)
         )
 
-    one, other = table(Shares).splitlines()[-2:]
+    one, other = table(Fractions).splitlines()[-2:]
     assert "| 0 to 1 | A part |" in one and "|  | Any |" in other
 
 

@@ -16,7 +16,7 @@ from hairloom.addon.shading.card_texture import (
     picture_size,
     wanted_level,
 )
-from hairloom.addon.shading.volume.card_opacity import LEAST_FACING
+from hairloom.addon.shading.volume.card_opacity import MIN_FACING
 
 GRID = AtlasGrid(4, 2)
 
@@ -89,7 +89,7 @@ def test_slant_brings_strands_nearer() -> None:
     shown = view_compensated_alpha(np.full(1000, alpha), across, tangent, to_eye) * np.abs(
         across[:, 0]
     )
-    turned = np.abs(across[:, 0]) > LEAST_FACING
+    turned = np.abs(across[:, 0]) > MIN_FACING
     assert shown[turned] == pytest.approx(alpha * MEAN_FACING, rel=0.06)
     # nothing stays nothing, all stays all, whichever way a strand leans to the eye
     leaning = np.array([0.6, 0.0, 0.8])

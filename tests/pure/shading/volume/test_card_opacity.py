@@ -7,14 +7,14 @@ import pytest
 
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.shading.volume.card_opacity import (
-    LEAST_FACING,
-    MOST_ALPHA,
+    MAX_ALPHA,
+    MIN_FACING,
     StrandArea,
     among_strands,
     card_optical_depth,
     card_shade,
-    even_depth,
-    own_share,
+    own_fraction,
+    view_compensated_depth,
 )
 from hairloom.addon.shading.volume.opacity import adds_to, layer_ends, layer_weights
 from hairloom.addon.shading.volume.settings import VolumeSettings
@@ -29,7 +29,7 @@ def test_depth_of_a_card_is_that_of_strands_at_random() -> None:
         covered[np.arange(first, first + 700) % len(covered)] = True
     alpha, tau = covered.mean(), strands * 700 / len(covered)
     assert card_optical_depth(alpha) == pytest.approx(tau, rel=0.1)
-    assert card_optical_depth(np.ones(1)) == -np.log(1.0 - MOST_ALPHA)
+    assert card_optical_depth(np.ones(1)) == -np.log(1.0 - MAX_ALPHA)
 
 
 @pytest.mark.parametrize("shadows", ["slices", "deep"])
@@ -39,7 +39,7 @@ def test_own_share_is_what_a_look_up_finds_of_a_single_card(shadows: str, bias: 
     for depth in np.random.default_rng(2).uniform(0.0, 1.0, 200):
         sums = 0.7 * adds_to(np.array(depth), ends)
         found = sums @ layer_weights(np.array(depth - bias), ends)
-        assert 0.7 * own_share(np.array(depth), bias, ends) == pytest.approx(found, abs=1e-9)
+        assert 0.7 * own_fraction(np.array(depth), bias, ends) == pytest.approx(found, abs=1e-9)
 
 
 def directions(count: int = 4000) -> np.ndarray:
@@ -96,10 +96,10 @@ def test_even_cards_count_the_same_from_all_sides_of_their_strands() -> None:
     across = 3.0 * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=-1)
     tangent, way = np.array([0.0, 0.0, 1.0]), np.array([0.8, 0.0, 0.6])
     width = np.abs(np.cos(turns))
-    counted = even_depth(across, tangent, way) * width
-    assert counted[width > LEAST_FACING] == pytest.approx(2.0 / np.pi)
+    counted = view_compensated_depth(across, tangent, way) * width
+    assert counted[width > MIN_FACING] == pytest.approx(2.0 / np.pi)
     assert counted.mean() == pytest.approx(width.mean(), rel=0.04)
-    assert even_depth(across[:1], tangent, tangent) == pytest.approx(2.0 / np.pi)
+    assert view_compensated_depth(across[:1], tangent, tangent) == pytest.approx(2.0 / np.pi)
 
 
 @pytest.mark.parametrize("tau", [0.05, 0.7, 3.0])

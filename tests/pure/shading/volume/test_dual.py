@@ -13,10 +13,12 @@ from hairloom.addon.shading.marschner.scattering import azimuthal_lobes
 from hairloom.addon.shading.marschner.tables import marschner_tables
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.dual import (
-    SHARES_SIZE,
-    Shares,
+    FRACTIONS_SIZE,
+    Fractions,
     absorption_place,
     dual_scattering,
+    fractions,
+    fractions_at,
     half_gaussian,
     mean_forward,
     off_the_skin,
@@ -24,8 +26,6 @@ from hairloom.addon.shading.volume.dual import (
     place_absorption,
     returned,
     returned_shape,
-    shares,
-    shares_at,
     spread_around,
 )
 
@@ -33,14 +33,14 @@ FIBRE = Fibre()
 
 
 @pytest.fixture(scope="module")
-def table() -> Shares:
-    return shares(marschner_tables(FIBRE, 128))
+def table() -> Fractions:
+    return fractions(marschner_tables(FIBRE, 128))
 
 
-def at(table: Shares, absorption: float, cos_d: float) -> tuple[np.ndarray, np.ndarray]:
+def at(table: Fractions, absorption: float, cos_d: float) -> tuple[np.ndarray, np.ndarray]:
     """Shares of the nearest texel, by lobe."""
-    row = round(float(absorption_place(np.array(absorption))) * (SHARES_SIZE - 1))
-    column = round(cos_d * (SHARES_SIZE - 1))
+    row = round(float(absorption_place(np.array(absorption))) * (FRACTIONS_SIZE - 1))
+    column = round(cos_d * (FRACTIONS_SIZE - 1))
     return table.forward[row, column], table.backward[row, column]
 
 
@@ -80,7 +80,7 @@ def test_white_hair_gives_all_light_back_and_no_hair_more() -> None:
     assert returned(np.array(0.8), np.array(0.19)) < 1.0
 
 
-def test_shares_are_those_of_the_lobes(table: Shares) -> None:
+def test_shares_are_those_of_the_lobes(table: Fractions) -> None:
     """Integrated finely over the reference's lobes, and whole for a clear fibre."""
     turn = (np.arange(4000) + 0.5) / 4000
     for cos_d in (1.0, 16 / 31):
@@ -92,7 +92,7 @@ def test_shares_are_those_of_the_lobes(table: Shares) -> None:
         assert forward.sum() + backward.sum() == pytest.approx(1.0, abs=0.02)
 
 
-def test_what_hair_sends_on_is_the_mean_over_strands_that_lie_any_way(table: Shares) -> None:
+def test_what_hair_sends_on_is_the_mean_over_strands_that_lie_any_way(table: Fractions) -> None:
     """Strands by chance, each of which meets as much light as it is broad."""
     alike = ShadingSettings(color_variation=0.0, grey_fraction=0.0)
     absorption = strand_absorption(alike, np.zeros(1), np.full(1, 0.5), np.full(1, 0.5))
@@ -100,7 +100,7 @@ def test_what_hair_sends_on_is_the_mean_over_strands_that_lie_any_way(table: Sha
     along = random.normal(size=(40_000, 3))
     sine = along[:, 0] / np.linalg.norm(along, axis=1)
     broad = np.sqrt(1.0 - sine**2)
-    sent = shares_at(table.forward, broad, absorption).sum(axis=-1)
+    sent = fractions_at(table.forward, broad, absorption).sum(axis=-1)
     expected = (sent * broad[:, None]).sum(axis=0) / broad.sum()
     assert mean_forward(table.forward, alike) == pytest.approx(expected, rel=5e-3)
     grey = mean_forward(table.forward, replace(alike, grey_fraction=1.0))
@@ -108,7 +108,7 @@ def test_what_hair_sends_on_is_the_mean_over_strands_that_lie_any_way(table: Sha
     assert half == pytest.approx(0.5 * (expected + grey), rel=5e-3)
 
 
-def test_more_pigment_sends_less_on_and_back(table: Shares) -> None:
+def test_more_pigment_sends_less_on_and_back(table: Fractions) -> None:
     assert (np.diff(table.forward.sum(axis=-1), axis=0) <= 1e-5).all()
     assert (np.diff(table.backward.sum(axis=-1), axis=0) <= 1e-5).all()
     # what the surface reflects is left of black hair
@@ -135,7 +135,7 @@ def test_half_gaussian_is_half_of_one() -> None:
     assert theta_h[half_gaussian(theta_h, np.array(0.1), np.array(0.01)).argmax()] < 0.0
 
 
-def light_on(table: Shares, absorption: float, tau: float, density: float = 0.7) -> np.ndarray:
+def light_on(table: Fractions, absorption: float, tau: float, density: float = 0.7) -> np.ndarray:
     forward, backward = (np.tile(part, (3, 1)) for part in at(table, absorption, 1.0))
     single = np.array([0.02, 0.02, 0.02])
     zero, beyond = np.array(0.0), np.array(6.0)
@@ -144,11 +144,11 @@ def light_on(table: Shares, absorption: float, tau: float, density: float = 0.7)
     )
 
 
-def test_a_strand_alone_in_the_light_is_a_strand_alone(table: Shares) -> None:
+def test_a_strand_alone_in_the_light_is_a_strand_alone(table: Fractions) -> None:
     assert np.allclose(light_on(table, 0.2, 0.0, density=0.0), 0.02)
 
 
-def test_light_hair_is_brighter_and_carries_light_farther(table: Shares) -> None:
+def test_light_hair_is_brighter_and_carries_light_farther(table: Fractions) -> None:
     pigments = (0.01, 0.1, 0.4, 2.0)
     near = [light_on(table, pigment, 1.0)[1] for pigment in pigments]
     deep = [light_on(table, pigment, 8.0)[1] for pigment in pigments]
@@ -195,7 +195,7 @@ def test_even_light_comes_back_through_the_strands_it_meets(beyond: float, facin
 @pytest.mark.parametrize("absorption", [0.0, 0.3, 1e4])
 @pytest.mark.parametrize("density", [0.0, 1.0])
 def test_no_end_of_a_range_gives_anything_but_numbers(
-    table: Shares, tau: float, absorption: float, density: float
+    table: Fractions, tau: float, absorption: float, density: float
 ) -> None:
     found = light_on(table, absorption, tau, density)
     assert np.isfinite(found).all() and (found >= 0.0).all()

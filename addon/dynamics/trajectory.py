@@ -1,10 +1,10 @@
-"""The way of roots and colliders during one frame: smooth, from three moments that are known.
+"""The trajectory of roots and colliders during one frame: smooth, through three known values.
 
-    way(s) = before + (now - before) s + bow s (s - 1),      s from 0 to 1 in the frame
+    at(s) = before + (now - before) s + curvature s (s - 1),      s from 0 to 1 in the frame
 
 is the parabola through where a thing was a frame earlier, at the frame's begin and at its end. Its
 speed is right to second order in the frame's duration, so that hair does not feel the frame rate;
-a straight way gives it a jerk at each frame. Roots and colliders go by the same formula, so that
+a straight line gives it a jerk at each frame. Roots and colliders use the same formula, so that
 they stay together.
 """
 
@@ -17,14 +17,14 @@ from ..arrays import Floats
 _RATIO = (0.25, 4.0)
 
 
-def bow(earlier: Floats, before: Floats, now: Floats, ratio: float) -> Floats:
-    """The bow of the way through three moments; same shape and unit as these.
+def curvature(earlier: Floats, before: Floats, now: Floats, ratio: float) -> Floats:
+    """The quadratic term of the parabola through three values; same shape and unit as these.
 
     Args:
         earlier, before, now: values one frame earlier, at the frame's begin and at its end.
         ratio: duration of the frame before, over that of this one.
     """
-    ratio = held_ratio(ratio)
+    ratio = clamped_ratio(ratio)
     result: Floats = now - before
     result *= ratio
     result += earlier - before
@@ -32,18 +32,18 @@ def bow(earlier: Floats, before: Floats, now: Floats, ratio: float) -> Floats:
     return result
 
 
-def held_ratio(ratio: float) -> float:
-    """The ratio of durations that a bow is made with."""
+def clamped_ratio(ratio: float) -> float:
+    """The ratio of durations as `curvature` uses it."""
     return min(max(ratio, _RATIO[0]), _RATIO[1])
 
 
-def at(before: Floats, way: Floats, bow: Floats | None, moment: float) -> Floats:
+def at(before: Floats, displacement: Floats, curvature: Floats | None, moment: float) -> Floats:
     """Where a thing is at a moment of the frame, 0 its begin and 1 its end."""
     number = before.dtype.type
-    if bow is None:
-        return before + way * number(moment)
-    here = bow * number(moment - 1.0)
-    here += way
+    if curvature is None:
+        return before + displacement * number(moment)
+    here = curvature * number(moment - 1.0)
+    here += displacement
     here *= number(moment)
     here += before
     return here

@@ -10,7 +10,7 @@ from ..strands.closest_point import ClosestPointSearch
 from ..strands.vectors import unit
 
 
-class Skin:
+class GrowthSurface:
     """A surface that growing hair may touch but not enter.
 
     Args:

@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..params.curve import along
 from .children_settings import ChildrenSettings
-from .near import nearest_points
+from .nearest import nearest_points
 from .weights import by_group, directions, likeness
 
 #: Children of the first level.
@@ -57,15 +57,15 @@ def _middles(
     """The middle of each member's lock (n,), and how far it draws the member, 0 to 1."""
     root = grid[:, 0]
     middle, strength = member.copy(), np.zeros(len(member))
-    member_way = directions(grid[member], root[member])
-    middle_way = directions(grid[:middle_count], root[:middle_count])
+    member_direction = directions(grid[member], root[member])
+    middle_direction = directions(grid[:middle_count], root[:middle_count])
     reach = _REACH * _apart(root[:middle_count])
     for of_group, middles in by_group(group[member], group[:middle_count]):
         if not len(middles):
             continue
         near, gap = nearest_points(root[member[of_group]], root[middles], _CANDIDATES)
         near = middles[near]
-        alike = likeness(member_way[of_group, None], middle_way[near], parting)
+        alike = likeness(member_direction[of_group, None], middle_direction[near], parting)
         alike[gap > reach] = 0.0
         best = (alike > 0.0).argmax(axis=1)[:, None]
         middle[of_group] = np.take_along_axis(near, best, axis=1)[:, 0]

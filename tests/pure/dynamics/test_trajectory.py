@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
-from hairloom.addon.dynamics.way import at, bow
+from hairloom.addon.dynamics.trajectory import at, curvature
 
 
 @pytest.mark.parametrize("ratio", [0.25, 0.5, 1.0, 1.7, 4.0])
@@ -16,7 +16,7 @@ def test_three_moments_give_their_parabola(ratio):
         return place + speed * share + bend * share**2
 
     before, now = parabola(0.0), parabola(1.0)
-    bent = bow(parabola(-ratio), before, now, ratio)
+    bent = curvature(parabola(-ratio), before, now, ratio)
     for share in (0.0, 0.2, 0.5, 1.0):
         np.testing.assert_allclose(
             at(before, now - before, bent, share), parabola(share), atol=1e-13
@@ -25,14 +25,14 @@ def test_three_moments_give_their_parabola(ratio):
 
 def test_an_even_way_is_straight():
     one, way = np.ones((2, 3)), np.full((2, 3), 0.25)
-    np.testing.assert_array_equal(bow(one - way, one, one + way, 1.0), 0.0)
+    np.testing.assert_array_equal(curvature(one - way, one, one + way, 1.0), 0.0)
     np.testing.assert_array_equal(at(one, way, None, 0.5), one + way / 2)
 
 
 def test_a_hiccup_does_not_throw_the_way_about():
     """A frame before of nearly no time would give any speed; the ratio is held."""
     before, now = np.zeros(3), np.array([0.01, 0.0, 0.0])
-    bent = bow(before - 0.02, before, now, 1e-6)
+    bent = curvature(before - 0.02, before, now, 1e-6)
     assert np.abs(bent).max() < 0.1
 
 
@@ -55,7 +55,7 @@ def test_roots_stay_on_a_turning_head(kit, degrees):
         ]
         return max(away)
 
-    smooth, straight = error(bow(earlier, before, now, 1.0)), error(None)
+    smooth, straight = error(curvature(earlier, before, now, 1.0)), error(None)
     assert straight == pytest.approx(0.1 * turn**2 / 8.0, rel=0.05)
     assert smooth < 0.1 * turn**3 / 15.0  # the third derivative: s (s - 1) (s + 1) / 6
     assert smooth < straight
@@ -66,8 +66,8 @@ def test_roots_and_colliders_go_the_same_way(kit):
     matrices = [kit.translation(0.1 * k * k, 0.0, 0.0) @ kit.rotation(0, 0.3 * k) for k in range(3)]
     point = np.array([0.02, 0.1, -0.03])
     earlier, before, now = (m[:3, :3] @ point + m[:3, 3] for m in matrices)
-    posed = PosedCollider(SphereCollider((0, 0, 0), 0.1), *matrices[1:], bow(*matrices, 1.0))
+    posed = PosedCollider(SphereCollider((0, 0, 0), 0.1), *matrices[1:], curvature(*matrices, 1.0))
     for share in (0.0, 0.3, 1.0):
         matrix = posed.matrix_at(share)
-        expected = at(before, now - before, bow(earlier, before, now, 1.0), share)
+        expected = at(before, now - before, curvature(earlier, before, now, 1.0), share)
         np.testing.assert_allclose(matrix[:3, :3] @ point + matrix[:3, 3], expected, atol=1e-15)

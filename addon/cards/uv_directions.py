@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 
 #: The way from root to tip in all UVs: found out, or known.
-type Way = Literal["auto", "up", "down", "right", "left"]
+type Heading = Literal["auto", "up", "down", "right", "left"]
 #: (axis, whether the root is where the coordinate is largest)
 _KNOWN: dict[str, tuple[int, bool]] = {
     "up": (1, False),
@@ -33,16 +33,16 @@ _NO_END = 0.05
 #: How much being higher counts beside being nearer to the head.
 _HEIGHT_WEIGHT = 0.2
 #: Fraction of the way between the ends of an island that counts as one of its ends.
-_END_SHARE = 0.25
+_END_FRACTION = 0.25
 
 
 @dataclass(frozen=True)
-class UvWays:
+class UvAxes:
     """The way of each island.
 
     axis: (island_count,) 0 where hair runs along u, 1 along v.
     is_down: (island_count,) whether the root is where that coordinate is largest.
-    is_doubtful: (island_count,) whether only the other islands told, or it runs against them.
+    is_doubtful: (island_count,) whether only the other islands decided, or it runs against them.
     """
 
     axis: Ints
@@ -50,9 +50,9 @@ class UvWays:
     is_doubtful: Bools
 
 
-def uv_ways(
-    corners: Floats, uv: Floats, distance: Floats, island: Ints, way: Way = "auto"
-) -> UvWays:
+def uv_axes(
+    corners: Floats, uv: Floats, distance: Floats, island: Ints, heading: Heading = "auto"
+) -> UvAxes:
     """Where roots and tips are.
 
     Args:
@@ -62,11 +62,11 @@ def uv_ways(
         island: (triangle_count,) numbered from 0 without gaps.
         way: of all islands, when it is known.
     """
-    if way != "auto":
+    if heading != "auto":
         count = int(island.max()) + 1
-        known_axis, known_end = _KNOWN[way]
+        known_axis, known_end = _KNOWN[heading]
         nobody = np.zeros(count, bool)
-        return UvWays(np.full(count, known_axis), np.full(count, known_end), nobody)
+        return UvAxes(np.full(count, known_axis), np.full(count, known_end), nobody)
     area = _sums(island, _areas(corners))
     lengths = _lengths(corners, uv, island)
     ratio = np.log(np.maximum(lengths[:, 1], 1e-12) / np.maximum(lengths[:, 0], 1e-12))
@@ -86,7 +86,7 @@ def uv_ways(
         against = is_strong & ((end > 0.0) != (vote > 0.0))
         is_unsaid = np.full(len(axis), abs(vote) <= _NO_END * float(area[own].sum()))
         is_doubtful |= own & (against | (is_unsaid & ~is_strong))
-    return UvWays(axis, is_down, is_doubtful)
+    return UvAxes(axis, is_down, is_doubtful)
 
 
 def coordinate_gradients(corners: Floats, uv: Floats) -> Floats:
@@ -129,11 +129,11 @@ def _end_evidence(
     coordinate = np.take_along_axis(uv, own[:, None, None], axis=2)[:, :, 0]
     low, high = island_bounds(coordinate, island)
     size = np.maximum(high - low, 1e-12)[island, None]
-    share = ((coordinate - low[island, None]) / size).ravel()
+    fraction = ((coordinate - low[island, None]) / size).ravel()
     whose = np.repeat(island, 3)
     nearness = (_HEIGHT_WEIGHT * corners[:, :, 2] - distance).ravel()
     ends = []
-    for is_end in (share <= _END_SHARE, share >= 1.0 - _END_SHARE):
+    for is_end in (fraction <= _END_FRACTION, fraction >= 1.0 - _END_FRACTION):
         count = np.maximum(_sums(whose, is_end.astype(np.float64), len(axis)), 1.0)
         ends.append(_sums(whose, np.where(is_end, nearness, 0.0), len(axis)) / count)
     difference: Floats = ends[1] - ends[0]

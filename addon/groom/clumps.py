@@ -12,7 +12,7 @@ _TURN = 2.0 * np.pi
 _CHUNK = 1024
 
 
-def assign_locks(root: Floats, settings: GrowSettings, random: np.random.Generator) -> Ints:
+def assign_clumps(root: Floats, settings: GrowSettings, random: np.random.Generator) -> Ints:
     """For each strand the strand in the middle of its lock, (strand_count,), itself included."""
     if not len(root):
         return np.zeros(0, np.int64)
@@ -31,7 +31,7 @@ def assign_locks(root: Floats, settings: GrowSettings, random: np.random.Generat
     return lock
 
 
-def style_locks(
+def style_clumps(
     grid: Floats, lock: Ints, settings: GrowSettings, random: np.random.Generator
 ) -> Floats:
     """The strands drawn into locks, waved and frizzed, (strand_count, cv_count, 3) [m].

@@ -20,15 +20,15 @@ from ..shading.volume.light_frame import Ball
 from .opacity_maps import OpacityMaps
 from .shader_feature import UniformBlocks, bound
 from .shader_program import ShaderRecipe
-from .shader_source import OTHERS_LIGHTS
+from .shader_source import OTHER_TAU_LIGHTS
 
 #: of a place that has no groom of its own
 NOBODY = -5
 
 
 _RECIPE = ShaderRecipe(
-    name="hair_between",
-    compute="hair_between.comp.glsl",
+    name="inter_groom_shadow",
+    compute="inter_groom_shadow.comp.glsl",
     structs=("struct_opacity.glsl",),
     textures=(("FLOAT_2D", "places"),),
     images=(("RGBA32F", "between", "READ_WRITE"),),
@@ -36,14 +36,14 @@ _RECIPE = ShaderRecipe(
 )
 
 
-class HairBetween:
+class InterGroomShadow:
     """Keeps what it has found for one texture of places; making one touches no GPU."""
 
     def __init__(self) -> None:
         self.release()
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next call makes it anew."""
+        """Let go of all that lies on the GPU; the next call makes it again."""
         self._blocks: list[UniformBlocks] = []
         self._found: Any = None
         self._made_of: tuple[Any, ...] = ()
@@ -80,7 +80,7 @@ class HairBetween:
                 textures={"places": places},
                 images={"between": self._found},
                 integers={
-                    "light_count": min(light_count, OTHERS_LIGHTS),
+                    "light_count": min(light_count, OTHER_TAU_LIGHTS),
                     "own_number": number,
                 },
             )
@@ -95,7 +95,7 @@ def may_shade(maps: OpacityMaps, ball: Ball) -> bool:
     Pure numpy.
     """
     rows = maps.values[: 5 * 4 * LIGHT_CAPACITY].reshape(5, LIGHT_CAPACITY, 4)
-    for x, y, w, depth, light in rows[:, :OTHERS_LIGHTS].swapaxes(0, 1).astype(np.float64):
+    for x, y, w, depth, light in rows[:, :OTHER_TAU_LIGHTS].swapaxes(0, 1).astype(np.float64):
         if light[0] >= 0.0 and _reaches(x, y, w, depth, ball):
             return True
     return False

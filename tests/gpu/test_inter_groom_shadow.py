@@ -107,7 +107,7 @@ def test_hair_has_the_shadow_of_other_grooms(
 
 
 def test_what_lies_beside_or_before_a_groom_is_not_asked(gpu_context: Any) -> None:
-    from hairloom.addon.render.hair_between import may_shade
+    from hairloom.addon.render.inter_groom_shadow import may_shade
     from hairloom.addon.render.strand_pass import StrandPass
 
     for light in (SUN, Light.point((0.0, 0.0, 1.2), (1.0, 1.0, 1.0), 10.0)):
@@ -120,13 +120,13 @@ def test_what_lies_beside_or_before_a_groom_is_not_asked(gpu_context: Any) -> No
 
 
 def test_places_without_a_serial_are_asked_anew_and_nothing_adds_up(gpu_context: Any) -> None:
-    from hairloom.addon.render.hair_between import NOBODY, HairBetween
+    from hairloom.addon.render.inter_groom_shadow import NOBODY, InterGroomShadow
     from hairloom.addon.render.strand_pass import StrandPass
     from hairloom.addon.render.textures import texture_from, texture_to_array
 
     maps = StrandPass().opacity(replace(groom("a", sheet(0.3)).snapshot, lights=(SUN,)))
     assert maps is not None
-    between = HairBetween()
+    between = InterGroomShadow()
 
     def found(x: float, serial: int | None) -> np.ndarray:
         places = np.tile(np.float32([x, 0.0, 0.0, 1.0]), (8, 8, 1))
@@ -143,7 +143,7 @@ def test_places_without_a_serial_are_asked_anew_and_nothing_adds_up(gpu_context:
 
 
 def test_a_place_has_what_all_but_its_own_groom_have_in_the_way(gpu_context: Any) -> None:
-    from hairloom.addon.render.hair_between import HairBetween
+    from hairloom.addon.render.inter_groom_shadow import InterGroomShadow
     from hairloom.addon.render.strand_pass import StrandPass
     from hairloom.addon.render.textures import texture_from, texture_to_array
 
@@ -157,7 +157,9 @@ def test_a_place_has_what_all_but_its_own_groom_have_in_the_way(gpu_context: Any
     places[0, :, 3] = (0.0, 1.0, 2.0, -1.0, 0.0, 1.0, 2.0, -1.0)
     places[0, 4:, 0] = 1.0  # beside both for the first light, behind them for no light
     found = texture_to_array(
-        HairBetween().at(texture_from(places, "RGBA32F"), None, [(0, maps[0]), (1, maps[1])], 2)
+        InterGroomShadow().at(
+            texture_from(places, "RGBA32F"), None, [(0, maps[0]), (1, maps[1])], 2
+        )
     )[0]
     assert found[:4, 0].min() == 0.0 == found[3, 0]
     of_second, of_first, of_both = found[:3, 0]
@@ -171,13 +173,13 @@ def test_a_place_has_what_all_but_its_own_groom_have_in_the_way(gpu_context: Any
     of_both = StrandPass().opacity(replace(groom("a", sheet(0.3)).snapshot, lights=lights))
     assert of_both is not None
     for count in (1, 2):
-        texture = HairBetween().at(texture_from(aside, "RGBA32F"), None, [(0, of_both)], count)
+        texture = InterGroomShadow().at(texture_from(aside, "RGBA32F"), None, [(0, of_both)], count)
         way = texture_to_array(texture)[0, 0]
         assert way[0] == 0.0 and (way[1] > 0.0) == (count == 2)
 
 
 def test_light_from_each_side_may_shade_and_none_without_light(gpu_context: Any) -> None:
-    from hairloom.addon.render.hair_between import may_shade
+    from hairloom.addon.render.inter_groom_shadow import may_shade
     from hairloom.addon.render.strand_pass import StrandPass
 
     def maps(*lights: Light) -> Any:
