@@ -33,7 +33,7 @@ from .solvers import Solver, computed_on, form_of, solver_of
 class Session:
     """One groom while it is previewed or baked; fulfils `simulated.Simulated`.
 
-    uid, name, hair, head: of its objects.
+    uid, hair, head: of its objects.
     groom: what it was made into; a placeholder until the first hair is made in a thread.
 
     Args:
@@ -64,7 +64,7 @@ class Session:
         self._source = GroomSource(hair, depsgraph)
         self._source.use_bake(baked)
         self.hair, self.head = self._source.hair, self._source.head
-        self.uid, self.name = self.hair.handle.uid, self._source.name
+        self.uid = self.hair.handle.uid
         self._is_drawn = is_drawn
         self._job = LatestJob[BuildRequest, tuple[BuildRequest, PreparedGroom]](
             "hair", partial(arrived, self)
@@ -82,6 +82,11 @@ class Session:
         self._take(request, made, None, depsgraph)
         if not blocking:
             self._begin()
+
+    @property
+    def name(self) -> str:
+        """Of its object, which may be renamed."""
+        return self._source.name
 
     @property
     def source(self) -> Source:
