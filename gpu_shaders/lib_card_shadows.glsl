@@ -1,6 +1,6 @@
 // What is in the way of a light to a card: all but the card itself, which is in the maps as well.
 //
-// Twin of own_share and among_strands in addon/shading/volume/card_opacity.py. Reads what lib_shadows.glsl reads.
+// Twin of own_fraction and among_strands in addon/shading/volume/card_opacity.py. Reads what lib_shadows.glsl reads.
 #include "lib_shadows.glsl"
 #include "lib_card_opacity.glsl"
 
@@ -32,7 +32,7 @@ float own_fraction(int light, vec3 point)
 }
 #endif
 
-// As way_of_light, for a place of a card whose texture covers alpha. `across`: normal of its plane, of any
+// As shadow_path, for a place of a card whose texture covers alpha. `across`: normal of its plane, of any
 // length. EVEN: for the foremost of its strands.
 vec3 shadow_path_to_card(
     int index, vec3 point, float alpha, vec3 to_light, vec3 across, vec3 tangent, vec3 normal)

@@ -11,7 +11,7 @@
 #  include "lib_dual.glsl"
 #endif
 
-// hair: its colour, for Kajiya-Kay; absorption and level: for Marschner; way: see way_of_light.
+// hair: its colour, for Kajiya-Kay; absorption and level: for Marschner; path: see shadow_path.
 vec3 hair_light(vec3 tangent,
                 vec3 normal,
                 vec3 to_light,

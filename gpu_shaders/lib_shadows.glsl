@@ -19,7 +19,7 @@ vec3 shadow_path(int index, vec3 point)
   return vec3(-1.0, {{unknown_beyond}}, 1.0);
 }
 
-// As way_of_light, for a place of a mesh and the normal of its triangle. Meshes reach beyond the map of
+// As shadow_path, for a place of a mesh and the normal of its triangle. Meshes reach beyond the map of
 // hair: towards its border the map of all meshes takes over what they are in the way of, or else their
 // shadows fade, or they would end at a line.
 vec3 shadow_path_to_mesh(int index, vec3 point, vec3 normal)
@@ -51,7 +51,7 @@ vec3 light_left(vec3 path, vec3 forward)
   return path.z * exp(-max(path.x, 0.0) * (1.0 - forward));
 }
 
-// As way_of_light, for a place of a strand of this radius [m] and opacity, which is in the maps as
+// As shadow_path, for a place of a strand of this radius [m] and opacity, which is in the maps as
 // well: it does not lie behind itself.
 vec3 shadow_path_to_strand(int index, vec3 point, vec3 tangent, float radius, float hides)
 {

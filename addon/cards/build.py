@@ -65,8 +65,8 @@ class CardBuild:
     backs: the triangles of each level once more, in the order in which back faces are drawn.
     errors: of each level [m], see `levels.CardLevel`: how far it is from the strands' own way.
     plan: what is to be baked into the atlas; None where its tiles are made by chance.
-    wrong_share: of the pixels of the finest level those that are drawn in a wrong order, see
-        `order_check.wrong_share`.
+    wrong_fraction: of the pixels of the finest level those that are drawn in a wrong order, see
+        `order_check.wrong_fraction`.
     """
 
     levels: tuple[CardMesh, ...]

@@ -9,7 +9,8 @@ Front faces and back faces are drawn in passes of their own, so each has an orde
 faces from the inside to the outside, back faces, which are on the far side of the hair, the other
 way round.
 
-Limitations: one order cannot suit views that contradict each other; `wrong_share` says how often.
+Limitations: one order cannot suit views that contradict each other; `wrong_fraction` says
+how often.
 Hair that swings far from its rest shape has to be sorted at run time, see `order_from`, or be a
 mesh of its own, such as a ponytail, see `card_orders`.
 """

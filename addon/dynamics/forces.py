@@ -40,7 +40,8 @@ def brake(position: Floats, previous: Floats, drag: float, air_displacement: Flo
     Changes `previous`, which holds the speed.
 
     Args:
-        air_way: (3, guide_count), what the air goes in a substep [m]; None when it stands still.
+        air_displacement: (3, guide_count), how far the air moves in a substep [m];
+            None when it stands still.
     """
     displacement = position - previous
     if air_displacement is not None:

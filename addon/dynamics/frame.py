@@ -148,7 +148,8 @@ class Frame:
 class Block:
     """Some guides made ready for a frame, rows (3, cv_count, n) world [m].
 
-    impulse, impulse_bow: what gravity and the moving style add to each CV in a substep, and how
+    impulse, impulse_curvature: what gravity and the moving style add to each CV in a
+        substep, and how
         that changes while the way of the style bends.
     radius: (cv_count * n,) [m], the distance that each CV keeps from colliders; not to be written.
     """

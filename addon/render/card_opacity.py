@@ -66,7 +66,7 @@ _STARTS_RECIPE = ShaderRecipe(
 
 @dataclass(frozen=True, eq=False)
 class _Cards:
-    """Cards on the GPU; see CardSnapshot for thickness and is_even."""
+    """Cards on the GPU; see CardSnapshot for thickness and is_view_compensated."""
 
     state: Hashable
     blocks: UniformBlocks

@@ -18,8 +18,8 @@ class CardSnapshot:
     has_tangent_map: the tangent map takes the place of the shift texture.
     back_triangles: (n, 3) the triangles in the order in which their back faces are drawn; None is
         the order of the mesh. Neither counts where cards are sorted for each view.
-    is_even: alpha is what the strands cover on the mean of all turns of a card, as a baked atlas
-        has it; cards cover as much at a slant, see card_look.view_compensated_alpha.
+    is_view_compensated: alpha is what the strands cover on the mean of all turns of a card, as
+        a baked atlas has it; cards cover as much at a slant, see card_look.view_compensated_alpha.
     thickness: of the hair that alpha stands for in shadows, see shading/volume/card_opacity.py.
     device: the card_textures.CardTextures that all who draw these cards share; None: each its own.
 

@@ -29,7 +29,7 @@ MARSCHNER_TEXTURES = (
     ("FLOAT_2D", "azimuthal"),
     ("FLOAT_2D", "paths"),
 )
-#: samplers of shares_at() in lib_dual.glsl
+#: samplers of fractions_at() in lib_dual.glsl
 FRACTIONS_TEXTURES = (("FLOAT_2D", "fractions_forward"), ("FLOAT_2D", "fractions_backward"))
 
 

@@ -69,7 +69,8 @@ class MeshPass:
         Args:
             opacity: the hair's maps, see StrandPass.opacity.
             shadows: of all meshes; without, they shade each other only where the hair's maps are.
-            between: what other hair is in the way, at each pixel of the target, see HairBetween;
+            between: what other hair is in the way, at each pixel of the target, see
+                InterGroomShadow;
                 counts where there are maps. Others as in StrandPass.draw.
         """
         skins = self.skin.shadows(

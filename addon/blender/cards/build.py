@@ -119,7 +119,7 @@ class CardMaps:
     highlights: what breaks them up, "shift" or "tangent", see TextureSettings: the atlas holds the
         directions of its own strands.
     base_gain: what the written base is to be multiplied by.
-    is_even: the alpha is that of baked strands, see CardSnapshot.
+    is_view_compensated: the alpha is that of baked strands, see CardSnapshot.
     """
 
     by_name: dict[str, Floats]
@@ -261,7 +261,7 @@ def has_gpu() -> bool:
 class BuiltCards:
     """Cards at rest, tied to the guides of their rig, with all that drawing them needs.
 
-    wrong_share: see cards.build.CardBuild.
+    wrong_fraction: see cards.build.CardBuild.
     notes: what the artist should know.
     """
 

@@ -101,7 +101,7 @@ def azimuthal_rest(cos_d: Floats, fibre: Fibre) -> Floats:
 def elliptic_index(index: float, ratio: float, cos_double: float) -> Floats:
     """The index with which TRT of an elliptic fibre is like that of a round one.
 
-    Marschner et al. 2003, section 5.2.3, at cos 2 phi_h; not less than LEAST_INDEX.
+    Marschner et al. 2003, section 5.2.3, at cos 2 phi_h; not less than MIN_INDEX.
     """
     narrow = 2.0 * (index - 1.0) * ratio**2 - index + 2.0
     wide = 2.0 * (index - 1.0) / ratio**2 - index + 2.0

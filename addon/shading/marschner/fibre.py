@@ -46,7 +46,7 @@ class Fibre:
             light that crosses the axis keeps exp(-2 absorption).
         cuticle_tilt: angle of the scales.
         width_r, width_tt, width_trt: standard deviation of theta_h. A highlight's spread in
-            theta_r is twice as wide. Widths under LEAST_WIDTH count as that.
+            theta_r is twice as wide. Widths under MIN_WIDTH count as that.
         offset_r, offset_tt, offset_trt: moves a highlight towards the tip, in theta_h, beyond
             what the tilt does.
         strength_r, strength_tt, strength_trt, strength_rest: factor of a lobe; 1 is physical. The

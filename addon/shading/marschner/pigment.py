@@ -46,7 +46,7 @@ def color_absorption(color: Floats, azimuthal_roughness: float = 0.3) -> Floats:
     """Absorption that gives a mass of hair this colour, (..., 3).
 
     Args:
-        color: linear rgb, (..., 3), taken into [LEAST_COLOR, 1].
+        color: linear rgb, (..., 3), taken into [MIN_COLOR, 1].
         azimuthal_roughness: Blender's radial roughness, in [0, 1].
     """
     logarithm = np.log(np.clip(color, MIN_COLOR, 1.0))

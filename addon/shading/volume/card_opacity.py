@@ -68,7 +68,7 @@ def among_strands(
     Args:
         before, beyond: the plane of the card by the map, the card itself in them.
         scale: what one strand of the card counts there. tau: of the card.
-        fraction: see own_share. front: fraction of its other strands that the light meets later.
+        fraction: see own_fraction. front: fraction of its other strands that the light meets later.
     """
     few = np.maximum(tau, MIN_TAU)
     others = scale * (few / -np.expm1(-few) - 1.0)

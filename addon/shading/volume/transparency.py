@@ -69,7 +69,7 @@ def layer_fractions(
     Args:
         depths: (pixel_count, n), in any order; ties go by alpha.
         alphas: (pixel_count, n), 0 where there is no layer.
-        layers: how many are shaded, at most; n of them and an unseen_share of 0 are exact.
+        layers: how many are shaded, at most; n of them and an unseen_fraction of 0 are exact.
     """
     order = np.lexsort((alphas, depths, alphas == 0.0), axis=-1)
     alphas = np.take_along_axis(alphas, order, axis=-1)
