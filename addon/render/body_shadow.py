@@ -19,9 +19,9 @@ import numpy as np
 from ..strands import Surface
 from .camera import Camera
 from .display import Display
+from .feature_programs import UniformBlocks, bound
 from .marschner_textures import under_hair_feature
 from .opacity_maps import OpacityMaps
-from .shader_feature import UniformBlocks, bound
 from .shader_program import ShaderRecipe, released_with_shaders
 from .snapshot import Caster, Snapshot, surface_of
 from .textures import drawing_state

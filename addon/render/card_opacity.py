@@ -21,8 +21,9 @@ from ..shading.volume.light_frame import Ball, ball_around
 from ..shading.volume.map_size import START_TEXELS
 from .card_snapshot import CardSnapshot
 from .card_textures import tiles_of
+from .feature_programs import UniformBlocks, bound
 from .opacity_maps import OpacityDrawing, OpacityMaps
-from .shader_feature import ShaderFeature, UniformBlocks, bound
+from .shader_feature import ShaderFeature
 from .shader_program import ShaderRecipe, program
 from .snapshot import Snapshot
 from .textures import drawing_into, drawing_state

@@ -38,9 +38,10 @@ from .card_opacity import CardOpacity
 from .card_snapshot import CardSnapshot
 from .card_textures import CardTextures, tiles_of
 from .display import Display
+from .feature_programs import UniformBlocks, bound
 from .marschner_textures import marschner_feature, scattering_feature
 from .opacity_maps import OpacityMaps
-from .shader_feature import ShaderFeature, UniformBlocks, bound
+from .shader_feature import ShaderFeature
 from .shader_program import ShaderRecipe, released_with_shaders
 from .shader_source import output_index
 from .snapshot import Snapshot

@@ -17,8 +17,8 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.lights import LIGHT_CAPACITY
 from ..shading.volume.light_frame import Ball
+from .feature_programs import UniformBlocks, bound
 from .opacity_maps import OpacityMaps
-from .shader_feature import UniformBlocks, bound
 from .shader_program import ShaderRecipe
 from .shader_source import OTHER_TAU_LIGHTS
 

@@ -8,13 +8,14 @@ from typing import Any
 from ..shading.lights import kept_lights
 from ..shading.skin.layout import SkinLayout
 from .camera import Camera
+from .feature_programs import UniformBlocks, bound
 from .hashed_alpha import shifts
 from .marschner_textures import hair_forward, under_hair_feature
 from .mesh_batch import mesh_batch
 from .mesh_pictures import PictureTextures, pictures_of
 from .mesh_shadows import MeshShadowPass, MeshShadows
 from .opacity_maps import OpacityMaps
-from .shader_feature import ShaderFeature, UniformBlocks, bound
+from .shader_feature import ShaderFeature
 from .shader_program import ShaderRecipe, released_with_shaders
 from .shader_source import output_index
 from .skin_pass import SkinPass, SkinShadow

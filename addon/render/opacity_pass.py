@@ -13,8 +13,9 @@ from ..shading.lights import Light
 from ..shading.settings import StrandSettings
 from ..shading.volume.light_frame import Ball
 from ..shading.volume.settings import VolumeSettings
+from .feature_programs import UniformBlocks, bound
 from .opacity_maps import OpacityDrawing, OpacityMaps
-from .shader_feature import ShaderFeature, UniformBlocks, bound
+from .shader_feature import ShaderFeature
 from .shader_program import ShaderRecipe
 from .snapshot import Caster
 

@@ -8,8 +8,8 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import HairloomError
 from ..shading.lights import LIGHT_CAPACITY
+from .feature_programs import UniformBlocks, bound
 from .opacity_maps import OpacityMaps
-from .shader_feature import UniformBlocks, bound
 from .shader_program import ShaderRecipe
 from .shader_source import TILE_GAP
 from .textures import texture_to_array

@@ -1,18 +1,16 @@
 """What programs have for one purpose, such as Marschner's model or opacity maps: said once.
 
-A feature holds each declaration together with the value that a draw gives it. A draw is a recipe
-and a list of features, so that what is declared is what is bound.
+A feature holds each declaration together with the value that a draw gives it; `feature_programs`
+makes programs of them. Nothing here needs a GPU.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..arrays import Floats
-from .shader_program import ShaderProgram, ShaderRecipe, program
-from .textures import UniformBlock
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,76 +33,3 @@ class ShaderFeature:
     varyings: tuple[tuple[str, str, str], ...] = ()
     outputs: tuple[tuple[str, str], ...] = ()
     defines: Mapping[str, int] = field(default_factory=dict)
-
-
-class UniformBlocks:
-    """Uniform buffers by name, each of which follows its values; made on first use."""
-
-    def __init__(self) -> None:
-        self._blocks: dict[str, UniformBlock] = {}
-
-    def holding(self, name: str, values: Floats) -> Any:
-        """The buffer of this name with these std140 values in it."""
-        return self._blocks.setdefault(name, UniformBlock()).holding(values)
-
-
-def recipe_with(recipe: ShaderRecipe, features: Iterable[ShaderFeature]) -> ShaderRecipe:
-    """The recipe with all that these features declare."""
-    features = tuple(features)
-    blocks = [(kind, name) for each in features for name, (kind, _) in each.blocks.items()]
-    textures = [(kind, name) for each in features for name, (kind, _) in each.textures.items()]
-    numbers = [(kind, name) for each in features for name, (kind, _) in each.numbers.items()]
-    defines = dict(recipe.defines)
-    for each in features:
-        defines |= each.defines
-    return replace(
-        recipe,
-        name="_".join([recipe.name, *(each.name for each in features if each.name)]),
-        blocks=(*recipe.blocks, *blocks),
-        textures=(*recipe.textures, *textures),
-        integers=(*recipe.integers, *(name for each in features for name in each.integers)),
-        numbers=(*recipe.numbers, *numbers),
-        inputs=(*recipe.inputs, *(one for each in features for one in each.inputs)),
-        varyings=(*recipe.varyings, *(one for each in features for one in each.varyings)),
-        outputs=(*recipe.outputs, *(one for each in features for one in each.outputs)),
-        defines=tuple(defines.items()),
-    )
-
-
-def bound(
-    recipe: ShaderRecipe,
-    features: Iterable[ShaderFeature],
-    blocks: UniformBlocks,
-    *,
-    images: Mapping[str, Any] | None = None,
-    textures: Mapping[str, Any] | None = None,
-    integers: Mapping[str, int] | None = None,
-    numbers: Mapping[str, Any] | None = None,
-) -> ShaderProgram:
-    """The program of a recipe with these features, ready to draw.
-
-    Args:
-        blocks: buffers of the features' blocks.
-        images, textures, integers, numbers: what the recipe declares by itself.
-
-    Raises:
-        ShaderError: it does not compile here, or something is not both declared and given.
-    """
-    features = tuple(features)
-    shader = program(recipe_with(recipe, features))
-    buffers: dict[str, Any] = {}
-    all_textures, all_numbers = dict(textures or {}), dict(numbers or {})
-    all_integers = dict(integers or {})
-    for each in features:
-        buffers |= {name: blocks.holding(name, values) for name, (_, values) in each.blocks.items()}
-        all_textures |= {name: texture for name, (_, texture) in each.textures.items()}
-        all_numbers |= {name: number for name, (_, number) in each.numbers.items()}
-        all_integers |= each.integers
-    shader.bind(
-        blocks=buffers,
-        textures=all_textures,
-        images=images,
-        integers=all_integers,
-        numbers=all_numbers,
-    )
-    return shader

@@ -23,9 +23,10 @@ from ..arrays import Floats, Ints
 from ..shading.skin.layout import SkinLayout
 from ..shading.skin.settings import SkinSettings
 from ..strands import Surface
+from .feature_programs import UniformBlocks, bound
 from .mesh_shadows import MeshShadows
 from .opacity_maps import OpacityMaps
-from .shader_feature import ShaderFeature, UniformBlocks, bound
+from .shader_feature import ShaderFeature
 from .shader_program import ShaderRecipe, program
 from .shader_source import SKIN_COPIES_ACROSS, SKIN_SEAMS_ACROSS, SKIN_TRIANGLES_ACROSS
 from .skin_layouts import layout_of

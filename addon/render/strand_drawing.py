@@ -8,7 +8,8 @@ from typing import Any
 
 from ..shading.settings import ShadingSettings, StrandSettings
 from .detail_pass import DetailOrder
-from .shader_feature import ShaderFeature, UniformBlocks, bound
+from .feature_programs import UniformBlocks, bound
+from .shader_feature import ShaderFeature
 from .shader_program import ShaderProgram, ShaderRecipe
 
 #: what covers pixels in part, see ribbon_coverage in lib_coverage.glsl

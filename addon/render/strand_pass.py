@@ -26,12 +26,13 @@ from ..shading.volume.light_frame import Ball
 from .camera import Camera
 from .detail_pass import DetailPass
 from .display import Display
+from .feature_programs import UniformBlocks
 from .hair_ball import HairBall
 from .inter_groom_shadow import NOBODY, InterGroomShadow
 from .marschner_textures import marschner_feature, scattering_feature
 from .opacity_maps import OpacityMaps
 from .opacity_pass import OpacityPass
-from .shader_feature import ShaderFeature, UniformBlocks
+from .shader_feature import ShaderFeature
 from .shader_program import released_with_shaders
 from .shader_source import DEBUG_VIEWS, ShaderError, output_index
 from .snapshot import Snapshot
