@@ -151,7 +151,7 @@ def test_a_render_changes_nothing_of_what_the_viewport_shows(scene, evaluated):
     bpy.ops.render.render()
     np.testing.assert_array_equal(session.strands, before)
     assert previews.sessions() == (session,) and scene.frame_current == 4
-    assert not playback._is_rendering
+    assert not playback._known.is_rendering
 
 
 def test_motion_blur_smears_the_hair_between_two_frames(scene, tmp_path):

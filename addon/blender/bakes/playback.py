@@ -18,12 +18,22 @@ from .bake_settings import absolute, folder_of
 from .baked_rig import BakedRig, rig_of
 from .cache import FACTS, Cache
 
-#: folder -> when its bake was written, and the bake
-_caches: dict[Path, tuple[int, Cache]] = {}
-_rigs: dict[Path, tuple[Cache, BakedRig]] = {}
-#: folder -> why its bake cannot be shown in renders; told once
-_troubles: dict[Path, str] = {}
-_is_rendering = False
+
+class _Known:
+    """What is kept of bakes, by folder.
+
+    caches: when a bake was written, and the bake. rigs: of which bake, and its rig.
+    problems: why a bake cannot be shown in renders; reported once.
+    """
+
+    def __init__(self) -> None:
+        self.caches: dict[Path, tuple[int, Cache]] = {}
+        self.rigs: dict[Path, tuple[Cache, BakedRig]] = {}
+        self.problems: dict[Path, str] = {}
+        self.is_rendering = False
+
+
+_known = _Known()
 
 
 def cache_in(folder: Path) -> Cache | None:
@@ -35,13 +45,13 @@ def cache_in(folder: Path) -> Cache | None:
     try:
         written = (folder / FACTS).stat().st_mtime_ns
     except OSError:
-        _caches.pop(folder, None)
-        _rigs.pop(folder, None)
+        _known.caches.pop(folder, None)
+        _known.rigs.pop(folder, None)
         return Cache.found(folder)  # a replacement may have been broken off
-    if folder not in _caches or _caches[folder][0] != written:
-        _caches[folder] = written, Cache(folder)
-        _troubles.pop(folder, None)
-    return _caches[folder][1]
+    if folder not in _known.caches or _known.caches[folder][0] != written:
+        _known.caches[folder] = written, Cache(folder)
+        _known.problems.pop(folder, None)
+    return _known.caches[folder][1]
 
 
 def cache_of(obj: bpy.types.Object) -> Cache | None:
@@ -60,9 +70,9 @@ def rig_in(cache: Cache) -> BakedRig:
     Raises:
         HairloomError: it is damaged.
     """
-    known = _rigs.get(cache.folder)
+    known = _known.rigs.get(cache.folder)
     if known is None or known[0] is not cache:
-        known = _rigs[cache.folder] = cache, rig_of(cache.constants(), str(cache.folder))
+        known = _known.rigs[cache.folder] = cache, rig_of(cache.constants(), str(cache.folder))
     return known[1]
 
 
@@ -158,8 +168,8 @@ def _write(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> No
 
 
 def _tell(folder: Path, problem: str) -> None:
-    if _troubles.get(folder) != problem:
-        _troubles[folder] = problem
+    if _known.problems.get(folder) != problem:
+        _known.problems[folder] = problem
         print(f"Hairloom: {problem}")
 
 
@@ -177,28 +187,26 @@ def is_dragged() -> bool:
 
 def rendering(begins: bool) -> None:
     """A render begins or has ended."""
-    global _is_rendering
-    _is_rendering = begins
+    _known.is_rendering = begins
 
 
 def needs_copies() -> bool:
     """Copies are for renders, and for exporters that go through the frames; while an artist
     plays or drags in the viewport, where they are hidden, they wait."""
-    return _is_rendering or bpy.app.background or not (is_played() or is_dragged())
+    return _known.is_rendering or bpy.app.background or not (is_played() or is_dragged())
 
 
 def drop(folder: Path) -> None:
     """The bake in this folder is gone, or another one."""
-    for known in (_caches, _rigs, _troubles):
+    for known in (_known.caches, _known.rigs, _known.problems):
         known.pop(folder, None)
 
 
 def forget() -> None:
     """Keep no bake in memory."""
-    global _is_rendering
-    for known in (_caches, _rigs, _troubles):
+    for known in (_known.caches, _known.rigs, _known.problems):
         known.clear()
-    _is_rendering = False
+    _known.is_rendering = False
 
 
 def check_frames(name: str, frames: range, cache: Cache) -> None:

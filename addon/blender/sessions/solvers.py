@@ -6,6 +6,7 @@ the drawing: only the head's vertices go up, and nothing comes back unless it is
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Protocol
 
 import gpu
@@ -116,9 +117,6 @@ def computed_on(form: str) -> str:
     return f"GPU ({backend}, {used['renderer'].partition(' (')[0]})"
 
 
-_problem: str | None = None
-
-
 def compute_available() -> bool:
     """Whether the GPU can simulate here and now; the first call with a GPU tries it out."""
     return not compute_problem()
@@ -130,16 +128,14 @@ def compute_problem() -> str:
     Blender in the background has no GPU until gpu.init(), so that is asked each time; what a GPU
     can do is found out once.
     """
-    global _problem
     try:
         gpu.platform.backend_type_get()
     except SystemError:
         return "Blender runs without a GPU"
-    if _problem is None:
-        _problem = _tried_out()
-    return _problem
+    return _tried_out()
 
 
+@cache
 def _tried_out() -> str:
     """What is wrong with a frame of a few strands on the GPU, compared with numpy."""
     along = np.linspace(0.0, 0.2, 6)
