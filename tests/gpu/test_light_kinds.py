@@ -38,7 +38,7 @@ AREA = Light.area((0.0, -4.0, 0.5), WHITE, 300.0, Panel(SIDE, UP, AHEAD, 1.0, 0.
 def test_kinds_that_are_left_out_would_add_nothing(
     lights: tuple[Light, ...], needed: int, transparency: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from hairloom.addon.render import frame, mesh_pass, strand_pass
+    from hairloom.addon.render import frame, view_block
 
     x, z = np.random.default_rng(4).uniform(-1.0, 1.0, (2, 300, 1))
     along = np.linspace(-1.5, 1.5, 6)
@@ -58,8 +58,7 @@ def test_kinds_that_are_left_out_would_add_nothing(
     )
     assert kinds_needed(lights) == needed
     found = frame.render_image(snapshot, camera, SIZE, SIZE, 1)
-    for module in (mesh_pass, strand_pass):
-        monkeypatch.setattr(module, "kinds_needed", lambda _: 2)
+    monkeypatch.setattr(view_block, "kinds_needed", lambda _: 2)
     of_all = frame.render_image(snapshot, camera, SIZE, SIZE, 1)
     assert np.abs(found - of_all).max() <= 1e-5 * max(of_all.max(), 1.0)
     dark = frame.render_image(replace(snapshot, lights=()), camera, SIZE, SIZE, 1)

@@ -14,7 +14,7 @@ def test_a_line_is_drawn_through_what_is_in_front_of_it() -> None:
     import gpu
     from mathutils import Matrix
 
-    from hairloom.addon.blender.base.lines import draw_lines
+    from hairloom.addon.blender.viewport.debug_lines import draw_lines
 
     offscreen: Any = gpu.types.GPUOffScreen(32, 32, format="RGBA16F")
     points = np.array([[-1.0, 0.03, 0.5], [1.0, 0.03, 0.5]], np.float32)
