@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.bakes.guide_motion import BakedGuides
 from hairloom.addon.blender.bakes.stale_bakes import changed_since
-from hairloom.addon.blender.cards.motion import baked_motion
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.strands.export_check import ExportCheck
 from hairloom.addon.blender.strands.strand_export import StrandExport
@@ -115,7 +115,7 @@ def test_motion_of_strands_and_of_cards_says_so(
 
     def notes() -> list[tuple[str, ...]]:
         plan = StrandExport.of([hair], evaluated(), ALEMBIC, StrandOutput(), frames=frames)
-        return [baked_motion(hair, None).notes, tuple(n for n in plan.notes if "bake" in n)]
+        return [BakedGuides.of(hair).notes, tuple(n for n in plan.notes if "bake" in n)]
 
     def line() -> str:
         check = ExportCheck.of([hair])
