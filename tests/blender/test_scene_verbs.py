@@ -196,7 +196,10 @@ def vertices_of(name: str) -> list[tuple[int, ...]]:
         (["run", "fit_spheres", "--set", "replace_mesh=1", "--output", "x.blend"], "true or false"),
         (["run", "sort_cards", "--set", "by=peaces", "--output", "x.blend"], "pieces"),
         (["grow", "--head", "Hair", "--output", "x.blend"], "Hair"),
-        (["run", "fin_remove", "--object", "Head", "--output", "x.blend"], "Select a fin"),
+        (
+            ["run", "fin_remove", "--object", "Head", "--output", "x.blend"],
+            "Select a mesh that is cloth",
+        ),
         (["run", "sort_cards", "--object", "Hair", "--output", "x.blend"], "Select a mesh"),
         (
             [

@@ -157,7 +157,7 @@ def test_a_failed_task_says_why_in_its_report(
 
 
 def test_a_report_that_cannot_be_written_fails_the_task(extension: None, tmp_path: Path) -> None:
-    assert command_line.run(["presets", "--report", str(tmp_path)]) == 1
+    assert command_line.run(["run", "--report", str(tmp_path)]) == 1
 
 
 def test_a_fault_of_ours_is_in_the_report_too(

@@ -191,7 +191,7 @@ def test_without_a_writer_of_videos_the_pictures_stay(
     assert sorted(table.folder.iterdir()) == sorted(table.files)
     assert len(table.files) == 4 and not table.has_video
     (note,) = table.notes
-    assert "FFmpeg" in note and "pictures are there" in note
+    assert "FFmpeg" in note and "pictures are complete" in note
 
 
 @pytest.mark.parametrize(

@@ -166,6 +166,6 @@ def _dark(scene: SceneSnapshot) -> tuple[str, ...]:
     if scene.lights or any(scene.ambient):
         return ()
     return (
-        "Lights: no light shines here and the world is black, so the picture is black. Add a "
+        "Lights: there is no light and the world is black, so the picture is black. Add a "
         "light, or give the world a colour.",
     )
