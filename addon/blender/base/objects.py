@@ -99,17 +99,20 @@ def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
 
 def is_solid(obj: bpy.types.Object) -> bool:
     """Whether 3D views draw it as a solid object that hides what is behind it."""
-    return bool(obj.visible_get() and obj.display_type in {"SOLID", "TEXTURED"})
+    # an area's local view would count: Blender asks the 3D view of the context, if there is one
+    with bpy.context.temp_override(area=None):
+        return bool(obj.visible_get() and obj.display_type in {"SOLID", "TEXTURED"})
 
 
 def layers_with(obj: bpy.types.Object) -> frozenset[LayerKey]:
     """The view layers of all scenes that show an object; local view is not considered."""
-    return frozenset(
-        layer_key(scene, layer)
-        for scene in bpy.data.scenes
-        for layer in scene.view_layers
-        if obj.visible_get(view_layer=layer)
-    )
+    with bpy.context.temp_override(area=None):  # see is_solid
+        return frozenset(
+            layer_key(scene, layer)
+            for scene in bpy.data.scenes
+            for layer in scene.view_layers
+            if obj.visible_get(view_layer=layer)
+        )
 
 
 def layer_key(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> LayerKey:
