@@ -24,7 +24,7 @@ from .card_mesh import CardMesh
 from .sort import connected_components
 from .uv_directions import Heading, UvAxes, coordinate_gradients, island_bounds, uv_axes
 
-#: A triangle of less than this share of the square of its longest edge has no area.
+#: A triangle of less than this fraction of the square of its longest edge has no area.
 _FLAT = 1.0e-7
 #: A card looks away from the head, or towards it, when its mean cosine is at least this.
 _MIN_FACING = 0.25

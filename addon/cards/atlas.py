@@ -115,7 +115,7 @@ class _CardShapes:
     """What cards are like.
 
     strand_count: (n,).
-    covered: (n, row_count) share of each row that its strands cover.
+    covered: (n, row_count) fraction of each row that its strands cover.
     pace: (n, row_count) way from row to row [m].
     features: (n, 5), of which each counts for as much as it is seen.
     """
@@ -196,7 +196,7 @@ def _medoids(features: Floats, count: int, random: np.random.Generator) -> tuple
 
 
 def _far_apart(features: Floats, count: int, random: np.random.Generator) -> Ints:
-    """k-means++: so many different ones, far from each other by chance."""
+    """k-means++: `count` different ones at random, far from each other."""
     chosen = [int(random.integers(len(features)))]
     gap = np.full(len(features), np.inf)
     for _ in range(1, count):

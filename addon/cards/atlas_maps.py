@@ -25,7 +25,7 @@ class AtlasMaps:
     Directions d are 0.5 d + 0.5 in the card's own frame: x across the card, along u; y along the
     card from root to tip; z away from the head.
 
-    alpha: (h, w) share of the texel that strands cover.
+    alpha: (h, w) fraction of the texel that strands cover.
     base: (h, w, 3) linear; times `base_gain` it is what the hair's colour is multiplied by.
     normal: (h, w, 3) of the strands, which are round.
     tangent: (h, w, 3) way of the strands.

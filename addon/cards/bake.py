@@ -2,7 +2,7 @@
 
 Twin of gpu_shaders/lib_atlas.glsl and of what render/atlas_pass.py does with it. Of each texel
 SAMPLES x SAMPLES places are looked at; each shows the outermost strand there. The texel's alpha is
-the share of the samples that show one, and its maps are the means over those.
+the fraction of the samples that show one, and its maps are the means over those.
 
 Each row of samples lies a quarter of a sample further left than the one below, so that a texel's
 are all at different places across: hair runs along a tile, and upright samples would stand in line
@@ -38,7 +38,7 @@ _TINY = 1e-12
 
 
 def min_one_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
-    """Half widths of ribbons a sample wide at least, and the share of their samples that counts.
+    """Half widths of ribbons a sample wide at least, and the fraction of their samples that counts.
 
     So a strand thinner than a sample still covers as much as it is wide, see `is_counted`.
 

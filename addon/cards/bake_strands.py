@@ -32,7 +32,7 @@ class FlatStrands:
     depth: (n, station_count) 0 to 1 as in AtlasMaps.
     tangent: (n, station_count, 3) unit vectors in the card's frame.
     base: (n, station_count, 3) the strand's colour as a factor of the hair's, over base_gain.
-    occlusion: (n, station_count) share of the light from the front that the tile's other strands
+    occlusion: (n, station_count) fraction of the light from the front that the tile's other strands
         let through.
     strand_id: (n,) from 0 to 1, by chance, no two the same.
     """
@@ -166,7 +166,7 @@ def _shades(plan: AtlasPlan, base: Floats | None, shape: tuple[int, ...]) -> tup
 def _occlusion(plan: AtlasPlan, across: Floats, radius: Floats, outside: Floats) -> Floats:
     """exp(-tau), tau the strands before each CV that light from the front meets by chance.
 
-    Those of the same row within _NEAR of the card's width count, by the share of that which they
+    Those of the same row within _NEAR of the card's width count, by the fraction of it that they
     cover.
 
     Args:

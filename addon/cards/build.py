@@ -31,7 +31,7 @@ from .strip import Strips, UncutCards, guide_strips, scattered_tiles, strip_mesh
 _COARSER_VIEWS = 16
 #: Views in which it is counted how often the order is wrong.
 _CHECKED_VIEWS = 8
-#: Cards are enough that stand for so many strands each; so many there are at most.
+#: Each card represents about this many strands; there are at most this many cards.
 _STRANDS_PER_CARD, _MAX_CARDS = 12, 600
 
 

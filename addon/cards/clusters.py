@@ -25,8 +25,8 @@ _CHUNK = 2048
 def cluster_strands(grid: Floats, group: Ints, count: int, seed: int = 0) -> Ints:
     """The cluster of each strand, (strand_count,) int32, numbered from 0 without gaps.
 
-    No cluster holds strands of two groups, and each group has clusters by its share of the
-    strands, one at least: so there may be a few more than `count`, and never more than strands.
+    No cluster holds strands of two groups. Each group gets clusters in proportion to its strands,
+    but at least one: there may be a few more than `count`, but never more than strands.
 
     Args:
         grid: (strand_count, cv_count, 3) [m], root first.

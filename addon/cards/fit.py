@@ -22,7 +22,7 @@ _COVERING = 1.8
 #: How much facing away from the head counts beside lying along the strands' spread.
 _FACING_WEIGHT = 0.35
 _TURNS = 72
-#: Least width of a row, as a share of the median; a single strand's card has it throughout.
+#: Least width of a row, as a fraction of the median; a single strand's card has it throughout.
 _MIN_WIDTH = 0.25
 #: How far a card reaches beyond the mean tip, in standard deviations of where its strands end.
 _TIP_REACH = 1.3
@@ -43,7 +43,7 @@ def cluster_of_strands(grid: Floats, group: Ints, settings: CardSettings) -> Int
 
 
 def with_fly_aways(grid: Floats, cluster: Ints, count: int) -> Ints:
-    """The clusters, and behind them so many strands alone, those farthest from their cluster.
+    """The clusters, and after them `count` strands alone, those farthest from their cluster.
 
     The last strand of a cluster stays in it.
     """
@@ -154,7 +154,7 @@ class _Mean:
 def _best_turn(spread: Floats, normal: Floats, side: Floats, outwards: Floats) -> Floats:
     """The turn of each strip [rad] that lays it along the spread and lets it face outwards.
 
-    Of the whole turn in steps, the one with the most of: the share of the strands' variance that
+    Of the whole turn in steps, the one with the most of: the fraction of the strands' variance that
     lies along the width, and _FACING_WEIGHT times the mean cosine between normal and outwards.
     """
     turns = np.linspace(-np.pi, np.pi, _TURNS, endpoint=False)

@@ -33,7 +33,7 @@ class ChainKeys:
 
 
 def chain_keys(rig: JointRig, near: float) -> Generator[float, None, tuple[ChainKeys, ...]]:
-    """The keys of all chains; yields the share of them that is done.
+    """The keys of all chains; yields the fraction of them that is done.
 
     Args:
         near: how far a joint, and what it moves, may be from its path between two keys [m].

@@ -15,8 +15,8 @@ from ..arrays import Floats, Ints
 
 #: How many joints move one vertex, as engines have it.
 INFLUENCES = 4
-#: How much a fit keeps to the turn before it, as a share of what the points say: points in a line
-#: say nothing of the turn about it.
+#: How much a fit keeps to the turn before it, as a fraction of what the points say: points in a
+#: line say nothing of the turn about it.
 _KEEP = 1.0e-4
 #: The same for weights.
 _KEEP_WEIGHTS = 1.0e-4

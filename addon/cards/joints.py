@@ -22,9 +22,9 @@ from .sort import card_of_vertex
 
 #: Numbers of joints that are tried, the fewest first.
 _COUNTS = (2, 3, 4, 6, 8, 12, 16)
-#: Joints go on being added while each step takes at least this share of the error away.
+#: Joints go on being added while each step takes at least this fraction of the error away.
 _WORTH = 0.03
-#: Share of the error that the joints may take; the rest is for the keys that are left out.
+#: Fraction of the error that the joints may take; the rest is for the keys that are left out.
 FIT_FRACTION = 0.9
 #: Frames from which weights are learnt, and vertices from which joints are.
 _LEARNT_FRAMES = 24

@@ -1,9 +1,9 @@
 """Levels of detail: the same cards with ever fewer triangles, for ever greater distances.
 
-Each level has about half the triangles of the one before: first by fewer rows, where the allowed
-error lets them go, which doubles from level to level up to a share of a card's width; then by fewer
-columns; then by fewer cards, where two that lie together become one that covers both. All levels
-show the same tiles of the same atlas, and a card keeps its number.
+Each level has about half the triangles of the one before: first by fewer rows, as far as the
+allowed error permits, which doubles from level to level up to a fraction of a card's width; then by
+fewer columns; then by fewer cards, where two that lie together become one that covers both. All
+levels show the same tiles of the same atlas, and a card keeps its number.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from .segments import edges_of, fewest_segments, interpolated, segment_errors, w
 from .settings import CardSettings
 from .strip import Strips, UncutCards, strip_mesh
 
-#: Share of the triangles that a level keeps of the one before, at most, to be worth having.
+#: Fraction of the triangles that a level keeps of the one before, at most, to be worth having.
 _MAX_KEPT = 0.6
-#: Where no error is allowed, levels start from this share of the cards' usual width; and from this
-#: one on rows stay: straighter cards would run through the head.
+#: Where no error is allowed, levels start from this fraction of the cards' usual width. From the
+#: second one on rows stay: straighter cards would run through the head.
 _MIN_ERROR, _MAX_ERROR = 0.05, 0.4
 _BISECTIONS = 24
-#: Share of the places on the edges of all cards, in percent, that a level's error holds for.
+#: Fraction of the places on the edges of all cards, in percent, that a level's error holds for.
 _HELD = 90.0
 
 

@@ -3,7 +3,7 @@
 For cards of which no strands are known, and for what other grooms shade; cards that are made from
 strands have the occlusion of these, see strand_occlusion.py.
 
-What is stored is the light that a vertex gets from an even sky, as a share of what a surface of
+What is stored is the light that a vertex gets from an even sky, as a fraction of what a surface of
 its normal gets in the open:  A = sum_i |n . d_i| T_i / sum_i |n . d_i|,  over directions d_i that
 are spread evenly over the half sphere about the normal n, which faces away from the head. So a
 card that lies open on the head has 1. T is the transmittance of the ray: a body lets nothing

@@ -60,7 +60,7 @@ def wrong_fraction(
     view_count: int = 40,
     size: int = 128,
 ) -> float:
-    """Share of the hair's pixels that are wrong, on average over views around the head.
+    """Fraction of the hair's pixels that are wrong, on average over views around the head.
 
     Args:
         front, back: (triangle_count,) triangles in the order in which front and back faces are

@@ -35,14 +35,14 @@ from .steps import result_of
 SAMPLE_COUNT = 7
 #: Directions from which pairs are collected, and pixels across.
 VIEW_COUNT, VIEW_SIZE = 48, 96
-#: The search looks at so many pieces; where there are more triangles, a piece has several.
+#: The search takes at most this many pieces; where there are more triangles, a piece has several.
 MAX_PIECES = 30_000
 #: With more triangles than this the distance decides alone.
 MAX_TRIANGLES = 250_000
 #: Views looked at in a step, and how much of the time they take.
 _VIEWS_PER_STEP, _FRACTION_OF_VIEWS = 8, 0.6
 
-#: A group dangles where its middle card is so many times as far from the head as nearly all cards
+#: A group dangles where its middle card is this many times as far from the head as nearly all cards
 #: of the groups that lie nearer and do not dangle.
 _FARTHER = 1.25
 #: Nearly all, in percent.
@@ -285,7 +285,7 @@ def _steps(values: Floats) -> Ints:
 def pieces(mesh: CardMesh) -> Ints:
     """What of a card is sorted apart from the rest of it, (triangle_count,) from 0 without gaps.
 
-    A triangle each, or so many that follow each other in a card that there are not too many.
+    A triangle each, or enough consecutive triangles of a card that there are not too many pieces.
     """
     count = len(mesh.triangles)
     together = -(-count // MAX_PIECES) if count else 1

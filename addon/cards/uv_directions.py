@@ -24,7 +24,7 @@ _KNOWN: dict[str, tuple[int, bool]] = {
     "left": (0, True),
 }
 
-#: An island that is so many times as long along one axis decides for itself.
+#: An island that is this many times as long along one axis decides for itself.
 _CLEAR_LENGTH = 2.0
 #: So does one whose ends differ by this, as a fraction of its length.
 _CLEAR_END = 0.3

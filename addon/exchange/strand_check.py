@@ -66,6 +66,6 @@ def _corner(values: list[float]) -> str:
 
 def _groups(facts: dict[str, Any]) -> str:
     names = facts["group_names"]
-    told = [f"{names.get(group, group)} ({size:,})" for group, size in facts["groups"].items()]
-    rest = len(told) - _MAX_NAMED
-    return ", ".join(told[:_MAX_NAMED]) + (f" and {rest} more" if rest > 0 else "")
+    named = [f"{names.get(group, group)} ({size:,})" for group, size in facts["groups"].items()]
+    rest = len(named) - _MAX_NAMED
+    return ", ".join(named[:_MAX_NAMED]) + (f" and {rest} more" if rest > 0 else "")

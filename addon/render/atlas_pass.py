@@ -6,7 +6,7 @@ compute shader that makes texels of them. Reference: cards/bake.py. The textures
     cv_places  RGBA32F: xy place, zw half width             of each CV
     cv_ways    RGBA32F: xyz tangent, w depth
     cv_looks   RGBA32F: xyz base, w occlusion
-    cv_rest    RG32F:   x share of samples that count, y strand_id
+    cv_rest    RG32F:   x fraction of samples that count, y strand_id
 
     sample_place  RGBA16F: x along, y strand_id, z depth, w occlusion
     sample_way    RGBA16F: xyz tangent, w place across the strand

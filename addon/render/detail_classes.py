@@ -18,7 +18,7 @@ from ..arrays import Floats, Ints
 
 #: A capacity is at most 1 / 16 above the one before, and below 32 each number is one.
 _STEP = 16
-#: Strands are drawn from near to far in so many steps.
+#: Strands are drawn from near to far in this many steps.
 _SLABS = 16
 
 

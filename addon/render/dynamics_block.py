@@ -31,7 +31,7 @@ _NUMBERS, _VECTORS = 16, 3 + 2 * MODES
 
 
 def spans_of(frame: Frame, first: int, count: int) -> Floats:
-    """Begin and end of some substeps as shares of the frame, (count, 2) float64."""
+    """Begin and end of some substeps as fractions of the frame, (count, 2) float64."""
     return np.array([frame.span(number) for number in range(first, first + count)]).reshape(-1, 2)
 
 

@@ -64,7 +64,7 @@ def dynamics_recipe(
     rounds: bool = False,
     fields: bool = False,
 ) -> ShaderRecipe:
-    """The program for guides of so many CVs; what a scene does not need is left out of it."""
+    """The program for guides of this many CVs, without what the scene does not need."""
     flags = {
         "RELAXATION": relaxation,
         "TIPS_HELD": tips_held,

@@ -57,7 +57,7 @@ class MarschnerTextures:
         return {name: kept[name] for _, name in FRACTIONS_TEXTURES}
 
     def forward(self, shading: ShadingSettings, size: int) -> Floats:
-        """The share of light that a strand sends on, by colour, (3,)."""
+        """The fraction of light that a strand sends on, by colour, (3,)."""
         return mean_forward(self._of(shading, size).fractions.forward, shading)
 
     def _of(self, shading: ShadingSettings, size: int) -> _Tables:
@@ -114,8 +114,8 @@ def under_hair_feature(snapshot: Snapshot, maps: OpacityMaps) -> ShaderFeature:
 
 
 def hair_forward(snapshot: Snapshot) -> tuple[float, float, float]:
-    """The share of light that the hair sends on to what lies under it, by colour; 0 without light
-    from strand to strand.
+    """The fraction of light that the hair sends on to what lies under it, by colour; 0 without
+    light from strand to strand.
     """
     shading = snapshot.shading
     if shading.model != "marschner" or not snapshot.volume.scattering:

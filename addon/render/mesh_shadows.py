@@ -129,7 +129,7 @@ class MeshShadowPass:
 
 
 def mesh_map_side(asked: int, layers: int, most: int) -> int:
-    """Texels along a side of each of so many maps that memory and GPU allow."""
+    """Texels along a side of each of these maps, as many as memory and GPU allow."""
     return max(min(asked, most, int(np.sqrt(MEMORY_LIMIT / (_TEXEL_BYTES * layers)))), 1)
 
 

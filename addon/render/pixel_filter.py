@@ -33,7 +33,7 @@ def jitters(count: int, filter_size: float) -> Floats:
 
 
 def _fraction_to_place(fraction: Floats) -> Floats:
-    """Where so large a share of the filter's weight lies to the left, in -0.5 to 0.5."""
+    """Where this fraction of the filter's weight lies to the left, in -0.5 to 0.5."""
     edges = np.linspace(0.0, 1.0, _TABLE + 1)
     middles = (edges[:-1] + edges[1:]) / 2.0
     weights = sum(a * np.cos(2.0 * np.pi * k * middles) for k, a in enumerate(_HARRIS))

@@ -2,8 +2,8 @@
 
     texels     what each texel of a head's UV map shows: triangle, two weights, island
     stretches  its width and height [m], and the nearest seam
-    shadow     the share of each light that reaches the skin, a channel a light, at first as it is;
-               spread along rows and then along columns
+    shadow     the fraction of each light that reaches the skin, a channel a light, at first as it
+               is; spread along rows and then along columns
     shifts     what closes seams where three or more meet
 
 The layout (addon/shading/skin/layout.py) is made when a head's triangles or UVs are others; the
@@ -88,8 +88,8 @@ class SkinShadow:
         )
 
     def picture(self) -> Floats:
-        """The map as a picture, (rows, columns, channels), row 0 at v = 0: the share of each light
-        that reaches the skin, 1 where there is none.
+        """The map as a picture, (rows, columns, channels), row 0 at v = 0: the fraction of each
+        light that reaches the skin, 1 where there is none.
         """
         return texture_to_array(self.textures["skin_shadow"])
 
@@ -160,8 +160,8 @@ class SkinPass:
 
         Args:
             light_count: lights that the maps know of.
-            forward: the share of light that hair sends on, by colour; the shadow is that of their
-                mean.
+            forward: the fraction of light that hair sends on, by colour; the shadow is that of
+                their mean.
             shadows: of all meshes, beyond the maps.
         """
         if opacity is None or not settings.soft_shadow or not settings.softness:
@@ -248,7 +248,7 @@ def layout_textures(layout: SkinLayout) -> dict[str, Any]:
 
 
 def spread(shadow: Any, textures: dict[str, Any], softness: float, axis: int) -> Any:
-    """The texture spread by so many metres along rows (axis 0) or columns (axis 1)."""
+    """The texture spread by `softness` metres along rows (axis 0) or columns (axis 1)."""
     found, shader = _like(shadow), program(_BLUR_RECIPE)
     names = ("skin_texels", "skin_stretches")
     shader.bind(

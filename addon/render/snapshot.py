@@ -68,13 +68,13 @@ class MeshSnapshot:
     vertex_normals: (vertex_count, 3) unit vectors.
     color: scene-linear albedo.
     occlusion: (vertex_count,) light that arrives, 0 to 1; None is 1 everywhere.
-    sheen: the share of the light that the surface throws back as it is, head on.
+    sheen: the fraction of the light that the surface throws back as it is, head on.
     number: what object masks hold where it is seen.
     is_holdout: it hides what is behind it and is a hole in the picture itself.
     skin: the head that it is a part of; None is no skin, on which shadows have hard edges.
     pictures: of its material; None, and on a surface without UVs, its colour alone.
     alpha: how much it covers, times the alpha of its picture.
-    transparency: one of TRANSPARENCIES: "opaque" whatever alpha says; "hashed" has so many holes as
+    transparency: one of TRANSPARENCIES: "opaque" whatever alpha says; "hashed" has as many holes as
         alpha asks for, finer than pixels; "blended" is drawn last, the farthest first.
     """
 

@@ -100,7 +100,7 @@ class StrandDrawing:
     """All that one draw binds.
 
     order: which strands, in how many pieces.
-    ribbon: the vertices of a strand that has room for so many pieces.
+    ribbon: the vertices of a strand that has room for this many pieces.
     points: where strands and eye are. shading: what all programs that shade have.
     shown: what those that write colours have beside that.
     """
@@ -130,7 +130,7 @@ class StrandDrawing:
         self._draw(self._bound(_GATHER_RECIPE, features, images, integers))
 
     def shade(self, images: Mapping[str, Any], seen_count: int) -> ShaderProgram:
-        """Bind what shades so many nodes that are seen."""
+        """Bind the program that shades the nodes that are seen."""
         features = [*self.points, *self.shading]
         return self._bound(_SHADE_RECIPE, features, images, {"seen_count": seen_count})
 

@@ -134,7 +134,7 @@ class StrandLayers:
         self._seen = gpu.types.GPUTexture((LAYER_ROW, rows), format="R32UI")
 
     def _fit(self, size: tuple[int, int]) -> None:
-        """Buffers that hold so many pixels, those of before where they are not far too large."""
+        """Buffers for this many pixels; the old ones, where they are not far too large."""
         kept, wanted = self._size, size
         is_held = kept[0] >= wanted[0] and kept[1] >= wanted[1]
         if is_held and kept[0] * kept[1] <= 4 * max(wanted[0] * wanted[1], 1):
@@ -153,7 +153,7 @@ class StrandLayers:
 
 
 def _dispatch(shader: ShaderProgram, count: int, across: int) -> None:
-    """One invocation for each of the first `count` texels of a texture so many texels wide."""
+    """One invocation for each of the first `count` texels of a texture `across` texels wide."""
     columns = -(-min(count, across) // shader.recipe.group_size[0])
     gpu.compute.dispatch(shader.shader, columns, -(-count // across), 1)
 

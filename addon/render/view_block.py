@@ -12,7 +12,7 @@ from .snapshot import Snapshot
 
 
 def view_feature(camera: Camera, width: int, height: int) -> ShaderFeature:
-    """The block `View` for a target of so many pixels."""
+    """The block `View` for a target of this size [pixels]."""
     return ShaderFeature(blocks={"view": ("View", view_values(camera, width, height))})
 
 

@@ -160,7 +160,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
 
 
 def _stale(hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
-    """What is out of date of its bake; one that cannot be read is told when it is written."""
+    """What is out of date in its bake; one that cannot be read is reported when it is written."""
     try:
         found = [(each, playback.cache_of(each)) for each in hair]
         stale = [stale_notes(each, cache, depsgraph) for each, cache in found if cache is not None]

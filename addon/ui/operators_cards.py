@@ -13,7 +13,7 @@ from .selection import chosen_hair, needs_hair
 
 
 class HAIRLOOM_OT_make_cards(LongWork, bpy.types.Operator):
-    """Make hair cards of the active hair, as meshes in the scene, or those anew. Esc cancels"""
+    """Make hair cards of the active hair as meshes in the scene, or update them. Esc cancels"""
 
     bl_idname = "hairloom.make_cards"
     bl_label = "Make Cards"

@@ -131,7 +131,7 @@ class HAIRLOOM_OT_export_tfx(StrandExportOperator, bpy.types.Operator):
     fills_groups: BoolProperty(
         name="Fill up to 64",
         description="Repeat the last strand until there is a multiple of 64, as TressFX simulates "
-        "so many at a time; its own loader does so by itself, others may not",
+        "64 at a time; its own loader does so by itself, others may not",
         default=False,
     )
     point_uv: BoolProperty(

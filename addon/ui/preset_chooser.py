@@ -27,7 +27,7 @@ KIND = EnumProperty(
     items=[(section, *texts) for section, texts in KINDS.items()],
     options={"SKIP_SAVE"},
 )
-#: pictures of presets: so many beside each other, so large; the pixels at UI scale 1 and the
+#: pictures of presets: how many side by side, and how large; the pixels at UI scale 1 and the
 #: letters that fit across them all
 _ACROSS, _PICTURE_SCALE, _WIDTH, _LETTERS = 3, 5.0, 330, 42
 

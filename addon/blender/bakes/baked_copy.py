@@ -18,7 +18,7 @@ _POLY = 1  # in Blender's attribute curve_type
 def show_in_renders(
     hair: bpy.types.Object, cache: Cache, depsgraph: bpy.types.Depsgraph
 ) -> bpy.types.Object:
-    """Make the copy, or make it anew, and let renders show it in place of the hair.
+    """Make the copy, or make it again, and let renders show it in place of the hair.
 
     The render's thread writes strands into the copy, so the window is locked while it does.
 

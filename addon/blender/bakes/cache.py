@@ -91,7 +91,7 @@ class CacheWriter:
         self._save(_frame_name(frame), arrays)
 
     def finish(self, facts: Facts) -> None:
-        """Put the whole bake in the place of the one before."""
+        """Replace the earlier bake by this one, complete."""
         assert len(self._moments) == facts.frame_count, "all frames are there"
         content = {"version": VERSION, **asdict(facts), "layout": self._layout}
         content["moments"] = self._moments

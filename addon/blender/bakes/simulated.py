@@ -1,7 +1,7 @@
 """What moves: a groom or a fin, as the window's Play, the timeline and a bake see it.
 
-Fingerprints and moments are hashes with names, such as "hair=3f2a settings=91bc", so that an
-artist can be told which of them has changed.
+Rig and frame hashes consist of named hashes, such as "hair=3f2a settings=91bc", so that messages
+can say which of them has changed.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Simulated(Protocol):
         """Show a frame of a bake in place of what was simulated."""
 
     def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
-        """Hashes of what a bake hangs on beside the animation."""
+        """Hashes of what a bake depends on beside the animation."""
 
     def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
         """Hashes of what drives this frame."""

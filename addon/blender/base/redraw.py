@@ -1,4 +1,4 @@
-"""Asking Blender to draw anew what of ours has changed."""
+"""Asking Blender to redraw what has changed of ours."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ def check_exporter(file_format: CardFormat, place: str) -> None:
         ) from error
 
 
-#: format -> its operator, which is looked up anew: add-ons come and go
+#: format -> its operator, looked up each time: add-ons come and go
 _OPERATORS: dict[str, Callable[[], Any]] = {
     GLB.name: lambda: bpy.ops.export_scene.gltf,
     FBX.name: lambda: bpy.ops.export_scene.fbx,

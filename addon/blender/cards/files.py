@@ -67,7 +67,7 @@ _UNITS = {
 _PIGMENT = {"pigment", "melanin", "redness", "absorption"}
 _OF_KIND = {"color": "scene-linear Rec. 709", "choice": "name", "toggle": "true or false"}
 
-#: Tells what is being done, and which share of it is done; None where nobody knows.
+#: What is being done, and which fraction of it is done; None where that is unknown.
 type FileSteps[Result] = Generator[tuple[str, float | None], None, Result]
 
 
@@ -369,7 +369,7 @@ class CardExport:
         return self.outcome((yield from steps))
 
     def outcome(self, written: WrittenCards) -> Outcome:
-        """What the artist is told."""
+        """What is reported to the artist."""
         first, *beside = (file.name for file in written.files)
         result = (
             f"Wrote {written.mesh.card_count:,} cards in {len(written.levels)} levels of detail "

@@ -1,8 +1,8 @@
 """Hair cards as mesh objects in the artist's scene, one a level of detail.
 
-They are made once and filled anew ever after: object, modifiers, materials and what else the artist
-has added stay. Their mesh lies in the space of the hair object, so that cards that were moved aside
-stay there.
+They are made once, and later only filled again: object, modifiers, materials and whatever else
+the artist has added stay. Their mesh lies in the space of the hair object, so cards that were
+moved aside stay there.
 """
 
 from __future__ import annotations

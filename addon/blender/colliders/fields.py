@@ -1,8 +1,8 @@
 """Distance fields of meshes, each made once, beside the window's work where nobody may wait.
 
-A field hangs on nothing but the mesh and its resolution, so that it is found again by the hash of
-those: in the next preview, by the next groom on the same head, by a bake. It is the same to the bit
-in whatever thread it is made.
+A field depends only on the mesh and its resolution, so it is found again by their hash: in the next
+preview, by the next groom on the same head, by a bake. It is the same to the bit, whichever thread
+builds it.
 """
 
 from __future__ import annotations

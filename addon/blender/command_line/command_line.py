@@ -66,7 +66,7 @@ def run(arguments: list[str]) -> int:
     except Exception as fault:
         report.fail(_our_fault(fault))
         _reported(report, options.report)
-        raise  # its traceback is for whoever mends it; Blender's exit code is 1
+        raise  # its traceback is for whoever fixes it; Blender's exit code is 1
     return code if _reported(report, options.report) else code or 1
 
 

@@ -25,8 +25,8 @@ from ..strands.strand_choices import BASES, COUNTS, PARTS, Items, path_in, stran
 from ..strands.strand_export import StrandExport, wishes_of
 from .inputs import Inputs
 from .job_options import (
-    add_at_most_option,
     add_frames_option,
+    add_max_frames_option,
     add_moment_options,
     add_object_option,
     frames_of_option,
@@ -40,7 +40,7 @@ def export(job: Job) -> None:
     """Write the strands for an engine, at rest, at a frame of a bake, or over frames."""
     options, report = job.options, job.report
     path, kind = path_in(job.output, options.format)
-    output, frames = strand_output(options), frames_of_option(options.frames, options.at_most)
+    output, frames = strand_output(options), frames_of_option(options.frames, options.max_frames)
     if options.object or _is_of_scene(options):
         plan = _of_objects(job, kind, output, frames)
     else:
@@ -170,7 +170,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         hair,
         "write the motion over these frames (Alembic, USD): of the bake of --object, or of --bake",
     )
-    add_at_most_option(hair)
+    add_max_frames_option(hair)
     hair.add_argument(
         "--no-bake",
         action="store_true",

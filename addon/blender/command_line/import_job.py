@@ -31,7 +31,7 @@ def import_grooms(job: Job) -> None:
             raise HairloomError(
                 f"strands would be {dropped_phrase(outcome.dropped)}",
                 place=str(path),
-                remedy="Mend the groom, or leave out --strict",
+                remedy="Fix the groom, or leave out --strict",
             )
         tell_notes(list(outcome.warnings), report)
         print(

@@ -93,32 +93,32 @@ def add_frames_option(parser: Any, about: str) -> None:
     parser.add_argument("--frames", nargs=2, type=int, metavar=("FIRST", "LAST"), help=about)
 
 
-def add_at_most_option(parser: Any) -> None:
+def add_max_frames_option(parser: Any) -> None:
     parser.add_argument(
-        "--at-most",
+        "--max-frames",
         type=int,
         metavar="COUNT",
-        help="so many frames from FIRST on, where LAST comes no sooner: a task of a farm",
+        help="at most this many frames from FIRST on: a task of a farm",
     )
 
 
-def frames_of_option(given: list[int] | None, at_most: int | None = None) -> range | None:
+def frames_of_option(given: list[int] | None, max_frames: int | None = None) -> range | None:
     """The frames that --frames names, the last one too, or the first of them; None without it.
 
     Raises:
         HairloomError: the last frame comes before the first, or there are to be none.
     """
-    if at_most is not None and (at_most < 1 or given is None):
+    if max_frames is not None and (max_frames < 1 or given is None):
         raise HairloomError(
-            f"{at_most} frames cannot be used" if given else "there are no frames to take from",
-            place="--at-most",
+            f"{max_frames} frames cannot be used" if given else "there are no frames to take from",
+            place="--max-frames",
             remedy="Give --frames FIRST LAST, and 1 or more",
         )
     if given is None:
         return None
     first, last = given
     frames = frame_range(first, last, "--frames")
-    return frames if at_most is None else frames[:at_most]
+    return frames if max_frames is None else frames[:max_frames]
 
 
 def add_bake_option(parser: Any) -> None:
@@ -238,7 +238,7 @@ def parameters_of[S: Settings](options: argparse.Namespace, settings: S) -> S:
 
 
 def add_farm_options(parser: argparse.ArgumentParser, *, can_skip: bool) -> None:
-    """What whoever started the job is told, and what a second run does again."""
+    """What is reported to whoever started the job, and what a second run does again."""
     job = parser.add_argument_group("the job")
     job.add_argument(
         "--report",
@@ -249,7 +249,7 @@ def add_farm_options(parser: argparse.ArgumentParser, *, can_skip: bool) -> None
         "--progress",
         choices=STYLES,
         default="lines",
-        help="how progress is told: for a reader (default), or for a farm that runs Open Job "
+        help="how progress is reported: to a reader (default), or to a farm that runs Open Job "
         "Descriptions",
     )
     if can_skip:

@@ -28,7 +28,7 @@ from .inputs import Inputs, Sources, head_of_sources, read_inputs
 
 @dataclass(frozen=True)
 class Job:
-    """One call of a verb: what to work on, how, where the result goes, and what is told of it."""
+    """One call of a verb: what to work on, how, where the result goes, and what is reported."""
 
     verb: str
     sources: Sources
@@ -89,7 +89,7 @@ def _tell_drops(job: Job, inputs: Inputs) -> None:
         raise HairloomError(
             f"strands would be dropped: {reasons}",
             place=inputs.groom_name,
-            remedy="Mend the groom, or leave out --strict",
+            remedy="Fix the groom, or leave out --strict",
         )
     print(f"hairloom: {inputs.groom_name}: dropped strands: {reasons}", flush=True)
 

@@ -1,8 +1,8 @@
 """What lets a farm run a task again and have only that done which is missing.
 
-A job that is told to skip what exists leaves a stamp beside its output: what it was asked for, and
-digests of all that it has read and written. It is done when all of these are still the same, so a
-changed scene, another option, a cut or missing file make it run again.
+A job with --skip-existing leaves a stamp beside its output: what was requested, and digests of all
+that it has read and written. It is done while all of these are the same; a changed scene, another
+option, or a truncated or missing file makes it run again.
 
 Paths are as seen from the stamp, so that a job whose folders are moved together, or are mounted
 elsewhere on another machine, is still done.

@@ -12,7 +12,7 @@ _HEADING = """# Verbs
 Made by `make docs` from the verbs themselves. [command-line.md](command-line.md) says how to call
 them; `VERB --help` says the same as here.
 """
-#: titles of the groups of options that many verbs have, told once
+#: titles of the groups of options that many verbs have, listed once
 _SHARED = ("what to work on (files, or objects of the scene)", "settings", "the job")
 
 type Groups = dict[str, list[argparse.Action]]

@@ -60,7 +60,7 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
             self.report({"WARNING"}, warning)
 
     def view_update(self, context: Any, depsgraph: Any) -> None:
-        """Blender has evaluated something anew."""
+        """Blender has evaluated something again."""
         self.failure = ""
         self._attempt(self.view.read, context, depsgraph)
 
@@ -77,7 +77,7 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
             self.tag_redraw()
 
     def _attempt(self, action: Any, context: Any, depsgraph: Any) -> Any:
-        """Do it; an error is told once, not at every redraw, until the scene is another one."""
+        """Do it; an error is reported once, not at every redraw, until the scene is another one."""
         if self.failure:
             return None
         try:

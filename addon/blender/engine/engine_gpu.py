@@ -60,7 +60,7 @@ def ensure_gpu_for_render() -> None:
         return
     if not gpu_in_use()["backend"] and not _can_draw():
         raise HairloomError(
-            "there is no GPU here, and no software driver that stands in for one",
+            "there is no GPU here, and no software driver in place of one",
             place="render",
             remedy="Install Mesa's drivers (libegl1, libgl1-mesa-dri) or render on another machine",
         )

@@ -52,7 +52,7 @@ class _ReadMesh:
 
 @dataclass(frozen=True, eq=False)
 class _ReadGroom:
-    """state: all that it hangs on but for its curves and its head."""
+    """state: all that it depends on, except its curves and its head."""
 
     state: tuple[Any, ...]
     groom: DrawnGroom

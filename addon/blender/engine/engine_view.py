@@ -32,7 +32,7 @@ from .engine_still import sky_of
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """All that a sample hangs on; equal ones add up.
+    """All that a sample depends on; equal ones accumulate.
 
     scene: with what is previewed in it.
     marks: numbers and objects that are others as soon as the picture is another one.
@@ -62,7 +62,7 @@ class EngineView:
         self._local: int = 0
 
     def read(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
-        """Take over what Blender has evaluated anew."""
+        """Take over what Blender has evaluated again."""
         changed = {update.id.original.session_uid for update in depsgraph.updates}
         self._read(context, depsgraph, changed if self._scene is not None else None)
 

@@ -33,7 +33,7 @@ from .slices import shown_slices
 #: three-quarter view from the front; heads face -Y
 VIEW_DIRECTION = (-0.55, -1.0, 0.18)
 FIELD_OF_VIEW = np.radians(30.0)
-#: how far around the groom its head is shown, as a share of the groom's size
+#: how far around the groom its head is shown, as a fraction of the groom's size
 HEAD_ROOM = 0.25
 #: below 1, because nothing fills the corners of the box that the camera holds
 MARGIN = 0.85
@@ -84,7 +84,7 @@ class Studio:
             points: (strand_count, cv_count, 3) [m], world space.
             samples: sub-pixels along each side of a pixel.
             camera: in place of the studio's own.
-            lights: in place of three that hang on the camera.
+            lights: in place of three that are attached to the camera.
             background: premultiplied.
         """
         camera, occluders = camera or self._camera(width / height), self._groom.occluders

@@ -18,10 +18,10 @@ from . import previews
 
 #: Scales that differ by less are rounding.
 _UNEVEN = 1.01
-#: So many roots, evenly chosen, say which mesh they are on.
+#: How many roots, evenly chosen, decide which mesh they are on.
 _ASKED = 100
-#: So many instances of a scene are looked at, 1 us each, for those of a groom.
-_MOST_INSTANCES = 10_000
+#: How many instances of a scene are searched for those of a groom, 1 us each.
+_MAX_INSTANCES = 10_000
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def instances_note(hair: bpy.types.Object) -> str:
     layer = bpy.context.view_layer
     if not any(_may_instance(obj) for obj in objects_in(layer) if obj != hair):
         return ""
-    looked_at = itertools.islice(layer.depsgraph.object_instances, _MOST_INSTANCES)
+    looked_at = itertools.islice(layer.depsgraph.object_instances, _MAX_INSTANCES)
     if any(each.is_instance and each.object.original == hair for each in looked_at):
         return "Instances of it have no hair in the preview; they have it in renders"
     return ""

@@ -31,7 +31,7 @@ SETTLING_TIME = 0.2
 #: Shading is drawn by quick tables while a slider moves, by full ones when it rests this long [s].
 REFINING_TIME = 0.3
 
-#: what may light hair anew; a light that was hidden or deleted is reported as its scene's change
+#: what may change the light on hair; a light that is hidden or deleted changes its scene
 _LIGHTING = (bpy.types.Light, bpy.types.World, bpy.types.Collection, bpy.types.Scene)
 
 
@@ -146,7 +146,7 @@ def _refine() -> None:
 def undone() -> None:
     """Anything may be different after undo and redo: look again, once Blender has settled.
 
-    Hair whose making was undone is simply gone; nobody needs to be told.
+    Hair whose creation was undone is simply gone; that needs no report.
     """
     for _, session in _grooms():
         if session.hair.handle.find() is None:
@@ -173,7 +173,7 @@ def _read_again() -> float | None:
 
 
 def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
-    """Read what was edited now; hair on another head is begun anew."""
+    """Read what was edited; hair on another head starts over."""
     for preview in tuple(previews.values()):
         if preview.session.is_stale:
             attempt(preview, depsgraph, partial(_read, preview, depsgraph))

@@ -39,7 +39,7 @@ class HAIRLOOM_PG_card_object(bpy.types.PropertyGroup):
         ),
         "wrong_fraction": FloatProperty(
             name="Wrong Order",
-            description="Share of the pixels that the finest level draws in a wrong order, from "
+            description="Fraction of the pixels that the finest level draws in a wrong order, from "
             "all sides",
             options={"HIDDEN"},
             override=OVERRIDABLE,
@@ -47,7 +47,7 @@ class HAIRLOOM_PG_card_object(bpy.types.PropertyGroup):
         "image": PointerProperty(
             type=bpy.types.Image,
             name="Image",
-            description="Picture of these cards, which is drawn anew with them",
+            description="Picture of these cards, which is drawn again with them",
             override=OVERRIDABLE,
         ),
     }

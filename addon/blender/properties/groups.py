@@ -148,7 +148,7 @@ class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
         "card_images": PointerProperty(
             type=HAIRLOOM_PG_card_images,
             name="Card Pictures",
-            description="Pictures in the place of generated textures of hair cards",
+            description="Pictures instead of generated textures of hair cards",
             override=OVERRIDABLE,
         ),
         "baked_in": StringProperty(

@@ -1,7 +1,7 @@
 """Presets: those that come with Hairloom and the artist's own, found by section, put onto a groom.
 
-The artist's own lie in the folder that Blender keeps for the extension. They are data like all
-presets, checked and never executed; a file there that is none is told of and otherwise left alone.
+The artist's own are in the folder that Blender keeps for the extension. They are data like all
+presets, checked and never executed; other files there are reported and otherwise left alone.
 """
 
 from __future__ import annotations

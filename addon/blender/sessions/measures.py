@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-#: What is reported is the median of so many frames, and only of what is not older than this [s].
+#: The median of this many frames is reported, and only of those not older than this [s].
 _KEPT, _LATEST = 15, 10.0
 
 #: of a frame

@@ -61,7 +61,7 @@ def _vertices_around(head: Surface, ball: Floats) -> Ints:
 
 
 def _carried(ball: Floats, rest: Floats, now: Floats) -> Floats | None:
-    """The ball (4,) where its surroundings have gone; None where that cannot be told."""
+    """The sphere (4,) where its surroundings have gone; None where that is unknown."""
     some = slice(None, None, max(len(rest) // _ENOUGH, 1))
     fit = fit_similarity(rest[some], now[some])
     if fit is None:

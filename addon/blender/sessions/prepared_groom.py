@@ -51,7 +51,7 @@ class BuildRequest:
     rig: Rig | None = None
 
     def gives_rig_of(self, other: BuildRequest) -> bool:
-        """Whether both give the same rig, as far as can be told without making it."""
+        """Whether both give the same rig, as far as is known without building it."""
         one, two = self.source, other.source
         return (
             self.settings.of_rig == other.settings.of_rig

@@ -328,7 +328,7 @@ class Session:
     def make_fields(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Have the fields of its colliders made beside the window's work, so that Play finds them.
 
-        What is wrong with a collider is told by Play.
+        Play reports what is wrong with a collider.
         """
         with suppress(HairloomError, NotMadeYetError):
             self._read_obstacles(depsgraph, blocking=False)

@@ -107,7 +107,7 @@ class GroomPicture:
         return shadow_warnings(lights, self._ball.of(snapshot), snapshot.volume)
 
     def take_groom(self, groom: PreparedGroom, settings: GroomSettings) -> None:
-        """All that hangs on the strands; it stands at rest, without light."""
+        """All that depends on the strands, at rest and without light."""
         self._groom = groom
         snapshot = snapshot_of(groom)
         self.snapshot = with_settings(snapshot, settings)

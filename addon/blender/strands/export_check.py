@@ -86,11 +86,11 @@ class ExportCheck:
         return f"{line}, out of date ({', '.join(changed)})" if changed else line
 
     def _look_at_bakes(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Once: hashing all that a bake hangs on takes too long for drawing."""
+        """Once: hashing all that a bake depends on takes too long for drawing."""
         for hair in filter(None, (each.find() for each in self.hair)):
             try:
                 cache = playback.cache_of(hair)
                 changed = () if cache is None else changed_since(hair, cache, depsgraph)
-            except HairloomError:  # told in the lines of its motion, and when it is written
+            except HairloomError:  # reported in the lines of its motion, and when it is written
                 changed = ()
             self._stale[hair.session_uid] = changed

@@ -68,7 +68,7 @@ class BakedMotion:
 
 @dataclass(frozen=True)
 class ShownMotion:
-    """Hair that modifiers and animation move, read anew at each frame."""
+    """Hair that modifiers and animation move, read again at each frame."""
 
     out: HairOut
     hair: Handle

@@ -195,7 +195,7 @@ def _weighed(groom: Groom, cv_count: int) -> Groom:
 
 
 def _at_cvs(values: Floats, strands: StrandSet, cv_count: int) -> Floats:
-    """Values of points (point_count, 3) at so many CVs of each strand, as `resample` has them."""
+    """Values of points (point_count, 3) at the CVs of each strand, as `resample` has them."""
     if (strands.point_counts == cv_count).all():
         return values
     left, weight = arc_length_positions(strands, cv_count)

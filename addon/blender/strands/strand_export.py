@@ -194,7 +194,7 @@ def _with_strands(groom: Groom, parts: str) -> Groom:
 def _bones(
     hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, outs: list[HairOut]
 ) -> tuple[BoneWeights | None, tuple[str, ...]]:
-    """The bones of all strands; none where some hair has no skinned head, which is told."""
+    """The bones of all strands; none where some hair has no skinned head, which is reported."""
     bones, without = [], []
     for each, out in zip(hair, outs, strict=True):
         own = bones_of(each, depsgraph, out.groom.strands)

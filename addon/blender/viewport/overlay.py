@@ -183,7 +183,7 @@ def retry() -> None:
 
 
 def _draw(what: Callable[[Any], None]) -> None:
-    """Called by Blender for each 3D view; an error is told once, not at every redraw."""
+    """Called by Blender for each 3D view; an error is reported once, not at every redraw."""
     if _overlay.failure or is_rendered_by_us(bpy.context):
         return
     try:
@@ -336,7 +336,7 @@ def _fail(error: Exception) -> None:
 
 
 def _tell_failure() -> None:
-    """Outside of drawing, where the handler may be removed and the window be told."""
+    """Outside of drawing, where the handler may be removed and the status text be set."""
     _remove_handlers()
     bpy.context.workspace.status_text_set(_overlay.failure.splitlines()[0])
     bpy.context.scene.update_tag()  # Blender's own strands are to be seen again
@@ -360,8 +360,8 @@ def forget_layers() -> None:
 def look_at_layers() -> None:
     """While a view is drawn: a view layer that is new in any window is evaluated after it.
 
-    Each view layer has evaluated copies of its own, and nobody is told when a window begins to
-    show one: our strands are drawn there at once, but Blender's are among them until it evaluates
+    Each view layer has its own evaluated copies, and nothing reports when a window begins to show
+    one: our strands are drawn there at once, but Blender's are among them until it evaluates
     something.
     """
     windows = bpy.context.window_manager.windows

@@ -30,7 +30,7 @@ from ...render.display import Display, DisplayTable, table_radiances
 from ..base.redraw import redraw_views
 from ..scene.lights import uses_scene_light
 
-#: tables kept, 7 MB each; a view transform more than that is asked for anew
+#: tables kept, 7 MB each; those of further view transforms are requested again
 CAPACITY = 8
 #: white balance: temperature [K] and tint
 type WhiteBalance = tuple[float, float]

@@ -25,8 +25,8 @@ type Arrays = dict[str, NDArray[Any]]
 MEMORY = 4 << 30
 #: Objects below each other; a damaged file may have them in a circle.
 DEEPEST = 64
-#: Exit code after an error that is told on stderr, as `apart` expects it.
-TOLD = 3
+#: Exit code after an error that is reported on stderr, as `run_reader` expects it.
+REPORTED = 3
 
 _VECTORS = {2: "IV2fArrayProperty", 3: "IV3fArrayProperty"}
 
@@ -141,7 +141,7 @@ def _main(path: str, result: str) -> int:
         found = read_curves(path)
     except (ImportError, RuntimeError, ValueError, LookupError, MemoryError) as error:
         print(str(error).strip() or type(error).__name__, file=sys.stderr)
-        return TOLD
+        return REPORTED
     with open(result, "wb") as file:
         np.savez(file, allow_pickle=False, **found)
     return 0

@@ -116,8 +116,8 @@ def joined(found: Arrays, path: Path) -> Joined:
 
 def _notes(objects: list[_Object]) -> tuple[str, ...]:
     together = f"its {len(objects):,} curves objects became one groom"
-    told = tuple(note for each in objects for note in each.notes)
-    return (together, *told) if len(objects) > 1 else told
+    notes = tuple(note for each in objects for note in each.notes)
+    return (together, *notes) if len(objects) > 1 else notes
 
 
 def _numbers(found: Arrays) -> list[int]:

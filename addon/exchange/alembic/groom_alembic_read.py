@@ -57,9 +57,9 @@ def read_groom_alembic(
             or no usable strand.
     """
     _check(path)
-    found = _read_apart(path, python)
+    found = _read_in_subprocess(path, python)
     curves = joined(found, path)
-    notes, space = list(curves.notes), space or _told_space(found)
+    notes, space = list(curves.notes), space or _recorded_space(found)
     if space is None:
         space = _guessed_space(curves)
         unit = "metres" if space.per_metre == 1.0 else "centimetres"
@@ -95,7 +95,7 @@ def _check(path: Path) -> None:
         raise _error(path, "it was never finished", "Export the groom again")
 
 
-def _read_apart(path: Path, python: Sequence[str] | None) -> Arrays:
+def _read_in_subprocess(path: Path, python: Sequence[str] | None) -> Arrays:
     """The file's curves, read by another process."""
     alembic_library(str(path))  # for its message, should it be missing
     script = Path(alembic_curves.__file__)
@@ -106,15 +106,15 @@ def _read_apart(path: Path, python: Sequence[str] | None) -> Arrays:
             return dict(arrays)
 
 
-def _told_space(found: Arrays) -> FileSpace | None:
+def _recorded_space(found: Arrays) -> FileSpace | None:
     """What our own files say of themselves, or what Blender's always are."""
     if "blender" in str(found.get("application", "")).lower():
         return FileSpace("Y", 1.0)
     text = str(found.get("groom_properties", ""))
-    told = dict(each.split("=", 1) for each in text.split(";") if "=" in each)
+    recorded = dict(each.split("=", 1) for each in text.split(";") if "=" in each)
     try:
-        per_metre = float(told["per_metre"])
-        space = FileSpace(told["up"], per_metre, told["mirrored"] == "1")
+        per_metre = float(recorded["per_metre"])
+        space = FileSpace(recorded["up"], per_metre, recorded["mirrored"] == "1")
     except (KeyError, ValueError):
         return None
     return space if space.up in ("Y", "Z") and 1e-6 < per_metre < 1e6 else None

@@ -1,8 +1,8 @@
 """Letting another process read a file, so that a library that fails on it does not take Blender
 along.
 
-What runs there is a script that imports none of our modules. It ends with TOLD after an error that
-it has written to stderr.
+What runs there is a script that imports none of our modules. It ends with REPORTED after an error
+that it has written to stderr.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ...errors import HairloomError
 #: for a process on Windows, which else would show one
 NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 #: exit code of a script that says why on stderr
-TOLD = 3
+REPORTED = 3
 #: Seconds for any file, and bytes that a slow disk gives in another one.
 _PATIENCE, _BYTES_A_SECOND = 60.0, 4.0e6
 
@@ -60,7 +60,7 @@ def run_reader(
         ) from error
     except OSError as error:
         raise _no_python(path, str(error)) from error
-    if done.returncode == TOLD:
+    if done.returncode == REPORTED:
         lines = done.stderr.decode(errors="replace").strip().splitlines() or ["no reason"]
         raise damaged(path, refusal(library, lines[-1]))
     if done.returncode:

@@ -29,7 +29,7 @@ from ..files.axes import from_z_up
 from ..files.names import plain_name
 from ..groom import Groom, GroomMotion, points_of
 from .usd_library import SUFFIXES, usd_library
-from .usd_probe import told
+from .usd_probe import summary
 
 #: The version of Epic's conventions that the names of primvars are from.
 GROOM_VERSION = (1, 5)
@@ -109,7 +109,7 @@ def write_usd(
                 _write_motion(usd, stage, parts, motion, space, path)
             stage.GetRootLayer().Save()
         except usd.Tf.ErrorException as error:
-            raise unwritable(path, told(error)) from error
+            raise unwritable(path, summary(error)) from error
 
 
 def _checked(up: str, scale: float, path: Path) -> UsdSpace:

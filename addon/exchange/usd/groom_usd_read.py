@@ -23,7 +23,7 @@ from ..files.axes import to_z_up
 from ..groom import Groom
 from ..read_groom import ReadGroom, kept_points
 from .usd_curves import Curves, UnusableCurvesError, curves_of
-from .usd_library import damage_told, opened_stage, usd_library
+from .usd_library import damage_reported, opened_stage, usd_library
 
 #: More than any groom; their positions alone take 3 GiB.
 MAX_POINTS = 1 << 28
@@ -55,7 +55,7 @@ def read_usd(
     """
     usd = usd_library(path)
     stage = opened_stage(path, python)
-    with damage_told(path):
+    with damage_reported(path):
         reading = _Reading(usd, stage, path, up, scale, factor)
         pieces = list(reading.pieces())
         if not pieces:

@@ -15,7 +15,7 @@ from typing import Any
 from ...errors import HairloomError
 from ..files.subprocess_reader import damaged, refusal, run_reader
 from .usd_crate import CRATE, check_crate
-from .usd_probe import told
+from .usd_probe import summary
 
 #: either of both, binary (crate), text
 SUFFIXES = (".usd", ".usdc", ".usda")
@@ -75,12 +75,12 @@ def opened_stage(path: Path, python: Sequence[str] | None = None) -> Any:
         # One thread: each further one reserves memory of its own, which would count.
         one_thread = {"PXR_WORK_THREAD_LIMIT": "1"}
         run_reader(PROBE, path, library="USD", python=python, settings=one_thread)
-    with damage_told(path):
+    with damage_reported(path):
         return usd.Usd.Stage.Open(str(path))
 
 
 @contextmanager
-def damage_told(path: Path) -> Iterator[None]:
+def damage_reported(path: Path) -> Iterator[None]:
     """Let the library's complaints about what a file holds become ours.
 
     Raises:
@@ -91,7 +91,7 @@ def damage_told(path: Path) -> Iterator[None]:
         yield
     # Beside its own error the library lets C++ exceptions through, as whatever Python has for them.
     except (usd.Tf.ErrorException, RuntimeError, ValueError, MemoryError) as error:
-        raise damaged(path, refusal("USD", told(error))) from error
+        raise damaged(path, refusal("USD", summary(error))) from error
 
 
 def _unusable(path: Path, problem: str, remedy: str) -> HairloomError:

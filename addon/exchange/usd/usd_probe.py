@@ -1,7 +1,7 @@
 """Reads all of a USD file in a process of its own: a script, run with the file's path.
 
-It ends with 0 when the library could read everything; with TOLD and a line on stderr when it could
-not. Whatever else a damaged file makes the library do, it does not do to Blender.
+It ends with 0 when the library could read everything; with REPORTED and a line on stderr when it
+could not. Whatever else a damaged file makes the library do, it does not do to Blender.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import os
 import sys
 from pathlib import Path
 
-#: as `apart` expects it
-TOLD = 3
+#: as `run_reader` expects it
+REPORTED = 3
 
 #: Memory that a file may take beside its own size, and as a multiple of it.
 _BESIDE, _MAX_TIMES = 1 << 30, 30
@@ -29,12 +29,12 @@ def main(path: Path) -> int:
                 if attribute.Get() is None:
                     attribute.Get(first)
     except (Tf.ErrorException, RuntimeError, ValueError, MemoryError) as error:
-        print(ascii(told(error)), file=sys.stderr)
-        return TOLD
+        print(ascii(summary(error)), file=sys.stderr)
+        return REPORTED
     return 0
 
 
-def told(error: BaseException) -> str:
+def summary(error: BaseException) -> str:
     """An error of the library in one line, without where in its code it was."""
     try:
         text = str(error)
