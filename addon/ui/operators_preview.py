@@ -11,7 +11,7 @@ import time
 
 import bpy
 
-from ..blender.bakes.fingerprints import frame_rate
+from ..blender.bakes.groom_hashes import frame_rate
 from ..blender.base.outcome import Outcome, report
 from ..blender.base.pace import Pace
 from ..blender.base.suspension import is_suspended

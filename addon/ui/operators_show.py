@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ..blender.bakes.fingerprints import frame_rate
+from ..blender.bakes.groom_hashes import frame_rate
 from ..blender.base.images import write_png
 from ..blender.base.outcome import report
 from ..blender.pictures.sheet import Sheet

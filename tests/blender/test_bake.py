@@ -192,8 +192,8 @@ def aged(folder):
     file = folder / FACTS
     content = json.loads(file.read_text(encoding="utf-8"))
     now, old = solver_part(str(SOLVER_VERSION)), solver_part("1")
-    assert now in content["fingerprint"]
-    content["fingerprint"] = content["fingerprint"].replace(now, old)
+    assert now in content["rig_hash"]
+    content["rig_hash"] = content["rig_hash"].replace(now, old)
     file.write_text(json.dumps(content), encoding="utf-8")
     playback.forget()
 
@@ -293,13 +293,13 @@ def test_a_crash_leaves_a_whole_bake(broken_off, swinging, tmp_path):
     hair, _ = swinging
     bake(hair)
     folder, new, old = (tmp_path / f"bake{ending}" for ending in ("", ".new", ".old"))
-    damping = Cache(folder).facts.fingerprint
+    damping = Cache(folder).facts.rig_hash
     shutil.copytree(folder, new)
     if broken_off == "while writing":
         (new / "cache.json").unlink()
     elif broken_off == "in the swap":
         folder.rename(old)
-    assert Cache(folder).facts.fingerprint == damping
+    assert Cache(folder).facts.rig_hash == damping
     assert Cache(folder).frame(LAST)["guides"].shape == (60, 16, 3)
     bake(hair)
     assert [path.name for path in tmp_path.iterdir()] == ["bake"]

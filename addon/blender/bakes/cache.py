@@ -40,7 +40,7 @@ class Facts:
     """What is known of a bake without reading its frames.
 
     first, last: scene frames. frame_rate: [1/s].
-    form: what computed it. fingerprint, moments: see `simulated.hashes`; a moment a frame.
+    form: what computed it. rig_hash, frame_hashes (one for each frame): see `simulated.hashes`.
     hairloom: the version that wrote it.
     """
 
@@ -49,9 +49,9 @@ class Facts:
     last: int
     frame_rate: float
     form: str
-    fingerprint: str
+    rig_hash: str
     hairloom: str
-    moments: tuple[str, ...] = ()
+    frame_hashes: tuple[str, ...] = ()
 
     @property
     def frame_count(self) -> int:
@@ -68,7 +68,7 @@ class CacheWriter:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._new, self._old = _beside(folder, ".new"), _beside(folder, ".old")
-        self._moments: list[str] = []
+        self._frame_hashes: list[str] = []
         self._layout: dict[str, list[Any]] = {}
         try:
             recover(folder)
@@ -82,19 +82,19 @@ class CacheWriter:
     def add_constants(self, arrays: Arrays) -> None:
         self._save(CONSTANTS, arrays)
 
-    def add(self, frame: int, arrays: Arrays, moment: str) -> None:
+    def add(self, frame: int, arrays: Arrays, frame_hash: str) -> None:
         """Frames come in order; all hold arrays of the same names, types and shapes."""
         layout = {name: [str(a.dtype), list(a.shape)] for name, a in arrays.items()}
-        assert not self._moments or layout == self._layout, "the frames of a bake are alike"
+        assert not self._frame_hashes or layout == self._layout, "the frames of a bake are alike"
         self._layout = layout
-        self._moments.append(moment)
+        self._frame_hashes.append(frame_hash)
         self._save(_frame_name(frame), arrays)
 
     def finish(self, facts: Facts) -> None:
         """Replace the earlier bake by this one, complete."""
-        assert len(self._moments) == facts.frame_count, "all frames are there"
+        assert len(self._frame_hashes) == facts.frame_count, "all frames are there"
         content = {"version": VERSION, **asdict(facts), "layout": self._layout}
-        content["moments"] = self._moments
+        content["frame_hashes"] = self._frame_hashes
         try:
             with open(self._new / FACTS, "w", encoding="utf-8") as file:
                 json.dump(content, file, indent=1)
@@ -133,9 +133,10 @@ class Cache:
         content = _read_facts(folder / FACTS)
         try:
             self._layout = {str(n): (str(d), tuple(s)) for n, (d, s) in content["layout"].items()}
-            names = [name for name in Facts.__dataclass_fields__ if name != "moments"]
+            names = [name for name in Facts.__dataclass_fields__ if name != "frame_hashes"]
             self.facts = Facts(
-                **{name: content[name] for name in names}, moments=tuple(content["moments"])
+                **{name: content[name] for name in names},
+                frame_hashes=tuple(content["frame_hashes"]),
             )
             _check(self.facts)
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -146,8 +147,8 @@ class Cache:
     def holds(self, frame: int) -> bool:
         return self.facts.first <= frame <= self.facts.last
 
-    def moment(self, frame: int) -> str:
-        return self.facts.moments[frame - self.facts.first]
+    def frame_hash(self, frame: int) -> str:
+        return self.facts.frame_hashes[frame - self.facts.first]
 
     def constants(self) -> Arrays:
         if self._constants is None:
@@ -257,10 +258,10 @@ def _check(facts: Facts) -> None:
     """Raise ValueError or TypeError for what no bake says of itself."""
     if not (isinstance(facts.first, int) and isinstance(facts.last, int)):
         raise TypeError("its frames are no whole numbers")
-    texts = (facts.owner, facts.form, facts.fingerprint, facts.hairloom, *facts.moments)
+    texts = (facts.owner, facts.form, facts.rig_hash, facts.hairloom, *facts.frame_hashes)
     if not all(isinstance(text, str) for text in texts):
         raise TypeError("names and hashes are no texts")
-    if len(facts.moments) != facts.frame_count:
+    if len(facts.frame_hashes) != facts.frame_count:
         raise ValueError("frames are missing")
     if not (math.isfinite(facts.frame_rate) and facts.frame_rate > 0.0):
         raise ValueError("the frame rate is no positive number")

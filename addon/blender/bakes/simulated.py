@@ -74,10 +74,10 @@ class Simulated(Protocol):
     def show_recorded(self, frame: Arrays) -> None:
         """Show a frame of a bake in place of what was simulated."""
 
-    def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
-        """Hashes of what a bake depends on beside the animation."""
+    def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
+        """Hashes of what a bake depends on in all its frames."""
 
-    def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
+    def frame_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """Hashes of what drives this frame."""
 
 
@@ -95,21 +95,21 @@ def differences(known: str, now: str) -> tuple[str, ...]:
 
 
 def solver_part(version: str) -> str:
-    """What a fingerprint says of the version of the solver."""
+    """The part of a rig hash that stands for the version of the solver."""
     return hashes(solver=version)
 
 
-def as_now(fingerprint: str, moments: Sequence[str]) -> str:
-    """The fingerprint of a bake of hair, by the version of now where that gives the same motion.
+def as_now(rig_hash: str, frame_hashes: Sequence[str]) -> str:
+    """The rig hash of a bake of hair, with today's version where that gives the same motion.
 
     Args:
-        moments: those of its frames.
+        frame_hashes: those of its frames.
     """
-    settings = {_parts(moment).get("settings") for moment in moments}
+    settings = {_parts(frame_hash).get("settings") for frame_hash in frame_hashes}
     if len(settings) > 1:
-        return fingerprint
+        return rig_hash
     old, now = (solver_part(each) for each in (_WITHOUT_ANIMATED_SETTINGS, str(SOLVER_VERSION)))
-    return " ".join(now if part == old else part for part in fingerprint.split())
+    return " ".join(now if part == old else part for part in rig_hash.split())
 
 
 def _parts(named: str) -> dict[str, str]:

@@ -10,7 +10,7 @@ from ..properties.groom_settings import GroomSettings
 from ..scene.poses import read_pose
 from . import playback
 from .cache import Cache
-from .fingerprints import groom_fingerprint, groom_moment, settings_part
+from .groom_hashes import groom_frame_hash, groom_rig_hash, settings_part
 from .simulated import as_now, differences
 
 
@@ -25,12 +25,12 @@ def changed_since(
         HairloomError: the bake is damaged.
     """
     facts, head, settings = cache.facts, head_of(hair), GroomSettings.of(hair)
-    now = groom_fingerprint(hair, head, settings, depsgraph.scene)
-    changed = differences(as_now(facts.fingerprint, facts.moments), now)
+    now = groom_rig_hash(hair, head, settings, depsgraph.scene)
+    changed = differences(as_now(facts.rig_hash, facts.frame_hashes), now)
     scene = depsgraph.scene
     if cache.holds(scene.frame_current) and not scene.frame_subframe:
         changed += _moved_otherwise(hair, head, cache, depsgraph)
-    elif not any(settings_part(hair) in moment.split() for moment in facts.moments):
+    elif not any(settings_part(hair) in frame_hash.split() for frame_hash in facts.frame_hashes):
         changed += ("settings",)
     return tuple(dict.fromkeys(changed))
 
@@ -68,5 +68,5 @@ def _moved_otherwise(
         pose = read_pose(Body(Handle.of(hair), baked.rests.hair), carrier, count, depsgraph)
     except HairloomError:  # it has other vertices now, or is nowhere
         return ("pose",)
-    now = groom_moment(hair, head if carrier else None, pose, depsgraph)
-    return differences(cache.moment(depsgraph.scene.frame_current), now)
+    now = groom_frame_hash(hair, head if carrier else None, pose, depsgraph)
+    return differences(cache.frame_hash(depsgraph.scene.frame_current), now)

@@ -16,7 +16,7 @@ from ...errors import HairloomError
 from ..bakes import baked_copy, playback
 from ..bakes.bake_settings import choose_folder, folder_of, folders_of_others, frames_of
 from ..bakes.cache import CacheWriter, Facts, delete
-from ..bakes.fingerprints import frame_rate
+from ..bakes.groom_hashes import frame_rate
 from ..bakes.simulated import Simulated
 from ..base.objects import Handle
 from ..base.report import environment
@@ -37,7 +37,7 @@ class _Part:
     folder: Path
     session: Simulated | None = None
     writer: CacheWriter | None = None
-    fingerprint: str = ""
+    rig_hash: str = ""
     notes: tuple[str, ...] = ()
 
     def go(self, frame: int, depsgraph: bpy.types.Depsgraph) -> None:
@@ -47,7 +47,7 @@ class _Part:
         if self.writer is None or self.session is None:
             session = self.session = simulated_for(self.found(), depsgraph)
             session.play(depsgraph)
-            self.fingerprint = session.fingerprint(depsgraph)
+            self.rig_hash = session.rig_hash(depsgraph)
             self.notes = session.rig.notes if isinstance(session, Session) else ()
             self.writer = CacheWriter(self.folder)
             self.writer.add_constants(session.constants())
@@ -56,7 +56,7 @@ class _Part:
             if isinstance(session, Session):
                 session.take_settings()  # those that are animated
             session.advance(depsgraph, 1.0 / frame_rate(depsgraph.scene))
-        self.writer.add(frame, session.recorded(), session.moment(depsgraph))
+        self.writer.add(frame, session.recorded(), session.frame_hash(depsgraph))
 
     def finish(self, rate: float) -> None:
         assert self.writer is not None and self.session is not None
@@ -67,7 +67,7 @@ class _Part:
                 last=self.frames.stop - 1,
                 frame_rate=rate,
                 form=form_of_session(self.session),
-                fingerprint=self.fingerprint,
+                rig_hash=self.rig_hash,
                 hairloom=environment()["hairloom"],
             )
         )

@@ -22,7 +22,7 @@ from ...errors import HairloomError
 from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
 from ..bakes.cache import Cache, Facts
-from ..bakes.fingerprints import RIG_PARTS, frame_rate, groom_fingerprint
+from ..bakes.groom_hashes import RIG_PARTS, frame_rate, groom_rig_hash
 from ..bakes.simulated import Simulated, as_now, differences
 from ..base import latest_job
 from ..base.objects import Handle, head_of
@@ -186,7 +186,7 @@ class Preview:
         """Blender has evaluated the body again, within a frame; the hair rests if that moved."""
         assert self.groom is not None
         if self.phase is Phase.BAKED and self.bake is not None:
-            if self.session.moment(depsgraph) == self.bake.frame_hash:
+            if self.session.frame_hash(depsgraph) == self.bake.frame_hash:
                 return
             facts = self.bake.facts
             self.bake = Bake(facts, self._changed(facts, depsgraph))
@@ -202,7 +202,7 @@ class Preview:
     def check(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Find out again whether there is a bake, and whether it is up to date."""
         obj = self.found()
-        self.rig_hash = self.session.fingerprint(depsgraph)
+        self.rig_hash = self.session.rig_hash(depsgraph)
         cache = self._cache_of(obj)
         self.bake = None if cache is None else self._state(cache.facts, depsgraph)
 
@@ -234,25 +234,25 @@ class Preview:
             self.bake_problem = str(error)
             return False
         self.act(Event.IS_BAKED, depsgraph)
-        self.rig_hash = self.rig_hash or self.session.fingerprint(depsgraph)
+        self.rig_hash = self.rig_hash or self.session.rig_hash(depsgraph)
         self.bake = self._state(cache.facts, depsgraph)
         return True
 
     def _state(self, facts: Facts, depsgraph: bpy.types.Depsgraph) -> Bake:
-        frame_hash = self.session.moment(depsgraph)
+        frame_hash = self.session.frame_hash(depsgraph)
         return Bake(facts, self._changed(facts, depsgraph, frame_hash), frame_hash)
 
     def _changed(
         self, facts: Facts, depsgraph: bpy.types.Depsgraph, frame_hash: str = ""
     ) -> tuple[str, ...]:
-        baked = facts.fingerprint
+        baked = facts.rig_hash
         if self.groom is not None:
-            baked = as_now(baked, facts.moments)
+            baked = as_now(baked, facts.frame_hashes)
         changed = differences(baked, self.rig_hash or baked)
         frame = depsgraph.scene.frame_current
         if facts.first <= frame <= facts.last:
-            recorded = facts.moments[frame - facts.first]
-            changed += differences(recorded, frame_hash or self.session.moment(depsgraph))
+            recorded = facts.frame_hashes[frame - facts.first]
+            changed += differences(recorded, frame_hash or self.session.frame_hash(depsgraph))
         return tuple(dict.fromkeys(changed))
 
     def _cache_of(self, obj: bpy.types.Object) -> Cache | None:
@@ -269,8 +269,8 @@ def rig_for(hair: bpy.types.Object, scene: bpy.types.Scene) -> BakedRig | None:
         cache = playback.cache_of(hair)
         if cache is None:
             return None
-        now = groom_fingerprint(hair, head_of(hair), GroomSettings.of(hair), scene)
-        changed = differences(cache.facts.fingerprint, now)
+        now = groom_rig_hash(hair, head_of(hair), GroomSettings.of(hair), scene)
+        changed = differences(cache.facts.rig_hash, now)
         return None if set(changed) & set(RIG_PARTS) else playback.rig_in(cache)
     except HairloomError:  # reported when the bake is to be shown
         return None

@@ -16,7 +16,7 @@ from ...dynamics.cloth.state import ClothState, start_cloth
 from ...dynamics.cloth.step import advance_cloth, cloth_at_frame_end
 from ...dynamics.step import Drive
 from ...errors import HairloomError
-from ..bakes.fingerprints import collider_places, collider_shapes, frame_rate, mesh_parts
+from ..bakes.groom_hashes import collider_places, collider_shapes, frame_rate, mesh_parts
 from ..bakes.simulated import CLOTH_VERSION, Arrays, hashes
 from ..base.objects import Body, matrix_of, objects_in
 from ..base.vertex_weights import read_weights
@@ -157,7 +157,7 @@ class FinSession:
             )
         self._show(obj, position)
 
-    def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
+    def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
         obj = self._found()
         modifiers = [(each.type, each.name) for each in obj.modifiers if each.show_viewport]
@@ -169,7 +169,7 @@ class FinSession:
             solver=str(CLOTH_VERSION),
         )
 
-    def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
+    def frame_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
         obj = self._found()
         carried, matrix = self._read(obj, depsgraph)

@@ -15,7 +15,7 @@ from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet
 from ..bakes.baked_rig import BakedRig, RestMatrices
-from ..bakes.fingerprints import groom_fingerprint, groom_moment
+from ..bakes.groom_hashes import groom_frame_hash, groom_rig_hash
 from ..base.objects import Body, head_of, matrix_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.poses import check_finite, read_pose
@@ -134,17 +134,17 @@ class GroomSource:
         vertex_count = None if rig.head is None else len(rig.head.positions)
         return read_pose(self.hair, self.head, vertex_count, depsgraph)
 
-    def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
+    def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
         hair = self.hair.found()
         head = None if self.head is None else self.head.found()
-        return groom_fingerprint(hair, head, self.settings, depsgraph.scene)
+        return groom_rig_hash(hair, head, self.settings, depsgraph.scene)
 
-    def moment(self, pose: Pose, depsgraph: bpy.types.Depsgraph) -> str:
+    def frame_hash(self, pose: Pose, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
         hair = self.hair.found()
         head = None if self.head is None else self.head.found()
-        return groom_moment(hair, head, pose, depsgraph)
+        return groom_frame_hash(hair, head, pose, depsgraph)
 
 
 def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:

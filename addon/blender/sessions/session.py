@@ -125,13 +125,13 @@ class Session:
         """See `baked_rig.rig_arrays`."""
         return rig_arrays(self.rig, self._source.rests)
 
-    def fingerprint(self, depsgraph: bpy.types.Depsgraph) -> str:
+    def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
-        return self._source.fingerprint(depsgraph)
+        return self._source.rig_hash(depsgraph)
 
-    def moment(self, depsgraph: bpy.types.Depsgraph) -> str:
+    def frame_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
-        return self._source.moment(self._pose(depsgraph), depsgraph)
+        return self._source.frame_hash(self._pose(depsgraph), depsgraph)
 
     def _pose(self, depsgraph: bpy.types.Depsgraph) -> Pose:
         return self._source.pose(self.rig, depsgraph)

@@ -18,7 +18,7 @@ from ...pipeline import Pose, Rig
 from ...strands.resample import resample
 from ..bakes import playback
 from ..bakes.cache import Cache
-from ..bakes.fingerprints import frame_rate
+from ..bakes.groom_hashes import frame_rate
 from ..bakes.playback import check_frames
 from ..bakes.stale_bakes import stale_notes
 from ..base.objects import Body, Handle, head_of

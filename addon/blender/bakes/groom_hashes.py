@@ -1,7 +1,7 @@
-"""What a groom's bake hangs on, as hashes: the same wherever the scene's playhead stands.
+"""The hashes of what a groom's bake depends on.
 
-Taken from the original data, in object space and before modifiers: these do not change with the
-animation. What modifiers and animation do to them shows in the moment of each frame.
+A rig hash is the same in every frame of the scene: it is taken from the original data, in object
+space and before modifiers. What modifiers and animation change shows in the hash of each frame.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from ..scene.surfaces import read_positions
 from ..scene.wind import gravity_of, scene_wind
 from .simulated import SOLVER_VERSION, Hashed, hashes
 
-#: What of the fingerprint makes the rig.
+#: The parts of a rig hash that determine the rig; the others only matter to a bake.
 RIG_PARTS = ("hair", "head", "guides", "children")
 
 
-def groom_fingerprint(
+def groom_rig_hash(
     hair: bpy.types.Object,
     head: bpy.types.Object | None,
     settings: GroomSettings,
     scene: bpy.types.Scene,
 ) -> str:
-    """Named hashes, see `simulated.hashes`; their names are what an artist is told has changed."""
+    """Named hashes, see `simulated.hashes`; messages say by these names what has changed."""
     grown: dict[str, tuple[Hashed, ...]] = {}
     if settings[ChildrenSettings].method != "none":  # bakes of older versions know of no children
         grown["children"] = (
@@ -54,7 +54,7 @@ def groom_fingerprint(
     )
 
 
-def groom_moment(
+def groom_frame_hash(
     hair: bpy.types.Object,
     head: bpy.types.Object | None,
     pose: Pose,
@@ -74,7 +74,7 @@ def groom_moment(
 
 
 def settings_part(hair: bpy.types.Object) -> str:
-    """What such a moment says of the settings."""
+    """The part of a frame hash that stands for the settings."""
     return hashes(settings=_dynamics(hair))
 
 
