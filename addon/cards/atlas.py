@@ -116,8 +116,8 @@ class _CardShapes:
 
     strand_count: (n,).
     covered: (n, row_count) fraction of each row that its strands cover.
-    pace: (n, row_count) way from row to row [m].
-    features: (n, 5), of which each counts for as much as it is seen.
+    spacing: (n, row_count) distance from row to row [m].
+    features: (n, 5), each weighted by how visible it is.
     """
 
     strand_count: Ints

@@ -1,8 +1,10 @@
-"""The order that breaks the least of many wishes "this before that": linear ordering by insertion.
+"""The order that breaks the least of many preferences "this before that": linear ordering by
+insertion.
 
-Each wish has a weight, wishes may contradict each other. The problem is NP-hard; moving one after
-the other to where it breaks the least, until nothing moves, comes near the optimum in practice
-(Marti and Reinelt, "The Linear Ordering Problem", 2011, section 2: insertion neighbourhood).
+Each preference has a weight, and they may contradict each other. The problem is NP-hard; moving one
+thing after the other to where it breaks the least, until nothing moves, comes near the optimum in
+practice (Marti and Reinelt, "The Linear Ordering Problem", 2011, section 2: insertion
+neighbourhood).
 """
 
 from __future__ import annotations
@@ -15,11 +17,11 @@ from ..arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
-class Wishes:
-    """What is left of wishes when those that contradict each other are set off.
+class Preferences:
+    """What is left of preferences when those that contradict each other cancel out.
 
     lower, higher: (pair_count,) two of `count` things, each pair once.
-    weight: (pair_count,) above 0, where the lower number is to come first, else below 0.
+    weight: (pair_count,) above 0 where the lower number should come first, else below 0.
     """
 
     count: int
@@ -28,23 +30,23 @@ class Wishes:
     weight: Ints
 
     def broken(self, rank: Ints) -> int:
-        """Weight of the wishes that an order breaks, which gives each thing its rank, (count,)."""
+        """Weight of the preferences that an order breaks. rank: (count,) of each thing."""
         is_lower_first = rank[self.lower] < rank[self.higher]
         return int(np.abs(self.weight[is_lower_first != (self.weight > 0)]).sum())
 
-    def of_whole(self, whole: Ints, count: int) -> Wishes:
-        """The same wishes for the `count` things that these are parts of, whole: (self.count,)."""
+    def of_whole(self, whole: Ints, count: int) -> Preferences:
+        """The same preferences for the `count` things that these are parts of, (self.count,)."""
         is_lower_first = self.weight > 0
         before = np.where(is_lower_first, self.lower, self.higher)
         after = np.where(is_lower_first, self.higher, self.lower)
-        return wishes(count, whole[before], whole[after], np.abs(self.weight))
+        return net_preferences(count, whole[before], whole[after], np.abs(self.weight))
 
 
-def wishes(count: int, before: Ints, after: Ints, weight: Ints) -> Wishes:
-    """`before` is to come before `after`, each (wish_count,) of `count` things.
+def net_preferences(count: int, before: Ints, after: Ints, weight: Ints) -> Preferences:
+    """`before` should come before `after`, each (pair_count,) of `count` things.
 
     Args:
-        weight: (wish_count,), not negative. A thing and itself have no order.
+        weight: (pair_count,), not negative. A thing and itself have no order.
     """
     is_pair = before != after
     before, after, weight = before[is_pair], after[is_pair], weight[is_pair]
@@ -55,24 +57,24 @@ def wishes(count: int, before: Ints, after: Ints, weight: Ints) -> Wishes:
     signed = np.where(before < after, weight, -weight).astype(np.int64)[order]
     total = np.add.reduceat(signed, starts) if len(starts) else signed
     lower, higher = np.divmod(key[starts][total != 0], max(count, 1))
-    return Wishes(count, lower, higher, total[total != 0])
+    return Preferences(count, lower, higher, total[total != 0])
 
 
-def min_broken(wished: Wishes, start: Ints, max_moves: int = 20) -> Ints:
+def min_broken(preferences: Preferences, start: Ints, max_moves: int = 20) -> Ints:
     """The rank of each thing, (count,), in an order from which no single move is better.
 
-    A thing is looked at again when one that it has wishes with has moved. Things without wishes
-    stay beside their neighbours in `start`.
+    A thing is looked at again when one that it is compared with has moved. Things without
+    preferences stay beside their neighbours in `start`.
 
     Args:
         start: (count,) the things in the order that is improved.
-        most_moves: how often a thing is looked at, on average, at most.
+        max_moves: how often a thing is looked at, on average.
     """
-    place = np.empty(wished.count)
-    place[start] = np.arange(wished.count)
-    firsts, others, weights = _by_thing(wished)
+    place = np.empty(preferences.count)
+    place[start] = np.arange(preferences.count)
+    firsts, others, weights = _by_thing(preferences)
     random = np.random.default_rng(0)
-    waiting, looks = np.ones(wished.count, bool), max_moves * wished.count
+    waiting, looks = np.ones(preferences.count, bool), max_moves * preferences.count
     while looks > 0 and waiting.any():
         todo = random.permutation(np.flatnonzero(waiting))
         waiting[:] = False
@@ -83,7 +85,7 @@ def min_broken(wished: Wishes, start: Ints, max_moves: int = 20) -> Ints:
                 place[thing] = better
                 waiting[others[mine]] = True
         looks -= len(todo)
-        place[np.argsort(place, kind="stable")] = np.arange(wished.count)
+        place[np.argsort(place, kind="stable")] = np.arange(preferences.count)
     return place.astype(np.int64)
 
 
@@ -91,7 +93,7 @@ def _better_place(own: float, places: Floats, weights: Ints) -> float | None:
     """Between which of the others a thing breaks the least; None where it cannot be bettered.
 
     Args:
-        weights: above 0 where the thing is to come before the other.
+        weights: above 0 where the thing should come before the other.
     """
     order = places.argsort()
     places = places[order]
@@ -105,11 +107,11 @@ def _better_place(own: float, places: Floats, weights: Ints) -> float | None:
     return float(low + high) / 2.0
 
 
-def _by_thing(wished: Wishes) -> tuple[list[int], Ints, Ints]:
-    """Where the wishes of each thing begin, with whom they are and what they weigh."""
-    one = np.concatenate([wished.lower, wished.higher])
-    other = np.concatenate([wished.higher, wished.lower])
-    weight = np.concatenate([wished.weight, -wished.weight])
+def _by_thing(preferences: Preferences) -> tuple[list[int], Ints, Ints]:
+    """Where the preferences of each thing begin, to which others, and their weights."""
+    one = np.concatenate([preferences.lower, preferences.higher])
+    other = np.concatenate([preferences.higher, preferences.lower])
+    weight = np.concatenate([preferences.weight, -preferences.weight])
     order = np.argsort(one, kind="stable")
-    firsts = np.searchsorted(one[order], np.arange(wished.count + 1))
+    firsts = np.searchsorted(one[order], np.arange(preferences.count + 1))
     return firsts.tolist(), other[order], weight[order]

@@ -28,7 +28,7 @@ from ..strands import Surface
 from ..strands.closest_point import closest_point
 from .card_mesh import OF_CARDS, OF_VERTICES, CardMesh
 from .order_pairs import Pairs, all_pairs, pairs_by_view
-from .order_search import Wishes, min_broken, wishes
+from .order_search import Preferences, min_broken, net_preferences
 from .steps import result_of
 
 #: Vertices of a card whose distance from the head is measured; more hardly change the order.
@@ -143,17 +143,17 @@ def _canonical_orders(
 
 def _learnt(mesh: CardMesh, pairs: Pairs, cards: Ints, piece: Ints | None) -> Ints:
     """All triangles in the order that breaks the least of the pairs, starting from whole cards."""
-    wished = wishes(len(mesh.triangles), pairs.behind, pairs.before, pairs.weight)
-    triangles = _improved(wished, mesh.card, cards)
+    preferences = net_preferences(len(mesh.triangles), pairs.behind, pairs.before, pairs.weight)
+    triangles = _improved(preferences, mesh.card, cards)
     if piece is None:
         return triangles
     _, first = np.unique(piece[triangles], return_index=True)
-    return _improved(wished, piece, np.argsort(first))
+    return _improved(preferences, piece, np.argsort(first))
 
 
-def _improved(wished: Wishes, thing: Ints, start: Ints) -> Ints:
+def _improved(preferences: Preferences, thing: Ints, start: Ints) -> Ints:
     """All triangles in an order of what they belong to, (triangle_count,), better than `start`."""
-    rank = min_broken(wished.of_whole(thing, len(start)), start)
+    rank = min_broken(preferences.of_whole(thing, len(start)), start)
     return np.argsort(rank[thing], kind="stable")
 
 

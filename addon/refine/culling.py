@@ -61,15 +61,15 @@ class Shades:
     slope: Floats
 
 
-def shades_of(hiders: Floats, view: PictureView, half_width: float, radius: float) -> Shades:
+def shades_of(spheres: Floats, view: PictureView, half_width: float, radius: float) -> Shades:
     """What balls hide in one view, at most as many as there are balls.
 
     Args:
-        hiders: (k, 4) xyz centre and w radius [m, world].
+        spheres: (k, 4) xyz centre and w radius [m, world] of occluder spheres.
         half_width: of what is drawn, at most [pixels].
         radius: of the strands, at most [m].
     """
-    balls = np.asarray(hiders, np.float64).reshape(-1, 4)
+    balls = np.asarray(spheres, np.float64).reshape(-1, 4)
     eye = np.linalg.inv(np.asarray(view.view, np.float64))
     scale = np.abs(np.diag(view.projection)[:2]) * view.half_size  # [pixels] for a metre, or slope
     if view.projection[3, 3] == 0.0:
@@ -126,7 +126,7 @@ def faces_away(root: Floats, center: Floats, eye: Floats) -> Bools:
     return np.einsum("ij,ij->i", root - center, to_eye) < 0.0
 
 
-def hiders_of(surface: Surface, count: int = 8, roots: Floats | None = None) -> Floats:
+def occluder_spheres_of(surface: Surface, count: int = 8, roots: Floats | None = None) -> Floats:
     """The largest balls inside a mesh that differ, largest first, (k <= count, 4) float32.
 
     xyz centre, w radius [m], in the space of the surface. Holes count as closed by a flat cap, so
@@ -147,12 +147,12 @@ def hiders_of(surface: Surface, count: int = 8, roots: Floats | None = None) -> 
     return _different(balls, count).astype(np.float32)
 
 
-def moved_hiders(hiders: Floats, matrix: Floats) -> Floats:
-    """Balls (k, 4) moved by an affine (4, 4) matrix, no larger than what becomes of them."""
+def moved_spheres(spheres: Floats, matrix: Floats) -> Floats:
+    """Spheres (k, 4) moved by an affine (4, 4) matrix, within the ellipsoids that they become."""
     matrix = np.asarray(matrix, np.float64)
-    centers = hiders[:, :3] @ matrix[:3, :3].T + matrix[:3, 3]
-    least = np.linalg.svd(matrix[:3, :3], compute_uv=False).min()
-    return np.column_stack([centers, hiders[:, 3] * least]).astype(np.float32)
+    centers = spheres[:, :3] @ matrix[:3, :3].T + matrix[:3, 3]
+    min_scale = np.linalg.svd(matrix[:3, :3], compute_uv=False).min()
+    return np.column_stack([centers, spheres[:, 3] * min_scale]).astype(np.float32)
 
 
 def _box(surface: Surface, roots: Floats | None) -> tuple[Floats, Floats]:

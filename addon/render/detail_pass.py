@@ -233,13 +233,13 @@ def _ordered(factors: Any, totals: Floats, widths: Floats) -> DetailOrder:
 
 
 def _shades(snapshot: Snapshot, view: PictureView, widening: float) -> Floats:
-    """What the hiders hide from view, (k, 12) as in lib_culling.glsl; k is 0 where nothing is."""
-    if snapshot.detail.culling != "hidden" or snapshot.hiders is None:
+    """What the occluder spheres hide from view, (k, 12) as in lib_culling.glsl."""
+    if snapshot.detail.culling != "hidden" or snapshot.occluder_spheres is None:
         return np.zeros((0, 12), np.float32)
     settings = snapshot.strand_settings
     radius = float(snapshot.radius.max()) * settings.width_scale * widening
     half_width = max(settings.minimum_width / 2.0, EDGE) * widening
-    shades = shades_of(snapshot.hiders[:SHADE_CAPACITY], view, half_width, radius)
+    shades = shades_of(snapshot.occluder_spheres[:SHADE_CAPACITY], view, half_width, radius)
     packed = np.zeros((len(shades.nearest), 12), np.float32)
     packed[:, 0:3], packed[:, 3] = shades.origin, shades.nearest
     packed[:, 4:7], packed[:, 7] = shades.axis, shades.width

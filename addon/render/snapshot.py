@@ -158,8 +158,8 @@ class Snapshot:
     guide, group: (strand_count,) whole numbers, what debug_view shows; None is 0 everywhere.
     rank: (strand_count,) in 0..1, below 1: when a groom gets small, strands of high rank go first
         (refine/thinning.py); None draws all of them always.
-    hiders: (k, 4) xyz center and w radius [m, world] of balls inside the head, behind which
-        strands are not seen (refine/culling.py), of which the first 16 count; None hides nothing.
+    occluder_spheres: (k, 4) xyz center and w radius [m, world] of spheres inside the head that hide
+        the strands behind them (refine/culling.py). The first 16 count; None hides nothing.
     debug_view: one of DEBUG_VIEWS.
     casters: meshes that are not drawn here but throw shadows on the hair, world space.
     table_size: texels across Marschner's look-up tables; PREVIEW_SIZE while their shape changes.
@@ -190,7 +190,7 @@ class Snapshot:
     guide: Ints | None = None
     group: Ints | None = None
     rank: Floats | None = None
-    hiders: Floats | None = None
+    occluder_spheres: Floats | None = None
     debug_view: str = "none"
     casters: tuple[Caster, ...] = ()
     table_size: int = DEFAULT_SIZE
@@ -207,8 +207,9 @@ class Snapshot:
             "guide": self.strands.shape[:1],
             "group": self.strands.shape[:1],
             "rank": self.strands.shape[:1],
-            "hiders": (0 if self.hiders is None else len(self.hiders), 4),
         }
+        if self.occluder_spheres is not None:
+            expected["occluder_spheres"] = (len(self.occluder_spheres), 4)
         for name, shape in expected.items():
             value = getattr(self, name)
             if value is not None and np.shape(value) != shape:

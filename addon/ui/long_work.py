@@ -28,13 +28,13 @@ _PAUSE = 0.01
 class Progress(NamedTuple):
     """How far the work has come.
 
-    share: of all, 0 to 1; None where nobody knows.
-    waits: there is nothing to do just now, since a thread works.
+    fraction: of all work, 0 to 1; None where it is unknown.
+    is_idle: there is nothing to do just now, since a thread works.
     """
 
     text: str
-    share: float | None = None
-    waits: bool = False
+    fraction: float | None = None
+    is_idle: bool = False
 
 
 type Steps[Result] = Generator[Progress, None, Result]
@@ -113,7 +113,7 @@ class LongWork:
         assert running is not None
         try:
             step = next(running.steps)
-            while not step.waits and time.perf_counter() < end:
+            while not step.is_idle and time.perf_counter() < end:
                 step = next(running.steps)
         except StopIteration:
             return {"FINISHED"}
@@ -146,11 +146,11 @@ class _Running:
             return
         self.progress = progress
         manager = bpy.context.window_manager
-        if progress.share is not None:
+        if progress.fraction is not None:
             if not self._has_cursor:
                 manager.progress_begin(0.0, 1.0)
                 self._has_cursor = True
-            manager.progress_update(progress.share)
+            manager.progress_update(progress.fraction)
         workspace = bpy.context.workspace
         workspace.status_text_set(f"{self.label}: {progress.text}. Esc: cancel")
         redraw_panels()
@@ -190,11 +190,11 @@ def draw_progress(layout: bpy.types.UILayout, operator: type[LongWork]) -> bool:
     """Draw the progress instead of the operator's button. Returns False if it does not run."""
     if _running is None or _running.operator is not operator:
         return False
-    text, share, _ = _running.progress
-    if share is None:
+    text, fraction, _ = _running.progress
+    if fraction is None:
         layout.label(text=text, icon="SORTTIME")
     else:
-        layout.progress(factor=share, text=text)
+        layout.progress(factor=fraction, text=text)
     return True
 
 
@@ -205,23 +205,23 @@ def counted(steps: Generator[int], total: int, things: str) -> Steps[None]:
             yield Progress(f"{done:,} of {total:,} {things}", done / total)
 
 
-def shared[Result](steps: Generator[float, None, Result]) -> Steps[Result]:
+def as_progress[Result](steps: Generator[float, None, Result]) -> Steps[Result]:
     """Work that reports the fraction that is done."""
     with closing(steps):
         while True:
             try:
-                share = next(steps)
+                fraction = next(steps)
             except StopIteration as end:
                 result: Result = end.value
                 return result
-            yield Progress(f"{share:.0%}", share)
+            yield Progress(f"{fraction:.0%}", fraction)
 
 
 def threaded[Result](work: ThreadWork[Result]) -> Steps[Result]:
     """Work in a thread, which reports its progress; closing the generator abandons it."""
     try:
         while not work.run_main_thread_steps():
-            yield Progress(work.stage, waits=not work.wants_main_thread)
+            yield Progress(work.stage, is_idle=not work.wants_main_thread)
         return work.result()
     finally:
         work.give_up()
@@ -241,5 +241,5 @@ def stop() -> None:
 
 def _at_once(steps: Steps[None]) -> None:
     for step in steps:
-        if step.waits:
+        if step.is_idle:
             time.sleep(_PAUSE)

@@ -19,7 +19,7 @@ from ..blender.cards.material import alpha_image
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..errors import HairloomError
-from .long_work import LongWork, Steps, shared
+from .long_work import LongWork, Steps, as_progress
 from .selection import active_mesh
 
 _WAYS = (
@@ -109,7 +109,7 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
             alpha=_named_image(self.alpha),
         )
         steps = sort_steps(obj, context.evaluated_depsgraph_get(), choices)
-        self._tell(obj, (yield from shared(steps)))
+        self._tell(obj, (yield from as_progress(steps)))
 
     def _tell(self, obj: bpy.types.Object, done: SortedCards) -> None:
         for note in done.notes:

@@ -40,9 +40,9 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
             previews.rest(context.evaluated_depsgraph_get(), keep_playing=False)
         bake = Bake.of(chosen(context), context.scene)
         yield from counted(bake.steps(), bake.frame_count, "frames")
-        locks = show_in_renders(bake.objects(), context.evaluated_depsgraph_get())
+        locked = show_in_renders(bake.objects(), context.evaluated_depsgraph_get())
         names = ", ".join(obj.name for obj in bake.objects())
-        also = "; Render > Lock Interface is on, which renders of baked hair need" if locks else ""
+        also = "; Render > Lock Interface is on, which renders of baked hair need" if locked else ""
         count = "1 frame" if bake.frame_count == 1 else f"{bake.frame_count:,} frames"
         report(self, "INFO", f"Baked {count} of {names}{also}")
 

@@ -64,8 +64,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context, panel: str) -> 
     if _check is None:
         return
     header, body = layout.panel(panel)
-    trouble = "INFO" if _check.lines else "ERROR"
-    icon = trouble if _check.warnings else "CHECKMARK"
+    severity = "INFO" if _check.lines else "ERROR"
+    icon = severity if _check.warnings else "CHECKMARK"
     header.label(text="What the Engine Will See", icon=icon)
     if body is None:
         return
@@ -73,7 +73,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context, panel: str) -> 
     for line in _check.lines:
         draw_lines(column, context, line)
     for warning in _check.warnings:
-        draw_lines(column, context, warning, trouble)
+        draw_lines(column, context, warning, severity)
 
 
 def _look(operator: Any, context: bpy.types.Context) -> None:

@@ -12,8 +12,8 @@ import time
 import bpy
 
 from ..blender.bakes.groom_hashes import frame_rate
+from ..blender.base.frame_clock import FrameClock
 from ..blender.base.outcome import Outcome, report
-from ..blender.base.pace import Pace
 from ..blender.base.suspension import is_suspended
 from ..blender.preview import fins, previews
 from ..blender.scene.source import mute_own_dynamics, own_dynamics
@@ -58,7 +58,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
     bl_idname = "hairloom.play"
     bl_label = "Play"
 
-    _pace: Pace
+    _clock: FrameClock
     _ticks: bpy.types.Timer
 
     @classmethod
@@ -88,7 +88,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
         if not previews.is_playing():
             return {"CANCELLED"}
         self._ticks = start_ticking(context)
-        self._pace = Pace(time.perf_counter())
+        self._clock = FrameClock(time.perf_counter())
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -114,9 +114,9 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
         """Simulate the scene's frames that are due, in one step: the head has moved only once."""
         now, rate = time.perf_counter(), frame_rate(context.scene)
         if previews.is_paused() or is_suspended():
-            self._pace.skip(now)
+            self._clock.skip(now)
             return
-        frames = self._pace.due(now, rate)
+        frames = self._clock.due(now, rate)
         if frames:
             previews.advance(context.evaluated_depsgraph_get(), frames / rate)
 

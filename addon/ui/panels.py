@@ -54,7 +54,7 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     row = layout.row(align=True)
     row.prop(hair.hairloom, "debug_view")
     row.prop(hair.hairloom, "show_counts", text="", icon="INFO")
-    layout.row(align=True).prop(hair.hairloom, "shown_aids")
+    layout.row(align=True).prop(hair.hairloom, "shown_overlays")
     layout.prop(hair.hairloom, "hide_original")
 
 

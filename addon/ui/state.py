@@ -22,7 +22,7 @@ def draw_state(layout: bpy.types.UILayout, context: bpy.types.Context, session: 
     """Counts, times and memory of a previewed groom."""
     lines = layout.column(align=True)
     if not session.is_made:
-        draw_lines(lines, context, f"It {registry.MAKING}")
+        draw_lines(lines, context, f"It {registry.BUILDING}")
         return
     rig = session.rig
     lines.label(text=f"{rig.strands.strand_count:,} strands, {len(rig.guides):,} guides")
@@ -80,7 +80,7 @@ def _moved_by(session: Session) -> str:
     if preview.phase is Phase.BAKED and preview.bake is not None:
         return "Shown from the bake" + (", which is out of date" if preview.bake.changed else "")
     if session.is_pending:
-        return f"Other hair {registry.MAKING}"
+        return f"Other hair {registry.BUILDING}"
     if preview.phase is Phase.WAITING or preview.is_deferred:
         return f"It {registry.WAITING}"
     computed = "Simulated" if session.is_playing else "To be simulated"

@@ -177,7 +177,7 @@ def _in_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:
         try:
             while not work.run_main_thread_steps():
                 text = f"{plan.done:,} of {total:,} frames"
-                yield Progress(text, plan.done / total, waits=not work.wants_main_thread)
+                yield Progress(text, plan.done / total, is_idle=not work.wants_main_thread)
             return work.result()
         finally:
             work.give_up()

@@ -87,12 +87,12 @@ def test_a_debug_view_reaches_the_snapshot_and_brings_its_counts(view, preview):
 
 def test_balls_inside_the_head_follow_it(preview):
     _, head, session = preview
-    before = drawing(session).snapshot.hiders
+    before = drawing(session).snapshot.occluder_spheres
     assert (np.linalg.norm(before[:, :3], axis=1) + before[:, 3] < 0.1).all()
     matrix = Matrix.LocRotScale((0.5, -1.0, 2.0), Matrix.Rotation(1.2, 3, (1, 2, 3)), (2, 2, 2))
     head.matrix_world = matrix
     update()
-    after = drawing(session).snapshot.hiders
+    after = drawing(session).snapshot.occluder_spheres
     expected = before[:, :3] @ np.array(matrix)[:3, :3].T + np.array(matrix)[:3, 3]
     np.testing.assert_allclose(after[:, :3], expected, atol=1e-5)
     np.testing.assert_allclose(after[:, 3], 2.0 * before[:, 3], rtol=1e-3)
@@ -101,12 +101,12 @@ def test_balls_inside_the_head_follow_it(preview):
 def test_balls_stay_inside_a_head_that_bends(sphere):
     """Its front is pressed in by more and more; what is pressed in is never in a ball."""
     surface = surface_of(sphere)
-    hiders = OccluderSpheres(surface, surface.positions)
-    radius = hiders.at(Pose(surface.positions, np.eye(4)))[:, 3].sum()
+    occluder_spheres = OccluderSpheres(surface, surface.positions)
+    radius = occluder_spheres.at(Pose(surface.positions, np.eye(4)))[:, 3].sum()
     for depth in (0.01, 0.03, 0.08):
         bent = surface.positions.copy()
         bent[:, 1] = np.maximum(bent[:, 1], depth - 0.1)
-        balls = hiders.at(Pose(bent, np.eye(4)))
+        balls = occluder_spheres.at(Pose(bent, np.eye(4)))
         balls = np.zeros((0, 4)) if balls is None else balls
         assert balls[:, 3].sum() < radius
         away = np.linalg.norm(bent[:, None] - balls[None, :, :3], axis=2)
@@ -116,7 +116,7 @@ def test_balls_stay_inside_a_head_that_bends(sphere):
 @pytest.mark.parametrize("how", ["eye", "wire"])
 def test_a_head_that_is_not_seen_hides_nothing(how, preview):
     hair, head, session = preview
-    assert drawing(session).snapshot.hiders is not None
+    assert drawing(session).snapshot.occluder_spheres is not None
     if how == "eye":
         head.hide_set(True)
     else:
@@ -125,18 +125,18 @@ def test_a_head_that_is_not_seen_hides_nothing(how, preview):
         hair.data.hairloom.detail.culling = culling
         update()
         shown = drawing(session).snapshot
-        assert shown.hiders is None and shown.detail.culling == "none"
+        assert shown.occluder_spheres is None and shown.detail.culling == "none"
     head.hide_set(False)
     head.display_type = "TEXTURED"
     update()
     assert drawing(session).snapshot.detail.culling == "away"
     hair.data.hairloom.detail.culling = "hidden"
-    assert drawing(session).snapshot.hiders is not None
+    assert drawing(session).snapshot.occluder_spheres is not None
 
 
 def test_hair_without_a_head_has_nothing_to_hide_it(new_hair, evaluated):
     session = previews.start(new_hair(), evaluated())
-    assert drawing(session).snapshot.hiders is None
+    assert drawing(session).snapshot.occluder_spheres is None
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def hair(new_hair: Callable[..., Any], sphere: Any) -> Any:
 
 
 class View:
-    """Reads as a 3D view in Rendered mode does: again and again, as long as hair is awaited."""
+    """Reads as a 3D view in Rendered mode does: again and again, as long as hair is pending."""
 
     def __init__(self) -> None:
         self.reader = SceneReader()
@@ -67,10 +67,10 @@ class View:
 
     def arrive(self) -> tuple[Any, ...]:
         end, found = time.monotonic() + 60.0, ()
-        while self.reader.awaited:
+        while self.reader.pending:
             assert time.monotonic() < end, "it is never made"
             latest_job.take_steps()
-            if not all(engine_hair.is_pending(uid) for uid in self.reader.awaited):
+            if not all(engine_hair.is_pending(uid) for uid in self.reader.pending):
                 found = self.read()
             time.sleep(0.005)
         return found
@@ -78,7 +78,7 @@ class View:
 
 def test_the_first_picture_is_without_hair_until_it_is_made(hair: Any, gate: Gate) -> None:
     view = View()
-    assert view.read() == () and view.reader.awaited == {hair.session_uid}
+    assert view.read() == () and view.reader.pending == {hair.session_uid}
     assert view.read() == (), "nor does the next picture wait"
     assert bpy.app.timers.is_registered(latest_job.take_steps)
     gate.opened.set()
@@ -130,7 +130,7 @@ def test_hair_that_cannot_be_made_is_told(
     view = View()
     view.read()
     assert view.arrive() == () and "it cannot be" in view.reader.warnings[0]
-    assert not view.reader.awaited
+    assert not view.reader.pending
 
 
 def test_hair_that_nobody_sees_any_more_is_not_waited_for(hair: Any, gate: Gate) -> None:
@@ -140,7 +140,7 @@ def test_hair_that_nobody_sees_any_more_is_not_waited_for(hair: Any, gate: Gate)
     assert engine_hair.is_pending(uid)
     bpy.data.objects.remove(hair)
     bpy.context.view_layer.update()
-    assert view.read() == () and not view.reader.awaited
+    assert view.read() == () and not view.reader.pending
     assert not engine_hair.is_pending(uid)
     assert latest_job.take_steps() is None
     latest_job.unwatch_all()

@@ -12,7 +12,7 @@ import pytest
 from hairloom.addon.blender.base.thread_work import GivenUpError, ThreadWork
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.ui.long_work import LongWork, Progress, Steps, counted, shared, threaded
+from hairloom.addon.ui.long_work import LongWork, Progress, Steps, as_progress, counted, threaded
 
 seen: list[Any] = []
 
@@ -81,8 +81,8 @@ def test_shares_are_told_and_the_result_is_kept() -> None:
         yield 0.25
         return "sorted"
 
-    assert list(shared(work())) == [Progress("25%", 0.25)]
-    assert result_of(shared(work())) == "sorted"
+    assert list(as_progress(work())) == [Progress("25%", 0.25)]
+    assert result_of(as_progress(work())) == "sorted"
 
 
 def test_a_thread_is_waited_for_and_its_stages_are_told() -> None:
@@ -96,7 +96,7 @@ def test_a_thread_is_waited_for_and_its_stages_are_told() -> None:
     steps = threaded(ThreadWork(work, "test"))
     while next(steps).text != "Sorting":
         pass
-    assert next(steps) == Progress("Sorting", waits=True)
+    assert next(steps) == Progress("Sorting", is_idle=True)
     may_end.set()
     assert result_of(steps) == "sorted"
 

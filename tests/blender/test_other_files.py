@@ -148,7 +148,7 @@ def test_a_file_of_an_old_version_has_what_was_set_and_defaults_for_the_rest(ext
     assert found[ShadingSettings].base_color == (0.5, 0.25, 0.125)
     assert found[DynamicsSettings].damping == 2.0
     assert found[VolumeSettings] == VolumeSettings() and found.debug_view == "none"
-    assert hair.hairloom.shown_aids == set()
+    assert hair.hairloom.shown_overlays == set()
     assert plays(hair)
 
 

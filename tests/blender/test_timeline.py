@@ -8,7 +8,7 @@ import pytest
 from mathutils import Matrix
 
 from hairloom.addon.blender.bakes import playback
-from hairloom.addon.blender.base.pace import MOST_AT_ONCE, Pace
+from hairloom.addon.blender.base.frame_clock import MAX_AT_ONCE, FrameClock
 from hairloom.addon.blender.preview import previews
 
 LAST = 10
@@ -234,13 +234,13 @@ def test_a_driver_that_gives_no_number_is_no_matter(swinging):
 
 
 def test_play_keeps_the_scenes_rate_and_drops_what_it_cannot_make_up_for():
-    pace = Pace(10.0)
+    clock = FrameClock(10.0)
     ticks = 10.0 + np.arange(1, 121) / 120.0
-    assert sum(pace.due(now, 24.0) for now in ticks) == 24
-    assert max(Pace(0.0).due(now, 24.0) for now in (5.0, 0.05)) == MOST_AT_ONCE
-    slow = Pace(0.0)
-    assert slow.due(5.0, 24.0) == MOST_AT_ONCE
+    assert sum(clock.due(now, 24.0) for now in ticks) == 24
+    assert max(FrameClock(0.0).due(now, 24.0) for now in (5.0, 0.05)) == MAX_AT_ONCE
+    slow = FrameClock(0.0)
+    assert slow.due(5.0, 24.0) == MAX_AT_ONCE
     assert slow.due(5.0 + 1.5 / 24.0, 24.0) == 1, "what was late is forgotten"
     slow.skip(9.0)
     assert slow.due(9.0 + 1.0 / 24.0, 24.0) == 1
-    assert Pace(0.0).due(0.5, 0.01) == 0
+    assert FrameClock(0.0).due(0.5, 0.01) == 0

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 #: every strand in its own pieces, none left out
 BARE = DetailSettings(culling="none", lod_height=0.0)
 #: a ball that hides nothing in these pictures, but has to be looked at
-HIDERS = np.array([[3.0, 3.0, 3.0, 0.1]], np.float32)
+OCCLUDER_SPHERES = np.array([[3.0, 3.0, 3.0, 0.1]], np.float32)
 
 
 @pytest.fixture(scope="module")
@@ -40,9 +40,9 @@ def chromaticity(pixel: np.ndarray) -> np.ndarray:
     return pixel[:3] / pixel[:3].max()
 
 
-@pytest.mark.parametrize("hiders", [None, HIDERS], ids=["plain", "computed"])
+@pytest.mark.parametrize("occluder_spheres", [None, OCCLUDER_SPHERES], ids=["plain", "computed"])
 def test_the_detail_view_shows_factors_by_colour(
-    frame: Any, front: Any, hiders: np.ndarray | None
+    frame: Any, front: Any, occluder_spheres: np.ndarray | None
 ) -> None:
     """From blue for one piece over green for eight to red for sixty-four."""
     strands = np.zeros((1, 3, 3), np.float32)
@@ -56,7 +56,7 @@ def test_the_detail_view_shows_factors_by_colour(
             detail,
             strand_settings=settings,
             debug_view="detail",
-            hiders=hiders,
+            occluder_spheres=occluder_spheres,
         )
         pixel = frame.render_image(snapshot, front, 200, 200, 1)[30, 100]
         assert pixel.max() > 0.1

@@ -26,7 +26,7 @@ WIDTH, HEIGHT = 320, 240
 #: every strand in its own pieces, none left out
 BARE = DetailSettings(culling="none", lod_height=0.0)
 #: balls inside of the one that `curly` grows from
-HIDERS = np.array([[0.0, 0.0, 0.0, 0.095], [0.02, 0.0, 0.03, 0.06]], np.float32)
+OCCLUDER_SPHERES = np.array([[0.0, 0.0, 0.0, 0.095], [0.02, 0.0, 0.03, 0.06]], np.float32)
 FIXED_64 = dataclasses.replace(BARE, mode="fixed", subdivisions=64)
 
 
@@ -94,7 +94,7 @@ def test_factors_and_culling_are_those_of_numpy(
     detail = DetailSettings(
         mode=mode, error=0.05, piece_length=2.0, subdivisions=7, max_subdivisions=60
     )
-    found, order = computed(strands, camera, detail, hiders=HIDERS)
+    found, order = computed(strands, camera, detail, occluder_spheres=OCCLUDER_SPHERES)
     view = PictureView(camera.view, camera.projection, WIDTH, HEIGHT)
     apart = np.abs(found - detail_factors(strands, view, detail))
     depth = strands @ view.view_projection[3, :3] + view.view_projection[3, 3]
@@ -102,7 +102,7 @@ def test_factors_and_culling_are_those_of_numpy(
     assert apart.max() <= 1 and (apart[~is_near] > 0).mean() < 0.001 and is_near.mean() < 0.5
     if cv_count > 2 and mode != "fixed":
         assert len(np.unique(found)) > 10, "the grooms have all kinds of segments"
-    is_hidden = hidden(strands, shades_of(HIDERS, view, 0.75, 5e-4))
+    is_hidden = hidden(strands, shades_of(OCCLUDER_SPHERES, view, 0.75, 5e-4))
     assert is_hidden.any(), "some are behind the balls"
     drawn = drawn_of(order)
     assert len(np.setxor1d(drawn, np.flatnonzero(~is_hidden))) <= 1
@@ -253,10 +253,11 @@ def test_two_views_in_turn_and_nothing_computed_twice(frame: Any, monkeypatch: A
     assert shown(finer, other)[1] == 1
     moved = dataclasses.replace(finer, strands=finer.strands + np.float32(0.01))
     assert shown(moved, other)[1] == 1
-    culled = dataclasses.replace(moved, detail=DetailSettings(lod_height=1e4), hiders=HIDERS[:0])
+    detail = DetailSettings(lod_height=1e4)
+    culled = dataclasses.replace(moved, detail=detail, occluder_spheres=OCCLUDER_SPHERES[:0])
     assert shown(culled, one)[1] == 1
-    for hiders in (HIDERS, HIDERS[::-1]):
-        culled = dataclasses.replace(culled, hiders=hiders)
+    for spheres in (OCCLUDER_SPHERES, OCCLUDER_SPHERES[::-1]):
+        culled = dataclasses.replace(culled, occluder_spheres=spheres)
         assert shown(culled, one)[1] == 1 and shown(culled, one)[1] == 0
     for rank in (np.arange(300) / 300.0, np.arange(300)[::-1] / 300.0):
         culled = dataclasses.replace(culled, rank=rank)
@@ -386,7 +387,7 @@ def head_of_hair(frame: Any, detail: DetailSettings) -> Any:
         detail,
         meshes=(frame.MeshSnapshot.of(ball),),
         lights=three_point_lights(cameras(frame)["whole"].view),
-        hiders=np.array([[0.0, 0.0, 0.0, 0.098]], np.float32),
+        occluder_spheres=np.array([[0.0, 0.0, 0.0, 0.098]], np.float32),
     )
 
 
@@ -409,7 +410,10 @@ def test_all_strands_may_be_hidden(frame: Any) -> None:
     strands[:, :, 1] = [0.5, 0.6, 0.7]
     passes = frame.MeshPass(), frame.StrandPass()
     snapshot = snapshot_of(
-        frame, strands, DetailSettings(), hiders=np.array([[0.0, 0.0, 0.0, 0.3]], np.float32)
+        frame,
+        strands,
+        DetailSettings(),
+        occluder_spheres=np.array([[0.0, 0.0, 0.0, 0.3]], np.float32),
     )
     camera = frame.Camera(
         frame.look_at((0.0, -1.0, 0.0), (0, 0, 0)), frame.perspective(0.6, 1.0, 0.1, 5.0)
@@ -424,8 +428,8 @@ def test_snapshots_refuse_detail_that_does_not_fit(frame: Any) -> None:
         ("guide", np.zeros(2, int)),
         ("group", np.zeros((3, 1), int)),
         ("rank", np.zeros(4)),
-        ("hiders", np.zeros((1, 3))),
-        ("hiders", np.zeros(4)),
+        ("occluder_spheres", np.zeros((1, 3))),
+        ("occluder_spheres", np.zeros(4)),
         ("debug_view", "pieces"),
     ):
         with pytest.raises(ValueError, match=name):

@@ -167,20 +167,20 @@ def what_acts_on_it():
     ball = bpy.data.objects.new("Ball", bpy.data.objects["Head"].data)
     bpy.context.collection.objects.link(ball)
     hair.hairloom.dynamics.wind_speed = 8.0
-    without = yield from pixels_at_rest("no-aids")
-    for aid in ("colliders", "wind", "lights"):
-        hair.hairloom.shown_aids = set()
-        yield from until(lambda: changed(without, pixels("no-aids-again")) < 1e-4, "lines stay")
-        hair.hairloom.shown_aids = {aid}
+    without = yield from pixels_at_rest("no-overlays")
+    for kind in ("colliders", "wind", "lights"):
+        hair.hairloom.shown_overlays = set()
+        yield from until(lambda: changed(without, pixels("no-overlays-again")) < 1e-4, "lines stay")
+        hair.hairloom.shown_overlays = {kind}
         yield from until(
-            lambda aid=aid: 0.0002 < changed(without, pixels(f"aid-{aid}")) < 0.1, f"no {aid}"
+            lambda kind=kind: 0.0002 < changed(without, pixels(f"{kind}")) < 0.1, f"no {kind}"
         )
-    hair.hairloom.shown_aids = {"colliders", "wind", "lights"}
+    hair.hairloom.shown_overlays = {"colliders", "wind", "lights"}
     yield
-    driver.screenshot("all-aids")
+    driver.screenshot("all-overlays")
     overlay.show_overlays = False
-    bare = yield from pixels_at_rest("aids-without-overlays")
-    hair.hairloom.shown_aids = set()
+    bare = yield from pixels_at_rest("overlays-off")
+    hair.hairloom.shown_overlays = set()
     without = yield from pixels_at_rest("no-overlays")
     assert changed(bare, without) < 0.001, "lines without overlays"
     overlay.show_overlays = True

@@ -165,9 +165,9 @@ def a_warning_mends():
     yield from until(
         lambda: live().sessions() and live().sessions()[0].head is not None, "it has no head yet"
     )
-    troubles = of_hairloom("diagnostics").issues_of(hair, live().sessions()[0])
+    issues = of_hairloom("diagnostics").issues_of(hair, live().sessions()[0])
     driver.screenshot("mended")
-    assert [trouble.operator for trouble in troubles] in ([], ["hairloom.snap_roots"])
+    assert [issue.operator for issue in issues] in ([], ["hairloom.snap_roots"])
 
 
 def to_the_engine():

@@ -52,7 +52,7 @@ def without_strands(snapshot: Snapshot) -> Snapshot:
         guide=None,
         group=None,
         rank=None,
-        hiders=None,
+        occluder_spheres=None,
     )
 
 

@@ -63,13 +63,13 @@ class SceneReader:
 
     warnings: what the artist should know of the last reading, each with its remedy.
     previewed: grooms that were left out because they are previewed, by session number.
-    awaited: grooms that are as they were, as other hair of them is being made.
+    pending: grooms that are shown as they were, until their new hair is built.
     """
 
     def __init__(self) -> None:
         self.warnings: tuple[str, ...] = ()
         self.previewed: dict[int, Visibility] = {}
-        self.awaited: set[int] = set()
+        self.pending: set[int] = set()
         self._meshes: dict[Key, _ReadMesh] = {}
         self._grooms: dict[Key, _ReadGroom] = {}
         self._heads: frozenset[int] = frozenset()
@@ -100,7 +100,7 @@ class SceneReader:
         grooms: dict[Key, _ReadGroom] = {}
         read: dict[Key, _ReadMesh] = {}
         uids: set[int] = set()
-        self.previewed, self.awaited = {}, set()
+        self.previewed, self.pending = {}, set()
         self._heads = _heads(depsgraph)
         for instance in depsgraph.object_instances:
             obj = instance.object
@@ -201,7 +201,7 @@ class SceneReader:
                 return known
             snapshot = engine_hair.read_groom(hair, depsgraph, blocking=blocking)
         except HairNotMadeYetError:
-            self.awaited.add(uid)
+            self.pending.add(uid)
             return None if known is None else _ReadGroom((), known.groom)  # to be read again
         except HairloomError as error:
             warnings.append(str(error))
@@ -211,7 +211,7 @@ class SceneReader:
             snapshot = engine_hair.placed(snapshot, matrix @ np.linalg.pinv(own))
         number = engine_hair.owner_of(hair).pass_index
         if not blocking and engine_hair.is_pending(uid):
-            self.awaited.add(uid)
+            self.pending.add(uid)
             state = ()
         return _ReadGroom(state, DrawnGroom(key, snapshot, number, is_holdout))
 

@@ -105,11 +105,11 @@ class EngineView:
     @property
     def is_waiting(self) -> bool:
         """Whether hair is being made, and the picture is without it."""
-        return bool(self._reader.awaited or overlay.expected())
+        return bool(self._reader.pending or overlay.expected())
 
     @property
     def _has_arrived(self) -> bool:
-        return not all(engine_hair.is_pending(uid) for uid in self._reader.awaited)
+        return not all(engine_hair.is_pending(uid) for uid in self._reader.pending)
 
     @property
     def count(self) -> int:

@@ -93,7 +93,7 @@ class Studio:
             strands=points,
             meshes=self._meshes(pose),
             lights=three_point_lights(camera.view) if lights is None else lights,
-            hiders=None if occluders is None else occluders.at(pose),
+            occluder_spheres=None if occluders is None else occluders.at(pose),
             cards=self._cards_at(pose, points),
         )
         return render_image(

@@ -56,7 +56,7 @@ class Preview:
     bake: None: it has none. rig_hash: of what the bake depends on beside the animation; "": it was
         not asked for yet.
     problem, bake_problem: why it is not simulated, or its bake not shown.
-    is_shaded_anew: whether its cards are to be shaded again once edits have settled.
+    cards_are_stale: whether its cards are to be shaded again once edits have settled.
 
     Methods raise HairloomError when what it is made of is gone or broken.
     """
@@ -68,7 +68,7 @@ class Preview:
         self.bake: Bake | None = None
         self.rig_hash = ""
         self.problem = self.bake_problem = ""
-        self.is_shaded_anew = False
+        self.cards_are_stale = False
 
     @property
     def uid(self) -> int:

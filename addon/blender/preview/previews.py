@@ -29,7 +29,7 @@ from .phases import Event, Phase
 from .preview import Bake, Preview, rig_for
 
 #: What is reported of hair that is about to play, and of hair that is not there yet.
-WAITING, MAKING = "plays as soon as its collider is made", "is being made"
+WAITING, BUILDING = "plays as soon as its collider is made", "is being made"
 
 
 class Previews(dict[int, Preview]):
@@ -306,14 +306,14 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     if session is None:
         return
     hair = session.hair.found()
-    note = "" if session.is_made else MAKING
+    note = "" if session.is_made else BUILDING
     if preview.phase is Phase.WAITING and not note:
         note = WAITING
     if note:
         note = f"{hair.name}: {note}"
     overlay.show(session.uid, overlay.read_drawing(session, hair, depsgraph, note))
-    lacks_lines = session.obstacles is None and "colliders" in hair.hairloom.shown_aids
-    if lacks_lines and not fields.are_made():
+    is_missing_lines = session.obstacles is None and "colliders" in hair.hairloom.shown_overlays
+    if is_missing_lines and not fields.are_made():
         watch((session.uid, "lines"), partial(_show_lines, preview))
     refresh_panels()
     # our own strands come into the place of Blender's where nobody edits these, and not before

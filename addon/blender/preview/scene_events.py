@@ -44,7 +44,7 @@ def settings_changed(owner: bpy.types.ID) -> None:
             attempt(preview, depsgraph, partial(_take_settings, preview, session, depsgraph))
             if session.is_stale:
                 _read_again_soon()
-        elif is_shaded_anew(session, {owner.session_uid}, depsgraph.view_layer):
+        elif occluders_changed(session, {owner.session_uid}, depsgraph.view_layer):
             _shade_again_soon(preview)
 
 
@@ -54,7 +54,7 @@ def _grooms() -> list[tuple[Preview, Session]]:
 
 
 def _shade_again_soon(preview: Preview) -> None:
-    preview.is_shaded_anew = True
+    preview.cards_are_stale = True
     _read_again_soon()
 
 
@@ -72,17 +72,17 @@ def display_changed(owner: bpy.types.ID) -> None:
 
 def updated(depsgraph: bpy.types.Depsgraph) -> None:
     """Blender has evaluated the scene: follow what moved, read again what was edited."""
-    moved, edited, is_lit_anew = changes(depsgraph)
+    moved, edited, light_changed = changes(depsgraph)
     for preview, session in _grooms():
-        if is_edited(session, edited) or is_weighted_anew(session, edited):
+        if is_edited(session, edited) or weights_changed(session, edited):
             session.is_stale = True
             _read_again_soon()
         elif session.is_stale and not bpy.app.timers.is_registered(_read_again):
             _read_again_soon()  # its scene is shown again
-        if is_shaded_anew(session, moved, depsgraph.view_layer):
+        if occluders_changed(session, moved, depsgraph.view_layer):
             _shade_again_soon(preview)
         follows = preview.phase is not Phase.FREE and is_among(session, moved)
-        update = partial(_update, preview, session, depsgraph, follows, is_lit_anew)
+        update = partial(_update, preview, session, depsgraph, follows, light_changed)
         attempt(preview, depsgraph, update)
 
 
@@ -91,9 +91,9 @@ def _update(
     session: Session,
     depsgraph: bpy.types.Depsgraph,
     follows: bool,
-    is_lit_anew: bool,
+    light_changed: bool,
 ) -> None:
-    if is_lit_anew:
+    if light_changed:
         session.light(depsgraph)
     if follows:
         preview.keep_or_rest(depsgraph)
@@ -105,17 +105,17 @@ def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
     Animated settings and lights are taken over. Curves that are animated themselves are not read
     again at every frame.
     """
-    _, _, is_lit_anew = changes(depsgraph)
+    _, _, light_changed = changes(depsgraph)
     for preview in tuple(previews.values()):
-        attempt(preview, depsgraph, partial(_go, preview, depsgraph, is_lit_anew))
+        attempt(preview, depsgraph, partial(_go, preview, depsgraph, light_changed))
 
 
-def _go(preview: Preview, depsgraph: bpy.types.Depsgraph, is_lit_anew: bool) -> None:
+def _go(preview: Preview, depsgraph: bpy.types.Depsgraph, light_changed: bool) -> None:
     session = preview.groom
     if session is not None:
         session.take_settings()
         _refine_soon(session)
-        if is_lit_anew:
+        if light_changed:
             session.light(depsgraph)
     is_free = preview.phase is Phase.FREE
     if preview.found().hairloom.bake.follows:
@@ -152,7 +152,7 @@ def undone() -> None:
         if session.hair.handle.find() is None:
             registry.stop(session)
     for preview in previews.values():
-        preview.session.is_stale = preview.is_shaded_anew = True
+        preview.session.is_stale = preview.cards_are_stale = True
     if previews:
         _read_again_soon()
 
@@ -178,8 +178,8 @@ def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
         if preview.session.is_stale:
             attempt(preview, depsgraph, partial(_read, preview, depsgraph))
     for preview, session in _grooms():
-        if preview.is_shaded_anew:
-            preview.is_shaded_anew = False
+        if preview.cards_are_stale:
+            preview.cards_are_stale = False
             attempt(preview, depsgraph, session.shade_cards_again)
     redraw_panels()
 
@@ -207,7 +207,7 @@ def clear() -> None:
 
 def changes(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
     """Session numbers of what has moved or changed shape, of changed shapes; if lights changed."""
-    moved, edited, is_lit_anew = set(), set(), False
+    moved, edited, light_changed = set(), set(), False
     for update in depsgraph.updates:
         changed = update.id.original  # the evaluated copy has no session number
         if update.is_updated_geometry or update.is_updated_transform:
@@ -215,8 +215,8 @@ def changes(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
         if update.is_updated_geometry:
             edited.add(changed.session_uid)
         is_light = isinstance(changed, bpy.types.Object) and changed.type == "LIGHT"
-        is_lit_anew |= is_light or isinstance(changed, _LIGHTING)
-    return moved, edited, is_lit_anew
+        light_changed |= is_light or isinstance(changed, _LIGHTING)
+    return moved, edited, light_changed
 
 
 def is_edited(session: Session, edited: set[int]) -> bool:
@@ -228,7 +228,7 @@ def is_edited(session: Session, edited: set[int]) -> bool:
     return hair is not None and not (is_carried and len(hair.modifiers))
 
 
-def is_weighted_anew(session: Session, edited: set[int]) -> bool:
+def weights_changed(session: Session, edited: set[int]) -> bool:
     """Whether the head's own mesh changed, and with it maybe the weights that children grow by."""
     if session.head is None or not session.settings.children_density:
         return False
@@ -236,7 +236,7 @@ def is_weighted_anew(session: Session, edited: set[int]) -> bool:
     return head is not None and head.data.session_uid in edited
 
 
-def is_shaded_anew(session: Session, changed: set[int], layer: bpy.types.ViewLayer) -> bool:
+def occluders_changed(session: Session, changed: set[int], layer: bpy.types.ViewLayer) -> bool:
     """Whether other hair that shades the cards of this groom may have changed, come or gone."""
     if not session.cards.is_shaded_by_others:
         return False

@@ -39,9 +39,9 @@ COLLIDER_SHAPES = (
     ),
     ("none", "None", "Hair does not collide with it"),
 )
-#: What acts on the hair and can be shown as lines.
-AIDS = (
-    ("colliders", "Colliders", "Balls and capsules, and the boxes of distance fields"),
+#: What acts on the hair and can be shown as lines in the viewport.
+OVERLAYS = (
+    ("colliders", "Colliders", "Spheres, capsules, and the boxes of distance fields"),
     ("wind", "Wind", "Where the mean wind blows to: as long as the hair is wide at 10 m/s"),
     ("lights", "Lights", "From the hair towards each light that shines on it"),
 )
@@ -201,8 +201,8 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
-        "shown_aids": EnumProperty(
-            items=AIDS,
+        "shown_overlays": EnumProperty(
+            items=OVERLAYS,
             options={"ENUM_FLAG"},
             name="Overlays",
             description="What acts on the hair, drawn into the viewport as lines",

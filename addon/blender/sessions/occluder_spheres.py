@@ -12,7 +12,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...dynamics.fitting.similarity import fit_similarity
 from ...pipeline import Pose
-from ...refine.culling import hiders_of, moved_hiders
+from ...refine.culling import moved_spheres, occluder_spheres_of
 from ...strands import Surface
 from ...strands.affine import moved
 
@@ -34,7 +34,7 @@ class OccluderSpheres:
 
     def __init__(self, head: Surface, roots: Floats) -> None:
         self._rest = head.positions
-        self._balls = hiders_of(head, roots=roots)
+        self._balls = occluder_spheres_of(head, roots=roots)
         self._around = [_vertices_around(head, ball) for ball in self._balls]
 
     def at(self, pose: Pose) -> Floats | None:
@@ -43,7 +43,7 @@ class OccluderSpheres:
             return None
         bent = np.abs(moved(self._rest, pose.matrix) - pose.head_positions).max()
         if bent <= _RIGID * self._balls[:, 3].min():
-            return moved_hiders(self._balls, pose.matrix)
+            return moved_spheres(self._balls, pose.matrix)
         now = [
             _carried(ball, self._rest[around], pose.head_positions[around])
             for ball, around in zip(self._balls, self._around, strict=True)
@@ -66,6 +66,6 @@ def _carried(ball: Floats, rest: Floats, now: Floats) -> Floats | None:
     fit = fit_similarity(rest[some], now[some])
     if fit is None:
         return None
-    (gone,) = moved_hiders(ball[None], fit.matrix)
+    (gone,) = moved_spheres(ball[None], fit.matrix)
     gone[3] -= np.linalg.norm(now - moved(rest, fit.matrix), axis=1).max()
     return gone

@@ -66,7 +66,7 @@ def shapes_alike(one: ShadingSettings, other: ShadingSettings) -> bool:
 
 def with_all_strands(snapshot: Snapshot) -> Snapshot:
     """The same where nothing hides hair, so that none is left out."""
-    return replace(snapshot, hiders=None, detail=replace(snapshot.detail, culling="none"))
+    return replace(snapshot, occluder_spheres=None, detail=replace(snapshot.detail, culling="none"))
 
 
 class GroomPicture:
@@ -153,13 +153,13 @@ class GroomPicture:
 
     def show(self, rig: Rig, solver: Solver, settings: GroomSettings) -> None:
         """The hair where the solver has it."""
-        pose, hiders = solver.pose, None
+        pose, spheres = solver.pose, None
         known = None if self._groom is None else self._groom.occluders
         if known is not None and settings[DetailSettings].culling == "hidden":
-            hiders = known.at(pose)
+            spheres = known.at(pose)
         self.snapshot = replace(
             solver.shown(self.snapshot),
-            hiders=hiders,
+            occluder_spheres=spheres,
             casters=_casters(rig, pose, settings),
             cards=self.cards.now(rig, pose, solver.guides, settings.sections),
         )

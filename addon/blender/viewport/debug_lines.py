@@ -22,7 +22,7 @@ from ...dynamics.wind import Air, air_of
 from ...errors import HairloomError
 from ...shading.lights import Light
 from ...strands.affine import moved
-from ..properties.groups import AIDS
+from ..properties.groups import OVERLAYS
 from ..scene.wind import scene_wind
 from ..sessions.session import Session
 
@@ -35,7 +35,7 @@ COLORS = {
 #: Corners of a circle.
 _CORNERS = 32
 #: More balls of a set than these are no help to the eye.
-_MOST_BALLS = 200
+_MAX_SPHERES = 200
 #: A wind of this speed [m/s] has an arrow as long as the hair is wide; its head is this share.
 _BRISK, _HEAD = 10.0, 0.2
 #: A light farther away than this many radii of the hair has its line cut there.
@@ -54,7 +54,7 @@ def debug_lines_of(
     session: Session, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Lines, ...]:
     """The lines that the artist wants to see of this groom."""
-    wanted = hair.hairloom.shown_aids
+    wanted = hair.hairloom.shown_overlays
     if not wanted:
         return ()
     points = session.snapshot.root_center, _radius(session)
@@ -67,7 +67,7 @@ def debug_lines_of(
     }
     return tuple(
         Lines(COLORS[kind], lines.astype(np.float32))
-        for kind, _, _ in AIDS
+        for kind, _, _ in OVERLAYS
         if kind in wanted and len(lines := made[kind]())
     )
 
@@ -95,7 +95,7 @@ def shape_lines(collider: Collider) -> Floats:
     if isinstance(collider, SphereCollider):
         return _ball(collider.center, collider.radius)
     if isinstance(collider, SphereSetCollider):
-        balls = zip(collider.centers[:_MOST_BALLS], collider.radii[:_MOST_BALLS], strict=True)
+        balls = zip(collider.centers[:_MAX_SPHERES], collider.radii[:_MAX_SPHERES], strict=True)
         return np.concatenate([_ball(center, float(radius)) for center, radius in balls])
     if isinstance(collider, CapsuleCollider):
         return _capsule(collider)

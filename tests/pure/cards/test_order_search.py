@@ -7,19 +7,19 @@ import itertools
 import numpy as np
 import pytest
 
-from hairloom.addon.cards.order_search import Wishes, min_broken, wishes
+from hairloom.addon.cards.order_search import Preferences, min_broken, net_preferences
 
 
-def random_wishes(random: np.random.Generator, count: int) -> np.ndarray:
+def random_preferences(random: np.random.Generator, count: int) -> np.ndarray:
     """A table of weights, [before, after]."""
     table = random.integers(0, 20, (count, count)) * (random.random((count, count)) < 0.6)
     np.fill_diagonal(table, 0)
     return table
 
 
-def as_wishes(table: np.ndarray) -> Wishes:
+def as_preferences(table: np.ndarray) -> Preferences:
     before, after = np.nonzero(table)
-    return wishes(len(table), before, after, table[before, after])
+    return net_preferences(len(table), before, after, table[before, after])
 
 
 def broken(table: np.ndarray, order: tuple[int, ...] | np.ndarray) -> int:
@@ -35,29 +35,29 @@ def order_of(rank: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_wishes_are_added_up_as_a_double_loop_does(seed: int) -> None:
+def test_preferences_are_added_up_as_a_double_loop_does(seed: int) -> None:
     random = np.random.default_rng(seed)
     before, after = random.integers(0, 9, (2, 200))
     weight = random.integers(0, 5, 200)
     table = np.zeros((9, 9), np.int64)
     for one, two, much in zip(before, after, weight, strict=True):
         table[one, two] += much * (one != two)
-    wished = wishes(9, before, after, weight)
+    preferences = net_preferences(9, before, after, weight)
     found = np.zeros_like(table)
-    found[wished.lower, wished.higher] = wished.weight
+    found[preferences.lower, preferences.higher] = preferences.weight
     np.testing.assert_array_equal(found, np.triu(table - table.T))
-    assert wished.weight.all()
-    assert (wished.lower < wished.higher).all()
+    assert preferences.weight.all()
+    assert (preferences.lower < preferences.higher).all()
     rank = random.permutation(9)
-    assert wished.broken(rank) == broken(table, np.argsort(rank))
+    assert preferences.broken(rank) == broken(table, np.argsort(rank))
 
 
-def test_wishes_of_parts_are_those_of_the_whole() -> None:
+def test_preferences_of_parts_are_those_of_the_whole() -> None:
     random = np.random.default_rng(1)
     before, after = random.integers(0, 30, (2, 400))
     weight, whole = random.integers(0, 5, 400), random.integers(0, 6, 30)
-    direct = wishes(6, whole[before], whole[after], weight)
-    found = wishes(30, before, after, weight).of_whole(whole, 6)
+    direct = net_preferences(6, whole[before], whole[after], weight)
+    found = net_preferences(30, before, after, weight).of_whole(whole, 6)
     for name in ("count", "lower", "higher", "weight"):
         np.testing.assert_array_equal(getattr(found, name), getattr(direct, name))
 
@@ -68,8 +68,8 @@ def test_what_is_found_is_nearly_the_best_of_all_orders(count: int) -> None:
     random = np.random.default_rng(count)
     trials, best_of_all, found_of_all = (40 if count < 7 else 8), 0, 0
     for _ in range(trials):
-        table = random_wishes(random, count)
-        order = order_of(min_broken(as_wishes(table), random.permutation(count)))
+        table = random_preferences(random, count)
+        order = order_of(min_broken(as_preferences(table), random.permutation(count)))
         best = min(broken(table, each) for each in itertools.permutations(range(count)))
         found = broken(table, order)
         best_of_all, found_of_all = best_of_all + best, found_of_all + found
@@ -79,34 +79,36 @@ def test_what_is_found_is_nearly_the_best_of_all_orders(count: int) -> None:
     assert found_of_all <= 1.25 * best_of_all
 
 
-def test_wishes_without_contradiction_are_fulfilled() -> None:
+def test_preferences_without_contradiction_are_fulfilled() -> None:
     random = np.random.default_rng(0)
     truth = random.permutation(300)
     one, two = random.integers(0, 300, (2, 4000))
     is_first = truth[one] < truth[two]
     before, after = np.where(is_first, one, two), np.where(is_first, two, one)
-    wished = wishes(300, before, after, np.ones(4000, np.int64))
-    assert wished.broken(np.argsort(random.permutation(300))) > 1000
-    assert wished.broken(min_broken(wished, random.permutation(300))) < 40
+    preferences = net_preferences(300, before, after, np.ones(4000, np.int64))
+    assert preferences.broken(np.argsort(random.permutation(300))) > 1000
+    assert preferences.broken(min_broken(preferences, random.permutation(300))) < 40
     near = np.argsort(truth + random.normal(0.0, 10.0, 300))
-    assert wished.broken(np.argsort(near)) > 50
-    assert wished.broken(min_broken(wished, near)) < 10
+    assert preferences.broken(np.argsort(near)) > 50
+    assert preferences.broken(min_broken(preferences, near)) < 10
 
 
-def test_things_without_wishes_stay_where_they_were() -> None:
+def test_things_without_preferences_stay_where_they_were() -> None:
     start = np.random.default_rng(2).permutation(12)
     none = np.zeros(0, np.int64)
-    np.testing.assert_array_equal(order_of(min_broken(wishes(12, none, none, none), start)), start)
-    one = wishes(12, start[9:10], start[8:9], np.array([3]))
+    np.testing.assert_array_equal(
+        order_of(min_broken(net_preferences(12, none, none, none), start)), start
+    )
+    one = net_preferences(12, start[9:10], start[8:9], np.array([3]))
     expected = start.copy()
     expected[[8, 9]] = start[[9, 8]]
     np.testing.assert_array_equal(order_of(min_broken(one, start)), expected)
-    assert len(min_broken(wishes(0, none, none, none), none)) == 0
+    assert len(min_broken(net_preferences(0, none, none, none), none)) == 0
 
 
 def test_a_search_without_end_is_cut_short() -> None:
-    table = random_wishes(np.random.default_rng(3), 30)
+    table = random_preferences(np.random.default_rng(3), 30)
     start = np.arange(30)
-    np.testing.assert_array_equal(order_of(min_broken(as_wishes(table), start, 0)), start)
-    once = min_broken(as_wishes(table), start, 1)
+    np.testing.assert_array_equal(order_of(min_broken(as_preferences(table), start, 0)), start)
+    once = min_broken(as_preferences(table), start, 1)
     assert broken(table, order_of(once)) < broken(table, start)

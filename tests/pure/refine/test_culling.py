@@ -15,8 +15,8 @@ from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.refine.culling import (
     faces_away,
     hidden,
-    hiders_of,
-    moved_hiders,
+    moved_spheres,
+    occluder_spheres_of,
     shades_of,
 )
 from hairloom.addon.refine.detail import PictureView
@@ -142,7 +142,7 @@ def test_balls_lie_inside_a_real_head_that_has_holes(
     sintel: tuple[Surface, Floats], by_roots: bool
 ) -> None:
     surface, roots = sintel
-    balls = hiders_of(surface, 8, roots if by_roots else None)
+    balls = occluder_spheres_of(surface, 8, roots if by_roots else None)
     assert balls.dtype == np.float32
     assert 2 <= len(balls) <= 8
     assert balls[0, 3] > 0.07  # the skull; its largest ball is 0.078
@@ -167,7 +167,7 @@ def test_a_cup_hides_no_more_than_when_it_is_closed() -> None:
     a, b = index[:, :-1], np.roll(index, -1, axis=0)[:, :-1]
     quads = np.stack([a, a + 1, b + 1, a, b + 1, b], axis=-1).reshape(-1, 3)
     cup = Surface(rings.reshape(-1, 3), quads)
-    balls = hiders_of(cup, 4)
+    balls = occluder_spheres_of(cup, 4)
     assert 0.4 < balls[0, 3] < 0.5
     assert (balls[:, 2] - balls[:, 3] > 0.0).all()
     assert (np.linalg.norm(balls[:, :3], axis=1) + balls[:, 3] < 1.0).all()
@@ -175,18 +175,18 @@ def test_a_cup_hides_no_more_than_when_it_is_closed() -> None:
 
 def test_what_has_no_inside_gives_no_balls() -> None:
     nothing = Surface(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
-    assert hiders_of(nothing).shape == (0, 4)
+    assert occluder_spheres_of(nothing).shape == (0, 4)
     flat = Surface(
         np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]), np.array([[0, 1, 2], [2, 1, 3]])
     )
-    assert len(hiders_of(flat)) == 0
+    assert len(occluder_spheres_of(flat)) == 0
     point = Surface(np.zeros((3, 3)), np.array([[0, 1, 2]]))
-    assert len(hiders_of(point)) == 0
+    assert len(occluder_spheres_of(point)) == 0
 
 
 def test_balls_move_with_the_head_and_never_get_too_large() -> None:
     matrix = np.eye(4)
     matrix[:3, :3] = [[0.0, -2.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 3.0]]
     matrix[:3, 3] = [1.0, 2.0, 3.0]
-    moved = moved_hiders(np.array([[1.0, 0.0, 1.0, 0.5]], np.float32), matrix)
+    moved = moved_spheres(np.array([[1.0, 0.0, 1.0, 0.5]], np.float32), matrix)
     assert moved == pytest.approx(np.array([[1.0, 3.0, 6.0, 0.5]]))

@@ -28,7 +28,7 @@ class HAIRLOOM_OT_set_surface(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _can_mend(cls, context)
+        return _can_fix(cls, context)
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -50,7 +50,7 @@ class HAIRLOOM_OT_snap_roots(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (_can_mend(cls, context) and _needs_surface(cls, context)):
+        if not (_can_fix(cls, context) and _needs_surface(cls, context)):
             return False
         if _surface_of(context).data.uv_layers.active is not None:
             return True
@@ -75,7 +75,7 @@ class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (_can_mend(cls, context) and _needs_surface(cls, context)):
+        if not (_can_fix(cls, context) and _needs_surface(cls, context)):
             return False
         head = _surface_of(context)
         if head.data.uv_layers.active is not None:
@@ -109,7 +109,7 @@ class HAIRLOOM_OT_apply_scale(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _can_mend(cls, context):
+        if not _can_fix(cls, context):
             return False
         hair = chosen_hair(context)[0]
         if hair.data.users > 1:
@@ -151,7 +151,7 @@ def _alone(context: bpy.types.Context, obj: bpy.types.Object) -> Iterator[None]:
         context.view_layer.objects.active = active
 
 
-def _can_mend(operator: type[Any], context: bpy.types.Context) -> bool:
+def _can_fix(operator: type[Any], context: bpy.types.Context) -> bool:
     if not needs_hair(operator, context):
         return False
     hair = chosen_hair(context)[0]

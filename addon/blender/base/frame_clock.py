@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-#: Frames at most that one tick makes up for; what is later than these is dropped, because making
-#: up for all of a slow frame would make the next one slower still.
-MOST_AT_ONCE = 4
+#: The most frames that one tick makes up for. Further ones are dropped: making up for all of a slow
+#: frame would make the next one slower still.
+MAX_AT_ONCE = 4
 
 
-class Pace:
+class FrameClock:
     """Counts frames against a clock.
 
     Args:
@@ -20,8 +20,8 @@ class Pace:
     def due(self, now: float, rate: float) -> int:
         """Whole frames that have become due since the last call, at a rate [1/s]."""
         frames = max(int((now - self._done_until) * rate + 1.0e-6), 0)
-        if frames > MOST_AT_ONCE:
-            frames, self._done_until = MOST_AT_ONCE, now
+        if frames > MAX_AT_ONCE:
+            frames, self._done_until = MAX_AT_ONCE, now
         else:
             self._done_until += frames / rate
         return frames

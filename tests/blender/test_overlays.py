@@ -10,7 +10,7 @@ import pytest
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.preview import previews
-from hairloom.addon.blender.properties.groups import AIDS
+from hairloom.addon.blender.properties.groups import OVERLAYS
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.blender.viewport.debug_lines import shape_lines
 from hairloom.addon.dynamics.colliders import (
@@ -31,13 +31,13 @@ def preview(new_hair, sphere, evaluated):
     return hair, sphere, previews.start(hair, evaluated())
 
 
-def aids(session):
+def overlays(session):
     return overlay.drawing_of(session.uid).lines
 
 
 def lines_of(hair, session, kind):
-    hair.hairloom.shown_aids = {kind}
-    (lines,) = aids(session)
+    hair.hairloom.shown_overlays = {kind}
+    (lines,) = overlays(session)
     assert lines.points.dtype == np.float32 and len(lines.points) % 2 == 0
     return lines.points
 
@@ -53,13 +53,13 @@ def test_lines_of_a_collider_that_is_being_made_come_when_it_is_there(preview, m
 
     fields.forget()
     monkeypatch.setattr(DistanceField, "from_surface", late)
-    hair.hairloom.shown_aids = {"colliders"}
-    assert aids(session) == () and latest_job.take_steps() == latest_job.ARRIVAL_TIME
+    hair.hairloom.shown_overlays = {"colliders"}
+    assert overlays(session) == () and latest_job.take_steps() == latest_job.ARRIVAL_TIME
     is_made.set()
     while not fields.are_made():
         time.sleep(0.001)
     assert latest_job.take_steps() is None
-    assert len(aids(session)) == 1
+    assert len(overlays(session)) == 1
 
 
 @pytest.mark.parametrize(
@@ -80,10 +80,10 @@ def test_the_lines_of_a_shape_lie_on_its_surface(collider):
 
 def test_nothing_is_drawn_until_it_is_wanted(preview):
     hair, _, session = preview
-    assert aids(session) == ()
-    hair.hairloom.shown_aids = {kind for kind, _, _ in AIDS}
-    hair.hairloom.shown_aids = set()
-    assert aids(session) == ()
+    assert overlays(session) == ()
+    hair.hairloom.shown_overlays = {kind for kind, _, _ in OVERLAYS}
+    hair.hairloom.shown_overlays = set()
+    assert overlays(session) == ()
 
 
 def test_the_box_of_a_field_is_around_its_mesh_and_follows_it(preview, evaluated):
@@ -102,8 +102,8 @@ def test_the_box_of_a_field_is_around_its_mesh_and_follows_it(preview, evaluated
 
 def test_the_arrow_points_where_the_wind_blows_and_is_as_long_as_it_is_strong(preview):
     hair, _, session = preview
-    hair.hairloom.shown_aids = {"wind"}
-    assert aids(session) == (), "still air"
+    hair.hairloom.shown_overlays = {"wind"}
+    assert overlays(session) == (), "still air"
     lengths = []
     for speed in (5.0, 10.0):
         hair.hairloom.dynamics.wind_speed = speed

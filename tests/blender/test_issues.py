@@ -14,8 +14,8 @@ def told(hair):
 
 def mend(hair):
     """Press the one button there is."""
-    (trouble,) = diagnostics.issues_of(hair, previews.session_of(hair))
-    group, name = trouble.operator.split(".")
+    (issue,) = diagnostics.issues_of(hair, previews.session_of(hair))
+    group, name = issue.operator.split(".")
     assert getattr(getattr(bpy.ops, group), name)() == {"FINISHED"}
 
 
@@ -41,8 +41,8 @@ def test_a_surface_is_set_and_the_hair_stays_where_it_is(new_hair, sphere):
     hair.location = (0.0, 0.0, 0.01)
     bpy.context.view_layer.update()
     before = read(hair).points
-    (trouble,) = diagnostics.issues_of(hair, preview(hair))
-    assert trouble.instead_of.startswith("Hair: it has no surface")
+    (issue,) = diagnostics.issues_of(hair, preview(hair))
+    assert issue.instead_of.startswith("Hair: it has no surface")
     mend(hair)
     bpy.context.view_layer.update()
     assert hair.data.surface == sphere and hair.parent == sphere, "the cube is far away"
@@ -83,8 +83,8 @@ def test_roots_in_the_air_are_counted_and_snapped(new_hair, sphere):
     points[: 20 * 8] *= 1.4  # twenty strands begin 4 cm above the sphere
     hair.data.position_data.foreach_set("vector", points.ravel())
     preview(hair)
-    (trouble,) = diagnostics.issues_of(hair, previews.session_of(hair))
-    assert trouble.text.startswith("20 roots are not on Head")
+    (issue,) = diagnostics.issues_of(hair, previews.session_of(hair))
+    assert issue.text.startswith("20 roots are not on Head")
     mend(hair)
     roots = np.linalg.norm(read(hair).roots, axis=1)
     assert roots == pytest.approx(np.full(60, 0.1), rel=0.02)
