@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from waiting import take_steps_until
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -169,11 +170,7 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
 
     assert read() == (before,)
     gate.opened.set()
-    end = time.monotonic() + 60.0
-    while session.is_pending:
-        assert time.monotonic() < end
-        latest_job.take_steps()
-        time.sleep(0.005)
+    take_steps_until(lambda: not session.is_pending)
     assert overlay.drawn() == {hair.session_uid} and not overlay.expected()
     assert read() == (), "the preview draws it from now on"
     scene_events.clear()

@@ -1,12 +1,12 @@
 """Distance fields that are made beside the window's work: hair waits for them, at rest."""
 
 import threading
-import time
 import weakref
 
 import bpy
 import numpy as np
 import pytest
+from waiting import until
 
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.preview import previews, scene_events
@@ -43,10 +43,7 @@ def gate(monkeypatch):
 
 
 def until_made():
-    end = time.monotonic() + 60.0
-    while not fields.are_made():
-        assert time.monotonic() < end, "the field is not made"
-        time.sleep(0.005)
+    until(fields.are_made)
 
 
 def surface_of(obj, evaluated):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from typing import Any
 
 import pytest
+from waiting import PATIENCE_S, take_steps_until
 
 bpy = pytest.importorskip("bpy", reason="its timer is Blender's")
 
@@ -15,9 +15,6 @@ from hairloom.addon.blender.base import latest_job  # noqa: E402
 from hairloom.addon.blender.base.latest_job import LatestJob, Work  # noqa: E402
 from hairloom.addon.blender.base.thread_work import ThreadWork  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
-
-#: A thread that may go on is done by then [s].
-PATIENCE = 30.0
 
 
 class Workshop:
@@ -43,7 +40,7 @@ class Workshop:
         self.begun.append(key)
 
         def work(thread: ThreadWork[str]) -> str:
-            assert self.gates[key].wait(PATIENCE)
+            assert self.gates[key].wait(PATIENCE_S)
             try:
                 thread.report("last part")
             finally:
@@ -74,15 +71,6 @@ def shop() -> Iterator[Workshop]:
     latest_job.unwatch_all()
 
 
-def until(is_so: Callable[[], bool]) -> None:
-    """Take steps as Blender's timer does, until this is so."""
-    end = time.monotonic() + PATIENCE
-    while not is_so():
-        assert time.monotonic() < end, "it does not come"
-        latest_job.take_steps()
-        time.sleep(0.001)
-
-
 def test_it_arrives_by_blenders_timer_and_is_not_made_twice(shop: Workshop) -> None:
     shop.want("a")
     assert bpy.app.timers.is_registered(latest_job.take_steps)
@@ -90,7 +78,7 @@ def test_it_arrives_by_blenders_timer_and_is_not_made_twice(shop: Workshop) -> N
     assert latest_job.take_steps() == latest_job.ARRIVAL_TIME and shop.taken == []
     shop.want("a")
     shop.open("a")
-    until(lambda: shop.taken == ["A"])
+    take_steps_until(lambda: shop.taken == ["A"])
     shop.want("a")
     assert shop.begun == ["a"] and not shop.job.is_pending
     assert latest_job.take_steps() is None, "the timer ends with the last work"
@@ -101,7 +89,7 @@ def test_what_runs_is_finished_and_then_the_last_one_wanted_begins(shop: Worksho
         shop.want(key)
     assert shop.begun == ["a"]
     shop.open("a", "d")
-    until(lambda: shop.taken == ["A", "D"])
+    take_steps_until(lambda: shop.taken == ["A", "D"])
     assert shop.begun == ["a", "d"], "what is in between is left out"
 
 
@@ -109,7 +97,7 @@ def test_who_wants_again_what_runs_gets_it_alone(shop: Workshop) -> None:
     for key in "aba":
         shop.want(key)
     shop.open("a", "b")
-    until(lambda: shop.taken == ["A"])
+    take_steps_until(lambda: shop.taken == ["A"])
     assert shop.begun == ["a"] and not shop.job.is_pending
 
 
@@ -117,13 +105,13 @@ def test_a_failure_counts_only_of_what_is_still_wanted(shop: Workshop) -> None:
     shop.want("a", fails=True)
     shop.want("b", fails=True)
     shop.open("a", "b")
-    until(lambda: bool(shop.errors))
+    take_steps_until(lambda: bool(shop.errors))
     assert shop.taken == [None] and [error.place for error in shop.errors] == ["b"]
     shop.want("b")
     assert not shop.job.is_pending, "it fails once"
     shop.want("c")
     shop.open("c")
-    until(lambda: shop.taken == [None, "C"])
+    take_steps_until(lambda: shop.taken == [None, "C"])
 
 
 def test_cancelled_work_ends_by_itself_and_is_not_wanted_any_more(shop: Workshop) -> None:
@@ -132,10 +120,10 @@ def test_cancelled_work_ends_by_itself_and_is_not_wanted_any_more(shop: Workshop
     shop.job.cancel()
     assert not shop.job.is_pending and latest_job.take_steps() is None
     shop.open("a", "b")
-    until(lambda: shop.ended == ["a"])
+    take_steps_until(lambda: shop.ended == ["a"])
     assert shop.taken == [] and shop.begun == ["a"]
     shop.want("a")
-    until(lambda: shop.taken == ["A"])
+    take_steps_until(lambda: shop.taken == ["A"])
 
 
 def test_who_takes_too_early_waits(shop: Workshop) -> None:
@@ -148,7 +136,7 @@ def test_it_is_offered_until_it_is_taken(shop: Workshop) -> None:
     offers: list[bool] = []
     job = LatestJob[str, str]("test", lambda: offers.append(job.has_arrived))
     job.want("a", lambda: lambda _: "A")
-    until(lambda: len(offers) >= 3)
+    take_steps_until(lambda: len(offers) >= 3)
     assert all(offers) and job.take() == "A"
     assert latest_job.take_steps() is None
 
@@ -171,7 +159,7 @@ def test_work_that_needs_this_thread_is_served_by_the_timer(shop: Workshop) -> N
 
     job = LatestJob[str, str]("test", lambda: shop.taken.append(job.take()))
     job.want("a", lambda: lambda work: work.on_main_thread(steps()))
-    until(lambda: shop.taken == ["A"])
+    take_steps_until(lambda: shop.taken == ["A"])
     assert seen == 3 * [threading.main_thread()]
 
 

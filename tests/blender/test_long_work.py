@@ -8,6 +8,7 @@ from typing import Any
 
 import bpy
 import pytest
+from waiting import until
 
 from hairloom.addon.blender.base.thread_work import GivenUpError, ThreadWork
 from hairloom.addon.cards.steps import result_of
@@ -115,7 +116,6 @@ def test_closing_gives_the_thread_up() -> None:
     next(steps)
     steps.close()
     may_go_on.set()
-    while not thread.run_main_thread_steps():
-        pass
+    until(thread.run_main_thread_steps)
     with pytest.raises(GivenUpError):
         thread.result()

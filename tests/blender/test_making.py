@@ -1,12 +1,12 @@
 """Hair that is made beside the window's work: what was there is shown until it arrives."""
 
 import threading
-import time
 from dataclasses import replace
 
 import bpy
 import numpy as np
 import pytest
+from waiting import take_steps_until, until
 
 from hairloom.addon import pipeline
 from hairloom.addon.blender.bakes import playback
@@ -58,12 +58,8 @@ def hair(new_hair, sphere):
 
 
 def arrive(session):
-    """As Blender's timer does, until nothing is being made."""
-    end = time.monotonic() + 60.0
-    while session.is_pending and previews.sessions():
-        assert time.monotonic() < end, "it is never made"
-        latest_job.take_steps()
-        time.sleep(0.005)
+    """Until nothing is being made."""
+    take_steps_until(lambda: not (session.is_pending and previews.sessions()))
 
 
 def shown(session):
@@ -101,8 +97,7 @@ def test_what_a_thread_makes_is_the_same_to_the_bit(hair, evaluated, in_window):
 def test_play_waits_for_the_hair(hair, evaluated, gate):
     session = previews.start(hair, evaluated())
     assert previews.play(evaluated(), blocking=False) == []
-    while not fields.are_made():
-        time.sleep(0.005)
+    until(fields.are_made)
     previews.advance(evaluated(), FRAME)
     assert previews.previews[session.uid].phase is Phase.WAITING and not session.is_playing
     with pytest.raises(fields.NotMadeYetError):
@@ -345,10 +340,7 @@ def test_playback_goes_on_before_a_collider_is_made(hair, moving, evaluated, mon
     rounds(session, 1, 2, 3)
     assert session.is_made and not session.is_playing and previews.previews[session.uid].is_deferred
     opened.set()
-    end = time.monotonic() + 60.0
-    while not fields.are_made():
-        assert time.monotonic() < end
-        time.sleep(0.005)
+    until(fields.are_made)
     rounds(session, 4)
     assert session.is_playing and not previews.previews[session.uid].is_deferred
 

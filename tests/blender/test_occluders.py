@@ -7,6 +7,7 @@ import threading
 import bpy
 import numpy as np
 import pytest
+from waiting import take_steps_until
 
 from hairloom.addon import card_flow
 from hairloom.addon.blender.base import latest_job
@@ -227,8 +228,7 @@ def test_other_hair_is_made_into_cards_in_the_thread(shaded, evaluated, monkeypa
     strands.rotation_euler.z += 0.3
     follow(evaluated)
     assert threads_of("hairloom cards") - first, "it moves while a build is pending"
-    while session.cards.is_pending:
-        latest_job.take_steps()
+    take_steps_until(lambda: not session.cards.is_pending)
     assert shown(session) is not near
     assert threads and threading.main_thread() not in threads
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from waiting import take_steps_until
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -21,6 +22,7 @@ def preview(new_hair, sphere, evaluated):
     hair = new_hair(sphere)
     hair.data.hairloom.cards.source = "guides"
     hair.data.hairloom.card_occlusion.rays = 4
+    hair.data.hairloom.atlas.size = "512"
     hair.data.hairloom.card_drawing.shown_as = "cards"
     session = previews.start(hair, evaluated())
     yield hair, sphere, session
@@ -40,8 +42,7 @@ def drawn(session):
 
 def served(session):
     """The cards that are shown once all that is on its way is built."""
-    while session.cards.is_pending:
-        latest_job.take_steps()
+    take_steps_until(lambda: not session.cards.is_pending)
     return drawn(session).cards
 
 
@@ -205,8 +206,7 @@ def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_win
     bpy.context.view_layer.update()
     scene_events.updated(evaluated())
     scene_events.catch_up(evaluated())
-    while session.is_pending:
-        latest_job.take_steps()
+    take_steps_until(lambda: not session.is_pending)
     assert session.cards.is_pending
     assert np.array_equal(drawn(session).cards.mesh.positions, before.mesh.positions)
     before = drawn(session).cards

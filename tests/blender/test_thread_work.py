@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Generator
 from typing import Any
 
 import pytest
+from waiting import PATIENCE_S, until
 
 pytest.importorskip("bpy", reason="what serves it runs inside Blender")
 
 from hairloom.addon.blender.base.thread_work import GivenUpError, ThreadWork
-
-#: A thread that has something to do has done it by then [s].
-PATIENCE = 30.0
-
-
-def until(is_so: Any) -> None:
-    end = time.monotonic() + PATIENCE
-    while not is_so():
-        assert time.monotonic() < end, "the thread does not get on"
-        time.sleep(0.001)
 
 
 def counting(seen: list[Any], last: int) -> Generator[None, None, int]:
@@ -87,7 +77,7 @@ def test_work_that_was_given_up_asks_and_goes_on_no_more() -> None:
     given_up, ended = threading.Event(), []
 
     def go_on(work: ThreadWork[None]) -> None:
-        given_up.wait(PATIENCE)
+        given_up.wait(PATIENCE_S)
         for goes_on in (lambda: work.report("next"), lambda: work.on_main_thread(counting([], 1))):
             try:
                 goes_on()
