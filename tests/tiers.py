@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import pytest
 
 
 def few_in_commits(cases: Iterable[Any], count: int = 1) -> list[Any]:
-    """Cases for `parametrize`: the first so many for every commit, the others are slow."""
+    """Cases for `parametrize`: the first ones, `count` of them, for every commit; others are slow."""
     return [case if number < count else _slow(case) for number, case in enumerate(cases)]
+
+
+def few_by_name(cases: Mapping[str, Any], *slow: str) -> list[Any]:
+    """Named cases for `parametrize`, of which those named are slow."""
+    assert set(slow) <= set(cases)
+    marks = {name: [pytest.mark.slow] if name in slow else [] for name in cases}
+    return [pytest.param(case, marks=marks[name], id=name) for name, case in cases.items()]
 
 
 def _slow(case: Any) -> Any:

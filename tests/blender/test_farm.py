@@ -145,6 +145,7 @@ def test_a_farm_bakes_exports_and_does_only_what_is_missing(folder: Path) -> Non
     assert not any("cards" in name for name in again)
 
 
+@pytest.mark.slow
 def test_a_failed_task_fails_the_job_and_harms_no_other(folder: Path) -> None:
     (folder / "scenes" / "ben.blend").write_bytes(b"no blend file")
     anna, ben = at_once(*(bake_of(folder, name) for name in CHARACTERS))

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from swinging import FRAME, swings
+from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.engine import engine_hair
@@ -190,7 +191,7 @@ def test_keyframes_and_drivers_act_in_preview_and_engine(new_hair, sphere, evalu
     assert (found.strand_settings.width_scale, found.shading.ambient) == (3.0, 0.75)
 
 
-@pytest.mark.parametrize("is_previewed", [False, True])
+@pytest.mark.parametrize("is_previewed", few_in_commits([True, False]))
 def test_a_rendered_animation_has_the_settings_of_each_frame(
     is_previewed, stage, new_hair, sphere, evaluated, monkeypatch, tmp_path
 ):

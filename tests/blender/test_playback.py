@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.preview import previews
@@ -103,7 +104,9 @@ def written(curves):
     return points
 
 
-@pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_WORKBENCH", "BLENDER_EEVEE"])
+@pytest.mark.parametrize(
+    "engine", few_in_commits(["CYCLES", "BLENDER_WORKBENCH", "BLENDER_EEVEE"], 2)
+)
 def test_a_render_shows_the_baked_hair_of_its_frame(engine, scene, tmp_path):
     if engine != "CYCLES":
         pytest.importorskip("gpu").init()

@@ -35,6 +35,7 @@ def tips(guides):
     return (guides[-1] - guides[0])[:, -1].mean(axis=0)
 
 
+@pytest.mark.slow
 def test_a_wind_force_field_blows_the_hair(scene, tmp_path):
     still = simulated(tmp_path / "still")
     assert np.abs(tips(still)).max() < 1e-3

@@ -97,6 +97,7 @@ def swing_of_new_hair(size):
     return np.linalg.norm(session.strands - at_first, axis=-1).max() / length
 
 
+@pytest.mark.slow
 def test_hair_swings_in_a_breeze_whatever_the_size_of_its_mesh():
     on_a_head = swing_of_new_hair(0.2)
     assert on_a_head > 0.02

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
+from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.base.frame_clock import MAX_AT_ONCE, FrameClock
@@ -180,7 +181,7 @@ def test_another_form_in_the_middle_goes_on_from_where_the_hair_is(swinging):
     assert lag(session) > 0.005
 
 
-@pytest.mark.parametrize("rate", [(1, 100.0), (240, 1.0), (24, 1.001)])
+@pytest.mark.parametrize("rate", few_in_commits([(240, 1.0), (1, 100.0), (24, 1.001)]))
 def test_any_frame_rate_is_simulated(rate, swinging):
     _, _, session = swinging
     render = bpy.context.scene.render

@@ -238,6 +238,7 @@ def test_a_contact_sheet_shows_all_sides(hair: bpy.types.Object, tmp_path: Path)
             assert np.abs(tile - other).max() > 0.1
 
 
+@pytest.mark.slow
 def test_a_contact_sheet_of_all_looks_leaves_the_groom_its_own(table: Turntable) -> None:
     studio, worn = table.studio, table.studio.settings
     sheet = Sheet(studio, table.pose, table.points, (48, 48), 1, by_looks=True)

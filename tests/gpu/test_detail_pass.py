@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from refinement_probes import adaptive_points, read_factors
+from tiers import few_in_commits
 
 from hairloom.addon.refine.culling import faces_away, hidden, shades_of
 from hairloom.addon.refine.detail import PictureView, detail_factors
@@ -391,8 +392,8 @@ def head_of_hair(frame: Any, detail: DetailSettings) -> Any:
     )
 
 
-@pytest.mark.parametrize("seen", ["whole", "inside", "orthographic"])
-@pytest.mark.parametrize("mode", ["adaptive", "fixed"])
+@pytest.mark.parametrize("seen", few_in_commits(["inside", "whole", "orthographic"], 2))
+@pytest.mark.parametrize("mode", few_in_commits(["adaptive", "fixed"]))
 def test_hidden_strands_change_no_pixel(frame: Any, mode: str, seen: str) -> None:
     camera, pictures, strands = cameras(frame)[seen], [], []
     for culling in ("none", "hidden"):

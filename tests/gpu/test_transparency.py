@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
@@ -131,8 +132,8 @@ def layers_of(
     return depth, np.round(alpha * 4095.0) / 4095.0, along
 
 
-@pytest.mark.parametrize("width", [0.4, 1.3, 5.0])
-@pytest.mark.parametrize("opacity", [0.2, 1.0])
+@pytest.mark.parametrize("width", few_in_commits([1.3, 0.4, 5.0]))
+@pytest.mark.parametrize("opacity", few_in_commits([0.2, 1.0]))
 def test_crossing_strands_are_those_sorted_in_numpy(
     frame: Any, width: float, opacity: float
 ) -> None:

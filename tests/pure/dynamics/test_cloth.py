@@ -118,6 +118,7 @@ def test_normals_are_those_of_the_surface():
 # --------------------------------------------------------------------------------------- motion
 
 
+@pytest.mark.slow
 def test_a_shaken_sheet_keeps_its_edges_and_comes_to_rest():
     """40 x 40 vertices, one metre, at the defaults: under 1 % in every frame."""
     states = play(hanging(), 6.0, FinSettings(), shaken)
@@ -138,6 +139,7 @@ def test_pinned_vertices_go_with_the_mesh():
     assert np.abs(states[-1].position.T[6:] - target[6:]).max() > 1e-3
 
 
+@pytest.mark.slow
 def test_weights_between_pull_the_more_the_higher_they_are():
     points, triangles = sheet(2, 5, 0.2)
     sag = []
@@ -176,6 +178,7 @@ def test_a_strip_held_at_both_ends_hangs_as_a_catenary():
     assert np.abs(end[2] - expected).max() < 0.02 * sag
 
 
+@pytest.mark.slow
 def test_stretch_is_as_promised_for_any_mesh_and_step():
     """A string of one metre gains the share that the parameter says, at its upper end."""
     for count, steps in ((11, 10), (41, 20), (41, 40)):
@@ -219,6 +222,7 @@ def test_two_runs_are_alike_to_the_last_bit():
     assert np.array_equal(one.previous, two.previous)
 
 
+@pytest.mark.slow
 def test_the_frame_rate_does_not_matter():
     """Within 2 % of the cloth's length; at the same moment, after a second of shaking."""
     ends = {}

@@ -59,6 +59,7 @@ def test_pearls_grow_towards_the_tip(kit):
     assert (away[:, 2:] > radius - 1e-3).all()
 
 
+@pytest.mark.slow
 def test_a_mesh_holds_hair_out(kit):
     """The same through a distance field of a ball mesh, to 1 mm, with the default radius."""
     field = DistanceField.from_surface(kit.icosphere(0.1, 3), DynamicsSettings())

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.dynamics.forces import predict
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -259,7 +260,7 @@ def catenary(start_point, end_point, length, share):
     return np.stack([x0 + x - left, z0 + a * (np.cosh(x / a) - np.cosh(left / a))], axis=1)
 
 
-@pytest.mark.parametrize("solver", ["direct", "relaxation"])
+@pytest.mark.parametrize("solver", few_in_commits(["direct", "relaxation"]))
 @pytest.mark.parametrize("rise", [0.0, 0.06])
 def test_a_strand_held_at_both_ends_hangs_as_a_catenary(kit, solver, rise):
     cv_count, length, span = 32, 0.3, 0.18

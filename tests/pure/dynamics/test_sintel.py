@@ -35,6 +35,7 @@ def true_depth(points, surface):
     return float((closest * (winding_number(points, surface) > 0.5)).max())
 
 
+@pytest.mark.slow
 def test_a_shaken_head(kit, shake, sintel):
     groom, surface = sintel
     settings = DynamicsSettings()

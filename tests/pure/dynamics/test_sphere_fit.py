@@ -59,11 +59,13 @@ def test_nothing_sticks_out_farther_than_allowed(kit, overshoot):
     assert fit.error.outside_max <= overshoot * 0.2 + 1e-5
 
 
+@pytest.mark.slow
 def test_more_spheres_leave_smaller_gaps(kit):
     gaps = [fitted(kit.box((0.2, 0.12, 0.08)), count).error.gap_mean for count in (5, 20, 60)]
     assert gaps[0] > 1.5 * gaps[1] > 2.25 * gaps[2]
 
 
+@pytest.mark.slow
 def test_no_other_choice_of_the_same_size_does_better_by_chance(kit):
     """Against many random choices of as many medial balls."""
     surface = both(kit.box((0.2, 0.05, 0.05)), shifted(kit.icosphere(0.04, 2), 0.0, 0.0, 0.07))
@@ -114,6 +116,7 @@ def test_a_hole_lets_no_sphere_out(kit):
     assert (fit.centers[:, 2] - fit.radii).min() > -0.06
 
 
+@pytest.mark.slow
 def test_parts_within_parts_do_no_harm(kit):
     """An eye within a head, with its own surface."""
     head, eye = kit.icosphere(0.1, 3), shifted(kit.icosphere(0.03, 2), 0.05, 0.0, 0.0)
@@ -163,6 +166,7 @@ def test_a_mesh_without_volume_is_named(positions, triangles, message):
     assert caught.value.place == "Scarf"
 
 
+@pytest.mark.slow
 def test_the_head_of_sintel(shared_data: Path):
     """60 spheres for a bust with open neck: about 1 mm off on average, ears and hems more."""
     surface = _read_obj(shared_data / "sintel" / "sintel.obj")
