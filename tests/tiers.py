@@ -9,7 +9,7 @@ import pytest
 
 
 def few_in_commits(cases: Iterable[Any], count: int = 1) -> list[Any]:
-    """Cases for `parametrize`: the first ones, `count` of them, for every commit; others are slow."""
+    """Cases for `parametrize`: the first `count` for every commit, the others are slow."""
     return [case if number < count else _slow(case) for number, case in enumerate(cases)]
 
 

@@ -20,6 +20,7 @@ from ...cards.vertex_animation import motion_layout
 from ...exchange.cards.card_formats import CardFormat, format_of
 from ...exchange.cards.index_buffer import index_buffer
 from ...exchange.cards.sidecar import SUFFIX, CardFile, sidecar_text
+from ...exchange.files.atomic import check_place
 from ...exchange.files.file_set import written_together
 from ...params import Settings, SettingsMap
 from ...shading.card_look import VIEW_COMPENSATED_ALPHA
@@ -137,9 +138,10 @@ def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> 
     """Refuse what cannot be written, before any work is done.
 
     Raises:
-        HairloomError: the format, or motion in it.
+        HairloomError: the place, the format, or motion in it.
     """
     path, file_format = format_of(path, output.format)
+    check_place(path)
     check_exporter(file_format, str(path))
     if motion is not None:
         check_motion(output.settings, motion, file_format)

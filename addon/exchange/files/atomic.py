@@ -89,6 +89,21 @@ def flush_to_disk(path: Path, flags: int) -> None:
         os.close(descriptor)
 
 
+def check_place(path: Path) -> None:
+    """Refuse a place that nothing can be written to before long work begins; writes nothing.
+
+    Raises:
+        HairloomError: a folder has this name, or no file can be made in its folder.
+    """
+    if path.is_dir():
+        raise unwritable(path, "a folder has this name")
+    folder = next(each for each in path.absolute().parents if each.exists())
+    if not folder.is_dir():
+        raise unwritable(path, f"{folder.name} is no folder")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise unwritable(path, "permission denied")
+
+
 def unwritable(path: Path, why: str) -> HairloomError:
     """The message for a place where nothing can be written."""
     return HairloomError(

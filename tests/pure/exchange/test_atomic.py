@@ -8,7 +8,12 @@ from pathlib import Path
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files.atomic import atomic_write, write_bytes_atomic, write_text_atomic
+from hairloom.addon.exchange.files.atomic import (
+    atomic_write,
+    check_place,
+    write_bytes_atomic,
+    write_text_atomic,
+)
 
 pytestmark = pytest.mark.portable
 
@@ -65,6 +70,16 @@ def test_impossible_places_are_named_before_anything_is_written(tmp_path: Path) 
         assert caught.value.place == str(target)
         assert "Choose a folder" in caught.value.remedy
     assert names(tmp_path) == ["file", "folder"]
+
+
+def test_a_place_is_refused_before_any_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for target in (tmp_path / "file" / "new" / "a.glb", tmp_path):
+        with pytest.raises(HairloomError) as caught:
+            check_place(target)
+        assert caught.value.place == str(target)
+    check_place(tmp_path / "new" / "folder" / "a.glb")
+    assert names(tmp_path) == ["file"], "nothing is written"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="file modes are POSIX")
