@@ -149,7 +149,7 @@ def sorted_picture(each: Stage) -> tuple[np.ndarray, np.ndarray]:
         shot = replace(snapshot, cards=replace(snapshot.cards, mesh=alone, back_triangles=None))
         target.clear((0.0, 0.0, 0.0, 0.0))
         with target.drawing():
-            passes.draw_depth(shot, each.camera, SIZE, SIZE, least_alpha=0.0)
+            passes.draw_depth(shot, each.camera, SIZE, SIZE, min_alpha=0.0)
         depth = target.depths().ravel()
         target.clear((0.0, 0.0, 0.0, 0.0))
         with target.drawing():

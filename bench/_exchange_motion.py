@@ -58,7 +58,7 @@ def motion_figures(seconds: float) -> dict[str, float]:
     fitted = time.perf_counter()
     length, told = moved.tracks.hair_length, joints.facts
     figures = {
-        "joint_error_percent": 100.0 * joints.share,
+        "joint_error_percent": 100.0 * joints.relative_error,
         "joint_error_percent_99": 100.0 * joints.error.most / length,
         "joint_error_percent_worst": 100.0 * joints.error.worst / length,
         "chains": told["chains"],

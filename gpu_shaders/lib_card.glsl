@@ -26,7 +26,7 @@ vec3 mapped_normal(vec3 texel, vec3 tangent, vec3 normal)
 float view_compensated_alpha(float alpha, vec3 across, vec3 tangent, vec3 to_eye)
 {
   float facing = turned_facing(across, tangent, to_eye);
-  return 1.0 - pow(1.0 - alpha, {{mean_facing}} / max(facing, {{least_facing}}));
+  return 1.0 - pow(1.0 - alpha, {{mean_facing}} / max(facing, {{min_facing}}));
 }
 
 // Mean colour of the strands, of which some are grey: times the base texture it is the hair's.

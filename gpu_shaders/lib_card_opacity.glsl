@@ -20,7 +20,7 @@ float turned_facing(vec3 across, vec3 tangent, vec3 direction)
 // Factor of the tau that light from a way meets in an even card.
 float view_compensated_depth(vec3 across, vec3 tangent, vec3 direction)
 {
-  return {{mean_turn}} / max(turned_facing(across, tangent, direction), {{least_facing}});
+  return {{mean_turn}} / max(turned_facing(across, tangent, direction), {{min_facing}});
 }
 
 // How much hair lies before and beyond the strand of an even card that is seen; `way`: before and beyond

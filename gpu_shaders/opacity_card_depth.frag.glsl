@@ -4,7 +4,7 @@
 void main()
 {
   vec4 steps = vec4(dFdx(card_uv), dFdy(card_uv));
-  if (card_texel(alpha_texture, card_uv, steps, atlas_tiles).x < least_alpha) {
+  if (card_texel(alpha_texture, card_uv, steps, atlas_tiles).x < min_alpha) {
     discard;
   }
 }

@@ -22,7 +22,7 @@ from ..strands.closest_point import closest_point
 from ..strands.vectors import unit_or
 from .card_mesh import CardMesh
 from .sort import connected_components
-from .uv_directions import Heading, UvAxes, coordinate_gradients, island_bounds, uv_axes
+from .uv_directions import UvAxes, UvDirection, coordinate_gradients, island_bounds, uv_axes
 
 #: A triangle of less than this fraction of the square of its longest edge has no area.
 _FLAT = 1.0e-7
@@ -52,7 +52,7 @@ def adopt_cards(
     head: Surface | None,
     *,
     group: Ints | None = None,
-    heading: Heading = "auto",
+    direction: UvDirection = "auto",
     place: str,
 ) -> AdoptedCards:
     """Read cards out of a mesh.
@@ -75,7 +75,7 @@ def adopt_cards(
     toward = _away_from(source.positions, head)
     corners = source.corners.astype(np.float64)
     distance = toward.distance[source.triangles]
-    axes = uv_axes(corners, uv[triangles], distance, island, heading)
+    axes = uv_axes(corners, uv[triangles], distance, island, direction)
     normal, is_turned, is_mixed = _facing(source, card, toward.direction)
     along = _along(uv[triangles], island, axes)
     mesh = CardMesh(
@@ -90,7 +90,7 @@ def adopt_cards(
         group=_groups(source.triangles, card, group),
     )
     notes = (
-        *_direction_notes(axes, island, card, head if heading == "auto" else source),
+        *_direction_notes(axes, island, card, head if direction == "auto" else source),
         *_shape_notes(source, card, is_mixed),
         *_uv_notes(uv),
     )

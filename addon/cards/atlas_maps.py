@@ -83,15 +83,15 @@ def dilated(maps: AtlasMaps, grid: AtlasGrid) -> AtlasMaps:
 
 
 def _between(name: str, texels: Floats, left: Ints, right: Ints, fraction: Floats) -> Floats:
-    """What goes over from one texel to the other, (n, ...)."""
+    """Values between two texels, (n, ...)."""
     if name == "strand_id":  # a number between two is a third strand's
         return texels[np.where(fraction < 0.5, left, right)]
     mixed = texels[left]
     mixed += (texels[right] - mixed) * fraction.reshape(-1, *[1] * (texels.ndim - 1))
     if name in ("normal", "tangent"):
-        way = mixed - 0.5
-        length = np.sqrt(np.einsum("ni,ni->n", way, way))
-        mixed = 0.5 + way * (0.5 / np.maximum(length, 1e-6))[:, None]
+        vector = mixed - 0.5
+        length = np.sqrt(np.einsum("ni,ni->n", vector, vector))
+        mixed = 0.5 + vector * (0.5 / np.maximum(length, 1e-6))[:, None]
     return mixed
 
 

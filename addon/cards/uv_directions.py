@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 
 #: The way from root to tip in all UVs: found out, or known.
-type Heading = Literal["auto", "up", "down", "right", "left"]
+type UvDirection = Literal["auto", "up", "down", "right", "left"]
 #: (axis, whether the root is where the coordinate is largest)
 _KNOWN: dict[str, tuple[int, bool]] = {
     "up": (1, False),
@@ -51,7 +51,7 @@ class UvAxes:
 
 
 def uv_axes(
-    corners: Floats, uv: Floats, distance: Floats, island: Ints, heading: Heading = "auto"
+    corners: Floats, uv: Floats, distance: Floats, island: Ints, direction: UvDirection = "auto"
 ) -> UvAxes:
     """Where roots and tips are.
 
@@ -62,9 +62,9 @@ def uv_axes(
         island: (triangle_count,) numbered from 0 without gaps.
         way: of all islands, when it is known.
     """
-    if heading != "auto":
+    if direction != "auto":
         count = int(island.max()) + 1
-        known_axis, known_end = _KNOWN[heading]
+        known_axis, known_end = _KNOWN[direction]
         nobody = np.zeros(count, bool)
         return UvAxes(np.full(count, known_axis), np.full(count, known_end), nobody)
     area = _sums(island, _areas(corners))

@@ -28,17 +28,17 @@ def mixed(root: Floats, guide_grid: Floats, weights: GuideWeights) -> Floats:
         guide_grid: (guide_count, cv_count, 3) float32 [m].
     """
     cv_count = guide_grid.shape[1]
-    way = (guide_grid - guide_grid[:, :1]).reshape(len(guide_grid), 3 * cv_count)
+    offset = (guide_grid - guide_grid[:, :1]).reshape(len(guide_grid), 3 * cv_count)
     grid = np.tile(np.asarray(root, np.float32), (1, cv_count))
     for start in range(0, len(grid), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         for guide, weight in zip(weights.guide[chunk].T, weights.weight[chunk].T, strict=True):
-            grid[chunk] += way[guide] * weight[:, None]
+            grid[chunk] += offset[guide] * weight[:, None]
     return grid.reshape(len(grid), cv_count, 3)
 
 
 def shorten(grid: Floats, settings: ChildrenSettings) -> None:
-    """Cut each strand to a random length along its own way, in place, and space its CVs as before.
+    """Cut each strand to a random length along its curve, in place, and space its CVs as before.
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
@@ -77,16 +77,16 @@ def _on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
     p0, p1, p2, p3 = (
         np.take_along_axis(extended, left[..., None] + step, axis=1) for step in range(4)
     )
-    way, bend = 0.5 * (p2 - p0), 0.5 * (p3 - p1)
+    m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)  # the tangents
     chord = p2 - p1
-    return p1 + t * (way + t * (3.0 * chord - 2.0 * way - bend + t * (way + bend - 2.0 * chord)))
+    return p1 + t * (m1 + t * (3.0 * chord - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * chord)))
 
 
 def frizz(grid: Floats, settings: ChildrenSettings) -> None:
-    """Let each strand stray from its way on waves of its own, in place; roots stay.
+    """Let each strand stray from its path in waves, in place; roots stay.
 
-    Two waves across each other, each with a direction, phase and pitch of the child's own, and no
-    further than `settings.frizz` together.
+    Two waves across each other, with each child's own direction, phase and pitch, and together no
+    further than `settings.frizz`.
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m].

@@ -163,19 +163,19 @@ def _laid(styled: Floats, plan: _Plan) -> Floats:
     """
     grid = styled.copy()
     for cv in range(1, grid.shape[1]):
-        way = unit(styled[:, cv] - grid[:, cv - 1])
+        direction = unit(styled[:, cv] - grid[:, cv - 1])
         if cv > 1:
-            way = _turn_limited(unit(grid[:, cv - 1] - grid[:, cv - 2]), way)
-        grid[:, cv] = plan.step(cv, grid[:, cv - 1], way)
+            direction = _turn_limited(unit(grid[:, cv - 1] - grid[:, cv - 2]), direction)
+        grid[:, cv] = plan.step(cv, grid[:, cv - 1], direction)
     # keeping the length may have drawn a point in again; half of its height is always kept
     free = plan.skin.outside(grid[:, 1:].reshape(-1, 3), 0.5 * plan.height.ravel())
     grid[:, 1:] = free.reshape(grid[:, 1:].shape)
     return grid
 
 
-def _turn_limited(before: Floats, way: Floats) -> Floats:
+def _turn_limited(before: Floats, direction: Floats) -> Floats:
     """Unit directions (n, 3), those that turn too sharply from the ones before turned back."""
-    cosine = np.einsum("ij,ij->i", before, way)[:, None]
-    beside = unit(way - before * cosine)
+    cosine = np.einsum("ij,ij->i", before, direction)[:, None]
+    beside = unit(direction - before * cosine)
     sharpest = before * np.cos(_SHARPEST_TURN) + beside * np.sin(_SHARPEST_TURN)
-    return np.where(cosine < np.cos(_SHARPEST_TURN), sharpest, way)
+    return np.where(cosine < np.cos(_SHARPEST_TURN), sharpest, direction)

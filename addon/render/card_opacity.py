@@ -51,7 +51,7 @@ _DEPTH_RECIPE = ShaderRecipe(
     vertex="opacity_card.vert.glsl",
     fragment="opacity_card_depth.frag.glsl",
     structs=("struct_opacity.glsl",),
-    numbers=(("FLOAT", "least_alpha"),),
+    numbers=(("FLOAT", "min_alpha"),),
     inputs=_INPUTS,
     varyings=_VARYINGS,
 )
@@ -114,7 +114,7 @@ class _Cards:
         target = gpu.types.GPUFrameBuffer(depth_slot=depths)
         with drawing_into(target), drawing_state(depth_test=depth_test):
             target.clear(depth=none)
-            features, numbers = [place, self.feature], {"least_alpha": MIN_ALPHA}
+            features, numbers = [place, self.feature], {"min_alpha": MIN_ALPHA}
             shader = bound(_DEPTH_RECIPE, features, self.blocks, numbers=numbers)
             self.batch.draw(shader.shader)
         return depths

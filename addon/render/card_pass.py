@@ -165,7 +165,7 @@ class CardPass:
         width: int,
         height: int,
         *,
-        least_alpha: float = _PRESENT_ALPHA,
+        min_alpha: float = _PRESENT_ALPHA,
     ) -> None:
         """The depth of the cards alone, wherever they cover at least so much.
 
@@ -178,7 +178,7 @@ class CardPass:
         self._take_textures(cards)
         view = view_feature(camera, width, height)
         with _state_of(FOUR_PASSES[0]):
-            self._draw_depth(view, self._batches.static(cards), least_alpha, sharpness=0.0)
+            self._draw_depth(view, self._batches.static(cards), min_alpha, sharpness=0.0)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
@@ -234,7 +234,7 @@ class CardPass:
         batch.draw(bound(_SHADED_RECIPE, features, self._blocks, integers=integers).shader)
 
     def _draw_depth(
-        self, view: ShaderFeature, batch: Any, least_alpha: float, *, sharpness: float
+        self, view: ShaderFeature, batch: Any, min_alpha: float, *, sharpness: float
     ) -> None:
         """Pixels of that alpha alone, by a shader that asks for nothing else.
 
@@ -248,7 +248,7 @@ class CardPass:
             self._blocks,
             textures={"alpha_texture": self._textures.of("alpha")},
             numbers={
-                "opaque_alpha": least_alpha,
+                "opaque_alpha": min_alpha,
                 "sharpness": sharpness,
                 "atlas_tiles": self._textures.tiles,
             },

@@ -114,7 +114,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "atlas_samples": str(SAMPLES),
         "mean_facing": repr(MEAN_FACING),
         "darkest": repr(DARKEST),
-        "least_facing": repr(MIN_FACING),
+        "min_facing": repr(MIN_FACING),
         "mean_turn": repr(MEAN_TURN),
         "min_tau": repr(MIN_TAU),
         "card_texture_levels": str(LEVELS),

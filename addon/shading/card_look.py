@@ -19,7 +19,7 @@ from .volume.card_opacity import MEAN_TURN, MIN_FACING, turned_facing
 #: depth (measured, Sintel).
 MEAN_FACING = 1.25 * MEAN_TURN
 #: both, by the names that sidecars have for them
-VIEW_COMPENSATED_ALPHA = {"mean_facing": MEAN_FACING, "least_facing": MIN_FACING}
+VIEW_COMPENSATED_ALPHA = {"mean_facing": MEAN_FACING, "min_facing": MIN_FACING}
 #: Darkest texel of a base texture of which an absorption is made.
 DARKEST = 1.0e-3
 

@@ -11,8 +11,8 @@ from ..blender.base.outcome import report
 from ..blender.cards.adopt import (
     ORDERS,
     CardOcclusionSettings,
-    SortChoices,
     SortedCards,
+    SortOptions,
     sort_steps,
 )
 from ..blender.cards.material import alpha_image
@@ -22,7 +22,7 @@ from ..errors import HairloomError
 from .long_work import LongWork, Steps, as_progress
 from .selection import active_mesh
 
-_WAYS = (
+_DIRECTIONS = (
     ("auto", "Automatic", "Detect by the end of the UVs that is nearer to the head"),
     ("down", "Down", "Roots are at the top of the texture"),
     ("up", "Up", "Roots are at the bottom of the texture"),
@@ -50,10 +50,10 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
             description="Vertex group of cards that swing, such as a ponytail: drawn after all "
             "others",
         ),
-        "way": EnumProperty(
+        "direction": EnumProperty(
             name="Root to Tip",
             description="Direction of the hair on the texture",
-            items=_WAYS,
+            items=_DIRECTIONS,
         ),
         "use_occlusion": BoolProperty(
             name="Ambient Occlusion",
@@ -89,7 +89,7 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
         layout.prop_search(self, "head", bpy.data, "objects")
         layout.prop(self, "by")
         layout.prop_search(self, "dangling", context.object, "vertex_groups")
-        layout.prop(self, "way")
+        layout.prop(self, "direction")
         layout.prop(self, "use_occlusion")
         column = layout.column()
         column.active = self.use_occlusion
@@ -100,15 +100,15 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
     def steps(self: Any, context: bpy.types.Context) -> Steps[None]:
         obj = active_mesh(context)
         assert obj is not None
-        choices = SortChoices(
+        options = SortOptions(
             head=_named_head(self.head, obj),
             by=self.by,
-            way=self.way,
+            direction=self.direction,
             dangling=self.dangling,
             occlusion=settings_of(self, CardOcclusionSettings) if self.use_occlusion else None,
             alpha=_named_image(self.alpha),
         )
-        steps = sort_steps(obj, context.evaluated_depsgraph_get(), choices)
+        steps = sort_steps(obj, context.evaluated_depsgraph_get(), options)
         self._tell(obj, (yield from as_progress(steps)))
 
     def _tell(self, obj: bpy.types.Object, done: SortedCards) -> None:

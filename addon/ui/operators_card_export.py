@@ -173,11 +173,11 @@ def _shown(writing: FileSteps[Outcome]) -> Steps[Outcome]:
     with closing(writing):
         while True:
             try:
-                text, share = next(writing)
+                text, fraction = next(writing)
             except StopIteration as end:
                 outcome: Outcome = end.value
                 return outcome
-            yield Progress(text, share)
+            yield Progress(text, fraction)
 
 
 class HAIRLOOM_FH_cards(bpy.types.FileHandler):

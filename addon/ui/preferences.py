@@ -24,7 +24,7 @@ def _looks(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
     return [name for name in names("shading") if typed.lower() in name.lower()]
 
 
-def _ways(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+def _motions(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
     return [name for name in names("dynamics") if typed.lower() in name.lower()]
 
 
@@ -41,7 +41,7 @@ NEW_GROOM: dict[str, Any] = {
         name="Dynamics",
         description="Motion preset of new grooms. If empty, the plain defaults are used",
         default=DYNAMICS,
-        search=_ways,
+        search=_motions,
         search_options={"SUGGESTION"},
     ),
     "plays": BoolProperty(

@@ -11,7 +11,7 @@ from waiting import take_steps_until
 
 from hairloom.addon import card_flow
 from hairloom.addon.blender.base import latest_job
-from hairloom.addon.blender.cards.adopt import SortChoices, sort_mesh
+from hairloom.addon.blender.cards.adopt import SortOptions, sort_mesh
 from hairloom.addon.blender.cards.build import read_inputs
 from hairloom.addon.blender.cards.object import card_objects
 from hairloom.addon.blender.cards.occluders import read_occluders
@@ -275,7 +275,7 @@ def test_own_cards_and_coarser_levels_and_other_meshes_are_left_out(hair, sphere
 
 def test_they_shade_what_is_sorted(hair, other, evaluated):
     def sorted_by(others):
-        choices = SortChoices(occlusion=CardOcclusionSettings(rays=64, others=others))
+        choices = SortOptions(occlusion=CardOcclusionSettings(rays=64, others=others))
         sort_mesh(other, evaluated(), choices)
         return openness(other).mean()
 

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.blender.cards.adopt import SortChoices, sort_mesh
+from hairloom.addon.blender.cards.adopt import SortOptions, sort_mesh
 from hairloom.addon.blender.cards.mesh import reorder_faces
 from hairloom.addon.blender.colliders.spheres import fitted_collections
 from hairloom.addon.blender.command_line import command_line
@@ -169,7 +169,7 @@ def test_cards_are_made_as_objects_and_sorted(scene: Path, gpu_context: object) 
     order = vertices_of(name)
     bpy.ops.wm.open_mainfile(filepath=str(shuffled))
     assert vertices_of(name) != order
-    choices = SortChoices(head=bpy.data.objects["Head"], occlusion=None)
+    choices = SortOptions(head=bpy.data.objects["Head"], occlusion=None)
     sort_mesh(bpy.data.objects[name], bpy.context.evaluated_depsgraph_get(), choices)
     assert vertices_of(name) == order, "the button gives another order"
 

@@ -108,8 +108,8 @@ def pose_in(cache: Cache, frame: int, subframe: float = 0.0) -> Pose:
     matrix = here.matrix + (there.matrix - here.matrix) * subframe
     if here.head_positions is None or there.head_positions is None:
         return Pose(None, matrix)
-    way = there.head_positions - here.head_positions
-    return Pose(here.head_positions + way * np.float32(subframe), matrix)
+    displacement = there.head_positions - here.head_positions
+    return Pose(here.head_positions + displacement * np.float32(subframe), matrix)
 
 
 def show_fins(scene: bpy.types.Scene) -> None:

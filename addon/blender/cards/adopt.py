@@ -1,8 +1,8 @@
 """Hair cards that an artist has made: a mesh of Blender is read as cards, sorted and shaded.
 
-What is written is the order of the mesh's own faces, which every exporter keeps, and ambient
-occlusion and the way from root to tip, under the names that our own cards have: as attributes, and
-as a map of UVs, (occlusion, along), that every format carries. Faces are not triangulated: their
+Written are the order of the mesh's own faces, which every exporter keeps, ambient occlusion and the
+place between root and tip. The latter two have the names that our own cards use: as attributes, and
+as a UV map, (occlusion, along), that every format carries. Faces are not triangulated: their
 corners, materials, maps and all else stay as they are.
 """
 
@@ -21,7 +21,7 @@ from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...cards.sort import SortBy, order_steps
 from ...cards.steps import map_progress, result_of
-from ...cards.uv_directions import Heading
+from ...cards.uv_directions import UvDirection
 from ...errors import HairloomError
 from ...strands import Surface
 from ..base.attributes import set_attribute
@@ -34,7 +34,7 @@ from .occluders import read_occluders
 __all__ = [
     "ORDERS",
     "CardOcclusionSettings",
-    "SortChoices",
+    "SortOptions",
     "SortedCards",
     "sort_mesh",
     "sort_steps",
@@ -49,12 +49,12 @@ _DANGLING = 1
 
 
 @dataclass(frozen=True)
-class SortChoices:
+class SortOptions:
     """What the artist has chosen.
 
     head: what the hair grows from and is shaded by, or None.
     by: see cards.sort.
-    way: see cards.uv_directions.
+    direction: see cards.uv_directions.
     dangling: a vertex group, whose cards are drawn after all others; "" for none.
     occlusion: None leaves ambient occlusion as it is.
     alpha: a picture that says where cards are clear; None takes that of their material.
@@ -62,7 +62,7 @@ class SortChoices:
 
     head: bpy.types.Object | None = None
     by: SortBy = "pieces"
-    way: Heading = "auto"
+    direction: UvDirection = "auto"
     dangling: str = ""
     occlusion: CardOcclusionSettings | None = field(default_factory=CardOcclusionSettings)
     alpha: bpy.types.Image | None = None
@@ -95,32 +95,32 @@ class SortedCards:
 
 
 def sort_steps(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, choices: SortChoices
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, options: SortOptions
 ) -> Generator[float, None, SortedCards]:
     """Put the faces of a mesh into the order in which its cards are to be drawn.
 
-    Each step gives the share that is done; the mesh changes in the last.
+    Each step gives the fraction that is done; the mesh changes in the last.
 
     Raises:
         HairloomError: not a mesh, in Edit Mode, no faces, no UVs, or no such vertex group.
     """
-    source = read_cards(obj, depsgraph, choices)
+    source = read_cards(obj, depsgraph, options)
     mesh = source.cards.mesh
     notes = list(source.notes)
-    apart = [_DANGLING] if choices.dangling else None
-    part_count = 1.0 if choices.occlusion is None else 2.0
-    needs_alpha = choices.by != "distance" or choices.occlusion is not None
-    alpha, problems = alpha_of(obj, choices.alpha) if needs_alpha else (None, [])
-    ordering = order_steps(mesh, source.head, choices.by, apart, alpha=alpha)
-    orders = yield from map_progress(ordering, lambda share: share / part_count)
+    apart = [_DANGLING] if options.dangling else None
+    part_count = 1.0 if options.occlusion is None else 2.0
+    needs_alpha = options.by != "distance" or options.occlusion is not None
+    alpha, problems = alpha_of(obj, options.alpha) if needs_alpha else (None, [])
+    ordering = order_steps(mesh, source.head, options.by, apart, alpha=alpha)
+    orders = yield from map_progress(ordering, lambda fraction: fraction / part_count)
     order = orders.front
-    if choices.occlusion is not None:
+    if options.occlusion is not None:
         bodies = [] if source.head is None else [source.head]
-        others, doubts = read_occluders(choices.occlusion, obj, depsgraph).cards()
+        others, doubts = read_occluders(options.occlusion, obj, depsgraph).cards()
         problems += doubts
         shades = [CardShade(mesh, alpha), *others]
-        shading = occlusion_steps(mesh, shades, bodies, choices.occlusion)
-        openness = yield from map_progress(shading, lambda share: (1.0 + share) / 2.0)
+        shading = occlusion_steps(mesh, shades, bodies, options.occlusion)
+        openness = yield from map_progress(shading, lambda fraction: (1.0 + fraction) / 2.0)
         corner = np.zeros(len(obj.data.loops), np.int32)
         corner[source.corner] = source.cards.corner
         problems += _write_occlusion(obj.data, source.cards.vertex, corner, openness, mesh.along)
@@ -130,28 +130,28 @@ def sort_steps(
 
 
 def sort_mesh(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, choices: SortChoices
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, options: SortOptions
 ) -> SortedCards:
     """All steps of `sort_steps` at once."""
-    return result_of(sort_steps(obj, depsgraph, choices))
+    return result_of(sort_steps(obj, depsgraph, options))
 
 
 def read_cards(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, choices: SortChoices
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, options: SortOptions
 ) -> CardSource:
-    """A mesh as cards, as modifiers have bent it, with the way of the hair on them.
+    """A mesh as cards, as modifiers deform it, with the direction of the hair on them.
 
     Raises:
         HairloomError: not a mesh, in Edit Mode, no faces, no UVs, or no such vertex group.
     """
     _check(obj)
-    head = choices.head
+    head = options.head
     surface = None
     if head is not None:
         surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     source, polygon, corner, notes = _read_faces(obj, depsgraph)
-    group = _dangling(obj, choices.dangling)
-    cards = adopt_cards(source, surface, group=group, heading=choices.way, place=obj.name)
+    group = _dangling(obj, options.dangling)
+    cards = adopt_cards(source, surface, group=group, direction=options.direction, place=obj.name)
     return CardSource(cards, surface, polygon, corner, (*notes, *_shared(obj.data), *cards.notes))
 
 
@@ -227,14 +227,14 @@ def _dangling(obj: bpy.types.Object, name: str) -> Ints | None:
 def _shared(mesh: bpy.types.Mesh) -> list[str]:
     if mesh.users < 2:
         return []
-    return [f"{mesh.users} objects share the mesh '{mesh.name}' and have been sorted together"]
+    return [f"{mesh.users} objects fraction the mesh '{mesh.name}' and have been sorted together"]
 
 
 def _write_occlusion(
     mesh: bpy.types.Mesh, vertex: Ints, corner: Ints, openness: Floats, along: Floats
 ) -> list[str]:
-    """Occlusion and way into attributes, where a vertex on a seam has the mean of its copies, and
-    into a UV map; gives what could not be done.
+    """Occlusion and place along the hair into attributes, where a vertex on a seam has the mean of
+    its copies, and into a UV map; returns what could not be done.
 
     Args:
         vertex: (n,) the vertex of the mesh that each value belongs to.

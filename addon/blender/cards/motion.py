@@ -26,7 +26,7 @@ from ..bakes.guide_motion import GuideMotion
 from ..base.images import write_texture
 
 #: Fraction of the error by which joints may be off between keys.
-_KEY_SHARE = 0.5
+_KEY_FRACTION = 0.5
 #: Motion of one frame says nothing.
 _FEWEST_FRAMES = 2
 
@@ -87,8 +87,8 @@ def moved_cards(
     for number, frame in enumerate(motion.frames):
         pose, guides = motion.at(frame)
         now = guides[:, :1].astype(np.float64)
-        turn, way = rigid_fits(roots, now, np.ones(len(roots)), turn)
-        carrier[number, :3, :3], carrier[number, :3, 3] = turn[0], way[0]
+        turn, translation = rigid_fits(roots, now, np.ones(len(roots)), turn)
+        carrier[number, :3, :3], carrier[number, :3, 3] = turn[0], translation[0]
         back = np.eye(4) if space == "world" else carrier[number]
         for level, binding in enumerate(bound):
             mesh = cards_at(rig, binding, pose, guides)
@@ -120,7 +120,7 @@ class JointMotion:
     settings: CardExportSettings
 
     @property
-    def share(self) -> float:
+    def relative_error(self) -> float:
         """The error as a fraction of the hair's length."""
         return self.error.mean_square_root / self.tracks.hair_length
 
@@ -128,11 +128,11 @@ class JointMotion:
     def notes(self) -> tuple[str, ...]:
         """What the artist should know."""
         wanted = self.settings.joint_error / 100.0
-        if self.share <= wanted:
+        if self.relative_error <= wanted:
             return ()
         return (
-            f"Joints are off by {self.share:.1%} of the hair's length, more than the {wanted:.1%} "
-            "that are asked for. Allow more chains, or joints in each.",
+            f"Joints are off by {self.relative_error:.1%} of the hair's length, more than the "
+            f"{wanted:.1%} that are asked for. Allow more chains, or joints in each.",
         )
 
     @property
@@ -150,7 +150,7 @@ def joint_motion_steps(
     tracks: CardTracks, settings: CardExportSettings
 ) -> Generator[float, None, JointMotion]:
     """Fit joints and keys; yields the share that is done."""
-    allowed = settings.joint_error / 100.0 * tracks.hair_length * _KEY_SHARE
+    allowed = settings.joint_error / 100.0 * tracks.hair_length * _KEY_FRACTION
     rig = yield from joint_steps(tracks, settings)
     keys = result_of(chain_keys(rig, allowed))
     yield 0.95

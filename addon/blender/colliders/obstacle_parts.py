@@ -184,10 +184,10 @@ def capsule_of(low: Floats, high: Floats, matrix: Floats) -> tuple[CapsuleCollid
     half, middle = (high - low) * scale / 2.0, (high + low) * scale / 2.0
     longest = int(half.argmax())
     radius = float(np.delete(half, longest).max())
-    way = np.zeros(3)
-    way[longest] = half[longest] - radius
+    to_end = np.zeros(3)
+    to_end[longest] = half[longest] - radius
     base = matrix @ np.diag([*(1.0 / scale), 1.0])
-    return CapsuleCollider(middle - way, middle + way, radius), base
+    return CapsuleCollider(middle - to_end, middle + to_end, radius), base
 
 
 def used_box(surface: Surface) -> tuple[Floats, Floats]:

@@ -164,9 +164,9 @@ def _carriers(vertices: Floats, center: Floats, radius: float) -> Ints | None:
     if len(near) < _LEAST:
         near = np.argsort(distance, kind="stable")[:_LEAST]
     first = near[distance[near].argmin()]
-    way = vertices[near] - vertices[first]
-    second = near[np.linalg.norm(way, axis=1).argmax()]
-    area = np.linalg.norm(np.cross(way, vertices[second] - vertices[first]), axis=1)
+    offset = vertices[near] - vertices[first]
+    second = near[np.linalg.norm(offset, axis=1).argmax()]
+    area = np.linalg.norm(np.cross(offset, vertices[second] - vertices[first]), axis=1)
     if not len(near) or area.max() <= 1.0e-6 * float(distance.max()) ** 2:
         return None
     return np.array([first, second, near[area.argmax()]])

@@ -46,7 +46,9 @@ def read_camera(
     )
     # the two eyes of a stereo camera look through shifted windows
     shift = engine.camera_shift_x(evaluated) - evaluated.data.shift_x
-    projection[0] -= 2.0 * shift * _fit_share(evaluated.data, render, width, height) * projection[3]
+    projection[0] -= (
+        2.0 * shift * _fit_fraction(evaluated.data, render, width, height) * projection[3]
+    )
     matrix = np.array(engine.camera_model_matrix(evaluated)).reshape(4, 4)
     return cropped(Camera(_view_matrix(matrix), projection), window)
 
@@ -134,7 +136,7 @@ def _view_matrix(matrix: Floats) -> Floats:
     return np.linalg.inv(rigid)
 
 
-def _fit_share(
+def _fit_fraction(
     camera: bpy.types.Camera, render: bpy.types.RenderSettings, width: int, height: int
 ) -> float:
     """The side that a shift is a fraction of, as a fraction of the picture's width."""

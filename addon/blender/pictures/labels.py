@@ -21,8 +21,8 @@ def labelled(picture: Floats, text: str) -> Floats:
     Args:
         picture: (height, width, 4) scene-linear, premultiplied, row 0 at the bottom.
     """
-    share = _letters(picture.shape[1], picture.shape[0], text)[..., None]
-    return (picture * (1.0 - share) + share * (*[_BRIGHTNESS] * 3, 1.0)).astype(np.float32)
+    coverage = _letters(picture.shape[1], picture.shape[0], text)[..., None]
+    return (picture * (1.0 - coverage) + coverage * (*[_BRIGHTNESS] * 3, 1.0)).astype(np.float32)
 
 
 def _letters(width: int, height: int, text: str) -> Floats:

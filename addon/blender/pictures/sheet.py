@@ -28,7 +28,7 @@ VIEWS = (
 CLOSE_UP = "Close-up"
 COLUMNS = 3
 #: of a close-up: how much of the groom it shows, and which fraction of all strands is near the eye
-_CLOSE_SHARE, _NEAREST_SHARE = 0.2, 0.1
+_CLOSE_FRACTION, _NEAREST_FRACTION = 0.2, 0.1
 
 
 class Sheet:
@@ -98,7 +98,7 @@ class Sheet:
         """A box around the nearest hair in the three-quarter view."""
         middles = self._points[:, self._points.shape[1] // 2]
         towards = middles @ np.array(VIEW_DIRECTION)
-        count = max(round(_NEAREST_SHARE * len(middles)), 1)
+        count = max(round(_NEAREST_FRACTION * len(middles)), 1)
         middle = middles[np.argsort(towards)[-count:]].mean(axis=0)
-        reach = 0.5 * _CLOSE_SHARE * float(np.max(self._bounds[1] - self._bounds[0]))
+        reach = 0.5 * _CLOSE_FRACTION * float(np.max(self._bounds[1] - self._bounds[0]))
         return middle - reach, middle + reach

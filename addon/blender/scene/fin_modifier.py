@@ -177,8 +177,8 @@ def _new_node_group() -> bpy.types.NodeTree:
     tree = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
     tree[_MARK] = _VERSION
     tree.is_modifier = True
-    for way in ("INPUT", "OUTPUT"):
-        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    for direction in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
     names = (
         "NodeGroupInput",
         "GeometryNodeStoreNamedAttribute",

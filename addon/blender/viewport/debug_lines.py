@@ -34,9 +34,9 @@ COLORS = {
 }
 #: Corners of a circle.
 _CORNERS = 32
-#: More balls of a set than these are no help to the eye.
+#: More spheres of a set than these only clutter the view.
 _MAX_SPHERES = 200
-#: A wind of this speed [m/s] has an arrow as long as the hair is wide; its head is this share.
+#: A wind of this speed [m/s] has an arrow as long as the hair is wide; its head is this fraction.
 _BRISK, _HEAD = 10.0, 0.2
 #: A light farther away than this many radii of the hair has its line cut there.
 _AWAY = 1.6
@@ -106,7 +106,7 @@ def shape_lines(collider: Collider) -> Floats:
 
 
 def wind_lines(air: Air | None, center: Floats, radius: float) -> Floats:
-    """An arrow from the hair's middle the way the wind blows, (2n, 3); none in still air."""
+    """An arrow from the hair's middle in the direction of the wind, (2n, 3); none in still air."""
     if air is None:
         return np.zeros((0, 3))
     speed = float(np.linalg.norm(air.velocity))
@@ -124,11 +124,11 @@ def light_lines(lights: tuple[Light, ...], center: Floats, radius: float) -> Flo
     """A line from the hair's middle towards each light, with a star at its end, (2n, 3)."""
     lines = [np.zeros((0, 3))]
     for light in lights:
-        way = np.asarray(light.vector, np.float64) - (0.0 if light.kind == "sun" else center)
-        distance = float(np.linalg.norm(way))
+        to_light = np.asarray(light.vector, np.float64) - (0.0 if light.kind == "sun" else center)
+        distance = float(np.linalg.norm(to_light))
         if distance <= 0.0:
             continue
-        along = way / distance
+        along = to_light / distance
         reach = _AWAY * radius * (1.0 if light.kind == "sun" else min(distance / radius / _AWAY, 1))
         end = center + reach * along
         star = 0.1 * radius * np.array([along, *_across(along)])
@@ -146,9 +146,9 @@ def _ball(center: Floats, radius: float) -> Floats:
 
 def _capsule(capsule: CapsuleCollider) -> Floats:
     """A ring and two half circles at either end, and four lines between."""
-    way = capsule.end - capsule.start
-    length = float(np.linalg.norm(way))
-    along = way / length if length else np.array([0.0, 0.0, 1.0])
+    axis = capsule.end - capsule.start
+    length = float(np.linalg.norm(axis))
+    along = axis / length if length else np.array([0.0, 0.0, 1.0])
     sides = [capsule.radius * side for side in _across(along)]
     lines = []
     for end, out in ((capsule.start, -1.0), (capsule.end, 1.0)):
@@ -160,9 +160,9 @@ def _capsule(capsule: CapsuleCollider) -> Floats:
     return np.concatenate(lines)
 
 
-def _circle(center: Floats, one: Floats, other: Floats, share: float = 1.0) -> Floats:
+def _circle(center: Floats, one: Floats, other: Floats, fraction: float = 1.0) -> Floats:
     """(2n, 3), from center + one by way of center + other."""
-    angle = np.linspace(0.0, 2.0 * np.pi * share, int(_CORNERS * share) + 1)[:, None]
+    angle = np.linspace(0.0, 2.0 * np.pi * fraction, int(_CORNERS * fraction) + 1)[:, None]
     corners = center + np.cos(angle) * one + np.sin(angle) * other
     return np.stack([corners[:-1], corners[1:]], axis=1).reshape(-1, 3)
 

@@ -55,7 +55,7 @@ def greedy_colors(pairs: Ints) -> Ints:
     return colors
 
 
-def ways_along_edges(
+def distances_along_edges(
     edges: Ints, length: Floats, seeds: Ints, vertex_count: int
 ) -> tuple[Floats, Ints]:
     """The shortest way along edges to the nearest seed (Dijkstra 1959).
@@ -64,21 +64,21 @@ def ways_along_edges(
         (vertex_count,), -1 where none.
     """
     beside: list[list[tuple[int, float]]] = [[] for _ in range(vertex_count)]
-    for (one, other), displacement in zip(edges.tolist(), length.tolist(), strict=True):
-        beside[one].append((other, displacement))
-        beside[other].append((one, displacement))
+    for (one, other), distance in zip(edges.tolist(), length.tolist(), strict=True):
+        beside[one].append((other, distance))
+        beside[other].append((one, distance))
     best = [np.inf] * vertex_count
     nearest = [-1] * vertex_count
     queue = [(0.0, seed, seed) for seed in seeds.tolist()]
     heapq.heapify(queue)
     while queue:
-        displacement, vertex, seed = heapq.heappop(queue)
-        if displacement >= best[vertex]:
+        distance, vertex, seed = heapq.heappop(queue)
+        if distance >= best[vertex]:
             continue
-        best[vertex], nearest[vertex] = displacement, seed
+        best[vertex], nearest[vertex] = distance, seed
         for other, step in beside[vertex]:
-            if displacement + step < best[other]:
-                heapq.heappush(queue, (displacement + step, other, seed))
+            if distance + step < best[other]:
+                heapq.heappush(queue, (distance + step, other, seed))
     return np.array(best), np.array(nearest)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from ...arrays import Bools, Floats, Ints
 from ...errors import HairloomError
 from ...strands.vectors import cross_rows, unit_rows
-from .coloring import greedy_colors, opposite_pairs, unique_edges, ways_along_edges
+from .coloring import distances_along_edges, greedy_colors, opposite_pairs, unique_edges
 
 #: From this pin weight on a vertex has infinite mass; Blender's weights are rounded.
 PINNED_FROM = 0.9999
@@ -126,7 +126,7 @@ def start_cloth(
     pinned = pin >= PINNED_FROM
 
     length = distances(position, pairs)
-    displacement, nearest = ways_along_edges(pairs, length, np.flatnonzero(pinned), count)
+    distance, nearest = distances_along_edges(pairs, length, np.flatnonzero(pinned), count)
     tied = nearest >= 0
     moving = ~pinned[pairs].all(axis=1)
     pairs, length = pairs[moving], length[moving]
@@ -141,7 +141,7 @@ def start_cloth(
         _colors(position, pairs),
         _colors(position, folds),
         np.where(tied, nearest, np.arange(count)),
-        np.where(tied, displacement, 0.0).astype(np.float32),
+        np.where(tied, distance, 0.0).astype(np.float32),
     )
     return ClothState(position, position, fabric)
 

@@ -185,16 +185,16 @@ def _add_animation(file: GlbFile, skeleton: Skeleton, joints: list[int]) -> None
         chains.append((own, joints[1 + number * size :][:size], skeleton.root))
     for keys, nodes, parent in chains:
         for joint, node in enumerate(nodes):
-            turns, ways = keys.rotation[joint], keys.translation[joint]
-            ways = ways if joint else ways - parent
-            add(node, "rotation", keys.frame, _rotations(turns), "VEC4")
-            add(node, "translation", keys.frame, GLB.placed(ways), "VEC3")
+            rotations, translations = keys.rotation[joint], keys.translation[joint]
+            translations = translations if joint else translations - parent
+            add(node, "rotation", keys.frame, _rotations(rotations), "VEC4")
+            add(node, "translation", keys.frame, GLB.placed(translations), "VEC3")
     animation = {"name": ANIMATION, "samplers": samplers, "channels": channels}
     file.append("animations", animation)
 
 
-def _vector(way: Floats) -> list[float]:
-    return [float(value) for value in GLB.placed(way)]
+def _vector(vector: Floats) -> list[float]:
+    return [float(value) for value in GLB.placed(vector)]
 
 
 def _rotations(quaternion: Floats) -> Floats:

@@ -22,7 +22,7 @@ from .draw_ranges import card_ranges, group_ranges
 from .index_buffer import IndexBuffer
 
 #: Version 1 knew GLB alone, one level and no material. Its readers find what they read: file,
-#: counts, bounds, attributes, draw_order, passes, opaque_alpha, least_alpha and textures are where
+#: counts, bounds, attributes, draw_order, passes, opaque_alpha, min_alpha and textures are where
 #: they were; `texture` became `atlas`, `axes` became `space`.
 SIDECAR_VERSION = 2
 #: name of the sidecar of NAME.glb
@@ -67,7 +67,7 @@ class DrawPass:
 
 _OPAQUE = "alpha >= opaque_alpha"
 _REST = "alpha < opaque_alpha"
-_VISIBLE = "alpha >= least_alpha"
+_VISIBLE = "alpha >= min_alpha"
 #: Scheuermann 2004, where the first pass alone tests alpha, so that the others keep early depth
 #: tests. The last one, which writes depth, tests it here too: else a card's clear pixels hide what
 #: is drawn after it, which doubles the difference to hair that is sorted for each view.
@@ -95,7 +95,7 @@ class CardFile:
     textures: role -> {"file", "channels"} of those that lie beside it; texture_files: file -> what
         its channels hold. highlights: which of them breaks up the highlights, "shift" or "tangent".
     base_gain: what the base texture is to be multiplied by.
-    view_compensated_alpha: mean_facing and least_facing where alpha is that of baked strands,
+    view_compensated_alpha: mean_facing and min_facing where alpha is that of baked strands,
         else empty.
     material: model, values, units, fibre and tables, see blender/cards/files.py.
     indices: the index buffer and its file, or None.
@@ -148,7 +148,7 @@ def description(cards: CardFile) -> dict[str, Any]:
         },
         "draw_order": {**texts.DRAW_ORDER, **_back_order(cards)},
         "opaque_alpha": OPAQUE_ALPHA,
-        "least_alpha": MIN_ALPHA,
+        "min_alpha": MIN_ALPHA,
         "passes": [each.as_dict() for each in FOUR_PASSES],
         "passes_fallback": [each.as_dict() for each in THREE_PASSES],
         "textures": _textures(cards),

@@ -44,7 +44,7 @@ TEXTURES = {
 VIEW_COMPENSATED_ALPHA = (
     "alpha is what strands cover on the mean of all turns of a card about its tangent. Seen at a "
     "slant, when its shading is drawn, it covers 1 - (1 - alpha)^(mean_facing / max(f, "
-    "least_facing)); f is |dot(n, e)| of the normal n of its plane and the way e to the eye made "
+    "min_facing)); f is |dot(n, e)| of the normal n of its plane and the way e to the eye made "
     "perpendicular to the tangent, a unit vector"
 )
 #: role of a texture -> its color space in files of integers, and what it says

@@ -56,7 +56,7 @@ static func _values(sidecar: Dictionary, folder: String) -> Dictionary:
 	var values := {
 		"model": 1 if material["model"] == "marschner" else 0,
 		"opaque_alpha": sidecar["opaque_alpha"],
-		"least_alpha": sidecar["least_alpha"],
+		"min_alpha": sidecar["min_alpha"],
 		"has_tangent_map": sidecar["textures"]["highlights_by"] == "tangent",
 	}
 	for name in material["values"]:
@@ -75,7 +75,7 @@ static func _values(sidecar: Dictionary, folder: String) -> Dictionary:
 			values[name + "_mask"] = _mask(entry)
 	values["base_gain"] = sidecar["textures"].get("base", {}).get("gain", 1.0)
 	var even: Dictionary = sidecar["textures"].get("view_compensated_alpha", {})
-	values["even_facing"] = Vector2(even.get("mean_facing", 0.0), even.get("least_facing", 0.0))
+	values["even_facing"] = Vector2(even.get("mean_facing", 0.0), even.get("min_facing", 0.0))
 	values["has_normal_map"] = "normal" in sidecar["textures"]
 	values["has_shift"] = "shift" in sidecar["textures"]
 	for name in TABLES:

@@ -95,14 +95,14 @@ function materialOf(pass, sidecar, formulas, uniforms) {
 
 function leastAlpha(pass, sidecar) {
   if (!pass.color_write) return sidecar.opaque_alpha;
-  return pass.pixels.includes('least_alpha') ? sidecar.least_alpha : 0.0;
+  return pass.pixels.includes('min_alpha') ? sidecar.min_alpha : 0.0;
 }
 
 async function uniformsOf(sidecar, address) {
   const { model, values, fibre, tables } = sidecar.material;
   const even = sidecar.textures.view_compensated_alpha;
   const uniforms = {
-    even_facing: { value: new THREE.Vector2(even?.mean_facing, even?.least_facing) },
+    even_facing: { value: new THREE.Vector2(even?.mean_facing, even?.min_facing) },
     model: { value: model === 'marschner' ? 1 : 0 },
     base_gain: { value: sidecar.textures.base?.gain ?? 1.0 }, // 8 bits hold no more than 1
   };

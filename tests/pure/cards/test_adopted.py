@@ -76,7 +76,7 @@ def test_our_own_cards_are_understood_whichever_way_they_lie(laid: str, stands: 
     if not stands:
         facing = np.einsum("ij,ij->i", found.normal, mesh.normal[adopted.vertex])
         assert facing.min() > 0.9
-    known = adopt_cards(source, None, heading=laid, place="test")  # type: ignore[arg-type]
+    known = adopt_cards(source, None, direction=laid, place="test")  # type: ignore[arg-type]
     np.testing.assert_allclose(known.mesh.along, found.along, atol=1e-6)
     assert known.notes == ()
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from hairloom.addon.dynamics.cloth.coloring import (
+    distances_along_edges,
     greedy_colors,
     opposite_pairs,
     unique_edges,
-    ways_along_edges,
 )
 from hairloom.addon.dynamics.cloth.reference import advance_cloth_slowly
 from hairloom.addon.dynamics.cloth.settings import FinSettings
@@ -103,7 +103,7 @@ def test_folds_lie_across_inner_edges():
 
 def test_ways_lead_along_edges_to_the_nearest_seed():
     edges = np.array([[0, 1], [1, 2], [2, 3], [0, 3], [4, 5]])
-    way, seed = ways_along_edges(edges, np.array([1.0, 1.0, 1.0, 5.0, 1.0]), np.array([0]), 6)
+    way, seed = distances_along_edges(edges, np.array([1.0, 1.0, 1.0, 5.0, 1.0]), np.array([0]), 6)
     assert way.tolist() == [0.0, 1.0, 2.0, 3.0, np.inf, np.inf]
     assert seed.tolist() == [0, 0, 0, 0, -1, -1]
 

@@ -116,7 +116,7 @@ def test_cards_are_listed_only_where_each_is_whole() -> None:
 
 def test_alpha_of_baked_strands_grows_at_a_slant() -> None:
     textures = {"alpha": {"file": "hair_alpha.png", "channels": "r"}}
-    even = {"mean_facing": 0.8, "least_facing": 0.1}
+    even = {"mean_facing": 0.8, "min_facing": 0.1}
     content = read(card_file(textures=textures, view_compensated_alpha=even))["textures"]
     assert content["view_compensated_alpha"].items() > even.items()
     assert "view_compensated_alpha" not in read(card_file(textures=textures))["textures"]
