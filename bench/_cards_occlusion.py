@@ -121,7 +121,9 @@ class _Scene:
             if index >= len(self._mesh.triangles):
                 if normal.dot(way) < 0.0:
                     return 0.0
-            elif self._mesh.card[index] != own or travelled > self._settings.own_reach:
+            elif (
+                self._mesh.card[index] != own or travelled > self._settings.self_occlusion_distance
+            ):
                 through = 1.0 - self._alpha_at(index, np.array(place))
                 light *= through**self._settings.extinction
             travelled += STEP

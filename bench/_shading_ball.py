@@ -111,7 +111,7 @@ def snapshot_of(
         color_variation=0.0,
         shift_noise=0.0,
         sparkle=0.0,
-        scattered=stand_ins,
+        fake_scattering=stand_ins,
         volume_shadow=stand_ins,
     )
     return Snapshot(

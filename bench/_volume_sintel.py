@@ -170,7 +170,7 @@ def hair_settings(absorption: tuple[float, float, float], stand_ins: float) -> S
         color_variation=0.0,
         shift_noise=0.0,
         sparkle=0.0,
-        scattered=stand_ins,
+        fake_scattering=stand_ins,
         volume_shadow=stand_ins,
     )
     return settings_from(node, alike)[0]

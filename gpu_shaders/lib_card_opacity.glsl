@@ -8,8 +8,8 @@ float card_optical_depth(float alpha)
   return -log(1.0 - min(alpha, {{max_alpha}}));
 }
 
-// |cos| of the turn about its strands by which a card faces a way. `across`: normal of its plane, of any
-// length.
+// |cos| of the turn about its strands by which a card faces a direction. `across`: normal of its plane, of
+// any length.
 float turned_facing(vec3 across, vec3 tangent, vec3 direction)
 {
   vec3 turned = direction - dot(direction, tangent) * tangent;
@@ -17,18 +17,18 @@ float turned_facing(vec3 across, vec3 tangent, vec3 direction)
   return size > 0.0 ? abs(dot(across, turned)) / size : 1.0;
 }
 
-// Factor of the tau that light from a way meets in an even card.
+// Factor of the tau that light from this direction meets in a card of view-compensated alpha.
 float view_compensated_depth(vec3 across, vec3 tangent, vec3 direction)
 {
   return {{mean_turn}} / max(turned_facing(across, tangent, direction), {{min_facing}});
 }
 
-// How much hair lies before and beyond the strand of an even card that is seen; `way`: before and beyond
+// How much hair lies before and beyond the strand that is seen of such a card; `plane`: before and beyond
 // its plane by the map.
-vec2 among_strands(vec2 direction, float scale, float tau, float fraction, float front)
+vec2 among_strands(vec2 plane, float scale, float tau, float fraction, float front)
 {
   float few = max(tau, {{min_tau}});
   float others = scale * (few / (1.0 - exp(-few)) - 1.0);
-  vec2 rest = max(direction - scale * tau * vec2(fraction, 1.0 - fraction), 0.0);
+  vec2 rest = max(plane - scale * tau * vec2(fraction, 1.0 - fraction), 0.0);
   return rest + others * vec2(1.0 - front, front);
 }

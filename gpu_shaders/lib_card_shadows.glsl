@@ -33,7 +33,7 @@ float own_fraction(int light, vec3 point)
 #endif
 
 // As shadow_path, for a place of a card whose texture covers alpha. `across`: normal of its plane, of any
-// length. EVEN: for the foremost of its strands.
+// length. VIEW_COMPENSATED: for the foremost of its strands.
 vec3 shadow_path_to_card(
     int index, vec3 point, float alpha, vec3 to_light, vec3 across, vec3 tangent, vec3 normal)
 {

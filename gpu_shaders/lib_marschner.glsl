@@ -162,5 +162,5 @@ vec3 marschner_light(sampler3D longitudinal,
       longitudinal, azimuthal, paths, angles, sparkle_noise, absorption, fibre, shading, level);
   float bias = diffuse_bias(normal, to_light) * (tau < 0.0 ? 1.0 : exp(-tau));
   return scattered * cos(angles.x) * straight_light(normal, to_light, tau, shading) +
-         strand_color(fibre, absorption) * (shading.scattered * bias / ANGLE_PI);
+         strand_color(fibre, absorption) * (shading.fake_scattering * bias / ANGLE_PI);
 }

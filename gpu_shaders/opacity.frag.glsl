@@ -1,8 +1,8 @@
 // Opacity maps, fragment stage: a strand is part of the sums of all layers that end behind it.
 //
 // TARGETS: textures of four layers each that are drawn into. DEEP: layers lie between the first
-// and the last hair that the light meets. CARDS: cards are drawn, not strands; they count as what their alpha stands
-// for; EVEN: from whichever side the light comes.
+// and the last hair that the light meets. CARDS: cards are drawn, not strands; they count as what their
+// alpha stands for. VIEW_COMPENSATED: from all directions of light.
 #include "lib_opacity.glsl"
 #ifdef CARDS
 #  include "lib_card_opacity.glsl"

@@ -3,12 +3,12 @@
 For cards of which no strands are known, and for what other grooms shade; cards that are made from
 strands have the occlusion of these, see strand_occlusion.py.
 
-What is stored is the light that a vertex gets from an even sky, as a fraction of what a surface of
-its normal gets in the open:  A = sum_i |n . d_i| T_i / sum_i |n . d_i|,  over directions d_i that
+Stored is the light that a vertex gets from a uniform sky, as a fraction of what a surface of its
+normal gets in the open:  A = sum_i |n . d_i| T_i / sum_i |n . d_i|,  over directions d_i that
 are spread evenly over the half sphere about the normal n, which faces away from the head. So a
 card that lies open on the head has 1. T is the transmittance of the ray: a body lets nothing
 through, each card (1 - alpha)^extinction at the place that is met (Scheuermann 2004, section 5;
-Zhukov, Iones and Kronin 1998, ambient light under an even sky). With an extinction of 1 a card is
+Zhukov, Iones and Kronin 1998, ambient light under a uniform sky). With an extinction of 1 a card is
 what it looks like; strands shade with more, see shading/ambient.py.
 
 All vertices share one set of axes. Along each axis every vertex has one ray, to that side to which
@@ -251,7 +251,7 @@ class _Rays:
         total = np.zeros(len(self.vertex))
         for met in self._met(corners, layer.triangles.height, settings.reach):
             is_own = layer.card.take(met.triangle) == self.card.take(met.ray)
-            kept = np.flatnonzero(~is_own | (met.distance > settings.own_reach))
+            kept = np.flatnonzero(~is_own | (met.distance > settings.self_occlusion_distance))
             places = met.triangle.take(kept), met.second.take(kept), met.third.take(kept)
             depth = layer.depth_at(*places)
             total += np.bincount(met.ray.take(kept), depth, minlength=len(total))

@@ -46,7 +46,7 @@ class CardOcclusionSettings(Settings):
         soft=(0.02, 2.0),
         hard=(0.0, 1_000.0),
     )
-    own_reach: float = number(
+    self_occlusion_distance: float = number(
         0.02,
         label="Self-occlusion Distance",
         description="Distance from which a card occludes itself; a little more than its width, so "

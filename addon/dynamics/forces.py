@@ -83,13 +83,13 @@ def felt_gravity(
     """
     pull = np.asarray(gravity, np.float32) * np.float32(settings.gravity)
     left = pull * np.float32(1.0 - settings.buoyancy)
-    if not settings.weight_held or not carried.shape[1] > PINNED or not carried.shape[2]:
+    if not settings.sag_compensation or not carried.shape[1] > PINNED or not carried.shape[2]:
         return left[:, None, None]
     combed = (turn @ pull.astype(np.float64)).astype(np.float32)
     felt = np.empty_like(carried)
     felt[:] = left[:, None, None]
     held = weight_on_style(combed, carried)
-    held *= np.float32(settings.weight_held)
+    held *= np.float32(settings.sag_compensation)
     felt[:, PINNED:] -= held
     return felt
 

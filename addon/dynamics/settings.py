@@ -55,7 +55,7 @@ class DynamicsSettings(MotionSettings):
         soft=(0.0, 2.0),
         hard=(-10.0, 10.0),
     )
-    weight_held: float = number(
+    sag_compensation: float = number(
         1.0,
         label="Sag Compensation",
         description="Fraction of the weight that the style compensates; at 1 a groom does not sag "

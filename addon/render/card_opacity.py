@@ -80,7 +80,7 @@ class _Cards:
     @property
     def feature(self) -> ShaderFeature:
         return ShaderFeature(
-            name="even" if self.is_view_compensated else "",
+            name="view_compensated" if self.is_view_compensated else "",
             textures={"alpha_texture": ("FLOAT_2D", self.alpha)},
             numbers={"atlas_tiles": ("VEC2", self.tiles)},
             defines={"VIEW_COMPENSATED": int(self.is_view_compensated)},

@@ -95,7 +95,7 @@ def _fill_forces(vectors: Floats, frame: Frame) -> None:
     vectors[0, :3] = pull * np.float32(1.0 - settings.buoyancy) * square
     vectors[0, 3] = clamped_ratio(frame.drive.earlier_ratio)
     combed = (frame.turn @ pull.astype(np.float64)).astype(np.float32)
-    vectors[1, :3] = combed * (np.float32(settings.weight_held) * square)
+    vectors[1, :3] = combed * (np.float32(settings.sag_compensation) * square)
     if air is not None:
         vectors[2, :3] = air.velocity
         vectors[3 : 3 + len(air.swing), :3] = air.swing

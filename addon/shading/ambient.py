@@ -48,7 +48,7 @@ def ambient_occlusion(
     if body is not None:
         depth = np.maximum(depth, body_depth(body, grid))
     openness = sky_openness(depth, settings.upper_fraction)
-    seen = sample(openness, grid.coordinates(points)) / settings.open_sky
+    seen = sample(openness, grid.coordinates(points)) / settings.ao_bias
     return (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
 
 

@@ -40,7 +40,7 @@ class AmbientSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
     )
-    open_sky: float = number(
+    ao_bias: float = number(
         0.5,
         label="AO Bias",
         description="Fraction of the sky that counts as unoccluded; the surface of a solid body "

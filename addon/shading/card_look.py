@@ -68,8 +68,8 @@ def view_compensated_alpha(
         tangent, to_eye: (..., 3) unit vectors.
     """
     facing = turned_facing(across, tangent, to_eye)
-    even: Floats = 1.0 - (1.0 - alpha) ** (MEAN_FACING / np.maximum(facing, MIN_FACING))
-    return even
+    compensated: Floats = 1.0 - (1.0 - alpha) ** (MEAN_FACING / np.maximum(facing, MIN_FACING))
+    return compensated
 
 
 def card_base(along: Floats, shading: ShadingSettings) -> Floats:

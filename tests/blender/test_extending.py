@@ -29,7 +29,7 @@ box = BoxCollider(np.array([0.1, 0.1, 0.05], np.float32))
 along = np.linspace(0.0, 0.1, 8)[:, None]
 guides = np.stack([[0.06, y, 0.1] + along * [1.0, 0.0, 0.0] for y in (-0.02, 0.02)])
 guides = guides.astype(np.float32)
-settings = DynamicsSettings(style_root=0.0, style_tip=0.0, bend=0.0, weight_held=0.0)
+settings = DynamicsSettings(style_root=0.0, style_tip=0.0, bend=0.0, sag_compensation=0.0)
 colliders = (PosedCollider(box, np.eye(4), np.eye(4)),)
 drive = Drive(guides, guides, gravity=np.array([0.0, 0.0, -9.81]), colliders=colliders)
 fast = slow = start(guides)

@@ -245,7 +245,7 @@ def test_hair_stays_out_of_fitted_spheres_that_an_armature_swings(monkey):
     bpy.context.collection.objects.link(owner)
     owner.hairloom.collider_collection = spheres.fitted_collections(monkey)[0]
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    settings = DynamicsSettings(style_root=0.3, style_tip=0.1, bend=0.2, weight_held=0.0)
+    settings = DynamicsSettings(style_root=0.3, style_tip=0.1, bend=0.2, sag_compensation=0.0)
     found = Obstacles.of(owner, None, None, settings, depsgraph, None)
     outward = np.random.default_rng(0).normal(size=(200, 1, 3))
     outward /= np.linalg.norm(outward, axis=2, keepdims=True)

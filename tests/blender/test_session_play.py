@@ -48,7 +48,7 @@ def test_playing_hair_lags_behind_and_returns_when_stopped(preview, evaluated):
 def test_without_motion_gravity_alone_pulls_unheld_hair_down(preview, evaluated):
     hair, _, session = preview
     at_rest = drawn(session)
-    hair.hairloom.dynamics.weight_held = 0.0
+    hair.hairloom.dynamics.sag_compensation = 0.0
     previews.play(evaluated())
     play(evaluated, 12)
     assert (drawn(session) - at_rest)[:, -1, 2].mean() < -0.001

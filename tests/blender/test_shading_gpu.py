@@ -102,7 +102,7 @@ def test_tables_are_made_once_a_shape_and_shared(
     changes: tuple[dict[str, Any], ...] = (
         {"base_color": (0.5, 0.1, 0.1)},
         {"strength_r": 0.2, "strength_trt": 3.0},
-        {"tip_tint": 1.0, "grey_fraction": 0.5, "scattered": 0.0},
+        {"tip_tint": 1.0, "grey_fraction": 0.5, "fake_scattering": 0.0},
     )
     for change in changes:
         assert (drawn(frame, snapshot_of(frame, replace(PLAIN, **change))) != first).any()

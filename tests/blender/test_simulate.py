@@ -46,7 +46,7 @@ def test_a_wind_force_field_blows_the_hair(scene, tmp_path):
 
 
 def test_the_scenes_gravity_is_used(scene, tmp_path):
-    limp = ["--set", "dynamics.weight_held=0", "--set", "dynamics.style_along=0,0,0,0,0"]
+    limp = ["--set", "dynamics.sag_compensation=0", "--set", "dynamics.style_along=0,0,0,0,0"]
     scene.gravity = (0.0, 5.0, 0.0)
     sideways = tips(simulated(tmp_path / "sideways", *limp))
     assert sideways[1] > 0.001 and sideways[1] > 3.0 * np.abs(sideways[[0, 2]]).max()
@@ -66,7 +66,7 @@ def test_files_are_simulated_as_the_same_scene_is_baked(new_hair, sphere, tmp_pa
         bpy.ops.wm.obj_export(filepath=str(path), export_selected_objects=True)
     files = ["--groom", str(groom), "--head", str(head), "--collider", str(ball)]
     shaken = ["--seconds", "0.2", "--frame-rate", "30", "--output", str(tmp_path / "files")]
-    limp = ["--set", "dynamics.weight_held=0", "--set", "guides.guide_count=12"]
+    limp = ["--set", "dynamics.sag_compensation=0", "--set", "guides.guide_count=12"]
     assert command_line.run(["simulate", *files, *limp, *shaken]) == 0
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 
@@ -77,7 +77,7 @@ def test_files_are_simulated_as_the_same_scene_is_baked(new_hair, sphere, tmp_pa
     other = mesh_object("My ball", read_mesh_file(ball, need_uv=False), scene)
     other.parent = own
     hair.hairloom.collider = other
-    hair.hairloom.dynamics.weight_held, hair.data.hairloom.guides.guide_count = 0.0, 12
+    hair.hairloom.dynamics.sag_compensation, hair.data.hairloom.guides.guide_count = 0.0, 12
     low, high = surface.bounds()
     shake(own, (low + high) / 2.0, 6, 30.0)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))

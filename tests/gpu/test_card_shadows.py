@@ -177,7 +177,7 @@ def test_light_from_strand_to_strand_brightens_light_cards_and_not_black(frame: 
     gain = []
     for melanin in (0.1, 1.0):
         look = dataclasses.replace(
-            PLAIN, model="marschner", pigment="melanin", melanin=melanin, scattered=0.0
+            PLAIN, model="marschner", pigment="melanin", melanin=melanin, fake_scattering=0.0
         )
         alone, among = (
             drawn(frame, mesh, textures_of([0.6, 0.6]), volume, shading=look)[..., 0].mean()

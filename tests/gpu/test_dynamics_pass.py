@@ -137,7 +137,7 @@ IN_AIR = {
     "drag in a current": Scene({"drag": 4.0, "wind_speed": 1.0}),
     "drag in still water": Scene({"drag": 6.0, "damping": 2.0}),
     "buoyancy": Scene({"buoyancy": 0.8}),
-    "weight not held": Scene({"weight_held": 0.3, "gravity": 1.4}),
+    "weight not held": Scene({"sag_compensation": 0.3, "gravity": 1.4}),
     "curves along": Scene(
         {"style_along": (1.0, 1.0, 0.2, 0.1, 0.3), "bend_along": (0.2, 1.0, 0.5, 0.0, 1.0)}
     ),

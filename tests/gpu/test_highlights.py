@@ -63,7 +63,7 @@ def draw() -> Callable[..., np.ndarray]:
 def look(name: str, model: str) -> ShadingSettings:
     shipped = read_any_preset(LOOKS / f"{name}.json", ALL_SETTINGS).settings
     return replace(
-        shipped, model=model, shift_noise=0.0, sparkle=0.0, color_variation=0.0, scattered=0.0
+        shipped, model=model, shift_noise=0.0, sparkle=0.0, color_variation=0.0, fake_scattering=0.0
     )
 
 

@@ -33,7 +33,9 @@ BLOND = ShadingSettings(model="marschner", pigment="melanin", melanin=0.25)
 LOOKS = {
     "brown": ShadingSettings(model="marschner", noise_cells=7.0),
     "blond, tinted and grey": replace(BLOND, tip_tint=0.7, grey_fraction=0.5, cuticle_tilt=0.1),
-    "without scattered light": replace(BLOND, scattered=0.0, volume_shadow=0.0, shift_noise=1.0),
+    "without scattered light": replace(
+        BLOND, fake_scattering=0.0, volume_shadow=0.0, shift_noise=1.0
+    ),
 }
 
 
@@ -160,7 +162,7 @@ def test_highlights_on_waves_do_not_flicker(
         width_tt=float(np.radians(1.5)),
         width_trt=float(np.radians(3.0)),
         **dict.fromkeys(("color_variation", "shift_noise", "sparkle"), 0.0),
-        **dict.fromkeys(("volume_shadow", "scattered"), 0.0),
+        **dict.fromkeys(("volume_shadow", "fake_scattering"), 0.0),
     )
     camera = frame.Camera(
         frame.look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 3.0)

@@ -103,9 +103,9 @@ def test_huangs_lobes_and_cross_section_are_taken_over_with_a_note() -> None:
 
 
 def test_what_the_node_does_not_speak_of_stays_and_tips_and_grey_strands_go() -> None:
-    before = ShadingSettings(sparkle=0.1, scattered=0.4, tip_tint=1.0, grey_fraction=0.5)
+    before = ShadingSettings(sparkle=0.1, fake_scattering=0.4, tip_tint=1.0, grey_fraction=0.5)
     settings, _ = settings_from(PrincipledHair(), before)
-    assert (settings.sparkle, settings.scattered) == (0.1, 0.4)
+    assert (settings.sparkle, settings.fake_scattering) == (0.1, 0.4)
     assert (settings.tip_tint, settings.grey_fraction) == (0.0, 0.0)
 
 

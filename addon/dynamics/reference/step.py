@@ -151,7 +151,9 @@ class _Guide:
         combed = np.tile(turn @ pull, free)
         jacobian = jacobian_of(self.before + self.displacement / 2.0)
         tension = np.linalg.solve(jacobian @ jacobian.T, jacobian @ combed)
-        felt[PINNED:] -= settings.weight_held * (combed - jacobian.T @ tension).reshape(free, 3)
+        felt[PINNED:] -= settings.sag_compensation * (combed - jacobian.T @ tension).reshape(
+            free, 3
+        )
         return felt
 
     def _restore_style(self, style: Floats, settings: DynamicsSettings, dt: float) -> None:

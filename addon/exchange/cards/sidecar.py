@@ -21,9 +21,7 @@ from .card_formats import CardFormat
 from .draw_ranges import card_ranges, group_ranges
 from .index_buffer import IndexBuffer
 
-#: Version 1 knew GLB alone, one level and no material. Its readers find what they read: file,
-#: counts, bounds, attributes, draw_order, passes, opaque_alpha, min_alpha and textures are where
-#: they were; `texture` became `atlas`, `axes` became `space`.
+#: Raise it when a reader of the version before would misread a sidecar.
 SIDECAR_VERSION = 2
 #: name of the sidecar of NAME.glb
 SUFFIX = ".hairloom.json"
@@ -217,7 +215,7 @@ def _textures(cards: CardFile) -> dict[str, Any]:
         space, meaning = texts.ROLES[role]
         gain = {"gain": cards.base_gain} if role == "base" else {}
         roles[role] = {**where, "color_space": space, **gain, "meaning": meaning}
-    even = (
+    compensation = (
         {
             "view_compensated_alpha": {
                 **cards.view_compensated_alpha,
@@ -227,4 +225,4 @@ def _textures(cards: CardFile) -> dict[str, Any]:
         if cards.view_compensated_alpha
         else {}
     )
-    return {**texts.TEXTURES, "highlights_by": cards.highlights, **even, **roles}
+    return {**texts.TEXTURES, "highlights_by": cards.highlights, **compensation, **roles}

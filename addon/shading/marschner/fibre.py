@@ -49,7 +49,7 @@ class Fibre:
             theta_r is twice as wide. Widths under MIN_WIDTH count as that.
         offset_r, offset_tt, offset_trt: moves a highlight towards the tip, in theta_h, beyond
             what the tilt does.
-        strength_r, strength_tt, strength_trt, strength_rest: factor of a lobe; 1 is physical. The
+        strength_r, strength_tt, strength_trt, strength_higher: factor of a lobe; 1 is physical. The
             rest is light reflected inside twice or more.
         eccentricity: one axis of the cross-section over the other, 1 for a round hair. It acts
             on TRT through a changed index only (Marschner section 5.2.3).
@@ -75,7 +75,7 @@ class Fibre:
     strength_r: float = 1.0
     strength_tt: float = 1.0
     strength_trt: float = 1.0
-    strength_rest: float = 1.0
+    strength_higher: float = 1.0
     eccentricity: float = 1.0
     glint_width: float = np.radians(10.0)
     glint_strength: float = 1.0
@@ -87,7 +87,7 @@ class Fibre:
             "index_of_refraction": 1.0,
             "eccentricity": 0.1,
             **dict.fromkeys(("width_r", "width_tt", "width_trt"), 0.0),
-            **dict.fromkeys(("strength_r", "strength_tt", "strength_trt", "strength_rest"), 0.0),
+            **dict.fromkeys(("strength_r", "strength_tt", "strength_trt", "strength_higher"), 0.0),
             **dict.fromkeys(("glint_width", "glint_strength", "glint_fade"), 0.0),
             "azimuthal_width": 0.0,
             **dict.fromkeys(("cuticle_tilt", "offset_r", "offset_tt", "offset_trt"), _MAX_TURNED),
@@ -125,7 +125,7 @@ class Fibre:
     @property
     def strengths(self) -> tuple[float, float, float, float]:
         """Of R, TT, TRT and the rest."""
-        return (self.strength_r, self.strength_tt, self.strength_trt, self.strength_rest)
+        return (self.strength_r, self.strength_tt, self.strength_trt, self.strength_higher)
 
     @property
     def lobe_widths(self) -> tuple[float, float, float, float]:

@@ -36,7 +36,7 @@ def fibre_of(settings: ShadingSettings) -> Fibre:
         strength_r=settings.strength_r,
         strength_tt=settings.strength_tt,
         strength_trt=settings.strength_trt,
-        strength_rest=settings.strength_rest,
+        strength_higher=settings.strength_higher,
         eccentricity=settings.eccentricity,
         glint_width=settings.glint_width,
         glint_strength=settings.glint_strength,
@@ -125,10 +125,11 @@ def single_scattering(
     level: Floats | float = 0.0,
 ) -> Floats:
     """S of a strand on its own, (..., 3): sparkle breaks up TRT alone."""
-    strength_r, strength_tt, strength_trt, strength_rest = fibre_of(shading).strengths
+    strength_r, strength_tt, strength_trt, strength_higher = fibre_of(shading).strengths
     sparkle = 1.0 + shading.sparkle * (np.asarray(sparkle_noise) - 1.0)
     strengths = np.stack(
-        np.broadcast_arrays(strength_r, strength_tt, strength_trt * sparkle, strength_rest), axis=-1
+        np.broadcast_arrays(strength_r, strength_tt, strength_trt * sparkle, strength_higher),
+        axis=-1,
     )
     return look_up(tables, *angles, absorption, strengths, level)
 
@@ -162,4 +163,4 @@ def marschner_light(
     bias = diffuse_bias(normal, to_light) * np.exp(-np.maximum(tau, 0.0))
     shade = straight_light(normal, to_light, tau, shading)
     direct = scattered * (np.cos(angles[0]) * shade)[..., None]
-    return direct + strand_color(absorption) * (shading.scattered * bias / np.pi)[..., None]
+    return direct + strand_color(absorption) * (shading.fake_scattering * bias / np.pi)[..., None]

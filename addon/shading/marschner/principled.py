@@ -136,7 +136,7 @@ def _shape(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
         "strength_r": 1.0,
         "strength_tt": 1.0,
         "strength_trt": 1.0,
-        "strength_rest": 1.0,
+        "strength_higher": 1.0,
     }
     if hair.model == "HUANG":
         notes.append("Huang's model is drawn as Chiang's: its Roughness counts in both directions")

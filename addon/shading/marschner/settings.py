@@ -177,7 +177,7 @@ class MarschnerSettings(Settings):
         panel="Fibre",
         shown_when=when("shading.model", "marschner"),
     )
-    strength_rest: float = number(
+    strength_higher: float = number(
         1.0,
         label="Higher-order Lobes",
         description="Factor on light reflected inside the hair twice or more; 1 is physical",
@@ -187,7 +187,7 @@ class MarschnerSettings(Settings):
         panel="Rim Light",
         shown_when=when("shading.model", "marschner"),
     )
-    scattered: float = number(
+    fake_scattering: float = number(
         0.6,
         label="Fake Scattering",
         description="Approximates light scattered between strands if Shadows with Scattering are "

@@ -73,7 +73,7 @@ def shape_of(fibre: Fibre) -> Fibre:
         strength_r=1.0,
         strength_tt=1.0,
         strength_trt=1.0,
-        strength_rest=1.0,
+        strength_higher=1.0,
     )
 
 

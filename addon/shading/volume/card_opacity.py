@@ -6,12 +6,11 @@ strands, one behind the other. That is more than a groom has, because cards are 
 stand for few strands too, so cards of a groom count by a thickness at which all of them together
 throw as much shadow as its strands.
 
-Cards of baked strands, "even" ones, count as strands do from whichever side: turned about its
-strands a card grows narrower, they do not. And the strand that is seen is the foremost one of its
-card, so that light from the front meets the others behind it, and light from behind before it.
+Cards of baked strands have view-compensated alpha and count as strands do from all sides: turned
+about its strands a card gets narrower, they do not. And the strand that is seen is the foremost one
+of its card, so light from the front meets the others behind it, and light from behind before it.
 
-Twin of gpu_shaders/lib_card_opacity.glsl and
-lib_card_shadows.glsl.
+Twin of gpu_shaders/lib_card_opacity.glsl and lib_card_shadows.glsl.
 """
 
 from __future__ import annotations
@@ -39,11 +38,11 @@ def card_optical_depth(alpha: Floats) -> Floats:
 
 
 def turned_facing(across: Floats, tangent: Floats, direction: Floats) -> Floats:
-    """|cos| of the turn about its strands by which a card faces a way, (...).
+    """|cos| of the turn about its strands by which a card faces a direction, (...).
 
     Args:
         across: (..., 3) normal of its plane, of any length.
-        tangent, way: (..., 3) unit vectors.
+        tangent, direction: (..., 3) unit vectors.
     """
     turned = direction - np.sum(direction * tangent, axis=-1, keepdims=True) * tangent
     size = np.linalg.norm(across, axis=-1) * np.linalg.norm(turned, axis=-1)
@@ -52,8 +51,9 @@ def turned_facing(across: Floats, tangent: Floats, direction: Floats) -> Floats:
 
 
 def view_compensated_depth(across: Floats, tangent: Floats, direction: Floats) -> Floats:
-    """Factor of the tau that light from a way meets in an even card, (...): its mean over all
-    turns of the card, times |cos|, is that of a flat card; arguments of `turned_facing`."""
+    """Factor of the tau that light from a direction meets in a card of view-compensated alpha,
+    (...): its mean over all turns of the card, times |cos|, is that of a flat card; arguments of
+    `turned_facing`."""
     factor: Floats = MEAN_TURN / np.maximum(turned_facing(across, tangent, direction), MIN_FACING)
     return factor
 
@@ -61,7 +61,7 @@ def view_compensated_depth(across: Floats, tangent: Floats, direction: Floats) -
 def among_strands(
     before: Floats, beyond: Floats, scale: Floats, tau: Floats, fraction: Floats, front: Floats
 ) -> tuple[Floats, Floats]:
-    """How much hair lies before and beyond the strand of an even card that is seen, (...) each.
+    """How much hair lies before and beyond the strand that is seen of such a card, (...) each.
 
     Where tau strands lie at random and one at least, it has tau / (1 - exp(-tau)) - 1 behind it.
 

@@ -74,8 +74,8 @@ static func _values(sidecar: Dictionary, folder: String) -> Dictionary:
 			values[name + "_texture"] = _texture(entry, folder, false)
 			values[name + "_mask"] = _mask(entry)
 	values["base_gain"] = sidecar["textures"].get("base", {}).get("gain", 1.0)
-	var even: Dictionary = sidecar["textures"].get("view_compensated_alpha", {})
-	values["even_facing"] = Vector2(even.get("mean_facing", 0.0), even.get("min_facing", 0.0))
+	var facing: Dictionary = sidecar["textures"].get("view_compensated_alpha", {})
+	values["facing_range"] = Vector2(facing.get("mean_facing", 0.0), facing.get("min_facing", 0.0))
 	values["has_normal_map"] = "normal" in sidecar["textures"]
 	values["has_shift"] = "shift" in sidecar["textures"]
 	for name in TABLES:

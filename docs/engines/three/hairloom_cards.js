@@ -100,9 +100,9 @@ function leastAlpha(pass, sidecar) {
 
 async function uniformsOf(sidecar, address) {
   const { model, values, fibre, tables } = sidecar.material;
-  const even = sidecar.textures.view_compensated_alpha;
+  const facing = sidecar.textures.view_compensated_alpha;
   const uniforms = {
-    even_facing: { value: new THREE.Vector2(even?.mean_facing, even?.min_facing) },
+    facing_range: { value: new THREE.Vector2(facing?.mean_facing, facing?.min_facing) },
     model: { value: model === 'marschner' ? 1 : 0 },
     base_gain: { value: sidecar.textures.base?.gain ?? 1.0 }, // 8 bits hold no more than 1
   };
@@ -187,8 +187,8 @@ uniform vec3 base_color, tip_color, primary_color, secondary_color;
 uniform float tip_tint, tint_start, tint_end, grey_fraction, shift_noise, sparkle, ambient;
 uniform float primary_strength, primary_exponent, primary_shift;
 uniform float secondary_strength, secondary_exponent, secondary_shift;
-uniform float scattered, volume_shadow, base_gain;
-uniform vec2 even_facing;
+uniform float fake_scattering, volume_shadow, base_gain;
+uniform vec2 facing_range;
 uniform vec4 fibre_root, fibre_tip, fibre_strengths;
 uniform sampler2D base_texture, alpha_texture, shift_texture, noise_texture, tangent_texture;
 uniform sampler2D normal_texture;
@@ -207,7 +207,7 @@ HairMaterial material() {
                       shift_noise, sparkle, ambient, primary_color, primary_strength,
                       primary_exponent, primary_shift, secondary_color, secondary_strength,
                       secondary_exponent, secondary_shift, fibre_root, fibre_tip,
-                      fibre_strengths, scattered, volume_shadow);
+                      fibre_strengths, fake_scattering, volume_shadow);
 }
 
 HairPlace place() {
@@ -238,7 +238,7 @@ void main() {
   vec3 to_eye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-card_point);
   vec3 across = cross(dFdx(card_point), dFdy(card_point));
   vec3 along = hair_unit(card_tangent, vec3(0.0, 0.0, 1.0));
-  alpha = hair_view_compensated_alpha(alpha, across, along, to_eye, even_facing);
+  alpha = hair_view_compensated_alpha(alpha, across, along, to_eye, facing_range);
 #endif
   if (alpha < LEAST_ALPHA) discard;
 #if IS_PRIME

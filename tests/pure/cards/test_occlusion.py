@@ -117,7 +117,7 @@ def test_the_mean_error_against_brute_force_is_below_two_hundredths() -> None:
     found = vertex_occlusion(mesh, [CardShade(mesh, alpha)], [head], settings)
     chosen = np.random.default_rng(2).choice(len(found), 50, replace=False)
     through = (1.0 - alpha) ** settings.extinction
-    expected = brute_force(mesh, 1.0 - through, head, chosen, 512, settings.own_reach)
+    expected = brute_force(mesh, 1.0 - through, head, chosen, 512, settings.self_occlusion_distance)
     assert expected.min() < 0.3 and expected.max() > 0.95  # it is not all alike
     error = found[chosen] - expected
     assert np.abs(error).mean() < 0.02
@@ -214,8 +214,8 @@ def test_a_card_that_curls_over_itself_shades_itself_beyond_its_own_reach() -> N
         np.array([[0, 0, 1]], np.float32),
         CardSettings(segment_count=40, width_factor=6.0, bend=0.0, roundness=0.0),
     )
-    inside = vertex_occlusion(mesh, [CardShade(mesh)], [], plain(own_reach=0.02))
-    never = vertex_occlusion(mesh, [CardShade(mesh)], [], plain(own_reach=1.0))
+    inside = vertex_occlusion(mesh, [CardShade(mesh)], [], plain(self_occlusion_distance=0.02))
+    never = vertex_occlusion(mesh, [CardShade(mesh)], [], plain(self_occlusion_distance=1.0))
     assert inside.max() < 0.8
     np.testing.assert_array_equal(never, 1.0)
 

@@ -24,7 +24,7 @@ LIMP = {
     "bend": 0.0,
     "damping": 0.0,
     "style_damping": 0.0,
-    "weight_held": 0.0,
+    "sag_compensation": 0.0,
 }
 
 

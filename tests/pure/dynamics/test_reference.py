@@ -35,7 +35,7 @@ def both(kit, scene, seconds=0.4, fps=50.0):
             {"substep_rate": 100.0, "length_iterations": 2},
             {},
             {"bend": 0.0, "damping": 3.0},
-            {"weight_held": 0.0, "style_damping": 0.0},
+            {"sag_compensation": 0.0, "style_damping": 0.0},
         ],
         2,
     ),

@@ -26,7 +26,7 @@ def test_a_groom_at_rest_does_not_sag(kit):
 
 def test_without_held_weight_it_sags(kit):
     grid = kit.curly(50, 16)
-    states = kit.Scene(grid, DynamicsSettings(weight_held=0.0)).play(2.0)
+    states = kit.Scene(grid, DynamicsSettings(sag_compensation=0.0)).play(2.0)
     assert np.abs(states[-1].grid - grid).max() > 0.02
 
 
@@ -204,7 +204,7 @@ def test_the_same_twice(kit, shake):
     np.testing.assert_array_equal(one.previous, other.previous)
 
 
-WINDY = {"wind_speed": 5.0, "drag": 1.0, "weight_held": 0.0}
+WINDY = {"wind_speed": 5.0, "drag": 1.0, "sag_compensation": 0.0}
 
 
 def swept(kit, shake, guides, settings):

@@ -123,7 +123,7 @@ def marched(depth: Floats, start: Floats, direction: Floats) -> float:
 
 def test_agrees_with_rays_marched_one_by_one() -> None:
     strands = straight_hair(400)
-    settings = AmbientSettings(extinction=1.0, open_sky=1.0, upper_fraction=0.0, cell_count=32)
+    settings = AmbientSettings(extinction=1.0, ao_bias=1.0, upper_fraction=0.0, cell_count=32)
     points = strands.points[::37]
     found = ambient_occlusion(strands, points, None, settings)
     grid = grid_around(strands, 32)
@@ -184,7 +184,7 @@ def test_open_at_the_outside_and_dark_at_the_scalp() -> None:
 def test_the_body_shuts_out_the_light_from_behind_and_only_that() -> None:
     """Without hair's shade: what a ball 1.5 cells smaller hides of the sky, and all inside."""
     strands = hair_on_ball()
-    settings = AmbientSettings(extinction=0.0, open_sky=1.0, upper_fraction=0.0, cell_count=96)
+    settings = AmbientSettings(extinction=0.0, ao_bias=1.0, upper_fraction=0.0, cell_count=96)
     on_ball = ambient_occlusion(strands, strands.roots * 1.01, ball(0.08), settings)
     shell = 0.08 - 1.5 * grid_around(strands, 96).cell
     hidden = 0.5 * (1.0 - np.sqrt(1.0 - (shell / 0.0808) ** 2))
@@ -209,7 +209,7 @@ def test_a_thin_sheet_shades_neither_of_its_sides() -> None:
 def test_light_from_above_leaves_the_lower_side_dark() -> None:
     strands = hair_on_ball()
     height = strands.roots[:, 2]
-    settings = AmbientSettings(extinction=1.0, upper_fraction=1.0, open_sky=1.0)
+    settings = AmbientSettings(extinction=1.0, upper_fraction=1.0, ao_bias=1.0)
     shade = ambient_occlusion(strands, strands.points, ball(0.08), settings).reshape(-1, 8)[:, -1]
     assert shade[height > 0.05].mean() > 0.85
     assert shade[height < -0.06].mean() < 0.1

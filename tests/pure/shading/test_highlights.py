@@ -33,7 +33,12 @@ def look(name: str, model: str) -> ShadingSettings:
     """A look without noise and without what stands in for light from strand to strand."""
     shipped = read_any_preset(LOOKS / f"{name}.json", ALL_SETTINGS).settings
     return replace(
-        shipped, model=model, shift_noise=0.0, color_variation=0.0, grey_fraction=0.0, scattered=0.0
+        shipped,
+        model=model,
+        shift_noise=0.0,
+        color_variation=0.0,
+        grey_fraction=0.0,
+        fake_scattering=0.0,
     )
 
 

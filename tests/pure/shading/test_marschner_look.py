@@ -116,7 +116,7 @@ def test_color_of_a_mass_is_the_color_asked_for() -> None:
 
 
 def test_light_hangs_linearly_on_each_strength(tables: MarschnerTables) -> None:
-    names = ("strength_r", "strength_tt", "strength_trt", "strength_rest", "scattered")
+    names = ("strength_r", "strength_tt", "strength_trt", "strength_higher", "fake_scattering")
     dark = replace(ShadingSettings(), **dict.fromkeys(names, 0.0))
     assert (light(tables, dark) == 0.0).all()
     parts = [light(tables, replace(dark, **{name: 1.0})) for name in names]
@@ -139,21 +139,21 @@ def test_the_side_away_from_the_light_is_in_the_dark(tables: MarschnerTables) ->
             tables, ways[0], normal, ways[1], ways[2], half, half, absorption, settings
         )
 
-    settings = ShadingSettings(shift_noise=0.0, scattered=0.0)
+    settings = ShadingSettings(shift_noise=0.0, fake_scattering=0.0)
     assert (seen(-x, settings) == 0.0).all()
     bare = replace(settings, volume_shadow=0.0)
     assert seen(-x, bare) == pytest.approx(seen(x, bare))
     assert seen(x, bare) == pytest.approx(seen(x, settings))
     only_scattered = replace(
         settings,
-        scattered=1.0,
-        **dict.fromkeys(("strength_r", "strength_tt", "strength_trt", "strength_rest"), 0.0),
+        fake_scattering=1.0,
+        **dict.fromkeys(("strength_r", "strength_tt", "strength_trt", "strength_higher"), 0.0),
     )
     assert seen(x, only_scattered) == pytest.approx(strand_color(absorption) / np.pi)
 
 
 def test_the_packed_fibre_is_what_the_struct_says() -> None:
-    settings = replace(PLAIN, strength_tt=0.5, strength_rest=2.0)
+    settings = replace(PLAIN, strength_tt=0.5, strength_higher=2.0)
     packed = pack_fibre(settings)
     assert packed.dtype == np.float32 and packed.shape == (20,)
     assert packed[:3] == pytest.approx(fibre_of(settings).absorption)

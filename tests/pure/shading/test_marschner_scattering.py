@@ -21,7 +21,7 @@ CLEAR = Fibre(absorption=(0.0, 0.0, 0.0))
         Fibre(),
         Fibre(eccentricity=0.85),
         Fibre(azimuthal_width=0.1),
-        Fibre(strength_rest=9.0),
+        Fibre(strength_higher=9.0),
     ],
 )
 def test_reciprocity(fibre: Fibre) -> None:

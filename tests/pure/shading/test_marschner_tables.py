@@ -97,7 +97,7 @@ def test_looked_up_s_is_within_half_a_percent_of_its_peak(shape: Fibre, absorpti
 
 
 def test_tables_hang_on_the_shape_alone() -> None:
-    painted = Fibre(absorption=(0.1, 2.0, 5.0), strength_r=0.0, strength_rest=3.0)
+    painted = Fibre(absorption=(0.1, 2.0, 5.0), strength_r=0.0, strength_higher=3.0)
     assert shape_of(painted) == shape_of(Fibre())
     assert shape_of(Fibre(glint_strength=2.0)) != shape_of(Fibre())
     there, here = marschner_tables(painted, 32), marschner_tables(shape_of(painted), 32)
@@ -191,7 +191,7 @@ def test_prefiltering_comes_closer_to_the_mean_over_a_pixel() -> None:
         {"glint_width": 1e-4},
         {"glint_width": 10.0},
         {"glint_strength": 0.0, "glint_fade": 0.0},
-        {"strength_r": 0.0, "strength_tt": 0.0, "strength_trt": 0.0, "strength_rest": 0.0},
+        {"strength_r": 0.0, "strength_tt": 0.0, "strength_trt": 0.0, "strength_higher": 0.0},
         {"azimuthal_width": 1e-6},
         {"azimuthal_width": np.radians(60.0)},
     ],
