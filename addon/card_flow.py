@@ -9,10 +9,10 @@ import numpy as np
 
 from .arrays import Floats
 from .cards.atlas_settings import AtlasSettings
-from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps, strand_shade
+from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps, strand_occluder
 from .cards.card_mesh import CardMesh
 from .cards.follow import CardBinding, bind_cards, card_lines, follow_guides
-from .cards.occlusion import CardShade
+from .cards.occlusion import CardOccluder
 from .cards.occlusion_settings import CardOcclusionSettings
 from .cards.settings import CardSettings
 from .groom.weights import guide_weights
@@ -29,7 +29,7 @@ def card_build_steps(
     rig: Rig,
     settings: SettingsMap,
     alpha_of: AlphaOf = lambda _build: None,
-    others: Sequence[CardShade] = (),
+    others: Sequence[CardOccluder] = (),
 ) -> Generator[str, None, CardBuild]:
     """Cards at rest in all levels of detail, with occlusion, from inside to outside.
 
@@ -55,9 +55,9 @@ def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
     return CardGroom(strands, rig.guides, radius, root_normals(rig), rig.head)
 
 
-def shade_of(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardShade:
+def occluder_of(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardOccluder:
     """What shades others instead of this groom's strands, world space."""
-    return strand_shade(card_groom(rig, drawn))
+    return strand_occluder(card_groom(rig, drawn))
 
 
 def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:

@@ -16,7 +16,7 @@ from mathutils.bvhtree import BVHTree
 from hairloom.addon.card_flow import card_build_steps
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.cards.occlusion import CardShade, vertex_occlusion
+from hairloom.addon.cards.occlusion import CardOccluder, vertex_occlusion
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.steps import result_of
@@ -38,11 +38,11 @@ def occlusion_figures() -> dict[str, float]:
     rounds the processor's time; ao_error and ao_bias against brute force; the twentieth part of
     vertices that lie deepest, and the most open ones."""
     mesh, alpha, head = sintel_cards()
-    settings, shades = CardOcclusionSettings(), [CardShade(mesh, alpha)]
+    settings, occluders = CardOcclusionSettings(), [CardOccluder(mesh, alpha)]
     timings = []
     for _ in range(ROUNDS):
         started, processed = time.perf_counter(), time.process_time()
-        found = vertex_occlusion(mesh, shades, [head], settings)
+        found = vertex_occlusion(mesh, occluders, [head], settings)
         timings.append((time.perf_counter() - started, time.process_time() - processed))
     seconds, processor = np.min(timings, axis=0) * VERTICES / len(mesh.positions)
     chosen = np.random.default_rng(1).choice(len(found), COMPARED, replace=False)

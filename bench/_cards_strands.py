@@ -33,7 +33,7 @@ from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
-from hairloom.addon.shading.volume.card_opacity import StrandArea, card_shade
+from hairloom.addon.shading.volume.card_opacity import StrandArea, card_shadow_area
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
 SHEET = REPOSITORY / "out" / "cards_sheet.png"
@@ -89,13 +89,13 @@ def _cards(rig: Rig, made: MappedCards, look: str, width: float) -> CardSnapshot
     settings, build, grid = _settings(look, width), made.build, rig.strands.grid
     maps, mesh = card_maps(CardInputs(rig, settings), build, drawn_maps), build.finest
     area = StrandArea.of(grid, rig.strands.radius.reshape(grid.shape[:2]))
-    shade = card_shade(mesh.positions, mesh.triangles, mesh.uv, maps.textures.alpha)
+    shadow = card_shadow_area(mesh.positions, mesh.triangles, mesh.uv, maps.textures.alpha)
     return CardSnapshot(
         mesh,
         maps.textures,
         maps.has_tangent_map,
         build.backs[0],
-        thickness=area.shade(settings[StrandSettings]) / shade,
+        thickness=area.shadow_area(settings[StrandSettings]) / shadow,
         is_view_compensated=maps.is_view_compensated,
     )
 

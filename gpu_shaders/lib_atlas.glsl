@@ -11,7 +11,7 @@ vec3 fibre_normal(vec3 tangent, float side)
   return right * side + cross(right, tangent) * sqrt(max(1.0 - side * side, 0.0));
 }
 
-// Whether a sample of a ribbon that was widened counts: `share` of them do, evenly spread by the R2
+// Whether a sample of a ribbon that was widened counts: this fraction of them does, evenly spread by the R2
 // sequence of Roberts 2018.
 bool is_counted(uint column, uint row, uint strand, float fraction)
 {

@@ -14,7 +14,7 @@ float fraction_below(float distance, vec2 normal)
   return distance < 0.0 ? beyond : 1.0 - beyond;
 }
 
-// The share that a strip covers. half_width: of the strip [pixels]; distance: of its middle line from
+// The fraction that a strip covers. half_width: of the strip [pixels]; distance: of its middle line from
 // the pixel's centre [pixels].
 float strip_coverage(float distance, float half_width, vec2 normal)
 {
@@ -27,7 +27,7 @@ float coverage_reach(vec2 normal)
   return 0.5 * (abs(normal.x) + abs(normal.y));
 }
 
-// The share that a ribbon covers. x distance from its middle line, y half its width, zw its normal: all
+// The fraction that a ribbon covers. x distance from its middle line, y half its width, zw its normal: all
 // of them linear in the picture. Vertices give them times their w, fragments take them times
 // gl_FragCoord.w, because some drivers clip what is declared noperspective wrongly.
 float ribbon_coverage(vec4 ribbon_of)

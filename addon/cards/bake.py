@@ -46,7 +46,7 @@ def min_one_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
         size: of the atlas [pixels].
 
     Returns:
-        half as in FlatStrands, and share (n, cv_count) in [0, 1].
+        half as in FlatStrands, and fraction (n, cv_count) in [0, 1].
     """
     side = size * SAMPLES
     direction = np.gradient(flat.place, axis=1) * side
@@ -64,7 +64,7 @@ def min_one_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
 
 
 def is_counted(column: Ints, row: Ints, strand: int, fraction: Floats) -> Bools:
-    """Whether a sample of a ribbon that was widened counts: `share` of them do, evenly spread."""
+    """Whether a sample of a widened ribbon counts: this fraction of them does, evenly spread."""
     x, y, z = SPARSE_STEPS
     place = (column * x + row * y + strand * z) % SPARSE_RANGE
     counted: Bools = place < fraction * SPARSE_RANGE
@@ -195,7 +195,7 @@ def _samples(corners: Floats, shape: tuple[int, int]) -> Iterator[tuple[Ints, In
 
 
 def _vertex_values(flat: FlatStrands, fraction: Floats, strand: int, vertices: Ints) -> Floats:
-    """share, side, along, id, depth, occlusion, tangent, base of the vertices, (3, 12)."""
+    """fraction, side, along, id, depth, occlusion, tangent, base of the vertices, (3, 12)."""
     cv, sign = vertices // 2, 2.0 * (vertices % 2) - 1.0
     along = cv / (flat.place.shape[1] - 1)
     number = np.full(3, flat.strand_id[strand])

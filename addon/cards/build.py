@@ -18,7 +18,7 @@ from .clusters import cluster_of_guides
 from .fit import cluster_of_strands, fit_strips
 from .layers import card_layers
 from .levels import card_levels
-from .occlusion import CardShade, occlusion_steps
+from .occlusion import CardOccluder, occlusion_steps
 from .occlusion_settings import CardOcclusionSettings
 from .order_check import wrong_fraction
 from .settings import CardSettings
@@ -96,7 +96,7 @@ def card_steps(
     atlas: AtlasSettings,
     occlusion: CardOcclusionSettings,
     alpha_of: AlphaOf,
-    others: Sequence[CardShade] = (),
+    others: Sequence[CardOccluder] = (),
 ) -> Generator[str, None, CardBuild]:
     """Build the cards; each step names what comes next, and the result is returned.
 
@@ -144,14 +144,16 @@ def _occlusion_steps(
     settings: CardSettings,
     mesh: CardMesh,
     alpha: Floats | None,
-    others: Sequence[CardShade],
+    others: Sequence[CardOccluder],
     occlusion: CardOcclusionSettings,
 ) -> Generator[float, None, Floats]:
     """Of each vertex: that of the strands there, times what rays find of other grooms."""
     if groom.occlusion is None:
         bodies = [] if groom.head is None else [groom.head]
         return (
-            yield from occlusion_steps(mesh, [CardShade(mesh, alpha), *others], bodies, occlusion)
+            yield from occlusion_steps(
+                mesh, [CardOccluder(mesh, alpha), *others], bodies, occlusion
+            )
         )
     own = strands_occlusion(
         mesh, groom.strands.grid, groom.occlusion, card_of_strand(groom, settings)
@@ -267,7 +269,7 @@ def with_occlusion_of(finest: CardMesh, level: CardMesh) -> CardMesh:
     return level.with_occlusion(finest.occlusion[candidate[np.arange(len(mine)), nearest]])
 
 
-def strand_shade(groom: CardGroom) -> CardShade:
+def strand_occluder(groom: CardGroom) -> CardOccluder:
     """Strands as cards that only shade others, for grooms of which no cards were made.
 
     They lie along clusters of the strands, each row as dense as the strands in it.
@@ -289,4 +291,4 @@ def strand_shade(groom: CardGroom) -> CardShade:
     same = np.zeros_like(numbers)
     cards = UncutCards(strips, same, same, same, numbers, AtlasGrid(columns=len(strips)))
     mesh = strip_mesh([(numbers, strips)], cards, 1, settings)
-    return CardShade(mesh, (1.0 - np.exp(-tau)).T.astype(np.float32))
+    return CardOccluder(mesh, (1.0 - np.exp(-tau)).T.astype(np.float32))

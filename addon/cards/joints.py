@@ -96,7 +96,7 @@ def joint_steps(
 ) -> Generator[float, None, JointRig]:
     """The fewest joints that stay under the error; where none do, the nearest ones.
 
-    Yields the share that is done.
+    Yields the fraction that is done.
     """
     learnt = _Learnt.of(tracks, settings.chains)
     yield 0.1

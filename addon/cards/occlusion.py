@@ -45,15 +45,15 @@ _DIRECTIONS_PER_STEP = 8
 
 
 @dataclass(frozen=True)
-class CardShade:
+class CardOccluder:
     """Cards that shade. alpha: (height, width) in [0, 1], row 0 the lowest; None is opaque."""
 
     mesh: CardMesh
     alpha: Floats | None = None
 
     @classmethod
-    def of_surface(cls, surface: Surface, alpha: Floats | None) -> CardShade:
-        """A mesh that shades and is not shaded: nothing is known of its cards. It is opaque
+    def of_surface(cls, surface: Surface, alpha: Floats | None) -> CardOccluder:
+        """A mesh that occluders and is not shaded: nothing is known of its cards. It is opaque
         without UVs."""
         corners = surface.triangles.ravel()
         count = len(corners)
@@ -74,31 +74,31 @@ class CardShade:
 
 def vertex_occlusion(
     mesh: CardMesh,
-    shades: Sequence[CardShade],
+    occluders: Sequence[CardOccluder],
     bodies: Sequence[Surface],
     settings: CardOcclusionSettings,
 ) -> Floats:
-    """How open each vertex of `mesh` is, (vertex_count,) float32: 1 open, 0 shut in.
+    """How open each vertex of `mesh` is, (vertex_count,) float32: 1 open, 0 enclosed.
 
     Args:
-        mesh: what is shaded; its own cards shade it when it is among the shades.
-        shades: cards of this groom, and of others by choice, all in one space.
+        mesh: what is shaded; its own cards shade it when it is among the occluders.
+        occluders: cards of this groom, and of others by choice, all in one space.
         bodies: heads and whatever else lets no light through, in the same space.
     """
-    return result_of(occlusion_steps(mesh, shades, bodies, settings))
+    return result_of(occlusion_steps(mesh, occluders, bodies, settings))
 
 
 def occlusion_steps(
     mesh: CardMesh,
-    shades: Sequence[CardShade],
+    occluders: Sequence[CardOccluder],
     bodies: Sequence[Surface],
     settings: CardOcclusionSettings,
 ) -> Generator[float, None, Floats]:
-    """As vertex_occlusion, some directions a step; each gives the share that is done."""
+    """As vertex_occlusion, some directions a step; each yields the fraction that is done."""
     count = len(mesh.positions)
     if not count:
         return np.ones(0, np.float32)
-    scene = _Scene(mesh, shades, bodies, settings)
+    scene = _Scene(mesh, occluders, bodies, settings)
     axes = even_axes(settings.rays)
     light, whole = np.zeros(count), np.zeros(count)
     with ThreadPoolExecutor(_THREADS) as threads:
@@ -142,17 +142,17 @@ class _Triangles:
 
 
 class _Layer:
-    """The cards of one shade.
+    """The cards of one occluder.
 
     texel: (triangle_count, 6) float32 where the texture is at each triangle's first corner, and
         how far from there it is at the others, in pixels, x and y.
     depth: (height, width) float32, optical depth.
-    card: (triangle_count,); -1 where the shaded vertices are of no card of this shade.
+    card: (triangle_count,); -1 where the shaded vertices are of no card of this occluder.
     """
 
-    def __init__(self, shade: CardShade, middle: Floats, is_own: bool) -> None:
-        mesh = shade.mesh
-        alpha = np.ones((1, 1), np.float32) if shade.alpha is None else shade.alpha
+    def __init__(self, occluder: CardOccluder, middle: Floats, is_own: bool) -> None:
+        mesh = occluder.mesh
+        alpha = np.ones((1, 1), np.float32) if occluder.alpha is None else occluder.alpha
         self.triangles = _Triangles(mesh.positions, mesh.triangles, middle)
         self.card = mesh.card if is_own else np.full_like(mesh.card, -1)
         self.depth = -np.log(np.maximum(1.0 - alpha, np.exp(-_OPAQUE))).astype(np.float32)
@@ -173,12 +173,12 @@ class _Layer:
 
 
 class _Scene:
-    """What is shaded and what shades, made ready for one axis after the other."""
+    """What is shaded and what occluders, made ready for one axis after the other."""
 
     def __init__(
         self,
         mesh: CardMesh,
-        shades: Sequence[CardShade],
+        occluders: Sequence[CardOccluder],
         bodies: Sequence[Surface],
         settings: CardOcclusionSettings,
     ) -> None:
@@ -188,7 +188,7 @@ class _Scene:
         self._card = card_of_vertex(mesh)
         self._settings = settings
         self._bodies = [_Triangles(body.positions, body.triangles, middle) for body in bodies]
-        self._layers = [_Layer(shade, middle, shade.mesh is mesh) for shade in shades]
+        self._layers = [_Layer(each, middle, each.mesh is mesh) for each in occluders]
 
     def seen_along(self, axis: Floats) -> tuple[Floats, Floats]:
         """(cosine, transmittance) of each vertex' ray along the axis, each (vertex_count,)."""

@@ -3,8 +3,8 @@
 A pixel is wrong where the four passes, drawing the triangles in the order at hand, give it another
 colour than all its fragments from the farthest to the nearest, with a colour by chance for each
 card: by more than 1/255 in any channel. So every wrong pair counts that could be seen at all, and
-none that lies behind opaque hair, behind the head, or where one of the two is clear. The share is
-of the pixels that hair covers.
+none that lies behind opaque hair, behind the head, or where one of the two is clear. The fraction
+is of the pixels that hair covers.
 
 The passes: opaque pixels with a depth test; then, of what is not hidden by them or by the head,
 back faces, and last front faces, which write their depth, so that farther ones that come too late

@@ -29,7 +29,7 @@ from .order_views import (
 #: What cards without a texture are taken to cover. More would see too few of the layers, less those
 #: that hardly show.
 OPACITY = 0.4
-#: A pair that changes its pixel's colour by less than this share is left out.
+#: A pair that changes its pixel's colour by less than this fraction is left out.
 MIN_WEIGHT = 0.004
 #: Weights are whole numbers, so that their sums do not depend on the order of adding.
 _UNIT = 1000

@@ -102,7 +102,7 @@ def order_steps(
     view_count: int = VIEW_COUNT,
     alpha: Floats | None = None,
 ) -> Generator[float, None, CardOrders]:
-    """As card_orders, some views a step; each gives the share that is done."""
+    """As card_orders, some views a step; each gives the fraction that is done."""
     numbered = canonical(mesh)
     orders = yield from _canonical_orders(numbered.mesh, head, by, apart, view_count, alpha)
     return CardOrders(numbered.triangle[orders.front], numbered.triangle[orders.back])

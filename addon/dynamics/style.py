@@ -55,7 +55,7 @@ class LocalShape:
 
     curvature: (3, cv_count - 2, guide_count) [m], each segment minus the one before it, in the
         frame of the one before it.
-    hold: (cv_count - 2, guide_count), the share that turns with the strand, 0 at sharp kinks.
+    hold: (cv_count - 2, guide_count), the part that turns with the strand, 0 at sharp kinks.
     twist_cv: (guide_count,) the CV that tells how a guide is turned about its root segment.
     """
 

@@ -15,8 +15,8 @@ _CANDIDATES_PER_GUIDE = 100
 def choose_guides(strands: StrandSet, settings: GuideSettings) -> Ints:
     """Indices of the strands that become guides, (guide_count,) int64, ascending.
 
-    Each group gets a share by its size, at least one guide, and spreads it over its roots by
-    farthest-point sampling (Gonzalez 1985): the next guide is the root farthest from all guides
+    Each group gets guides in proportion to its size, at least one, and spreads them over its roots
+    by farthest-point sampling (Gonzalez 1985): the next guide is the root farthest from all guides
     so far. The same seed gives the same guides. No more guides than strands, none of none.
     """
     random = np.random.default_rng(settings.seed)

@@ -1,13 +1,13 @@
 """Fewer and wider strands where the groom is small in the picture.
 
-Each strand has a rank in [0, 1) once and for all. The strands whose rank is below the share are
+Each strand has a rank in [0, 1) once and for all. The strands whose rank is below the fraction are
 drawn; the last fifth of them grows thin before it is gone, so that nothing pops. All others are
 widened so that the groom covers as much of the picture as before.
 
 How much wider: the width is made up after the least width in pixels, because far hair is as wide as
 that, whatever its radius. But n times fewer strands must not be n times wider where they lie over
-each other many times, and wide strands stand out over the outline. With s the share, f the factor
-of the width, L the layers of hair (what all strands cover side by side, over the area of the
+each other many times, and wide strands stand out over the outline. With s the fraction, f the
+factor of the width, L the layers of hair (what all strands cover side by side, over the area of the
 groom), and q what half a strand's width all around adds to that area, the groom covers
 
     c(s, f) = s f L / (s f L + 1) (1 + f q)
@@ -33,17 +33,17 @@ from ..strands.morton import morton_code
 from .detail import NEAREST, PictureView
 from .settings import DetailSettings
 
-#: From this share on every strand is drawn and as wide as it is.
+#: From this fraction on every strand is drawn and as wide as it is.
 WHOLE = 1.25
-#: A share below is taken to be this, which is no strand or one.
+#: A fraction below is taken to be this, which is no strand or one.
 SMALLEST_FRACTION = 1.0e-6
-#: How fast a strand gets its width once the share exceeds its rank: all of it at rank * WHOLE.
+#: How fast a strand gets its width once the fraction exceeds its rank: all of it at rank * WHOLE.
 FADE = WHOLE / (WHOLE - 1.0)
 
 
 @dataclass(frozen=True)
 class Thinning:
-    """What of a groom is drawn. share: see `drawn_fraction`. widening: factor of the width."""
+    """What of a groom is drawn. fraction: see `drawn_fraction`. widening: factor of the width."""
 
     fraction: float = WHOLE
     widening: float = 1.0

@@ -212,12 +212,12 @@ def threads_of(name):
 def test_other_hair_is_made_into_cards_in_the_thread(shaded, evaluated, monkeypatch):
     session, strands = shaded
     threads = []
-    shade_of = card_flow.shade_of
+    occluder_of = card_flow.occluder_of
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     monkeypatch.setattr(
         card_flow,
-        "shade_of",
-        lambda *given: threads.append(threading.current_thread()) or shade_of(*given),
+        "occluder_of",
+        lambda *given: threads.append(threading.current_thread()) or occluder_of(*given),
     )
     near = shown(session)
     strands.location.x = 5.0

@@ -126,8 +126,8 @@ def test_hair_shades_the_skin_below(frame: Any, form: str) -> None:
         picture: np.ndarray = frame.render_image(snapshot, camera, SIZE, SIZE, 1)
         return picture[:, :, 0]
 
-    ao_bias, shaded = floor_seen(of_form("none")), floor_seen(of_form(form, resolution=16))
-    ratio = shaded / np.maximum(ao_bias, 1e-9)
+    open_sky, shaded = floor_seen(of_form("none")), floor_seen(of_form(form, resolution=16))
+    ratio = shaded / np.maximum(open_sky, 1e-9)
     assert ratio[30:34, 2:8].min() > 0.99
     assert ratio[30:34, 30:34].mean() == pytest.approx(np.exp(-0.5), abs=0.1)
 

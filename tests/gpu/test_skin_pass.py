@@ -168,12 +168,12 @@ def test_the_map_holds_what_is_in_the_way_of_the_light(frame: Any) -> None:
     weights = np.dstack([1.0 - layout.weights.sum(axis=-1), layout.weights])
     place = np.einsum("hwi,hwij->hwj", weights, surface.corners[layout.triangle])
     is_shown = layout.island >= 0
-    ao_bias = is_shown & (place[..., 0] > 0.01) & (place[..., 2] > 0.03)
+    open_sky = is_shown & (place[..., 0] > 0.01) & (place[..., 2] > 0.03)
     below_hair = is_shown & (place[..., 0] < -0.01) & (place[..., 2] > 0.03)
     # towards the border of a light's map the shadows of meshes fade
     is_amid = np.hypot(place[..., 0], place[..., 1]) < 0.08
     dark_side = is_shown & is_amid & (place[..., 2] < -0.03)
-    assert found[ao_bias].mean() > 0.98
+    assert found[open_sky].mean() > 0.98
     assert found[below_hair].mean() == pytest.approx(np.exp(-40 * 8.0e-3 / 0.115), abs=0.05)
     # a little light falls through the ball, which is open at both poles
     assert found[dark_side].mean() < 0.06

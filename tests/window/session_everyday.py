@@ -173,7 +173,7 @@ def what_acts_on_it():
         yield from until(lambda: changed(without, pixels("no-overlays-again")) < 1e-4, "lines stay")
         hair.hairloom.shown_overlays = {kind}
         yield from until(
-            lambda kind=kind: 0.0002 < changed(without, pixels(f"{kind}")) < 0.1, f"no {kind}"
+            lambda kind=kind: 0.0002 < changed(without, pixels(kind)) < 0.1, f"no {kind}"
         )
     hair.hairloom.shown_overlays = {"colliders", "wind", "lights"}
     yield

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...cards.adopted import AdoptedCards, adopt_cards
-from ...cards.occlusion import CardShade, occlusion_steps
+from ...cards.occlusion import CardOccluder, occlusion_steps
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...cards.sort import SortBy, order_steps
@@ -118,8 +118,8 @@ def sort_steps(
         bodies = [] if source.head is None else [source.head]
         others, doubts = read_occluders(options.occlusion, obj, depsgraph).cards()
         problems += doubts
-        shades = [CardShade(mesh, alpha), *others]
-        shading = occlusion_steps(mesh, shades, bodies, options.occlusion)
+        occluders = [CardOccluder(mesh, alpha), *others]
+        shading = occlusion_steps(mesh, occluders, bodies, options.occlusion)
         openness = yield from map_progress(shading, lambda fraction: (1.0 + fraction) / 2.0)
         corner = np.zeros(len(obj.data.loops), np.int32)
         corner[source.corner] = source.cards.corner
@@ -227,7 +227,7 @@ def _dangling(obj: bpy.types.Object, name: str) -> Ints | None:
 def _shared(mesh: bpy.types.Mesh) -> list[str]:
     if mesh.users < 2:
         return []
-    return [f"{mesh.users} objects fraction the mesh '{mesh.name}' and have been sorted together"]
+    return [f"{mesh.users} objects share the mesh '{mesh.name}' and have been sorted together"]
 
 
 def _write_occlusion(

@@ -38,7 +38,7 @@ from ...shading.drawn_strands import drawn_radius, strand_variation
 from ...shading.settings import ShadingSettings, StrandSettings
 from ...shading.texture_settings import TextureSettings
 from ...shading.textures import TEXTURES, HairTextures, hair_textures
-from ...shading.volume.card_opacity import StrandArea, card_shade
+from ...shading.volume.card_opacity import StrandArea, card_shadow_area
 from ..base.gpu_context import ensure_gpu
 from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
@@ -269,7 +269,7 @@ class BuiltCards:
     binding: CardBinding
     rest: CardSnapshot
     strand_area: StrandArea
-    card_shade: float
+    card_shadow_area: float
     wrong_fraction: float
     notes: tuple[str, ...]
 
@@ -288,7 +288,7 @@ class BuiltCards:
                 is_view_compensated=maps.is_view_compensated,
             ),
             StrandArea.of(strands.grid, strands.radius.reshape(strands.strand_count, -1)),
-            card_shade(mesh.positions, mesh.triangles, mesh.uv, textures.alpha),
+            card_shadow_area(mesh.positions, mesh.triangles, mesh.uv, textures.alpha),
             build.wrong_fraction,
             cards.notes,
         )
@@ -321,8 +321,8 @@ class BuiltCards:
 
     def drawn(self, cards: CardSnapshot, settings: SettingsMap) -> CardSnapshot:
         """The same cards by these settings."""
-        shade = self.strand_area.shade(settings[StrandSettings])
-        thickness = shade / max(self.card_shade, 1.0e-12)
+        shadow = self.strand_area.shadow_area(settings[StrandSettings])
+        thickness = shadow / max(self.card_shadow_area, 1.0e-12)
         return replace(cards, drawing=settings[CardDrawingSettings], thickness=thickness)
 
 

@@ -67,7 +67,7 @@ def check_motion(
 def moved_cards(
     motion: GuideMotion, levels: Sequence[CardMesh], *, space: str, with_directions: bool
 ) -> Generator[float, None, MovedCards]:
-    """The cards in all frames; yields the share that is done.
+    """The cards in all frames; yields the fraction that is done.
 
     Args:
         levels: at rest, world space.
@@ -149,7 +149,7 @@ class JointMotion:
 def joint_motion_steps(
     tracks: CardTracks, settings: CardExportSettings
 ) -> Generator[float, None, JointMotion]:
-    """Fit joints and keys; yields the share that is done."""
+    """Fit joints and keys; yields the fraction that is done."""
     allowed = settings.joint_error / 100.0 * tracks.hair_length * _KEY_FRACTION
     rig = yield from joint_steps(tracks, settings)
     keys = result_of(chain_keys(rig, allowed))

@@ -15,7 +15,7 @@ import numpy as np
 
 from ... import card_flow
 from ...arrays import Floats
-from ...cards.occlusion import CardShade
+from ...cards.occlusion import CardOccluder
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
@@ -39,7 +39,7 @@ _NO_MOTION = np.eye(4)
 class _Read(Protocol):
     """One object as it was read."""
 
-    def shade(self) -> CardShade:
+    def occluder(self) -> CardOccluder:
         """Raises:
         HairloomError: it cannot be made into cards.
         """
@@ -47,15 +47,15 @@ class _Read(Protocol):
 
     @property
     def state(self) -> tuple[object, ...]:
-        """All that its shade depends on."""
+        """All that its occlusion depends on."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Occluders:
-    """All other hair that is to shade, read from the scene: arrays that a thread may use.
+    """All other hair that occludes, read from the scene: arrays that a thread may use.
 
-    uids: session numbers of the objects, those that cannot be used too.
+    uids: session numbers of the objects, including those that cannot be used.
     notes: what the artist should know of how they were read.
     """
 
@@ -63,19 +63,19 @@ class Occluders:
     notes: tuple[str, ...] = ()
     _read: tuple[_Read, ...] = ()
 
-    def cards(self) -> tuple[tuple[CardShade, ...], tuple[str, ...]]:
+    def cards(self) -> tuple[tuple[CardOccluder, ...], tuple[str, ...]]:
         """The hair as cards, and what the artist should know of it."""
-        found: list[CardShade] = []
+        found: list[CardOccluder] = []
         notes = list(self.notes)
         for each in self._read:
             try:
-                found.append(each.shade())
+                found.append(each.occluder())
             except HairloomError as error:
                 notes.append(_shades_nothing(error))
         return tuple(found), tuple(notes)
 
     def is_like(self, other: Occluders) -> bool:
-        """Whether both shade alike."""
+        """Whether both occlude alike."""
         if (self.uids, self.notes) != (other.uids, other.notes):
             return False
         pairs = zip(self._read, other._read, strict=True)
@@ -87,8 +87,8 @@ class _ReadMesh:
     surface: Surface
     alpha: Floats | None
 
-    def shade(self) -> CardShade:
-        return CardShade.of_surface(self.surface, self.alpha)
+    def occluder(self) -> CardOccluder:
+        return CardOccluder.of_surface(self.surface, self.alpha)
 
     @property
     def state(self) -> tuple[object, ...]:
@@ -102,9 +102,9 @@ class _ReadStrands:
     settings: SettingsMap
     name: str
 
-    def shade(self) -> CardShade:
+    def occluder(self) -> CardOccluder:
         rig = rig_from(self.source, self.settings, place=self.name)
-        return card_flow.shade_of(rig, self.settings[StrandSettings])
+        return card_flow.occluder_of(rig, self.settings[StrandSettings])
 
     @property
     def state(self) -> tuple[object, ...]:
@@ -120,7 +120,7 @@ def read_occluders(
     depsgraph: bpy.types.Depsgraph | None = None,
     motion: Floats = _NO_MOTION,
 ) -> Occluders:
-    """All other hair if it is to shade.
+    """All other hair, if the settings include it.
 
     Args:
         own: hair curves, or a mesh of cards; None leaves nothing out.

@@ -15,7 +15,7 @@ from ..cards.textures import named_pictures
 from ..pictures.studio import Studio
 from .cards_job import written_cards
 from .job_options import add_motion_options, add_picture_options, add_texture_option
-from .job_steps import Job, Moment, open_studio, read_rig
+from .job_steps import Job, PosedHair, open_studio, read_rig
 from .render_job import write_sheet, write_still
 from .simulate_job import simulated
 from .verb import Verb
@@ -29,7 +29,7 @@ def demo(job: Job) -> None:
     with TemporaryDirectory() as bake:
         motion = simulated(job, Path(bake) / "bake")
         studio = open_studio(job, rig)
-        write_still(job, folder / "still.png", studio, Moment.of_rest(rig))
+        write_still(job, folder / "still.png", studio, PosedHair.of_rest(rig))
         write_sheet(job, folder / "motion.png", studio, motion)
     written = written_cards(job, folder / "cards.glb", rig, pictures)
     _write_card_still(job, folder / "cards.png", studio, rig, written)

@@ -134,7 +134,7 @@ def add_bake_option(parser: Any) -> None:
 
 
 def add_moment_options(parser: argparse.ArgumentParser) -> None:
-    """At which moment of a bake, see job_steps.moment_of."""
+    """At which frame of a bake, see job_steps.posed_hair."""
     moment = parser.add_argument_group("when")
     add_bake_option(moment)
     moment.add_argument(

@@ -102,8 +102,8 @@ def tell_notes(notes: list[str], report: Report) -> None:
 
 
 @dataclass(frozen=True)
-class Moment:
-    """Hair at one moment: all strands (strand_count, cv_count, 3) [m, world], and the pose."""
+class PosedHair:
+    """Hair in one frame: all strands (strand_count, cv_count, 3) [m, world], and the pose."""
 
     rig: Rig
     pose: Pose
@@ -141,13 +141,13 @@ def motion_of(job: Job, frames: range | None = None) -> BakedGuides:
     return motion
 
 
-def moment_of(job: Job) -> Moment:
+def posed_hair(job: Job) -> PosedHair:
     """The hair at rest, or at --frame of --bake."""
     if job.options.bake is None:
-        return Moment.of_rest(read_rig(job)[0])
+        return PosedHair.of_rest(read_rig(job)[0])
     frame = job.options.frame
     motion = motion_of(job, None if frame is None else range(frame, frame + 1))
-    return Moment.of_motion(motion, with_uvs(motion.rig, job.sources), motion.frames[0])
+    return PosedHair.of_motion(motion, with_uvs(motion.rig, job.sources), motion.frames[0])
 
 
 def with_uvs(rig: Rig, sources: Sources) -> Rig:

@@ -16,7 +16,7 @@ from ..bakes.guide_motion import BakedGuides
 from ..base.images import contact_sheet, write_png
 from ..pictures.studio import Studio
 from .job_options import add_moment_options, add_picture_options
-from .job_steps import Job, Moment, finish, moment_of, motion_of, open_studio
+from .job_steps import Job, PosedHair, finish, motion_of, open_studio, posed_hair
 from .verb import Verb
 
 SHEET_COLUMNS, SHEET_ROWS = 4, 3
@@ -26,25 +26,25 @@ def render(job: Job) -> None:
     """Draw a still, at rest or at a frame of a bake, and a contact sheet of its motion."""
     options = job.options
     _check(job)
-    moment = moment_of(job)
-    studio = open_studio(job, moment.rig)
+    hair = posed_hair(job)
+    studio = open_studio(job, hair.rig)
     if options.sheet:
         write_sheet(job, Path(options.sheet), studio, motion_of(job))
-    write_still(job, job.output, studio, moment)
+    write_still(job, job.output, studio, hair)
     if options.slices:
-        _write_slices(job, Path(options.slices), studio, moment)
+        _write_slices(job, Path(options.slices), studio, hair)
     if options.skin_shadow:
-        _write_skin_shadow(job, Path(options.skin_shadow), studio, moment)
+        _write_skin_shadow(job, Path(options.skin_shadow), studio, hair)
     finish(job, job.output)
 
 
-def write_still(job: Job, path: Path, studio: Studio, moment: Moment) -> None:
+def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> None:
     """One picture of the strands, and how much was drawn."""
     print("drawing the still", flush=True)
     options, report = job.options, job.report
     with report.stage("draw still"):
         picture = studio.picture(
-            moment.pose, moment.points, options.width, options.height, options.samples
+            hair.pose, hair.points, options.width, options.height, options.samples
         )
     drawn = studio.statistics
     report.facts["drawn"] = {
@@ -93,18 +93,18 @@ def _check(job: Job) -> None:
         )
 
 
-def _write_slices(job: Job, path: Path, studio: Studio, moment: Moment) -> None:
+def _write_slices(job: Job, path: Path, studio: Studio, hair: PosedHair) -> None:
     """The layers of the shadow maps."""
     with job.report.stage("draw slices"):
-        picture = studio.slices(moment.pose, moment.points)
+        picture = studio.slices(hair.pose, hair.points)
     write_png(path, picture)
     job.report.add_output(path)
 
 
-def _write_skin_shadow(job: Job, path: Path, studio: Studio, moment: Moment) -> None:
+def _write_skin_shadow(job: Job, path: Path, studio: Studio, hair: PosedHair) -> None:
     """The map of the soft shadow on the head."""
     with job.report.stage("draw skin shadow"):
-        picture = studio.skin_shadow(moment.pose, moment.points)
+        picture = studio.skin_shadow(hair.pose, hair.points)
     write_png(path, picture)
     job.report.add_output(path)
 

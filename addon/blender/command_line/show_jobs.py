@@ -8,7 +8,7 @@ from ..base.images import write_png
 from ..pictures.sheet import Sheet
 from ..pictures.turntable import LIGHTS, Turntable, TurntableSettings
 from .job_options import add_moment_options, add_picture_options
-from .job_steps import Job, finish, moment_of, open_studio, tell_notes
+from .job_steps import Job, finish, open_studio, posed_hair, tell_notes
 from .verb import Verb
 
 
@@ -25,9 +25,9 @@ def turntable(job: Job) -> None:
         video=not options.no_video,
         frame_rate=options.frame_rate,
     )
-    moment = moment_of(job)
-    studio = open_studio(job, moment.rig)
-    turn = Turntable(studio, moment.pose, moment.points, chosen, job.output)
+    hair = posed_hair(job)
+    studio = open_studio(job, hair.rig)
+    turn = Turntable(studio, hair.pose, hair.points, chosen, job.output)
     progress = report.progress("drawing the turntable", chosen.frames)
     with report.stage("draw turntable"):
         for done in turn.steps():
@@ -41,10 +41,10 @@ def turntable(job: Job) -> None:
 def sheet(job: Job) -> None:
     """Draw a contact sheet: the groom from all sides, or in all looks."""
     options, report = job.options, job.report
-    moment = moment_of(job)
-    studio = open_studio(job, moment.rig)
+    hair = posed_hair(job)
+    studio = open_studio(job, hair.rig)
     size, samples = (options.width, options.height), options.samples
-    drawn = Sheet(studio, moment.pose, moment.points, size, samples, by_looks=options.looks)
+    drawn = Sheet(studio, hair.pose, hair.points, size, samples, by_looks=options.looks)
     progress = report.progress("drawing the contact sheet", drawn.count)
     with report.stage("draw contact sheet"):
         for done in drawn.steps():

@@ -81,7 +81,7 @@ class CapsuleCollider:
         return np.arange(points.shape[1])
 
     def distance(self, points: Floats) -> tuple[Floats, Floats]:
-        """From the closest point of the axis, at its share 0 (start) to 1 (end)."""
+        """From the closest point of the axis, at its fraction 0 (start) to 1 (end)."""
         axis = self.end - self.start
         length_squared = np.maximum((axis * axis).sum(), TINY * TINY)
         outward = points - self.start[:, None]

@@ -34,7 +34,7 @@ from .surface_samples import Boundary, SurfaceSamples, boundary_of, samples_of
 _SAMPLES, _MIN, _MAX = 40, 1200, 3000
 #: Steps at most until a ball no longer shrinks.
 _SHRINKS = 40
-#: A ball that shrinks by less than this share has found its place.
+#: A ball that shrinks by less than this fraction has found its place.
 _SETTLED = 5.0e-3
 #: Balls that differ by less than this fraction of the mesh's longest side are one candidate.
 _ALIKE = 0.006

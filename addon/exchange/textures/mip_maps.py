@@ -79,7 +79,7 @@ def mip_levels(
 class _Taps:
     """Along one axis: what each texel of the smaller level is made of.
 
-    index: (new, taps) texels of the larger level; share: (new, taps) of each, 1 in sum.
+    index: (new, taps) texels of the larger level; fraction: (new, taps) of each, 1 in sum.
     """
 
     index: Ints

@@ -96,7 +96,7 @@ class StrandArea:
         along = (np.arange(len(area)) + 0.5) / max(len(area), 1)
         return cls(float(area.sum()), float((area * along).sum()))
 
-    def shade(self, strands: StrandSettings) -> float:
+    def shadow_area(self, strands: StrandSettings) -> float:
         """What they take of light from everywhere [m^2]: pi / 4 of their area, as cylinders."""
         tapered = self.whole + (strands.tip_width - 1.0) * self.weighted
         return 0.25 * np.pi * strands.width_scale * strands.as_drawn.opacity * tapered
@@ -110,7 +110,7 @@ _PLACES = (np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6.0).astype(
 _LIT_TEXELS = 4
 
 
-def card_shade(positions: Floats, triangles: Ints, uv: Floats, alpha: Floats) -> float:
+def card_shadow_area(positions: Floats, triangles: Ints, uv: Floats, alpha: Floats) -> float:
     """What cards of thickness 1 would take of light from everywhere [m^2]: half of their area,
     as flat things, times tau.
 

@@ -44,7 +44,7 @@ UNKNOWN_BEYOND = 4.0
 FRACTIONS_SIZE = 32
 #: Absorption in the middle of that axis.
 MIDPOINT = 0.5
-#: share that hair may send on at most, so that sums have bounds
+#: fraction that hair may send on at most, so that sums have bounds
 _MAX = 0.999
 _MAX_KEPT = 0.9999
 _SMALLEST = 1e-6

@@ -70,7 +70,7 @@ def layer_weights(depth: Floats, ends: Floats) -> Floats:
 def transmittance(
     optical_depth: Floats, extinction: float, forward: Floats | float = 0.0
 ) -> Floats:
-    """Light that is left, with what strands send on: of all that they take this share.
+    """Light that is left, with what strands send on: this fraction of all that they take.
 
     See passed() in dual.py: straight light and light sent on, in one.
     """

@@ -9,7 +9,7 @@ import pytest
 from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import OF_VERTICES, CardMesh
-from hairloom.addon.cards.occlusion import CardShade, even_axes, vertex_occlusion
+from hairloom.addon.cards.occlusion import CardOccluder, even_axes, vertex_occlusion
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.strands import Surface
@@ -114,7 +114,7 @@ def test_the_mean_error_against_brute_force_is_below_two_hundredths() -> None:
     alpha = np.random.default_rng(4).random((64, 64)).astype(np.float32)
     alpha[:, 20:40] = 1.0
     settings = CardOcclusionSettings()
-    found = vertex_occlusion(mesh, [CardShade(mesh, alpha)], [head], settings)
+    found = vertex_occlusion(mesh, [CardOccluder(mesh, alpha)], [head], settings)
     chosen = np.random.default_rng(2).choice(len(found), 50, replace=False)
     through = (1.0 - alpha) ** settings.extinction
     expected = brute_force(mesh, 1.0 - through, head, chosen, 512, settings.self_occlusion_distance)
@@ -126,7 +126,7 @@ def test_the_mean_error_against_brute_force_is_below_two_hundredths() -> None:
 
 def test_a_card_alone_is_open() -> None:
     mesh = hanging(1)
-    found = vertex_occlusion(mesh, [CardShade(mesh)], [], plain())
+    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [], plain())
     np.testing.assert_array_equal(found, 1.0)
     nothing = vertex_occlusion(hanging(20), [], [], plain())
     np.testing.assert_array_equal(nothing, 1.0)
@@ -136,13 +136,13 @@ def test_a_card_that_lies_open_on_the_head_has_nearly_all_light() -> None:
     along = np.linspace(-0.04, 0.04, 9)
     top = np.stack([along, 0.0 * along, np.sqrt(0.105**2 - along**2)], axis=1)[None]
     mesh = build_cards(top.astype(np.float32), np.array([[0, 0, 1]], np.float32), CardSettings())
-    found = vertex_occlusion(mesh, [CardShade(mesh)], [ball()], plain())
+    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [ball()], plain())
     assert found.min() > 0.97
 
 
 def test_deep_inside_it_is_dark_and_outside_light() -> None:
     mesh, head = hanging(600, layers=0.04), ball()
-    found = vertex_occlusion(mesh, [CardShade(mesh)], [head], CardOcclusionSettings(rays=128))
+    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [head], CardOcclusionSettings(rays=128))
     from_middle = np.linalg.norm(mesh.positions[:, :2], axis=1)
     ring = (np.abs(mesh.positions[:, 2]) < 0.02) & (mesh.along > 0.05)
     inner = from_middle[ring] < np.quantile(from_middle[ring], 0.2)
@@ -154,7 +154,7 @@ def test_below_a_wide_square_only_the_light_past_its_edge_arrives() -> None:
     """Form factor of a square from below its middle: Lambert's formula for four equal edges."""
     mesh = stacked([0.0, 1.0])
     middle = stacked([0.0], size=1e-3)
-    found = vertex_occlusion(middle, [CardShade(mesh)], [], plain(rays=4096))
+    found = vertex_occlusion(middle, [CardOccluder(mesh)], [], plain(rays=4096))
     # the first square lies in the plane of the vertices themselves
     slant = 1.0 / np.sqrt(2.0)
     blocked = 4.0 / (np.pi) * slant * np.arctan(slant)
@@ -170,7 +170,7 @@ def test_cards_let_one_minus_alpha_through_and_several_multiply(
     below = stacked([0.0], size=0.01)
     picture = np.full((4, 4), alpha, np.float32)
     settings = plain(extinction=extinction)
-    found = vertex_occlusion(below, [CardShade(shades, picture)], [], settings)
+    found = vertex_occlusion(below, [CardOccluder(shades, picture)], [], settings)
     np.testing.assert_allclose(found, (1.0 - alpha) ** (3.0 * extinction), atol=0.01)
 
 
@@ -181,7 +181,7 @@ def test_alpha_is_read_at_the_place_that_is_hit() -> None:
     half[:, 4:] = 1.0
     for shift, expected in ((-0.5, 1.0), (0.5, 0.0), (0.0, 0.5)):
         moved = replace(below, positions=below.positions + np.array([shift, 0.0, 0.0], np.float32))
-        found = vertex_occlusion(moved, [CardShade(shades, half)], [], plain())
+        found = vertex_occlusion(moved, [CardOccluder(shades, half)], [], plain())
         np.testing.assert_allclose(found, expected, atol=0.06)
 
 
@@ -191,7 +191,7 @@ def test_both_sides_of_a_card_shade_and_what_is_behind_does_not() -> None:
         shades = stacked([height], size=50.0)
         for turned in (shades.triangles, shades.triangles[:, ::-1]):
             card = replace(shades, triangles=turned)
-            found = vertex_occlusion(below, [CardShade(card)], [], plain())
+            found = vertex_occlusion(below, [CardOccluder(card)], [], plain())
             np.testing.assert_allclose(found, expected, atol=0.01)
 
 
@@ -202,7 +202,7 @@ def test_roots_below_the_skin_are_not_dark() -> None:
     mesh = build_cards(
         leaning[None].astype(np.float32), np.array([[1, 0, 0]], np.float32), CardSettings()
     )
-    found = vertex_occlusion(mesh, [CardShade(mesh)], [ball()], plain())
+    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [ball()], plain())
     assert found[mesh.along == 0.0].min() > 0.4  # half its sky is below the horizon
 
 
@@ -214,8 +214,8 @@ def test_a_card_that_curls_over_itself_shades_itself_beyond_its_own_reach() -> N
         np.array([[0, 0, 1]], np.float32),
         CardSettings(segment_count=40, width_factor=6.0, bend=0.0, roundness=0.0),
     )
-    inside = vertex_occlusion(mesh, [CardShade(mesh)], [], plain(self_occlusion_distance=0.02))
-    never = vertex_occlusion(mesh, [CardShade(mesh)], [], plain(self_occlusion_distance=1.0))
+    inside = vertex_occlusion(mesh, [CardOccluder(mesh)], [], plain(self_occlusion_distance=0.02))
+    never = vertex_occlusion(mesh, [CardOccluder(mesh)], [], plain(self_occlusion_distance=1.0))
     assert inside.max() < 0.8
     np.testing.assert_array_equal(never, 1.0)
 
@@ -225,7 +225,7 @@ def test_other_grooms_and_bodies_shade_as_well_and_only_within_the_reach() -> No
     body = Surface(*sheet(0.2, 50.0))
     below = Surface(body.positions, body.triangles[:, ::-1])
     near, far = plain(reach=0.1), plain()
-    for shades, bodies in (([CardShade(other)], []), ([], [below])):
+    for shades, bodies in (([CardOccluder(other)], []), ([], [below])):
         np.testing.assert_array_equal(vertex_occlusion(mesh, shades, bodies, near), 1.0)
         assert vertex_occlusion(mesh, shades, bodies, far).max() < 0.02
 
@@ -234,20 +234,22 @@ def test_a_mesh_of_other_cards_shades_as_the_cards_themselves() -> None:
     first, other = hanging(40), hanging(40, seed=2)
     alpha = np.random.default_rng(2).random((16, 16)).astype(np.float32)
     mesh = Surface(other.positions, other.triangles, other.uv[other.triangles])
-    shades = CardShade(other, alpha), CardShade.of_surface(mesh, alpha)
-    found = [vertex_occlusion(first, [CardShade(first), each], [], plain()) for each in shades]
+    shades = CardOccluder(other, alpha), CardOccluder.of_surface(mesh, alpha)
+    found = [vertex_occlusion(first, [CardOccluder(first), each], [], plain()) for each in shades]
     np.testing.assert_allclose(found[0], found[1], atol=1e-5)
-    assert found[0].mean() < vertex_occlusion(first, [CardShade(first)], [], plain()).mean() - 0.02
+    assert (
+        found[0].mean() < vertex_occlusion(first, [CardOccluder(first)], [], plain()).mean() - 0.02
+    )
 
 
 def test_strength_mixes_in_and_the_same_input_gives_the_same_bits() -> None:
     mesh = hanging(40)
-    full = vertex_occlusion(mesh, [CardShade(mesh)], [ball()], CardOcclusionSettings(rays=32))
+    full = vertex_occlusion(mesh, [CardOccluder(mesh)], [ball()], CardOcclusionSettings(rays=32))
     half = vertex_occlusion(
-        mesh, [CardShade(mesh)], [ball()], CardOcclusionSettings(rays=32, strength=0.5)
+        mesh, [CardOccluder(mesh)], [ball()], CardOcclusionSettings(rays=32, strength=0.5)
     )
     np.testing.assert_allclose(half, 0.5 + 0.5 * full, atol=1e-6)
-    again = vertex_occlusion(mesh, [CardShade(mesh)], [ball()], CardOcclusionSettings(rays=32))
+    again = vertex_occlusion(mesh, [CardOccluder(mesh)], [ball()], CardOcclusionSettings(rays=32))
     np.testing.assert_array_equal(full, again)
     assert full.dtype == np.float32
 
@@ -260,11 +262,11 @@ def test_nothing_and_triangles_without_area() -> None:
         card=one.card[:0],
         **{name: getattr(one, name)[:0] for name in OF_VERTICES},
     )
-    assert vertex_occlusion(empty, [CardShade(empty)], [ball()], plain()).shape == (0,)
+    assert vertex_occlusion(empty, [CardOccluder(empty)], [ball()], plain()).shape == (0,)
     mesh = stacked([0.0, 1.0])
-    assert vertex_occlusion(mesh, [CardShade(empty)], [], plain()).min() == 1.0
+    assert vertex_occlusion(mesh, [CardOccluder(empty)], [], plain()).min() == 1.0
     flat = replace(mesh, positions=np.zeros_like(mesh.positions))
-    np.testing.assert_array_equal(vertex_occlusion(flat, [CardShade(flat)], [], plain()), 1.0)
+    np.testing.assert_array_equal(vertex_occlusion(flat, [CardOccluder(flat)], [], plain()), 1.0)
 
 
 def test_axes_are_even_over_the_sphere() -> None:

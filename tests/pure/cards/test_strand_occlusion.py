@@ -11,7 +11,7 @@ from hairloom.addon import card_flow, pipeline
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.build import CardBuild, CardGroom, card_of_strand, card_steps
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.cards.occlusion import CardShade, vertex_occlusion
+from hairloom.addon.cards.occlusion import CardOccluder, vertex_occlusion
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import card_of_vertex
@@ -33,7 +33,7 @@ def rig_of(count: int) -> Rig:
     return pipeline.prepare(falling(count), None, GuideSettings(guide_count=40), place="hair")
 
 
-def built(groom: CardGroom, settings: CardSettings, *others: CardShade) -> CardBuild:
+def built(groom: CardGroom, settings: CardSettings, *others: CardOccluder) -> CardBuild:
     return result_of(card_steps(groom, settings, MADE, FEW_RAYS, lambda _build: None, others))
 
 
@@ -123,9 +123,9 @@ def test_other_grooms_shade_beside_that() -> None:
     wall = ladder()
     wall = replace(wall, positions=wall.positions * [100.0, 1.0, 2.0] + [0.0, -0.4, -0.8])
     lit = built(replace(groom, occlusion=even), CLUSTERS).finest
-    shaded = built(replace(groom, occlusion=even), CLUSTERS, CardShade(wall)).finest
+    shaded = built(replace(groom, occlusion=even), CLUSTERS, CardOccluder(wall)).finest
     np.testing.assert_allclose(lit.occlusion, 0.6, rtol=1e-5)
-    rays = vertex_occlusion(lit, [CardShade(wall)], [], FEW_RAYS)
+    rays = vertex_occlusion(lit, [CardOccluder(wall)], [], FEW_RAYS)
     assert rays.min() < 0.3 < 0.9 < rays.max()
     np.testing.assert_allclose(shaded.occlusion, 0.6 * rays, rtol=1e-5)
 

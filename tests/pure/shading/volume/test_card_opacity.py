@@ -12,7 +12,7 @@ from hairloom.addon.shading.volume.card_opacity import (
     StrandArea,
     among_strands,
     card_optical_depth,
-    card_shade,
+    card_shadow_area,
     own_fraction,
     view_compensated_depth,
 )
@@ -57,8 +57,8 @@ def test_shade_of_strands_is_their_mean_shadow() -> None:
     across = np.linalg.norm(np.cross(steps[None], directions()[:, None, None]), axis=3).mean(axis=0)
     width = 2.0 * 5.0e-5 * 2.0 * np.linspace(1.0, 0.25, 40)
     expected = 0.5 * (across * 0.5 * (width[1:] + width[:-1])).sum()
-    shade = StrandArea.of(grid, radius).shade(settings)
-    assert shade == pytest.approx(expected, rel=0.01)
+    shadow_area = StrandArea.of(grid, radius).shadow_area(settings)
+    assert shadow_area == pytest.approx(expected, rel=0.01)
 
 
 def test_shade_of_cards_is_their_mean_shadow() -> None:
@@ -75,7 +75,7 @@ def test_shade_of_cards_is_their_mean_shadow() -> None:
     area = 0.5 * np.cross(b - a, c - a)
     tau = np.where(uv[triangles].mean(axis=1)[:, 1] < 0.5, -np.log(0.6), -np.log(0.2))
     expected = (np.abs(directions() @ area.T) * tau).sum(axis=1).mean()
-    assert card_shade(positions, triangles, uv, alpha) == pytest.approx(expected, rel=0.02)
+    assert card_shadow_area(positions, triangles, uv, alpha) == pytest.approx(expected, rel=0.02)
 
 
 def test_strands_thinner_than_what_lights_resolve_count_by_their_mean() -> None:
@@ -85,8 +85,8 @@ def test_strands_thinner_than_what_lights_resolve_count_by_their_mean() -> None:
     alpha[:, 20:] = 0.25
     positions = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0]])
     uv = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    shade = card_shade(positions, np.array([[0, 1, 2]]), uv, alpha)
-    assert shade == pytest.approx(0.5 * 3.0 * card_optical_depth(np.float32(0.25)), rel=1e-5)
+    shadow_area = card_shadow_area(positions, np.array([[0, 1, 2]]), uv, alpha)
+    assert shadow_area == pytest.approx(0.5 * 3.0 * card_optical_depth(np.float32(0.25)), rel=1e-5)
 
 
 def test_even_cards_count_the_same_from_all_sides_of_their_strands() -> None:

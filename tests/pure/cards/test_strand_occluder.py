@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hairloom.addon import card_flow, pipeline
-from hairloom.addon.cards.occlusion import CardShade
+from hairloom.addon.cards.occlusion import CardOccluder
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.shading.settings import StrandSettings
@@ -27,15 +27,15 @@ def curtain(count: int, radius: float = 2.0e-4) -> Rig:
     return pipeline.prepare(strands, None, GuideSettings(guide_count=20), place="curtain")
 
 
-def taken(shade: CardShade) -> float:
+def taken(occluder: CardOccluder) -> float:
     """What cards take of light from everywhere [m^2]: half of their area times tau (Cauchy)."""
-    mesh = shade.mesh
-    assert shade.alpha is not None
+    mesh = occluder.mesh
+    assert occluder.alpha is not None
     a, b, c = (mesh.positions[mesh.triangles[:, corner]] for corner in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    at = mesh.uv[mesh.triangles].mean(axis=1) * shade.alpha.shape[::-1]
+    at = mesh.uv[mesh.triangles].mean(axis=1) * occluder.alpha.shape[::-1]
     column, row = at.astype(int).T
-    return 0.5 * float((area * -np.log1p(-shade.alpha[row, column])).sum())
+    return 0.5 * float((area * -np.log1p(-occluder.alpha[row, column])).sum())
 
 
 def test_they_take_what_the_strands_take() -> None:
@@ -44,13 +44,13 @@ def test_they_take_what_the_strands_take() -> None:
         strands = rig.strands
         area = StrandArea.of(strands.grid, strands.radius.reshape(count, -1))
         drawn = StrandSettings(width_scale=2.0, tip_width=1.0)
-        found = taken(card_flow.shade_of(rig, drawn))
+        found = taken(card_flow.occluder_of(rig, drawn))
         # cards are a little longer than the mean of their strands
-        assert np.isclose(found, area.shade(drawn), rtol=0.06)
+        assert np.isclose(found, area.shadow_area(drawn), rtol=0.06)
 
 
 def test_one_strand_and_short_strands_shade_too() -> None:
     for count in (1, 2):
-        shade = card_flow.shade_of(curtain(count))
-        assert len(np.unique(shade.mesh.card)) == 1
-        assert shade.alpha is not None and (shade.alpha > 0.0).all()
+        occluder = card_flow.occluder_of(curtain(count))
+        assert len(np.unique(occluder.mesh.card)) == 1
+        assert occluder.alpha is not None and (occluder.alpha > 0.0).all()
