@@ -102,7 +102,7 @@ def _check(source: Surface, place: str) -> None:
         raise HairloomError("this mesh has no faces", place=place, remedy="Choose a mesh of cards")
     if source.corner_uv is None:
         raise HairloomError(
-            "these cards have no UVs, so nobody knows which way the hair on them runs",
+            "these cards have no UVs, so the direction of the hair on them is unknown",
             place=place,
             remedy="Unwrap them (Edit Mode, UV > Unwrap) and lay them on the hair texture",
         )

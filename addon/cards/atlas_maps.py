@@ -1,8 +1,9 @@
-"""`AtlasMaps`, the pictures of an atlas, and what they say where no hair is: what is on both sides.
+"""`AtlasMaps`, the pictures of an atlas, and how the texels between hairs are filled.
 
-So that filtering and mip maps never mix in what is no hair, nor another tile. Between two hairs of
-a row values go over from one to the other; beside the outermost they go on. A row without hair
-takes the nearest one of its tile that has some. Hair runs along a tile, so rows find what is near.
+They are filled so that filtering and mip maps never mix in anything but hair, or another tile.
+Between two hairs of a row values are interpolated; beyond the outermost hair they continue. A row
+without hair takes the nearest row of its tile that has some. Hair runs along a tile, so rows find
+what is near.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ class FlatStrands:
     base: (n, station_count, 3) the strand's colour as a factor of the hair's, over base_gain.
     occlusion: (n, station_count) fraction of the light from the front that the tile's other strands
         let through.
-    strand_id: (n,) from 0 to 1, by chance, no two the same.
+    strand_id: (n,) from 0 to 1, at random, no two the same.
     """
 
     place: Floats
@@ -164,7 +164,7 @@ def _shades(plan: AtlasPlan, base: Floats | None, shape: tuple[int, ...]) -> tup
 
 
 def _occlusion(plan: AtlasPlan, across: Floats, radius: Floats, outside: Floats) -> Floats:
-    """exp(-tau), tau the strands before each CV that light from the front meets by chance.
+    """exp(-tau), tau the strands before each CV that light from the front meets at random.
 
     Those of the same row within _NEAR of the card's width count, by the fraction of it that they
     cover.

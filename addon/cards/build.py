@@ -64,7 +64,7 @@ class CardBuild:
         of triangles is that in which front faces are drawn.
     backs: the triangles of each level once more, in the order in which back faces are drawn.
     errors: of each level [m], see `levels.CardLevel`: how far it is from the strands' own way.
-    plan: what is to be baked into the atlas; None where its tiles are made by chance.
+    plan: what is to be baked into the atlas; None where its tiles are made at random.
     wrong_fraction: of the pixels of the finest level those that are drawn in a wrong order, see
         `order_check.wrong_fraction`.
     """
@@ -232,7 +232,7 @@ def _looking_out(cards: UncutCards, groom: CardGroom) -> UncutCards:
 def _by_chance(
     strips: Strips, strand_count: Ints, group: Ints, settings: CardSettings
 ) -> UncutCards:
-    """Cards with tiles by chance."""
+    """Cards with random tiles."""
     layer = card_layers(strips, settings.layers)
     # loose strands lie on everything, as artists lay them
     is_loose = (strand_count == 1) & (strand_count.max() > 1)

@@ -36,7 +36,7 @@ class CardDrawingSettings(Settings):
             ("three", "Three", "Opaque pixels, then both sides, with an alpha test in each pass"),
         ),
         label="Passes",
-        description="How many passes cards are drawn in",
+        description="Number of passes in which cards are drawn",
         source="Scheuermann 2004, optimized scheme and its fall-back",
         panel="Drawing",
         active_when=when("card_drawing.shown_as", "cards"),

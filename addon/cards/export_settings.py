@@ -49,7 +49,7 @@ class CardExportSettings(Settings):
     index_buffer: bool = toggle(
         False,
         label="Index Buffer",
-        description="Write the sorted indices as a file of their own too, NAME.indices.bin, for "
+        description="Also write the sorted indices as a separate file, NAME.indices.bin, for "
         "engines that keep their own vertices",
     )
     motion: str = choice(

@@ -1,7 +1,7 @@
 """How often cards are drawn in a wrong order: the four passes of Scheuermann 2004, by hand.
 
 A pixel is wrong where the four passes, drawing the triangles in the order at hand, give it another
-colour than all its fragments from the farthest to the nearest, with a colour by chance for each
+colour than all its fragments from the farthest to the nearest, with a random colour for each
 card: by more than 1/255 in any channel. So every wrong pair counts that could be seen at all, and
 none that lies behind opaque hair, behind the head, or where one of the two is clear. The fraction
 is of the pixels that hair covers.

@@ -102,7 +102,7 @@ def _both_directions(
     for sign in (1.0, -1.0):
         if sign * direction[2] < np.sin(np.radians(LOWEST)):
             continue
-        # opaque pixels have a pass of their own, which hides what lies behind them
+        # opaque pixels have their own pass, which hides what lies behind them
         limit = np.full(size * size, -np.inf, np.float32)
         near = np.float32(sign) * met.near
         np.maximum.at(limit, met.pixel[is_opaque], near[is_opaque])

@@ -166,7 +166,7 @@ def seen_from_afar(alpha: Floats, mesh: CardMesh, pixel: float) -> Floats:
     """The alpha in texels that are about as large on the cards as a pixel of this many metres.
 
     Halved as often as the finest step above it, as mip maps are; their mean is what counts, since
-    the thin strands of one texel each would be met by chance.
+    thin strands of one texel each would be hit or missed at random.
     """
     texels = texels_per_metre(alpha, mesh) * pixel
     while texels >= 2.0 and min(alpha.shape) > 1:

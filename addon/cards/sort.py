@@ -5,7 +5,7 @@ sorting at run time (Scheuermann 2004, "Rendering with approximate depth sorting
 distance from the head. Here that is where a search begins, which looks at the hair from many sides
 and moves what was drawn in the wrong order; order_pairs.py and order_search.py say how.
 
-Front faces and back faces are drawn in passes of their own, so each has an order of its own: front
+Front faces and back faces are drawn in separate passes, so each has its own order: front
 faces from the inside to the outside, back faces, which are on the far side of the hair, the other
 way round.
 
@@ -258,8 +258,8 @@ def _lowest_first(triangles: Ints) -> Ints:
 def order_from(mesh: CardMesh, eye: Floats) -> Ints:
     """All triangles from the farthest to the nearest, (triangle_count,): an order at run time.
 
-    By the middles of triangles: by those of whole cards more pixels are wrong. At rest the orders
-    of `card_orders` are better than this one, and where hair has swung far it is better than they.
+    Triangles are sorted by their centres; by the centres of whole cards more pixels are wrong. At
+    rest the orders of `card_orders` are better; where hair has swung far, this one is.
 
     Args:
         eye: (4,) homogeneous, world space; (x, y, z, 0) looks in parallel from this direction.

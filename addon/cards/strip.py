@@ -118,7 +118,7 @@ def strip_mesh(
 
 
 def scattered_tiles(card_count: int, atlas: AtlasGrid, seed: int) -> Ints:
-    """A tile for each card, by chance, (card_count,)."""
+    """A tile for each card, at random, (card_count,)."""
     return np.random.default_rng(seed).integers(atlas.tile_count, size=card_count)
 
 
@@ -173,7 +173,7 @@ def card_frames(guides: Floats, root_normal: Floats, segment_count: int) -> Card
 def _facing_turn(normal: Floats, side: Floats, root_normal: Floats) -> Floats:
     """The turn of each whole card about its guide that brings it to face the root's normal best.
 
-    At the root alone that would be decided by chance: hair often starts along the normal. The sum
+    At the root alone that would be arbitrary: hair often starts along the normal. The sum
     over the rows of cos(turn) normal.r + sin(turn) side.r is largest for this angle [rad].
     """
     ahead = np.einsum("gri,gi->g", normal, root_normal)

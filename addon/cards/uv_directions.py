@@ -102,7 +102,7 @@ def coordinate_gradients(corners: Floats, uv: Floats) -> Floats:
 
 
 def island_bounds(values: Floats, island: Ints) -> tuple[Floats, Floats]:
-    """Least and greatest of (triangle_count, 3, ...) values of each island."""
+    """Minimum and maximum of (triangle_count, 3, ...) values of each island."""
     order = np.argsort(island, kind="stable")
     starts = np.searchsorted(island[order], np.arange(int(island.max()) + 1))
     low = np.minimum.reduceat(values.min(axis=1)[order], starts)

@@ -26,7 +26,7 @@ class Groom:
     strands: points and radii [m], groups, root UVs; guides are among them, marked by `is_guide`.
     name: of the groom, for objects in the file.
     color: (point_count, 3) float32, scene-linear.
-    strand_id: (strand_count,) int32, a number of its own for each strand.
+    strand_id: (strand_count,) int32, unique for each strand.
     is_guide: (strand_count,) bool; None: no strand is a guide.
     closest_guides: (strand_count, 3) int32, the strand_id of guides, nearest first.
     guide_weights: (strand_count, 3) float32, their sum is 1.

@@ -232,7 +232,7 @@ class _HairFile(BinaryFile):
         return bytes(self._header["info"]).decode("utf-8", "replace")
 
     def default(self, name: str) -> Any:
-        """What holds for all strands where there is no array."""
+        """The value for all strands, where there is no array."""
         return self._header[name]
 
     def point_counts(self) -> Ints:

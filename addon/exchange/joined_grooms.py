@@ -42,7 +42,7 @@ def joined_grooms(grooms: Sequence[Groom], name: str) -> tuple[Groom, tuple[str,
     if root_uv is None and len(without) < len(grooms):
         notes = (
             f"{', '.join(without)}: no root UVs, so the file has none at all. Give this hair a "
-            "surface with UVs, or write it to a file of its own.",
+            "surface with UVs, or write it to a separate file.",
         )
     return Groom(together, name, group_names=names, **values), notes
 

@@ -1,10 +1,10 @@
-"""Locks of children: those that grew later draw together around some that grew earlier.
+"""Clumps of children: those that grew later draw together around some that grew earlier.
 
 Children come in an order of which every beginning is spread evenly, so the first of them are the
-middles of locks. The first 4,096 children have one middle for each `clump_size` of them; whenever
-the number of children doubles, so does that of the middles, which are those of before and as many
-of the children since. So a lock of few strands becomes a lock of locks as strands are added, its
-strands stay as many on average, and no child ever changes its lock.
+middles of clumps. The first 4,096 children have one middle for each `clump_size` of them; whenever
+the number of children doubles, so does that of the middles: the former ones and as many
+of the children since. So a clump of few strands becomes a clump of clumps as strands are added, its
+strands stay as many on average, and no child ever changes its clump.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _CHUNK = 2048
 
 
 def clump(grid: Floats, group: Ints, settings: ChildrenSettings) -> None:
-    """Draw the children of each lock towards its middle, in place; roots stay.
+    """Draw the children of each clump towards its middle, in place; roots stay.
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m], in the order in which they grew.
@@ -54,7 +54,7 @@ def clump(grid: Floats, group: Ints, settings: ChildrenSettings) -> None:
 def _middles(
     grid: Floats, group: Ints, member: Ints, middle_count: int, parting: float
 ) -> tuple[Ints, Floats]:
-    """The middle of each member's lock (n,), and how far it draws the member, 0 to 1."""
+    """The middle of each member's clump (n,), and how far it draws the member, 0 to 1."""
     root = grid[:, 0]
     middle, strength = member.copy(), np.zeros(len(member))
     member_direction = directions(grid[member], root[member])

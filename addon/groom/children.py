@@ -4,7 +4,7 @@ Tariq (2008, Real-time hair rendering on the GPU) has two patterns: multi strand
 guides (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23), and single strand, around one guide.
 
 Children are progressive: those of a smaller number are exactly the first of a larger number. So
-roots come in an order of their own (`blue_noise`), what is random about a child depends on its
+roots come in their own order (`blue_noise`), what is random about a child depends on its
 place in that order, and nothing is measured over all children.
 """
 

@@ -1,4 +1,4 @@
-"""Locks: neighbouring strands draw together towards the tip, swing alike, and stray a little."""
+"""Clumps: neighbouring strands draw together towards the tip, swing alike, and stray a little."""
 
 from __future__ import annotations
 
@@ -8,42 +8,42 @@ from ..arrays import Floats, Ints
 from .settings import GrowSettings
 
 _TURN = 2.0 * np.pi
-#: Strands given to their lock at once, to bound the memory.
+#: Strands given to their clump at once, to bound the memory.
 _CHUNK = 1024
 
 
 def assign_clumps(root: Floats, settings: GrowSettings, random: np.random.Generator) -> Ints:
-    """For each strand the strand in the middle of its lock, (strand_count,), itself included."""
+    """For each strand the strand in the middle of its clump, (strand_count,), itself included."""
     if not len(root):
         return np.zeros(0, np.int64)
-    lock_count = max(1, round(len(root) / settings.clump_size))
+    clump_count = max(1, round(len(root) / settings.clump_size))
     # strands come in an order that follows the scalp, so every n-th one is spread over it
-    middles = np.linspace(0, len(root) - 1, lock_count).round().astype(np.int64)
-    scattered = root + random.normal(0.0, 0.3, root.shape) * _lock_size(root, lock_count)
+    middles = np.linspace(0, len(root) - 1, clump_count).round().astype(np.int64)
+    scattered = root + random.normal(0.0, 0.3, root.shape) * _clump_size(root, clump_count)
     center = scattered[middles] - root.mean(axis=0)
     nearest = np.empty(len(root), np.int64)
     for start in range(0, len(root), _CHUNK):
         chunk = scattered[start : start + _CHUNK] - root.mean(axis=0)
         table = (center**2).sum(axis=1) - 2.0 * chunk @ center.T  # squared distance less |chunk|^2
         nearest[start : start + _CHUNK] = table.argmin(axis=1)
-    lock = middles[nearest]
-    lock[middles] = middles
-    return lock
+    clump = middles[nearest]
+    clump[middles] = middles
+    return clump
 
 
 def style_clumps(
-    grid: Floats, lock: Ints, settings: GrowSettings, random: np.random.Generator
+    grid: Floats, clump: Ints, settings: GrowSettings, random: np.random.Generator
 ) -> Floats:
-    """The strands drawn into locks, waved and frizzed, (strand_count, cv_count, 3) [m].
+    """The strands drawn into clumps, waved and frizzed, (strand_count, cv_count, 3) [m].
 
     Roots stay; lengths change a little.
     """
     fraction = np.linspace(0.0, 1.0, grid.shape[1])[None, :, None]
     pull = settings.clump * fraction**0.8 * (0.75 + 0.25 * random.random((len(grid), 1, 1)))
-    styled = grid + pull * (grid[lock] - grid)
+    styled = grid + pull * (grid[clump] - grid)
     along = _arc_length(grid)
     fade = np.minimum(fraction * 3.0, 1.0)
-    swing = _swing(along / settings.wave_length, lock, random) * settings.wave
+    swing = _swing(along / settings.wave_length, clump, random) * settings.wave
     stray = _swing(along / (0.6 * settings.wave_length), np.arange(len(grid)), random)
     return styled + fade * (swing + stray * settings.frizz * (0.5 + fraction))
 
@@ -70,6 +70,6 @@ def _arc_length(grid: Floats) -> Floats:
     return along
 
 
-def _lock_size(root: Floats, lock_count: int) -> float:
-    """About the distance from one lock to the next [m]."""
-    return float(np.linalg.norm(np.ptp(root, axis=0))) / np.sqrt(lock_count) / 2.0
+def _clump_size(root: Floats, clump_count: int) -> float:
+    """About the distance from one clump to the next [m]."""
+    return float(np.linalg.norm(np.ptp(root, axis=0))) / np.sqrt(clump_count) / 2.0

@@ -1,7 +1,7 @@
 """Growing a groom on a head: out of the scalp, along the comb, down with gravity, around the head.
 
 Segments that lengthen towards the tip are Nguyen and Donnelly's (2005, GPU Gems 2, chapter 23), as
-is growth along the normals (`normal_growth`); the comb, the fall around the head and the locks are
+is growth along the normals (`normal_growth`); the comb, the fall around the head and the clumps are
 Hairloom's.
 
 Limitations: the head is upright (Z up) and faces -Y, and strands do not push each other.
@@ -28,7 +28,7 @@ __all__ = ["grow", "scalp_density"]
 _DOWN = np.array([0.0, 0.0, -1.0])
 #: The step for which `GrowSettings.droop` says how much the hair turns [m].
 _DROOP_STEP = 0.02
-#: The sharpest turn from one segment to the next that a lock or a wave may make [rad].
+#: The sharpest turn from one segment to the next that a clump or a wave may make [rad].
 _SHARPEST_TURN = np.radians(60.0)
 
 
@@ -69,14 +69,14 @@ def _grow_combed(
     triangle, barycentric = sample_roots(surface, settings.strand_count, where, random)
     corners = surface.corners[triangle].astype(np.float64)
     root = np.einsum("sk,skj->sj", barycentric, corners)
-    lock = assign_clumps(root, settings, random)
+    clump = assign_clumps(root, settings, random)
     factor = None if length is None else at_roots(length, surface, triangle, barycentric)
-    plan = _plan(surface, lock, factor, settings, random)
+    plan = _plan(surface, clump, factor, settings, random)
 
     normal = plan.skin.normal(triangle, barycentric)
     comb = _combed(surface, root, normal, settings)
     grid = _fallen(root, normal, comb, plan, settings)
-    grid = _laid(style_clumps(grid, lock, settings, random), plan)
+    grid = _laid(style_clumps(grid, clump, settings, random), plan)
     return bound_strands(grid, triangle, barycentric, surface, settings.radius)
 
 
@@ -97,31 +97,31 @@ class _Plan:
 
 def _plan(
     surface: Surface,
-    lock: Ints,
+    clump: Ints,
     factor: Floats | None,
     settings: GrowSettings,
     random: np.random.Generator,
 ) -> _Plan:
-    segment = _segments(lock, settings, random)
+    segment = _segments(clump, settings, random)
     if factor is not None:
         segment *= factor[:, None]
-    height = _heights(lock, settings, random)
+    height = _heights(clump, settings, random)
     return _Plan(
         segment, height, GrowthSurface(surface, reach=float((segment + height).max(initial=0.0)))
     )
 
 
-def _segments(lock: Ints, settings: GrowSettings, random: np.random.Generator) -> Floats:
-    """Length of each segment, (strand_count, cv_count - 1) [m]; the strands of a lock are alike."""
-    count = len(lock)
-    shorter = 0.6 * random.random(count)[lock] + 0.4 * random.random(count)
+def _segments(clump: Ints, settings: GrowSettings, random: np.random.Generator) -> Floats:
+    """Length of each segment, (strand_count, cv_count - 1) [m]; the strands of a clump are alike."""
+    count = len(clump)
+    shorter = 0.6 * random.random(count)[clump] + 0.4 * random.random(count)
     length = settings.length * (1.0 - settings.length_variation * shorter)
     return length[:, None] * segment_fractions(settings.cv_count, settings.segment_ratio)
 
 
-def _heights(lock: Ints, settings: GrowSettings, random: np.random.Generator) -> Floats:
+def _heights(clump: Ints, settings: GrowSettings, random: np.random.Generator) -> Floats:
     """How far from the skin each segment's end stays, (strand_count, cv_count - 1) [m]."""
-    layer = 0.7 * random.random(len(lock))[lock] + 0.3 * random.random(len(lock))
+    layer = 0.7 * random.random(len(clump))[clump] + 0.3 * random.random(len(clump))
     fraction = np.linspace(0.0, 1.0, settings.cv_count)[1:]
     rise = 1.0 - (1.0 - np.minimum(3.0 * fraction, 1.0)) ** 2
     clearance = settings.clearance * np.minimum(5.0 * fraction, 1.0)
@@ -159,7 +159,7 @@ def _fallen(
 def _laid(styled: Floats, plan: _Plan) -> Floats:
     """The styled strands with their own segment lengths again, unfolded, and outside of the skin.
 
-    A strand that its lock draws to the other side of the head would otherwise turn back on itself.
+    A strand that its clump draws to the other side of the head would otherwise turn back on itself.
     """
     grid = styled.copy()
     for cv in range(1, grid.shape[1]):

@@ -41,10 +41,10 @@ def fitting_factor(roots: Floats, search: ClosestPointSearch) -> float | None:
 
 
 def better_fit(readings: Mapping[str, Floats], search: ClosestPointSearch) -> RootFit | None:
-    """The way that lies clearly nearer to the surface than the first one as it is, if one does.
+    """The reading that lies clearly nearer to the surface than the first one, if one does.
 
     Args:
-        ways: name -> roots, (root_count, 3); the first are the roots as they were read.
+        readings: name -> roots, (root_count, 3); the first are the roots as they were read.
     """
     name, roots = next(iter(readings.items()))
     as_read = _best_fit(name, roots, search, (1.0,))

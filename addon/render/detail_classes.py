@@ -45,7 +45,7 @@ def detail_classes(totals: Ints, depths: Floats) -> tuple[Ints, tuple[DetailClas
     """The strands that are drawn, in order of their classes, and these classes.
 
     Near strands come first: what they hide is then not shaded. The depths are cut into slabs, and
-    each slab has classes of its own. Within a class strands keep their order, so that two pictures
+    each slab has its own classes. Within a class strands keep their order, so that two pictures
     of one view are the same, and strands that are not drawn change no other's place.
 
     Args:

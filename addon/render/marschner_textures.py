@@ -94,7 +94,7 @@ def marschner_feature(snapshot: Snapshot) -> ShaderFeature:
 
 
 def scattering_feature(snapshot: Snapshot) -> ShaderFeature:
-    """What a program has that adds light from strand to strand, in Marschner's model."""
+    """What a program needs to add light scattered from strand to strand, in Marschner's model."""
     textures = MARSCHNER.fractions(snapshot.shading, snapshot.table_size)
     return ShaderFeature(
         name="scattering",

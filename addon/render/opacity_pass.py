@@ -72,7 +72,7 @@ class OpacityPass:
         self.release()
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw makes it again."""
+        """Release everything on the GPU; the next draw makes it again."""
         self._drawing, self._blocks = OpacityDrawing(), UniformBlocks()
         self._strip: tuple[int, Any] = (0, None)
 

@@ -29,7 +29,7 @@ from .textures import texture_to_array
 
 type Rgba = tuple[float, float, float, float]
 
-#: A render in the window draws in a thread of its own, and passes share textures.
+#: A render in the window draws in a separate thread, and passes share textures.
 ONE_AT_A_TIME = threading.Lock()
 _NOTHING: Rgba = (0.0, 0.0, 0.0, 0.0)
 #: distance [m] where nothing is, as Blender's engines have it

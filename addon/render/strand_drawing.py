@@ -39,7 +39,7 @@ _OPAQUE_RECIPE = ShaderRecipe(
     outputs=(("VEC4", "color"),),
     defines=(*_PLAIN, *_WHOLE, ("HASHED", 0), ("COVERED", 0), ("GATHERED", 0)),
 )
-#: leaves fragments out by chance
+#: leaves fragments out at random
 _HASHED_RECIPE = ShaderRecipe(
     name="strand_hashed",
     vertex="strand.vert.glsl",

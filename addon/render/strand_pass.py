@@ -137,7 +137,7 @@ class StrandPass:
     def opacity(self, snapshot: Snapshot) -> OpacityMaps | None:
         """How much hair lies between each light and every place; None where it throws no shadow.
 
-        Drawn into textures of its own, and only when something has changed.
+        Drawn into separate textures, and only when something has changed.
 
         Raises:
             ShaderError: as `draw`.

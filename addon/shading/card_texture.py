@@ -76,7 +76,7 @@ def wanted_level(to_right: Floats, to_top: Floats, size: tuple[int, int]) -> Flo
 
 
 def within_tile(place: Floats, texels: Ints, tiles: tuple[int, int]) -> Floats:
-    """A place (..., 2) moved so far into its tile that no other one is mixed in, nor an edge.
+    """A place (..., 2) moved far enough into its tile that filtering mixes in no other tile.
 
     Args:
         texels: (2,) width and height of the level. tiles: columns and rows.

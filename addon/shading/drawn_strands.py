@@ -19,7 +19,7 @@ _DARKEST = 1e-4
 
 
 def drawn_radius(radius: Floats, settings: StrandSettings) -> Floats:
-    """Half the width that strands are drawn with, (n, cv_count) [m]: less to the tip.
+    """Half the width that strands are drawn with, (n, cv_count) [m], narrower towards the tip.
 
     Args:
         radius: (n, cv_count) [m].

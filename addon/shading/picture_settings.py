@@ -1,4 +1,4 @@
-"""What the artist sets about pictures of the render engine."""
+"""Settings of pictures of the render engine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the artist sets about the look of strands: their shading and their drawn width."""
+"""Settings of the look of strands: their shading and their drawn width."""
 
 from __future__ import annotations
 

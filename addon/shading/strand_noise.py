@@ -36,7 +36,7 @@ def strand_noise(seed: Ints, channel: int, along: Floats) -> Floats:
 
     Args:
         seed: whole numbers below SEED_LIMIT.
-        channel: 0 to 3, each a noise of its own.
+        channel: 0 to 3, each a different noise.
         along: cells from the root, not negative; broadcasts with seed.
     """
     own = np.asarray(seed, np.uint32) * np.uint32(4) + np.uint32(channel)

@@ -71,7 +71,7 @@ def _previewed(context: bpy.types.Context) -> Session:
 
 
 def _show(context: bpy.types.Context, image: bpy.types.Image) -> None:
-    """In an Image Editor that is open, else in a window of its own."""
+    """In an open Image Editor, else in a new window."""
     windows = context.window_manager.windows
     areas = [area for window in windows for area in window.screen.areas]
     editor = next((area for area in areas if area.type == "IMAGE_EDITOR"), None)

@@ -127,7 +127,7 @@ def display_encoded(linear: Floats) -> Floats:
 
 
 def contact_sheet(pictures: list[Floats], columns: int) -> Floats:
-    """Pictures of one size as one, in reading order, (rows * height, columns * width, 4)."""
+    """Pictures of equal size in one, in reading order, (rows * height, columns * width, 4)."""
     height, width, channels = pictures[0].shape
     rows = -(-len(pictures) // columns)
     sheet = np.zeros((rows * height, columns * width, channels), np.float32)

@@ -31,7 +31,7 @@ _steps: dict[Hashable, Step] = {}
 
 
 def is_blocking() -> bool:
-    """Whether nothing goes on until work is done: in the background nobody sees a window."""
+    """Whether to wait for work: in the background there is no window that has to respond."""
     return bool(bpy.app.background)
 
 

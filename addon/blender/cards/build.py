@@ -191,9 +191,9 @@ def order_line(wrong_fraction: float) -> str:
 
 
 def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps:
-    """The maps of these cards: baked from strands, or made by chance, with the artist's own.
+    """The maps of these cards: baked from strands, or made at random, with the artist's own.
 
-    Shift and noise break up highlights from strand to strand and are made by chance in any case.
+    Shift and noise break up highlights from strand to strand and are made at random in any case.
     """
     settings, pictures = inputs.settings, inputs.pictures
     texture = settings[TextureSettings]

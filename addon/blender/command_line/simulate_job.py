@@ -1,6 +1,6 @@
 """The verb `simulate`: hair of files or of the scene, moved by a shake or by the scene, as a bake.
 
-What comes from files goes into a scene of its own, which is baked as the button Bake does.
+What comes from files goes into a separate scene, which is baked as the button Bake does.
 """
 
 from __future__ import annotations

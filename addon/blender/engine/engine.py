@@ -41,7 +41,7 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
                 self.register_pass(scene, renderlayer, name, channels, ids, kind)
 
     def render(self, depsgraph: Any) -> None:
-        """F12 and animations, once for each view layer; in a thread of its own in the window."""
+        """F12 and animations, once for each view layer; in a separate thread in the window."""
         layer = depsgraph.view_layer
         for (name, channels, ids, _), is_wanted in _data_passes(layer):
             if is_wanted:

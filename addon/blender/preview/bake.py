@@ -214,7 +214,7 @@ def form_of_session(session: Simulated) -> str:
 
 
 def bakeable(obj: bpy.types.Object) -> bool:
-    """Whether it is hair, but no copy that shows a bake, or a fin."""
+    """Whether it is a fin, or hair other than the copy that shows a bake."""
     if obj.type == "CURVES":
         return not obj.data.hairloom.baked_in
     return fin_modifier(obj) is not None

@@ -42,7 +42,7 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
     """What is wrong with this groom, worst first; quick enough to ask at every redraw.
 
     Args:
-        session: its preview; without one nobody knows where roots are.
+        session: its preview; without one it is unknown where roots are.
     """
     head = head_of(hair)
     known = "" if session is None else session.source.head_warning

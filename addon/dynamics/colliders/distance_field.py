@@ -97,8 +97,8 @@ class DistanceField:
         return self.low + center * np.float32(self.cell), (farthest + 3.0**0.5) * self.cell
 
     def near(self, points: Floats, reach: Floats | float) -> Ints:
-        """Points whose nearest node is not farther than `reach` and the way to it: as distance
-        changes by no more than the way, no point within `reach` is missed."""
+        """Points whose nearest node is no farther away than `reach` plus the distance to that node:
+        the distance changes by no more than the way, so no point within `reach` is missed."""
         place = points - self.low[:, None]
         place *= np.float32(1.0 / self.cell)
         held = self._held(place)

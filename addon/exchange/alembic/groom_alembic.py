@@ -106,7 +106,7 @@ class _Taken:
         return self.groom.strands.point_counts if self.cap is None else np.diff(self.cap.offsets)
 
     def capped(self, values: Floats) -> Floats:
-        """Values at the points of this object's strands at those that are written."""
+        """Values at the points of this object's strands, interpolated at those that are written."""
         return values if self.cap is None else self.cap.apply(values)
 
 

@@ -42,7 +42,7 @@ def written_together(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise unwritable(path, error.strerror or str(error)) from error
     except HairloomError as error:
-        # nobody knows the hidden folder, in which the file is no more
+        # the message names the path that the caller knows, not the hidden folder
         place = error.place.replace(str(staging), str(folder))
         raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     finally:

@@ -1,4 +1,4 @@
-"""Reads all of a USD file in a process of its own: a script, run with the file's path.
+"""Reads all of a USD file in a separate process: a script, run with the file's path.
 
 It ends with 0 when the library could read everything; with REPORTED and a line on stderr when it
 could not. Whatever else a damaged file makes the library do, it does not do to Blender.

@@ -62,7 +62,7 @@ def settings_from(
     """Settings of the model Marschner, and notes on what could not be taken over as it is.
 
     Args:
-        before: gives what the node does not speak of: noise, sparkle, scattered light.
+        before: supplies what the node does not have: noise, sparkle, scattered light.
     """
     notes: list[str] = []
     values = _pigment(hair, notes) | _shape(hair, notes)

@@ -1,4 +1,4 @@
-"""What the artist sets about a fibre; shading/settings.py holds what both models share."""
+"""Settings of a fibre; shading/settings.py holds what both models share."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def mesh_light(
     Args:
         depths: (size, size) of the first mesh, row 0 at the bottom; 1 where there is none.
         points: (n, 3) [m]. normals: (n, 3) unit, of their triangles; their sign counts for nothing.
-        shift: of the texels that are asked, in texels.
+        shift: of the texels that are read, in texels.
     """
     size = len(depths)
     places, depth = frame.places(points)

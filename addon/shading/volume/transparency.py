@@ -10,7 +10,7 @@ Many thin strands may lie in a pixel, far more than can be shaded. `layer_fracti
 that stand for all of them, by how much of the light is theirs; were it the nearest, small pictures
 would show the outermost strands alone, which are lit more. They are chosen as in VarOpt (Cohen et
 al. 2009), where single items that weigh much stay as they are and others share out the rest, but
-evenly along the way of light, not by chance. So strands that have not moved are drawn as before.
+evenly along the way of light, not at random. So strands that have not moved are drawn as before.
 
 Twin of lib_coverage.glsl and of strand_layers_order.comp.glsl.
 """

@@ -76,7 +76,7 @@ def groomed(egg: Surface) -> StrandSet:
 def test_more_children_move_none(
     egg: Surface, groomed: StrandSet, way: str, is_painted: bool
 ) -> None:
-    """Bit for bit, over the count at which locks get locks of their own."""
+    """Bit for bit, over the count at which clumps get clumps of their own."""
     density = np.maximum(egg.positions[:, 2], 0.0) if is_painted else None
     values = {"clump": 0.8, "clump_size": 5, "frizz": 0.002, "length_variation": 0.3}
 
@@ -281,7 +281,7 @@ def test_a_parting_stays(way: str) -> None:
     assert least_sideways(parting=np.radians(60.0)) > 0.299
     if way == "multi":
         assert least_sideways(parting=np.pi) < 0.15
-    # nor do locks reach across: one that did would turn its members back
+    # nor do clumps reach across: one that did would turn its members back
     assert least_sideways(parting=np.radians(60.0), clump=1.0) > 0.2
 
 
@@ -352,7 +352,7 @@ def test_clump_draws_the_tips_of_locks_together() -> None:
     share = np.linspace(0.0, 1.0, 9)[None, :, None]
     expected = 0.7 * share * (loose.grid[middle] - loose.grid[middles:])
     assert move == pytest.approx(expected, abs=1e-6)
-    # it is the nearest one, so locks are compact
+    # it is the nearest one, so clumps are compact
     root = loose.roots
     apart = np.linalg.norm(root[middles:, None] - root[None, :middles], axis=2)
     assert (apart.argmin(axis=1) == middle).mean() > 0.99
@@ -366,7 +366,7 @@ def test_locks_stay_as_large_as_children_get_more() -> None:
     tips = make_children(guides, surface, chosen, place="test").strands.grid[:, -1]
     for first, last in ((0, 4096), (4096, 8192), (8192, 16_384)):
         places = np.unique(tips[:last].round(5), axis=0)
-        assert len(places) <= 1.02 * 4096 / 32  # locks of locks end where the first ones do
+        assert len(places) <= 1.02 * 4096 / 32  # clumps of clumps end where the first ones do
         assert len(np.unique(tips[first:last].round(5), axis=0)) > 100
 
 

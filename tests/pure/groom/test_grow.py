@@ -12,7 +12,7 @@ from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.strands import StrandSet, Surface
 
 SMALL = GrowSettings(strand_count=400)
-#: no wave, frizz or lock: hair as the comb and gravity leave it
+#: no wave, frizz or clump: hair as the comb and gravity leave it
 PLAIN = GrowSettings(strand_count=400, clump=0.0, wave=0.0, frizz=0.0)
 
 
@@ -106,7 +106,7 @@ def test_locks_draw_tips_together(egg: Surface) -> None:
 
 
 def test_no_strand_folds_back_on_itself(egg: Surface) -> None:
-    """Not even where its lock lies on the other side of the head; the skin may add a little."""
+    """Not even where its clump lies on the other side of the head; the skin may add a little."""
     for clump_size in (30, 200):
         settings = GrowSettings(strand_count=400, clump=1.0, clump_size=clump_size)
         segment = np.diff(grow(egg, settings).grid, axis=1)
