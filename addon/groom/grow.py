@@ -112,7 +112,7 @@ def _plan(
 
 
 def _segments(clump: Ints, settings: GrowSettings, random: np.random.Generator) -> Floats:
-    """Length of each segment, (strand_count, cv_count - 1) [m]; the strands of a clump are alike."""
+    """Length of each segment, (strand_count, cv_count - 1) [m]; a clump's strands are alike."""
     count = len(clump)
     shorter = 0.6 * random.random(count)[clump] + 0.4 * random.random(count)
     length = settings.length * (1.0 - settings.length_variation * shorter)
