@@ -50,7 +50,7 @@ bench: setup ## one benchmark: NAME=x runs bench/x.py, no NAME lists them
 docs: setup ## write what the documentation takes from the code
 	$(PYTHON) tools/make_docs.py
 
-pictures: setup ## draw the documentation's pictures anew
+pictures: setup ## draw the documentation's pictures again
 	$(PYTHON) tools/make_docs.py --pictures
 
 zip: setup ## the extension's zip, into dist/
@@ -59,7 +59,7 @@ zip: setup ## the extension's zip, into dist/
 	$(PYTHON) .venv/lib/python*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py \
 	    build --source-dir . --output-dir dist
 
-lock: ## write requirements.lock anew from requirements.in (needs uv)
+lock: ## write requirements.lock again from requirements.in (needs uv)
 	uv pip compile --quiet --universal --generate-hashes --python-version 3.13 --upgrade \
 	    --no-emit-index-url --custom-compile-command "make lock" requirements.in -o requirements.lock
 

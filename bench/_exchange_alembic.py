@@ -28,7 +28,7 @@ from hairloom.addon.exchange.groom_presets import PRESETS  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
 STRANDS, POINTS, GROUPS, ROUNDS = 100_000, 16, 3, 5
-#: one strand in so many is a guide
+#: one strand in this many is a guide
 GUIDES = 50
 
 

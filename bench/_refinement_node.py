@@ -45,7 +45,7 @@ class InterpolatedHair:
         self._set(Input_10=3)  # Interpolation Guides
 
     def strands(self, count: int) -> StrandSet:
-        """With the density at which the node makes about so many."""
+        """With the density at which the node makes about this many."""
         density = count / (4.0 * np.pi * RADIUS**2)
         for _ in range(4):
             self._set(Input_15=density)

@@ -154,7 +154,7 @@ def _error_of(strands: np.ndarray, factors: np.ndarray, view: PictureView) -> fl
 
 
 def frame_times(shown: Groom) -> dict[str, float]:
-    """Milliseconds a frame while the camera turns, so that all detail is found anew each frame.
+    """Milliseconds a frame while the camera turns, so that all detail is found again each frame.
 
     Medians of rounds in which the contestants take turns, at the size of the picture and at half.
     """

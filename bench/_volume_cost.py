@@ -1,7 +1,7 @@
 """What a whole frame with shadows costs, beside EEVEE's fastest, and deep layers beside slices.
 
 4,095 strands of 30 points on a ball, under one sun that throws shadows, at 800 x 600. The hair
-moves in every frame, so that every frame uploads its points and draws its maps anew. All take
+moves in every frame, so that every frame uploads its points and draws its maps again. All take
 turns, so that a busy machine meets all of them alike.
 """
 

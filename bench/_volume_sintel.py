@@ -37,7 +37,7 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
 SHEET = REPOSITORY / "out" / "volume_sintel.png"
-#: across a picture; ours has so many samples across each pixel, which all strands are wider than
+#: across a picture; ours has this many samples across each pixel, which all strands are wider than
 SIZE, SAMPLES = 256, 8
 #: paths a pixel in each of Cycles' pictures; how much noise is left to be, and in how many at most
 PATHS, BOUNCES, NOISE, MOST_PICTURES = 64, 64, 0.01, 24

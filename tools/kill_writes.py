@@ -28,7 +28,7 @@ from hairloom.addon.exchange.tressfx import write_tfx
 from hairloom.addon.exchange.usd.groom_usd import write_usd
 
 STRANDS = 3000
-#: the child is killed within the time of so many writes from its first one on
+#: the child is killed within the time of this many writes from its first one on
 WRITES = 4.0
 #: what is exported as a set, beside the file that is asked for
 OTHERS = ("hair_base.png", "hair_normal.png", "hair.json")
@@ -81,7 +81,7 @@ def main(arguments: list[str]) -> int:
 def killed(
     write: Callable[[Path, int], object], target: Path, trials: int, seed: int
 ) -> dict[str, int]:
-    """Kill a writer so many times and look at what it left.
+    """Kill a writer this many times and look at what it left.
 
     Returns:
         trials; failures: a file that is neither the old one nor the new one; amid: kills that left

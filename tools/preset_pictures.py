@@ -19,7 +19,7 @@ from extension_loader import PACKAGE, REPOSITORY, load_package
 LOOKS = REPOSITORY / "presets" / "looks"
 #: [pixels]; thumbnails are square
 THUMBNAIL, WIDTH, HEIGHT, SAMPLES = 192, 210, 250, 2
-#: so many, so much thicker than they are grown
+#: how many of them, and how much thicker than they are grown
 STRANDS, THICKER = 9000, 1.6
 #: from behind the ear, where there is the most hair
 DIRECTION = (-0.9, 0.75, 0.35)

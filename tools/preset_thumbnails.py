@@ -19,7 +19,7 @@ from preset_pictures import NO_BACKDROP, THUMBNAIL, coarse, of_addon
 PRESETS, SAMPLES = REPOSITORY / "presets", 2
 #: all hair is blond here: it shows shadows best
 LOOK, STRANDS, THICKER = "looks/blond", 5000, 1.8
-#: the head turns by so much [rad] and stops; what is drawn is so many frames after it began
+#: the head turns by this much [rad] and stops; the picture is taken this many frames after it began
 TURN, TURNING, FRAMES, DURATION = np.radians(70.0), 8, 13, 1.0 / 24.0
 #: enough for a picture of this size
 ATLAS = "1024"

@@ -154,7 +154,7 @@ def decorated(obj):
 
 
 def everything(obj):
-    """All that a mesh has, by what it hangs on: faces and corners by their vertices."""
+    """All that a mesh has, by what it belongs to: faces and corners by their vertices."""
     mesh = obj.data
     faces = [tuple(face.vertices) for face in mesh.polygons]
     corners = [(face, at) for face in faces for at in range(len(face))]

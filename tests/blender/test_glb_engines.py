@@ -98,7 +98,7 @@ def composed(mesh: CardMesh, texture: np.ndarray, size: int, extent: float) -> n
     """The same picture, triangle by triangle: filtered texture, depth test and write, blend over.
 
     The filter matters most where it makes alpha: a pixel of hardly any still writes depth and hides
-    what is drawn later behind it. How many such pixels there are hangs on the order of the cards.
+    what is drawn later behind it. How many such pixels there are depends on the order of the cards.
     """
     picture, depth = np.zeros((size, size, 3)), np.full((size, size), np.inf)
     pixel = (mesh.positions[:, [0, 2]].astype(np.float64) / extent + 0.5) * size - 0.5

@@ -12,7 +12,7 @@ def told(hair):
     return [each.operator for each in diagnostics.issues_of(hair, previews.session_of(hair))]
 
 
-def mend(hair):
+def fix(hair):
     """Press the one button there is."""
     (issue,) = diagnostics.issues_of(hair, previews.session_of(hair))
     group, name = issue.operator.split(".")
@@ -43,7 +43,7 @@ def test_a_surface_is_set_and_the_hair_stays_where_it_is(new_hair, sphere):
     before = read(hair).points
     (issue,) = diagnostics.issues_of(hair, preview(hair))
     assert issue.instead_of.startswith("Hair: it has no surface")
-    mend(hair)
+    fix(hair)
     bpy.context.view_layer.update()
     assert hair.data.surface == sphere and hair.parent == sphere, "the cube is far away"
     assert hair.data.surface_uv_map == "UVMap"
@@ -66,7 +66,7 @@ def test_a_selected_mesh_is_taken_before_a_closer_one(new_hair, sphere):
     cube = bpy.context.object
     hair = new_hair()
     cube.select_set(True)
-    mend(hair)
+    fix(hair)
     assert hair.data.surface == cube
 
 
@@ -85,7 +85,7 @@ def test_roots_in_the_air_are_counted_and_snapped(new_hair, sphere):
     preview(hair)
     (issue,) = diagnostics.issues_of(hair, previews.session_of(hair))
     assert issue.text.startswith("20 roots are not on Head")
-    mend(hair)
+    fix(hair)
     roots = np.linalg.norm(read(hair).roots, axis=1)
     assert roots == pytest.approx(np.full(60, 0.1), rel=0.02)
     preview(hair)
@@ -98,7 +98,7 @@ def test_a_surface_without_uvs_is_unwrapped_without_overlap(new_hair, sphere):
     assert told(hair) == ["hairloom.unwrap_surface"]
     with pytest.raises(RuntimeError, match="no UVs: press Unwrap"):
         bpy.ops.hairloom.snap_roots()
-    mend(hair)
+    fix(hair)
     assert told(hair) == [] and bpy.context.mode == "OBJECT" and bpy.context.object == hair
     corners = np.empty((len(sphere.data.loops), 2), np.float32)
     sphere.data.uv_layers.active.uv.foreach_get("vector", corners.ravel())
@@ -111,7 +111,7 @@ def test_an_uneven_scale_goes_into_the_curves(new_hair, sphere):
     bpy.context.view_layer.update()
     before = read(hair).points
     assert told(hair) == ["hairloom.apply_scale"]
-    mend(hair)
+    fix(hair)
     bpy.context.view_layer.update()
     assert hair.scale[:] == (1.0, 1.0, 1.0)
     assert read(hair).points == pytest.approx(before, abs=1e-6)
@@ -136,7 +136,7 @@ def test_blenders_dynamics_are_muted(sphere, extension):
     bpy.ops.object.curves_empty_hair_add()
     hair = bpy.context.object
     assert told(hair) == ["hairloom.mute_hair_dynamics"]
-    mend(hair)
+    fix(hair)
     assert told(hair) == []
 
 

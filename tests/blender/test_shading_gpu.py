@@ -1,4 +1,4 @@
-"""Marschner's tables on the GPU as Blender has it: filtered right, kept, shared, made anew."""
+"""Marschner's tables on the GPU as Blender has it: filtered right, kept, shared, made again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a farm hangs on: reports of failures, progress lines, interrupted and repeated tasks."""
+"""What a farm depends on: reports of failures, progress lines, interrupted and repeated tasks."""
 
 from __future__ import annotations
 

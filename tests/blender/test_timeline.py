@@ -107,7 +107,7 @@ def test_frames_that_playback_drops_are_made_up_for(swinging, monkeypatch):
     go(1, 2, 5, 6)
     assert durations == pytest.approx([1 / 24, 3 / 24, 1 / 24])
     go(1, 2)
-    assert len(durations) == 5 - 1, "a loop begins anew"
+    assert len(durations) == 5 - 1, "a loop begins again"
 
 
 def test_the_preview_range_begins_where_it_begins(swinging):

@@ -197,7 +197,7 @@ def test_highlights_on_waves_do_not_flicker(
     marschner_textures.MARSCHNER.release()
     plain = drawn(1)
     marschner_textures.MARSCHNER.release()
-    assert off(plain)[:-1].min() > 0.7, "there is something to mend"
+    assert off(plain)[:-1].min() > 0.7, "there is something to fix"
     assert (off(filtered)[:-1] < 0.25 * off(plain)[:-1]).all()
     assert off(filtered)[-1] < 0.2
     assert filtered.mean(axis=(1, 2)) == pytest.approx(exact.mean(axis=(1, 2)), rel=0.15)

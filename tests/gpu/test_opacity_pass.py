@@ -331,7 +331,7 @@ def test_a_light_in_the_hair_throws_no_shadow(
 
 
 def test_hair_that_moves_keeps_its_textures(gpu_context: Any) -> None:
-    """Textures made anew in every frame pile up on Vulkan as long as nothing is read back."""
+    """Textures made again in every frame pile up on Vulkan as long as nothing is read back."""
     from hairloom.addon.render.opacity_pass import OpacityPass
 
     strands, radius = dome(50)

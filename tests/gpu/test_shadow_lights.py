@@ -93,7 +93,7 @@ def test_a_lamp_amidst_the_hair_leaves_the_shadows_of_others_as_they_are(
     )
     assert alone[..., 0].max() > 0.01 and unshaded[..., 0].max() > 0.01
     assert np.allclose(both[..., :3], (alone + unshaded)[..., :3], rtol=1e-3)
-    # nor does it stand in the place of one that could throw a shadow
+    # nor does it take the place of one that could throw a shadow
     assert np.array_equal(both, drawn(frame, of_form(form, max_lights=1), *lights))
 
 

@@ -350,7 +350,7 @@ def test_bad_hair_gives_finite_pictures(frame: Any, transparency: str) -> None:
 
 
 def test_an_empty_groom_and_other_sizes(frame: Any, front: Any) -> None:
-    """Buffers are made anew, or kept, as pictures of other sizes come between."""
+    """Buffers are made again, or kept, as pictures of other sizes come between."""
     from hairloom.addon.render.mesh_pass import MeshPass
     from hairloom.addon.render.strand_pass import StrandPass
 

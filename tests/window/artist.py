@@ -150,7 +150,7 @@ def pixels_at_rest(label: str) -> Iterator[int]:
 
 
 def at_rest(label: str, look: Callable[[], np.ndarray], count: int = 3) -> Iterator[int]:
-    """What something looks like when that has been the same for so many drawings in a row."""
+    """What something looks like when that has been the same for this many drawings in a row."""
     seen: list[np.ndarray] = []
     while len(seen) < count or not all(np.array_equal(each, seen[-1]) for each in seen[-count:]):
         assert len(seen) < 500, f"{label} does not come to rest"

@@ -73,7 +73,7 @@ def show(names):
 
 
 def open_from_the_start(panel):
-    """It and those below it are registered anew: Blender keeps what it once has drawn."""
+    """It and those below it are registered again: Blender keeps what it once has drawn."""
     classes = of_hairloom("registration").CLASSES
     chosen = [each for each in classes if each.__name__.startswith(panel)]
     for each in reversed(chosen):

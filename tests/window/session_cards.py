@@ -307,7 +307,7 @@ def cards_are_made():
     bpy.data.objects.remove(finest)
     yield
     make_cards()
-    yield from until(lambda: not is_making(), "a deleted object is not made anew")
+    yield from until(lambda: not is_making(), "a deleted object is not made again")
     assert [each.hairloom.card_object.level for each in card_objects()] == [0, 1]
 
 

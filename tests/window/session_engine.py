@@ -137,7 +137,7 @@ def it_is_what_f12_gives():
 
 def a_region_alone_is_drawn():
     """The lower left quarter of the camera's frame, which is that of the view; then all again."""
-    yield from settled()  # F12 lets the view begin anew
+    yield from settled()  # F12 lets the view begin again
     whole, render, size = pixels("whole"), bpy.context.scene.render, view()._picture.size
     render.border_min_x = render.border_min_y = 0.0
     render.border_max_x = render.border_max_y = 0.5

@@ -1,5 +1,5 @@
 """The first five minutes: nothing selected, the sample scene, hair on a mesh that plays at once,
-undo, presets with pictures, warnings that mend, export, the page in the Preferences with its test.
+undo, presets with pictures, warnings with a fix, export, the page in the Preferences with its test.
 """
 
 import os

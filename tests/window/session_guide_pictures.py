@@ -28,7 +28,7 @@ from open_panels import (
 )
 
 EXPORTS = ("export_cards", "export_alembic", "export_usd", "export_tfx", "export_hair")
-#: so many drawings in a row are the same when panels have slid to their places
+#: this many drawings in a row are the same when panels have slid to their places
 STILL = 6
 #: [pixels] how wide the Properties editor is
 COLUMN = 340
@@ -36,7 +36,7 @@ COLUMN = 340
 USED = 0.8
 #: [pixels] Blender's own lines above an add-on's preferences; one names a folder of this machine
 BLENDERS = 228
-#: so many pixels are of colour where all pictures of looks are there
+#: this many pixels are of colour where all pictures of looks are there
 COLOURED, COLOURED_COUNT = 40, 10_000
 
 

@@ -142,7 +142,7 @@ def test_finish_reaches_the_tolerance_only_where_needed(disturbed):
 
 
 def test_finish_never_gives_up_on_lengths(disturbed):
-    """One Newton step cannot mend this; laying the guide out anew does."""
+    """One Newton step cannot fix this; laying the guide out again does."""
     position, length = disturbed
     position[:, PINNED:] *= np.random.default_rng(2).uniform(-30, 30, position[:, PINNED:].shape)
     finish_lengths(position, length, None, None, 0.002, 1)

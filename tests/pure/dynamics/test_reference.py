@@ -93,7 +93,7 @@ def test_held_tips(kit, shake, solver):
 
 @pytest.mark.parametrize("iterations", [1, 8])
 def test_held_tips_that_tear(kit, iterations):
-    """Heads that turn by a right angle in a frame: both forms lay the same guides out anew."""
+    """Heads that turn by a right angle in a frame: both forms lay the same guides out again."""
     grid = kit.curly(6, 10)
     settings = DynamicsSettings(**TIGHT | {"length_iterations": iterations, "substep_rate": 50.0})
     scene = kit.Scene(

@@ -152,7 +152,7 @@ def test_without_the_compressor_other_formats_still_work(
 
 @contextmanager
 def full_disk(most_bytes: int) -> Iterator[None]:
-    """No file of this process may grow beyond so many bytes."""
+    """No file of this process may grow beyond this many bytes."""
     resource = pytest.importorskip("resource", reason="limits are those of POSIX")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))

@@ -78,7 +78,7 @@ def test_noise_is_even_and_stretched(along: int) -> None:
     counts, _ = np.histogram(noise, bins=16, range=(0.0, 1.0))
     np.testing.assert_array_equal(counts, noise.size // 16)
     across, down = (np.abs(np.diff(noise, axis=axis)).mean() for axis in (1, 0))
-    stretch = (512 / along) / (128 / 16)  # a cell is so many times as long as wide
+    stretch = (512 / along) / (128 / 16)  # a cell is this many times as long as wide
     assert across / down == pytest.approx(stretch, rel=0.35)
 
 
