@@ -79,7 +79,7 @@ def field(area: Any, kind: str, path: str) -> Iterator[int]:
     """
     part = next(each for each in area.regions if each.type == kind)
     x = part.x + int(0.7 * part.width)
-    for y in range(part.y + part.height - 5, part.y + 5, -6):
+    for y in range(part.y + part.height - 5, part.y + 5, -12):
         bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
         yield 1
         with bpy.context.temp_override(area=area, region=part):

@@ -171,7 +171,8 @@ def take_a_preset():
 
 
 def show_cards():
-    hair().data.hairloom.cards.card_count = 20
+    groom = hair().data.hairloom
+    groom.cards.card_count, groom.card_occlusion.rays, groom.atlas.size = 20, 8, "512"
     hair().data.hairloom.card_drawing.shown_as = "cards"
     bpy.ops.ed.undo_push(message="cards")
     yield 1
