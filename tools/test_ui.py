@@ -46,9 +46,17 @@ SESSION_LIMIT_S = float(os.environ.get("HAIRLOOM_SESSION_LIMIT", "1800"))
 ON_VULKAN = ("cards", "engine", "look", "shadows", "first_light", "random")
 #: It makes pictures of the documentation, and is played where all is.
 NOT_IN_COMMITS = ("guide_pictures",)
-#: Sessions that need another screen than the usual one: long panels are pictured uncut, and random
-#: actions need not look closely, while most of their time goes into drawing the window.
-SCREENS = {"session_guide_pictures": "1600x1500x24", "session_random": "800x600x24"}
+#: Most of a session's time goes into drawing the window. Some need another screen than the usual
+#: one: long panels are pictured uncut, Blender's own texts and gizmos must be a small part of what
+#: is compared, and random actions need not look closely.
+_LARGE = "1600x1000x24"
+SCREENS = {
+    "session_engine": _LARGE,
+    "session_everyday": _LARGE,
+    "session_guide_pictures": "1600x1500x24",
+    "session_random": "800x600x24",
+    "session_refinement": _LARGE,
+}
 #: random actions, and how many of each seed
 SEEDS = os.environ.get("HAIRLOOM_SEEDS", "1 2 3 4 5").split()
 ACTIONS = int(os.environ.get("HAIRLOOM_ACTIONS", "80"))

@@ -81,8 +81,12 @@ timers = Timers()
 _mark = ViewMark()
 
 
-def play(steps: Iterator[float | None]) -> None:
-    """Plays the session, says how it ended and quits Blender."""
+def play(steps: Iterator[float | None], *, anti_aliasing: bool = False) -> None:
+    """Plays the session, says how it ended and quits Blender.
+
+    Args:
+        anti_aliasing: leave Blender's own on.
+    """
     ticks = _ticks(steps)
 
     def tick() -> float | None:
@@ -101,6 +105,8 @@ def play(steps: Iterator[float | None]) -> None:
                 bpy.ops.wm.quit_blender()
         return None
 
+    # Else Blender draws each view eight times; first_light looks at hair as that shows it.
+    bpy.context.preferences.system.viewport_aa = "8" if anti_aliasing else "OFF"
     faulthandler.enable()  # of a crash the log tells the lines of Python as well
     bpy.app.timers.register(tick, first_interval=1.0, persistent=True)
 

@@ -237,4 +237,4 @@ def disable():
     os.remove(FILE)
 
 
-driver.play(steps())
+driver.play(steps(), anti_aliasing=True)
