@@ -209,6 +209,7 @@ class GuideSettings(Settings):
     section = "guides"
     title = "Guides"
     owner = "groom"
+    panel_after = "strands"
 
     guide_count: int = integer(
         762,

@@ -128,6 +128,10 @@ class Settings:
     owner: ClassVar[Owner] = "job"
     #: below that of the section, in order
     panels: ClassVar[tuple[str, ...]] = ()
+    #: the panel after which its own stands, if that shows nothing but what is declared here
+    panel_after: ClassVar[str] = ""
+    #: the toggle in the header of its panel
+    switch: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         for parameter in self.parameters():

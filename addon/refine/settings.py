@@ -17,6 +17,7 @@ class DetailSettings(Settings):
     section = "detail"
     title = "Detail"
     owner = "groom"
+    panel_after = "strands"
 
     mode: str = choice(
         "adaptive",

@@ -17,6 +17,8 @@ class ShaftSettings(Settings):
     section = "shafts"
     title = "Light Shafts"
     owner = "groom"
+    panel_after = "shadows"
+    switch = "use_shafts"
 
     use_shafts: bool = toggle(
         False,

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import bpy
 
 from ..parameters import ALL_SETTINGS
+from ..params import Owner
 from .card_sections import CARD_SECTIONS, draw_cards
 from .drawing import Draw, draw_section
 from .operators_bake import draw_bake
 from .operators_colliders import draw_colliders
 from .operators_show import draw_show
 from .preset_chooser import draw_preset_row
+
+#: name, label, what draws it
+type Section = tuple[str, str, Draw]
 
 
 def _groom(hair: bpy.types.Object) -> Any:
@@ -24,13 +28,31 @@ def _character(hair: bpy.types.Object) -> Any:
     return hair.hairloom
 
 
-def _panel(owner: Callable[[bpy.types.Object], Any], section: str, panel: str = "") -> Draw:
+_OWNERS: dict[Owner, Callable[[bpy.types.Object], Any]] = {
+    "groom": _groom,
+    "character": _character,
+}
+
+
+def _panel(section: str, panel: str = "") -> Draw:
     """Draws what is declared for a panel and nothing else."""
+    settings = ALL_SETTINGS[section]
+    owner, switch = _OWNERS[settings.owner], {settings.switch}
 
     def draw(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-        draw_section(layout, owner(hair), section, panel)
+        draw_section(layout, owner(hair), section, panel, leave_out=switch)
 
     return draw
+
+
+def _with_declared(sections: Iterable[Section]) -> tuple[Section, ...]:
+    """With those that only show what they declare."""
+    found = list(sections)
+    for name, settings in ALL_SETTINGS.items():
+        if settings.panel_after:
+            before = next(i for i, each in enumerate(found) if each[0] == settings.panel_after)
+            found.insert(before + 1, (name, settings.title, _panel(name)))
+    return tuple(found)
 
 
 def _look_panel(panel: str) -> Draw:
@@ -62,14 +84,10 @@ def draw_volume(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     groom = hair.data.hairloom
-    draw_section(layout, groom, "skin", leave_out={"soft_shadow"})
+    _panel("skin")(layout, hair)
     column = layout.column()
     column.active = groom.skin.soft_shadow and groom.volume.shadows != "none"
     column.operator("hairloom.show_skin_shadow")
-
-
-def draw_shafts(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    draw_section(layout, hair.data.hairloom, "shafts", leave_out={"use_shafts"})
 
 
 def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -99,40 +117,46 @@ def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 #: those below Look that have nothing to show in another model
 _MARSCHNER_PANELS = ("Rim Light", "Fibre")
-SECTIONS: tuple[tuple[str, str, Draw], ...] = (
-    ("look", "Look", draw_look),
-    ("shadows", "Shadows", draw_volume),
-    ("shafts", "Light Shafts", draw_shafts),
-    ("strands", "Strands", draw_strands),
-    ("detail", "Detail", _panel(_groom, "detail")),
-    ("guides", "Guides", _panel(_groom, "guides")),
-    ("children", "Children", draw_children),
-    ("dynamics", "Dynamics", draw_dynamics),
-    ("show", "Show", draw_show),
-    ("cards", "Cards", draw_cards),
-    ("export", "Export", draw_export),
+SECTIONS = _with_declared(
+    (
+        ("look", "Look", draw_look),
+        ("shadows", "Shadows", draw_volume),
+        ("strands", "Strands", draw_strands),
+        ("children", "Children", draw_children),
+        ("dynamics", "Dynamics", draw_dynamics),
+        ("show", "Show", draw_show),
+        ("cards", "Cards", draw_cards),
+        ("export", "Export", draw_export),
+    )
 )
 #: those that the sidebar has too: what is done to the hair, not what it is
 SESSION_SECTIONS = frozenset({"look", "dynamics", "bake", "show", "cards", "export"})
+
+
+def _switch(section: str) -> tuple[Callable[[bpy.types.Object], Any], str]:
+    settings = ALL_SETTINGS[section]
+    owner = _OWNERS[settings.owner]
+    return lambda hair: getattr(owner(hair), section), settings.switch
+
+
 #: section that is on or off -> what holds the property of the checkbox in its header, its name
 SWITCHES: dict[str, tuple[Callable[[bpy.types.Object], Any], str]] = {
+    **{name: _switch(name) for name, each in ALL_SETTINGS.items() if each.switch},
     "shadows": (_groom, "use_shadows"),
-    "skin": (lambda hair: hair.data.hairloom.skin, "soft_shadow"),
-    "shafts": (lambda hair: hair.data.hairloom.shafts, "use_shafts"),
     "children": (_groom, "use_children"),
     "cards": (_groom, "use_cards"),
 }
 #: section -> those below it
-SUB_SECTIONS: dict[str, tuple[tuple[str, str, Draw], ...]] = {
+SUB_SECTIONS: dict[str, tuple[Section, ...]] = {
     "look": tuple(
         (f"look_{panel.split()[0].lower()}", panel, _look_panel(panel))
         for panel in ALL_SETTINGS["shading"].panels
     ),
     "shadows": (("skin", "Soft Shadow on Skin", draw_skin),),
     "dynamics": (
-        ("style", "Style", _panel(_character, "dynamics", "Style")),
-        ("medium", "Medium & Wind", _panel(_character, "dynamics", "Medium & Wind")),
-        ("lengths", "Lengths", _panel(_character, "dynamics", "Lengths")),
+        ("style", "Style", _panel("dynamics", "Style")),
+        ("medium", "Medium & Wind", _panel("dynamics", "Medium & Wind")),
+        ("lengths", "Lengths", _panel("dynamics", "Lengths")),
         ("collisions", "Collisions", draw_collisions),
         ("bake", "Bake", draw_bake),
     ),
