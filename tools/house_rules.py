@@ -70,7 +70,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "parameters": PURE,
     "render": PURE | {"gpu"},
     **{f"blender.{room}": PURE | FLOWS | {"render", "gpu"} | BLENDER for room in BLENDER_ROOMS},
-    "ui": {"params", "parameters", "strands", "blender"} | BLENDER,
+    "ui": {"params", "parameters", "strands", "blender"} | BLENDER,  # and declarations, see below
     "registration": {"blender", "ui"} | BLENDER,
     "__init__": {"registration"},
 }
@@ -110,6 +110,12 @@ def imports_of(file: Path, addon: Path = ADDON) -> Iterator[tuple[int, str]]:
             yield from ((node.lineno, "." + ".".join([*module, a.name])) for a in node.names)
 
 
+def is_declaration(name: str, addon: Path = ADDON) -> bool:
+    """Whether it is of a module that declares what an artist can choose: settings or formats."""
+    file = addon.joinpath(*name.lstrip(".").split(".")[:-1]).with_suffix(".py")
+    return file.stem.endswith(("settings", "formats")) and file.is_file()
+
+
 def violations(addon: Path) -> list[str]:
     """Every import that the table above does not allow."""
     found = []
@@ -124,6 +130,8 @@ def violations(addon: Path) -> list[str]:
                 found.append(f"{file.relative_to(addon)}:{line} imports {name}: {why}")
                 continue
             if target.startswith("blender.") and room.startswith("blender."):
+                continue
+            if room == "ui" and is_declaration(name, addon):
                 continue
             target = target.partition(".")[0]
             external = target in sys.stdlib_module_names or target == "numpy"

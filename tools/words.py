@@ -6,8 +6,7 @@ extension, its shaders and presets. A retired identifier is looked for in every 
 without spaces counts as a name, as it may be a key in a file. A term that is written with a capital
 is looked for as it is written.
 
-    python tools/words.py           all uses, by file and line
-    python tools/words.py counts    how many of each: uses in prose, different names in code
+    python tools/words.py    all uses, by file and line
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import ast
 import io
 import json
 import re
-import sys
 import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -203,8 +201,6 @@ def _preset(text: str) -> Found:
 
 if __name__ == "__main__":
     for retired, found in uses().items():
-        if sys.argv[1:] == ["counts"] and found:
-            print(f'    ("{retired.scope}", "{retired.term}"): {amount(found)},')
-        elif found:
+        if found:
             print(f"{retired.scope}: {retired.term} (say: {retired.instead})")
             print("".join(f"    {use}\n" for use in found), end="")

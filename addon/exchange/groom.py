@@ -17,6 +17,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet
+from .tfxbone import BoneWeights
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class Groom:
     closest_guides: (strand_count, 3) int32, the strand_id of guides, nearest first.
     guide_weights: (strand_count, 3) float32, their sum is 1.
     group_names: group -> name, for some of the groups.
+    bones: that carry the strands; they go into a .tfxbone file beside .tfx.
     dropped: by a reader: reason -> number of strands left out.
     source: by a reader: the file.
 
@@ -46,6 +48,7 @@ class Groom:
     closest_guides: Ints | None = None
     guide_weights: Floats | None = None
     group_names: Mapping[int, str] = field(default_factory=lambda: MappingProxyType({}))
+    bones: BoneWeights | None = None
     dropped: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     source: Path | None = None
 
@@ -66,6 +69,8 @@ class Groom:
             if value.shape != shapes[name]:
                 raise _broken(f"{name} has shape {value.shape} instead of {shapes[name]}")
             object.__setattr__(self, name, value)
+        if self.bones is not None and self.bones.strand_count != strands:
+            raise _broken(f"bones of {self.bones.strand_count} strands instead of {strands}")
         if (self.closest_guides is None) != (self.guide_weights is None):
             raise _broken("closest_guides and guide_weights come together or not at all")
         if self.closest_guides is not None and self.strand_id is None:
@@ -79,6 +84,8 @@ class Groom:
             value = getattr(self, name)
             if value is not None:
                 changes[name] = value[points if name == "color" else strands]
+        if self.bones is not None:
+            changes["bones"] = self.bones.take(strands)
         return replace(self, **changes)
 
     def guides(self) -> Groom:

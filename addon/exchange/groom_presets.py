@@ -19,8 +19,9 @@ WIDEST = 5.0e-3
 
 @dataclass(frozen=True)
 class GroomPreset:
-    """How a groom Alembic is laid out for one engine.
+    """How a file of strands is laid out for one engine.
 
+    title, about: what the artist reads.
     space: the file's unit and axes.
     max_points: longer curves are resampled to this count; the engine would cut or refuse them.
     min_points: of a curve that the engine takes.
@@ -32,6 +33,8 @@ class GroomPreset:
     """
 
     name: str
+    title: str
+    about: str
     space: FileSpace
     max_points: int
     min_points: int = 2
@@ -46,6 +49,8 @@ class GroomPreset:
 #: Blender arrive there with y mirrored. It keeps 8 bits for a point's number, 22 for a curve's.
 UNREAL = GroomPreset(
     "unreal",
+    "Unreal",
+    "Centimetres, Z up, left-handed as Unreal is: import it without a rotation",
     FileSpace("Z", 100.0, is_mirrored=True),
     max_points=255,
     max_strands=(1 << 22) - 1,
@@ -55,6 +60,8 @@ UNREAL = GroomPreset(
 #: and reads root UVs from the curves.
 UNITY = GroomPreset(
     "unity",
+    "Unity",
+    "Centimetres, Y up, strands only, an object for each group",
     FileSpace("Y", 100.0),
     max_points=128,
     min_points=3,
@@ -64,7 +71,13 @@ UNITY = GroomPreset(
     has_curve_uv=True,
 )
 #: As Blender's own Alembic files are, bit-exact.
-BLENDER = GroomPreset("blender", FileSpace("Y", 1.0), max_points=1 << 16)
+BLENDER = GroomPreset(
+    "blender",
+    "Blender",
+    "Metres, Y up, as Blender's own Alembic files",
+    FileSpace("Y", 1.0),
+    max_points=1 << 16,
+)
 PRESETS = {preset.name: preset for preset in (UNREAL, UNITY, BLENDER)}
 
 

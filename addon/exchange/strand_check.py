@@ -6,8 +6,8 @@ from typing import Any
 
 from .groom import Groom
 from .groom_presets import preflight
+from .strand_export_settings import StrandExportSettings, layout_of
 from .strand_formats import StrandFormat
-from .strand_output import StrandOutput, layout_of
 
 #: units in a metre -> name
 _UNITS = {1.0: "m", 10.0: "dm", 100.0: "cm", 1000.0: "mm"}
@@ -15,7 +15,9 @@ _UNITS = {1.0: "m", 10.0: "dm", 100.0: "cm", 1000.0: "mm"}
 _MAX_NAMED = 8
 
 
-def check_strands(groom: Groom, kind: StrandFormat, output: StrandOutput) -> dict[str, Any]:
+def check_strands(
+    groom: Groom, kind: StrandFormat, settings: StrandExportSettings
+) -> dict[str, Any]:
     """What `groom_presets.preflight` says, for any format, in the file's unit and axes.
 
     Returns:
@@ -23,9 +25,9 @@ def check_strands(groom: Groom, kind: StrandFormat, output: StrandOutput) -> dic
         that have one.
 
     Raises:
-        HairloomError: an engine or a unit that cannot be.
+        HairloomError: an engine or option that cannot be.
     """
-    preset = layout_of(kind, output)
+    preset = layout_of(kind, settings)
     space = preset.space
     facts = preflight(groom, preset)
     return {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,14 +13,12 @@ from .alembic.groom_alembic_read import read_groom_alembic
 from .groom import Groom
 from .hair_file import read_hair_file
 from .read_groom import ReadGroom
-from .strand_formats import ALEMBIC, TRESSFX, USD, strand_format
+from .strand_formats import ALEMBIC, HAIR, TRESSFX, USD, strand_format
 from .tressfx import read_tfx
 from .usd.groom_usd_read import read_usd
 
 #: what of a file that holds strands and guides is wanted
 PARTS = ("strands", "guides", "both")
-#: of formats that do not say it
-_TRESSFX_UP, _HAIR_UP = "Y", "Z"
 
 
 def read_strands(
@@ -58,20 +56,21 @@ def read_strands(
         raise HairloomError(
             f"{scale} cannot be used", place="scale", remedy="Use a number above zero"
         )
-    read = _read(path, up, scale, python)
+    read = _READERS[strand_format(path).name](path, up, scale, python)
     groom, note = _parts(read.groom, parts, path)
     return replace(read, groom=groom, notes=(*read.notes, *note))
 
 
-def _read(path: Path, up: str | None, scale: float, python: Sequence[str] | None) -> ReadGroom:
-    known = strand_format(path)
-    if known is ALEMBIC:
-        return read_groom_alembic(path, up=up, factor=scale, python=python)
-    if known is USD:
-        return read_usd(path, up=up, factor=scale, python=python)
-    if known is TRESSFX:
-        return read_tfx(path, up=up or _TRESSFX_UP, scale=scale)
-    return read_hair_file(path, up=up or _HAIR_UP, scale=scale)
+type Reader = Callable[[Path, str | None, float, Sequence[str] | None], ReadGroom]
+
+_READERS: dict[str, Reader] = {
+    ALEMBIC.name: lambda path, up, scale, python: read_groom_alembic(
+        path, up=up, factor=scale, python=python
+    ),
+    USD.name: lambda path, up, scale, python: read_usd(path, up=up, factor=scale, python=python),
+    TRESSFX.name: lambda path, up, scale, _: read_tfx(path, up=up or "Y", scale=scale),
+    HAIR.name: lambda path, up, scale, _: read_hair_file(path, up=up or "Z", scale=scale),
+}
 
 
 def _parts(groom: Groom, parts: str, path: Path) -> tuple[Groom, tuple[str, ...]]:

@@ -15,11 +15,11 @@ from .alembic.groom_alembic import write_groom_alembic
 from .files.file_set import written_together
 from .files.names import plain_name
 from .groom import Groom, GroomMotion, points_of
-from .groom_presets import chosen_strands
+from .groom_presets import GroomPreset, chosen_strands
 from .hair_file import write_hair_file
+from .strand_export_settings import StrandExportSettings, layout_of, metres_per_unit
 from .strand_formats import ALEMBIC, HAIR, TRESSFX, USD, strand_format
-from .strand_output import StrandOutput, layout_of, metres_per_unit
-from .tfxbone import BoneWeights, write_tfxbone
+from .tfxbone import write_tfxbone
 from .tressfx import STRANDS_AT_ONCE, write_tfx
 from .usd.groom_usd import write_usd
 
@@ -39,7 +39,7 @@ class WrittenStrands:
 def write_strands(
     path: Path,
     groom: Groom,
-    output: StrandOutput | None = None,
+    settings: StrandExportSettings | None = None,
     motion: GroomMotion | None = None,
 ) -> WrittenStrands:
     """Write a groom; all its files are there complete, or what was there before stays.
@@ -48,23 +48,23 @@ def write_strands(
         motion: of the groom's points; for Alembic and USD.
 
     Raises:
-        HairloomError: a suffix, engine or unit that cannot be, motion for a format without,
+        HairloomError: a suffix, engine or option that cannot be, motion for a format without,
             nothing to write, a library that is missing, or nothing can be written there.
     """
-    kind, output = strand_format(path), output or StrandOutput()
+    kind, settings = strand_format(path), settings or StrandExportSettings()
     if motion is not None and not kind.has_motion:
         raise HairloomError(
             f"{kind.title} holds no motion",
             place=str(path),
             remedy="Write one frame, or choose Alembic (.abc) or USD (.usdc)",
         )
-    return _WRITERS[kind.name](path, groom, output, motion)
+    return _WRITERS[kind.name](path, groom, settings, motion)
 
 
 def _write_alembic(
-    path: Path, groom: Groom, output: StrandOutput, motion: GroomMotion | None
+    path: Path, groom: Groom, settings: StrandExportSettings, motion: GroomMotion | None
 ) -> WrittenStrands:
-    preset = layout_of(ALEMBIC, output)
+    preset = layout_of(ALEMBIC, settings)
     write_groom_alembic(path, groom, preset, motion=motion)
     counts = groom.strands.point_counts[chosen_strands(groom, preset.parts)]
     long = int((counts > preset.max_points).sum())
@@ -75,9 +75,9 @@ def _write_alembic(
 
 
 def _write_usd(
-    path: Path, groom: Groom, output: StrandOutput, motion: GroomMotion | None
+    path: Path, groom: Groom, settings: StrandExportSettings, motion: GroomMotion | None
 ) -> WrittenStrands:
-    layout = layout_of(USD, output)
+    layout = layout_of(USD, settings)
     chosen = chosen_strands(groom, layout.parts)
     if motion is not None and len(chosen) < groom.strands.strand_count:
         points = points_of(groom.strands, chosen)
@@ -86,7 +86,7 @@ def _write_usd(
         path,
         _part(groom, chosen, layout.parts),
         up=layout.space.up,
-        scale=metres_per_unit(USD, output),
+        scale=metres_per_unit(USD, settings),
         by_group=layout.is_split,
         is_linear=layout.basis == "linear",
         motion=motion,
@@ -95,45 +95,48 @@ def _write_usd(
 
 
 def _write_tressfx(
-    path: Path, groom: Groom, output: StrandOutput, _motion: GroomMotion | None
+    path: Path, groom: Groom, settings: StrandExportSettings, _motion: GroomMotion | None
 ) -> WrittenStrands:
-    layout, scale = layout_of(TRESSFX, output), metres_per_unit(TRESSFX, output)
+    layout, scale = layout_of(TRESSFX, settings), metres_per_unit(TRESSFX, settings)
+    count = None if settings.vertex_count == "fit" else int(settings.vertex_count)
 
-    def write(file: Path, part: Groom, bones: BoneWeights | None) -> tuple[str, ...]:
+    def write(file: Path, part: Groom) -> tuple[str, ...]:
         notes = write_tfx(
             file,
             part,
             up=layout.space.up,
             scale=scale,
-            vertex_count=output.vertex_count,
+            vertex_count=count,
             parts="both",  # they are chosen already
-            held_count=output.held_count,
-            multiple_of_64=output.fills_groups,
-            vertex_uv=output.point_uv,
+            held_count=settings.held_count,
+            multiple_of_64=settings.fills_groups,
+            vertex_uv=settings.point_uv,
         )
-        if bones is not None:
-            count = part.strands.strand_count
-            filled = count + (-count % STRANDS_AT_ONCE if output.fills_groups else 0)
-            write_tfxbone(file.with_suffix(".tfxbone"), bones, filled)
+        if part.bones is not None:
+            strands = part.strands.strand_count
+            filled = strands + (-strands % STRANDS_AT_ONCE if settings.fills_groups else 0)
+            write_tfxbone(file.with_suffix(".tfxbone"), part.bones, filled)
         return notes
 
-    return _write_files(path, groom, output, layout.parts, write)
+    return _write_files(path, groom, layout, write)
 
 
 def _write_hair(
-    path: Path, groom: Groom, output: StrandOutput, _motion: GroomMotion | None
+    path: Path, groom: Groom, settings: StrandExportSettings, _motion: GroomMotion | None
 ) -> WrittenStrands:
-    layout, scale = layout_of(HAIR, output), metres_per_unit(HAIR, output)
+    layout, scale = layout_of(HAIR, settings), metres_per_unit(HAIR, settings)
 
-    def write(file: Path, part: Groom, _bones: BoneWeights | None) -> tuple[str, ...]:
+    def write(file: Path, part: Groom) -> tuple[str, ...]:
         return write_hair_file(
-            file, part, up=layout.space.up, scale=scale, parts="both", uv=output.point_uv
+            file, part, up=layout.space.up, scale=scale, parts="both", uv=settings.point_uv
         )
 
-    return _write_files(path, groom, output, layout.parts, write)
+    return _write_files(path, groom, layout, write)
 
 
-_WRITERS: dict[str, Callable[[Path, Groom, StrandOutput, GroomMotion | None], WrittenStrands]] = {
+type Writer = Callable[[Path, Groom, StrandExportSettings, GroomMotion | None], WrittenStrands]
+
+_WRITERS: dict[str, Writer] = {
     ALEMBIC.name: _write_alembic,
     USD.name: _write_usd,
     TRESSFX.name: _write_tressfx,
@@ -144,20 +147,17 @@ _WRITERS: dict[str, Callable[[Path, Groom, StrandOutput, GroomMotion | None], Wr
 def _write_files(
     path: Path,
     groom: Groom,
-    output: StrandOutput,
-    parts: str,
-    write: Callable[[Path, Groom, BoneWeights | None], tuple[str, ...]],
+    layout: GroomPreset,
+    write: Callable[[Path, Groom], tuple[str, ...]],
 ) -> WrittenStrands:
     """One file, or one for each group, with what lies beside them."""
-    chosen = chosen_strands(groom, parts)
-    groom = _part(groom, chosen, parts)
-    bones = None if output.bones is None else output.bones.take(chosen)
-    files = _group_files(path, groom) if output.by_group else {path: np.arange(len(chosen))}
+    chosen = chosen_strands(groom, layout.parts)
+    groom = _part(groom, chosen, layout.parts)
+    files = _group_files(path, groom) if layout.is_split else {path: np.arange(len(chosen))}
     notes: list[str] = []
     with written_together(next(iter(files))) as folder:
         for file, strands in files.items():
-            own = None if bones is None else bones.take(strands)
-            notes += write(folder / file.name, groom.take(strands), own)
+            notes += write(folder / file.name, groom.take(strands))
         written = sorted(
             (path.with_name(file.name) for file in folder.iterdir()),
             key=lambda file: (file not in files, file.name),

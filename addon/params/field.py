@@ -131,7 +131,7 @@ class Settings:
     #: the panel after which its own stands, if that shows nothing but what is declared here
     panel_after: ClassVar[str] = ""
     #: the toggle in the header of its panel
-    switch: ClassVar[str] = ""
+    header_toggle: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         for parameter in self.parameters():

@@ -18,7 +18,7 @@ class ShaftSettings(Settings):
     title = "Light Shafts"
     owner = "groom"
     panel_after = "shadows"
-    switch = "use_shafts"
+    header_toggle = "use_shafts"
 
     use_shafts: bool = toggle(
         False,

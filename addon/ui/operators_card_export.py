@@ -13,21 +13,20 @@ from bpy_extras.io_utils import ExportHelper
 from ..blender.bakes import playback
 from ..blender.bakes.bake_settings import frame_range
 from ..blender.bakes.stale_bakes import stale_notes
+from ..blender.base.file_names import file_of, file_stem
 from ..blender.base.outcome import Outcome
-from ..blender.cards.card_choices import (
-    FORMAT_ITEMS,
-    SUFFIXES,
-    card_output,
-    file_stem,
-    suffix_of,
-)
-from ..blender.cards.files import CardExport, FileSteps
+from ..blender.cards.files import CardExport, CardOutput, FileSteps
 from ..blender.properties.groups import operator_properties
+from ..blender.properties.properties import settings_of
+from ..cards.export_settings import CardExportSettings
 from ..errors import HairloomError
+from ..exchange.cards.card_formats import FORMATS, SUFFIXES
 from .long_work import LongWork, Progress, Steps, threaded
 from .messages import draw_lines
 from .reports import tell
 from .selection import chosen_hair, needs_hair
+
+_FORMATS = [(each.name, each.entry, each.about) for each in FORMATS]
 
 
 class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
@@ -49,7 +48,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         default="",
         options={"HIDDEN"},
     )
-    format: EnumProperty(name="Format", description="Format of the file", items=FORMAT_ITEMS)
+    format: EnumProperty(name="Format", description="Format of the file", items=_FORMATS)
     own_levels: BoolProperty(
         name="Other Levels of Detail",
         description="Write another number of levels than the groom's settings say",
@@ -73,7 +72,9 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     @property
     def filename_ext(self) -> str:
         """What Blender puts behind a name; one of the format's own stays."""
-        return suffix_of(self.format, self.filepath)
+        (chosen,) = (each for each in FORMATS if each.name == self.format)
+        suffix = Path(self.filepath).suffix.lower()
+        return suffix if suffix in chosen.suffixes else chosen.suffixes[0]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -106,10 +107,16 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             hair,
             depsgraph,
             path,
-            card_output(self, path, hair.name),
+            self._output(path, hair.name),
             levels=self.levels if self.own_levels else None,
             frames=self._frames(hair),
         )
+
+    def _output(self, path: Path, hair_name: str) -> CardOutput:
+        """How it is written; a suffix that is known counts."""
+        is_known = path.suffix.lower() in SUFFIXES
+        settings = settings_of(self, CardExportSettings)
+        return CardOutput(None if is_known else self.format, file_stem(hair_name), settings)
 
     def _frames(self, hair: bpy.types.Object) -> range | None:
         if not self.own_frames or self.motion == "none":
@@ -129,7 +136,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     def _path(self, hair: bpy.types.Object, *, is_alone: bool) -> Path:
         """Where it goes; of several grooms each has its name behind the file's."""
         path = Path(bpy.path.abspath(self.filepath))
-        return path if is_alone else path.with_stem(f"{path.stem}_{file_stem(hair.name)}")
+        return file_of(path, hair.name, is_alone=is_alone)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

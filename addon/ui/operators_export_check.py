@@ -10,7 +10,8 @@ from bpy.props import EnumProperty
 from ..blender.base.outcome import Outcome
 from ..blender.preview.bake import bakeable
 from ..blender.strands.export_check import ExportCheck
-from ..blender.strands.strand_choices import ALEMBIC_ENGINES, FORMATS, USD_ENGINES, strand_output
+from ..exchange.strand_export_settings import StrandExportSettings
+from ..exchange.strand_formats import STRAND_FORMATS, StrandFormat
 from .messages import draw_lines
 from .reports import tell, waiting
 from .selection import chosen_hair, needs_hair
@@ -38,12 +39,12 @@ def count() -> int:
     return 0 if _check is None else len(_check.hair)
 
 
-def refresh(context: bpy.types.Context, kind: str, output: Any) -> bool:
-    """Check for a format, by its name, and what is asked of it; whether anything may be new."""
+def refresh(context: bpy.types.Context, kind: StrandFormat, settings: StrandExportSettings) -> bool:
+    """Check for a format and what is asked of it; whether anything may be new."""
     if _check is None:
         return False
     with waiting(context):
-        return _check.refresh(context.evaluated_depsgraph_get(), FORMATS[kind], output)
+        return _check.refresh(context.evaluated_depsgraph_get(), kind, settings)
 
 
 def draw_motion(layout: bpy.types.UILayout, context: bpy.types.Context, *, use_bake: bool) -> None:
@@ -78,8 +79,21 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context, panel: str) -> 
 
 def _look(operator: Any, context: bpy.types.Context) -> None:
     """Look at the hair as the chosen engine will."""
-    kind, _, engine = operator.engine.partition(" ")
-    refresh(context, kind, strand_output(_Engine(engine)))
+    name, _, engine = operator.engine.partition(" ")
+    (kind,) = (each for each in STRAND_FORMATS if each.name == name)
+    settings = StrandExportSettings(engine=engine) if engine else StrandExportSettings()
+    refresh(context, kind, settings)
+
+
+def _engines() -> list[tuple[str, str, str]]:
+    """Each engine by each format that knows it; "format engine" or "format"."""
+    return [
+        (f"{kind.name} {layout.name}", f"{layout.title}, {kind.title}", layout.about)
+        if "engine" in kind.options
+        else (kind.name, kind.title, layout.about)
+        for kind in STRAND_FORMATS
+        for layout in kind.layouts
+    ]
 
 
 class HAIRLOOM_OT_check_export(bpy.types.Operator):
@@ -91,15 +105,7 @@ class HAIRLOOM_OT_check_export(bpy.types.Operator):
     engine: EnumProperty(
         name="For",
         description="Which engine, and by which file",
-        items=(
-            *(
-                (f"alembic {name}", f"{label}, Alembic", about)
-                for name, label, about in ALEMBIC_ENGINES
-            ),
-            *((f"usd {name}", f"{label}, USD", about) for name, label, about in USD_ENGINES),
-            ("tressfx", "TressFX", "Metres, Y up"),
-            ("hair", "Cem Yuksel's .hair", "Metres, Z up"),
-        ),
+        items=_engines(),
         update=_look,
     )
 
@@ -134,13 +140,6 @@ class HAIRLOOM_OT_check_export(bpy.types.Operator):
 
     def cancel(self, _context: bpy.types.Context) -> None:
         end(self.own)
-
-
-class _Engine:
-    """All as usual but the engine."""
-
-    def __init__(self, engine: str) -> None:
-        self.engine = engine
 
 
 CLASSES = (HAIRLOOM_OT_check_export,)

@@ -16,7 +16,13 @@ from bpy.props import (
 from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
 
 from ..blender.base.outcome import report
-from ..blender.strands.groom_in import FILE_KINDS, Ground, StrandImport, import_strands, read_ground
+from ..blender.strands.import_groom import (
+    FILE_KINDS,
+    Ground,
+    StrandImport,
+    import_strands,
+    read_ground,
+)
 from ..errors import HairloomError
 from .reports import reporting, tell, waiting
 from .selection import active_mesh, ground_mesh, make_active

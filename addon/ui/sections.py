@@ -37,7 +37,7 @@ _OWNERS: dict[Owner, Callable[[bpy.types.Object], Any]] = {
 def _panel(section: str, panel: str = "") -> Draw:
     """Draws what is declared for a panel and nothing else."""
     settings = ALL_SETTINGS[section]
-    owner, switch = _OWNERS[settings.owner], {settings.switch}
+    owner, switch = _OWNERS[settings.owner], {settings.header_toggle}
 
     def draw(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         draw_section(layout, owner(hair), section, panel, leave_out=switch)
@@ -136,12 +136,12 @@ SESSION_SECTIONS = frozenset({"look", "dynamics", "bake", "show", "cards", "expo
 def _switch(section: str) -> tuple[Callable[[bpy.types.Object], Any], str]:
     settings = ALL_SETTINGS[section]
     owner = _OWNERS[settings.owner]
-    return lambda hair: getattr(owner(hair), section), settings.switch
+    return lambda hair: getattr(owner(hair), section), settings.header_toggle
 
 
 #: section that is on or off -> what holds the property of the checkbox in its header, its name
 SWITCHES: dict[str, tuple[Callable[[bpy.types.Object], Any], str]] = {
-    **{name: _switch(name) for name, each in ALL_SETTINGS.items() if each.switch},
+    **{name: _switch(name) for name, each in ALL_SETTINGS.items() if each.header_toggle},
     "shadows": (_groom, "use_shadows"),
     "children": (_groom, "use_children"),
     "cards": (_groom, "use_cards"),

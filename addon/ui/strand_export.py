@@ -3,23 +3,54 @@
 from __future__ import annotations
 
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+from bpy.props import EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes.bake_settings import frame_range
+from ..blender.base.file_names import file_of, file_stem
 from ..blender.base.outcome import Outcome
-from ..blender.strands.strand_choices import FORMATS, FRAMES, SEVERAL, file_of, strand_output
+from ..blender.properties.properties import property_annotations, settings_of
 from ..blender.strands.strand_export import StrandExport
 from ..errors import HairloomError
+from ..exchange.strand_export_settings import StrandExportSettings
+from ..exchange.strand_formats import StrandFormat
+from ..params import Parameter
 from . import operators_export_check as export_check
 from .long_work import LongWork, Progress, Steps
 from .operators_export_check import writable
 from .reports import tell
 from .selection import chosen_hair, needs_hair
+
+_SEVERAL = (
+    ("one", "One File", "All hair in one file, each with groups of its own"),
+    ("each", "A File Each", "Each hair in a file of its own, named after it"),
+)
+_FRAMES = (
+    ("still", "This Frame", "The hair as it is now"),
+    ("scene", "Scene Range", "All frames of the scene"),
+    ("own", "Frames", "A range of frames"),
+)
+#: the dialog's own options in the panels, before those of the settings
+_OF_DIALOG = {"Include": ("several",), "Animation": ("frames", "first", "last")}
+
+
+def option_properties(kind: StrandFormat) -> dict[str, Any]:
+    """For the `__annotations__` of the operator that writes a format: of the engines, those that
+    the format knows."""
+    engines = tuple((each.name, each.title, each.about) for each in kind.layouts)
+    return property_annotations(
+        replace(each, default=engines[0][0], choices=engines) if each.name == "engine" else each
+        for each in _options(kind)
+    )
+
+
+def _options(kind: StrandFormat) -> list[Parameter]:
+    return [each for each in StrandExportSettings.parameters() if each.name in kind.options]
 
 
 class StrandExportOperator(LongWork, ExportHelper):
@@ -27,8 +58,7 @@ class StrandExportOperator(LongWork, ExportHelper):
 
     bl_options: ClassVar[set[str]] = {"PRESET"}
     unharmed = "the file is as it was before"
-    #: name of the format
-    kind: ClassVar[str]
+    kind: ClassVar[StrandFormat]
 
     collection: StringProperty(
         name="Source Collection",
@@ -37,13 +67,13 @@ class StrandExportOperator(LongWork, ExportHelper):
         options={"HIDDEN"},
     )
     several: EnumProperty(
-        name="Multiple Objects", description="Where more than one hair is chosen", items=SEVERAL
+        name="Multiple Objects", description="Where more than one hair is chosen", items=_SEVERAL
     )
 
     @property
     def filename_ext(self) -> str:
         """What Blender puts behind a name; one of the format's own stays."""
-        suffix, known = Path(self.filepath).suffix.lower(), FORMATS[self.kind].suffixes
+        suffix, known = Path(self.filepath).suffix.lower(), self.kind.suffixes
         return suffix if suffix in known else known[0]
 
     @classmethod
@@ -57,8 +87,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         hair = writable(chosen_hair(context))
         if hair and not self.filepath:
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
-            name = file_of(folder / hair[0].name, hair[0].name, is_alone=True).name
-            self.properties.filepath = str(folder / (name + self.filename_ext))
+            self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
         export_check.begin(hair)
         self._refresh(context)
         return super().invoke(context, event)
@@ -69,7 +98,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         return self._refresh(context) or changed
 
     def _refresh(self, context: bpy.types.Context) -> bool:
-        return export_check.refresh(context, self.kind, strand_output(self))
+        return export_check.refresh(context, self.kind, settings_of(self, StrandExportSettings))
 
     def steps(self: Any, context: bpy.types.Context) -> Steps[None]:
         export_check.end()
@@ -94,11 +123,9 @@ class StrandExportOperator(LongWork, ExportHelper):
                 StrandExport.of(
                     part,
                     depsgraph,
-                    FORMATS[self.kind],
-                    strand_output(self),
+                    self.kind,
+                    settings_of(self, StrandExportSettings),
                     frames=self._frames(context.scene),
-                    use_bake=getattr(self, "use_bake", True),
-                    with_bones=getattr(self, "bones", True),
                 ),
             )
             for part in parts
@@ -130,7 +157,10 @@ class StrandExportOperator(LongWork, ExportHelper):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        for label, names in self.sections:
+        for label in StrandExportSettings.panels:
+            names = self._names(label)
+            if not names:
+                continue
             header, body = layout.panel(f"{self.bl_idname}_{label}")
             header.label(text=label)
             if body is not None:
@@ -141,6 +171,11 @@ class StrandExportOperator(LongWork, ExportHelper):
         if not self.collection:
             export_check.draw(layout, context, f"{self.bl_idname}_check")
 
+    def _names(self, panel: str) -> list[str]:
+        """The options in a panel."""
+        own = [name for name in _OF_DIALOG.get(panel, ()) if hasattr(self, name)]
+        return own + [each.name for each in _options(self.kind) if each.panel == panel]
+
     def _draw_option(self: Any, layout: bpy.types.UILayout, name: str) -> None:
         """An option, unless it says nothing just now."""
         if name in ("first", "last") and self.frames != "own":
@@ -149,23 +184,15 @@ class StrandExportOperator(LongWork, ExportHelper):
             return
         if name == "several" and export_check.count() == 1:
             return
-        if name in ("up", "scale") and not getattr(self, "own_space", True):
-            return
         layout.prop(self, name)
 
 
 class MovingExport:
     """Formats that hold motion."""
 
-    frames: EnumProperty(name="Frames", description="Which frames are written", items=FRAMES)
+    frames: EnumProperty(name="Frames", description="Which frames are written", items=_FRAMES)
     first: IntProperty(name="First", description="First frame", default=1)
     last: IntProperty(name="Last", description="Last frame", default=250)
-    use_bake: BoolProperty(
-        name="Use Bake",
-        description="Write the motion that Hairloom has baked, of hair that has a bake; off: as "
-        "Blender's own animation and modifiers move the hair",
-        default=True,
-    )
 
 
 def _in_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:

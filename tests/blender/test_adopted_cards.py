@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.blender.cards.adopt import SortOptions, read_cards, sort_mesh
 from hairloom.addon.blender.cards.mesh import reorder_faces
@@ -331,7 +332,7 @@ def test_doubtful_cards_are_noted(sphere, evaluated):
     assert np.isfinite(layer(two.data, "Occlusion")).all()
 
 
-@pytest.mark.parametrize("name", ["long01", "ponytail01"])
+@pytest.mark.parametrize("name", few_in_commits(["long01", "ponytail01"]))
 def test_real_cards_leave_blender_in_their_order(
     extension, evaluated, shared_data: Path, tmp_path: Path, name: str
 ):

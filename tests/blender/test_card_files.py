@@ -8,11 +8,13 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from glb_files import Glb
+from tiers import few_in_commits
 
 from hairloom.addon.exchange.cards.card_formats import FORMATS
 from hairloom.addon.exchange.textures.card_textures import FORMATS as TEXTURE_FORMATS
@@ -25,9 +27,9 @@ bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy modul
 jsonschema = pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
 
 from hairloom.addon.blender.cards import files  # noqa: E402
-from hairloom.addon.blender.cards.card_choices import suffix_of  # noqa: E402
 from hairloom.addon.blender.cards.textures import TABLE_SIZE  # noqa: E402
 from hairloom.addon.blender.command_line import command_line  # noqa: E402
+from hairloom.addon.ui.operators_card_export import HAIRLOOM_OT_export_cards  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -37,6 +39,7 @@ SCHEMA = json.loads(
 SMALL = (
     *("--set", "grow.strand_count=100", "--set", "guides.guide_count=10"),
     *("--set", "card_occlusion.rays=16", "--set", "cards.source=guides"),
+    *("--set", "cards.order_by=distance"),
     *("--set", "atlas.source=made"),
 )
 BAKED = (
@@ -147,7 +150,7 @@ def test_both_models_give_all_their_values(tmp_path: Path) -> None:
         np.testing.assert_array_equal(stored, values.astype(np.float32))
 
 
-@pytest.mark.parametrize("suffix", [".glb", ".obj"])
+@pytest.mark.parametrize("suffix", few_in_commits([".glb", ".obj"]))
 def test_a_failure_in_the_middle_leaves_the_old_files(
     tmp_path: Path,
     suffix: str,
@@ -199,7 +202,7 @@ def nobody() -> Iterator[None]:
             os.seteuid(0)
 
 
-@pytest.mark.parametrize("refused", [1, 3])
+@pytest.mark.parametrize("refused", few_in_commits([3, 1]))
 def test_a_file_that_cannot_be_replaced_leaves_all_old_files(
     tmp_path: Path, refused: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -270,9 +273,13 @@ def test_all_that_there_is_can_be_chosen() -> None:
 
 
 def test_the_suffix_follows_the_format() -> None:
-    assert suffix_of("glb", "hair.fbx") == ".glb"
-    assert suffix_of("usd", "hair.usda") == ".usda"
-    assert suffix_of("usd", "hair") == ".usd"
+    def suffix(chosen: str, path: str) -> Any:
+        operator = SimpleNamespace(format=chosen, filepath=path)
+        return HAIRLOOM_OT_export_cards.filename_ext.fget(operator)
+
+    assert suffix("glb", "hair.fbx") == ".glb"
+    assert suffix("usd", "hair.usda") == ".usda"
+    assert suffix("usd", "hair") == ".usd"
 
 
 def test_a_collections_exporter_writes_all_its_hair(sphere: Any, tmp_path: Path) -> None:

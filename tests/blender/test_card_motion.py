@@ -117,6 +117,7 @@ def test_skinned_cards_are_the_simulated_ones(
     assert np.sqrt(np.mean(np.square(moved))) > 5.0 * rms
 
 
+@pytest.mark.slow
 def test_the_head_is_in_the_root_joint_where_it_is_asked_for(
     motion: GuideMotion, tmp_path: Path
 ) -> None:

@@ -18,6 +18,7 @@ from hairloom.addon.cards.export_settings import CardExportSettings  # noqa: E40
 
 
 @pytest.mark.usefixtures("extension")
+@pytest.mark.slow
 def test_the_command_line_writes_a_bake(tmp_path: Path, capfd: Any) -> None:
     few = ["--set", "grow.strand_count=60", "--set", "guides.guide_count=12"]
     few += ["--set", "grow.length=0.06"]
@@ -48,6 +49,7 @@ def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
     hair, scene = bpy.context.object, bpy.context.scene
     hair.data.hairloom.guides.guide_count = 8
     hair.data.hairloom.card_occlusion.rays = 8
+    hair.data.hairloom.cards.order_by = "distance"
     hair.data.hairloom.cards.source, hair.data.hairloom.atlas.source = "guides", "made"
     scene.frame_start, scene.frame_end = 3, 9
     for frame in (3, 6, 9):
@@ -88,6 +90,7 @@ def test_cancelled_in_its_midst_it_leaves_the_old_files(
     hair, scene = bpy.context.object, bpy.context.scene
     hair.data.hairloom.cards.source = "guides"
     hair.data.hairloom.card_occlusion.rays = 8
+    hair.data.hairloom.cards.order_by = "distance"
     hair.data.hairloom.atlas.source = "made"
     scene.frame_start, scene.frame_end = 1, 6
     for frame in (1, 6):

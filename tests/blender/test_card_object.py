@@ -22,6 +22,7 @@ def hair(new_hair, sphere):
     cards.segment_count, cards.error = 8, 0.0
     made.data.hairloom.atlas.source = "made"
     made.data.hairloom.card_occlusion.rays = 32
+    made.data.hairloom.cards.order_by = "distance"
     texture.height = texture.variant_width = 32
     bpy.context.view_layer.update()
     return made

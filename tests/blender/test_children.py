@@ -15,8 +15,8 @@ from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.strands.strand_export import StrandExport
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 from hairloom.addon.exchange.strand_formats import TRESSFX
-from hairloom.addon.exchange.strand_output import StrandOutput
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.settings import GuideSettings
@@ -120,6 +120,7 @@ def test_no_children_at_all_are_the_guides(hair, evaluated):
     assert session.rig.strands.strand_count == len(session.rig.guides) == 60
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_children_are_made(hair, evaluated):
     session = previews.start(hair, evaluated())
     rig = pipeline.prepare(
@@ -292,10 +293,12 @@ def test_undo_brings_the_children_back(hair, evaluated):
 
 
 def test_cards_are_one_a_guide_and_tressfx_holds_all(hair, evaluated, tmp_path, capfd):
-    hair.data.hairloom.cards.source = "guides"
+    settings = hair.data.hairloom
+    settings.cards.source, settings.atlas.size = "guides", "512"
+    settings.cards.order_by, settings.card_occlusion.rays = "distance", 16
     assert bpy.ops.hairloom.export_cards(filepath=str(tmp_path / "cards.glb")) == {"FINISHED"}
     assert "Wrote 60 cards" in capfd.readouterr().out
-    plan = StrandExport.of([hair], evaluated(), TRESSFX, StrandOutput(up="Z"))
+    plan = StrandExport.of([hair], evaluated(), TRESSFX, StrandExportSettings(up="Z"))
     assert "260 strands" in plan.write(tmp_path / "hair.tfx").result
     written = read_tfx(tmp_path / "hair.tfx", up="Z", scale=1.0).strands
     session = previews.start(hair, evaluated())

@@ -261,6 +261,8 @@ def test_simulate_render_and_export_agree_on_the_motion(
 def test_the_demo_writes_everything_the_report_names(tmp_path: Path, gpu_context: object) -> None:
     """The built-in head and groom, small."""
     small = ["--set", "grow.strand_count=300", "--set", "guides.guide_count=40"]
+    small += ["--set", "atlas.size=512", "--set", "card_occlusion.rays=16"]
+    small += ["--set", "cards.order_by=distance"]
     size = ["--width", "96", "--height", "72", "--samples", "1", "--seconds", "0.2"]
     assert command_line.run(["demo", *small, *size, "--output", str(tmp_path)]) == 0
     report = json.loads((tmp_path / "report.json").read_text())

@@ -110,6 +110,7 @@ def test_a_check_writes_nothing(
 
 
 @needs_usd
+@pytest.mark.slow
 def test_a_simulation_moves_in_usd(
     extension: None, sphere: Any, tmp_path: Path, run: Callable[..., Any]
 ) -> None:
@@ -169,7 +170,8 @@ def test_options_of_the_formats_reach_them(
     new_hair: Any, sphere: Any, tmp_path: Path, run: Callable[..., Any]
 ) -> None:
     new_hair(sphere)
-    options = ["--split-groups", "--vertices", "16", "--fill", "--up", "Z", "--unit", "0.01"]
+    options = ["--by-group", "--vertex-count", "16", "--fills-groups"]
+    options += ["--up", "Z", "--scale", "0.01"]
     report = run("--object", "Hair", *options, output="hair.tfx")
     assert report["outputs"] == ["hair_group0.tfx", "hair_group1.tfx"]
     read = read_tfx(tmp_path / "hair_group0.tfx", up="Z", scale=0.01).strands

@@ -76,20 +76,21 @@ except HairloomError as error:
     "A strand format": """
 from pathlib import Path
 from hairloom.addon.blender.command_line import command_line
-from hairloom.addon.blender.strands.groom_in import FILE_KINDS
+from hairloom.addon.blender.strands.import_groom import FILE_KINDS
 from hairloom.addon.exchange.strand_reading import read_strands
 from hairloom.addon.exchange.strand_writing import write_strands
-from hairloom.addon.exchange.strand_output import StrandOutput
+from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 
 one, other = Path("one.strands"), Path("other.strands")
 facts["code"] = command_line.run(
     ["export", "--set", "grow.strand_count=40", "--output", str(one)]
 )
 read = read_strands(one)
-write_strands(other, read.groom, StrandOutput())
+write_strands(other, read.groom, StrandExportSettings())
 facts["strands"] = read.strands.strand_count
 facts["is_same"] = one.read_text() == other.read_text()
 facts["kinds"] = [title for title, _ in FILE_KINDS]
+facts["is_in_menu"] = hasattr(bpy.types, "HAIRLOOM_OT_export_plain")
 """,
     "A card format": """
 facts["code"] = command_line.run(
@@ -217,7 +218,7 @@ def test_a_strand_format(facts: dict[str, dict[str, Any]]) -> None:
     found = facts["A strand format"]
     assert (found["code"], found["is_same"]) == (0, True)
     assert found["strands"] > 0
-    assert "Plain Text" in found["kinds"]
+    assert "Plain Text" in found["kinds"] and found["is_in_menu"]
 
 
 @pytest.mark.slow

@@ -258,6 +258,7 @@ print(json.dumps(dict(
 """
 
 
+@pytest.mark.slow
 def test_it_installs_from_the_zip_and_goes_on_and_off_ten_times(built, tmp_path):
     script = tmp_path / "install.py"
     resources = str(tmp_path / "resources")

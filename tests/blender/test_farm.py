@@ -115,6 +115,7 @@ def test_the_template_is_valid_and_names_verbs_and_options_that_there_are() -> N
         assert options.skip_existing and options.progress == "openjd" and options.report
 
 
+@pytest.mark.slow
 def test_a_farm_bakes_exports_and_does_only_what_is_missing(folder: Path) -> None:
     assert at_once(*(bake_of(folder, name) for name in CHARACTERS)) == [0, 0]
     tasks = [strands_of(folder, *task) for task in (("anna", 1), ("anna", 3), ("ben", 1))]

@@ -28,6 +28,7 @@ def hair(new_hair, sphere):
     groom = made.data.hairloom
     groom.cards.source, groom.cards.card_count, groom.cards.levels = "clusters", 12, 2
     groom.atlas.source, groom.card_occlusion.rays = "made", 64
+    groom.cards.order_by = "distance"
     groom.card_texture.height = groom.card_texture.variant_width = 32
     bpy.context.view_layer.update()
     press()

@@ -165,14 +165,14 @@ def test_a_head_without_uvs_is_a_warning_with_the_remedy(sphere, groom_file, tol
     assert bpy.ops.hairloom.import_strands(filepath=str(groom_file)) == {"FINISHED"}
     assert "Unwrap" in told()
     out = groom_file.with_name("out.tfx")
-    assert bpy.ops.hairloom.export_tfx(filepath=str(out)) == {"FINISHED"}
+    assert bpy.ops.hairloom.export_tressfx(filepath=str(out)) == {"FINISHED"}
     assert "Unwrap" in told() and out.is_file()
 
 
 def test_strands_leave_as_they_came(sphere, groom_file, told):
     bpy.ops.hairloom.import_strands(filepath=str(groom_file))
     out = groom_file.with_name("out.tfx")
-    assert bpy.ops.hairloom.export_tfx(filepath=str(out)) == {"FINISHED"}
+    assert bpy.ops.hairloom.export_tressfx(filepath=str(out)) == {"FINISHED"}
     assert "40 strands" in told()
     before, after = read_tfx(groom_file).strands, read_tfx(out).strands
     assert after.points == pytest.approx(before.points, abs=1e-6)
@@ -181,7 +181,7 @@ def test_strands_leave_as_they_came(sphere, groom_file, told):
 def test_axes_and_scale_are_undone_by_their_own_inverse(groom_file):
     bpy.ops.hairloom.import_strands(filepath=str(groom_file), up="Z", scale=0.01)
     out = groom_file.with_name("out.tfx")
-    bpy.ops.hairloom.export_tfx(filepath=str(out), up="Z", scale=0.01)
+    bpy.ops.hairloom.export_tressfx(filepath=str(out), up="Z", scale=0.01)
     before, after = read_tfx(groom_file).strands, read_tfx(out).strands
     assert after.points == pytest.approx(before.points, rel=1e-5, abs=1e-6)
 
@@ -203,7 +203,7 @@ def test_cards_are_written_with_their_sidecar(sphere, tmp_path, told):
     assert {data.name_full for data in bpy.data.user_map()} == data_blocks
 
 
-@pytest.mark.parametrize("operator", ["export_cards", "export_tfx"])
+@pytest.mark.parametrize("operator", ["export_cards", "export_tressfx"])
 def test_hair_without_curves_is_not_exported(operator, sphere, tmp_path, told):
     hair = grown(sphere, strand_count=10)
     hair.data.remove_curves()
@@ -213,7 +213,9 @@ def test_hair_without_curves_is_not_exported(operator, sphere, tmp_path, told):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("operator", "name"), [("export_cards", "x.glb"), ("export_tfx", "x.tfx")])
+@pytest.mark.parametrize(
+    ("operator", "name"), [("export_cards", "x.glb"), ("export_tressfx", "x.tfx")]
+)
 def test_a_place_that_cannot_be_written_to_is_named(operator, name, sphere, tmp_path, told):
     grown(sphere, strand_count=50)
     (tmp_path / "no folder").write_text("a file")

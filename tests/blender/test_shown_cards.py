@@ -22,6 +22,7 @@ def preview(new_hair, sphere, evaluated):
     hair = new_hair(sphere)
     hair.data.hairloom.cards.source = "guides"
     hair.data.hairloom.card_occlusion.rays = 4
+    hair.data.hairloom.cards.order_by = "distance"
     hair.data.hairloom.atlas.size = "512"
     hair.data.hairloom.card_drawing.shown_as = "cards"
     session = previews.start(hair, evaluated())

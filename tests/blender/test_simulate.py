@@ -58,7 +58,7 @@ def test_files_are_simulated_as_the_same_scene_is_baked(new_hair, sphere, tmp_pa
     """Bit for bit, with a collider that is not the head."""
     hair = new_hair(sphere)
     groom, head, ball = tmp_path / "hair.tfx", tmp_path / "head.obj", tmp_path / "ball.obj"
-    bpy.ops.hairloom.export_tfx(filepath=str(groom))
+    bpy.ops.hairloom.export_tressfx(filepath=str(groom))
     for obj, path in ((sphere, head), (sphere, ball)):
         bpy.ops.object.select_all(action="DESELECT")
         obj.select_set(True)

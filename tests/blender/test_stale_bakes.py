@@ -16,8 +16,8 @@ from hairloom.addon.blender.bakes.stale_bakes import changed_since
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.strands.export_check import ExportCheck
 from hairloom.addon.blender.strands.strand_export import StrandExport
+from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 from hairloom.addon.exchange.strand_formats import ALEMBIC
-from hairloom.addon.exchange.strand_output import StrandOutput
 
 LAST = 4
 
@@ -114,12 +114,12 @@ def test_motion_of_strands_and_of_cards_says_so(
     hair, frames = baked[0], range(1, LAST + 1)
 
     def notes() -> list[tuple[str, ...]]:
-        plan = StrandExport.of([hair], evaluated(), ALEMBIC, StrandOutput(), frames=frames)
+        plan = StrandExport.of([hair], evaluated(), ALEMBIC, StrandExportSettings(), frames=frames)
         return [BakedGuides.of(hair).notes, tuple(n for n in plan.notes if "bake" in n)]
 
     def line() -> str:
         check = ExportCheck.of([hair])
-        check.refresh(evaluated(), ALEMBIC, StrandOutput())
+        check.refresh(evaluated(), ALEMBIC, StrandExportSettings())
         return check.motion_lines(use_bake=True)[0]
 
     assert notes() == [(), ()] and "out of date" not in line()
@@ -127,7 +127,7 @@ def test_motion_of_strands_and_of_cards_says_so(
     for (note,) in notes():
         assert "out of date (settings)" in note and "Bake again" in note
     assert line().endswith("at 24 fps, out of date (settings)")
-    still = StrandExport.of([hair], evaluated(), ALEMBIC, StrandOutput())
+    still = StrandExport.of([hair], evaluated(), ALEMBIC, StrandExportSettings())
     assert not any("out of date" in note for note in still.notes), "a still has no motion"
 
     capfd.readouterr()

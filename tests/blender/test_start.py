@@ -135,6 +135,7 @@ def test_the_sample_scene_is_a_scene_of_its_own_that_moves():
     assert head.rotation_euler[:] == pytest.approx(at_start[:], abs=1e-4), "it jumps as it repeats"
 
 
+@pytest.mark.slow
 def test_the_camera_of_the_sample_sees_all_of_its_hair():
     from bpy_extras.object_utils import world_to_camera_view
     from mathutils import Vector
@@ -195,6 +196,7 @@ def test_particle_hair_becomes_curves_on_its_mesh(sphere):
     assert particle_hair.hair_systems(sphere)
 
 
+@pytest.mark.slow
 def test_hair_of_a_scene_that_is_not_shown_waits_for_it():
     """Its head is not evaluated there: no vertex count fits, which is nobody's fault."""
     own = bpy.context.scene

@@ -57,7 +57,7 @@ def test_own_axes_and_unit_go_over_those_of_the_program(new_hair: Any, tmp_path:
     new_hair(strands=straight())
     path = tmp_path / "hair.usda"
     bpy.ops.hairloom.export_usd(
-        filepath=str(path), engine="unreal", own_space=True, up="Y", scale=0.1, parts="strands"
+        filepath=str(path), engine="unreal", up="Y", scale=0.1, parts="strands"
     )
     _, curves = stage_of(path)
     np.testing.assert_allclose(curves.GetPointsAttr().Get()[0], (10.0, 30.0, -20.0), rtol=1e-6)

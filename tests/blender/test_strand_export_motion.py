@@ -19,8 +19,8 @@ from hairloom.addon.blender.strands.export_check import ExportCheck
 from hairloom.addon.blender.strands.strand_export import StrandExport
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.groom import Groom
+from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 from hairloom.addon.exchange.strand_formats import ALEMBIC, TRESSFX, USD
-from hairloom.addon.exchange.strand_output import StrandOutput
 
 LAST = 6
 
@@ -177,7 +177,7 @@ def test_curves_that_come_and_go_are_told_and_leave_nothing(new_hair: Any, tmp_p
         [hair],
         bpy.context.evaluated_depsgraph_get(),
         USD,
-        StrandOutput(),
+        StrandExportSettings(),
         frames=range(1, 4),
     )
     hair.data.remove_curves(indices=[0])
@@ -195,7 +195,9 @@ def test_a_cancelled_export_leaves_the_old_file(swinging: Any, tmp_path: Path) -
         path = tmp_path / f"hair{suffix}"
         path.write_bytes(b"old")
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        plan = StrandExport.of([hair], depsgraph, kind, StrandOutput(), frames=range(1, LAST + 1))
+        plan = StrandExport.of(
+            [hair], depsgraph, kind, StrandExportSettings(), frames=range(1, LAST + 1)
+        )
         positions = plan.positions()
         work = plan.writing(path, positions)
         limit = time.monotonic() + 20.0
@@ -216,7 +218,7 @@ def test_in_steps_the_same_file_is_written_as_at_once(swinging: Any, tmp_path: P
     for path in (tmp_path / "once.abc", tmp_path / "steps.abc"):
         depsgraph = bpy.context.evaluated_depsgraph_get()
         plan = StrandExport.of(
-            [hair], depsgraph, ALEMBIC, StrandOutput(), frames=range(1, LAST + 1)
+            [hair], depsgraph, ALEMBIC, StrandExportSettings(), frames=range(1, LAST + 1)
         )
         if path.stem == "once":
             plan.write(path)
@@ -236,7 +238,7 @@ def test_motion_into_a_format_without_is_refused(new_hair: Any, tmp_path: Path) 
         [new_hair(strands=straight())],
         bpy.context.evaluated_depsgraph_get(),
         TRESSFX,
-        StrandOutput(),
+        StrandExportSettings(),
         frames=range(1, 3),
     )
     with pytest.raises(HairloomError, match=r"TressFX holds no motion.*Alembic"):

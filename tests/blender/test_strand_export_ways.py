@@ -14,7 +14,7 @@ from tfxbone_reader import read_tfxbone
 
 from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.blender.scene.groom_attributes import store_groom
-from hairloom.addon.blender.strands.groom_out import Wishes, still_hair
+from hairloom.addon.blender.strands.read_hair import ExportRequest, still_hair
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.tressfx import read_tfx
@@ -49,7 +49,7 @@ def test_bones_of_a_skinned_head_lie_beside_tressfx(
 ) -> None:
     skinned(sphere)
     new_hair(sphere)
-    bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "hair.tfx"), up="Z", fills_groups=True)
+    bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "hair.tfx"), up="Z", fills_groups=True)
     read = read_tfx(tmp_path / "hair.tfx", up="Z").strands
     assert read.strand_count == 64 and set(read.point_counts) == {8}
     bones = read_tfxbone(tmp_path / "hair.tfxbone")
@@ -58,7 +58,7 @@ def test_bones_of_a_skinned_head_lie_beside_tressfx(
     clear = np.abs(read.roots[:, 2]) > 0.03
     np.testing.assert_array_equal(carrier[clear], (read.roots[:, 2] < 0.0)[clear])
 
-    bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "split.tfx"), by_group=True, up="Z")
+    bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "split.tfx"), by_group=True, up="Z")
     names = {f"split_group{g}{suffix}" for g in (0, 1) for suffix in (".tfx", ".tfxbone")}
     assert {p.name for p in tmp_path.glob("split*")} == names
     part = read_tfxbone(tmp_path / "split_group1.tfxbone")
@@ -69,12 +69,12 @@ def test_bones_are_left_out_where_they_are_not_wanted_or_not_there(
     new_hair: Any, sphere: Any, tmp_path: Path
 ) -> None:
     new_hair(sphere)
-    bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "a.tfx"))
+    bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "a.tfx"))
     skinned(sphere)
     bpy.ops.object.select_all(action="DESELECT")
     bpy.data.objects["Hair"].select_set(True)
     bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
-    bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "b.tfx"), bones=False)
+    bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "b.tfx"), bones=False)
     assert {p.name for p in tmp_path.iterdir()} == {"a.tfx", "b.tfx"}
 
 
@@ -98,14 +98,19 @@ def test_a_collection_writes_its_own_hair(new_hair: Any, sphere: Any, tmp_path: 
     bpy.context.scene.collection.children.link(other)
     write_curves("Brows", hedgehog(20, 5), sphere, other)
     new_hair(sphere)
-    for operator, suffix in (("alembic", "abc"), ("usd", "usda"), ("tfx", "tfx"), ("hair", "hair")):
+    for operator, suffix in (
+        ("alembic", "abc"),
+        ("usd", "usda"),
+        ("tressfx", "tfx"),
+        ("hair", "hair"),
+    ):
         path = tmp_path / f"a.{suffix}"
         run = getattr(bpy.ops.hairloom, f"export_{operator}")
         assert run(filepath=str(path), collection="Other") == {"FINISHED"}
     assert read_hair_file(tmp_path / "a.hair").strands.strand_count == 20
     with pytest.raises(RuntimeError, match="no hair to write"):
-        bpy.ops.hairloom.export_tfx(filepath=str(tmp_path / "b.tfx"), collection="Nothing")
-    for name, suffixes in (("alembic", ".abc"), ("usd", ".usdc;.usd;.usda"), ("tfx", ".tfx")):
+        bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "b.tfx"), collection="Nothing")
+    for name, suffixes in (("alembic", ".abc"), ("usd", ".usdc;.usd;.usda"), ("tressfx", ".tfx")):
         handler = getattr(bpy.types, f"HAIRLOOM_FH_export_{name}")
         assert handler.bl_export_operator == f"hairloom.export_{name}"
         assert handler.bl_file_extensions == suffixes
@@ -163,7 +168,7 @@ def test_hair_of_guides_alone_is_written_as_strands(new_hair: Any, tmp_path: Pat
             "export_usd", ".usdc", {"engine": "blender", "parts": "both"}, marks=needs_usd
         ),
         pytest.param("export_usd", ".usda", {"engine": "maya", "parts": "both"}, marks=needs_usd),
-        ("export_tfx", ".tfx", {}),
+        ("export_tressfx", ".tfx", {}),
         ("export_hair", ".hair", {}),
     ],
 )
@@ -178,7 +183,12 @@ def test_what_is_written_comes_in_again(
         group_names={0: "crown", 1: "nape"},
     )
     store_groom(hair.data, said)
-    before = still_hair(hair, bpy.context.evaluated_depsgraph_get(), Wishes(guides=False)).groom
+
+    def groom_of(hair: bpy.types.Object) -> Groom:
+        request = ExportRequest(guides=False)
+        return still_hair(hair, bpy.context.evaluated_depsgraph_get(), request).groom
+
+    before = groom_of(hair)
     path = tmp_path / f"hair{suffix}"
     getattr(bpy.ops.hairloom, operator)(filepath=str(path), **options)
     bpy.ops.object.select_all(action="DESELECT")
@@ -186,7 +196,7 @@ def test_what_is_written_comes_in_again(
     bpy.context.view_layer.objects.active = sphere
     assert bpy.ops.hairloom.import_strands(filepath=str(path)) == {"FINISHED"}
     again = next(o for o in bpy.data.objects if o.type == "CURVES" and o != hair)
-    after = still_hair(again, bpy.context.evaluated_depsgraph_get(), Wishes(guides=False)).groom
+    after = groom_of(again)
     bits = options.get("engine") == "blender"
     tolerance = 0.0 if bits else 1e-6
     np.testing.assert_allclose(after.strands.points, before.strands.points, atol=tolerance, rtol=0)

@@ -185,6 +185,7 @@ def test_a_farm_reads_status_and_progress(
 
 
 @pytest.mark.skipif(not bpy.app.module, reason="tools/headless.py needs Blender as a module")
+@pytest.mark.slow
 def test_an_interrupted_task_leaves_nothing(scene: Path, tmp_path: Path) -> None:
     """As a farm does it: a process that is sent SIGTERM, here as well by Ctrl-C's SIGINT."""
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -281,6 +281,7 @@ def test_the_command_line_turns_a_groom(tmp_path: Path) -> None:
     assert "turntable_0003.png" in report.read_text()
 
 
+@pytest.mark.slow
 def test_the_command_line_draws_a_contact_sheet(tmp_path: Path) -> None:
     sizes = ["--width", "64", "--height", "48", "--samples", "1"]
     path = tmp_path / "sheet.png"

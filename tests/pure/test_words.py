@@ -6,21 +6,6 @@ from pathlib import Path
 
 import words
 
-#: What is still used, by kind of text and term. A number may only fall: where fewer are
-#: left, `.venv/bin/python tools/words.py counts` prints the table to put here. Empty is the aim;
-#: after that this table goes away.
-LEFT: dict[tuple[str, str], int] = {
-    ("code", "told"): 2,
-    ("code", "wishes"): 3,
-    ("code", "hair_out"): 1,
-    ("code", "card_choices"): 1,
-    ("code", "strand_choices"): 1,
-    ("code", "ways"): 1,
-    ("code", "share"): 1,
-    ("code", "most_"): 1,
-    ("code", "least_"): 1,
-}
-
 GLOSSARY = """\
 ## Retired in prose
 | Do not say | Say |
@@ -36,18 +21,12 @@ GLOSSARY = """\
 
 
 def test_no_retired_word_is_used() -> None:
-    grown = [
-        f"{retired.scope}: `{retired.term}` {words.amount(found)}, not {allowed}; "
-        f"say {retired.instead}: {', '.join(str(use) for use in found[:20])}"
-        for retired, found in words.uses().items()
-        if words.amount(found) > (allowed := LEFT.get((retired.scope, retired.term), 0))
+    found = [
+        f"{retired.scope}: `{retired.term}`; say {retired.instead}: {', '.join(map(str, places))}"
+        for retired, places in words.uses().items()
+        if places
     ]
-    assert grown == []
-
-
-def test_what_is_left_is_retired() -> None:
-    known = {(retired.scope, retired.term) for retired in words.retired_terms()}
-    assert set(LEFT) - known == set()
+    assert found == []
 
 
 def test_each_kind_of_use_is_seen(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from open_panels import (
     there,
 )
 
-EXPORTS = ("export_cards", "export_alembic", "export_usd", "export_tfx", "export_hair")
+EXPORTS = ("export_cards", "export_alembic", "export_usd", "export_tressfx", "export_hair")
 #: this many drawings in a row are the same when panels have slid to their places
 STILL = 6
 #: [pixels] how wide the Properties editor is

@@ -164,12 +164,12 @@ def file_steps(
     check_cards(made.build.levels, str(path))
     with written_together(path) as folder:
         writer = _Writer(folder / path.name, made, settings, output, file_format, stage)
-        told = yield from writer.steps(motion)
+        said = yield from writer.steps(motion)
         names = {file.name for file in folder.iterdir() if file.is_file()}
     beside = sorted(names - {path.name, path.stem + SUFFIX})
     files = (path.name, *beside, path.stem + SUFFIX)
     paths = tuple(path.with_name(name) for name in files)
-    notes = (*made.notes, *told)
+    notes = (*made.notes, *said)
     return WrittenCards(made.build, made.maps, paths, notes, writer.motion)
 
 
@@ -205,10 +205,11 @@ class _Writer:
         settings = self.output.settings
         with self.stage("move cards"):
             steps = moved_cards(motion, levels, space="head", with_directions=False)
-            moved = yield from map_progress(steps, lambda share: ("Moving the cards", share))
+            moved = yield from map_progress(steps, lambda fraction: ("Moving the cards", fraction))
         with self.stage("fit joints"):
             joints: JointMotion = yield from map_progress(
-                joint_motion_steps(moved.tracks, settings), lambda share: ("Fitting joints", share)
+                joint_motion_steps(moved.tracks, settings),
+                lambda fraction: ("Fitting joints", fraction),
             )
         self.motion = joints.facts
         yield "Writing", None
@@ -224,7 +225,7 @@ class _Writer:
         motion_layout(count, len(motion.frames), str(self.path))  # refused before the work
         with self.stage("move cards"):
             steps = moved_cards(motion, levels, space=settings.motion_space, with_directions=True)
-            moved = yield from map_progress(steps, lambda share: ("Moving the cards", share))
+            moved = yield from map_progress(steps, lambda fraction: ("Moving the cards", fraction))
         yield "Writing", None
         texture = TextureMotion.of(moved, settings, self.file_format, str(self.path))
         with self.stage("write motion texture"):
@@ -393,11 +394,11 @@ def _motion_line(written: WrittenCards) -> str:
     if motion["kind"] == "texture":
         return f"; motion textures of {motion['width']} x {motion['height']} texels"
     length = motion["error"]["hair_length"]
-    share, most, worst = (
+    usual, most, worst = (
         motion["error"][name] / length for name in ("root_mean_square", "percentile_99", "worst")
     )
     return (
-        f"; {motion['chains']} chains of {motion['joints_in_chain']} joints, off by {share:.1%} of "
+        f"; {motion['chains']} chains of {motion['joints_in_chain']} joints, off by {usual:.1%} of "
         f"the hair's length (root mean square; 99% by less than {most:.1%}, the worst by "
         f"{worst:.1%})"
     )

@@ -15,21 +15,22 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...exchange.groom import Groom
 from ...exchange.strand_check import check_lines
-from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat
-from ...exchange.strand_output import ENGINES, StrandOutput
+from ...exchange.strand_export_settings import StrandExportSettings
+from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat, format_of
 from ...pipeline import Rig
 from ...shading.settings import ShadingSettings
 from ..strands.groom_motion import BakedMotion
-from ..strands.groom_out import hair_of_rig
-from ..strands.strand_choices import BASES, COUNTS, PARTS, Items, path_in, strand_output
-from ..strands.strand_export import StrandExport, wishes_of
+from ..strands.read_hair import hair_of_rig
+from ..strands.strand_export import StrandExport, request_of
 from .inputs import Inputs
 from .job_options import (
     add_frames_option,
     add_max_frames_option,
     add_moment_options,
     add_object_option,
+    add_parameter_options,
     frames_of_option,
+    parameters_of,
 )
 from .job_steps import Job, motion_of, read_hair, read_rig, tell_notes
 from .object_settings import named_grooms, put_settings
@@ -39,12 +40,13 @@ from .verb import Verb
 def export(job: Job) -> None:
     """Write the strands for an engine, at rest, at a frame of a bake, or over frames."""
     options, report = job.options, job.report
-    path, kind = path_in(job.output, options.format)
-    output, frames = strand_output(options), frames_of_option(options.frames, options.max_frames)
+    path, kind = format_of(job.output, options.format)
+    settings = parameters_of(options, job.settings[StrandExportSettings])
+    frames = frames_of_option(options.frames, options.max_frames)
     if options.object or _is_of_scene(options):
-        plan = _of_objects(job, kind, output, frames)
+        plan = _of_objects(job, kind, settings, frames)
     else:
-        plan = _of_rig(job, kind, output, frames)
+        plan = _of_rig(job, kind, settings, frames)
     facts = plan.check()
     report.facts.update(preflight=facts, dropped=plan.dropped)
     if options.preflight:
@@ -65,7 +67,7 @@ def _is_of_scene(options: argparse.Namespace) -> bool:
 
 
 def _of_objects(
-    job: Job, kind: StrandFormat, output: StrandOutput, frames: range | None
+    job: Job, kind: StrandFormat, settings: StrandExportSettings, frames: range | None
 ) -> StrandExport:
     """Hair of the scene, as the artist's operators write it."""
     options = job.options
@@ -83,10 +85,8 @@ def _of_objects(
             hair,
             bpy.context.evaluated_depsgraph_get(),
             kind,
-            output,
+            settings,
             frames=frames,
-            use_bake=not options.no_bake,
-            with_bones=not options.no_bones,
         )
     for part in plan.moving:
         if isinstance(part, BakedMotion):
@@ -95,10 +95,10 @@ def _of_objects(
 
 
 def _of_rig(
-    job: Job, kind: StrandFormat, output: StrandOutput, frames: range | None
+    job: Job, kind: StrandFormat, settings: StrandExportSettings, frames: range | None
 ) -> StrandExport:
     """Hair of --groom, of --bake, or hair that is grown here."""
-    needs, color = wishes_of(kind, output), job.settings[ShadingSettings].base_color
+    needs, color = request_of(kind, settings), job.settings[ShadingSettings].base_color
     if job.options.bake is None:
         if frames is not None:
             raise HairloomError(
@@ -108,7 +108,7 @@ def _of_rig(
             )
         rig, inputs = read_rig(job)
         groom = hair_of_rig(rig, _groom(rig, inputs), needs, color).groom
-        return StrandExport(groom, output, kind, inputs.dropped)
+        return StrandExport(groom, settings, kind, inputs.dropped)
     at = frames if job.options.frame is None else range(job.options.frame, job.options.frame + 1)
     motion = motion_of(job, at)
     rig, read = motion.rig, read_hair(job) if job.sources.groom else None
@@ -121,7 +121,7 @@ def _of_rig(
         _, points = motion.strands(motion.frames[0])
         groom = replace(groom, strands=rig.strands.with_points(points.reshape(-1, 3)))
     moving = BakedMotion(hair_of_rig(rig, groom, needs, color), motion.cache)
-    plan = StrandExport(moving.out.groom, output, kind, frames=frames)
+    plan = StrandExport(moving.out.groom, settings, kind, frames=frames)
     if frames is not None:
         plan.moving, plan.rate = (moving,), moving.rate
     return plan
@@ -171,38 +171,11 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         "write the motion over these frames (Alembic, USD): of the bake of --object, or of --bake",
     )
     add_max_frames_option(hair)
-    hair.add_argument(
-        "--no-bake",
-        action="store_true",
-        help="the motion of Blender's own animation and modifiers, in place of the bake",
-    )
     file = parser.add_argument_group("the file")
     file.add_argument(
         "--format",
         choices=[each.name for each in STRAND_FORMATS],
         help="of the file (default: by its suffix)",
-    )
-    file.add_argument(
-        "--engine",
-        choices=list(dict.fromkeys(name for known in ENGINES.values() for name in known)),
-        help="unit, axes and parts as this program wants them (default: unreal for Alembic, "
-        "blender for USD)",
-    )
-    file.add_argument("--parts", choices=_names(PARTS), help="(default: as the engine wants)")
-    file.add_argument(
-        "--split-groups",
-        dest="by_group",
-        action="store_true",
-        help="an object for each group; a file for each where the format has no groups",
-    )
-    file.add_argument("--basis", choices=_names(BASES), help="between points, of Alembic and USD")
-    file.add_argument("--up", choices=("Y", "Z"), help="up in the file; not for Alembic")
-    file.add_argument(
-        "--unit",
-        dest="scale",
-        type=float,
-        metavar="METRES",
-        help="metres in one unit of the file, such as 0.01; not for Alembic",
     )
     file.add_argument(
         "--preflight",
@@ -211,30 +184,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         choices=("text", "json"),
         help="say what the engine will see, and write nothing",
     )
-    tressfx = parser.add_argument_group("TressFX and .hair")
-    tressfx.add_argument(
-        "--vertices",
-        dest="vertex_count",
-        choices=_names(COUNTS),
-        help="on each strand (default: as needed)",
-    )
-    tressfx.add_argument(
-        "--held", dest="held_count", type=int, default=1, help="vertices at the root that stay"
-    )
-    tressfx.add_argument(
-        "--fill",
-        dest="fills_groups",
-        action="store_true",
-        help="repeat the last strand up to a multiple of 64, for loaders that do not",
-    )
-    tressfx.add_argument(
-        "--point-uv", action="store_true", help="UVs of points too; in .hair as LuxCore has them"
-    )
-    tressfx.add_argument("--no-bones", action="store_true", help="no .tfxbone of a skinned head")
-
-
-def _names(items: Items) -> list[str]:
-    return [name for name, *_ in items if name not in ("engine", "fit")]
+    add_parameter_options(file, StrandExportSettings)
 
 
 EXPORT = Verb(
@@ -245,7 +195,7 @@ EXPORT = Verb(
     operators=(
         "export_alembic",
         "export_usd",
-        "export_tfx",
+        "export_tressfx",
         "export_hair",
         "check_export",
     ),

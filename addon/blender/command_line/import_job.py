@@ -12,7 +12,7 @@ from ...errors import HairloomError
 from ...exchange.strand_formats import SUFFIXES
 from ..base.outcome import dropped_phrase
 from ..scene.mesh_files import import_mesh_file
-from ..strands.groom_in import GUIDES, Ground, StrandImport, import_strands, read_ground
+from ..strands.import_groom import GUIDES, Ground, StrandImport, import_strands, read_ground
 from .job_steps import Job, tell_notes
 from .object_settings import named_objects, put_settings
 from .verb import Verb

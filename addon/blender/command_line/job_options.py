@@ -215,7 +215,8 @@ def add_parameter_options(parser: Any, kind: type[Settings]) -> None:
         name = "--" + parameter.name.replace("_", "-")
         about = parameter.description.replace("%", "%%")
         if parameter.kind == "toggle":
-            parser.add_argument(name, action="store_true", default=None, help=about)
+            action = argparse.BooleanOptionalAction if parameter.default else "store_true"
+            parser.add_argument(name, action=action, default=None, help=about)
             continue
         choices = [identifier for identifier, *_ in parameter.choices] or None
         parser.add_argument(

@@ -63,7 +63,7 @@ def _form(action: argparse.Action) -> str:
     """Such as --frames FIRST LAST."""
     name = action.option_strings[0] if action.option_strings else ""
     if action.nargs == 0:
-        return name
+        return "` / `".join(action.option_strings)
     if action.metavar is not None:
         values = action.metavar if isinstance(action.metavar, str) else " ".join(action.metavar)
     elif action.choices is not None:

@@ -106,7 +106,7 @@ SECTION_GROUPS["fin"].__annotations__ |= {
 
 def operator_properties(section: str) -> dict[str, Any]:
     """For the `__annotations__` of an operator that works by the settings of one section."""
-    return property_annotations(ALL_SETTINGS[section])
+    return property_annotations(ALL_SETTINGS[section].parameters())
 
 
 def _switch(section: str, parameter: str, values: tuple[str, str], name: str, text: str) -> Any:

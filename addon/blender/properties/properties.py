@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import bpy
@@ -44,22 +44,27 @@ def property_group(settings: type[Settings], changed: Changed | None = None) -> 
     """
     namespace = {
         "__doc__": settings.title,
-        "__annotations__": property_annotations(settings, changed),
+        "__annotations__": property_annotations(settings.parameters(), changed),
         "settings": settings,
     }
     return type(f"HAIRLOOM_PG_{settings.section}", (bpy.types.PropertyGroup,), namespace)
 
 
 def property_annotations(
-    settings: type[Settings], changed: Changed | None = None
+    parameters: Iterable[Parameter], changed: Changed | None = None
 ) -> dict[str, Any]:
     """name -> Blender property, for the `__annotations__` of a group or an operator."""
-    return {parameter.name: _property(parameter, changed) for parameter in settings.parameters()}
+    return {parameter.name: _property(parameter, changed) for parameter in parameters}
 
 
 def settings_of[S: Settings](group: Any, settings: type[S]) -> S:
-    """The values in a property group (or operator) made from these settings, checked."""
-    return settings(**{p.name: _value(group, p) for p in settings.parameters()})
+    """The values in a property group (or operator) made from these settings, checked.
+
+    An operator may have a part of them; the others are the defaults.
+    """
+    return settings(
+        **{p.name: _value(group, p) for p in settings.parameters() if hasattr(group, p.name)}
+    )
 
 
 def _property(parameter: Parameter, changed: Changed | None) -> Any:

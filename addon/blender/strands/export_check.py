@@ -10,13 +10,13 @@ from ...errors import HairloomError
 from ...exchange.groom import Groom
 from ...exchange.joined_grooms import joined_grooms
 from ...exchange.strand_check import check_lines, check_strands
+from ...exchange.strand_export_settings import StrandExportSettings
 from ...exchange.strand_formats import StrandFormat
-from ...exchange.strand_output import StrandOutput
 from ..bakes import playback
 from ..bakes.stale_bakes import changed_since
 from ..base.objects import Handle
-from .groom_out import Wishes, still_hair
-from .strand_export import wishes_of
+from .read_hair import ExportRequest, still_hair
+from .strand_export import request_of
 
 
 @dataclass
@@ -29,30 +29,33 @@ class ExportCheck:
     hair: list[Handle]
     lines: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    _read: dict[Wishes, tuple[Groom, tuple[str, ...]]] = field(default_factory=dict)
+    _read: dict[ExportRequest, tuple[Groom, tuple[str, ...]]] = field(default_factory=dict)
     _stale: dict[int, tuple[str, ...]] = field(default_factory=dict)
-    _checked: tuple[StrandFormat, StrandOutput] | None = None
+    _checked: tuple[StrandFormat, StrandExportSettings] | None = None
 
     @classmethod
     def of(cls, hair: list[bpy.types.Object]) -> ExportCheck:
         return cls([Handle.of(each) for each in hair])
 
     def refresh(
-        self, depsgraph: bpy.types.Depsgraph, kind: StrandFormat, output: StrandOutput
+        self,
+        depsgraph: bpy.types.Depsgraph,
+        kind: StrandFormat,
+        settings: StrandExportSettings,
     ) -> bool:
         """Check it for a format and what is asked of it; whether anything may be new since."""
-        if self._checked == (kind, output):
+        if self._checked == (kind, settings):
             return False
         if self._checked is None:
             self._look_at_bakes(depsgraph)
         try:
-            groom, notes = self._groom(depsgraph, wishes_of(kind, output))
-            facts = check_strands(groom, kind, output)
+            groom, notes = self._groom(depsgraph, request_of(kind, settings))
+            facts = check_strands(groom, kind, settings)
         except HairloomError as error:
             self.lines, self.warnings = [], [str(error)]
         else:
             self.lines, self.warnings = check_lines(facts), [*notes, *facts["warnings"]]
-        self._checked = kind, output
+        self._checked = kind, settings
         return True
 
     def motion_lines(self, *, use_bake: bool) -> list[str]:
@@ -61,17 +64,17 @@ class ExportCheck:
         return [f"{each.name}: {self._moved_by(each, use_bake)}" for each in hair]
 
     def _groom(
-        self, depsgraph: bpy.types.Depsgraph, wishes: Wishes
+        self, depsgraph: bpy.types.Depsgraph, request: ExportRequest
     ) -> tuple[Groom, tuple[str, ...]]:
-        if wishes not in self._read:
+        if request not in self._read:
             found = [hair for hair in (each.find() for each in self.hair) if hair is not None]
             if not found:
                 raise HairloomError("it is gone", place="hair", remedy="Export again")
-            outs = [still_hair(each, depsgraph, wishes) for each in found]
+            outs = [still_hair(each, depsgraph, request) for each in found]
             groom, lost = joined_grooms([out.groom for out in outs], found[0].name)
             notes = dict.fromkeys([note for out in outs for note in out.notes])
-            self._read[wishes] = groom, (*notes, *lost)
-        return self._read[wishes]
+            self._read[request] = groom, (*notes, *lost)
+        return self._read[request]
 
     def _moved_by(self, hair: bpy.types.Object, use_bake: bool) -> str:
         try:

@@ -27,7 +27,7 @@ from ..properties.properties import settings_of
 from ..scene.rigs import rig_of
 from ..scene.source import read_source, usable_curves
 from ..scene.surfaces import read_positions
-from .groom_out import HairOut, Wishes, baked_hair, still_hair
+from .read_hair import ExportRequest, ExportStrands, baked_hair, still_hair
 
 
 class Moving(Protocol):
@@ -38,7 +38,7 @@ class Moving(Protocol):
     """
 
     @property
-    def out(self) -> HairOut: ...
+    def out(self) -> ExportStrands: ...
 
     @property
     def rate(self) -> float: ...
@@ -54,7 +54,7 @@ class Moving(Protocol):
 class BakedMotion:
     """Hair that goes by its bake."""
 
-    out: HairOut
+    out: ExportStrands
     cache: Cache
     needs_scene: bool = False
 
@@ -70,7 +70,7 @@ class BakedMotion:
 class ShownMotion:
     """Hair that modifiers and animation move, read again at each frame."""
 
-    out: HairOut
+    out: ExportStrands
     hair: Handle
     rate: float
     needs_scene: bool = True
@@ -91,7 +91,7 @@ class ChildrenMotion:
     body: what carries the roots.
     """
 
-    out: HairOut
+    out: ExportStrands
     hair: Handle
     rate: float
     rig: Rig
@@ -117,7 +117,7 @@ def moving_hair(
     hair: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
     frames: range,
-    wishes: Wishes,
+    request: ExportRequest,
     *,
     use_bake: bool,
 ) -> tuple[Moving, tuple[str, ...]]:
@@ -133,9 +133,9 @@ def moving_hair(
     cache = playback.cache_of(hair) if use_bake else None
     if cache is not None:
         check_frames(hair.name, frames, cache)
-        motion = BakedMotion(baked_hair(hair, depsgraph, cache, wishes), cache)
+        motion = BakedMotion(baked_hair(hair, depsgraph, cache, request), cache)
         return motion, stale_notes(hair, cache, depsgraph)
-    out, rate = still_hair(hair, depsgraph, wishes), frame_rate(depsgraph.scene)
+    out, rate = still_hair(hair, depsgraph, request), frame_rate(depsgraph.scene)
     notes: tuple[str, ...] = ()
     if use_bake:
         notes = (
@@ -155,10 +155,10 @@ def common_rate(parts: Sequence[Moving]) -> float:
     """
     rates = {part.rate for part in parts}
     if len(rates) > 1:
-        told = " and ".join(f"{rate:g}" for rate in sorted(rates))
+        listed = " and ".join(f"{rate:g}" for rate in sorted(rates))
         names = ", ".join(part.out.groom.name for part in parts)
         raise HairloomError(
-            f"this hair has different frame rates, {told}",
+            f"this hair has different frame rates, {listed}",
             place=names,
             remedy="Bake all of it at the scene's rate, or write a file each",
         )
@@ -190,7 +190,7 @@ def positions_of(parts: Sequence[Moving], frames: range) -> Generator[Floats]:
 
 
 def _children_motion(
-    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, out: HairOut, rate: float
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, out: ExportStrands, rate: float
 ) -> ChildrenMotion:
     source = read_source(hair, depsgraph)
     settings = settings_of(hair.data.hairloom.guides, GuideSettings)

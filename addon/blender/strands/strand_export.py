@@ -15,15 +15,15 @@ from ...exchange.groom import Groom, GroomMotion
 from ...exchange.groom_presets import chosen_parts
 from ...exchange.joined_grooms import joined_bones, joined_grooms
 from ...exchange.strand_check import check_strands
+from ...exchange.strand_export_settings import StrandExportSettings, layout_of
 from ...exchange.strand_formats import ALEMBIC, TRESSFX, USD, StrandFormat
-from ...exchange.strand_output import StrandOutput, layout_of
 from ...exchange.strand_writing import WrittenStrands, write_strands
 from ...exchange.tfxbone import BoneWeights
 from ..base.outcome import Outcome
 from ..base.thread_work import ThreadWork
 from ..scene.bone_weights import bones_of, has_bones
 from .groom_motion import Moving, common_rate, moving_hair, positions_of
-from .groom_out import HairOut, Wishes, still_hair
+from .read_hair import ExportRequest, ExportStrands, still_hair
 
 
 @dataclass
@@ -35,7 +35,7 @@ class StrandExport:
     """
 
     groom: Groom
-    output: StrandOutput
+    settings: StrandExportSettings
     kind: StrandFormat
     dropped: dict[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -51,44 +51,43 @@ class StrandExport:
         hair: list[bpy.types.Object],
         depsgraph: bpy.types.Depsgraph,
         kind: StrandFormat,
-        output: StrandOutput,
+        settings: StrandExportSettings,
         *,
         frames: range | None = None,
-        use_bake: bool = True,
-        with_bones: bool = True,
     ) -> StrandExport:
         """Read hair of the scene; several become one groom, each with groups of its own.
 
         Args:
             frames: scene frames; None: as it is now.
-            use_bake: for motion, go by the bake of hair that has one.
-            with_bones: for TressFX, the bones of skinned heads.
 
         Raises:
             HairloomError: no hair that can be used, frames that were not baked, or an engine or
-                unit that cannot be.
+                option that cannot be.
         """
-        has_roots = kind is TRESSFX and with_bones and any(has_bones(each) for each in hair)
-        wishes = replace(wishes_of(kind, output), roots=has_roots)
+        with_bones = kind is TRESSFX and settings.bones
+        has_roots = with_bones and any(has_bones(each) for each in hair)
+        request = replace(request_of(kind, settings), roots=has_roots)
         if frames is None:
-            outs, moving, notes = _still(hair, depsgraph, wishes)
+            outs, moving, notes = _still(hair, depsgraph, request)
         else:
-            outs, moving, notes = _moving(hair, depsgraph, wishes, frames, use_bake=use_bake)
+            outs, moving, notes = _moving(
+                hair, depsgraph, request, frames, use_bake=settings.use_bake
+            )
         groom, lost = joined_grooms([out.groom for out in outs], hair[0].name)
-        groom = _with_strands(groom, layout_of(kind, output).parts)
+        groom = _with_strands(groom, layout_of(kind, settings).parts)
         bones, missing = None, tuple[str, ...]()
-        if kind is TRESSFX and with_bones:
+        if with_bones:
             bones, missing = _bones(hair, depsgraph, outs)
         dropped: Counter[str] = Counter()
         for out in outs:
             dropped.update(out.dropped)
-        told = dict.fromkeys([note for out in outs for note in out.notes])
+        read = dict.fromkeys([note for out in outs for note in out.notes])
         return cls(
-            groom,
-            replace(output, bones=bones),
+            replace(groom, bones=bones),
+            settings,
             kind,
             dict(dropped),
-            (*told, *notes, *lost, *missing),
+            (*read, *notes, *lost, *missing),
             frames,
             common_rate(moving) if moving else 0.0,
             moving,
@@ -101,7 +100,7 @@ class StrandExport:
     def check(self) -> dict[str, Any]:
         """What the engine will see, see `exchange.strand_check`; and frames: first, last, a second,
         for motion."""
-        facts = check_strands(self.groom, self.kind, self.output)
+        facts = check_strands(self.groom, self.kind, self.settings)
         if self.frames is not None:
             facts["frames"] = [self.frames[0], self.frames[-1], self.rate]
         return facts
@@ -118,7 +117,7 @@ class StrandExport:
         motion = None
         if self.frames is not None:
             motion = GroomMotion(positions or self.positions(), self.rate, self.frames[0])
-        written = write_strands(path, self.groom, self.output, motion)
+        written = write_strands(path, self.groom, self.settings, motion)
         self.files = written.files
         return self._outcome(written)
 
@@ -138,7 +137,7 @@ class StrandExport:
         return ThreadWork(work, "Hairloom strands")
 
     def _outcome(self, written: WrittenStrands) -> Outcome:
-        chosen = chosen_parts(self.groom, layout_of(self.kind, self.output).parts)
+        chosen = chosen_parts(self.groom, layout_of(self.kind, self.settings).parts)
         guides = 0 if chosen.is_guide is None else int(chosen.is_guide.sum())
         counts = {"strands": chosen.strands.strand_count - guides, "guides": guides}
         what = [f"{count:,} {name}" for name, count in counts.items() if count]
@@ -151,36 +150,37 @@ class StrandExport:
         return Outcome(result, self.dropped, (*self.notes, *written.notes))
 
 
-def wishes_of(kind: StrandFormat, output: StrandOutput) -> Wishes:
+def request_of(kind: StrandFormat, settings: StrandExportSettings) -> ExportRequest:
     """What has to be read of hair for such a file.
 
     Raises:
-        HairloomError: an engine that the format does not know.
+        HairloomError: as `layout_of`.
     """
+    guides = layout_of(kind, settings).parts != "strands"
     # one colour for all points would fill a .tfx, where it says nothing
-    return Wishes(guides=layout_of(kind, output).parts != "strands", color=kind in (ALEMBIC, USD))
+    return ExportRequest(guides=guides, color=kind in (ALEMBIC, USD))
 
 
 def _still(
-    hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, wishes: Wishes
-) -> tuple[list[HairOut], tuple[Moving, ...], tuple[str, ...]]:
-    return [still_hair(each, depsgraph, wishes) for each in hair], (), ()
+    hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, request: ExportRequest
+) -> tuple[list[ExportStrands], tuple[Moving, ...], tuple[str, ...]]:
+    return [still_hair(each, depsgraph, request) for each in hair], (), ()
 
 
 def _moving(
     hair: list[bpy.types.Object],
     depsgraph: bpy.types.Depsgraph,
-    wishes: Wishes,
+    request: ExportRequest,
     frames: range,
     *,
     use_bake: bool,
-) -> tuple[list[HairOut], tuple[Moving, ...], tuple[str, ...]]:
+) -> tuple[list[ExportStrands], tuple[Moving, ...], tuple[str, ...]]:
     moving: list[Moving] = []
     notes: list[str] = []
     for each in hair:
-        part, told = moving_hair(each, depsgraph, frames, wishes, use_bake=use_bake)
+        part, said = moving_hair(each, depsgraph, frames, request, use_bake=use_bake)
         moving.append(part)
-        notes += told
+        notes += said
     return [part.out for part in moving], tuple(moving), tuple(notes)
 
 
@@ -192,7 +192,7 @@ def _with_strands(groom: Groom, parts: str) -> Groom:
 
 
 def _bones(
-    hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, outs: list[HairOut]
+    hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, outs: list[ExportStrands]
 ) -> tuple[BoneWeights | None, tuple[str, ...]]:
     """The bones of all strands; none where some hair has no skinned head, which is reported."""
     bones, without = [], []

@@ -27,6 +27,7 @@ class CardFormat:
     """One of the formats.
 
     name: as the command line has it.
+    entry, about: in the list of formats of the dialog.
     suffixes: of such files, the usual one first.
     up: "Y" or "Z"; axes are right-handed.
     unit: of lengths in the file, and how many of them are a metre.
@@ -36,6 +37,8 @@ class CardFormat:
 
     name: str
     title: str
+    entry: str
+    about: str
     suffixes: tuple[str, ...]
     up: str
     unit: str
@@ -62,6 +65,8 @@ class CardFormat:
 GLB = CardFormat(
     "glb",
     "glTF Binary",
+    "glTF (.glb)",
+    "Metres, Y up; for three.js, Godot and most others",
     (".glb",),
     "Y",
     "metre",
@@ -78,6 +83,8 @@ GLB = CardFormat(
 FBX = CardFormat(
     "fbx",
     "FBX",
+    "FBX (.fbx)",
+    "Centimetres, Y up, with a LOD group; for Unreal and Unity",
     (".fbx",),
     "Y",
     "centimetre",
@@ -95,6 +102,8 @@ FBX = CardFormat(
 USD = CardFormat(
     "usd",
     "Universal Scene Description",
+    "USD (.usd)",
+    "Metres, Z up",
     (".usd", ".usda", ".usdc"),
     "Z",
     "metre",
@@ -111,6 +120,8 @@ USD = CardFormat(
 OBJ = CardFormat(
     "obj",
     "Wavefront OBJ",
+    "Wavefront (.obj)",
+    "Metres, Y up; without tangents",
     (".obj",),
     "Y",
     "metre",
@@ -124,6 +135,7 @@ OBJ = CardFormat(
     {},
 )
 FORMATS = (GLB, FBX, USD, OBJ)
+SUFFIXES = tuple(suffix for each in FORMATS for suffix in each.suffixes)
 
 
 def format_of(path: Path, name: str | None = None) -> tuple[Path, CardFormat]:
@@ -140,9 +152,9 @@ def format_of(path: Path, name: str | None = None) -> tuple[Path, CardFormat]:
         if suffix in known.suffixes and name in (None, known.name):
             return path, known
     named = next((known for known in FORMATS if known.name == name), None)
-    if named is not None and not any(suffix in known.suffixes for known in FORMATS):
+    if named is not None and suffix not in SUFFIXES:
         return path.with_name(path.name + named.suffixes[0]), named
-    suffixes = named.suffixes if named else [s for known in FORMATS for s in known.suffixes]
+    suffixes = named.suffixes if named else SUFFIXES
     raise HairloomError(
         f"cards are not written as '{path.suffix}'" + (f" in the format {name}" if name else ""),
         place=str(path),

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -40,7 +40,7 @@ _WAITING = 1 << 28
 
 @dataclass(frozen=True)
 class UsdSpace:
-    """What a program takes for granted.
+    """The unit and axes of the stage.
 
     up: "Y" or "Z".
     scale: metres in one unit.
@@ -48,17 +48,6 @@ class UsdSpace:
 
     up: str
     scale: float
-
-
-USD_SPACES = MappingProxyType(
-    {
-        "blender": UsdSpace("Z", 1.0),
-        "unreal": UsdSpace("Z", 0.01),
-        "unity": UsdSpace("Y", 1.0),
-        "maya": UsdSpace("Y", 0.01),
-        "houdini": UsdSpace("Y", 1.0),
-    }
-)
 
 
 def write_usd(

@@ -18,7 +18,7 @@ class SkinSettings(Settings):
     section = "skin"
     title = "Soft Shadow on Skin"
     owner = "groom"
-    switch = "soft_shadow"
+    header_toggle = "soft_shadow"
 
     soft_shadow: bool = toggle(
         True,

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tiers import few_in_commits
+from tiers import few_by_name, few_in_commits
 
 from hairloom.addon.dynamics.forces import predict
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -303,7 +303,9 @@ def tips_after_two_seconds(kit, fps, values, bowed):
     return scene.play(2.0, fps)[-1].grid[:, -1]
 
 
-@pytest.mark.parametrize("values", [{}, {"wind_speed": 4.0, "damping": 2.0}], ids=["still", "wind"])
+@pytest.mark.parametrize(
+    "values", few_by_name({"still": {}, "wind": {"wind_speed": 4.0, "damping": 2.0}}, "still")
+)
 def test_the_frame_rate_does_not_matter(kit, values):
     """Under 2 % of the hair's length (0.2 m) at the tips, any two rates.
 

@@ -14,7 +14,8 @@ import pytest
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.groom import Groom, GroomMotion
-from hairloom.addon.exchange.usd.groom_usd import USD_SPACES, write_usd
+from hairloom.addon.exchange.strand_formats import USD
+from hairloom.addon.exchange.usd.groom_usd import write_usd
 from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 from hairloom.addon.strands import StrandSet
 
@@ -105,15 +106,16 @@ def _primvars(prim: Any) -> list[Any]:
     return [each for each in found if each.GetPrimvarName() != "widths"]
 
 
-@pytest.mark.parametrize("space", USD_SPACES.values(), ids=USD_SPACES.keys())
-def test_a_strand_of_a_metre_is_where_it_belongs(tmp_path: Path, space: Any) -> None:
+@pytest.mark.parametrize("layout", USD.layouts, ids=lambda layout: layout.name)
+def test_a_strand_of_a_metre_is_where_it_belongs(tmp_path: Path, layout: Any) -> None:
     """Measured by the stage's own unit and axis: from (1, 2, 3) a metre up."""
     strand = StrandSet([[1, 2, 3], [1, 2, 3.5], [1, 2, 4]], [0, 3], [0.0005] * 3, [0])
-    write_usd(tmp_path / "a.usda", Groom(strand), up=space.up, scale=space.scale)
+    space, scale = layout.space, 1.0 / layout.space.per_metre
+    write_usd(tmp_path / "a.usda", Groom(strand), up=space.up, scale=scale)
     stage = stage_of(tmp_path / "a.usda")
     curves = only_curves(stage)
     unit = UsdGeom.GetStageMetersPerUnit(stage)
-    assert (UsdGeom.GetStageUpAxis(stage), unit) == (space.up, space.scale)
+    assert (UsdGeom.GetStageUpAxis(stage), unit) == (space.up, scale)
     points = np.array(curves.GetPointsAttr().Get(), np.float64) * unit
     right, up, back = points[:, 0], points[:, 1], points[:, 2]  # of a file with Y up
     if space.up == "Z":
@@ -508,7 +510,13 @@ for path in sorted(Path(sys.argv[2]).iterdir()):
 """
 
 
-@pytest.mark.parametrize(("suffix", "count"), [(".usdc", 24), (".usda", 48)])
+@pytest.mark.parametrize(
+    ("suffix", "count"),
+    [
+        (".usdc", 24),
+        pytest.param(".usda", 48, marks=pytest.mark.slow),
+    ],
+)
 def test_damaged_files_are_refused_or_read(tmp_path: Path, suffix: str, count: int) -> None:
     """Cut, overwritten and shortened files, read in a process of its own that must end well."""
     groom = full_groom()

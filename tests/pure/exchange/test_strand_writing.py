@@ -15,8 +15,8 @@ from hairloom.addon.exchange.groom import Groom, GroomMotion, with_guide_copies
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.joined_grooms import joined_bones, joined_grooms
 from hairloom.addon.exchange.strand_check import check_lines, check_strands
+from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 from hairloom.addon.exchange.strand_formats import ALEMBIC, HAIR, TRESSFX, USD
-from hairloom.addon.exchange.strand_output import StrandOutput
 from hairloom.addon.exchange.strand_writing import write_strands
 from hairloom.addon.exchange.tfxbone import strongest_bones
 from hairloom.addon.exchange.tressfx import read_tfx
@@ -72,7 +72,7 @@ def test_the_suffix_says_the_format(suffix: str, tmp_path: Path) -> None:
     pytest.importorskip("alembic3d")
     pytest.importorskip("pxr")
     path = tmp_path / f"hair{suffix}"
-    written = write_strands(path, guided(), StrandOutput(parts="strands"))
+    written = write_strands(path, guided(), StrandExportSettings(parts="strands"))
     assert written.files == (path,) and list(tmp_path.iterdir()) == [path]
     readers = {".abc": read_groom_alembic, ".tfx": read_tfx, ".hair": read_hair_file}
     read = readers.get(suffix, read_usd)(path)
@@ -84,14 +84,21 @@ def test_the_suffix_says_the_format(suffix: str, tmp_path: Path) -> None:
 
 def test_a_suffix_or_engine_that_is_not_known_is_named(tmp_path: Path) -> None:
     for name, output, message in (
-        ("hair.obj", StrandOutput(), r"'\.obj' is no suffix.*\.abc"),
-        ("hair.abc", StrandOutput(engine="maya"), "no layout for 'maya'.*unreal, unity, blender"),
-        ("hair.tfx", StrandOutput(engine="unreal"), "no layout for 'unreal'.*up axis"),
-        ("hair.usda", StrandOutput(scale=0.0), "unit of 0.0 m"),
-        ("hair.hair", StrandOutput(scale=float("nan")), "unit of nan m"),
+        ("hair.obj", StrandExportSettings(), r"'\.obj' is no suffix.*\.abc"),
+        (
+            "hair.abc",
+            StrandExportSettings(engine="maya"),
+            "no layout for 'maya'.*unreal, unity, blender",
+        ),
+        ("hair.tfx", StrandExportSettings(engine="unreal"), "TressFX does not have.*'For'"),
+        ("hair.abc", StrandExportSettings(up="Y"), "Groom Alembic does not have.*'Up'"),
+        ("hair.hair", StrandExportSettings(vertex_count="8"), ".hair does not have.*'Vertices'"),
     ):
         with pytest.raises(HairloomError, match=message):
             write_strands(tmp_path / name, groom(), output)
+    for scale in (-1.0, float("nan")):
+        with pytest.raises(HairloomError, match="'scale'"):
+            StrandExportSettings(scale=scale)
     motion = GroomMotion([groom().strands.points], 24.0)
     with pytest.raises(HairloomError, match=r"\.hair holds no motion"):
         write_strands(tmp_path / "hair.hair", groom(), motion=motion)
@@ -103,13 +110,13 @@ def test_usd_has_the_parts_that_the_engine_wants_in_motion_too(tmp_path: Path) -
     hair = guided()
     frames = [hair.strands.points + np.float32(step) for step in (0.0, 0.5)]
     for engine, parts, count in (
-        ("unreal", "", 12),
-        ("houdini", "", 10),
+        ("unreal", "usual", 12),
+        ("houdini", "usual", 10),
         ("houdini", "guides", 2),
         ("houdini", "both", 12),
     ):
         path = tmp_path / f"{engine}{parts}.usdc"  # the library remembers files by name
-        output = StrandOutput(engine=engine, parts=parts)
+        output = StrandExportSettings(engine=engine, parts=parts)
         write_strands(path, hair, output, GroomMotion(iter(frames), 24.0, 5))
         stage = usd.Stage.Open(str(path))
         (prim,) = (each for each in stage.Traverse() if each.GetTypeName() == "BasisCurves")
@@ -123,8 +130,8 @@ def test_usd_has_the_parts_that_the_engine_wants_in_motion_too(tmp_path: Path) -
 
 def test_groups_go_into_files_with_the_bones_of_their_strands(tmp_path: Path) -> None:
     bones = strongest_bones(("a", "b", "c"), np.random.default_rng(2).random((COUNT + 2, 3)))
-    output = StrandOutput(by_group=True, bones=bones)
-    written = write_strands(tmp_path / "hair.tfx", guided(), output)
+    output = StrandExportSettings(by_group=True)
+    written = write_strands(tmp_path / "hair.tfx", replace(guided(), bones=bones), output)
     names = ["hair_crown.tfx", "hair_group4.tfx", "hair_crown.tfxbone", "hair_group4.tfxbone"]
     assert [path.name for path in written.files] == names
     for name, own in (("crown", slice(0, 6)), ("group4", slice(6, 10))):
@@ -137,7 +144,8 @@ def test_groups_go_into_files_with_the_bones_of_their_strands(tmp_path: Path) ->
 
 def test_bones_of_the_last_strand_fill_up_to_64(tmp_path: Path) -> None:
     bones = strongest_bones(("a", "b"), np.eye(2)[np.arange(COUNT) % 2])
-    write_strands(tmp_path / "hair.tfx", groom(), StrandOutput(bones=bones, fills_groups=True))
+    hair = replace(groom(), bones=bones)
+    write_strands(tmp_path / "hair.tfx", hair, StrandExportSettings(fills_groups=True))
     assert read_tfx(tmp_path / "hair.tfx").strands.strand_count == 64
     held = read_tfxbone(tmp_path / "hair.tfxbone")
     assert held.strand_count == 64 and (held.bone[COUNT:, 0] == 1).all()
@@ -147,7 +155,7 @@ def test_a_file_that_fails_takes_the_others_with_it(tmp_path: Path) -> None:
     (tmp_path / "hair_crown.tfx").write_bytes(b"old")
     (tmp_path / "hair_group4.tfx").mkdir()
     with pytest.raises(HairloomError, match="a folder has this name"):
-        write_strands(tmp_path / "hair.tfx", groom(), StrandOutput(by_group=True))
+        write_strands(tmp_path / "hair.tfx", groom(), StrandExportSettings(by_group=True))
     assert (tmp_path / "hair_crown.tfx").read_bytes() == b"old"
 
 
@@ -198,7 +206,7 @@ def test_joined_bones_are_one_by_name() -> None:
 def test_the_check_counts_in_the_files_own_unit() -> None:
     place = np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 4.0]])
     hair = Groom(StrandSet(place, [0, 2], np.full(2, 4e-5), [3]), group_names={3: "fringe"})
-    facts = check_strands(hair, USD, StrandOutput(engine="maya"))
+    facts = check_strands(hair, USD, StrandExportSettings(engine="maya"))
     assert (facts["unit"], facts["up"], facts["is_mirrored"]) == ("cm", "Y", False)
     np.testing.assert_allclose(facts["lowest"], (100.0, 300.0, -200.0))
     np.testing.assert_allclose(facts["highest"], (100.0, 400.0, -200.0))
@@ -206,8 +214,8 @@ def test_the_check_counts_in_the_files_own_unit() -> None:
     lines = check_lines(facts)
     assert lines[0] == "1 strands, 0 guides, 2 points" and "Groups: fringe (1)" in lines
     assert "Width: 0.008 cm" in lines and "Length: 100 cm" in lines
-    unreal = check_strands(hair, ALEMBIC, StrandOutput())
+    unreal = check_strands(hair, ALEMBIC, StrandExportSettings())
     assert unreal["is_mirrored"] and any("left-handed" in line for line in check_lines(unreal))
-    assert check_strands(hair, HAIR, StrandOutput(scale=0.001))["unit"] == "mm"
-    inch = check_strands(hair, TRESSFX, StrandOutput(scale=0.0254))
+    assert check_strands(hair, HAIR, StrandExportSettings(scale=0.001))["unit"] == "mm"
+    inch = check_strands(hair, TRESSFX, StrandExportSettings(scale=0.0254))
     assert inch["unit"] == "1/39.3701 m" and inch["points_per_curve"] == (2, 2)

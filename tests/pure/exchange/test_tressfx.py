@@ -11,7 +11,7 @@ import pytest
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.groom import Groom
-from hairloom.addon.exchange.strand_output import StrandOutput
+from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 from hairloom.addon.exchange.strand_writing import write_strands
 from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
 from hairloom.addon.strands import StrandSet
@@ -266,7 +266,7 @@ def test_a_file_for_each_group(tmp_path: Path) -> None:
     strands = StrandSet(strands.points, strands.offsets, strands.radius, np.arange(12) % 3)
     names = {0: "front/top", 1: "Side", 2: "side"}
     groom = Groom(strands, group_names=names)
-    output = StrandOutput(by_group=True, up="Z")
+    output = StrandExportSettings(by_group=True, up="Z")
     written = write_strands(tmp_path / "hair.tfx", groom, output)
     files, notes = written.files, written.notes
     assert sorted(tmp_path.iterdir()) == sorted(files)

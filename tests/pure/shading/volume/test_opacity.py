@@ -241,6 +241,7 @@ def crossed(strands: np.ndarray, radius: float, lamp: np.ndarray, place: np.ndar
     return int((meets & (gap < radius)).sum())
 
 
+@pytest.mark.slow
 def test_a_lamp_within_the_ball_counts_as_many_strands_as_its_rays_meet() -> None:
     """Also towards the rim of its wide map, whichever way strands run there."""
     random, radius, lamp = np.random.default_rng(7), 5e-4, np.array([0.0, 0.02, 0.07])

@@ -29,7 +29,7 @@ FILE_KINDS = tuple((each.title, each.suffixes) for each in STRAND_FORMATS)
 #: what becomes of guides beside strands: left out, hair curves of their own, among the strands
 GUIDES = ("leave", "apart", "among")
 #: Hair of an extent beyond these is no hair of a head, nor of an animal [m].
-_LEAST_EXTENT, _MOST_EXTENT = 0.005, 20.0
+_MIN_EXTENT, _MAX_EXTENT = 0.005, 20.0
 
 
 @dataclass(frozen=True)
@@ -148,12 +148,12 @@ def _bound(
 
 def _remedy(strands: StrandSet, surface: Surface, choices: StrandImport, path: Path) -> str | None:
     """How the file would fit the mesh, if there is a way: it is read again to know."""
-    ways = {"": strands.roots}
+    candidates = {"": strands.roots}
     for up in ("Y", "Z"):
         roots = _read(path, replace(choices, up=up)).strands.roots
         if not np.array_equal(roots, strands.roots):
-            ways[up] = roots
-    fit = better_fit(ways, ClosestPointSearch(surface))
+            candidates[up] = roots
+    fit = better_fit(candidates, ClosestPointSearch(surface))
     if fit is None:
         return None
     wanted, options = [], []
@@ -170,7 +170,7 @@ def _remedy(strands: StrandSet, surface: Surface, choices: StrandImport, path: P
 def _size_warning(strands: StrandSet, path: Path) -> tuple[str, ...]:
     low, high = strands.bounds()
     extent = float((high - low).max())
-    if _LEAST_EXTENT <= extent <= _MOST_EXTENT:
+    if _MIN_EXTENT <= extent <= _MAX_EXTENT:
         return ()
     return (f"{path.name}: its hair is {extent:.3g} m wide. Import it with another scale.",)
 

@@ -1,4 +1,4 @@
-"""Hair as it goes into files: what Blender shows of it, with its guides and all that it says."""
+"""Hair as it goes into files: what Blender shows of it, with its guides and all attributes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _OF_GUIDES = ("is_guide", "closest_guides", "guide_weights")
 
 
 @dataclass(frozen=True)
-class Wishes:
+class ExportRequest:
     """What a file asks for.
 
     guides: curves for the guides beside the strands.
@@ -41,7 +41,7 @@ class Wishes:
 
 
 @dataclass(frozen=True)
-class HairOut:
+class ExportStrands:
     """A hair as it goes into a file.
 
     seen: its strands; in the groom copies of guides may come behind them.
@@ -61,7 +61,9 @@ class HairOut:
         return np.concatenate([seen, seen[self.copied]]) if len(self.copied) else seen
 
 
-def still_hair(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, wishes: Wishes) -> HairOut:
+def still_hair(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, request: ExportRequest
+) -> ExportStrands:
     """All strands after the modifiers, with their own points; or guides and children if there are.
 
     Guides that the hair has marked stay; else there are copies of those that Hairloom chooses.
@@ -73,24 +75,24 @@ def still_hair(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, wishes: W
     if hair.data.hairloom.children.method != "none":
         rig = rig_of(hair, source)
         groom = Groom(rig.strands, hair.name, group_names=group_names(hair))
-        return _told(hair, source, _out(groom, rig, wishes, look_color(hair)), rig)
+        return _with_notes(hair, source, _out(groom, rig, request, look_color(hair)), rig)
     said = _without_empty_marks(stored_groom(hair, depsgraph, source.kept))
-    if wishes.guides and "is_guide" not in said:
+    if request.guides and "is_guide" not in said:
         rig = rig_of(hair, source)
         groom = Groom(_bound_as(source.strands, rig.strands), hair.name, **said)
-        return _told(hair, source, _out(groom, rig, wishes, look_color(hair)), rig)
+        return _with_notes(hair, source, _out(groom, rig, request, look_color(hair)), rig)
     strands = source.strands
-    if source.head is not None and (wishes.roots or strands.root_uv is None):
+    if source.head is not None and (request.roots or strands.root_uv is None):
         strands = bind_roots(strands, source.head, place=hair.name).strands
     groom = Groom(strands, hair.name, **said)
-    if wishes.guides and groom.closest_guides is None:
+    if request.guides and groom.closest_guides is None:
         groom = _weighed(groom, hair.data.hairloom.guides.cv_count)
-    return _told(hair, source, _out(groom, None, wishes, look_color(hair)))
+    return _with_notes(hair, source, _out(groom, None, request, look_color(hair)))
 
 
 def baked_hair(
-    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, cache: Cache, wishes: Wishes
-) -> HairOut:
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, cache: Cache, request: ExportRequest
+) -> ExportStrands:
     """The strands of a bake at rest, and what the hair says of them where they are its curves.
 
     Raises:
@@ -108,13 +110,13 @@ def baked_hair(
         notes = (f"{hair.name}: its bake has no root UVs. Bake again to have them in the file.",)
     groom = Groom(rig.strands, hair.name, **({"group_names": group_names(hair)} | said))
     has_marks = groom.is_guide is not None
-    out = _out(groom, None if has_marks else rig, wishes, look_color(hair))
+    out = _out(groom, None if has_marks else rig, request, look_color(hair))
     return replace(out, notes=notes)
 
 
 def hair_of_rig(
-    rig: Rig, groom: Groom, wishes: Wishes, color: tuple[float, float, float]
-) -> HairOut:
+    rig: Rig, groom: Groom, request: ExportRequest, color: tuple[float, float, float]
+) -> ExportStrands:
     """Hair of the command line.
 
     Args:
@@ -124,7 +126,7 @@ def hair_of_rig(
     bound = replace(groom, strands=_bound_as(groom.strands, rig.strands))
     if groom.is_guide is not None and not groom.is_guide.any():
         bound = replace(bound, is_guide=None, closest_guides=None, guide_weights=None)
-    return _out(bound, rig if bound.is_guide is None else None, wishes, color)
+    return _out(bound, rig if bound.is_guide is None else None, request, color)
 
 
 def look_color(hair: bpy.types.Object) -> tuple[float, float, float]:
@@ -134,18 +136,20 @@ def look_color(hair: bpy.types.Object) -> tuple[float, float, float]:
 
 
 def _out(
-    groom: Groom, rig: Rig | None, wishes: Wishes, color: tuple[float, float, float]
-) -> HairOut:
+    groom: Groom, rig: Rig | None, request: ExportRequest, color: tuple[float, float, float]
+) -> ExportStrands:
     """With the copies of the rig's guides, if they are wanted."""
-    if groom.color is None and wishes.color:
+    if groom.color is None and request.color:
         groom = replace(groom, color=np.full((groom.strands.point_count, 3), color, np.float32))
-    if rig is None or not wishes.guides:
-        return HairOut(groom, groom.strands, np.zeros(0, np.int64))
+    if rig is None or not request.guides:
+        return ExportStrands(groom, groom.strands, np.zeros(0, np.int64))
     whole = with_guide_copies(groom, rig.guides, rig.weights.guide, rig.weights.weight)
-    return HairOut(whole, groom.strands, points_of(groom.strands, rig.guides))
+    return ExportStrands(whole, groom.strands, points_of(groom.strands, rig.guides))
 
 
-def _told(hair: bpy.types.Object, source: Source, out: HairOut, rig: Rig | None = None) -> HairOut:
+def _with_notes(
+    hair: bpy.types.Object, source: Source, out: ExportStrands, rig: Rig | None = None
+) -> ExportStrands:
     notes = () if rig is None else notes_of(hair, rig)
     return replace(out, dropped=source.dropped, notes=(*source.warnings, *notes))
 

@@ -1,0 +1,197 @@
+"""How strands are written to files: what an artist chooses, and the layout that follows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from ..errors import HairloomError
+from ..params import Owner, Settings, choice, integer, number, toggle
+from .files.file_space import FileSpace
+from .groom_presets import GroomPreset
+from .strand_formats import STRAND_FORMATS, StrandFormat
+from .tressfx_layout import VERTEX_COUNTS
+
+#: as the format has it, or the engine wants it
+USUAL = "usual"
+
+
+def _engines() -> tuple[tuple[str, str, str], ...]:
+    """Those of all formats, with what each format says of them."""
+    titles: dict[str, str] = {}
+    about: dict[str, list[str]] = {}
+    for each in STRAND_FORMATS:
+        for layout in each.layouts if "engine" in each.options else ():
+            titles[layout.name] = layout.title
+            about.setdefault(layout.name, []).append(f"{each.title}: {layout.about}")
+    return tuple((name, title, ". ".join(about[name])) for name, title in titles.items())
+
+
+@dataclass(frozen=True, kw_only=True)
+class StrandExportSettings(Settings):
+    """What is chosen beside the file and its format; a format goes by some of it alone."""
+
+    section: ClassVar[str] = "strands_export"
+    title: ClassVar[str] = "Strand Files"
+    owner: ClassVar[Owner] = "job"
+    panels: ClassVar[tuple[str, ...]] = ("Engine", "Include", "TressFX", "Animation")
+
+    engine: str = choice(
+        USUAL,
+        ((USUAL, "As Usual", "Unreal in Alembic, Blender in USD"), *_engines()),
+        label="For",
+        description="Which program the file is for; it sets unit, axes and parts",
+        panel="Engine",
+    )
+    basis: str = choice(
+        USUAL,
+        (
+            (USUAL, "As Usual", "Straight in Alembic, curved in USD"),
+            ("linear", "Straight", "Straight lines between points"),
+            ("cubic", "Curved", "Catmull-Rom curves through the points"),
+        ),
+        label="Curves",
+        description="What the hair is between its points, in Alembic and USD",
+        panel="Engine",
+    )
+    up: str = choice(
+        USUAL,
+        (
+            (USUAL, "As Usual", "As the program has it; Y in TressFX, Z in .hair"),
+            ("Y", "Y Up", "The file's Y axis points up, as in most engines"),
+            ("Z", "Z Up", "The file's Z axis points up, as in Blender"),
+        ),
+        label="Up",
+        description="Which axis points up in the file; not for Alembic",
+        panel="Engine",
+    )
+    scale: float = number(
+        0.0,
+        label="Scale",
+        description="Metres in one unit of the file: 0.01 writes centimetres. 0: as the program "
+        "has it; not for Alembic",
+        soft=(0.0, 100.0),
+        hard=(0.0, 1.0e6),
+        panel="Engine",
+    )
+    parts: str = choice(
+        USUAL,
+        (
+            (USUAL, "As the Engine Wants", "Unreal gets strands and guides, others the strands"),
+            ("strands", "Strands", "The strands that are seen"),
+            ("guides", "Guides", "The guides alone"),
+            ("both", "Strands and Guides", "The strands, and copies of the guides marked as such"),
+        ),
+        label="What",
+        description="What is written; TressFX calls all of it guides",
+        panel="Include",
+    )
+    by_group: bool = toggle(
+        False,
+        label="Split by Group",
+        description="An object or prim for each group, which Unity always gets; a file for each "
+        "where the format has no groups: TressFX and .hair",
+        panel="Include",
+    )
+    bones: bool = toggle(
+        True,
+        label="Bones",
+        description="Where an armature and vertex groups move the head, write which bones carry "
+        "each strand to a .tfxbone file beside the .tfx file",
+        panel="Include",
+    )
+    point_uv: bool = toggle(
+        False,
+        label="UVs of Points",
+        description="Write UVs of points too. TressFX: u across the strands, v along them. "
+        ".hair: root UVs as LuxCore does; other programs may refuse such a file",
+        panel="Include",
+    )
+    vertex_count: str = choice(
+        "fit",
+        (
+            ("fit", "As Needed", "The smallest number that holds the longest strand"),
+            *((str(n), str(n), f"{n} vertices on each strand") for n in VERTEX_COUNTS),
+        ),
+        label="Vertices",
+        description="On each strand; strands with other counts are resampled",
+        panel="TressFX",
+    )
+    held_count: int = integer(
+        1,
+        label="Held Vertices",
+        description="Vertices at the root that TressFX does not move; AMD's exporter holds two",
+        soft=(0, 8),
+        hard=(0, 8),
+        panel="TressFX",
+    )
+    fills_groups: bool = toggle(
+        False,
+        label="Fill up to 64",
+        description="Repeat the last strand until there is a multiple of 64, as TressFX simulates "
+        "64 at a time; its own loader does so by itself, others may not",
+        panel="TressFX",
+    )
+    use_bake: bool = toggle(
+        True,
+        label="Use Bake",
+        description="Write the motion that Hairloom has baked, of hair that has a bake; off: as "
+        "Blender's own animation and modifiers move the hair",
+        panel="Animation",
+    )
+
+
+def layout_of(kind: StrandFormat, settings: StrandExportSettings) -> GroomPreset:
+    """The engine's layout of the file, with all that was chosen in its place.
+
+    Raises:
+        HairloomError: an engine that the format does not know, or a choice that it cannot follow.
+    """
+    _check_options(kind, settings)
+    layout = _engine_layout(kind, settings.engine)
+    space = layout.space
+    if settings.scale or settings.up != USUAL:
+        up = space.up if settings.up == USUAL else settings.up
+        space = FileSpace(up, 1.0 / settings.scale if settings.scale else space.per_metre)
+    return replace(
+        layout,
+        space=space,
+        parts=layout.parts if settings.parts == USUAL else settings.parts,
+        is_split=layout.is_split or settings.by_group,
+        basis=layout.basis if settings.basis == USUAL else settings.basis,
+    )
+
+
+def metres_per_unit(kind: StrandFormat, settings: StrandExportSettings) -> float:
+    """Metres in one unit of the file.
+
+    Raises:
+        HairloomError: as `layout_of`.
+    """
+    return settings.scale or 1.0 / layout_of(kind, settings).space.per_metre
+
+
+def _engine_layout(kind: StrandFormat, engine: str) -> GroomPreset:
+    """The layout for the engine that is asked for, or the format's usual one."""
+    if engine == USUAL:
+        return kind.layouts[0]
+    for layout in kind.layouts:
+        if layout.name == engine:
+            return layout
+    known = ", ".join(layout.name for layout in kind.layouts)
+    raise HairloomError(
+        f"{kind.title} has no layout for '{engine}'",
+        place="engine",
+        remedy=f"Choose one of {known}",
+    )
+
+
+def _check_options(kind: StrandFormat, settings: StrandExportSettings) -> None:
+    for parameter in settings.parameters():
+        is_chosen = getattr(settings, parameter.name) != parameter.default
+        if is_chosen and parameter.name not in kind.options:
+            raise HairloomError(
+                f"{kind.title} does not have the option '{parameter.label}'",
+                place=parameter.name,
+                remedy="Leave the option out, or choose another format",
+            )
