@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 pytest.importorskip("bpy", reason="turntables are drawn inside Blender")
 
@@ -136,7 +137,7 @@ def test_transparent_pictures_have_no_backdrop(table: Turntable) -> None:
     assert picture[0, 0].tolist() == [0.0] * 4 and picture[..., 3].max() > 0.9
 
 
-@pytest.mark.parametrize("is_there", [False, True])
+@pytest.mark.parametrize("is_there", few_in_commits([True, False]))
 def test_what_is_cancelled_leaves_nothing(table: Turntable, is_there: bool) -> None:
     kept = table.folder / "turntable_0001.png"
     if is_there:
@@ -269,6 +270,7 @@ def test_names_of_data_blocks_become_names_of_files() -> None:
 GROWN = ["--set", "grow.strand_count=60", "--set", "guides.guide_count=10"]
 
 
+@pytest.mark.slow
 def test_the_command_line_turns_a_groom(tmp_path: Path) -> None:
     folder, report = tmp_path / "turn", tmp_path / "report.json"
     sizes = ["--frames", "3", "--width", "64", "--height", "48", "--samples", "1"]

@@ -268,9 +268,9 @@ def test_wind_carries_free_cloth_along():
 @pytest.mark.parametrize(
     ("values", "tolerance"),
     [
-        ({}, 2e-5),
+        pytest.param({}, 2e-5, marks=pytest.mark.slow),
         ({"drag": 2.0, "wind_speed": 3.0, "stretch": 0.01, "bend": 5.0, "shape": 1.0}, 5e-5),
-        ({"radius": 0.01}, 2e-5),
+        pytest.param({"radius": 0.01}, 2e-5, marks=pytest.mark.slow),
     ],
 )
 def test_the_slow_form_agrees(values, tolerance):
