@@ -1,6 +1,15 @@
 """Dynamics on the GPU: `dynamics.step.advance` as a compute shader, one invocation a guide.
 
-The guides stay on the GPU from frame to frame, in the textures of guide_textures.py.
+The guides stay on the GPU from frame to frame, in textures with the layout of textures.strand_rows:
+
+    positions      RGBA32F: xyz world [m], w the z of a substep earlier
+    previous_positions   RG32F: x and y of a substep earlier; software drivers take time for each
+                   number that is written
+    bridged        RGBA32F: xyz world [m], at the frame's very end (step.grid_at_frame_end)
+    styles_earlier, styles_before, styles_now   RGBA32F: xyz world [m], see frame.Drive
+    rest_shapes    RGBA32F: of CV i xyz curvature [m] and w hold (style.LocalShape); of CV 0 x its
+                   twist CV
+    rest_lengths   R32F: [m] to the next CV; at the tip whether it is held
 
 Limitations: a CV keeps two contacts at once, the most pressing ones, where numpy keeps one for each
 collider. A set of balls has each of its balls asked, numpy only near ones. Two forms that round
@@ -23,10 +32,9 @@ from ..dynamics.contacts import REACH
 from ..dynamics.frame import Drive, Frame, check_drive
 from ..dynamics.schedule import due_substeps
 from ..dynamics.settings import DynamicsSettings
-from ..dynamics.state import DynamicsState, as_rows
+from ..dynamics.state import DynamicsState, Rest, as_rows
 from .collider_textures import ColliderTextures
 from .dynamics_block import block_of, moments_of, spans_of
-from .guide_textures import points_texture, rest_lengths, rest_shapes
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .textures import (
     UniformBlock,
@@ -229,3 +237,34 @@ class DynamicsPass:
         """A texture as (guide_count, cv_count, channels)."""
         pixels = texture_to_array(self._textures[name])
         return from_strand_rows(pixels, self._state.guide_count, self._state.cv_count)
+
+
+def points_texture(grid: Floats, lane: Floats | float = 0.0) -> Any:
+    """Points (guide_count, cv_count, 3) as a texture in the layout of strand_rows.
+
+    Args:
+        lane: (guide_count, cv_count) what goes with them in w.
+    """
+    points = np.empty((*grid.shape[:2], 4), np.float32)
+    for axis in range(3):  # one by one is three times faster than all three
+        points[..., axis] = grid[..., axis]
+    points[..., 3] = lane
+    return texture_from(strand_rows(points), "RGBA32F")
+
+
+def rest_shapes(rest: Rest) -> Floats:
+    """`rest_shapes`, (guide_count, cv_count, 4)."""
+    shapes = np.zeros((*rest.position.shape[:0:-1], 4), np.float32)
+    shapes[:, 1:-1, :3] = rest.shape.curvature.transpose(2, 1, 0)
+    shapes[:, 1:-1, 3] = rest.shape.hold.T
+    shapes[:, 0, 0] = rest.shape.twist_cv
+    return shapes
+
+
+def rest_lengths(rest: Rest) -> Floats:
+    """`rest_lengths`, (guide_count, cv_count, 1)."""
+    lengths = np.zeros((*rest.position.shape[:0:-1], 1), np.float32)
+    lengths[:, :-1, 0] = rest.length.T
+    if rest.tip_held is not None:
+        lengths[:, -1, 0] = rest.tip_held
+    return lengths

@@ -21,8 +21,7 @@ from hairloom.addon.blender.base.images import read_texture
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.pictures import turntable as turntable_module
 from hairloom.addon.blender.pictures import video
-from hairloom.addon.blender.pictures.labels import labelled
-from hairloom.addon.blender.pictures.sheet import COLUMNS, VIEWS, Sheet
+from hairloom.addon.blender.pictures.sheet import COLUMNS, VIEWS, Sheet, labelled
 from hairloom.addon.blender.pictures.showing import file_name, shown_groom
 from hairloom.addon.blender.pictures.turntable import Turntable, TurntableSettings
 from hairloom.addon.blender.properties.presets import shipped

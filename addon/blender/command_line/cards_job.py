@@ -14,15 +14,21 @@ from ...cards.export_settings import CardExportSettings
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...errors import HairloomError
-from ...exchange.cards.card_formats import format_of
+from ...exchange.cards.card_formats import FORMATS, format_of
 from ...pipeline import Rig
 from ..bakes.guide_motion import GuideMotion
 from ..cards.build import CardInputs, order_line
 from ..cards.files import CardOutput, WrittenCards, write_cards
 from ..cards.occluders import read_occluders
 from ..cards.textures import chosen_pictures, named_pictures
-from .card_options import add_card_options
-from .job_options import add_texture_option, frames_of_option, parameters_of
+from .job_options import (
+    add_bake_option,
+    add_frames_option,
+    add_parameter_options,
+    add_texture_option,
+    frames_of_option,
+    parameters_of,
+)
 from .job_steps import Job, finish, motion_of, read_rig, tell_notes
 from .verb import Verb
 
@@ -100,7 +106,18 @@ def _moving(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
     add_texture_option(parser)
-    add_card_options(parser.add_argument_group("the files"))
+    files = parser.add_argument_group("the files")
+    files.add_argument(
+        "--format",
+        choices=[each.name for each in FORMATS],
+        help="of the file (default: by its suffix)",
+    )
+    files.add_argument(
+        "--levels", type=int, metavar="N", help="levels of detail (default: those of cards.levels)"
+    )
+    add_parameter_options(files, CardExportSettings)
+    add_bake_option(files)
+    add_frames_option(files, "of the motion (default: all)")
 
 
 CARDS = Verb(

@@ -10,8 +10,12 @@ from hairloom.addon.dynamics.colliders.sphere_set import SphereSetCollider
 from hairloom.addon.dynamics.fitting.holes import close_holes
 from hairloom.addon.dynamics.fitting.settings import SphereFitSettings
 from hairloom.addon.dynamics.fitting.similarity import fit_similarity
-from hairloom.addon.dynamics.fitting.sphere_error import measured_error, union_places
-from hairloom.addon.dynamics.fitting.sphere_fit import fit_spheres, medial_balls
+from hairloom.addon.dynamics.fitting.sphere_fit import (
+    fit_spheres,
+    measured_error,
+    medial_balls,
+    union_places,
+)
 from hairloom.addon.dynamics.fitting.surface_samples import boundary_of, samples_of
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.strands import Surface
