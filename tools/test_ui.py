@@ -37,7 +37,7 @@ BACKENDS = ("opengl", "vulkan")
 ALL_TESTS = {"opengl": ("tests/pure", "tests/gpu"), "vulkan": ("tests/gpu", "tests/blender")}
 #: For a commit: what may differ with another Python and numpy, and what Vulkan may draw otherwise.
 COMMIT_TESTS = {
-    "opengl": ("-m", "portable", "tests/pure", "tests/gpu", "tests/blender"),
+    "opengl": ("-m", "portable and not slow", "tests/pure", "tests/gpu", "tests/blender"),
     "vulkan": ("-m", "draws and not slow", "tests/gpu", "tests/blender"),
 }
 TESTS_LIMIT_S = 3600

@@ -38,7 +38,7 @@ def groom_rig_hash(
 ) -> str:
     """Named hashes, see `simulated.hashes`; messages say by these names what has changed."""
     grown: dict[str, tuple[Hashed, ...]] = {}
-    if settings[ChildrenSettings].method != "none":  # bakes of older versions know of no children
+    if settings[ChildrenSettings].method != "none":
         grown["children"] = (
             settings[ChildrenSettings],
             _density_before_modifiers(head, settings),

@@ -7,7 +7,6 @@ can say which of them has changed.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from typing import Any, Protocol
 
 import bpy
@@ -20,9 +19,7 @@ type Arrays = dict[str, NDArray[Any]]
 type Hashed = NDArray[Any] | Settings | str | float | None
 
 #: Raise it when the same input gives other motion than before, so that old bakes say so.
-SOLVER_VERSION, CLOTH_VERSION = 2, 1
-#: The first version baked hair by the settings of its first frame; nothing else is different.
-_WITHOUT_ANIMATED_SETTINGS = "1"
+SOLVER_VERSION = CLOTH_VERSION = 1
 
 
 class Simulated(Protocol):
@@ -92,24 +89,6 @@ def differences(known: str, now: str) -> tuple[str, ...]:
     names = [name for name in after if before.get(name) != after[name]]
     names += [name for name in before if name not in after]
     return tuple(name.replace("_", " ") for name in names)
-
-
-def solver_part(version: str) -> str:
-    """The part of a rig hash that stands for the version of the solver."""
-    return hashes(solver=version)
-
-
-def as_now(rig_hash: str, frame_hashes: Sequence[str]) -> str:
-    """The rig hash of a bake of hair, with today's version where that gives the same motion.
-
-    Args:
-        frame_hashes: those of its frames.
-    """
-    settings = {_parts(frame_hash).get("settings") for frame_hash in frame_hashes}
-    if len(settings) > 1:
-        return rig_hash
-    old, now = (solver_part(each) for each in (_WITHOUT_ANIMATED_SETTINGS, str(SOLVER_VERSION)))
-    return " ".join(now if part == old else part for part in rig_hash.split())
 
 
 def _parts(named: str) -> dict[str, str]:

@@ -11,7 +11,7 @@ from ..scene.poses import read_pose
 from . import playback
 from .cache import Cache
 from .groom_hashes import groom_frame_hash, groom_rig_hash, settings_part
-from .simulated import as_now, differences
+from .simulated import differences
 
 
 def changed_since(
@@ -26,7 +26,7 @@ def changed_since(
     """
     facts, head, settings = cache.facts, head_of(hair), GroomSettings.of(hair)
     now = groom_rig_hash(hair, head, settings, depsgraph.scene)
-    changed = differences(as_now(facts.rig_hash, facts.frame_hashes), now)
+    changed = differences(facts.rig_hash, now)
     scene = depsgraph.scene
     if cache.holds(scene.frame_current) and not scene.frame_subframe:
         changed += _moved_otherwise(hair, head, cache, depsgraph)

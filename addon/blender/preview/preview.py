@@ -23,7 +23,7 @@ from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
 from ..bakes.cache import Cache, Facts
 from ..bakes.groom_hashes import RIG_PARTS, frame_rate, groom_rig_hash
-from ..bakes.simulated import Simulated, as_now, differences
+from ..bakes.simulated import Simulated, differences
 from ..base import latest_job
 from ..base.objects import Handle, head_of
 from ..colliders import fields
@@ -245,10 +245,7 @@ class Preview:
     def _changed(
         self, facts: Facts, depsgraph: bpy.types.Depsgraph, frame_hash: str = ""
     ) -> tuple[str, ...]:
-        baked = facts.rig_hash
-        if self.groom is not None:
-            baked = as_now(baked, facts.frame_hashes)
-        changed = differences(baked, self.rig_hash or baked)
+        changed = differences(facts.rig_hash, self.rig_hash or facts.rig_hash)
         frame = depsgraph.scene.frame_current
         if facts.first <= frame <= facts.last:
             recorded = facts.frame_hashes[frame - facts.first]
