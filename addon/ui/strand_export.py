@@ -17,7 +17,7 @@ from ..blender.base.outcome import Outcome
 from ..blender.properties.properties import property_annotations, settings_of
 from ..blender.strands.strand_export import StrandExport
 from ..errors import HairloomError
-from ..exchange.strand_export_settings import StrandExportSettings
+from ..exchange.strand_export_settings import USUAL, StrandExportSettings
 from ..exchange.strand_formats import StrandFormat
 from ..params import Parameter
 from . import operators_export_check as export_check
@@ -40,13 +40,21 @@ _OF_DIALOG = {"Include": ("several",), "Animation": ("frames", "first", "last")}
 
 
 def option_properties(kind: StrandFormat) -> dict[str, Any]:
-    """For the `__annotations__` of the operator that writes a format: of the engines, those that
-    the format knows."""
-    engines = tuple((each.name, each.title, each.about) for each in kind.layouts)
-    return property_annotations(
-        replace(each, default=engines[0][0], choices=engines) if each.name == "engine" else each
-        for each in _options(kind)
-    )
+    """For the `__annotations__` of the operator that writes a format."""
+    return property_annotations(_as_in(kind, each) for each in _options(kind))
+
+
+def _as_in(kind: StrandFormat, option: Parameter) -> Parameter:
+    """An option with what is usual in the format: its engines, or else its axis and unit."""
+    if option.name == "engine":
+        engines = tuple((each.name, each.title, each.about) for each in kind.layouts)
+        return replace(option, default=engines[0][0], choices=engines)
+    if "engine" not in kind.options and option.name in ("up", "scale"):
+        space = kind.layouts[0].space
+        usual = {"up": space.up, "scale": 1.0 / space.per_metre}
+        choices = tuple(each for each in option.choices if each[0] != USUAL)
+        return replace(option, default=usual[option.name], choices=choices)
+    return option
 
 
 def _options(kind: StrandFormat) -> list[Parameter]:

@@ -162,6 +162,6 @@ def screenshot(label: str) -> np.ndarray:
 
     After a change, `yield` before it.
     """
-    pixels = screen.pixels()
+    pixels = _mark.painted_over(screen.pixels())
     screenshot_path(label).write_bytes(screen.png(pixels))
     return pixels

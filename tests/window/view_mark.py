@@ -40,6 +40,19 @@ class ViewMark:
         self._is_wanted = False
         return True
 
+    def painted_over(self, shown: np.ndarray) -> np.ndarray:
+        """The screen without marks: in their places stands what is beside them."""
+        shown = shown.copy()
+        for window, region in _views():
+            # a pixel more on each side: backends place squares half a pixel apart
+            left = window.x + region.x + LEFT - 1
+            right = left + SIDE + 2
+            bottom = len(shown) - (window.y + region.y + int(LOW * region.height)) + 1
+            rows = slice(max(bottom - SIDE * BITS - 2, 0), max(bottom, 0))
+            if left >= 0 and right < shown.shape[1]:
+                shown[rows, left:right] = shown[rows, right : right + 1]
+        return shown
+
     def _bits(self) -> list[bool]:
         return [bool(self._number >> bit & 1) for bit in range(BITS)]
 
