@@ -221,7 +221,7 @@ def test_the_panel_draws_what_there_is(hair):
 
 
 def test_the_panel_shows_only_what_acts_on_these_cards(hair):
-    from hairloom.addon.ui.sections import draw_card_texture, draw_strips
+    from hairloom.addon.ui.card_sections import draw_card_texture, draw_strips
 
     drawn: list[str] = []
 
