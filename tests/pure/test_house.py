@@ -18,6 +18,7 @@ from house_rules import (
     MOST_MUTABLE,
     PURE,
     import_circle,
+    is_declaration,
     module_name,
     mutable_names,
     unused_names,
@@ -27,6 +28,17 @@ from house_rules import (
 
 def test_rooms_import_only_what_they_may() -> None:
     assert violations(ADDON) == []
+
+
+def test_ui_may_know_what_pure_rooms_declare_and_nothing_else() -> None:
+    assert is_declaration(".exchange.strand_formats.SUFFIXES")
+    assert is_declaration(".cards.export_settings.CardExportSettings")
+    for name in (
+        "strand_writing.write_strands",
+        "nothing_formats.SUFFIXES",
+        "files.names.plain_name",
+    ):
+        assert not is_declaration(f".exchange.{name}")
 
 
 def test_the_order_names_every_room_of_blender() -> None:
