@@ -6,7 +6,7 @@ artist's buttons and from the command line alike.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,8 @@ from .groom.children_settings import ChildrenSettings
 from .groom.guides import choose_guides
 from .groom.roots import RootFrames, bind_roots, follow, root_frames
 from .groom.settings import GuideSettings
-from .groom.weights import GUIDES_PER_STRAND, GuideWeights, guide_weights
+from .groom.weights import GuideWeights, guide_weights
+from .groom.widths import Widths, with_widths
 from .refine.ride import ride
 from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
@@ -51,10 +52,12 @@ class Rig:
     """A groom made ready to move: all strands at one CV count, their guides and weights.
 
     strands: uniform, world space at rest; bound when there is a head.
-    guides: (guide_count,) indices of the strands that are simulated; where children are made they
-        are the first ones, and the children follow in the order in which they are grown.
+    guides: (guide_count,) indices of the strands that are simulated.
     rest_frames: of all strands, or None without a head.
     notes: what the artist should know, each with its remedy.
+    own_count: how many strands, the first ones, are the artist's own; children follow in the order
+        in which they are grown. None: all.
+    widths: how wide the strands are, and why.
     """
 
     strands: StrandSet
@@ -63,6 +66,13 @@ class Rig:
     weights: GuideWeights
     rest_frames: RootFrames | None
     notes: tuple[str, ...] = ()
+    own_count: int | None = None
+    widths: Widths = field(default_factory=Widths)
+
+    @property
+    def child_count(self) -> int:
+        own = self.own_count
+        return 0 if own is None else self.strands.strand_count - own
 
     @property
     def rest_pose(self) -> Pose:
@@ -109,10 +119,9 @@ def prepare(
     place: str,
     children: ChildrenSettings | None = None,
     density: Floats | None = None,
+    widths: str = "own",
 ) -> Rig:
-    """Bind strands to the head, choose the guides, weigh them for every strand.
-
-    Where children are wanted, they and the guides are all the hair there is.
+    """Bind strands to the head, choose the guides, weigh them for every strand, give it its width.
 
     Args:
         strands: world space at rest.
@@ -120,6 +129,7 @@ def prepare(
         place: names the groom in error messages.
         children: None is none.
         density: (vertex_count,) how densely children grow; None: wherever guides are near.
+        widths: one of `groom.widths.METHODS`.
 
     Raises:
         HairloomError: no strands, or a groom of another scale than the head.
@@ -131,44 +141,52 @@ def prepare(
     bound = strands if head is None else bind_roots(strands, head, place=place).strands
     uniform = resample(bound, settings.cv_count)
     guides = choose_guides(uniform, settings)
+    weights = _weights(uniform, uniform.take(guides))
+    rig = Rig(uniform, head, guides, weights, _frames(uniform, head))
     if children is not None and children.method != "none":
-        return _with_children(uniform.take(guides), head, children, density, place)
-    grid, group = uniform.grid, uniform.group
-    weights = guide_weights(
-        uniform.roots,
-        group,
-        uniform.roots[guides],
-        group[guides],
-        strand_grid=grid,
-        guide_grid=grid[guides],
+        rig = _with_children(rig, children, density, place)
+    strands, found = with_widths(rig.strands, widths)
+    return replace(rig, strands=strands, widths=found)
+
+
+def _weights(strands: StrandSet, guides: StrandSet) -> GuideWeights:
+    return guide_weights(
+        strands.roots,
+        strands.group,
+        guides.roots,
+        guides.group,
+        strand_grid=strands.grid,
+        guide_grid=guides.grid,
     )
-    return Rig(uniform, head, guides, weights, _frames(uniform, head))
 
 
-def _with_children(
-    guides: StrandSet,
-    head: Surface | None,
-    settings: ChildrenSettings,
-    density: Floats | None,
-    place: str,
-) -> Rig:
-    """Guides, each of which rides on itself, and what grows between them."""
-    own = np.arange(guides.strand_count, dtype=np.int32)
-    each = np.repeat(own[:, None], GUIDES_PER_STRAND, axis=1)
-    alone = np.zeros(each.shape, np.float32)
-    alone[:, 0] = 1.0
+def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None, place: str) -> Rig:
+    """The artist's own strands, and children grown between them."""
+    own, head = rig.strands, rig.head
     if head is None:
         note = (
-            "Children need a surface to grow from, so only the guides are shown. Give the hair a "
-            "surface, or set Children to None."
+            "Children need a surface to grow from, so there are none. Give the hair a surface, or "
+            "set Children to None."
         )
-        return Rig(guides, None, own, GuideWeights(each, alone), None, (note,))
-    made = make_children(guides, head, settings, density, place=place)
-    strands = _joined(guides, made.strands)
-    weights = GuideWeights(
-        np.concatenate([each, made.weights.guide]), np.concatenate([alone, made.weights.weight])
+        return replace(rig, notes=(*rig.notes, note))
+    made = make_children(own, head, settings, density, place=place)
+    strands = _joined(own, made.strands)
+    weights = made.weights
+    if len(rig.guides) < own.strand_count:
+        # shaped by their neighbours among all strands, they move as guides do
+        weights = _weights(made.strands, own.take(rig.guides))
+    return Rig(
+        strands,
+        head,
+        rig.guides,
+        GuideWeights(
+            np.concatenate([rig.weights.guide, weights.guide]),
+            np.concatenate([rig.weights.weight, weights.weight]),
+        ),
+        _frames(strands, head),
+        (*rig.notes, *made.notes),
+        own_count=own.strand_count,
     )
-    return Rig(strands, head, own, weights, _frames(strands, head), made.notes)
 
 
 def _joined(one: StrandSet, other: StrandSet) -> StrandSet:
@@ -178,7 +196,9 @@ def _joined(one: StrandSet, other: StrandSet) -> StrandSet:
         parts = [getattr(one, name), getattr(other, name)]
         both[name] = None if any(part is None for part in parts) else np.concatenate(parts)
     return StrandSet(
-        offsets=np.concatenate([one.offsets, other.offsets[1:] + one.offsets[-1]]), **both
+        offsets=np.concatenate([one.offsets, other.offsets[1:] + one.offsets[-1]]),
+        has_widths=one.has_widths and other.has_widths,
+        **both,
     )
 
 
@@ -252,27 +272,39 @@ def strands_at(rig: Rig, pose: Pose, guides_now: Floats) -> Floats:
 
 def rest_occlusion(rig: Rig, settings: AmbientSettings) -> Floats:
     """Ambient occlusion of every CV at rest, (strand_count, cv_count), 1 where nothing shades."""
-    strands = rig.strands
+    strands, settings = rig.strands, _ambient(rig, settings)
     occlusion = ambient_occlusion(strands, strands.points, rig.head, settings)
     return occlusion.reshape(strands.strand_count, -1)
 
 
 def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:
     """The light that the hair lets through to the head, (vertex_count,); None without a head."""
-    return None if rig.head is None else skin_occlusion(rig.strands, rig.head, settings)
+    if rig.head is None:
+        return None
+    return skin_occlusion(rig.strands, rig.head, _ambient(rig, settings))
+
+
+def _ambient(rig: Rig, settings: AmbientSettings) -> AmbientSettings:
+    """As strong as the hairs that strands stand for are."""
+    factor = rig.widths.extinction
+    return replace(
+        settings,
+        extinction=settings.extinction * factor,
+        scalp_extinction=settings.scalp_extinction * factor,
+    )
 
 
 def strand_ranks(rig: Rig) -> Floats:
     """Where each strand stands in an even order, (strand_count,) in 0 to 1: the strands of low
     rank alone are the same hair, only sparser.
 
-    Children come in the order in which they were grown, which is such an order, after the guides.
+    Children come in the order in which they were grown, which is such an order, after the
+    artist's own strands.
     """
-    guide_count, count = len(rig.guides), rig.strands.strand_count
-    if not np.array_equal(rig.guides, np.arange(guide_count)):
-        return even_ranks(rig.strands.roots)
-    ranks = np.arange(count, dtype=np.float32) / np.float32(count)
-    ranks[:guide_count] = even_ranks(rig.strands.roots[:guide_count]) * (guide_count / count)
+    count = rig.strands.strand_count
+    own = count - rig.child_count
+    ranks = np.arange(count, dtype=np.float32) / np.float32(max(count, 1))
+    ranks[:own] = even_ranks(rig.strands.roots[:own]) * np.float32(own / max(count, 1))
     return ranks
 
 

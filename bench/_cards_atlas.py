@@ -17,7 +17,7 @@ from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 
 ROUNDS = 3
 #: 11,400 strands stand for many more
-STRANDS = StrandSettings(width_scale=2.0)
+STRANDS = StrandSettings(fullness=2.0)
 
 
 def atlas_figures() -> dict[str, float]:

@@ -77,7 +77,7 @@ def strands_figures() -> dict[str, float]:
 
 
 def _settings(look: str, width: float) -> SettingsMap:
-    return SettingsMap(*SETTINGS, _look(look), StrandSettings(width_scale=width))
+    return SettingsMap(*SETTINGS, _look(look), StrandSettings(fullness=width))
 
 
 def _made(rig: Rig, width: float) -> MappedCards:
@@ -117,7 +117,7 @@ def _strands(rig: Rig, look: str, width: float, occlusion: np.ndarray) -> Snapsh
         lights=(Light.sun(SUN, (1.0, 1.0, 1.0), STRENGTH),),
         ambient=WORLD,
         shading=_look(look),
-        strand_settings=StrandSettings(width_scale=width),
+        strand_settings=StrandSettings(fullness=width),
     )
 
 

@@ -71,7 +71,7 @@ def sintel() -> Snapshot:
         meshes=(MeshSnapshot.of(head, is_skin=True),),
         casters=(head,),
         lights=three_point_lights(camera(hair.bounds()).view),
-        strand_settings=StrandSettings(width_scale=2.0),
+        strand_settings=StrandSettings(fullness=2.0),
         volume=DEEP,
         skin=SkinSettings(),
     )

@@ -38,7 +38,7 @@ RATE, FRAMES, MOVES, BEATS = 24.0, 24, 8, 2000
 SLIDERS = {
     "dynamics.damping": 0.3,
     "shading.sparkle": 0.5,
-    "strands.width_scale": 1.5,
+    "strands.fullness": 1.5,
     "guides.guide_count": 400,
 }
 

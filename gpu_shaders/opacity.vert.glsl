@@ -30,7 +30,7 @@ void main()
 
   float texels = float(opacity.resolution);
   float taper = mix(1.0, strands.tip_width, float(station) / float(cv_count - 1));
-  float half_width = cv.w * strands.width_scale * taper *
+  float half_width = cv.w * strands.fullness * taper *
                      strand_breadth(opacity, light_index, clip.xyw, across);
   float drawn = max(half_width, 0.5);
 

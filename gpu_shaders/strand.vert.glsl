@@ -53,7 +53,7 @@ void main()
   vec3 point = catmull_rom_point(before, from.xyz, to.xyz, after, u);
   vec3 tangent = catmull_rom_tangent(before, from.xyz, to.xyz, after, u);
   float along = (float(segment) + u) / float(last);
-  float radius = mix(from.w, to.w, u) * strands.width_scale;
+  float radius = mix(from.w, to.w, u) * strands.fullness;
   float taper = mix(1.0, strands.tip_width, along);
 
 #if GATHERED

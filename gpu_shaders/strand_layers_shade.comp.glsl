@@ -38,7 +38,7 @@ vec3 layer_radiance(int strand, float along)
   bend = tangent_bend(before, from, to, after, u, tangent);
 #endif
   float occlusion = mix(from_look.x, to_look.x, u);
-  float radius = mix(root_side.w, tip_side.w, u) * strands.width_scale *
+  float radius = mix(root_side.w, tip_side.w, u) * strands.fullness *
                  mix(1.0, strands.tip_width, along);
   vec4 between = vec4(0.0);
 #ifdef OTHER_TAU

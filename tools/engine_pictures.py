@@ -59,7 +59,7 @@ def scene_of_head() -> Any:
     hair = bpy.context.object
     hair.pass_index = 2
     bpy.ops.hairloom.apply_preset(name="looks/brown")
-    hair.data.hairloom.strands.width_scale = THICKER
+    hair.data.hairloom.strands.fullness = THICKER
     bpy.ops.mesh.primitive_plane_add(size=2.0, location=(0.2, 0.5, 0.0), rotation=(1.57, 0.0, -0.4))
     wall = bpy.context.object
     wall.scale, wall.pass_index = (0.25, 0.2, 1.0), 3

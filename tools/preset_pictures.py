@@ -47,7 +47,7 @@ def wig() -> Any:
         snapshot,
         meshes=(of_addon("render.snapshot").MeshSnapshot.of(head, occlusion=groom.head_occlusion),),
         detail=settings["detail"](lod_height=0.0),
-        strand_settings=settings["strands"](width_scale=THICKER),
+        strand_settings=settings["strands"](fullness=THICKER),
     )
 
 

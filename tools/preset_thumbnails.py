@@ -67,7 +67,7 @@ def main(folder: Path) -> None:
     plain = of_addon("blender.properties.groom_settings").GroomSettings(
         of_addon("params").SettingsMap(
             shading,
-            settings["strands"](width_scale=THICKER),
+            settings["strands"](fullness=THICKER),
             settings["detail"](lod_height=0.0),
         )
     )

@@ -25,7 +25,7 @@ from .files.axes import from_z_up, to_z_up
 from .files.binary_file import BinaryFile, write_blocks
 from .groom import Groom
 from .groom_presets import chosen_parts
-from .read_groom import ReadGroom, finite, kept_points, plausible, usable
+from .read_groom import ReadGroom, finite, kept_points, usable
 
 _SEGMENTS, _POINTS, _THICKNESS, _TRANSPARENCY, _COLOR, _UV = 1, 2, 4, 8, 16, 32
 _DTYPES: dict[int, np.dtype[Any]] = {
@@ -93,7 +93,7 @@ def read_hair_file(path: Path, up: str = "Z", scale: float = 1.0) -> ReadHairFil
     thickness, uv = file.values(_THICKNESS), file.values(_UV)
     with np.errstate(over="ignore", invalid="ignore"):
         half = np.float32(0.5) * np.float32(scale)
-        radius = plausible(half * (file.default("thickness") if thickness is None else thickness))
+        radius = half * (file.default("thickness") if thickness is None else thickness)
         points = to_z_up(points, up) * np.float32(scale)
     cleaned = usable(
         file,

@@ -36,6 +36,7 @@ def joined_grooms(grooms: Sequence[Groom], name: str) -> tuple[Groom, tuple[str,
         np.concatenate([each.radius for each in strands]),
         groups,
         root_uv,
+        has_widths=all(each.has_widths for each in strands),
     )
     without = [groom.name for groom in grooms if groom.strands.root_uv is None]
     notes: tuple[str, ...] = ()

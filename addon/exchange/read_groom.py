@@ -13,9 +13,6 @@ from ..strands.clean import Cleaned, clean
 from .files.binary_file import BinaryFile
 from .groom import Groom
 
-#: Thicker than any hair [m]: such a thickness is a coefficient or in another unit.
-THICKEST_RADIUS = 5.0e-3
-
 
 @dataclass(frozen=True)
 class ReadGroom:
@@ -58,11 +55,6 @@ def usable(
         reasons = ", ".join(f"{count} with {reason}" for reason, count in cleaned.dropped.items())
         raise file.error(f"none of its strands can be used ({reasons})", "Export the groom again")
     return cleaned
-
-
-def plausible(radius: Floats) -> Floats:
-    """NaN, which `clean` replaces, where this cannot be a radius in metres."""
-    return np.where((radius > 0.0) & (radius <= THICKEST_RADIUS), radius, np.float32(np.nan))
 
 
 def finite(values: Floats, least: float = -np.inf) -> Floats:

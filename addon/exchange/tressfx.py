@@ -27,7 +27,7 @@ from .files.axes import from_z_up, to_z_up
 from .files.binary_file import write_blocks
 from .groom import Groom
 from .groom_presets import chosen_parts
-from .read_groom import ReadGroom, finite, kept_points, plausible, usable
+from .read_groom import ReadGroom, finite, kept_points, usable
 from .tressfx_layout import HEADER_4, VERTEX_COUNTS, TressfxFile
 
 #: TressFX simulates this many strands at a time.
@@ -65,7 +65,7 @@ def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadTressfx:
     # What overflows becomes infinite, and what is not finite is dropped and counted.
     with np.errstate(over="ignore", invalid="ignore"):
         points = to_z_up(positions[:, :3], up) * np.float32(scale)
-        radius = None if thickness is None else plausible(thickness[:, 0] * np.float32(scale))
+        radius = None if thickness is None else thickness[:, 0] * np.float32(scale)
     offsets = np.arange(file.strand_count + 1) * count
     cleaned = usable(
         file,

@@ -77,6 +77,7 @@ def make_children(
         root_uv=_root_uv(roots, surface),
         root_triangle=roots.triangle,
         root_barycentric=roots.barycentric,
+        has_widths=guides.has_widths,
     )
     return Children(strands, weights, roots.notes + _notes(guides, settings))
 

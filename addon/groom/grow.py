@@ -77,7 +77,7 @@ def _grow_combed(
     comb = _combed(surface, root, normal, settings)
     grid = _fallen(root, normal, comb, plan, settings)
     grid = _laid(style_clumps(grid, clump, settings, random), plan)
-    return bound_strands(grid, triangle, barycentric, surface, settings.radius)
+    return bound_strands(grid, triangle, barycentric, surface)
 
 
 @dataclass(frozen=True)

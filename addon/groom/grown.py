@@ -7,6 +7,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
+from ..strands.strand_set import DEFAULT_RADIUS
 
 
 def segment_fractions(cv_count: int, ratio: float) -> Floats:
@@ -60,13 +61,10 @@ def at_roots(weights: Floats, surface: Surface, triangle: Ints, barycentric: Flo
     return result
 
 
-def bound_strands(
-    grid: Floats, triangle: Ints, barycentric: Floats, surface: Surface, radius: float
-) -> StrandSet:
+def bound_strands(grid: Floats, triangle: Ints, barycentric: Floats, surface: Surface) -> StrandSet:
     """Strands of one CV count (strand_count, cv_count, 3), held where they grow, with root UVs.
 
-    Args:
-        radius: [m], the same for all.
+    Their widths are yet to be found (`widths`).
     """
     strand_count, cv_count = grid.shape[:2]
     root_uv = None
@@ -75,9 +73,10 @@ def bound_strands(
     return StrandSet(
         points=grid.reshape(-1, 3),
         offsets=np.arange(strand_count + 1) * cv_count,
-        radius=np.full(strand_count * cv_count, radius),
+        radius=np.full(strand_count * cv_count, DEFAULT_RADIUS),
         group=np.zeros(strand_count, np.int32),
         root_uv=root_uv,
         root_triangle=triangle,
         root_barycentric=barycentric,
+        has_widths=False,
     )

@@ -59,7 +59,7 @@ def grow_along_normals(
     along[1:] = segment_fractions(settings.cv_count, settings.segment_ratio).cumsum()
     reach = strand_length[:, None] * along
     grid = root[:, None] + reach[..., None] * _normals(surface, triangle, barycentric)[:, None]
-    return bound_strands(grid, triangle, barycentric, surface, settings.radius)
+    return bound_strands(grid, triangle, barycentric, surface)
 
 
 def somewhere(density: Floats | None, length: Floats | None) -> Floats | None:

@@ -184,15 +184,6 @@ class GrowSettings(Settings):
         hard=(0.0, 10.0),
         shown_when=when("grow.method", "combed"),
     )
-    radius: float = number(
-        2.0e-4,
-        label="Radius",
-        description="Radius of the strands; use more than that of a real hair if there are few "
-        "strands",
-        unit="length",
-        soft=(1.0e-5, 5.0e-4),
-        hard=(1.0e-7, 0.1),
-    )
     seed: int = integer(
         1,
         label="Seed",

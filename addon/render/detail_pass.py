@@ -195,7 +195,7 @@ class GroomExtent:
         return thinning(
             (self.low + roots, self.high + roots),
             self.total_length,
-            self.radius * settings.width_scale,
+            self.radius * settings.fullness,
             settings.min_width,
             view,
             snapshot.detail,
@@ -237,7 +237,7 @@ def _shades(snapshot: Snapshot, view: PictureView, widening: float) -> Floats:
     if snapshot.detail.culling != "hidden" or snapshot.occluder_spheres is None:
         return np.zeros((0, 12), np.float32)
     settings = snapshot.strand_settings
-    radius = float(snapshot.radius.max()) * settings.width_scale * widening
+    radius = float(snapshot.radius.max()) * settings.fullness * widening
     half_width = max(settings.minimum_width / 2.0, EDGE) * widening
     shades = shades_of(snapshot.occluder_spheres[:SHADE_CAPACITY], view, half_width, radius)
     packed = np.zeros((len(shades.nearest), 12), np.float32)

@@ -148,6 +148,7 @@ class Snapshot:
 
     strands: (strand_count, cv_count, 3) float32 [m], world space, root first.
     radius: (strand_count, cv_count) float32 [m].
+    extinction: factor on the light that a strand blocks, see `groom.widths.Widths`.
     occlusion: (strand_count, cv_count) ambient light that arrives, 0 to 1; None is 1 everywhere.
     seed: (strand_count,) whole numbers below 2^24, which the noise of a strand depends on; None is
         each strand's index.
@@ -195,6 +196,7 @@ class Snapshot:
     casters: tuple[Caster, ...] = ()
     table_size: int = DEFAULT_SIZE
     cards: CardSnapshot | None = None
+    extinction: float = 1.0
 
     def __post_init__(self) -> None:
         if self.strands.ndim != 3 or self.strands.shape[1] < 2 or self.strands.shape[2] != 3:

@@ -25,7 +25,7 @@ def drawn_radius(radius: Floats, settings: StrandSettings) -> Floats:
         radius: (n, cv_count) [m].
     """
     taper = np.linspace(1.0, settings.tip_width, radius.shape[1], dtype=np.float32)
-    drawn: Floats = radius * (np.float32(settings.width_scale) * taper)
+    drawn: Floats = radius * (np.float32(settings.fullness) * taper)
     return drawn
 
 

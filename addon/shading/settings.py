@@ -41,7 +41,7 @@ class SharedSettings(Settings):
     """Act in both models."""
 
     model: str = choice(
-        "kajiya_kay",
+        "marschner",
         MODELS,
         label="Model",
         description="Shading model of the strands",
@@ -208,10 +208,10 @@ class StrandSettings(Settings):
     title = "Strands"
     owner = "groom"
 
-    width_scale: float = number(
+    fullness: float = number(
         1.0,
-        label="Width Scale",
-        description="Factor on the strand radius; raise it if there are few strands",
+        label="Fullness",
+        description="Factor on the widths of strands, and so on the light that they block",
         soft=(0.1, 10.0),
         hard=(0.0, 1000.0),
     )

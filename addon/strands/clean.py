@@ -37,7 +37,8 @@ def clean(
     Args:
         points: (point_count, 3) [m].
         offsets: (curve_count + 1,), ascending from 0 to point_count.
-        radius: (point_count,) [m]; absent, not finite or not positive: 0.04 mm.
+        radius: (point_count,) [m]; the median takes the place of those that are not finite or not
+            positive, and 0.04 mm where there is none.
         group: (curve_count,); absent: one group, 0.
         root_uv: (curve_count, 2); values that are not finite become 0.
     """
@@ -75,6 +76,7 @@ def clean(
         radius=_usable_radius(radius, len(points))[point_kept],
         group=np.zeros(len(kept), np.int32) if group is None else np.asarray(group)[kept],
         root_uv=None if root_uv is None else np.nan_to_num(root_uv, posinf=0, neginf=0)[kept],
+        has_widths=radius is not None and bool(_is_width(np.asarray(radius)).any()),
     )
     return Cleaned(strands, dropped, kept)
 
@@ -113,4 +115,10 @@ def _usable_radius(radius: Floats | None, point_count: int) -> Floats:
     if radius is None:
         return np.full(point_count, DEFAULT_RADIUS, np.float32)
     radius = np.asarray(radius, np.float32)
-    return np.where(np.isfinite(radius) & (radius > 0.0), radius, np.float32(DEFAULT_RADIUS))
+    is_width = _is_width(radius)
+    known = np.median(radius[is_width]) if is_width.any() else DEFAULT_RADIUS
+    return np.where(is_width, radius, np.float32(known))
+
+
+def _is_width(radius: Floats) -> Bools:
+    return np.isfinite(radius) & (radius > 0.0)

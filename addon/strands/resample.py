@@ -27,6 +27,7 @@ def resample(strands: StrandSet, cv_count: int) -> StrandSet:
         strands.root_uv,
         strands.root_triangle,
         strands.root_barycentric,
+        strands.has_widths,
     )
 
 

@@ -12,7 +12,7 @@ from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .affine import mean_scale, moved
 
-#: Thinner and wider than any hair; widths outside of it are taken for a mistake in units.
+#: Of hair whose width nobody knows, until it is found (`groom.widths`).
 DEFAULT_RADIUS = 4.0e-5  # [m], half of 0.08 mm, a typical human hair
 
 
@@ -27,6 +27,7 @@ class StrandSet:
     root_uv: (strand_count, 2) float32, or None where no UVs are known.
     root_triangle: (strand_count,) int32, or None when unbound.
     root_barycentric: (strand_count, 3) float32, or None when unbound.
+    has_widths: whether the radii are the groom's own; else they are `DEFAULT_RADIUS`.
 
     Raises:
         HairloomError: shapes that do not fit, a strand of fewer than two points, values that
@@ -40,6 +41,7 @@ class StrandSet:
     root_uv: Floats | None = None
     root_triangle: Ints | None = None
     root_barycentric: Floats | None = None
+    has_widths: bool = True
 
     def __post_init__(self) -> None:
         for name, dtype in _DTYPES.items():
@@ -132,7 +134,13 @@ class StrandSet:
             name: None if getattr(self, name) is None else getattr(self, name)[strands]
             for name in _PER_STRAND
         }
-        return StrandSet(self.points[picked], offsets, self.radius[picked], **per_strand)
+        return StrandSet(
+            self.points[picked],
+            offsets,
+            self.radius[picked],
+            has_widths=self.has_widths,
+            **per_strand,
+        )
 
     def with_points(self, points: Floats) -> StrandSet:
         """The same strands with moved points, (point_count, 3) [m]."""
@@ -159,7 +167,7 @@ _DTYPES = {
     "root_barycentric": np.float32,
 }
 _PER_STRAND = ("group", "root_uv", "root_triangle", "root_barycentric")
-assert set(_DTYPES) == {field.name for field in fields(StrandSet)}
+assert {*_DTYPES, "has_widths"} == {field.name for field in fields(StrandSet)}
 
 
 def _broken(problem: str) -> HairloomError:

@@ -7,10 +7,12 @@ from typing import Any
 
 import bpy
 
+from ..blender.preview import previews
 from ..parameters import ALL_SETTINGS
 from ..params import Owner
 from .card_sections import CARD_SECTIONS, draw_cards
 from .drawing import Draw, draw_section
+from .messages import draw_lines
 from .operators_bake import draw_bake
 from .operators_colliders import draw_colliders
 from .operators_show import draw_show
@@ -70,6 +72,11 @@ def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """The widths that the preview has, where they come from, and the rest."""
+    session = previews.session_of(hair)
+    if session is not None and session.is_made:
+        draw_lines(layout.column(align=True), bpy.context, f"{session.rig.widths.line}.")
+    draw_section(layout, hair.data.hairloom, "widths")
     draw_section(layout, hair.data.hairloom, "strands")
     layout.label(text=ALL_SETTINGS["ambient"].title)
     draw_section(layout, hair.data.hairloom, "ambient")

@@ -133,28 +133,31 @@ def test_another_scale_names_the_factor(
 
 
 @pytest.mark.parametrize("verb", ["simulate", "render", "cards", "export"])
-def test_a_head_without_uvs_needs_a_word(
+def test_a_head_without_uvs_is_refused_when_strict(
     verb: str, groom: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     bare = tmp_path / "bare.obj"
     lines = [line for line in HEAD_OBJ.splitlines() if not line.startswith("vt")]
     faces = [" ".join(word.split("/")[0] for word in line.split(" ")) for line in lines]
     bare.write_text("\n".join(faces))
-    arguments = [verb, "--groom", str(groom), "--head", str(bare), *SMALL]
+    arguments = [verb, "--groom", str(groom), "--head", str(bare), "--strict", *SMALL]
     output = tmp_path / f"result{'.tfx' if verb == 'export' else '.glb'}"
     assert command_line.run([*arguments, "--output", str(output)]) == 1
     message = capfd.readouterr().err
-    assert str(bare) in message and "UV" in message and "--no-uv" in message
+    assert str(bare) in message and "UV" in message and "--strict" in message
     assert not output.exists()
 
 
-def test_a_head_without_uvs_is_accepted_on_request(groom: Path, tmp_path: Path) -> None:
+def test_a_head_without_uvs_warns_once(
+    groom: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     bare = tmp_path / "bare.obj"
     bare.write_text("\n".join(x for x in HEAD_OBJ.replace("/", " /").splitlines() if x[:2] == "v "))
     with open(bare, "a") as file:
         file.write("\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n")
-    arguments = ["export", "--groom", str(groom), "--head", str(bare), "--no-uv", *SMALL]
+    arguments = ["export", "--groom", str(groom), "--head", str(bare), *SMALL]
     assert command_line.run([*arguments, "--output", str(tmp_path / "out.tfx")]) == 0
+    assert capfd.readouterr().out.count("no UVs") == 1
 
 
 @pytest.mark.parametrize(
@@ -221,7 +224,7 @@ def test_hair_grows_where_and_as_long_as_the_groups_say(
             group.add(chosen, float(weight), "REPLACE")
     arguments = ["export", "--set", "grow.method=normals", "--set", "grow.length=0.1"]
     arguments += ["--set", "grow.length_variation=0", "--set", "grow.strand_count=200"]
-    arguments += ["--no-uv", "--output", str(tmp_path / "hair.tfx")]
+    arguments += ["--output", str(tmp_path / "hair.tfx")]
     groups = ["--density-group", "Right", "--length-group", "Half"]
     assert command_line.run([*arguments, "--head", sphere.name, *groups]) == 0
     strands = read_tfx(tmp_path / "hair.tfx", up="Y").strands

@@ -48,7 +48,7 @@ def test_hair_is_drawn_and_two_renders_are_the_same(
 ) -> None:
     bald = picture(tmp_path)
     hair = new_hair(sphere)
-    hair.data.hairloom.strands.width_scale = 20.0
+    hair.data.hairloom.strands.fullness = 20.0
     first, second = picture(tmp_path), picture(tmp_path)
     np.testing.assert_array_equal(first, second)
     assert (np.abs(first - bald)[..., :3].max(axis=2) > 0.05).mean() > 0.01
@@ -85,7 +85,7 @@ def test_depth_and_object_index_of_hair(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
     hair = new_hair(sphere)
-    hair.data.hairloom.strands.width_scale = 20.0
+    hair.data.hairloom.strands.fullness = 20.0
     sphere.pass_index, hair.pass_index = 3, 7
     layer = stage.view_layers[0]
     layer.use_pass_z = layer.use_pass_object_index = True

@@ -102,9 +102,9 @@ def test_old_hair_stays_until_the_new_is_made(hair: Any, gate: Gate) -> None:
         hair.data.hairloom.children.strand_count = count
         (old,) = view.read({hair.data.session_uid})
         assert old.strand_count == COUNT
-    hair.data.hairloom.strands.width_scale = 3.0
+    hair.data.hairloom.strands.fullness = 3.0
     (old,) = view.read({hair.data.session_uid})
-    assert old.strand_settings.width_scale == 3.0, "what acts at once does"
+    assert old.strand_settings.fullness == 3.0, "what acts at once does"
     gate.opened.set()
     (new,) = view.arrive()
     assert new.strand_count >= 320 and len(gate.makers) == 3, "what is in between is left out"

@@ -51,7 +51,7 @@ def test_hair_may_be_a_hole(
     stage.render.film_transparent = True
     stage.hairloom.picture.samples = 16
     hair = new_hair(sphere)
-    hair.data.hairloom.strands.width_scale = 60.0
+    hair.data.hairloom.strands.fullness = 60.0
     hair.data.hairloom.strands.transparency = way
     hair.data.hairloom.strands.opacity = 0.7
     bpy.data.objects.remove(sphere)
@@ -143,7 +143,7 @@ def test_hidden_in_renders_is_not_drawn(
     stage.render.film_transparent = True
     hair = new_hair(sphere)
     sphere.hide_render = True
-    hair.data.hairloom.strands.width_scale = 20.0
+    hair.data.hairloom.strands.fullness = 20.0
     assert picture(tmp_path)[..., 3].max() > 0.5
     hair.visible_camera = False
     assert picture(tmp_path)[..., 3].max() == 0.0
@@ -189,7 +189,7 @@ def test_hair_is_rendered_as_it_was_baked(
             found = engine_hair.read_groom(obj, depsgraph)
             np.testing.assert_array_equal(found.strands, expected)
     stage.view_layers[0].use_pass_object_index = True
-    hair.data.hairloom.strands.width_scale = 20.0
+    hair.data.hairloom.strands.fullness = 20.0
     numbers = rendered(tmp_path)["ViewLayer.Object Index"]
     assert (numbers == 5.0).any()
 
@@ -207,8 +207,8 @@ def test_a_bake_has_the_animated_settings_of_the_frame(
     hair = new_hair(sphere)
     strands = hair.data.hairloom.strands
     for frame, width in ((1, 1.0), (3, 5.0)):
-        strands.width_scale = width
-        hair.data.keyframe_insert("hairloom.strands.width_scale", frame=frame)
+        strands.fullness = width
+        hair.data.keyframe_insert("hairloom.strands.fullness", frame=frame)
     hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.bake.folder = str(tmp_path / "bake")
@@ -219,7 +219,7 @@ def test_a_bake_has_the_animated_settings_of_the_frame(
 
     def seen(obj: Any, depsgraph: Any, *, blocking: bool) -> Any:
         assert blocking, "a render does not show what was made before"
-        widths.append(read_groom(obj, depsgraph).strand_settings.width_scale)
+        widths.append(read_groom(obj, depsgraph).strand_settings.fullness)
         return read_groom(obj, depsgraph)
 
     monkeypatch.setattr(engine_hair, "read_groom", seen)

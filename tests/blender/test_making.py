@@ -180,12 +180,12 @@ def test_what_acts_at_once_meanwhile_is_kept(playing, hair, evaluated, monkeypat
     opened = hold(monkeypatch)
     hair.data.hairloom.guides.guide_count = 9
     scene_events.catch_up(evaluated())
-    hair.data.hairloom.strands.width_scale = 3.0
-    assert shown(playing).snapshot.strand_settings.width_scale == 3.0
+    hair.data.hairloom.strands.fullness = 3.0
+    assert shown(playing).snapshot.strand_settings.fullness == 3.0
     assert not playing.is_stale
     opened.set()
     arrive(playing)
-    assert shown(playing).snapshot.strand_settings.width_scale == 3.0
+    assert shown(playing).snapshot.strand_settings.fullness == 3.0
     assert len(playing.rig.guides) == 9
 
 

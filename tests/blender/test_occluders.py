@@ -88,7 +88,7 @@ def test_grooms_without_cards_shade_by_their_strands(hair, new_hair, sphere):
     alone = openness(card_objects(hair)[0])
     strands = new_hair(sphere)
     strands.rotation_euler.z += 0.3
-    strands.data.hairloom.strands.width_scale = 20.0
+    strands.data.hairloom.strands.fullness = 20.0
     bpy.context.view_layer.update()
     on = CardOcclusionSettings(others=True)
     (shade,), notes = read_occluders(on, hair).cards()
@@ -119,7 +119,7 @@ def shaded(hair, new_hair, sphere, evaluated):
     """Hair shown as cards, and other hair that shades them by its strands."""
     strands = new_hair(sphere)
     strands.name = "Shading"
-    strands.data.hairloom.strands.width_scale = 20.0
+    strands.data.hairloom.strands.fullness = 20.0
     groom = hair.data.hairloom
     groom.card_occlusion.others, groom.card_drawing.shown_as = True, "cards"
     bpy.context.view_layer.update()
@@ -174,7 +174,7 @@ def test_the_preview_follows_other_hair_that_goes_and_comes(shaded, evaluated, w
 def test_the_preview_follows_the_settings_of_other_hair(shaded, evaluated):
     session, strands = shaded
     near = shown(session)
-    strands.data.hairloom.strands.width_scale = 1.0
+    strands.data.hairloom.strands.fullness = 1.0
     scene_events.catch_up(evaluated())
     assert shown(session).mean() > near.mean() + 0.02
     before = shown(session)

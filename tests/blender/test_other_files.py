@@ -85,7 +85,7 @@ def test_an_override_has_settings_of_its_own_which_last(override, tmp_path):
     hair = saved_and_loaded(tmp_path)
     assert hair.override_library is not None and settings(hair) == (5.0, 0.25)
     assert hair.hairloom.debug_view == "guide" and not hair.hairloom.bake.is_shown
-    assert hair.data.hairloom.strands.width_scale == 1.0, "what was not set is the library's"
+    assert hair.data.hairloom.strands.fullness == 1.0, "what was not set is the library's"
 
 
 @pytest.fixture
@@ -180,15 +180,15 @@ def test_keyframes_and_drivers_act_in_preview_and_engine(new_hair, sphere, evalu
     hair, scene = new_hair(sphere), bpy.context.scene
     source = bpy.data.objects.new("Source", None)
     scene.collection.objects.link(source)
-    keyed(hair.data, "hairloom.strands.width_scale", {1: 1.0, 5: 3.0})
+    keyed(hair.data, "hairloom.strands.fullness", {1: 1.0, 5: 3.0})
     driven(hair.data, "hairloom.shading.ambient", source)
     session = previews.start(hair, evaluated())
     source.location.x = 0.75
     scene.frame_set(5)
     snapshot = overlay.drawing_of(session.uid).snapshot
-    assert (snapshot.strand_settings.width_scale, snapshot.shading.ambient) == (3.0, 0.75)
+    assert (snapshot.strand_settings.fullness, snapshot.shading.ambient) == (3.0, 0.75)
     found = engine_hair.read_groom(hair, evaluated())
-    assert (found.strand_settings.width_scale, found.shading.ambient) == (3.0, 0.75)
+    assert (found.strand_settings.fullness, found.shading.ambient) == (3.0, 0.75)
 
 
 @pytest.mark.parametrize("is_previewed", few_in_commits([True, False]))
@@ -197,7 +197,7 @@ def test_a_rendered_animation_has_the_settings_of_each_frame(
 ):
     hair, source = new_hair(sphere), bpy.data.objects.new("Source", None)
     stage.collection.objects.link(source)
-    keyed(hair.data, "hairloom.strands.width_scale", {1: 1.0, 3: 3.0})
+    keyed(hair.data, "hairloom.strands.fullness", {1: 1.0, 3: 3.0})
     keyed(hair.data, "hairloom.guides.guide_count", {1: 40, 3: 10})
     keyed(hair, "hairloom.debug_view", {1: "none", 3: "guide"})
     driven(hair.data, "hairloom.shading.ambient", source)
@@ -208,7 +208,7 @@ def test_a_rendered_animation_has_the_settings_of_each_frame(
 
     def reading(*arguments, **named):
         snapshot = read(*arguments, **named)
-        values = snapshot.strand_settings.width_scale, snapshot.shading.ambient
+        values = snapshot.strand_settings.fullness, snapshot.shading.ambient
         guides = len(np.unique(snapshot.guide))
         found[stage.frame_current] = (*values, snapshot.debug_view, guides)
         return snapshot

@@ -86,10 +86,10 @@ def test_sliders_act_at_once(preview):
     hair, _, session = preview
     before = overlay.drawing_of(session.uid).snapshot
     hair.data.hairloom.shading.base_color = (1.0, 0.5, 0.25)
-    hair.data.hairloom.strands.width_scale = 3.0
+    hair.data.hairloom.strands.fullness = 3.0
     snapshot = overlay.drawing_of(session.uid).snapshot
     assert snapshot.shading.base_color == (1.0, 0.5, 0.25)
-    assert snapshot.strand_settings.width_scale == 3.0
+    assert snapshot.strand_settings.fullness == 3.0
     assert snapshot.strands is before.strands, "nothing else is made again"
     assert snapshot.device_points is before.device_points
 

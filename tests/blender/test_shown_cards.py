@@ -165,7 +165,7 @@ def test_cards_throw_the_shadow_of_their_strands(preview):
     hair, _, session = preview
     before = drawn(session).cards.thickness
     assert before > 0.0 and before != 1.0
-    hair.data.hairloom.strands.width_scale *= 2.0
+    hair.data.hairloom.strands.fullness *= 2.0
     assert drawn(session).cards.thickness == pytest.approx(2.0 * before, rel=1e-3)
 
 

@@ -98,7 +98,7 @@ def test_the_skin_shadow_of_previewed_hair(new_hair: Any, sphere: Any) -> None:
     hair = new_hair(sphere)
     hair.data.hairloom.volume.resolution = 128
     hair.data.hairloom.skin.skin_resolution = 128
-    hair.data.hairloom.strands.width_scale = 30.0
+    hair.data.hairloom.strands.fullness = 30.0
     assert not bpy.ops.hairloom.show_skin_shadow.poll()
     bpy.ops.hairloom.preview()
     try:

@@ -52,7 +52,7 @@ def covered(snapshot, camera, width: int, height: int, samples: int = 1) -> np.n
     taper = 1.0 + share * (settings.tip_width - 1.0)
     focal = camera.projection[1, 1] * height / 2.0
     minimum = settings.minimum_width * samples
-    half = np.maximum(radius * settings.width_scale * focal / depth, minimum / 2.0) * taper
+    half = np.maximum(radius * settings.fullness * focal / depth, minimum / 2.0) * taper
     half = np.maximum(half, min(minimum, 1.0) / 2.0)
     one, other = pixels - across * half[..., None], pixels + across * half[..., None]
     quads = np.stack([one[:, :-1], other[:, :-1], one[:, 1:], other[:, 1:]], axis=2)
@@ -109,7 +109,7 @@ def test_coverage_is_that_of_the_definition(
 ) -> None:
     strands = curly_groom(400)
     settings = StrandSettings(
-        width_scale=2.0, tip_width=0.4, minimum_width=minimum_width, transparency="none"
+        fullness=2.0, tip_width=0.4, minimum_width=minimum_width, transparency="none"
     )
     detail = DetailSettings(mode="fixed", subdivisions=subdivisions)
     radius = np.full(strands.shape[:2], 1e-3, np.float32)

@@ -47,7 +47,7 @@ def test_the_detail_view_shows_factors_by_colour(
     """From blue for one piece over green for eight to red for sixty-four."""
     strands = np.zeros((1, 3, 3), np.float32)
     strands[0, :, 2] = [-0.4, 0.0, 0.4]
-    settings = StrandSettings(width_scale=60.0, tip_width=1.0)
+    settings = StrandSettings(fullness=60.0, tip_width=1.0)
     for pieces, expected in ((1, [0.0, 0.04, 1.0]), (8, [0.02, 1.0, 0.0]), (64, [1.0, 0.0, 0.0])):
         detail = DetailSettings(mode="fixed", subdivisions=pieces)
         snapshot = snapshot_of(
@@ -73,7 +73,7 @@ def test_the_detail_view_colours_each_segment_by_its_own_factor(frame: Any, fron
         frame,
         strand,
         detail,
-        strand_settings=StrandSettings(width_scale=20.0, tip_width=1.0),
+        strand_settings=StrandSettings(fullness=20.0, tip_width=1.0),
         debug_view="detail",
     )
     picture = frame.render_image(snapshot, front, 480, 480, 1)
@@ -94,7 +94,7 @@ def test_guides_and_groups_have_colours_of_their_own(frame: Any, front: Any, nam
     strands[..., 0] = (np.arange(8)[:, None] + 0.5) / 8.0 - 0.5
     strands[:, :, 2] = [-0.6, 0.6]
     numbers = np.array([0, 1, 2, 3, 0, 1, 2, 70_000])
-    settings = StrandSettings(width_scale=60.0, tip_width=1.0)
+    settings = StrandSettings(fullness=60.0, tip_width=1.0)
 
     def colors(**more: Any) -> np.ndarray:
         snapshot = snapshot_of(frame, strands, BARE, strand_settings=settings, **more)
@@ -113,7 +113,7 @@ def test_the_occlusion_view_shows_it_in_grey(frame: Any, front: Any) -> None:
     strands = np.zeros((1, 3, 3), np.float32)
     strands[0, :, 2] = [-0.5, 0.0, 0.5]
     occlusion = np.array([[0.2, 0.6, 1.0]], np.float32)
-    settings = StrandSettings(width_scale=60.0, tip_width=1.0)
+    settings = StrandSettings(fullness=60.0, tip_width=1.0)
     snapshot = snapshot_of(
         frame,
         strands,

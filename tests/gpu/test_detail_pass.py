@@ -208,7 +208,7 @@ def test_a_bent_ribbon_has_no_hole(frame: Any) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 12)
     strand = np.stack([np.sin(angle) * 0.3, 0.0 * angle, angle / 2.0 / np.pi - 0.5], axis=-1)
     strands = strand[None].astype(np.float32)
-    settings = StrandSettings(width_scale=40.0, tip_width=1.0, transparency="none")
+    settings = StrandSettings(fullness=40.0, tip_width=1.0, transparency="none")
     camera = frame.Camera(
         frame.look_at((0, -1, 0), (0, 0, 0)), frame.orthographic(1.2, WIDTH / HEIGHT, 0.1, 3.0)
     )

@@ -23,7 +23,7 @@ PLAIN = ShadingSettings(
     shift_noise=0.0,
     color_variation=0.0,
 )
-RIBBON = StrandSettings(width_scale=1.0, tip_width=1.0, minimum_width=0.0)
+RIBBON = StrandSettings(fullness=1.0, tip_width=1.0, minimum_width=0.0)
 
 
 @pytest.fixture(scope="module")
@@ -280,7 +280,7 @@ def test_thin_opaque_strands_get_the_minimum_width(frame: Any, front: Any) -> No
 
 def test_radius_scale_and_taper(frame: Any, front: Any) -> None:
     strands, radius = uprights(np.array([0.5]), 0.05)
-    settings = dataclasses.replace(RIBBON, width_scale=2.0, tip_width=0.25)
+    settings = dataclasses.replace(RIBBON, fullness=2.0, tip_width=0.25)
     drawn = frame.render_image(
         frame.Snapshot(strands, radius, strand_settings=settings), front, 100, 100, 4
     )[..., 3]

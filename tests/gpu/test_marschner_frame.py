@@ -25,7 +25,7 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
-RIBBON = StrandSettings(width_scale=1.0, tip_width=1.0, minimum_width=0.0)
+RIBBON = StrandSettings(fullness=1.0, tip_width=1.0, minimum_width=0.0)
 WHITE = (1.0, 1.0, 1.0)
 
 

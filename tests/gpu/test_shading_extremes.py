@@ -34,7 +34,7 @@ IDENTIFIERS = [identifier for identifier, _, _ in MODELS]
 #: what is black by itself
 DARK = {("kajiya_kay", "base_color", (0.0, 0.0, 0.0))}
 #: what leaves nothing of a strand
-INVISIBLE = {("width_scale", 0.0), ("opacity", 0.0)}
+INVISIBLE = {("fullness", 0.0), ("opacity", 0.0)}
 #: what else a parameter needs to be seen
 TINTED = {"tip_tint": 1.0}
 NEEDS: dict[str, dict[str, Any]] = {

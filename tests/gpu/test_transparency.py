@@ -315,7 +315,7 @@ def test_what_comes_later_is_hidden_by_hair_that_hides(frame: Any, front: Any) -
 
 @pytest.mark.parametrize("transparency", ["layers", "hashed"])
 @pytest.mark.parametrize(
-    "change", [{"opacity": 0.0}, {"width_scale": 0.0}], ids=["no opacity", "no width"]
+    "change", [{"opacity": 0.0}, {"fullness": 0.0}], ids=["no opacity", "no width"]
 )
 def test_what_is_not_there_draws_nothing(
     frame: Any, front: Any, transparency: str, change: dict[str, float]

@@ -52,7 +52,7 @@ def set_the_scene():
     bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
     bpy.data.objects["Hair"].select_set(True)
     bpy.data.objects["Hair"].data.hairloom.shading.model = "marschner"
-    bpy.data.objects["Hair"].data.hairloom.strands.width_scale = 3.0
+    bpy.data.objects["Hair"].data.hairloom.strands.fullness = 3.0
     volume().shadows = "deep"
     volume().on_body = True
     shading = viewport().spaces.active.shading

@@ -100,7 +100,7 @@ def set_the_scene():
     cards = settings("cards")
     cards.source, cards.card_count, cards.levels = "clusters", CARDS, 2
     settings("atlas").size, settings("card_occlusion").rays = "512", 8
-    settings("strands").width_scale = 6.0  # few strands are seen all the same
+    settings("strands").fullness = 6.0  # few strands are seen all the same
     overlays = viewport().spaces.active.overlay
     overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
     look_from_front(0.9)

@@ -77,7 +77,7 @@ def set_the_scene():
     bpy.ops.object.shade_smooth()
     bpy.ops.hairloom.grow(method="normals", strand_count=GUIDES, length=0.08)
     bpy.context.object.name = "Hair"
-    hair().data.hairloom.strands.width_scale = 3.0  # so few strands that pictures hardly show them
+    hair().data.hairloom.strands.fullness = 3.0  # so few strands that pictures hardly show them
     overlays = viewport().spaces.active.overlay
     overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
     look_from_front(0.7)

@@ -14,6 +14,7 @@ from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...groom.roots import root_frames
 from ...groom.weights import GuideWeights
+from ...groom.widths import Widths
 from ...pipeline import Pose, Rig
 from ...strands import StrandSet, Surface
 from .simulated import Arrays
@@ -78,6 +79,9 @@ def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
         "weight": rig.weights.weight,
         "hair_rest": rests.hair,
         "notes": np.array(rig.notes, np.str_),
+        "own_count": np.array(strands.strand_count - rig.child_count),
+        "widths": np.array(rig.widths.numbers),
+        "widths_reason": np.array(rig.widths.reason, np.str_),
     }
     if strands.root_uv is not None:
         arrays["root_uv"] = strands.root_uv
@@ -130,7 +134,16 @@ def _rig_of(arrays: Arrays) -> BakedRig:
     _check_indices(arrays["weight_guide"], len(arrays["guides"]))
     weights = GuideWeights(arrays["weight_guide"], arrays["weight"])
     notes = tuple(str(note) for note in arrays.get("notes", ()))
-    rig = Rig(strands, head, arrays["guides"], weights, frames, notes)
+    rig = Rig(
+        strands,
+        head,
+        arrays["guides"],
+        weights,
+        frames,
+        notes,
+        int(arrays["own_count"]),
+        Widths.of(arrays["widths"], str(arrays["widths_reason"])),
+    )
     rests = RestMatrices(arrays["hair_rest"], arrays.get("head_rest"))
     return BakedRig(rig, rests, used_vertices(rig))
 

@@ -15,6 +15,7 @@ from ...arrays import Floats, Ints
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
+from ...groom.width_settings import WidthSettings
 from ...pipeline import Pose
 from ..base.objects import matrix_of
 from ..base.vertex_weights import weight_names, weights_on
@@ -27,7 +28,7 @@ from ..scene.wind import gravity_of, scene_wind
 from .simulated import SOLVER_VERSION, Hashed, hashes
 
 #: The parts of a rig hash that determine the rig; the others only matter to a bake.
-RIG_PARTS = ("hair", "head", "guides", "children")
+RIG_PARTS = ("hair", "head", "guides", "widths", "children")
 
 
 def groom_rig_hash(
@@ -47,6 +48,7 @@ def groom_rig_hash(
         hair=_curves_parts(hair),
         head=() if head is None else mesh_parts(head),
         guides=settings[GuideSettings],
+        widths=settings[WidthSettings],
         **grown,
         colliders=collider_shapes(hair, head),
         frame_rate=frame_rate(scene),

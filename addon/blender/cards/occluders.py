@@ -20,6 +20,7 @@ from ...cards.occlusion_settings import CardOcclusionSettings
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
+from ...groom.width_settings import WidthSettings
 from ...params import SettingsMap
 from ...shading.settings import StrandSettings
 from ...strands import Surface
@@ -166,7 +167,7 @@ def _read_strands(
         head=None if source.head is None else source.head.transformed(back),
     )
     settings = GroomSettings.of(hair).sections
-    of_shade = settings.only(GuideSettings, ChildrenSettings, StrandSettings)
+    of_shade = settings.only(GuideSettings, WidthSettings, ChildrenSettings, StrandSettings)
     return _ReadStrands(source, of_shade, hair.name)
 
 

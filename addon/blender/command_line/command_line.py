@@ -169,7 +169,7 @@ def _sources(verb: Verb, options: argparse.Namespace) -> Sources:
         groom_scale=options.groom_scale,
         groom_up=options.groom_up,
         need_head=verb.needs_head,
-        need_uv=not options.no_uv,
+        need_uv=options.strict,
         density_group=options.density_group,
         length_group=options.length_group,
         children_density=options.children_density or _own_density(options.groom),

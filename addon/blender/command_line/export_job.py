@@ -17,6 +17,8 @@ from ...exchange.groom import Groom
 from ...exchange.strand_check import check_lines
 from ...exchange.strand_export_settings import StrandExportSettings
 from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat, format_of
+from ...groom.width_settings import WidthSettings
+from ...groom.widths import with_widths
 from ...pipeline import Rig
 from ...shading.settings import ShadingSettings
 from ..strands.groom_motion import BakedMotion
@@ -107,7 +109,9 @@ def _of_rig(
                 remedy="Give a bake with --bake, or hair of the scene with --object",
             )
         rig, inputs = read_rig(job)
-        groom = hair_of_rig(rig, _groom(rig, inputs), needs, color).groom
+        groom = hair_of_rig(
+            rig, _groom(rig, inputs, job.settings[WidthSettings].method), needs, color
+        ).groom
         return StrandExport(groom, settings, kind, inputs.dropped)
     at = frames if job.options.frame is None else range(job.options.frame, job.options.frame + 1)
     motion = motion_of(job, at)
@@ -127,12 +131,15 @@ def _of_rig(
     return plan
 
 
-def _groom(rig: Rig, inputs: Inputs) -> Groom:
+def _groom(rig: Rig, inputs: Inputs, widths: str) -> Groom:
     """The strands with their own points; those of the rig where they are children."""
     name = Path(inputs.groom_name).stem
     if inputs.strands.strand_count != rig.strands.strand_count:
         return Groom(rig.strands, name)
-    return Groom(inputs.strands, name) if inputs.groom is None else replace(inputs.groom, name=name)
+    own, _ = with_widths(inputs.strands, widths)
+    if inputs.groom is None:
+        return Groom(own, name)
+    return replace(inputs.groom, name=name, strands=own)
 
 
 def _of_strands(groom: Groom) -> dict[str, Any]:

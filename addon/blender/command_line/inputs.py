@@ -46,7 +46,7 @@ class Sources:
     groom_scale: float = 1.0
     groom_up: str | None = None
     need_head: bool = True
-    need_uv: bool = True
+    need_uv: bool = False
     density_group: str = ""
     length_group: str = ""
     children_density: str = ""
@@ -94,6 +94,12 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
         collider = _read_mesh(sources.collider, need_uv=False)
     head_object = bpy.data.objects.get(head_name or "")
     name = sources.groom or BUILT_IN
+    if head is not None and head.corner_uv is None:
+        notes = (
+            *notes,
+            f"{head_name}: it has no UVs, so strands have no root UVs, and shadows on it have hard "
+            "edges. Unwrap it (Edit Mode, UV > Unwrap).",
+        )
     children = _weights(sources.children_density, head_name)
     found = head_object and head_object.name
     return Inputs(strands, dropped, groom, notes, name, head, found, collider, children)

@@ -56,7 +56,6 @@ def add_hair_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="the same for how densely children grow (--set children.method=multi)",
     )
-    sources.add_argument("--no-uv", action="store_true", help="accept a head without UVs")
     sources.add_argument(
         "--strict", action="store_true", help="fail when a single strand must be dropped"
     )

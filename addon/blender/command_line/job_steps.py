@@ -15,6 +15,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GrowSettings, GuideSettings
+from ...groom.width_settings import WidthSettings
 from ...params import SettingsMap
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
@@ -61,8 +62,10 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
             place=inputs.groom_name,
             children=job.settings[ChildrenSettings],
             density=inputs.density,
+            widths=job.settings[WidthSettings].method,
         )
     tell_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
+    print(f"{rig.widths.line}.", flush=True)
     tell_rig(report, rig, inputs.groom_name)
     return rig, inputs
 
@@ -74,7 +77,8 @@ def tell_rig(report: Report, rig: Rig, name: str) -> None:
         groom=Path(name).name,
         strands=rig.strands.strand_count,
         guides=len(rig.guides),
-        children=rig.strands.strand_count - len(rig.guides),
+        children=rig.child_count,
+        widths=rig.widths.line,
         cv_count=rig.strands.grid.shape[1],
         bounds_m=[low.round(5).tolist(), high.round(5).tolist()],
     )

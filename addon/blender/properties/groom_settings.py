@@ -9,6 +9,7 @@ import bpy
 from ...cards.drawing_settings import CardDrawingSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
+from ...groom.width_settings import WidthSettings
 from ...parameters import ALL_SETTINGS, sections_of
 from ...params import Owner, Settings, SettingsMap
 from ...shading.ambient_settings import AmbientSettings
@@ -77,8 +78,9 @@ class GroomSettings:
     def of_rig(self) -> tuple[SettingsMap, str]:
         """What decides which strands and guides there are."""
         if self[ChildrenSettings].method == "none":
-            return self.sections.only(GuideSettings), ""
-        return self.sections.only(GuideSettings, ChildrenSettings), self.children_density
+            return self.sections.only(GuideSettings, WidthSettings), ""
+        kinds = (GuideSettings, WidthSettings, ChildrenSettings)
+        return self.sections.only(*kinds), self.children_density
 
     def acts_at_once(self, before: GroomSettings) -> bool:
         """Whether only such settings differ that need nothing to be read or made again."""
@@ -86,5 +88,6 @@ class GroomSettings:
 
     def at_once(self, before: GroomSettings) -> GroomSettings:
         """These, but for what waits until the hair is read again."""
-        waiting = (before[kind] for kind in (GuideSettings, ChildrenSettings, AmbientSettings))
+        kinds = (GuideSettings, WidthSettings, ChildrenSettings, AmbientSettings)
+        waiting = (before[kind] for kind in kinds)
         return replace(self.with_settings(*waiting), children_density=before.children_density)

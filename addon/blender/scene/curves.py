@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
+from ...groom.widths import with_widths
 from ...strands import StrandSet
 from ...strands.affine import mean_scale, moved
 from ...strands.clean import Cleaned, clean
@@ -60,12 +61,16 @@ def write_curves(
     """A new hair curves object that holds these strands, attached to a surface if there is one.
 
     Args:
-        strands: world space, which is also object space: the object is at the origin.
+        strands: world space, which is also object space: the object is at the origin. If nobody
+            knows their widths, the curves have those that are found.
     """
     curves = bpy.data.hair_curves.new(name)
     if strands.strand_count:
         curves.add_curves(strands.point_counts.tolist())
         curves.position_data.foreach_set("vector", strands.points.ravel())
+    if not strands.has_widths:
+        strands, _ = with_widths(strands, "found")
+        curves.hairloom.widths.method = "found"
     set_attribute(curves, "radius", "POINT", strands.radius)
     if strands.group.any():
         set_attribute(curves, GROUP_ATTRIBUTES[0], "CURVE", strands.group)

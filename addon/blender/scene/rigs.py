@@ -7,6 +7,7 @@ import bpy
 from ... import pipeline
 from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
+from ...groom.width_settings import WidthSettings
 from ...params import SettingsMap
 from ...pipeline import Rig
 from ..properties.groom_settings import GroomSettings
@@ -29,6 +30,7 @@ def rig_from(source: Source, settings: SettingsMap, *, place: str) -> Rig:
         place=place,
         children=settings[ChildrenSettings],
         density=source.density,
+        widths=settings[WidthSettings].method,
     )
 
 

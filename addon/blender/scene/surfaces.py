@@ -38,7 +38,7 @@ def read_surface(
             raise HairloomError(
                 "this mesh has no UVs, so hair cannot be placed on its texture",
                 place=place,
-                remedy="Unwrap it (Edit Mode, UV > Unwrap), or continue without UVs by --no-uv",
+                remedy="Unwrap it (Edit Mode, UV > Unwrap), or leave out --strict",
             )
         surface = Surface(_positions(mesh), triangles, corner_uv)
     return surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world))

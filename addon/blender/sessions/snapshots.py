@@ -43,12 +43,15 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
         guide=np.ascontiguousarray(groom.rig.weights.guide[:, 0]),
         group=strands.group,
         rank=groom.rank,
+        extinction=groom.rig.widths.extinction,
     )
 
 
 def with_settings(snapshot: Snapshot, settings: GroomSettings) -> Snapshot:
     """The same groom by these settings."""
     sections: dict[str, Any] = {name: settings[kind] for name, kind in SECTIONS.items()}
+    volume = settings[VolumeSettings]
+    sections["volume"] = replace(volume, extinction=volume.extinction * snapshot.extinction)
     return replace(snapshot, debug_view=settings.debug_view, **sections)
 
 

@@ -25,7 +25,7 @@ _HEAD_SIZE = 0.19
 #: Meshes within these factors are heads or bodies of real size, and are not fitted.
 _REAL = 2.5
 #: lengths that belong to the whole head, not to single hairs
-_LENGTHS = ("length", "wave", "wave_length", "frizz", "clearance", "volume", "radius")
+_LENGTHS = ("length", "wave", "wave_length", "frizz", "clearance", "volume")
 #: settings of dynamics -> the power of the size that they scale with; frequencies are kept
 _MOTION = {
     "gravity": 1,

@@ -13,6 +13,7 @@ from ...arrays import Floats, Ints
 from ...exchange.groom import Groom, points_of, with_guide_copies
 from ...groom.roots import bind_roots
 from ...groom.weights import guide_weights
+from ...groom.widths import with_widths
 from ...pipeline import Rig
 from ...strands import StrandSet
 from ...strands.resample import arc_length_positions, resample
@@ -79,9 +80,10 @@ def still_hair(
     said = _without_empty_marks(stored_groom(hair, depsgraph, source.kept))
     if request.guides and "is_guide" not in said:
         rig = rig_of(hair, source)
-        groom = Groom(_bound_as(source.strands, rig.strands), hair.name, **said)
+        strands = _as_wide_as_drawn(hair, source.strands)
+        groom = Groom(_bound_as(strands, rig.strands), hair.name, **said)
         return _with_notes(hair, source, _out(groom, rig, request, look_color(hair)), rig)
-    strands = source.strands
+    strands = _as_wide_as_drawn(hair, source.strands)
     if source.head is not None and (request.roots or strands.root_uv is None):
         strands = bind_roots(strands, source.head, place=hair.name).strands
     groom = Groom(strands, hair.name, **said)
@@ -152,6 +154,10 @@ def _with_notes(
 ) -> ExportStrands:
     notes = () if rig is None else notes_of(hair, rig)
     return replace(out, dropped=source.dropped, notes=(*source.warnings, *notes))
+
+
+def _as_wide_as_drawn(hair: bpy.types.Object, strands: StrandSet) -> StrandSet:
+    return with_widths(strands, hair.data.hairloom.widths.method)[0]
 
 
 def _bound_as(strands: StrandSet, bound: StrandSet) -> StrandSet:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Bools, Floats, Ints
 from ...strands.affine import mean_scale, moved
-from ..read_groom import finite, plausible
+from ..read_groom import finite
 from .usd_basis import OnCurves, points_on_curves
 
 #: Where programs put the UVs of roots, Blender's among them; the first one found counts.
@@ -116,7 +116,7 @@ def _radius(values: _Values, curves: Any, scale: float) -> tuple[Floats | None, 
     if radius is None:
         return None, ()
     with np.errstate(over="ignore", invalid="ignore"):
-        radius = plausible(radius * np.float32(0.5 * scale))
+        radius = radius * np.float32(0.5 * scale)
     wrong = int(np.isnan(radius).sum())
     notes = (f"{wrong:,} widths are none of hair and were replaced",) if wrong else ()
     return radius, notes

@@ -99,7 +99,7 @@ class StrandArea:
     def shadow_area(self, strands: StrandSettings) -> float:
         """What they take of light from everywhere [m^2]: pi / 4 of their area, as cylinders."""
         tapered = self.whole + (strands.tip_width - 1.0) * self.weighted
-        return 0.25 * np.pi * strands.width_scale * strands.as_drawn.opacity * tapered
+        return 0.25 * np.pi * strands.fullness * strands.as_drawn.opacity * tapered
 
 
 #: places in a triangle, barycentric, where its alpha is looked up

@@ -261,7 +261,7 @@ def test_notes_go_by_how_wide_strands_are_drawn() -> None:
     atlas = AtlasSettings(size="512", columns=8, rows=2)
 
     def notes(scale: float) -> str:
-        groom = card_flow.card_groom(rig, StrandSettings(width_scale=scale, tip_width=1.0))
+        groom = card_flow.card_groom(rig, StrandSettings(fullness=scale, tip_width=1.0))
         plan = uncut_cards(groom, settings, atlas)[1]
         assert plan is not None
         return " ".join(plan.notes)

@@ -43,7 +43,7 @@ def test_they_take_what_the_strands_take() -> None:
         rig = curtain(count, radius)
         strands = rig.strands
         area = StrandArea.of(strands.grid, strands.radius.reshape(count, -1))
-        drawn = StrandSettings(width_scale=2.0, tip_width=1.0)
+        drawn = StrandSettings(fullness=2.0, tip_width=1.0)
         found = taken(card_flow.occluder_of(rig, drawn))
         # cards are a little longer than the mean of their strands
         assert np.isclose(found, area.shadow_area(drawn), rtol=0.06)

@@ -16,7 +16,7 @@ BROWN = (0.4, 0.25, 0.15)
 
 
 def test_radii_are_scaled_and_taper_evenly() -> None:
-    radius = drawn_radius(np.full((2, 5), 1e-4), StrandSettings(width_scale=3.0, tip_width=0.2))
+    radius = drawn_radius(np.full((2, 5), 1e-4), StrandSettings(fullness=3.0, tip_width=0.2))
     np.testing.assert_allclose(radius, np.tile([3e-4, 2.4e-4, 1.8e-4, 1.2e-4, 0.6e-4], (2, 1)))
 
 

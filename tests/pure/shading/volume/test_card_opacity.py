@@ -52,7 +52,7 @@ def test_shade_of_strands_is_their_mean_shadow() -> None:
     random = np.random.default_rng(7)
     grid = np.cumsum(random.normal(0.0, 0.01, (20, 40, 3)), axis=1)
     radius = np.full((20, 40), 5.0e-5)
-    settings = StrandSettings(width_scale=2.0, tip_width=0.25, transparency="layers", opacity=0.5)
+    settings = StrandSettings(fullness=2.0, tip_width=0.25, transparency="layers", opacity=0.5)
     steps = np.diff(grid, axis=1)
     across = np.linalg.norm(np.cross(steps[None], directions()[:, None, None]), axis=3).mean(axis=0)
     width = 2.0 * 5.0e-5 * 2.0 * np.linspace(1.0, 0.25, 40)

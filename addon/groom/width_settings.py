@@ -1,0 +1,25 @@
+"""What the artist sets about where widths come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..params import Settings, choice
+from .widths import METHODS
+
+
+@dataclass(frozen=True, kw_only=True)
+class WidthSettings(Settings):
+    """Where the widths of strands come from."""
+
+    section = "widths"
+    title = "Widths"
+    owner = "groom"
+
+    method: str = choice(
+        "auto",
+        METHODS,
+        label="Widths",
+        description="Where the widths of strands come from",
+        source="Robbins 2012, Chemical and Physical Behavior of Human Hair, chapter 9",
+    )

@@ -1,0 +1,89 @@
+"""The grooms of the sight bench, made ready as the product does with no setting changed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import bmesh
+import numpy as np
+from extension_loader import REPOSITORY
+
+from hairloom.addon import pipeline
+from hairloom.addon.blender.scene.mesh_files import read_mesh_file
+from hairloom.addon.exchange.joined_grooms import joined_grooms
+from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.groom.width_settings import WidthSettings
+from hairloom.addon.pipeline import Rig
+from hairloom.addon.strands import StrandSet, Surface
+
+_DATA = Path(os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data"))
+type Pair = tuple[StrandSet, Surface | None]
+
+
+def sintel() -> Pair:
+    folder = _DATA / "sintel"
+    return _file(folder / "SintelHairOriginal-sintel_hair.16points.tfx"), _mesh(
+        folder / "sintel.obj"
+    )
+
+
+def ponytail() -> Pair:
+    """Four files, one head of hair; it comes without a head, so on the hull of its roots."""
+    names = ("front_top", "side", "back", "tail")
+    parts = [read_tfx(_DATA / "tressfx_ponytail" / f"{name}.tfx").groom for name in names]
+    strands = joined_grooms(parts, "ponytail")[0].strands
+    return strands, _hull(strands.roots)
+
+
+def bear() -> Pair:
+    return _file(_DATA / "creatures" / "bear.tfx"), _mesh(_DATA / "creatures" / "bear.obj")
+
+
+def mohawk() -> Pair:
+    folder = _DATA / "creatures"
+    return _file(folder / "Ratboy_mohawk.tfx"), _mesh(folder / "ratboy_body.obj")
+
+
+GROOMS: dict[str, Callable[[], Pair]] = {
+    "sintel": sintel,
+    "ponytail": ponytail,
+    "bear": bear,
+    "mohawk": mohawk,
+}
+
+
+def scaled(pair: Pair, factor: float) -> Pair:
+    strands, head = pair
+    moved = strands.transformed(np.diag([factor, factor, factor, 1.0]))
+    return moved, head and replace(head, positions=head.positions * np.float32(factor))
+
+
+def rig_of(pair: Pair, name: str) -> Rig:
+    strands, head = pair
+    widths = WidthSettings().method
+    return pipeline.prepare(strands, head, GuideSettings(), place=name, widths=widths)
+
+
+def _hull(points: np.ndarray) -> Surface:
+    shape = bmesh.new()
+    for point in points.tolist():
+        shape.verts.new(point)
+    hull = bmesh.ops.convex_hull(shape, input=shape.verts)
+    faces = [each for each in hull["geom"] if isinstance(each, bmesh.types.BMFace)]
+    shape.verts.index_update()
+    corners = [[vertex.index for vertex in face.verts] for face in faces]
+    places = np.array([vertex.co for vertex in shape.verts], np.float32)
+    shape.free()
+    return Surface(places, np.array(corners, np.int32))
+
+
+def _file(path: Path) -> StrandSet:
+    return read_tfx(path).strands
+
+
+def _mesh(path: Path) -> Surface:
+    return read_mesh_file(path, need_uv=False)

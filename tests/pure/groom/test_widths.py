@@ -1,0 +1,110 @@
+"""Found widths against what is known of a head: 100,000 hairs of 0.08 mm on 600 cm2."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon.groom.widths import Widths, with_widths
+from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands.clean import clean
+
+AREA = 0.06  # [m2]
+LENGTH = 0.25  # [m]
+
+
+def head_of_hair(count: int, factor: float = 1.0, *, has_widths: bool = False) -> StrandSet:
+    """Strands that stand on half a sphere, evenly spread (Fibonacci's spiral)."""
+    height = (np.arange(count) + 0.5) / count
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
+    across = np.sqrt(1.0 - height**2)
+    normal = np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
+    root = normal * np.sqrt(AREA / (2.0 * np.pi))
+    # they hang, as hair does, rather than spread out
+    along = np.linspace(0.0, LENGTH, 4)[:, None] * np.array([0.0, 0.0, -1.0])
+    points = (root[:, None] + along).reshape(-1, 3) * factor
+    return StrandSet(
+        points,
+        np.arange(count + 1) * 4,
+        np.full(4 * count, 4e-5),
+        np.zeros(count),
+        has_widths=has_widths,
+    )
+
+
+def width(strands: StrandSet) -> float:
+    found, widths = with_widths(strands)
+    assert widths.is_found
+    np.testing.assert_allclose(np.median(found.radius) * 2.0, widths.median, rtol=1e-6)
+    return widths.median
+
+
+def test_a_hundred_thousand_strands_are_hairs() -> None:
+    assert width(head_of_hair(100_000)) == pytest.approx(8e-5, rel=0.05)
+    assert with_widths(head_of_hair(100_000))[1].hairs == pytest.approx(1.0, rel=0.05)
+    assert with_widths(head_of_hair(10_000))[1].hairs == pytest.approx(10.0, rel=0.05)
+
+
+@pytest.mark.parametrize("factor", [1e-3, 0.05, 1e3])
+def test_no_unit_of_length_is_assumed(factor: float) -> None:
+    one, other = head_of_hair(3000), head_of_hair(3000, factor)
+    assert width(other) == pytest.approx(width(one) * factor, rel=1e-3)
+    assert with_widths(other)[1].extinction == pytest.approx(with_widths(one)[1].extinction)
+
+
+def test_few_strands_take_as_much_light_as_many() -> None:
+    taken = []
+    for count in (2000, 20_000, 100_000):
+        strands, widths = with_widths(head_of_hair(count))
+        spacing = np.sqrt(AREA / count)
+        assert 2.0 * strands.radius.max() <= 0.25 * spacing * 1.3, "a quarter of the spacing"
+        taken.append(count * 2.0 * strands.radius.mean() * widths.extinction)
+    np.testing.assert_allclose(taken, taken[-1], rtol=0.06)
+
+
+def test_own_widths_are_kept_where_they_can_be_hair() -> None:
+    strands = head_of_hair(20_000, has_widths=True)
+    own = replace(strands, radius=np.full(strands.point_count, 1e-4))
+    kept, widths = with_widths(own)
+    assert kept is own and not widths.is_found and widths.extinction == 1.0
+    assert "as the groom has them" in widths.line
+    for method, is_found in (("own", False), ("found", True)):
+        assert with_widths(own, method)[1].is_found == is_found
+
+
+@pytest.mark.parametrize(("radius", "why"), [(4e-6, "bald"), (0.5, "bury"), (5e-3, "bury")])
+def test_widths_that_cannot_be_hair_are_found(radius: float, why: str) -> None:
+    strands = head_of_hair(10_000, has_widths=True)
+    found, widths = with_widths(replace(strands, radius=np.full(strands.point_count, radius)))
+    assert widths.is_found and why in widths.line
+    assert np.median(found.radius) == pytest.approx(width(head_of_hair(10_000)) / 2.0)
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
+def test_numbers_that_are_no_widths_are_not_known(bad: float) -> None:
+    strands = head_of_hair(500)
+    cleaned = clean(strands.points, strands.offsets, radius=np.full(strands.point_count, bad))
+    assert not cleaned.strands.has_widths
+    some = np.full(strands.point_count, 2e-4)
+    some[::2] = bad
+    mixed = clean(strands.points, strands.offsets, radius=some).strands
+    assert mixed.has_widths and np.allclose(mixed.radius, 2e-4)
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 300])
+def test_without_any_spacing_the_length_decides(count: int) -> None:
+    """One strand, or all of them in the same place."""
+    one = head_of_hair(1)
+    points = np.tile(one.points, (count, 1))
+    strands = StrandSet(
+        points, np.arange(count + 1) * 4, np.ones(4 * count), np.zeros(count), has_widths=False
+    )
+    assert 0.0 < width(strands) <= LENGTH / 12.0
+    assert with_widths(strands)[1].extinction == 1.0
+
+
+def test_no_strands_have_no_widths() -> None:
+    none = head_of_hair(1).take(np.zeros(0, np.int64))
+    assert with_widths(none) == (none, Widths())
