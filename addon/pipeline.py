@@ -29,6 +29,7 @@ from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
 from .strands import StrandSet, Surface
+from .strands.colors import joined_colors
 from .strands.resample import resample
 
 NO_WIND = np.zeros(3)
@@ -178,7 +179,9 @@ def _joined(one: StrandSet, other: StrandSet) -> StrandSet:
         parts = [getattr(one, name), getattr(other, name)]
         both[name] = None if any(part is None for part in parts) else np.concatenate(parts)
     return StrandSet(
-        offsets=np.concatenate([one.offsets, other.offsets[1:] + one.offsets[-1]]), **both
+        offsets=np.concatenate([one.offsets, other.offsets[1:] + one.offsets[-1]]),
+        color=joined_colors([one, other]),
+        **both,
     )
 
 

@@ -27,6 +27,8 @@ class StrandSet:
     root_uv: (strand_count, 2) float32, or None where no UVs are known.
     root_triangle: (strand_count,) int32, or None when unbound.
     root_barycentric: (strand_count, 3) float32, or None when unbound.
+    color: (point_count, 3) float32 scene-linear, the hair's own; None where it has none, NaN all
+        along strands that have none.
 
     Raises:
         HairloomError: shapes that do not fit, a strand of fewer than two points, values that
@@ -40,6 +42,7 @@ class StrandSet:
     root_uv: Floats | None = None
     root_triangle: Ints | None = None
     root_barycentric: Floats | None = None
+    color: Floats | None = None
 
     def __post_init__(self) -> None:
         for name, dtype in _DTYPES.items():
@@ -65,6 +68,7 @@ class StrandSet:
             "root_uv": (strands, 2),
             "root_triangle": (strands,),
             "root_barycentric": (strands, 3),
+            "color": (points, 3),
         }
         for name, shape in expected.items():
             value = getattr(self, name)
@@ -108,6 +112,11 @@ class StrandSet:
         cv_count = int(self.point_counts[0]) if self.strand_count else 2
         return self.points.reshape(self.strand_count, cv_count, 3)
 
+    @property
+    def color_grid(self) -> Floats | None:
+        """The colours as (strand_count, cv_count, 3); only for a uniform set."""
+        return None if self.color is None else self.color.reshape(self.grid.shape)
+
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner of all points, each (3,) [m]; zeros for an empty set."""
         if not self.point_count:
@@ -132,7 +141,10 @@ class StrandSet:
             name: None if getattr(self, name) is None else getattr(self, name)[strands]
             for name in _PER_STRAND
         }
-        return StrandSet(self.points[picked], offsets, self.radius[picked], **per_strand)
+        color = None if self.color is None else self.color[picked]
+        return StrandSet(
+            self.points[picked], offsets, self.radius[picked], color=color, **per_strand
+        )
 
     def with_points(self, points: Floats) -> StrandSet:
         """The same strands with moved points, (point_count, 3) [m]."""
@@ -157,6 +169,7 @@ _DTYPES = {
     "root_uv": np.float32,
     "root_triangle": np.int32,
     "root_barycentric": np.float32,
+    "color": np.float32,
 }
 _PER_STRAND = ("group", "root_uv", "root_triangle", "root_barycentric")
 assert set(_DTYPES) == {field.name for field in fields(StrandSet)}

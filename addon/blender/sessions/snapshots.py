@@ -43,6 +43,7 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
         guide=np.ascontiguousarray(groom.rig.weights.guide[:, 0]),
         group=strands.group,
         rank=groom.rank,
+        color=strands.color_grid,
     )
 
 

@@ -9,8 +9,8 @@ void main()
     return;
   }
   vec3 place = texelFetch(places, ivec2(at.x, 0), 0).xyz;
-  vec3 absorption = strand_absorption(fibre, place.x, place.y, place.z, shading);
-  vec3 base = strand_base(place.x, place.y, place.z, shading);
+  vec3 absorption = strand_absorption(fibre, place.x, place.y, place.z, shading, fibre.root.xyz);
+  vec3 base = strand_base(place.x, place.y, place.z, shading, shading.base_color);
   vec3 value = at.y == 0 ? absorption : at.y == 1 ? strand_color(fibre, absorption) : base;
   imageStore(result, at, vec4(value, tip_fraction(place.x, shading)));
 }
