@@ -30,6 +30,7 @@ from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
 from .strands import StrandSet, Surface
+from .strands.colors import joined_colors
 from .strands.resample import resample
 
 NO_WIND = np.zeros(3)
@@ -198,6 +199,7 @@ def _joined(one: StrandSet, other: StrandSet) -> StrandSet:
     return StrandSet(
         offsets=np.concatenate([one.offsets, other.offsets[1:] + one.offsets[-1]]),
         has_widths=one.has_widths and other.has_widths,
+        color=joined_colors([one, other]),
         **both,
     )
 

@@ -64,10 +64,10 @@ def full_groom() -> Groom:
         np.tile(np.linspace(4e-5, 1e-5, POINTS), STRANDS),
         random.integers(0, GROUPS, STRANDS),
         random.random((STRANDS, 2)),
+        color=random.random((STRANDS * POINTS, 3)),
     )
     return Groom(
         strands,
-        color=random.random((STRANDS * POINTS, 3)),
         strand_id=np.arange(STRANDS),
         is_guide=is_guide,
         closest_guides=random.choice(np.flatnonzero(is_guide), (STRANDS, 3)),

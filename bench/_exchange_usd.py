@@ -55,11 +55,11 @@ def full_groom() -> Groom:
         radius=np.tile(np.linspace(5.0e-5, 1.0e-5, POINTS), STRANDS),
         group=random.integers(0, 4, STRANDS),
         root_uv=random.random((STRANDS, 2)),
+        color=random.random((STRANDS * POINTS, 3)),
     )
     weights = random.random((STRANDS, 3))
     return Groom(
         strands,
-        color=random.random((STRANDS * POINTS, 3)),
         strand_id=random.permutation(STRANDS),
         is_guide=random.random(STRANDS) < 0.02,
         closest_guides=random.integers(0, STRANDS, (STRANDS, 3)),

@@ -51,8 +51,8 @@ void main()
   float sparkle_noise = card_texel(noise_texture, card_uv, steps, vec2(0.0)).x;
   vec3 absorption = vec3(0.0);
 #  if MARSCHNER
-  vec3 colored = strand_absorption(fibre, along, 0.5, 1.5, shading);
-  vec3 grey = strand_absorption(fibre, along, 0.5, -0.5, shading);
+  vec3 colored = strand_absorption(fibre, along, 0.5, 1.5, shading, fibre.root.xyz);
+  vec3 grey = strand_absorption(fibre, along, 0.5, -0.5, shading, fibre.root.xyz);
   absorption = own_absorption(mix(colored, grey, shading.grey_fraction), base, fibre.root.w);
   vec3 hair = strand_color(fibre, absorption);
 #  else

@@ -32,8 +32,8 @@ float view_compensated_alpha(float alpha, vec3 across, vec3 tangent, vec3 to_eye
 // Mean colour of the strands, of which some are grey: times the base texture it is the hair's.
 vec3 card_base(float along, ShadingSettings shading)
 {
-  vec3 colored = strand_base(along, 0.5, 1.5, shading);
-  vec3 grey = strand_base(along, 0.5, -0.5, shading);
+  vec3 colored = strand_base(along, 0.5, 1.5, shading, shading.base_color);
+  vec3 grey = strand_base(along, 0.5, -0.5, shading, shading.base_color);
   return mix(colored, grey, shading.grey_fraction);
 }
 

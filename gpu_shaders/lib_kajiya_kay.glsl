@@ -80,9 +80,10 @@ vec3 kajiya_kay(vec3 tangent,
 
 // The hair's colour at a place of a strand: the base mixed to the tips', or grey, made darker or
 // brighter by the strand's noise in 0..1. Strands of the lowest grey noise are grey.
-vec3 strand_base(float along, float color_noise, float grey_noise, ShadingSettings shading)
+vec3 strand_base(
+    float along, float color_noise, float grey_noise, ShadingSettings shading, vec3 root)
 {
-  vec3 color = mix(shading.base_color, shading.tip_color, tip_fraction(along, shading));
+  vec3 color = mix(root, shading.tip_color, tip_fraction(along, shading));
   color = grey_noise < shading.grey_fraction ? GREY_COLOR : color;
   return color * (1.0 + shading.color_variation * (2.0 * color_noise - 1.0));
 }

@@ -12,6 +12,8 @@
 const float MIN_COSINE = 1.0e-4;
 // _MIN_VARIANCE of addon/shading/marschner/tables.py
 const float MIN_VARIANCE = 1.0e-6;
+// MIN_COLOR of addon/shading/marschner/pigment.py
+const float MIN_COLOR = 1.0e-4;
 
 // theta_i, theta_r and |phi| of unit vectors.
 vec3 directions_to_angles(vec3 tangent, vec3 to_light, vec3 to_eye)
@@ -72,11 +74,23 @@ vec3 look_up(sampler3D longitudinal,
   return kept * factors / (cos_d * cos_d);
 }
 
-// Absorption at a place of a strand, per radius; both noises are the strand's own, in 0..1.
-vec3 strand_absorption(
-    Fibre fibre, float along, float color_noise, float grey_noise, ShadingSettings shading)
+// Absorption that gives a mass of hair this colour. Twin of addon/shading/marschner/pigment.py.
+vec3 color_absorption(Fibre fibre, vec3 color)
 {
-  vec3 mixed = mix(fibre.root.xyz, fibre.tip.xyz, tip_fraction(along, shading));
+  vec3 root = log(clamp(color, MIN_COLOR, 1.0)) / fibre.root.w;
+  return root * root;
+}
+
+// Absorption at a place of a strand, per radius; both noises are the strand's own, in 0..1. `root` is
+// that without a tint.
+vec3 strand_absorption(Fibre fibre,
+                       float along,
+                       float color_noise,
+                       float grey_noise,
+                       ShadingSettings shading,
+                       vec3 root)
+{
+  vec3 mixed = mix(root, fibre.tip.xyz, tip_fraction(along, shading));
   float amount = 1.0 + shading.color_variation * (1.0 - 2.0 * color_noise);
   vec3 grey = vec3(fibre.tip.w * dot(mixed, vec3(1.0 / 3.0)));
   return amount * (grey_noise < shading.grey_fraction ? grey : mixed);

@@ -1,7 +1,8 @@
 // What a strand sends to the eye: all lights and the world's. SHADOWS of strands on strands come from
 // opacity maps; where a light has none, the occlusion and how much the volume faces it stand in.
 // With SCATTERING light goes from strand to strand. OTHERS: there is more hair in the way than the maps
-// hold; `between` is its optical depth, of the first lights.
+// hold; `between` is its optical depth, of the first lights. OWN_COLOR: strands have colours, `own`, in
+// place of the look's; w is 0 where one has none.
 //
 // Reads the blocks `view`, `lights`, `strands`, `shading`, `fibre`, and the textures of their features.
 #include "lib_lights.glsl"
@@ -33,6 +34,7 @@ vec3 strand_radiance(vec3 point,
                      float along,
                      float occlusion,
                      vec4 between,
+                     vec4 own,
                      uint seed)
 {
   vec3 normal = strand_normal(point, tangent, volume_center);
@@ -44,10 +46,18 @@ vec3 strand_radiance(vec3 point,
   float grey_noise = strand_noise(seed, 3u, 0.0);
   vec3 absorption = vec3(0.0);
 #if MARSCHNER
-  absorption = strand_absorption(fibre, along, color_noise, grey_noise, shading);
+  vec3 root = fibre.root.xyz;
+#  ifdef OWN_COLOR
+  root = own.w > 0.5 ? color_absorption(fibre, own.xyz) : root;
+#  endif
+  absorption = strand_absorption(fibre, along, color_noise, grey_noise, shading, root);
   vec3 hair = strand_color(fibre, absorption);
 #else
-  vec3 hair = strand_base(along, color_noise, grey_noise, shading);
+  vec3 root = shading.base_color;
+#  ifdef OWN_COLOR
+  root = own.w > 0.5 ? own.xyz : root;
+#  endif
+  vec3 hair = strand_base(along, color_noise, grey_noise, shading, root);
 #endif
 
   vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz * occlusion;

@@ -49,12 +49,15 @@ void main()
   vec3 radiance = debug_radiance(tangent, seed);
 #else
   vec2 place = strand_along_and_occlusion;
-  vec4 between = vec4(0.0);
+  vec4 between = vec4(0.0), own = vec4(0.0);
 #  ifdef OTHER_TAU
   between = strand_other_tau;
 #  endif
+#  ifdef OWN_COLOR
+  own = strand_own_color;
+#  endif
   vec3 radiance = strand_radiance(
-      strand_point, tangent, vec3(0.0), strand_radius, place.x, place.y, between, seed);
+      strand_point, tangent, vec3(0.0), strand_radius, place.x, place.y, between, own, seed);
 #endif
 #if HASHED
   // at the end, because derivatives want all pixels until then

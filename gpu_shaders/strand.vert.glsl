@@ -69,6 +69,11 @@ void main()
                        texelFetch(cv_other_tau, strand_texel(strand, segment + 1, cv_count), 0),
                        u);
 #  endif
+#  ifdef OWN_COLOR
+  strand_own_color = mix(texelFetch(cv_colors, strand_texel(strand, segment, cv_count), 0),
+                         texelFetch(cv_colors, strand_texel(strand, segment + 1, cv_count), 0),
+                         u);
+#  endif
 #endif
 #if DEBUG || GATHERED
   strand_index = strand;

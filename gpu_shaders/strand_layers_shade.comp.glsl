@@ -40,14 +40,19 @@ vec3 layer_radiance(int strand, float along)
   float occlusion = mix(from_look.x, to_look.x, u);
   float radius = mix(root_side.w, tip_side.w, u) * strands.fullness *
                  mix(1.0, strands.tip_width, along);
-  vec4 between = vec4(0.0);
+  vec4 between = vec4(0.0), own = vec4(0.0);
 #ifdef OTHER_TAU
   between = mix(texelFetch(cv_other_tau, strand_texel(strand, segment, cv_count), 0),
                 texelFetch(cv_other_tau, strand_texel(strand, segment + 1, cv_count), 0),
                 u);
 #endif
+#ifdef OWN_COLOR
+  own = mix(texelFetch(cv_colors, strand_texel(strand, segment, cv_count), 0),
+            texelFetch(cv_colors, strand_texel(strand, segment + 1, cv_count), 0),
+            u);
+#endif
   uint seed = uint(from_look.y);
-  return strand_radiance(point, tangent, bend, radius, along, occlusion, between, seed);
+  return strand_radiance(point, tangent, bend, radius, along, occlusion, between, own, seed);
 }
 
 void main()

@@ -80,8 +80,9 @@ def sample(strand_count: int, seed: int = 0, *, point_count: int = 0) -> Groom:
         np.repeat(radius, counts),
         np.arange(strand_count) % 3,
         random.random((strand_count, 2)),
+        color=random.random((len(points), 3)),
     )
-    return Groom(strands, color=random.random((len(points), 3)))
+    return Groom(strands)
 
 
 def _tfx_files(path: Path, strand_count: int) -> Iterator[bytes]:

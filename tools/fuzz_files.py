@@ -121,6 +121,14 @@ def judged(
     return outcome, seconds, tracemalloc.get_traced_memory()[1] - before
 
 
+def _are_whole(color: Any, offsets: Any) -> bool:
+    """Whether each strand has colours all along or none at all."""
+    is_none = np.isnan(color).all(axis=1)
+    of_strand = np.repeat(is_none[offsets[:-1]], np.diff(offsets))
+    known = color[~is_none]
+    return bool((is_none == of_strand).all() and (known >= 0.0).all() and np.isfinite(known).all())
+
+
 def unsound(found: Any) -> str:
     """What is wrong with what a reader gave; empty where nothing is."""
     if isinstance(found, ReadGroom):
@@ -130,7 +138,7 @@ def unsound(found: Any) -> str:
             np.isfinite(strands.points).all(),
             np.isfinite(strands.radius).all() and (strands.radius > 0.0).all(),
             strands.root_uv is None or np.isfinite(strands.root_uv).all(),
-            color is None or (np.isfinite(color).all() and (color >= 0.0).all()),
+            color is None or _are_whole(color, strands.offsets),
         ]
         return "" if all(sound) else f"a groom that is not sound: {sound}"
     return "" if isinstance(found, Preset) else f"a {type(found).__name__}"

@@ -24,9 +24,9 @@ from .tfxbone import BoneWeights
 class Groom:
     """Strands with all that a file can say of them, checked when made; what is None is not known.
 
-    strands: points and radii [m], groups, root UVs; guides are among them, marked by `is_guide`.
+    strands: points, radii [m], colours, groups, root UVs; guides are among them, marked by
+        `is_guide`.
     name: of the groom, for objects in the file.
-    color: (point_count, 3) float32, scene-linear.
     strand_id: (strand_count,) int32, unique for each strand.
     is_guide: (strand_count,) bool; None: no strand is a guide.
     closest_guides: (strand_count, 3) int32, the strand_id of guides, nearest first.
@@ -42,7 +42,6 @@ class Groom:
 
     strands: StrandSet
     name: str = "hair"
-    color: Floats | None = None
     strand_id: Ints | None = None
     is_guide: Bools | None = None
     closest_guides: Ints | None = None
@@ -53,9 +52,8 @@ class Groom:
     source: Path | None = None
 
     def __post_init__(self) -> None:
-        strands, points = self.strands.strand_count, self.strands.point_count
+        strands = self.strands.strand_count
         shapes = {
-            "color": (points, 3),
             "strand_id": (strands,),
             "is_guide": (strands,),
             "closest_guides": (strands, 3),
@@ -76,14 +74,18 @@ class Groom:
         if self.closest_guides is not None and self.strand_id is None:
             raise _broken("closest_guides name strands by strand_id, which is missing")
 
+    @property
+    def color(self) -> Floats | None:
+        """The strands', (point_count, 3) scene-linear."""
+        return self.strands.color
+
     def take(self, strands: Ints) -> Groom:
         """The strands with these indices, in this order, with all that belongs to them."""
-        points = points_of(self.strands, strands)
         changes: dict[str, Any] = {"strands": self.strands.take(strands)}
         for name in _DTYPES:
             value = getattr(self, name)
             if value is not None:
-                changes[name] = value[points if name == "color" else strands]
+                changes[name] = value[strands]
         if self.bones is not None:
             changes["bones"] = self.bones.take(strands)
         return replace(self, **changes)
@@ -156,7 +158,6 @@ def with_guide_copies(groom: Groom, guides: Ints, guide: Ints, weight: Floats) -
 
 _LARGEST_ID = np.iinfo(np.int32).max
 _DTYPES = {
-    "color": np.float32,
     "strand_id": np.int32,
     "is_guide": np.bool_,
     "closest_guides": np.int32,

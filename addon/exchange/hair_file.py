@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet
-from ..strands.clean import Cleaned
 from .files.axes import from_z_up, to_z_up
 from .files.binary_file import BinaryFile, write_blocks
 from .groom import Groom
@@ -101,6 +100,7 @@ def read_hair_file(path: Path, up: str = "Z", scale: float = 1.0) -> ReadHairFil
         offsets,
         np.broadcast_to(radius, len(points)),
         None if uv is None else uv[np.minimum(offsets[:-1], len(uv) - 1)],
+        _color(file, len(points)),
     )
 
     transparency = file.values(_TRANSPARENCY)
@@ -109,7 +109,6 @@ def read_hair_file(path: Path, up: str = "Z", scale: float = 1.0) -> ReadHairFil
     groom = Groom(
         cleaned.strands,
         name=path.stem,
-        color=_color(file, offsets, cleaned),
         dropped=cleaned.dropped,
         source=path,
     )
@@ -195,14 +194,12 @@ def _one_or_each(
         arrays[bit] = values
 
 
-def _color(file: _HairFile, offsets: Ints, cleaned: Cleaned) -> Floats | None:
+def _color(file: _HairFile, point_count: int) -> Floats | None:
     values = file.values(_COLOR)
     if values is not None:
-        return finite(kept_points(values, offsets, cleaned), 0.0)
+        return values
     same = file.default("color")
-    if (same == _WHITE).all():
-        return None
-    return np.broadcast_to(finite(same, 0.0), (cleaned.strands.point_count, 3))
+    return None if (same == _WHITE).all() else np.broadcast_to(same, (point_count, 3))
 
 
 class _HairFile(BinaryFile):

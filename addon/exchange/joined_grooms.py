@@ -22,7 +22,6 @@ def joined_grooms(grooms: Sequence[Groom], name: str) -> tuple[Groom, tuple[str,
         return grooms[0], ()
     groups, names = _groups(grooms)
     values: dict[str, Any] = {
-        "color": _all_or_none([groom.color for groom in grooms]),
         "is_guide": _guides(grooms),
         **_numbered(grooms),
     }
@@ -37,15 +36,24 @@ def joined_grooms(grooms: Sequence[Groom], name: str) -> tuple[Groom, tuple[str,
         groups,
         root_uv,
         has_widths=all(each.has_widths for each in strands),
+        color=_all_or_none([each.color for each in strands]),
     )
-    without = [groom.name for groom in grooms if groom.strands.root_uv is None]
-    notes: tuple[str, ...] = ()
-    if root_uv is None and len(without) < len(grooms):
-        notes = (
-            f"{', '.join(without)}: no root UVs, so the file has none at all. Give this hair a "
-            "surface with UVs, or write it to a separate file.",
-        )
+    notes = (
+        *_lost(grooms, "root_uv", "root UVs", "a surface with UVs"),
+        *_lost(grooms, "color", "colours", "an attribute color"),
+    )
     return Groom(together, name, group_names=names, **values), notes
+
+
+def _lost(grooms: Sequence[Groom], name: str, what: str, remedy: str) -> tuple[str, ...]:
+    """A note where some strands have this and others do not."""
+    without = [groom.name for groom in grooms if getattr(groom.strands, name) is None]
+    if not 0 < len(without) < len(grooms):
+        return ()
+    return (
+        f"{', '.join(without)}: no {what}, so the file has none at all. Give this hair {remedy}, "
+        "or write it to a separate file.",
+    )
 
 
 def joined_bones(bones: Sequence[BoneWeights]) -> BoneWeights:

@@ -42,7 +42,12 @@ class ReadGroom:
 
 
 def usable(
-    file: BinaryFile, points: Floats, offsets: Ints, radius: Floats | None, root_uv: Floats | None
+    file: BinaryFile,
+    points: Floats,
+    offsets: Ints,
+    radius: Floats | None,
+    root_uv: Floats | None,
+    color: Floats | None = None,
 ) -> Cleaned:
     """The file's strands without those that cannot be used.
 
@@ -50,7 +55,7 @@ def usable(
         HairloomError: none is left.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        cleaned = clean(points, offsets, radius=radius, root_uv=root_uv)
+        cleaned = clean(points, offsets, radius=radius, root_uv=root_uv, color=color)
     if not cleaned.strands.strand_count:
         reasons = ", ".join(f"{count} with {reason}" for reason, count in cleaned.dropped.items())
         raise file.error(f"none of its strands can be used ({reasons})", "Export the groom again")

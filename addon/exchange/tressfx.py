@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats
 from ..errors import HairloomError
 from ..strands import StrandSet
-from ..strands.resample import arc_length_positions, resample
+from ..strands.resample import resample
 from .files.axes import from_z_up, to_z_up
 from .files.binary_file import write_blocks
 from .groom import Groom
@@ -62,6 +62,7 @@ def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadTressfx:
     file = TressfxFile(path)
     count, positions = file.vertex_count, file.positions()
     thickness, strand_uv = file.of_strands("thickness", 1), file.of_strands("strand_uv", 2)
+    color, vertex_uv = file.of_vertices("color", 4), file.of_vertices("vertex_uv", 2)
     # What overflows becomes infinite, and what is not finite is dropped and counted.
     with np.errstate(over="ignore", invalid="ignore"):
         points = to_z_up(positions[:, :3], up) * np.float32(scale)
@@ -73,16 +74,15 @@ def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadTressfx:
         offsets,
         None if radius is None else np.repeat(radius, count),
         strand_uv,
+        None if color is None else color[:, :3],
     )
     if file.position_width == 4:
         is_held = kept_points(positions[:, 3], offsets, cleaned) == 0.0
     else:
         is_held = file.held(cleaned.strands.strand_count)
-    color, vertex_uv = file.of_vertices("color", 4), file.of_vertices("vertex_uv", 2)
     groom = Groom(
         cleaned.strands,
         name=path.stem,
-        color=None if color is None else finite(kept_points(color[:, :3], offsets, cleaned), 0.0),
         dropped=cleaned.dropped,
         source=path,
     )
@@ -148,8 +148,10 @@ def write_tfx(
         blocks["strand_uv"] = uniform.root_uv
     if vertex_uv:
         blocks["vertex_uv"] = _vertex_uv(len(grid), count)
-    if groom.color is not None:
-        blocks["color"] = _color(groom, count)
+    if uniform.color is not None:
+        opaque = np.ones((len(grid), count, 4), "<f4")
+        opaque[..., :3] = uniform.color.reshape(-1, count, 3)
+        blocks["color"] = opaque
     blocks["thickness"] = uniform.radius[uniform.offsets[:-1]] / np.float32(scale)
     added = -len(grid) % STRANDS_AT_ONCE if multiple_of_64 else 0
     if added:
@@ -189,18 +191,6 @@ def _vertex_count(wanted: int | None, strands: StrandSet, path: Path) -> int:
             remedy="Use 4, 8, 16, 32 or 64",
         )
     return wanted
-
-
-def _color(groom: Groom, count: int) -> Floats:
-    """(strand_count, count, 4), opaque."""
-    strands, color = groom.strands, groom.color
-    assert color is not None
-    if (strands.point_counts != count).any():
-        left, weight = arc_length_positions(strands, count)
-        color = color[left] * (1.0 - weight[..., None]) + color[left + 1] * weight[..., None]
-    opaque = np.ones((strands.strand_count, count, 4), "<f4")
-    opaque[..., :3] = color.reshape(-1, count, 3)
-    return opaque
 
 
 def _vertex_uv(strand_count: int, count: int) -> Floats:

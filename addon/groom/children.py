@@ -78,6 +78,7 @@ def make_children(
         root_triangle=roots.triangle,
         root_barycentric=roots.barycentric,
         has_widths=guides.has_widths,
+        color=_color(guides, weights),
     )
     return Children(strands, weights, roots.notes + _notes(guides, settings))
 
@@ -98,6 +99,22 @@ def _radius(guides: StrandSet, weights: GuideWeights, settings: ChildrenSettings
     for guide, weight in zip(weights.guide.T, weights.weight.T, strict=True):
         total += own[guide] * weight[:, None]
     return total.ravel()
+
+
+def _color(guides: StrandSet, weights: GuideWeights) -> Floats | None:
+    """Mixed as the points are, of the guides that have a colour, (child_count x cv_count, 3)."""
+    if guides.color is None:
+        return None
+    own = guides.color.reshape(guides.strand_count, -1, 3)
+    is_colored = ~np.isnan(own[:, 0, 0])
+    own = np.where(is_colored[:, None, None], own, np.float32(0.0))
+    known = weights.weight * is_colored[weights.guide]
+    total = np.zeros((len(known), *own.shape[1:]), np.float32)
+    for guide, weight in zip(weights.guide.T, known.T, strict=True):
+        total += own[guide] * weight[:, None, None]
+    whole = known.sum(axis=1)[:, None, None]
+    none = np.full_like(total, np.nan)
+    return np.divide(total, whole, out=none, where=whole > 0.0).reshape(-1, 3)
 
 
 def _root_uv(roots: ChildRoots, surface: Surface) -> Floats | None:

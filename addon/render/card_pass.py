@@ -31,6 +31,7 @@ import gpu
 from ..cards.drawing_settings import CardDrawingSettings
 from ..exchange.cards.sidecar import FOUR_PASSES, OPAQUE_ALPHA, THREE_PASSES, DrawPass
 from ..params.glsl import struct_values
+from ..shading.drawn_strands import in_color
 from ..shading.settings import ShadingSettings
 from .camera import Camera
 from .card_batches import ATTRIBUTES, CardBatches
@@ -144,6 +145,9 @@ class CardPass:
         if cards is None:
             return
         self._take_textures(cards)
+        if cards.base_color is not None:
+            shading = in_color(cards.base_color, snapshot.shading)
+            snapshot = replace(snapshot, shading=shading)
         batches = self._batches.of(cards, camera.eye)
         view = view_feature(camera, width, height)
         features = (view, *self._shading(snapshot, cards, opacity))

@@ -21,6 +21,8 @@ class CardSnapshot:
     is_view_compensated: alpha is what the strands cover on the mean of all turns of a card, as
         a baked atlas has it; cards cover as much at a slant, see card_look.view_compensated_alpha.
     thickness: of the hair that alpha stands for in shadows, see shading/volume/card_opacity.py.
+    base_color: that the base texture is a factor of, where it is not the look's: of strands that
+        have colours of their own.
     device: the card_textures.CardTextures that all who draw these cards share; None: each its own.
 
     Mesh and textures are uploaded again only when they are other objects than before; triangles
@@ -34,4 +36,5 @@ class CardSnapshot:
     drawing: CardDrawingSettings = field(default_factory=CardDrawingSettings)
     thickness: float = 1.0
     is_view_compensated: bool = False
+    base_color: tuple[float, float, float] | None = None
     device: Any = None

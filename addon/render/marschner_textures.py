@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..arrays import Floats
+from ..shading.drawn_strands import mean_look
 from ..shading.marschner.look import fibre_of, pack_fibre
 from ..shading.marschner.tables import MarschnerTables, marschner_tables, shape_of
 from ..shading.settings import ShadingSettings
@@ -117,7 +118,7 @@ def hair_forward(snapshot: Snapshot) -> tuple[float, float, float]:
     """The fraction of light that the hair sends on to what lies under it, by colour; 0 without
     light from strand to strand.
     """
-    shading = snapshot.shading
+    shading = mean_look(snapshot.color, snapshot.shading)
     if shading.model != "marschner" or not snapshot.volume.scattering:
         return 0.0, 0.0, 0.0
     red, green, blue = MARSCHNER.forward(shading, snapshot.table_size).tolist()

@@ -150,6 +150,8 @@ class Snapshot:
     radius: (strand_count, cv_count) float32 [m].
     extinction: factor on the light that a strand blocks, see `groom.widths.Widths`.
     occlusion: (strand_count, cv_count) ambient light that arrives, 0 to 1; None is 1 everywhere.
+    color: (strand_count, cv_count, 3) scene-linear, the strands' own; None is the look's, and so is
+        NaN, all along a strand. Counts where the look wants it, see drawn_strands.drawn_color.
     seed: (strand_count,) whole numbers below 2^24, which the noise of a strand depends on; None is
         each strand's index.
     ambient: the world's colour [W/(m^2 sr)].
@@ -197,6 +199,7 @@ class Snapshot:
     table_size: int = DEFAULT_SIZE
     cards: CardSnapshot | None = None
     extinction: float = 1.0
+    color: Floats | None = None
 
     def __post_init__(self) -> None:
         if self.strands.ndim != 3 or self.strands.shape[1] < 2 or self.strands.shape[2] != 3:
@@ -209,6 +212,7 @@ class Snapshot:
             "guide": self.strands.shape[:1],
             "group": self.strands.shape[:1],
             "rank": self.strands.shape[:1],
+            "color": self.strands.shape,
         }
         if self.occluder_spheres is not None:
             expected["occluder_spheres"] = (len(self.occluder_spheres), 4)

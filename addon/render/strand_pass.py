@@ -4,6 +4,7 @@ Packed textures, one row a strand (column blocks beyond 16384 rows, see textures
     cv_points RGBA32F: xyz position [m, world], w radius [m]     new with every new pose, unless
                                                                  it lies on the GPU already
     cv_looks  RG32F:   x ambient occlusion, y seed as a number   constant
+    cv_colors RGBA16F: xyz own colour, w 0 where there is none   constant; of coloured hair alone
     debug_numbers R32F: the guide or the group that a debug view shows
 
 How many pieces each segment has comes from detail_pass.py, unless all have equally many.
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import gpu
@@ -20,6 +22,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..params.glsl import struct_values
+from ..shading.drawn_strands import drawn_color
 from ..shading.lights import kept_lights
 from ..shading.strand_noise import SEED_LIMIT
 from ..shading.volume.light_frame import Ball
@@ -41,6 +44,8 @@ from .strand_layers import LAYERS_OF_PIXELS
 from .textures import drawing_state, strand_rows, texture_from
 from .view_block import lights_feature, view_feature
 
+#: half floats end soon after
+_BRIGHTEST = 6.0e4
 #: debug views that show a number of each strand
 NUMBERED_VIEWS = ("guide", "group")
 
@@ -195,6 +200,8 @@ class StrandPass:
         yield lights_feature(snapshot)
         if snapshot.debug_view != "none":
             return
+        if "cv_colors" in self._textures:
+            yield self._color_feature()
         is_marschner, maps = snapshot.shading.model == "marschner", self.opacity(snapshot)
         if is_marschner:
             yield marschner_feature(snapshot)
@@ -219,6 +226,15 @@ class StrandPass:
             defines={"OTHER_TAU": 1},
         )
 
+    def _color_feature(self) -> ShaderFeature:
+        """What a program has that shades strands in their own colours."""
+        return ShaderFeature(
+            name="colored",
+            textures={"cv_colors": ("FLOAT_2D", self._textures["cv_colors"])},
+            varyings=(("smooth", "VEC4", "strand_own_color"),),
+            defines={"OWN_COLOR": 1},
+        )
+
     def _debug_feature(self, debug_view: str) -> ShaderFeature:
         """What a program has that shows a debug view."""
         numbers = {"debug_numbers": ("FLOAT_2D", self._textures.get("debug_numbers"))}
@@ -240,6 +256,11 @@ class StrandPass:
             self._points_serial += 1
         looks = (snapshot.occlusion, snapshot.seed, snapshot.strands.shape)
         self._take("cv_looks", looks, lambda: texture_from(strand_rows(_looks(snapshot)), "RG32F"))
+        color = drawn_color(snapshot.color, snapshot.shading)
+        if color is None:
+            self._drop("cv_colors")
+        else:
+            self._take("cv_colors", (color,), partial(_colors_texture, color))
         if snapshot.debug_view in NUMBERED_VIEWS:
             numbers = getattr(snapshot, snapshot.debug_view)
             shown = (numbers, snapshot.strands.shape[:1])
@@ -257,6 +278,11 @@ class StrandPass:
         self._uploaded[name] = sources
         return True
 
+    def _drop(self, name: str) -> None:
+        """Let go of a texture that is not wanted any more."""
+        self._textures.pop(name, None)
+        self._uploaded.pop(name, None)
+
     def _ribbon(self, capacity: int) -> Any:
         """A strip of vertices without attributes: two a station, see lib_strand_geometry.glsl."""
         if capacity not in self._ribbons:
@@ -272,6 +298,12 @@ def _points_texture(snapshot: Snapshot) -> Any:
         return snapshot.device_points.texture
     packed = np.concatenate([snapshot.strands, snapshot.radius[..., None]], axis=-1)
     return texture_from(strand_rows(packed), "RGBA32F")
+
+
+def _colors_texture(color: Floats) -> Any:
+    is_known = ~np.isnan(color[..., :1])
+    packed = np.concatenate([np.where(is_known, color, 0.0), is_known], axis=-1)
+    return texture_from(strand_rows(np.minimum(packed, _BRIGHTEST)), "RGBA16F")
 
 
 def _numbers_texture(snapshot: Snapshot) -> Any:

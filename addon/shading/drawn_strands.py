@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..arrays import Floats, Ints
 from .card_look import card_base
 from .kajiya_kay import strand_base
-from .marschner.look import strand_absorption, strand_color
+from .marschner.look import root_absorption, strand_absorption, strand_color
+from .marschner.pigment import color_absorption
 from .settings import ShadingSettings, StrandSettings
 from .strand_noise import strand_noise
 
@@ -16,6 +19,8 @@ _COLOR, _GREY = 2, 3
 #: What grey strands may be brighter than hair that is nearly black.
 _MAX = 4.0
 _DARKEST = 1e-4
+#: Strands whose colours stand for those of all, where a mean will do.
+_FEW = 1000
 
 
 def drawn_radius(radius: Floats, settings: StrandSettings) -> Floats:
@@ -29,21 +34,75 @@ def drawn_radius(radius: Floats, settings: StrandSettings) -> Floats:
     return drawn
 
 
-def strand_variation(seed: Ints, cv_count: int, shading: ShadingSettings) -> Floats:
-    """The colour of strands as a factor of the card's mean, (n, cv_count, 3), up to _MOST.
+def drawn_color(color: Floats | None, shading: ShadingSettings) -> Floats | None:
+    """Strands' own colours where they are drawn in them; None where in the look's."""
+    return color if shading.color_source == "own" else None
+
+
+def look_color(shading: ShadingSettings) -> Floats:
+    """The look's colour at the roots, (3,) scene-linear, whatever its pigment."""
+    if shading.model == "marschner" and shading.pigment != "color":
+        return strand_color(root_absorption(shading))
+    return np.array(shading.base_color)
+
+
+def in_color(color: Floats | tuple[float, ...], shading: ShadingSettings) -> ShadingSettings:
+    """The look in another colour, (3,)."""
+    red, green, blue = np.clip(color, 0.0, 1.0).tolist()
+    return replace(shading, pigment="color", base_color=(red, green, blue))
+
+
+def mean_look(color: Floats | None, shading: ShadingSettings) -> ShadingSettings:
+    """The look in the mean of the strands' own colours, where they are drawn in them.
+
+    Args:
+        color: (n, cv_count, 3) of strands, as in Snapshot.
+    """
+    own = drawn_color(color, shading)
+    if own is None or not len(own):
+        return shading
+    few = own[:: max(len(own) // _FEW, 1)]
+    return in_color(_whole(few, shading).mean(axis=(0, 1)), shading)
+
+
+def brightest_look(color: Floats | None, shading: ShadingSettings) -> ShadingSettings:
+    """The look that an atlas of strands with their own colours is a factor of: of each channel the
+    brightest, so that no factor is lost above white; arguments as of `mean_look`.
+    """
+    own = drawn_color(color, shading)
+    if own is None or not len(own):
+        return shading
+    return in_color(_whole(own, shading).max(axis=(0, 1)), shading)
+
+
+def strand_variation(
+    seed: Ints, cv_count: int, shading: ShadingSettings, color: Floats | None = None
+) -> Floats:
+    """The colour of strands as a factor of the card's mean, (n, cv_count, 3), up to _MAX; where
+    they have their own, of the mean by `brightest_look`.
 
     Args:
         seed: (n,) what the noise of a strand depends on, as in Snapshot.
+        color: (n, cv_count, 3) as in Snapshot.
     """
+    root = drawn_color(color, shading)
+    root = None if root is None else _whole(root, shading)
+    card = brightest_look(color, shading)
     along = np.linspace(0.0, 1.0, cv_count)[None, :]
     color_noise = strand_noise(seed, _COLOR, np.zeros(1))[:, None]
     grey_noise = strand_noise(seed, _GREY, np.zeros(1))[:, None]
     if shading.model == "marschner":
-        own = strand_color(strand_absorption(shading, along, color_noise, grey_noise))
+        absorbing = None if root is None else color_absorption(root)
+        own = strand_color(strand_absorption(shading, along, color_noise, grey_noise, absorbing))
         even = np.full_like(along, 0.5)
-        colored, grey = (strand_absorption(shading, along, even, even + s) for s in (1.0, -1.0))
+        colored, grey = (strand_absorption(card, along, even, even + s) for s in (1.0, -1.0))
         mean = strand_color(colored + (grey - colored) * shading.grey_fraction)
     else:
-        own = strand_base(along, color_noise, grey_noise, shading)
-        mean = card_base(along, shading)
+        own = strand_base(along, color_noise, grey_noise, shading, root)
+        mean = card_base(along, card)
     return np.clip(own / np.maximum(mean, _DARKEST), 0.0, _MAX)
+
+
+def _whole(color: Floats, shading: ShadingSettings) -> Floats:
+    """Colours with the look's where strands have none."""
+    return np.where(np.isnan(color), look_color(shading), color)

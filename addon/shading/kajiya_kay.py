@@ -81,7 +81,11 @@ def kajiya_kay(
 
 
 def strand_base(
-    along: Floats, color_noise: Floats, grey_noise: Floats, shading: ShadingSettings
+    along: Floats,
+    color_noise: Floats,
+    grey_noise: Floats,
+    shading: ShadingSettings,
+    root: Floats | None = None,
 ) -> Floats:
     """The hair's colour at places of strands, (..., 3).
 
@@ -91,8 +95,9 @@ def strand_base(
         along: 0 at the root, 1 at the tip.
         color_noise, grey_noise: of each strand, in [0, 1]; strands of the lowest grey noise are
             grey.
+        root: (..., 3) the base; None is the look's.
     """
-    base, tip = np.array(shading.base_color), np.array(shading.tip_color)
+    base, tip = np.array(shading.base_color if root is None else root), np.array(shading.tip_color)
     color = base + (tip - base) * tip_fraction(along, shading)[..., None]
     color = np.where((grey_noise < shading.grey_fraction)[..., None], GREY_COLOR, color)
     brightness = 1.0 + shading.color_variation * (2.0 * color_noise - 1.0)

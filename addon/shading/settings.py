@@ -25,6 +25,11 @@ PIGMENTS = (
     ("absorption", "Absorption", "Set absorption directly"),
 )
 
+COLOR_SOURCES = (
+    ("own", "Curves", "The curves' own colours, where they have an attribute named color"),
+    ("look", "Look", "The look's colour alone"),
+)
+
 TRANSPARENCIES = (
     ("layers", "Layers", "Blend strands by their coverage of each pixel, sorted by depth"),
     ("hashed", "Hashed", "Stochastic coverage: needs no memory, but is noisy"),
@@ -45,6 +50,14 @@ class SharedSettings(Settings):
         MODELS,
         label="Model",
         description="Shading model of the strands",
+    )
+    color_source: str = choice(
+        "own",
+        COLOR_SOURCES,
+        label="Colour Source",
+        description="Where the colour comes from; strands that have none of their own have the "
+        "look's",
+        panel="Colour",
     )
     pigment: str = choice(
         "color",

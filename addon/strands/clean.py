@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from .colors import usable_colors
 from .strand_set import DEFAULT_RADIUS, StrandSet
 
 #: A strand shorter than this is a point to the eye and has no direction in float32 [m].
@@ -31,6 +32,7 @@ def clean(
     radius: Floats | None = None,
     group: Ints | None = None,
     root_uv: Floats | None = None,
+    color: Floats | None = None,
 ) -> Cleaned:
     """Make a `StrandSet` from curves of any origin.
 
@@ -41,16 +43,17 @@ def clean(
             positive, and 0.04 mm where there is none.
         group: (curve_count,); absent: one group, 0.
         root_uv: (curve_count, 2); values that are not finite become 0.
+        color: (point_count, 3) scene-linear; see `usable_colors`.
     """
     points = np.asarray(points, np.float32).reshape(-1, 3)
     offsets = np.asarray(offsets, np.int64)
     counts = np.diff(offsets)
     curve_count = len(counts)
+    color = None if color is None else usable_colors(color, offsets)
     if radius is not None and _are_sound(points, offsets, radius, root_uv):
         group = np.zeros(curve_count, np.int32) if group is None else group
-        return Cleaned(
-            StrandSet(points, offsets, radius, group, root_uv), {}, np.arange(curve_count)
-        )
+        strands = StrandSet(points, offsets, radius, group, root_uv, color=color)
+        return Cleaned(strands, {}, np.arange(curve_count))
 
     faults = {
         "fewer than two points": counts < 2,
@@ -77,6 +80,7 @@ def clean(
         group=np.zeros(len(kept), np.int32) if group is None else np.asarray(group)[kept],
         root_uv=None if root_uv is None else np.nan_to_num(root_uv, posinf=0, neginf=0)[kept],
         has_widths=radius is not None and bool(_is_width(np.asarray(radius)).any()),
+        color=None if color is None else color[point_kept],
     )
     return Cleaned(strands, dropped, kept)
 

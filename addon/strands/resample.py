@@ -19,6 +19,9 @@ def resample(strands: StrandSet, cv_count: int) -> StrandSet:
     left, weight = arc_length_positions(strands, cv_count)
     points = _mix(strands.points, left, weight[..., None])
     radius = _mix(strands.radius, left, weight)
+    color = strands.color
+    if color is not None:
+        color = _mix(color, left, weight[..., None]).reshape(-1, 3)
     return StrandSet(
         points.reshape(-1, 3),
         np.arange(strands.strand_count + 1, dtype=np.int32) * cv_count,
@@ -27,6 +30,7 @@ def resample(strands: StrandSet, cv_count: int) -> StrandSet:
         strands.root_uv,
         strands.root_triangle,
         strands.root_barycentric,
+        color,
         strands.has_widths,
     )
 

@@ -27,6 +27,8 @@ class StrandSet:
     root_uv: (strand_count, 2) float32, or None where no UVs are known.
     root_triangle: (strand_count,) int32, or None when unbound.
     root_barycentric: (strand_count, 3) float32, or None when unbound.
+    color: (point_count, 3) float32 scene-linear, the hair's own; None where it has none, NaN all
+        along strands that have none.
     has_widths: whether the radii are the groom's own; else they are `DEFAULT_RADIUS`.
 
     Raises:
@@ -41,6 +43,7 @@ class StrandSet:
     root_uv: Floats | None = None
     root_triangle: Ints | None = None
     root_barycentric: Floats | None = None
+    color: Floats | None = None
     has_widths: bool = True
 
     def __post_init__(self) -> None:
@@ -67,6 +70,7 @@ class StrandSet:
             "root_uv": (strands, 2),
             "root_triangle": (strands,),
             "root_barycentric": (strands, 3),
+            "color": (points, 3),
         }
         for name, shape in expected.items():
             value = getattr(self, name)
@@ -110,6 +114,11 @@ class StrandSet:
         cv_count = int(self.point_counts[0]) if self.strand_count else 2
         return self.points.reshape(self.strand_count, cv_count, 3)
 
+    @property
+    def color_grid(self) -> Floats | None:
+        """The colours as (strand_count, cv_count, 3); only for a uniform set."""
+        return None if self.color is None else self.color.reshape(self.grid.shape)
+
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner of all points, each (3,) [m]; zeros for an empty set."""
         if not self.point_count:
@@ -138,6 +147,7 @@ class StrandSet:
             self.points[picked],
             offsets,
             self.radius[picked],
+            color=None if self.color is None else self.color[picked],
             has_widths=self.has_widths,
             **per_strand,
         )
@@ -165,6 +175,7 @@ _DTYPES = {
     "root_uv": np.float32,
     "root_triangle": np.int32,
     "root_barycentric": np.float32,
+    "color": np.float32,
 }
 _PER_STRAND = ("group", "root_uv", "root_triangle", "root_barycentric")
 assert {*_DTYPES, "has_widths"} == {field.name for field in fields(StrandSet)}

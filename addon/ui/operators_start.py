@@ -162,7 +162,10 @@ class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
         with waiting(context):
             made = convert_particle_hair(context, mesh)
             for hair in made:
-                take_over(hair, context.evaluated_depsgraph_get(), chosen_presets(chosen))
+                depsgraph = context.evaluated_depsgraph_get()
+                _, done = take_over(hair, depsgraph, chosen_presets(chosen))
+                for one in done:
+                    report(self, "INFO", f"{hair.name}: {one}")
             _begin(self, context, made, plays=chosen.plays)
         report(self, "INFO", f"{mesh.name}: its particle hair is hidden, curves took its place")
         return {"FINISHED"}

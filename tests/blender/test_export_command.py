@@ -60,9 +60,9 @@ def on_sphere(*, coloured: bool = True) -> Groom:
         np.concatenate([[0], np.cumsum(counts)]),
         np.full(len(points), 5e-5),
         np.arange(40) % 2 + 3,
+        color=random.random((len(points), 3)) if coloured else None,
     )
-    color = random.random((len(points), 3)) if coloured else None
-    return Groom(strands, color=color, strand_id=np.arange(40) + 100, group_names={3: "top"})
+    return Groom(strands, strand_id=np.arange(40) + 100, group_names={3: "top"})
 
 
 def test_a_grooms_file_keeps_all_that_it_says(

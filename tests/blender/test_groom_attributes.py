@@ -1,5 +1,7 @@
 """What a groom says beside its strands, kept on hair curves."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from hairloom.addon.blender.scene.groom_attributes import (
     store_group_names,
     stored_groom,
 )
+from hairloom.addon.blender.scene.source import read_source
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.strands import StrandSet
 
@@ -25,12 +28,12 @@ def full_groom(counts=(2, 5, 16, 3), seed=0):
         radius=rng.uniform(1e-5, 1e-3, offsets[-1]),
         group=np.arange(len(counts)) % 3,
         root_uv=rng.random((len(counts), 2)),
+        color=rng.random((offsets[-1], 3)) * 3.0,
     )
     # IDs that no float32 can tell apart
     ids = (1 << 30) + np.arange(len(counts))
     return Groom(
         strands,
-        color=rng.random((offsets[-1], 3)) * 3.0,
         strand_id=ids,
         is_guide=np.arange(len(counts)) % 2 == 0,
         closest_guides=ids[rng.integers(0, len(counts), (len(counts), 3))],
@@ -67,7 +70,7 @@ def test_all_is_read_back_bit_for_bit():
 
 
 def test_a_groom_that_says_nothing_more_leaves_no_attributes():
-    groom = Groom(full_groom().strands)
+    groom = Groom(replace(full_groom().strands, color=None))
     hair = written(groom)
     assert {each.name for each in hair.data.attributes} <= {
         *("position", "radius", "curve_type", "groom_group_id", "surface_uv_coordinate")
@@ -115,10 +118,20 @@ def test_modifiers_carry_it_along():
     assert_same(read, groom)
 
 
-def test_a_colour_that_is_not_finite_is_black():
+@pytest.mark.parametrize("faulty", [np.nan, -0.5, np.inf])
+def test_a_strand_with_a_colour_that_cannot_be_used_has_none(faulty):
     groom = full_groom()
-    groom.color[3] = (np.nan, 0.5, np.inf)
-    assert read_back(written(groom)).color[3].tolist() == [0.0, 0.5, 0.0]
+    hair = written(groom)
+    opaque = np.ones((len(groom.color), 4), np.float32)
+    opaque[:, :3] = groom.color
+    opaque[3, 1] = faulty  # of the second strand
+    hair.data.attributes["color"].data.foreach_set("color", opaque.ravel())
+    read = read_back(hair).color
+    assert np.isnan(read[2:7]).all()
+    np.testing.assert_array_equal(read[:2], groom.color[:2])
+    np.testing.assert_array_equal(read[7:], groom.color[7:])
+    warnings = read_source(hair, bpy.context.evaluated_depsgraph_get()).warnings
+    assert sum("1 of 4 strands have no colour" in warning for warning in warnings) == 1
 
 
 def test_ids_that_are_not_unique_are_none():
@@ -142,7 +155,8 @@ def test_closest_guides_that_are_gone_are_none():
 
 def test_a_colour_of_whole_curves_and_of_bytes_counts_too():
     groom = full_groom()
-    hair = write_curves("Hair", groom.strands, None, bpy.context.collection)
+    uncolored = replace(groom.strands, color=None)
+    hair = write_curves("Hair", uncolored, None, bpy.context.collection)
     painted = hair.data.attributes.new("color", "BYTE_COLOR", "CURVE")
     painted.data[2].color_srgb = (0.6, 0.0, 1.0, 1.0)
     color = read_back(hair).color

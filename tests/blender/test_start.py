@@ -12,8 +12,9 @@ from hairloom.addon.blender.scene.source import own_dynamics
 from hairloom.addon.blender.setup import starting
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.groom.settings import GrowSettings
+from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.ui import operators_start
-from hairloom.addon.ui.preferences import DYNAMICS, LOOK, preferences
+from hairloom.addon.ui.preferences import DYNAMICS, LOOK, chosen_presets, preferences
 
 pytestmark = [pytest.mark.portable, pytest.mark.usefixtures("extension")]
 FEW = {"strand_count": 150, "length": 0.1}
@@ -245,3 +246,43 @@ def test_all_settings_leaves_an_editor_alone_that_cannot_show_them(tabs, shown):
     editor = Editor(*tabs)
     operators_start._show_data(editor)
     assert editor.context == shown
+
+
+def with_principled_hair(hair):
+    material = bpy.data.materials.new("Auburn")
+    material.use_nodes = True
+    nodes = material.node_tree
+    nodes.nodes.clear()
+    shader = nodes.nodes.new("ShaderNodeBsdfHairPrincipled")
+    shader.parametrization = "COLOR"
+    shader.inputs["Color"].default_value = (0.3, 0.06, 0.02, 1.0)
+    output = nodes.nodes.new("ShaderNodeOutputMaterial")
+    nodes.links.new(shader.outputs[0], output.inputs["Surface"])
+    hair.data.materials.append(material)
+
+
+def test_hair_that_nobody_dressed_has_the_look_of_its_material(new_hair, sphere, evaluated):
+    hair = new_hair(sphere)
+    with_principled_hair(hair)
+    _, done = starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context)))
+    assert done == ("took its look from the material 'Auburn'",)
+    shading = hair.data.hairloom.shading
+    assert (shading.model, shading.color_source) == ("marschner", "own")
+    assert shading.base_color[:] == pytest.approx((0.3, 0.06, 0.02), rel=1e-3)
+
+
+def test_a_look_that_was_set_stays_whatever_the_material(new_hair, sphere, evaluated):
+    hair = new_hair(sphere)
+    with_principled_hair(hair)
+    hair.data.hairloom.shading.tip_tint = 0.5
+    _, done = starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context)))
+    shading = hair.data.hairloom.shading
+    assert done == () and shading.base_color[:] == pytest.approx(ShadingSettings().base_color)
+
+
+def test_hair_with_colours_of_its_own_keeps_them_as_it_is_dressed(new_hair, sphere, evaluated):
+    hair = new_hair(sphere)
+    starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context)))
+    assert hair.data.hairloom.shading.color_source == "own"
+    bpy.ops.hairloom.apply_preset(name="looks/blond")
+    assert hair.data.hairloom.shading.color_source == "look", "a look that was chosen is seen"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from strand_files import curves_of, hedgehog, needs_usd, push_up, stage_of, stra
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.blender.scene.curves import set_colors
 from hairloom.addon.blender.scene.groom_attributes import store_groom
 from hairloom.addon.blender.strands.export_check import ExportCheck
 from hairloom.addon.blender.strands.strand_export import StrandExport
@@ -97,8 +99,9 @@ def test_a_bake_keeps_what_its_curves_say(swinging: Any, tmp_path: Path) -> None
     hair, _ = swinging
     hair.data.hairloom.guides.cv_count = 15
     color = np.random.default_rng(6).random((480, 3)).astype(np.float32)
-    said = Groom(hedgehog(), color=color, strand_id=np.arange(60) + 9, group_names={1: "nape"})
+    said = Groom(hedgehog(), strand_id=np.arange(60) + 9, group_names={1: "nape"})
     store_groom(hair.data, said)
+    set_colors(hair.data, replace(said.strands, color=color))
     bake(hair, frames=range(1, 3))
     path = tmp_path / "a.abc"
     bpy.ops.hairloom.export_alembic(

@@ -19,6 +19,7 @@ from hairloom.addon.shading.marschner.look import (
     strand_absorption,
     strand_color,
 )
+from hairloom.addon.shading.marschner.pigment import color_absorption
 from hairloom.addon.shading.marschner.tables import (
     PREVIEW_SIZE,
     MarschnerTables,
@@ -187,10 +188,13 @@ def test_colors(compute: Callable[..., np.ndarray], changes: dict[str, Any]) -> 
     settings = ShadingSettings(**changes)
     places = np.random.default_rng(9).random((1, 400, 3)).astype(np.float32)
     places[0, :5, 0] = 0.0, 1.0, settings.tint_start, settings.tint_end, 0.5
+    # black and more than white among them
+    roots = np.random.default_rng(10).uniform(0.0, 1.2, (1, 400, 3)).astype(np.float32) ** 3
+    roots[0, 0] = 0.0
     found = compute(
         "strand_colors.glsl",
-        (400, 3),
-        textures={"places": texels(places)},
+        (400, 5),
+        textures={"places": texels(places), "roots": texels(roots)},
         blocks={
             "fibre": ("Fibre", pack_fibre(settings)),
             "shading": ("ShadingSettings", struct_values(settings)),
@@ -205,3 +209,8 @@ def test_colors(compute: Callable[..., np.ndarray], changes: dict[str, Any]) -> 
     assert found[0, :, :3] == pytest.approx(absorption, rel=1e-4)
     assert found[1, :, :3] == pytest.approx(strand_color(absorption), rel=1e-4)
     assert found[2, :, :3] == pytest.approx(base, rel=1e-4)
+    own = roots[0].astype(np.float64)
+    noises = along, color_noise, grey_noise
+    absorption = strand_absorption(settings, *noises, color_absorption(own))
+    assert found[3, :, :3] == pytest.approx(absorption, rel=1e-4, abs=1e-9)
+    assert found[4, :, :3] == pytest.approx(strand_base(*noises, settings, own), rel=1e-4)

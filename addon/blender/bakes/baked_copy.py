@@ -8,6 +8,7 @@ from __future__ import annotations
 import bpy
 
 from ..base.attributes import read_attribute, set_attribute
+from ..scene.curves import set_colors
 from . import playback
 from .baked_rig import BakedRig
 from .cache import Cache
@@ -94,6 +95,7 @@ def _fill(
     shown = hair.evaluated_get(depsgraph).data
     if len(shown.curves) == len(grid):  # else it is not known which strand is which
         _take_attributes(curves, shown)
+    set_colors(curves, strands)
     curves.materials.clear()
     for material in hair.data.materials:
         curves.materials.append(material)

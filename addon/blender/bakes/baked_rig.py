@@ -85,6 +85,8 @@ def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
     }
     if strands.root_uv is not None:
         arrays["root_uv"] = strands.root_uv
+    if strands.color is not None:
+        arrays["color"] = strands.color
     if rig.head is not None and rests.head is not None:
         assert strands.root_triangle is not None and strands.root_barycentric is not None
         arrays |= {
@@ -129,6 +131,7 @@ def _rig_of(arrays: Arrays) -> BakedRig:
         root_uv=arrays.get("root_uv"),
         root_triangle=arrays.get("root_triangle"),
         root_barycentric=arrays.get("root_barycentric"),
+        color=arrays.get("color"),
     )
     _check_indices(arrays["guides"], count)
     _check_indices(arrays["weight_guide"], len(arrays["guides"]))

@@ -17,12 +17,13 @@ from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...pipeline import Pose
+from ..base.attributes import read_attribute
 from ..base.objects import matrix_of
 from ..base.vertex_weights import weight_names, weights_on
 from ..colliders.carriers import is_deforming
 from ..colliders.obstacles import shape_of, sources_of
 from ..properties.groom_settings import GroomSettings
-from ..scene.curves import GROUP_ATTRIBUTES
+from ..scene.curves import COLOR_ATTRIBUTE, GROUP_ATTRIBUTES
 from ..scene.surfaces import read_positions
 from ..scene.wind import gravity_of, scene_wind
 from .simulated import SOLVER_VERSION, Hashed, hashes
@@ -139,6 +140,10 @@ def _curves_parts(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
             group = np.empty(len(attribute.data), np.int32)
             attribute.data.foreach_get("value", group)
             parts.append(group)
+    for domain in ("POINT", "CURVE"):
+        color = read_attribute(curves, COLOR_ATTRIBUTE, domain, 4)
+        if color is not None:
+            parts.append(color)
     return tuple(parts)
 
 

@@ -34,7 +34,13 @@ from ...render.atlas_pass import baked_maps, baking
 from ...render.card_snapshot import CardSnapshot
 from ...render.card_textures import CardTextures, packed_textures
 from ...shading.ambient_settings import AmbientSettings
-from ...shading.drawn_strands import drawn_radius, strand_variation
+from ...shading.drawn_strands import (
+    brightest_look,
+    drawn_color,
+    drawn_radius,
+    mean_look,
+    strand_variation,
+)
 from ...shading.settings import ShadingSettings, StrandSettings
 from ...shading.texture_settings import TextureSettings
 from ...shading.textures import TEXTURES, HairTextures, hair_textures
@@ -106,7 +112,7 @@ def cards_key(groom: GroomSettings) -> Hashable:
     look = groom[ShadingSettings]
     return (
         groom.sections.only(*kinds, StrandSettings, AmbientSettings),
-        (look.model, look.color_variation, look.grey_fraction),
+        (look.model, look.color_source, look.color_variation, look.grey_fraction),
         groom.card_pictures,
     )
 
@@ -120,6 +126,7 @@ class CardMaps:
         directions of its own strands.
     base_gain: what the written base is to be multiplied by.
     is_view_compensated: the alpha is that of baked strands, see CardSnapshot.
+    base_color: as of CardSnapshot.
     """
 
     by_name: dict[str, Floats]
@@ -127,6 +134,7 @@ class CardMaps:
     highlights: str
     base_gain: float = 1.0
     is_view_compensated: bool = False
+    base_color: tuple[float, float, float] | None = None
 
     @property
     def has_tangent_map(self) -> bool:
@@ -196,13 +204,15 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
     Shift and noise break up highlights from strand to strand and are made at random in any case.
     """
     settings, pictures = inputs.settings, inputs.pictures
-    texture = settings[TextureSettings]
+    texture, color = settings[TextureSettings], inputs.rig.strands.color_grid
+    look, strands = settings[ShadingSettings], settings[StrandSettings]
+    colored = "base" not in pictures and drawn_color(color, look) is not None
     made = hair_textures(texture, build.finest.atlas.columns)
     if build.plan is None:
         textures = made.with_pictures(pictures)
         by_name = {name: getattr(textures, name) for name in TEXTURES}
-        return CardMaps(by_name, textures, texture.highlights)
-    look, strands = settings[ShadingSettings], settings[StrandSettings]
+        mean = mean_look(color, look).base_color if colored else None
+        return CardMaps(by_name, textures, texture.highlights, base_color=mean)
     maps = baked_atlas(inputs.rig, build.plan, look, strands, draw)
     # as many strips above each other as the atlas has rows
     rows = (build.plan.grid.rows, 1)
@@ -212,7 +222,14 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
     names = ("alpha", "shift", "noise", "tangent", "normal")
     shown = {name: by_name[name] for name in names}
     textures = HairTextures(base=by_name["base"] * gain, **shown)
-    return CardMaps(by_name, textures, "tangent", gain, is_view_compensated="alpha" not in pictures)
+    return CardMaps(
+        by_name,
+        textures,
+        "tangent",
+        gain,
+        is_view_compensated="alpha" not in pictures,
+        base_color=brightest_look(color, look).base_color if colored else None,
+    )
 
 
 def drawn_maps(flat: FlatStrands, size: int) -> AtlasMaps:
@@ -242,7 +259,7 @@ def baked_atlas(
     grid = rig.strands.grid
     count, cv_count = grid.shape[:2]
     radius = drawn_radius(rig.strands.radius.reshape(count, cv_count), drawn)
-    colors = strand_variation(np.arange(count), cv_count, shading)
+    colors = strand_variation(np.arange(count), cv_count, shading, rig.strands.color_grid)
     flat = flat_strands(plan, grid, radius, colors)
     return dilated(draw(flat, plan.size), plan.grid)
 
@@ -286,6 +303,7 @@ class BuiltCards:
                 maps.has_tangent_map,
                 build.backs[0],
                 is_view_compensated=maps.is_view_compensated,
+                base_color=maps.base_color,
             ),
             StrandArea.of(strands.grid, strands.radius.reshape(strands.strand_count, -1)),
             card_shadow_area(mesh.positions, mesh.triangles, mesh.uv, textures.alpha),

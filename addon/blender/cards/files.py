@@ -24,6 +24,7 @@ from ...exchange.files.atomic import check_place
 from ...exchange.files.file_set import written_together
 from ...params import Settings, SettingsMap
 from ...shading.card_look import VIEW_COMPENSATED_ALPHA
+from ...shading.drawn_strands import in_color
 from ...shading.kajiya_kay_settings import KajiyaKaySettings
 from ...shading.marschner.look import fibre_of, pack_fibre
 from ...shading.marschner.settings import MarschnerSettings
@@ -246,6 +247,8 @@ class _Writer:
         path, build, maps = self.path, self.made.build, self.made.maps
         settings = self.output.settings
         shading = self.settings[ShadingSettings]
+        if maps.base_color is not None:
+            shading = in_color(maps.base_color, shading)
         with self.stage("write textures"):
             grid = build.finest.atlas
             written = write_textures(path.parent, path.stem, maps.by_name, grid, settings)
@@ -304,7 +307,7 @@ def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str
         tables: name -> file of the tables that lie beside it, see `write_tables`.
     """
     own: type[Settings] = KajiyaKaySettings if shading.model == "kajiya_kay" else MarschnerSettings
-    left_out = {"model"} | (_PIGMENT if own is KajiyaKaySettings else set())
+    left_out = {"model", "color_source"} | (_PIGMENT if own is KajiyaKaySettings else set())
     every = (*SharedSettings.parameters(), *own.parameters())
     parameters = [each for each in every if each.name not in left_out]
     content: dict[str, Any] = {

@@ -60,7 +60,7 @@ class CardObjectJob:
         for obj in card_objects(hair):
             _check_editable(obj)
         self.notes += tuple(f"{hair.name}: {note}." for note in made.notes)
-        color = self._inputs.settings[ShadingSettings].base_color
+        color = made.maps.base_color or self._inputs.settings[ShadingSettings].base_color
         self.objects = _write(hair, build, made.maps.textures.card, color, self._matrix)
         self.order = order_line(build.wrong_fraction)
 

@@ -100,7 +100,7 @@ def _of_rig(
     job: Job, kind: StrandFormat, settings: StrandExportSettings, frames: range | None
 ) -> StrandExport:
     """Hair of --groom, of --bake, or hair that is grown here."""
-    needs, color = request_of(kind, settings), job.settings[ShadingSettings].base_color
+    needs, look = request_of(kind, settings), job.settings[ShadingSettings]
     if job.options.bake is None:
         if frames is not None:
             raise HairloomError(
@@ -109,9 +109,8 @@ def _of_rig(
                 remedy="Give a bake with --bake, or hair of the scene with --object",
             )
         rig, inputs = read_rig(job)
-        groom = hair_of_rig(
-            rig, _groom(rig, inputs, job.settings[WidthSettings].method), needs, color
-        ).groom
+        own = _groom(rig, inputs, job.settings[WidthSettings].method)
+        groom = hair_of_rig(rig, own, needs, look).groom
         return StrandExport(groom, settings, kind, inputs.dropped)
     at = frames if job.options.frame is None else range(job.options.frame, job.options.frame + 1)
     motion = motion_of(job, at)
@@ -124,7 +123,7 @@ def _of_rig(
     if frames is None:
         _, points = motion.strands(motion.frames[0])
         groom = replace(groom, strands=rig.strands.with_points(points.reshape(-1, 3)))
-    moving = BakedMotion(hair_of_rig(rig, groom, needs, color), motion.cache)
+    moving = BakedMotion(hair_of_rig(rig, groom, needs, look), motion.cache)
     plan = StrandExport(moving.out.groom, settings, kind, frames=frames)
     if frames is not None:
         plan.moving, plan.rate = (moving,), moving.rate

@@ -15,6 +15,7 @@ from ...exchange.strand_reading import read_strands
 from ...groom.grow import grow, scalp_density
 from ...groom.settings import GrowSettings
 from ...strands import StrandSet, Surface
+from ...strands.colors import color_notes
 from ..base.objects import head_of
 from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import built_in_head
@@ -153,13 +154,14 @@ def _read_groom(
     groom_object = bpy.data.objects.get(source)
     if groom_object is not None:
         read = read_curves(groom_object, bpy.context.evaluated_depsgraph_get())
-        return read.strands, read.dropped, None, ()
+        return read.strands, read.dropped, None, color_notes(source, read.strands)
     if source.lower().endswith(SUFFIXES):
         path = Path(source)
         file = read_strands(
             path, up=sources.groom_up, scale=sources.groom_scale, python=python_for(path)
         )
-        return file.strands, file.dropped, file.groom, file.notes
+        notes = (*file.notes, *color_notes(path.name, file.strands))
+        return file.strands, file.dropped, file.groom, notes
     raise _unknown(source, "hair curves", "a groom's file such as hair.abc")
 
 

@@ -243,6 +243,7 @@ def _of_curves(
         source.strands.offsets,
         source.strands.radius,
         source.strands.group,
+        source.strands.color,
         None if source.head is None else source.head.positions,
         source.density,
         settings.of_rig,
@@ -278,7 +279,7 @@ def _made(
 def _alike(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
     """Whether two lists of values, arrays among them, are the same."""
     return len(one) == len(other) and all(
-        np.array_equal(a, b)
+        np.array_equal(a, b, equal_nan=True)
         if isinstance(a, np.ndarray) and isinstance(b, np.ndarray)
         else not isinstance(a, np.ndarray) and not isinstance(b, np.ndarray) and a == b
         for a, b in zip(one, other, strict=True)

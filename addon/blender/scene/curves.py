@@ -18,6 +18,8 @@ from ..base.attributes import read_attribute, set_attribute
 #: Curve attributes that may hold a strand's group. The first one found wins; its name is the one
 #: that Unreal and USD use.
 GROUP_ATTRIBUTES = ("groom_group_id", "group")
+#: The attribute of Blender's own importers, per point or per curve.
+COLOR_ATTRIBUTE = "color"
 _REMEDIES = {
     "CURVE": "Convert them: Object > Convert > Curves (hair)",
     "MESH": "Select hair curves; particle hair converts by Object > Convert > Curves (hair)",
@@ -49,6 +51,7 @@ def read_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleane
         radius=None if radius is None else radius * np.float32(mean_scale(matrix)),
         group=group,
         root_uv=read_attribute(curves, "surface_uv_coordinate", "CURVE", 2),
+        color=_colors(curves),
     )
 
 
@@ -76,11 +79,21 @@ def write_curves(
         set_attribute(curves, GROUP_ATTRIBUTES[0], "CURVE", strands.group)
     if strands.root_uv is not None:
         set_attribute(curves, "surface_uv_coordinate", "CURVE", strands.root_uv)
+    set_colors(curves, strands)
     obj = bpy.data.objects.new(name, curves)
     collection.objects.link(obj)
     if surface is not None:
         _attach(obj, surface)
     return obj
+
+
+def set_colors(curves: bpy.types.Curves, strands: StrandSet) -> None:
+    """Write the strands' own colours, if they have any; -1 where a strand has none, since Blender
+    would draw no number at all."""
+    if strands.color is not None:
+        opaque = np.ones((strands.point_count, 4), np.float32)
+        opaque[:, :3] = np.nan_to_num(strands.color, nan=-1.0)
+        set_attribute(curves, COLOR_ATTRIBUTE, "POINT", opaque)
 
 
 def _attach(obj: bpy.types.Object, surface: bpy.types.Object) -> None:
@@ -98,6 +111,17 @@ def _positions(curves: bpy.types.Curves) -> Floats:
     points = np.empty((len(curves.position_data), 3), np.float32)
     curves.position_data.foreach_get("vector", points.ravel())
     return points
+
+
+def _colors(curves: bpy.types.Curves) -> Floats | None:
+    """(point_count, 3) scene-linear, whether painted per point or per curve; None without any."""
+    colors = read_attribute(curves, COLOR_ATTRIBUTE, "POINT", 4)
+    if colors is None:
+        of_curves = read_attribute(curves, COLOR_ATTRIBUTE, "CURVE", 4)
+        if of_curves is None:
+            return None
+        colors = np.repeat(of_curves, np.diff(curve_offsets(curves)), axis=0)
+    return np.ascontiguousarray(colors[:, :3])
 
 
 def curve_offsets(curves: bpy.types.Curves) -> Ints:

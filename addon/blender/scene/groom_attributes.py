@@ -1,8 +1,8 @@
 """What a groom holds besides its strands, as attributes of hair curves, in both directions.
 
 Blender shows them in Data properties > Attributes, and its modifiers pass them on. Names follow
-Epic's "Alembic for Grooms Specification" 1.5; colours use the attribute of Blender's own
-importers. Each closest guide has its own attribute, because Blender has no type of three integers.
+Epic's "Alembic for Grooms Specification" 1.5. Each closest guide has its own attribute, because
+Blender has no type of three integers.
 """
 
 from __future__ import annotations
@@ -13,13 +13,11 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Ints
 from ...exchange.groom import Groom
 from ...exchange.read_groom import finite
 from ..base.attributes import read_attribute, set_attribute
-from .curves import curve_offsets
 
-COLOR = "color"
 STRAND_ID = "groom_id"
 GUIDE = "groom_guide"
 CLOSEST_GUIDES = ("groom_closest_guide_1", "groom_closest_guide_2", "groom_closest_guide_3")
@@ -30,10 +28,6 @@ GROUP_NAMES = "groom_group_names"
 
 def store_groom(curves: bpy.types.Curves, groom: Groom) -> None:
     """Write everything but the strands of a groom to hair curves made from its strands."""
-    if groom.color is not None:
-        opaque = np.ones((len(groom.color), 4), np.float32)
-        opaque[:, :3] = groom.color
-        set_attribute(curves, COLOR, "POINT", opaque)
     if groom.strand_id is not None:
         set_attribute(curves, STRAND_ID, "CURVE", groom.strand_id)
     if groom.is_guide is not None:
@@ -63,14 +57,11 @@ def stored_groom(
         kept: (strand_count,) indices of the curves that became strands, from `read_curves`.
 
     Returns:
-        group_names, and those of color, strand_id, is_guide, closest_guides and guide_weights that
+        group_names, and those of strand_id, is_guide, closest_guides and guide_weights that
         the hair has.
     """
     curves = hair.evaluated_get(depsgraph).data
     fields: dict[str, Any] = {"group_names": group_names(hair)}
-    color = _color(curves, kept)
-    if color is not None:
-        fields["color"] = finite(color)
     guide = read_attribute(curves, GUIDE, "CURVE")
     if guide is not None:
         fields["is_guide"] = guide[kept] != 0
@@ -101,21 +92,6 @@ def group_names(hair: bpy.types.Object) -> dict[int, str]:
 
 def _is_number(text: str) -> bool:
     return text.removeprefix("-").isdecimal() and abs(int(text)) < 1 << 31
-
-
-def _color(curves: bpy.types.Curves, kept: Ints) -> Floats | None:
-    """(point_count, 3) float32 of the kept curves, whether painted per point or per curve."""
-    offsets = curve_offsets(curves)
-    counts = np.diff(offsets)
-    color = read_attribute(curves, COLOR, "POINT", 4)
-    if color is None:
-        of_curves = read_attribute(curves, COLOR, "CURVE", 4)
-        return None if of_curves is None else np.repeat(of_curves[kept, :3], counts[kept], axis=0)
-    if len(kept) < len(counts):
-        is_kept = np.zeros(len(counts), bool)
-        is_kept[kept] = True
-        color = color[np.repeat(is_kept, counts)]
-    return np.ascontiguousarray(color[:, :3])
 
 
 def _whole(curves: bpy.types.Curves, name: str, kept: Ints) -> Ints | None:

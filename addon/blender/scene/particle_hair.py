@@ -38,6 +38,9 @@ def convert_particle_hair(
         if converted is mesh or converted is None or converted.type != "CURVES":
             continue
         made.append(_on_its_mesh(context, converted, mesh, name))
+        slot = system.settings.material - 1  # counted from 1, even where the mesh has none
+        if slot < len(mesh.material_slots):
+            made[-1].data.materials.append(mesh.material_slots[slot].material)
         modifier = next(m for m in mesh.modifiers if getattr(m, "particle_system", None) == system)
         modifier.show_viewport = modifier.show_render = False
         context.view_layer.objects.active = mesh

@@ -11,6 +11,7 @@ from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import StrandSet, Surface
 from ...strands.clean import Cleaned
+from ...strands.colors import color_notes
 from ..base.objects import head_of
 from ..base.vertex_weights import read_weights
 from .curves import read_curves
@@ -28,6 +29,7 @@ class Source:
     kept: (strand_count,) indices of the curves that became strands.
     density: (vertex_count,) how densely children grow on the head, or None.
     head_warning, density_warning: a warning with its remedy, or empty.
+    color_warnings: about strands without a colour.
     """
 
     strands: StrandSet
@@ -37,10 +39,12 @@ class Source:
     density: Floats | None = None
     head_warning: str = ""
     density_warning: str = ""
+    color_warnings: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return tuple(filter(None, (self.head_warning, self.density_warning)))
+        found = self.head_warning, self.density_warning, *self.color_warnings
+        return tuple(filter(None, found))
 
 
 def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
@@ -53,7 +57,14 @@ def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sourc
     head, head_warning = _read_head(hair, depsgraph)
     density, density_warning = read_density(hair, head, depsgraph)
     return Source(
-        read.strands, read.dropped, read.kept, head, density, head_warning, density_warning
+        read.strands,
+        read.dropped,
+        read.kept,
+        head,
+        density,
+        head_warning,
+        density_warning,
+        color_notes(hair.name, read.strands),
     )
 
 

@@ -14,6 +14,7 @@ from ...arrays import Floats
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet
+from ...strands.colors import color_notes
 from ..bakes.baked_rig import BakedRig, RestMatrices
 from ..bakes.groom_hashes import groom_frame_hash, groom_rig_hash
 from ..base.objects import Body, head_of, matrix_of
@@ -107,6 +108,7 @@ class GroomSource:
             dropped=read.dropped,
             density=density,
             density_warning=warning,
+            color_warnings=color_notes(hair.name, strands),
         )
         request = BuildRequest(self.name, source, GroomSettings.of(hair))
         if (
@@ -155,4 +157,11 @@ def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
         and np.allclose(one.points, other.points, rtol=0.0, atol=1e-6 * farthest)
         and np.allclose(one.radius, other.radius, rtol=1e-5)
         and np.array_equal(one.group, other.group)
+        and _same_colors(one.color, other.color)
     )
+
+
+def _same_colors(one: Floats | None, other: Floats | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other, equal_nan=True)

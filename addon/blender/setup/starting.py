@@ -16,6 +16,7 @@ from ..base.objects import head_of
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
 from ..scene.curves import read_curves
+from ..scene.principled import has_principled_hair, look_from_material
 from ..scene.source import mute_own_dynamics
 from ..scene.surfaces import read_positions
 from ..strands.groom_files import grow_on
@@ -123,6 +124,8 @@ def dress(hair: bpy.types.Object, presets: tuple[str, ...]) -> None:
     for name in presets:
         for settings in named_preset(name).all:
             apply(settings, hair)
+    if presets:  # which nobody chose for this hair: it keeps the colours that it has
+        hair.data.hairloom.shading.color_source = "own"
 
 
 def take_over(
@@ -148,7 +151,17 @@ def take_over(
     if is_untouched(hair):
         dress(hair, presets)
         fit_motion(hair, factor)
+        done += _material_look(hair, depsgraph)
     return hair, tuple(done)
+
+
+def _material_look(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:
+    """Take the look from its material's Principled Hair BSDF if it has one; what was done."""
+    if not has_principled_hair(hair):
+        return []
+    settings, notes = look_from_material(hair, depsgraph)
+    apply(settings, hair)
+    return [f"took its look from the material '{hair.active_material.name}'", *notes]
 
 
 def is_untouched(hair: bpy.types.Object) -> bool:

@@ -15,11 +15,14 @@ from ...groom.roots import bind_roots
 from ...groom.weights import guide_weights
 from ...groom.widths import with_widths
 from ...pipeline import Rig
+from ...shading.drawn_strands import drawn_color, look_color
+from ...shading.settings import ShadingSettings
 from ...strands import StrandSet
-from ...strands.resample import arc_length_positions, resample
+from ...strands.resample import resample
 from ..bakes import playback
 from ..bakes.cache import Cache
 from ..base.outcome import notes_of
+from ..properties.groom_settings import GroomSettings
 from ..scene.groom_attributes import group_names, stored_groom
 from ..scene.rigs import rig_of
 from ..scene.source import Source, read_source, usable_curves
@@ -76,20 +79,20 @@ def still_hair(
     if hair.data.hairloom.children.method != "none":
         rig = rig_of(hair, source)
         groom = Groom(rig.strands, hair.name, group_names=group_names(hair))
-        return _with_notes(hair, source, _out(groom, rig, request, look_color(hair)), rig)
+        return _with_notes(hair, source, _out(groom, rig, request, _look(hair)), rig)
     said = _without_empty_marks(stored_groom(hair, depsgraph, source.kept))
     if request.guides and "is_guide" not in said:
         rig = rig_of(hair, source)
         strands = _as_wide_as_drawn(hair, source.strands)
         groom = Groom(_bound_as(strands, rig.strands), hair.name, **said)
-        return _with_notes(hair, source, _out(groom, rig, request, look_color(hair)), rig)
+        return _with_notes(hair, source, _out(groom, rig, request, _look(hair)), rig)
     strands = _as_wide_as_drawn(hair, source.strands)
     if source.head is not None and (request.roots or strands.root_uv is None):
         strands = bind_roots(strands, source.head, place=hair.name).strands
     groom = Groom(strands, hair.name, **said)
     if request.guides and groom.closest_guides is None:
         groom = _weighed(groom, hair.data.hairloom.guides.cv_count)
-    return _with_notes(hair, source, _out(groom, None, request, look_color(hair)))
+    return _with_notes(hair, source, _out(groom, None, request, _look(hair)))
 
 
 def baked_hair(
@@ -105,44 +108,43 @@ def baked_hair(
     is_plain = hair.data.hairloom.children.method == "none"
     if is_plain and rig.strands.strand_count == read.strands.strand_count:
         said = _without_empty_marks(stored_groom(hair, depsgraph, read.kept))
-        if "color" in said:
-            said["color"] = _at_cvs(said["color"], read.strands, rig.strands.grid.shape[1])
     notes: tuple[str, ...] = ()
     if rig.strands.root_uv is None and rig.head is not None:
         notes = (f"{hair.name}: its bake has no root UVs. Bake again to have them in the file.",)
     groom = Groom(rig.strands, hair.name, **({"group_names": group_names(hair)} | said))
     has_marks = groom.is_guide is not None
-    out = _out(groom, None if has_marks else rig, request, look_color(hair))
+    out = _out(groom, None if has_marks else rig, request, _look(hair))
     return replace(out, notes=notes)
 
 
 def hair_of_rig(
-    rig: Rig, groom: Groom, request: ExportRequest, color: tuple[float, float, float]
+    rig: Rig, groom: Groom, request: ExportRequest, look: ShadingSettings
 ) -> ExportStrands:
     """Hair of the command line.
 
     Args:
         groom: the rig's strands, or the same with other points.
-        color: of the look.
     """
     bound = replace(groom, strands=_bound_as(groom.strands, rig.strands))
     if groom.is_guide is not None and not groom.is_guide.any():
         bound = replace(bound, is_guide=None, closest_guides=None, guide_weights=None)
-    return _out(bound, rig if bound.is_guide is None else None, request, color)
+    return _out(bound, rig if bound.is_guide is None else None, request, look)
 
 
-def look_color(hair: bpy.types.Object) -> tuple[float, float, float]:
-    """The colour of the hair's look, scene-linear."""
-    red, green, blue = hair.data.hairloom.shading.base_color
-    return red, green, blue
+def _look(hair: bpy.types.Object) -> ShadingSettings:
+    return GroomSettings.of(hair)[ShadingSettings]
 
 
 def _out(
-    groom: Groom, rig: Rig | None, request: ExportRequest, color: tuple[float, float, float]
+    groom: Groom, rig: Rig | None, request: ExportRequest, look: ShadingSettings
 ) -> ExportStrands:
-    """With the copies of the rig's guides, if they are wanted."""
-    if groom.color is None and request.color:
-        groom = replace(groom, color=np.full((groom.strands.point_count, 3), color, np.float32))
+    """In the colours that are drawn, with the copies of the rig's guides if they are wanted."""
+    color = drawn_color(groom.color, look)
+    if color is not None or request.color:
+        shape = groom.strands.point_count, 3
+        color = np.full(shape, np.nan) if color is None else color
+        color = np.where(np.isnan(color), look_color(look), color)
+    groom = replace(groom, strands=replace(groom.strands, color=color))
     if rig is None or not request.guides:
         return ExportStrands(groom, groom.strands, np.zeros(0, np.int64))
     whole = with_guide_copies(groom, rig.guides, rig.weights.guide, rig.weights.weight)
@@ -202,13 +204,3 @@ def _weighed(groom: Groom, cv_count: int) -> Groom:
         closest_guides=ids[guides][weights.guide],
         guide_weights=weights.weight,
     )
-
-
-def _at_cvs(values: Floats, strands: StrandSet, cv_count: int) -> Floats:
-    """Values of points (point_count, 3) at the CVs of each strand, as `resample` has them."""
-    if (strands.point_counts == cv_count).all():
-        return values
-    left, weight = arc_length_positions(strands, cv_count)
-    weight = weight[..., None]
-    between = values[left] * (1.0 - weight) + values[left + 1] * weight
-    return between.reshape(-1, values.shape[1]).astype(np.float32)

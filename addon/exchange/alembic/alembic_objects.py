@@ -106,7 +106,7 @@ def joined(found: Arrays, path: Path) -> Joined:
         color=_side_by_side(
             [each.of_points("groom_color", 3) for each in objects],
             [len(each.points) for each in objects],
-            0.0,
+            np.nan,
         ),
         uniform=_guides(objects),
         group_names=names,

@@ -21,7 +21,7 @@ from ...strands.clean import clean
 from ..files.file_space import FileSpace
 from ..files.subprocess_reader import run_reader
 from ..groom import Groom
-from ..read_groom import ReadGroom, finite, kept_points
+from ..read_groom import ReadGroom
 from . import alembic_curves
 from .alembic_curves import Arrays
 from .alembic_library import alembic_library
@@ -132,7 +132,12 @@ def _groom(curves: Joined, space: FileSpace, path: Path) -> Groom:
         points = space.from_file(curves.points)
         radius = None if curves.widths is None else _radius(curves.widths, space)
         cleaned = clean(
-            points, curves.offsets, radius=radius, group=curves.group, root_uv=curves.root_uv
+            points,
+            curves.offsets,
+            radius=radius,
+            group=curves.group,
+            root_uv=curves.root_uv,
+            color=curves.color,
         )
     if not cleaned.strands.strand_count:
         reasons = ", ".join(f"{count} with {why}" for why, count in cleaned.dropped.items())
@@ -140,13 +145,9 @@ def _groom(curves: Joined, space: FileSpace, path: Path) -> Groom:
         raise _error(path, problem, "Export the groom again")
     kept = cleaned.kept
     optional: dict[str, Any] = {name: values[kept] for name, values in curves.uniform.items()}
-    color = None
-    if curves.color is not None:
-        color = finite(kept_points(curves.color, curves.offsets, cleaned))
     return Groom(
         cleaned.strands,
         path.stem,
-        color=color,
         group_names=curves.group_names,
         dropped=cleaned.dropped,
         source=path,

@@ -21,7 +21,7 @@ from ...errors import HairloomError
 from ...strands.clean import clean
 from ..files.axes import to_z_up
 from ..groom import Groom
-from ..read_groom import ReadGroom, kept_points
+from ..read_groom import ReadGroom
 from .usd_curves import Curves, UnusableCurvesError, curves_of
 from .usd_library import damage_reported, opened_stage, usd_library
 
@@ -169,6 +169,7 @@ def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Gr
             radius=_together([_radius(piece) for piece in pieces]),
             group=groups,
             root_uv=_of_all("root UVs", [piece.root_uv for piece in pieces], notes),
+            color=_colors(pieces),
         )
     if not cleaned.strands.strand_count:
         reasons = ", ".join(f"{count:,} with {why}" for why, count in cleaned.dropped.items())
@@ -179,11 +180,9 @@ def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Gr
         )
     if len(pieces) > 1:
         notes.append(f"its {len(pieces):,} prims of curves became one groom")
-    color = _of_all("colours", [piece.color for piece in pieces], notes)
     return Groom(
         cleaned.strands,
         name=name,
-        color=None if color is None else kept_points(color, offsets, cleaned),
         is_guide=_guides(pieces, cleaned.kept),
         group_names=group_names,
         dropped=cleaned.dropped,
@@ -211,6 +210,16 @@ def _radius(piece: Curves) -> Floats:
     if piece.radius is not None:
         return piece.radius
     return np.full(len(piece.points), np.nan, np.float32)
+
+
+def _colors(pieces: list[Curves]) -> Floats | None:
+    """NaN, which is none, where a prim has none."""
+    if all(piece.color is None for piece in pieces):
+        return None
+    none = np.float32(np.nan)
+    return _together(
+        [np.full((len(p.points), 3), none) if p.color is None else p.color for p in pieces]
+    )
 
 
 def _groups(pieces: list[Curves]) -> tuple[Ints, dict[int, str]]:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ...arrays import Bools, Floats, Ints
 from ...strands.affine import mean_scale, moved
-from ..read_groom import finite
 from .usd_basis import OnCurves, points_on_curves
 
 #: Where programs put the UVs of roots, Blender's among them; the first one found counts.
@@ -98,7 +97,7 @@ def curves_of(usd: ModuleType, prim: Any, matrix: Floats) -> Curves:
         group=values.of_strands("groom_group_id", np.int32),
         group_name=values.texts_of_strands("groom_group_name"),
         root_uv=next((uv for uv in uvs if uv is not None), None),
-        color=None if color is None else finite(color, 0.0),
+        color=color,
         strand_id=ids,
         is_guide=None if guide is None else guide > 0,
         closest_guides=values.of_strands("groom_closest_guides", np.int32, 3),

@@ -70,15 +70,21 @@ def tip_absorption(settings: ShadingSettings) -> Floats:
 
 
 def strand_absorption(
-    settings: ShadingSettings, along: Floats, color_noise: Floats, grey_noise: Floats
+    settings: ShadingSettings,
+    along: Floats,
+    color_noise: Floats,
+    grey_noise: Floats,
+    root: Floats | None = None,
 ) -> Floats:
     """Absorption at a place of a strand, (..., 3), per radius.
 
     Args:
         along: 0 at the root to 1 at the tip.
         color_noise, grey_noise: the strand's own, in [0, 1].
+        root: (..., 3) absorption without a tint; None is the look's.
     """
-    root, tip = root_absorption(settings), tip_absorption(settings)
+    root = root_absorption(settings) if root is None else root
+    tip = tip_absorption(settings)
     mixed = root + (tip - root) * tip_fraction(along, settings)[..., None]
     amount = 1.0 + settings.color_variation * (1.0 - 2.0 * np.asarray(color_noise))
     is_grey = (np.asarray(grey_noise) < settings.grey_fraction)[..., None]

@@ -18,5 +18,5 @@ void main()
                         light_and_shift.w,
                         eye_and_sparkle.w,
                         shading);
-  imageStore(result, at, vec4(sum, strand_base(0.0, light_and_shift.w, 1.0, shading).x));
+  imageStore(result, at, vec4(sum, strand_base(0.0, light_and_shift.w, 1.0, shading, shading.base_color).x));
 }

@@ -48,9 +48,9 @@ def groom() -> Groom:
             random.uniform(1e-5, 8e-5, points),
             GROUP,
             random.random((strands, 2)),
+            color=random.random((points, 3)),
         ),
         "Mira's hair",
-        color=random.random((points, 3)),
         strand_id=[40, 41, 42, 43, 44, 45],
         is_guide=IS_GUIDE,
         closest_guides=np.tile([43, 40, 44], (strands, 1)),
@@ -174,8 +174,9 @@ def test_groups_are_in_memory_one_at_a_time(tmp_path: Path) -> None:
         np.full(count * 16, 5.0e-5),
         np.arange(count) % groups,
         np.zeros((count, 2)),
+        color=points,
     )
-    groom = Groom(strands, color=points, is_guide=np.arange(count) % 50 == 0)
+    groom = Groom(strands, is_guide=np.arange(count) % 50 == 0)
     write_groom_alembic(tmp_path / "first.abc", groom, UNITY)  # loads the library
     tracemalloc.start()
     write_groom_alembic(tmp_path / "second.abc", groom, UNITY)
@@ -233,7 +234,7 @@ def test_long_curves_alone_are_resampled(tmp_path: Path) -> None:
     path = tmp_path / "a.abc"
     points = np.concatenate([np.linspace([0, 0, 0], [0, 0, 3], 301), [[5, 0, 0], [5, 0, 1.5]]])
     radius = np.concatenate([np.linspace(3e-5, 0.0, 301), [2e-5, 1e-5]])
-    hair = Groom(StrandSet(points, [0, 301, 303], radius, [1, 2]), color=points)
+    hair = Groom(StrandSet(points, [0, 301, 303], radius, [1, 2], color=points))
     motion = GroomMotion([hair.strands.points, hair.strands.points * 2], rate=25.0)
     write_groom_alembic(path, hair, replace(BLENDER, max_points=4), motion=motion)
     ((_, curves),) = first_below(path)

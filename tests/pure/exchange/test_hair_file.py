@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -107,8 +108,8 @@ def test_bad_strands_are_dropped_with_all_that_is_theirs(path: Path) -> None:
     read = read_hair_file(path)
     assert read.dropped == {"a point that is not finite": 1, "no length": 1}
     np.testing.assert_array_equal(read.strands.points, POINTS[:3])
-    color[0, 1] = 0.0
-    np.testing.assert_array_equal(read.groom.color, color[:3])
+    assert read.groom.color is not None and read.groom.color.shape == (3, 3)
+    assert np.isnan(read.groom.color).all(), "a strand has a colour all along or none"
 
 
 def ragged(strand_count: int, **more: np.ndarray) -> StrandSet:
@@ -123,7 +124,8 @@ def ragged(strand_count: int, **more: np.ndarray) -> StrandSet:
 @pytest.mark.parametrize("up", ["Y", "Z"])
 def test_round_trip_is_exact(path: Path, up: str) -> None:
     strands = ragged(40, root_uv=np.random.default_rng(0).random((40, 2)))
-    groom = Groom(strands, color=np.random.default_rng(1).random((strands.point_count, 3)))
+    color = np.random.default_rng(1).random((strands.point_count, 3))
+    groom = Groom(replace(strands, color=color))
     assert write_hair_file(path, groom, up=up, uv=True) == ()
     read = read_hair_file(path, up=up)
     for name in ("points", "offsets", "radius", "root_uv"):
@@ -135,7 +137,7 @@ def test_round_trip_is_exact(path: Path, up: str) -> None:
 @pytest.mark.parametrize("color", [1.0, 0.25])
 def test_hair_of_one_colour_stays_so(path: Path, color: float) -> None:
     strands = ragged(4)
-    write_hair_file(path, Groom(strands, color=np.full((strands.point_count, 3), color)))
+    write_hair_file(path, replace(strands, color=np.full((strands.point_count, 3), color)))
     read = read_hair_file(path).groom.color
     assert read is not None
     np.testing.assert_array_equal(read, np.float32(color))

@@ -186,11 +186,12 @@ def test_joined_grooms_keep_their_groups_guides_and_ids_apart() -> None:
 
 
 def test_joined_grooms_lose_what_one_of_them_lacks_and_say_so() -> None:
-    bald, painted = groom("bald", has_uv=False), replace(guided(), color=np.ones((60, 3)))
+    bald, painted = groom("bald", has_uv=False), guided()
+    painted = replace(painted, strands=replace(painted.strands, color=np.ones((60, 3))))
     both, notes = joined_grooms([painted, bald], "all")
     assert both.strands.root_uv is None and both.color is None and both.closest_guides is None
     assert both.is_guide is not None and both.is_guide.sum() == 2
-    assert "bald: no root UVs" in notes[0]
+    assert "bald: no root UVs" in notes[0] and "bald: no colours" in notes[1]
     assert joined_grooms([bald], "all") == (bald, ())
 
 

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from hairloom.addon.shading.card_look import DARKEST, card_base, own_absorption
-from hairloom.addon.shading.drawn_strands import drawn_radius, strand_variation
+from hairloom.addon.shading.drawn_strands import (
+    brightest_look,
+    drawn_color,
+    drawn_radius,
+    look_color,
+    mean_look,
+    strand_variation,
+)
 from hairloom.addon.shading.kajiya_kay import GREY_COLOR
 from hairloom.addon.shading.marschner.look import strand_absorption
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
@@ -73,3 +80,35 @@ def test_absorption_of_black_and_of_more_than_white_stays_within_bounds() -> Non
     assert np.isfinite(black).all()
     np.testing.assert_array_equal(black, own_absorption(np.full(3, 0.5), np.full(3, DARKEST)))
     np.testing.assert_array_equal(own_absorption(np.full(3, 0.01), np.full(3, 4.0)), 0.0)
+
+
+RED, BLUE = (0.8, 0.02, 0.03), (0.01, 0.05, 0.6)
+
+
+@pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
+def test_a_card_has_the_own_colours_of_its_strands(model: str) -> None:
+    """Its look times the factor is each strand's colour, the look's where a strand has none."""
+    shading = ShadingSettings(
+        model=model, pigment="melanin", base_color=BROWN, color_variation=0.0, tip_tint=0.0
+    )
+    color = np.repeat([RED, BLUE, (np.nan,) * 3, RED], 5, axis=0).reshape(4, 5, 3)
+    factor = strand_variation(np.arange(4), 5, shading, color)
+    card = brightest_look(color, shading)
+    expected = np.where(np.isnan(color), look_color(shading), color)
+    np.testing.assert_allclose(factor * np.array(card.base_color), expected, rtol=1e-4)
+    assert factor.max() <= 1.0 + 1e-5, "an atlas of 8 bits holds it whole"
+    if model == "kajiya_kay":
+        assert look_color(shading) == pytest.approx(BROWN)
+    else:
+        assert look_color(shading) != pytest.approx(BROWN), "its pigment is melanin"
+    mean = mean_look(color, shading).base_color
+    assert mean == pytest.approx(expected.mean(axis=(0, 1)))
+
+
+def test_the_look_alone_leaves_own_colours_out() -> None:
+    shading = ShadingSettings(base_color=BROWN, color_source="look")
+    color = np.broadcast_to(RED, (9, 6, 3))
+    plain = strand_variation(np.arange(9), 6, shading)
+    np.testing.assert_array_equal(strand_variation(np.arange(9), 6, shading, color), plain)
+    assert drawn_color(color, shading) is None
+    assert mean_look(color, shading) is brightest_look(color, shading) is shading
