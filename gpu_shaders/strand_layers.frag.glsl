@@ -1,15 +1,38 @@
 // Strands as layers, first step: each fragment that no mesh hides joins the list of its pixel. The
 // first one puts the pixel into the list of those that have hair. What fragments look like is found
 // later, for those that are seen.
+//
+// COUNTED: instead, the heads of lists count what they would hold. PARTS: only fragments of a run of
+// pixels, row by row, and of a range of depths, see addon/render/pixel_parts.py.
 #include "lib_coverage.glsl"
 #include "lib_layer_packing.glsl"
 
 layout(early_fragment_tests) in;
 
+const uint MAX_COUNTED = 0x80000000u;
+
+#if PARTS
+bool is_in_part()
+{
+  int place = int(gl_FragCoord.x) + int(gl_FragCoord.y) * imageSize(layer_heads).x;
+  int depth = clamp(floatBitsToInt(gl_FragCoord.z), 0, {{depth_end}} - 1);
+  return place >= part_first && place < part_end && depth >= part_near && depth < part_far;
+}
+#endif
+
 void main()
 {
+  color = vec4(0.0);
+#if PARTS
+  if (!is_in_part()) {
+    return;
+  }
+#endif
   float alpha = strands.opacity * ribbon_coverage(ribbon * gl_FragCoord.w);
   if (alpha * LAYER_ALPHA >= 0.5) {
+#if COUNTED
+    imageAtomicAdd(layer_heads, ivec2(gl_FragCoord.xy), 1u);
+#else
     uint number = imageAtomicAdd(layer_count, ivec2(0), 1u) + 1u;
     if (number <= uint(capacity)) {
       uvec2 pixel = uvec2(gl_FragCoord.xy);
@@ -23,6 +46,10 @@ void main()
       uint word = packed_layer(strand_along, alpha);
       imageStore(layer_nodes, layer_texel(number), uvec4(next, depth, uint(strand_index), word));
     }
+    else if (number > MAX_COUNTED) {
+      // were it to begin again at 0, lists would run into each other
+      imageAtomicMin(layer_count, ivec2(0), MAX_COUNTED);
+    }
+#endif
   }
-  color = vec4(0.0);
 }

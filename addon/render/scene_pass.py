@@ -86,6 +86,12 @@ class ScenePass:
             add_shafts(color, color, depth, camera, scene.lights, shafts)
             put_under(color, sky)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the artist should know of the last draw, each with its remedy."""
+        found = [note for each in self._strand_passes.values() for note in each.statistics.notes]
+        return tuple(dict.fromkeys(found))
+
     def distances_and_numbers(
         self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]
     ) -> tuple[Floats, Floats]:

@@ -33,6 +33,7 @@ from ..shading.volume.mesh_frames import MESH_FRAME_CAPACITY
 from ..shading.volume.mesh_light import EDGE_ON, MESH_BIAS, STEEPEST
 from ..shading.volume.opacity import MAP_BORDER, MIN_THICKNESS
 from ..shading.volume.transparency import UNSEEN_FRACTION
+from .pixel_parts import DEPTH_END
 
 SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
 
@@ -104,6 +105,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "layer_row": str(LAYER_ROW),
         "unseen_fraction": repr(UNSEEN_FRACTION),
         "list_digits": str(LIST_DIGITS),
+        "depth_end": str(DEPTH_END),
         "skin_triangles_across": str(SKIN_TRIANGLES_ACROSS),
         "skin_seams_across": str(SKIN_SEAMS_ACROSS),
         "skin_copies_across": str(SKIN_COPIES_ACROSS),

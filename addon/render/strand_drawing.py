@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..shading.settings import ShadingSettings, StrandSettings
 from .detail_pass import DetailOrder
 from .feature_programs import UniformBlocks, bound
+from .pixel_parts import PixelPart
 from .shader_feature import ShaderFeature
 from .shader_program import ShaderProgram, ShaderRecipe
 
@@ -67,7 +68,15 @@ _GATHER_RECIPE = ShaderRecipe(
     integers=("capacity",),
     varyings=(("smooth", "FLOAT", "strand_along"), ("flat", "INT", "strand_index"), *_RIBBON),
     outputs=(("VEC4", "color"),),
-    defines=(*_WHOLE, ("COVERED", 1), ("GATHERED", 1)),
+    defines=(*_WHOLE, ("COVERED", 1), ("GATHERED", 1), ("COUNTED", 0), ("PARTS", 0)),
+)
+#: counts the fragments of each pixel
+_COUNT_RECIPE = replace(
+    _GATHER_RECIPE,
+    name="strand_count",
+    images=(("R32UI", "layer_heads", "READ_WRITE"),),
+    integers=(),
+    defines=(*_WHOLE, ("COVERED", 1), ("GATHERED", 1), ("COUNTED", 1), ("PARTS", 0)),
 )
 #: shades those of all lists that are seen
 _SHADE_RECIPE = ShaderRecipe(
@@ -123,11 +132,17 @@ class StrandDrawing:
         recipe = _HASHED_RECIPE if is_hashed else _OPAQUE_RECIPE
         self._draw(bound(recipe, features, self.blocks, integers=integers))
 
-    def gather(self, images: Mapping[str, Any], capacity: int) -> None:
-        """All strands into the lists of pixels, see strand_layers.py."""
-        features = [*self.points, self._detail]
+    def gather(
+        self, images: Mapping[str, Any], capacity: int, part: PixelPart | None = None
+    ) -> None:
+        """All strands, or what of them is in a part, into lists of pixels, see strand_layers.py."""
+        features = [*self.points, self._detail, *(() if part is None else (_part_feature(part),))]
         integers = {"capacity": capacity}
         self._draw(self._bound(_GATHER_RECIPE, features, images, integers))
+
+    def count(self, images: Mapping[str, Any]) -> None:
+        """How many fragments the list of each pixel would have, into its head."""
+        self._draw(self._bound(_COUNT_RECIPE, [*self.points, self._detail], images, {}))
 
     def shade(self, images: Mapping[str, Any], seen_count: int) -> ShaderProgram:
         """Bind the program that shades the nodes that are seen."""
@@ -172,3 +187,13 @@ class StrandDrawing:
     ) -> ShaderProgram:
         own = {name: images[name] for _, name, *_ in recipe.images}
         return bound(recipe, features, self.blocks, images=own, integers=integers)
+
+
+def _part_feature(part: PixelPart) -> ShaderFeature:
+    """What a program has that gathers only what is in a part."""
+    ends = {"first": part.first, "end": part.end, "near": part.near, "far": part.far}
+    return ShaderFeature(
+        name="part",
+        integers={f"part_{name}": end for name, end in ends.items()},
+        defines={"PARTS": 1},
+    )

@@ -11,24 +11,33 @@
 
 That is 16 bytes a pixel, and 20 more for each fragment of a strand that no mesh hides. All grooms
 and all views share them, since nothing is kept from one draw to the next.
+
+Fragments that have no room all at once are drawn in parts, see pixel_parts.py: first each pixel
+counts its own, then parts that have room are gathered, ordered, shaded and shown one by one. So
+memory decides how often strands are drawn, and never what is seen. A part of one pixel that has no
+room is drawn by depth, the farthest first, each over what is there: exact but for the colours of
+Blender's viewport, which are added up as they are encoded.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import gpu
 import numpy as np
 
+from ..arrays import Ints
 from ..shading.volume.transparency import LAYERS
+from .pixel_parts import PixelPart, pixel_parts
 from .shader_program import ShaderProgram, ShaderRecipe, program, released_with_shaders
-from .shader_source import LAYER_ROW
+from .shader_source import LAYER_ROW, ShaderError
 from .strand_drawing import StrandDrawing
-from .textures import drawing_state
+from .textures import drawing_rows, drawing_state
 
-#: rows of nodes at first, and at most: 32 Mi fragments, 640 MiB. What comes after that is missing:
-#: the farthest, since near strands are drawn first.
-FIRST_ROWS, MAX_ROWS = 256, 8192
+#: rows of nodes at first, and at most: 12 Mi fragments, 240 MiB
+FIRST_ROWS, MAX_ROWS = 256, 3072
 #: a count that turned out too small is made this much larger than what was found
 _SPARE = 1.25
 
@@ -52,15 +61,29 @@ _DONE_RECIPE = ShaderRecipe(
 )
 
 
-class StrandLayers:
-    """What a draw of layers needs on the GPU; making one touches no GPU."""
+@dataclass(frozen=True)
+class LayersDrawn:
+    """In how many parts layers were drawn, and how many fragments had no room in any."""
 
-    def __init__(self) -> None:
+    parts: int = 0
+    missing: int = 0
+
+
+class StrandLayers:
+    """What a draw of layers needs on the GPU; making one touches no GPU.
+
+    Args:
+        max_rows: of nodes, LAYER_ROW fragments each.
+    """
+
+    def __init__(self, max_rows: int = MAX_ROWS) -> None:
+        self._wanted_rows = max_rows
         self.release()
         released_with_shaders(self)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw makes it again."""
+        self._max_rows = self._wanted_rows
         self._size = 0, 0
         self._count: Any = None
         self._heads: Any = None
@@ -70,13 +93,74 @@ class StrandLayers:
         self._fronts: Any = None
         self._triangle: Any = None
 
-    def draw(self, drawing: StrandDrawing) -> None:
-        """Gather, order, shade, and put the result over what is in the bound framebuffer."""
+    def draw(
+        self, drawing: StrandDrawing, *, is_own_target: bool, in_parts: bool = False
+    ) -> LayersDrawn:
+        """Gather, order, shade, and put the result over what is in the bound framebuffer.
+
+        Args:
+            is_own_target: nobody else has set a scissor for that framebuffer.
+            in_parts: whether it is likely to have no room at once, so that this is not even tried.
+
+        Raises:
+            ShaderError: a shader does not compile here, or there is no memory at all.
+        """
         left, bottom, width, height = gpu.state.viewport_get()
-        size = left + width, bottom + height
-        self._fit(size)
-        while not self._gathered(drawing):
-            pass
+        self._fit((left + width, bottom + height))
+        if not in_parts and self._is_gathered(drawing):
+            self._finish(drawing)
+            return LayersDrawn(1)
+        counts, drawn, missing = self._counted(drawing), 0, 0
+        self._make_room(int(counts.sum(dtype=np.int64)))
+        waiting = pixel_parts(counts, self._capacity)[::-1]
+        while waiting:
+            part = waiting.pop()
+            rows = part.rows(self._heads.width) if is_own_target else None
+            beyond = self._gather(drawing, part, rows) - self._capacity
+            if beyond > 0 and part.halves:
+                waiting += part.halves[::-1]
+                continue
+            self._finish(drawing)
+            drawn, missing = drawn + 1, missing + max(beyond, 0)
+        return LayersDrawn(drawn, missing)
+
+    def _is_gathered(self, drawing: StrandDrawing) -> bool:
+        """Gather all fragments at once, where they have room or can be given it."""
+        while (found := self._gather(drawing)) > self._capacity:
+            if found > self._max_rows * LAYER_ROW or not self._make_room(int(found * _SPARE)):
+                return False
+        return True
+
+    def _gather(
+        self, drawing: StrandDrawing, part: PixelPart | None = None, rows: range | None = None
+    ) -> int:
+        """Gather all fragments, or those of a part; how many there are, with room or without."""
+        self._store(lambda: drawing.gather(self._images, self._capacity, part), rows)
+        found, _, _ = self._counts()
+        return found
+
+    def _counted(self, drawing: StrandDrawing) -> Ints:
+        """How many fragments each pixel has, row by row."""
+        self._store(lambda: drawing.count(self._images))
+        return np.asarray(self._heads.read()).ravel()
+
+    def _store(self, draw: Callable[[], None], rows: range | None = None) -> None:
+        """Have a draw write images, which begin at 0, so that they can be read after it."""
+        for counter in (self._count, self._heads):
+            counter.clear(format="UINT", value=(0,))
+        # adds nothing to the colours; with the colour mask off, drivers skip such a draw
+        with (
+            drawing_state(depth_write=False, blend="ADDITIVE_PREMULT"),
+            drawing_rows(rows),
+        ):
+            draw()
+        done = program(_DONE_RECIPE)
+        done.bind()
+        gpu.compute.dispatch(done.shader, 1, 1, 1)
+        gpu.shader.unbind()
+
+    def _finish(self, drawing: StrandDrawing) -> None:
+        """Order, shade and show what is gathered."""
         _, pixel_count, _ = self._counts()
         if not pixel_count:
             return
@@ -95,24 +179,6 @@ class StrandLayers:
             gpu.state.color_mask_set(False, False, False, False)
             self._triangle.draw(drawing.show(images, writes_depth=True).shader)
 
-    def _gathered(self, drawing: StrandDrawing) -> bool:
-        """Whether all fragments had room; where not, there is more of it now."""
-        for counter in (self._count, self._heads):
-            counter.clear(format="UINT", value=(0,))
-        capacity = self._nodes.height * LAYER_ROW
-        # adds nothing to the colours; with the colour mask off, drivers skip such a draw
-        with drawing_state(depth_write=False, blend="ADDITIVE_PREMULT"):
-            drawing.gather(self._images, capacity)
-        done = program(_DONE_RECIPE)
-        done.bind()
-        gpu.compute.dispatch(done.shader, 1, 1, 1)
-        gpu.shader.unbind()
-        found, _, _ = self._counts()
-        if found <= capacity or self._nodes.height == MAX_ROWS:
-            return True
-        self._make_nodes(min(int(found * _SPARE) // LAYER_ROW + 1, MAX_ROWS))
-        return False
-
     def _counts(self) -> tuple[int, int, int]:
         """How many fragments there are, pixels that have some, and fragments that are seen."""
         found, pixels, seen = np.asarray(self._count.read()).ravel().tolist()
@@ -129,9 +195,31 @@ class StrandLayers:
             "layer_fronts": self._fronts,
         }
 
+    @property
+    def _capacity(self) -> int:
+        """How many fragments have room."""
+        return int(self._nodes.height) * LAYER_ROW
+
+    def _make_room(self, count: int) -> bool:
+        """Room for this many fragments, as far as it goes; whether it is more than before."""
+        before = self._capacity
+        rows = min(-(-count // LAYER_ROW), self._max_rows)
+        if rows * LAYER_ROW > before:
+            self._make_nodes(rows)
+        return self._capacity > before
+
     def _make_nodes(self, rows: int) -> None:
-        self._nodes = gpu.types.GPUTexture((LAYER_ROW, rows), format="RGBA32UI")
-        self._seen = gpu.types.GPUTexture((LAYER_ROW, rows), format="R32UI")
+        """This many rows, or as many as there is memory for."""
+        self._nodes = self._seen = None
+        while self._nodes is None:
+            try:
+                nodes = gpu.types.GPUTexture((LAYER_ROW, rows), format="RGBA32UI")
+                self._seen = gpu.types.GPUTexture((LAYER_ROW, rows), format="R32UI")
+                self._nodes = nodes
+            except RuntimeError as error:
+                if rows == 1:
+                    raise ShaderError("strands as layers: the GPU has no memory left") from error
+                self._max_rows = rows = rows // 2
 
     def _fit(self, size: tuple[int, int]) -> None:
         """Buffers for this many pixels; the old ones, where they are not far too large."""
@@ -143,7 +231,7 @@ class StrandLayers:
         self._count = gpu.types.GPUTexture((3, 1), format="R32UI")
         self._heads = gpu.types.GPUTexture(size, format="R32UI")
         self._pixels = gpu.types.GPUTexture(size, format="R32UI")
-        self._make_nodes(FIRST_ROWS)
+        self._make_nodes(min(FIRST_ROWS, self._max_rows))
         self._fronts = gpu.types.GPUTexture(size, format="RG32F")
         if self._triangle is None:
             layout = gpu.types.GPUVertFormat()

@@ -13,7 +13,7 @@ How many pieces each segment has comes from detail_pass.py, unless all have equa
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -40,7 +40,7 @@ from .shader_program import released_with_shaders
 from .shader_source import DEBUG_VIEWS, ShaderError, output_index
 from .snapshot import Snapshot
 from .strand_drawing import StrandDrawing
-from .strand_layers import LAYERS_OF_PIXELS
+from .strand_layers import LAYERS_OF_PIXELS, LayersDrawn
 from .textures import drawing_state, strand_rows, texture_from
 from .view_block import lights_feature, view_feature
 
@@ -52,11 +52,27 @@ NUMBERED_VIEWS = ("guide", "group")
 
 @dataclass(frozen=True)
 class Statistics:
-    """What a draw has drawn: strands, their straight pieces, and the vertices of all instances."""
+    """What a draw has drawn: strands, their straight pieces, and the vertices of all instances.
+
+    layers: how those that are drawn as layers had room.
+    """
 
     strands: int = 0
     pieces: int = 0
     vertices: int = 0
+    layers: LayersDrawn = field(default_factory=LayersDrawn)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the artist should know of the draw, each with its remedy."""
+        missing = self.layers.missing
+        if not missing:
+            return ()
+        return (
+            f"Strands: {missing:,} fragments of hair are missing, because too many lie in one "
+            "point of the picture. Remove strands that lie in one another, or set Transparency "
+            "to Hashed.",
+        )
 
 
 class StrandPass:
@@ -103,6 +119,7 @@ class StrandPass:
         Raises:
             ShaderError: the shader does not compile here, or points on the GPU were released.
         """
+        in_parts = self.statistics.layers.parts > 1
         self.statistics = Statistics()
         if not snapshot.strand_count:
             return
@@ -128,8 +145,10 @@ class StrandPass:
             samples_across=samples,
         )
         transparency = "none" if is_debug else snapshot.strand_settings.transparency
+        layers = LayersDrawn()
         if transparency == "layers":
-            LAYERS_OF_PIXELS.draw(drawing)
+            is_own_target = output == "scene_linear"
+            layers = LAYERS_OF_PIXELS.draw(drawing, is_own_target=is_own_target, in_parts=in_parts)
         else:
             with drawing_state():
                 drawing.draw(is_hashed=transparency == "hashed")
@@ -137,6 +156,7 @@ class StrandPass:
             strands=sum(drawn.count for drawn in order.classes),
             pieces=order.pieces,
             vertices=sum(drawn.vertex_count for drawn in order.classes),
+            layers=layers,
         )
 
     def opacity(self, snapshot: Snapshot) -> OpacityMaps | None:

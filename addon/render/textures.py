@@ -138,6 +138,24 @@ def drawing_into(framebuffer: Any) -> Iterator[None]:
     gpu.state.scissor_set(*scissor)
 
 
+@contextmanager
+def drawing_rows(rows: range | None) -> Iterator[None]:
+    """Draw into these rows only, of a framebuffer of our own: whether others test against a scissor
+    cannot be asked for. None is all.
+    """
+    if rows is None:
+        yield
+        return
+    scissor = left, _, width, _ = gpu.state.scissor_get()
+    gpu.state.scissor_set(left, rows.start, width, len(rows))
+    gpu.state.scissor_test_set(True)
+    try:
+        yield
+    finally:
+        gpu.state.scissor_test_set(False)
+        gpu.state.scissor_set(*scissor)
+
+
 def _set_unreadable_defaults() -> None:
     gpu.state.face_culling_set("NONE")
     gpu.state.front_facing_set(False)

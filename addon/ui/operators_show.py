@@ -89,7 +89,7 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
         table = self._table(context)
         count = table.settings.frames
         yield from counted(table.steps(), count, "pictures")
-        for note in table.notes:
+        for note in (*table.notes, *table.studio.notes):
             report(self, "WARNING", note)
         video = " and a video" if table.has_video else ""
         report(self, "INFO", f"Wrote {count:,} pictures{video} to {table.folder}")
@@ -162,6 +162,8 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
             finally:
                 manager.progress_end()
             write_png(Path(self.filepath), sheet.picture)
+        for note in shown.studio.notes:
+            report(self, "WARNING", note)
         report(self, "INFO", f"Wrote {sheet.count} pictures to {self.filepath}")
         return {"FINISHED"}
 

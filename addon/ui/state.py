@@ -62,7 +62,8 @@ def draw_issues(
         draw_message(layout, context, dropped_phrase(session.source.dropped).capitalize(), "INFO")
     reported = {issue.instead_of for issue in issues}
     problems = previews[session.uid].problems
-    others = filter(None, (problems, view_transform.problem(), instances_note(hair)))
+    drawn = statistics_of(session.uid).notes
+    others = filter(None, (problems, view_transform.problem(), instances_note(hair), *drawn))
     for warning in dict.fromkeys((*session.warnings, *others)):
         if warning not in reported:
             draw_message(layout, context, warning.removeprefix(f"{hair.name}: "), "ERROR")

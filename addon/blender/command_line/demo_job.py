@@ -15,7 +15,7 @@ from ..cards.textures import named_pictures
 from ..pictures.studio import Studio
 from .cards_job import written_cards
 from .job_options import add_motion_options, add_picture_options, add_texture_option
-from .job_steps import Job, PosedHair, open_studio, read_rig
+from .job_steps import Job, PosedHair, open_studio, read_rig, tell_notes
 from .render_job import write_sheet, write_still
 from .simulate_job import simulated
 from .verb import Verb
@@ -31,6 +31,7 @@ def demo(job: Job) -> None:
         studio = open_studio(job, rig)
         write_still(job, folder / "still.png", studio, PosedHair.of_rest(rig))
         write_sheet(job, folder / "motion.png", studio, motion)
+    tell_notes(list(studio.notes), report)
     written = written_cards(job, folder / "cards.glb", rig, pictures)
     _write_card_still(job, folder / "cards.png", studio, rig, written)
     with report.stage("write strands"):

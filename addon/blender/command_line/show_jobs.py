@@ -32,7 +32,7 @@ def turntable(job: Job) -> None:
     with report.stage("draw turntable"):
         for done in turn.steps():
             progress.show(done)
-    tell_notes(turn.notes, report)
+    tell_notes([*turn.notes, *studio.notes], report)
     for path in turn.files:
         report.add_output(path)
     finish(job, job.output)
@@ -50,6 +50,7 @@ def sheet(job: Job) -> None:
         for done in drawn.steps():
             progress.show(done)
     write_png(job.output, drawn.picture)
+    tell_notes(list(studio.notes), report)
     finish(job, job.output)
 
 

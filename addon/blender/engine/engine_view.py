@@ -118,7 +118,7 @@ class EngineView:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return self._reader.warnings
+        return (*self._reader.warnings, *self._pass.notes)
 
     def _read(self, context: Any, depsgraph: bpy.types.Depsgraph, changed: set[int] | None) -> None:
         space = context.space_data

@@ -58,6 +58,7 @@ class Studio:
         ensure_gpu()
         self._groom, self._rig, self._snapshot = groom, groom.rig, snapshot_of(groom)
         self._passes, self._card_pass = (MeshPass(), StrandPass()), CardPass()
+        self._notes: dict[str, None] = {}
         self._cards: tuple[Hashable, BuiltCards] | None = None
         self._card_pictures = card_pictures or {}
         self.settings = settings
@@ -96,7 +97,7 @@ class Studio:
             occluder_spheres=None if occluders is None else occluders.at(pose),
             cards=self._cards_at(pose, points),
         )
-        return render_image(
+        picture = render_image(
             as_shown(snapshot),
             camera,
             width,
@@ -106,6 +107,13 @@ class Studio:
             passes=self._passes,
             card_pass=self._card_pass,
         )
+        self._notes |= dict.fromkeys(self.statistics.notes)
+        return picture
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the artist should know of all pictures so far, each with its remedy."""
+        return tuple(self._notes)
 
     def _cards_at(self, pose: Pose, points: Floats) -> CardSnapshot | None:
         """The cards riding on the guides among these strands, where cards are shown."""

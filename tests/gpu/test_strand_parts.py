@@ -1,0 +1,233 @@
+"""Strands as layers with little memory: drawn in parts, they are the same, and none is missing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands import Surface
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+SIZE = 64
+#: rows of memory that hold few of a picture's fragments, and that hold all of them
+FEW, MANY = 2, 3072
+
+
+@pytest.fixture(scope="module")
+def front(frame: Any) -> Any:
+    """A pixel is a metre; x and z from 0 to SIZE, along +y."""
+    middle = SIZE / 2
+    return frame.Camera(
+        frame.look_at((middle, -100.0, middle), (middle, 0.0, middle)),
+        frame.orthographic(SIZE, 1.0, 0.0, 200.0),
+    )
+
+
+@pytest.fixture
+def with_rows(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A pass whose lists have so many rows of memory, at most."""
+    from hairloom.addon.render import strand_pass
+    from hairloom.addon.render.strand_layers import StrandLayers
+
+    def passes(rows: int) -> Any:
+        monkeypatch.setattr(strand_pass, "LAYERS_OF_PIXELS", StrandLayers(rows))
+        return strand_pass.StrandPass()
+
+    return passes
+
+
+def hair(frame: Any, ends: np.ndarray, brightness: np.ndarray, **more: Any) -> Any:
+    """Straight strands whose colour is their brightness."""
+    settings = {
+        "ambient": (1.0, 1.0, 1.0),
+        "shading": ShadingSettings(base_color=(1.0, 1.0, 1.0), color_variation=0.0),
+        "strand_settings": StrandSettings(tip_width=1.0, opacity=0.6),
+        "detail": DetailSettings(lod_height=0.0),
+        "volume": VolumeSettings(shadows="none"),
+    }
+    return frame.Snapshot(
+        ends.astype(np.float32),
+        np.full(ends.shape[:2], 0.4, np.float32),
+        np.repeat(brightness[:, None], 2, axis=1).astype(np.float32),
+        **(settings | more),
+    )
+
+
+def crossing(frame: Any, seed: int, count: int = 1500, **more: Any) -> Any:
+    """Strands through the picture at all depths and angles."""
+    random = np.random.default_rng(seed)
+    ends = random.uniform(0.0, SIZE, (count, 2, 3))
+    ends[..., 1] = random.uniform(-40.0, 40.0, (count, 2))
+    return hair(frame, ends, random.random(count), **more)
+
+
+def sheets(frame: Any, depths: np.ndarray, opacity: float) -> Any:
+    """Strands so wide that each covers all of a picture; the farther, the darker."""
+    ends = np.zeros((len(depths), 2, 3))
+    ends[..., 0], ends[..., 1] = SIZE / 2, depths[:, None]
+    ends[..., 2] = -SIZE, 2 * SIZE
+    settings = StrandSettings(tip_width=1.0, opacity=opacity, width_scale=500.0)
+    return hair(frame, ends, brightness_of(depths), strand_settings=settings)
+
+
+def brightness_of(depths: np.ndarray) -> np.ndarray:
+    return 0.9 - (depths + 40.0) / 100.0
+
+
+def test_grooms_and_a_mesh_in_parts_are_the_same_picture(
+    frame: Any, front: Any, with_rows: Any
+) -> None:
+    """In a part of a target that others have drawn into, of which the mesh hides strands."""
+    import gpu
+
+    from hairloom.addon.render.mesh_pass import MeshPass
+    from hairloom.addon.render.textures import drawing_into
+
+    square = np.array([[0, 0, 0], [48, 0, 9], [48, 0, 50], [0, 0, 40]], np.float32)
+    mesh = frame.MeshSnapshot.of(Surface(square, np.array([[0, 1, 2], [0, 2, 3]])))
+    grooms = [crossing(frame, seed, meshes=(mesh,)) for seed in (1, 2)]
+
+    def picture(rows: int) -> tuple[np.ndarray, list[int]]:
+        color = gpu.types.GPUTexture((SIZE + 20, SIZE + 9), format="RGBA32F")
+        depth = gpu.types.GPUTexture((SIZE + 20, SIZE + 9), format="DEPTH_COMPONENT32F")
+        target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+        passes = [with_rows(rows) for _ in grooms]
+        with drawing_into(target):
+            target.clear(color=(0.2, 0.1, 0.0, 0.3), depth=1.0)
+            gpu.state.viewport_set(13, 7, SIZE, SIZE)
+            MeshPass().draw(grooms[0], front, SIZE, SIZE)
+            for own, groom in zip(passes, grooms, strict=True):
+                own.draw(groom, front, SIZE, SIZE)
+        pixels = np.asarray(color.read()).reshape(color.height, color.width, 4)
+        depths = np.array(depth.read()).reshape(color.height, color.width, 1)
+        return np.dstack([pixels, depths]), [own.statistics.layers.parts for own in passes]
+
+    whole, at_once = picture(MANY)
+    found, parts = picture(FEW)
+    assert at_once == [1, 1] and parts[0] > 5 and parts[1] > 1
+    assert (found == whole).all()
+    assert (whole[7:-2, 13:-7, 3] > 0.5).mean() > 0.9, "where the viewport is"
+    assert (whole[..., :4] == np.float32([0.2, 0.1, 0.0, 0.3])).all(axis=-1).any(), "and only there"
+
+
+@pytest.mark.parametrize("output", ["scene_linear", "viewport"])
+def test_each_draw_is_whole_and_tries_first_what_the_last_one_needed(
+    frame: Any, front: Any, with_rows: Any, output: str
+) -> None:
+    import gpu
+
+    from hairloom.addon.render.textures import drawing_into
+
+    shown = crossing(frame, 3)
+    few = replace(
+        shown,
+        strands=shown.strands[:40],
+        radius=shown.radius[:40],
+        occlusion=np.ascontiguousarray(shown.occlusion[:40]),
+    )
+    color = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
+    depth = gpu.types.GPUTexture((SIZE, SIZE), format="DEPTH_COMPONENT32F")
+    target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+
+    def picture(own: Any, groom: Any) -> np.ndarray:
+        with drawing_into(target):
+            target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
+            own.draw(groom, front, SIZE, SIZE, output=output)
+        return np.array(color.read())
+
+    own = with_rows(MANY)
+    expected = [picture(own, groom) for groom in (shown, few)]
+    own, parts = with_rows(FEW), []
+    for number in (0, 0, 1, 1, 0):
+        assert (picture(own, (shown, few)[number]) == expected[number]).all()
+        parts.append(own.statistics.layers.parts)
+    assert parts[0] > 5 and parts == [parts[0], parts[0], 1, 1, parts[0]]
+
+
+def test_no_pixel_is_without_hair_that_hashed_strands_cover(
+    frame: Any, front: Any, with_rows: Any
+) -> None:
+    shown = crossing(frame, 4)
+    layers = frame.render_image(
+        shown, front, SIZE, SIZE, 1, passes=(frame.MeshPass(), with_rows(FEW))
+    )
+    settings = replace(shown.strand_settings, transparency="hashed")
+    hashed = replace(shown, strand_settings=settings)
+    samples = [
+        frame.render_image(hashed, replace(front, sample=sample), SIZE, SIZE, 1)[..., 3]
+        for sample in range(16)
+    ]
+    is_covered = np.mean(samples, axis=0) > 0.5
+    assert is_covered.mean() > 0.9
+    assert layers[is_covered, 3].min() > 0.1
+
+
+def test_pixels_that_have_no_room_are_drawn_by_depth(
+    frame: Any, front: Any, with_rows: Any
+) -> None:
+    """Against what thousands of sheets, nearest first, let through in theory."""
+    random = np.random.default_rng(5)
+    depths, opacity = random.uniform(-40.0, 40.0, 5000), 4.0 / 4095.0
+    own = with_rows(1)
+    picture = frame.render_image(
+        sheets(frame, depths, opacity), front, 2, 1, 1, passes=(frame.MeshPass(), own)
+    )
+    assert own.statistics.layers.parts >= 2 * 2 and not own.statistics.notes
+    through = (1.0 - opacity) ** np.arange(len(depths) + 1)
+    exact = (opacity * through[:-1] * brightness_of(np.sort(depths))).sum()
+    assert picture[..., 3] == pytest.approx(np.full((1, 2), 1.0 - through[-1]), abs=1e-3)
+    assert picture[..., 0] == pytest.approx(np.full((1, 2), exact), abs=0.02)
+
+
+def test_nearest_strands_hide_all_others_wherever_a_pixel_has_no_room(
+    frame: Any, front: Any, with_rows: Any
+) -> None:
+    depths = np.random.default_rng(6).permutation(np.linspace(-40.0, 40.0, 5000))
+    shown = sheets(frame, depths, 1.0)
+    pictures = [
+        frame.render_image(shown, front, 2, 1, 1, passes=(frame.MeshPass(), with_rows(rows)))
+        for rows in (1, MANY)
+    ]
+    assert (pictures[0] == pictures[1]).all()
+    assert pictures[0][..., 0] == pytest.approx(np.full((1, 2), 0.9), abs=2e-3)
+
+
+def test_what_cannot_be_drawn_is_told(frame: Any, front: Any, with_rows: Any) -> None:
+    """More than there is memory for, all at one depth of one pixel."""
+    own, opacity = with_rows(1), 4.0 / 4095.0
+    shown = sheets(frame, np.zeros(5000), opacity)
+    picture = frame.render_image(shown, front, 1, 1, 1, passes=(frame.MeshPass(), own))
+    assert picture[0, 0, 3] == pytest.approx(1.0 - (1.0 - opacity) ** 4096, abs=1e-3)
+    assert own.statistics.layers.missing == 5000 - 4096
+    (note,) = own.statistics.notes
+    assert "904" in note
+
+
+def test_little_memory_makes_more_parts_and_not_a_crash(
+    frame: Any, front: Any, with_rows: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import gpu
+
+    from hairloom.addon.render import strand_layers
+
+    shown = crossing(frame, 7)
+    expected = frame.render_image(shown, front, SIZE, SIZE, 1)
+    make = gpu.types.GPUTexture
+
+    def made(size: Any, **more: Any) -> Any:
+        if more["format"] == "RGBA32UI" and size[1] > 3:
+            raise RuntimeError("no memory")
+        return make(size, **more)
+
+    monkeypatch.setattr(strand_layers.gpu.types, "GPUTexture", made)
+    own = with_rows(MANY)
+    picture = frame.render_image(shown, front, SIZE, SIZE, 1, passes=(frame.MeshPass(), own))
+    assert own.statistics.layers.parts > 3
+    assert (picture == expected).all()
