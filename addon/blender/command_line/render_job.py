@@ -53,7 +53,7 @@ def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> None:
         "vertices": drawn.vertices,
     }
     with report.stage("write still"):
-        write_png(path, picture)
+        studio.write(path, picture)
     report.add_output(path)
 
 
@@ -67,7 +67,7 @@ def write_sheet(job: Job, path: Path, studio: Studio, motion: BakedGuides) -> No
         with job.report.stage("draw frame"):
             pictures.append(studio.picture(pose, points, 480, 360, samples=2))
         progress.show(len(pictures))
-    write_png(path, contact_sheet(pictures, SHEET_COLUMNS))
+    studio.write(path, contact_sheet(pictures, SHEET_COLUMNS))
     job.report.add_output(path)
 
 
