@@ -13,7 +13,7 @@ const float LIGHT_PI = 3.14159265358979;
 const float POINT_LIGHT = 1.0, SPOT_LIGHT = 2.0, RECTANGLE_LIGHT = 3.0, DISK_LIGHT = 4.0;
 const float ROUND_GRID_LIGHT = 6.0;
 // FAR and MIN_HEIGHT of addon/shading/area_lights.py
-const float FAR_PANEL = 2.5e-3, MIN_HEIGHT = 1.0e-6;
+const float FAR_PANEL = 2.5e-3, MIN_HEIGHT = 1.0e-9;
 // Gauss-Legendre, six nodes on -1 .. 1: these and their mirror images
 const vec3 PANEL_NODES = vec3(0.23861918608319692, 0.6612093864662645, 0.932469514203152);
 const vec3 PANEL_WEIGHTS = vec3(0.46791393457269104, 0.3607615730481386, 0.17132449237917036);
@@ -171,7 +171,7 @@ void light_at(Lights lights, int index, vec3 point, out vec3 to_light, out vec3 
     return;
   }
   vec3 away = light.xyz - point;
-  to_light = away / max(length(away), {{nearest_distance}});
+  to_light = away * inversesqrt(max(dot(away, away), 1.0e-30));
 #  if LIGHT_KINDS > 1
   if (light.w >= RECTANGLE_LIGHT) {
     vec3 arriving = panel_vector_irradiance(lights, index, away);

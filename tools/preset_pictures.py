@@ -24,6 +24,7 @@ STRANDS, THICKER = 9000, 1.6
 #: from behind the ear, where there is the most hair
 DIRECTION = (-0.9, 0.75, 0.35)
 NO_BACKDROP = (0.0, 0.0, 0.0, 0.0)
+BACKDROP = (0.045, 0.05, 0.058, 1.0)
 #: of each channel of a thumbnail; few, so that a picture of hair stays a small file
 SHADES = 64
 
@@ -94,7 +95,7 @@ def main(folder: Path) -> None:
         thumbnail = picture(look, lights.three_point_lights, square, 0.75, NO_BACKDROP)
         images.write_png(path.with_suffix(".png"), coarse(thumbnail))
         for light in (lights.three_point_lights, against):
-            sheet.append(picture(look, light, (WIDTH, HEIGHT), 0.75, studio.BACKDROP))
+            sheet.append(picture(look, light, (WIDTH, HEIGHT), 0.75, BACKDROP))
         print(f"Drew {path.stem}", flush=True)
     images.write_png(folder / "looks.png", images.contact_sheet(sheet, 6))
 

@@ -14,7 +14,7 @@ import bpy  # noqa: F401  it must come before gpu, which lives inside it
 import gpu
 import numpy as np
 from extension_loader import REPOSITORY, load_package
-from preset_pictures import NO_BACKDROP, THUMBNAIL, coarse, of_addon
+from preset_pictures import THUMBNAIL, coarse, of_addon
 
 PRESETS, SAMPLES = REPOSITORY / "presets", 2
 #: all hair is blond here: it shows shadows best
@@ -91,7 +91,7 @@ def main(folder: Path) -> None:
         for entry in presets.shipped(section):
             studio.settings, (pose, points) = look_and_motion(presets.named_preset(entry.name))
             size = THUMBNAIL, THUMBNAIL, SAMPLES
-            picture = studio.picture(pose, points, *size, background=NO_BACKDROP)
+            picture = studio.picture(pose, points, *size, is_transparent=True)
             images.write_png(entry.path.with_suffix(".png"), coarse(picture))
             sheet.append(picture)
             print(f"Drew {entry.name}", flush=True)

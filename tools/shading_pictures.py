@@ -17,6 +17,7 @@ import gpu
 import numpy as np
 from extension_loader import PACKAGE, REPOSITORY, load_package
 from hair_ball import ball_mesh, combed_strands
+from preset_pictures import BACKDROP
 
 BLOND = REPOSITORY / "presets" / "looks" / "blond.json"
 STRANDS, RADIUS = 16_000, 0.003
@@ -69,8 +70,7 @@ def main(folder: Path) -> None:
             volume=volume(shadows=shadows),
             volume_center=np.zeros(3, np.float32),
         )
-        backdrop = of_addon("blender.pictures.studio").BACKDROP
-        return frame.render_image(snapshot, camera, SIZE, SIZE, SAMPLES, background=backdrop)
+        return frame.render_image(snapshot, camera, SIZE, SIZE, SAMPLES, background=BACKDROP)
 
     shown = [
         picture(alone(blond, "r"), FORWARD, STRENGTH),

@@ -19,6 +19,7 @@ import gpu
 import numpy as np
 from extension_loader import PACKAGE, load_package
 from hair_ball import ball_mesh, combed_strands
+from preset_pictures import BACKDROP
 
 STRANDS, RADIUS, SUN = 14_000, 0.003, (-0.45, -0.5, -0.8)
 #: side of a picture [pixels]; what it shows from bottom to top [m]
@@ -130,7 +131,7 @@ def shadow_pictures(strands: Any) -> list[Any]:
             SIZE,
             SIZE,
             SAMPLES,
-            background=of_addon("blender.pictures.studio").BACKDROP,
+            background=BACKDROP,
         )
         for way in ways
     ]

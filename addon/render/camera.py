@@ -92,7 +92,7 @@ def orthographic(height: float, aspect: float, near: float, far: float) -> Float
 
 def frame_camera(
     bounds: tuple[Floats, Floats],
-    direction: Sequence[float],
+    direction: Sequence[float] | Floats,
     field_of_view: float,
     aspect: float,
     *,
@@ -109,7 +109,7 @@ def frame_camera(
     """
     low, high = (np.asarray(corner, np.float64) for corner in bounds)
     center = (low + high) / 2.0
-    size = max(float(np.linalg.norm(high - low)), 1.0e-6)
+    size = max(float(np.linalg.norm(high - low)), 1.0e-30)
     turn = look_at(center + np.asarray(direction, np.float64), center, up)[:3, :3]
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     seen = (low + corners * (high - low) - center) @ turn.T
@@ -122,3 +122,35 @@ def frame_camera(
     near = max(distance - size, 0.02 * distance)
     view = look_at(center + turn[2] * distance, center, up)
     return Camera(view, perspective(field_of_view, aspect, near, distance + size))
+
+
+def frame_points(
+    points: Floats,
+    direction: Sequence[float] | Floats,
+    field_of_view: float,
+    aspect: float,
+    *,
+    margin: float = 1.08,
+    up: Sequence[float] = (0.0, 0.0, 1.0),
+) -> Camera:
+    """The perspective camera that just holds points, in the middle of the picture.
+
+    Args:
+        points: (n, 3) [m], world space, at least one. Others as in `frame_camera`.
+    """
+    places = np.asarray(points, np.float64)
+    low, high = places.min(axis=0), places.max(axis=0)
+    center = (low + high) / 2.0
+    turn = look_at(np.asarray(direction, np.float64), np.zeros(3), up)[:3, :3]
+    seen = (places - center) @ turn.T
+    # A point at (x, y, z) of view space is inside for an eye at (u, v, distance) when
+    # |x - u| < (distance - z) slope_x and |y - v| < (distance - z) slope_y.
+    slope = np.tan(field_of_view / 2.0) / margin * np.array([aspect, 1.0])
+    right = (seen[:, :2] + seen[:, 2:] * slope).max(axis=0)
+    left = (seen[:, 2:] * slope - seen[:, :2]).max(axis=0)
+    size = max(float(np.linalg.norm(high - low)), 1.0e-30)
+    distance = max(float(((left + right) / (2.0 * slope)).max()), 0.01 * size)
+    eye = center + turn.T @ np.array([*(right - left) / 2.0, distance])
+    view = np.eye(4)
+    view[:3, :3], view[:3, 3] = turn, -turn @ eye
+    return Camera(view, perspective(field_of_view, aspect, 0.05 * distance, distance + 8.0 * size))

@@ -117,11 +117,16 @@ class _Drawn:
 
 @dataclass(eq=False)
 class _Head:
-    """A head on the GPU. drawn: of what its shadow was drawn."""
+    """A head on the GPU.
+
+    size: [m] the square root of its area when its layout was made.
+    drawn: of what its shadow was drawn.
+    """
 
     triangles: Ints
     corner_uv: Floats
     resolution: int
+    size: float
     layout: SkinLayout
     textures: dict[str, Any]
     drawn: _Drawn | None = None
@@ -173,7 +178,7 @@ class SkinPass:
             head = self._head(mesh.skin.surface, settings.skin_resolution)
             used.append(head)
             if not head.layout.is_empty:
-                light = settings.softness, light_count, forward, shadows
+                light = settings.softness * head.size, light_count, forward, shadows
                 wanted = _Drawn(mesh.skin.surface.positions, opacity, *light)
                 found[id(mesh)] = self._drawn(head, mesh.skin.surface, wanted)
         self._heads = [head for head in self._heads if head in used]
@@ -192,7 +197,14 @@ class SkinPass:
         layout = layout_of(surface, resolution)
         textures = {} if layout.is_empty else layout_textures(layout)
         self._heads.append(
-            _Head(surface.triangles, surface.corner_uv, resolution, layout, textures)
+            _Head(
+                surface.triangles,
+                surface.corner_uv,
+                resolution,
+                head_size(surface),
+                layout,
+                textures,
+            )
         )
         return self._heads[-1]
 
@@ -226,6 +238,12 @@ class SkinPass:
         )
         _dispatch(shader, found)
         return found
+
+
+def head_size(surface: Surface) -> float:
+    """What the softness of its shadow is a fraction of: the square root of its area [m]."""
+    a, b, c = surface.corners.astype(np.float64).transpose(1, 0, 2)
+    return float(np.sqrt(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()))
 
 
 def layout_textures(layout: SkinLayout) -> dict[str, Any]:

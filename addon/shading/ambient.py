@@ -27,8 +27,8 @@ type Step = tuple[int, int, int]
 _DIRECTION_WEIGHTS = {1: 1 / 21, 2: 4 / 105, 3: 9 / 280}
 
 
-#: Where light on the skin is measured, above it, so that it lies in the hair [m].
-SKIN_CLEARANCE = 0.003
+#: Where light on the skin is measured, above it, so that it lies in the hair [cells].
+_SKIN_CLEARANCE = 0.5
 
 
 def ambient_occlusion(
@@ -101,6 +101,9 @@ def _add_shifted(target: Floats, source: Floats, step: list[int]) -> None:
 
 def skin_occlusion(strands: StrandSet, skin: Surface, settings: AmbientSettings) -> Floats:
     """The light that the hair lets through to each vertex of the skin, (vertex_count,) float32."""
-    above = skin.positions + SKIN_CLEARANCE * skin.vertex_normals()
+    if not strands.strand_count:
+        return np.ones(len(skin.positions), np.float32)
+    clearance = _SKIN_CLEARANCE * grid_around(strands, settings.cell_count).cell
+    above = skin.positions + np.float32(clearance) * skin.vertex_normals()
     through = replace(settings, extinction=settings.scalp_extinction)
     return ambient_occlusion(strands, above, None, through)

@@ -30,9 +30,9 @@ type Vector = tuple[float, float, float]
 #: is narrow also against its spread); in lib_lights
 FAR = 2.5e-3
 #: nearer to its plane than this [m] is behind a panel; in lib_lights
-MIN_HEIGHT = 1.0e-6
+MIN_HEIGHT = 1.0e-9
 #: sides no shorter than this [m], nor than this of the other side
-MIN_SIDE, MIN_ASPECT = 1.0e-4, 1.0e-3
+MIN_SIDE, MIN_ASPECT = 1.0e-7, 1.0e-3
 #: a spread of none is a beam of this [rad]
 MIN_SPREAD = float(np.radians(1.0))
 #: the tangent of a spread of a half turn

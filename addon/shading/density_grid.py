@@ -21,7 +21,7 @@ from ..strands.closest_point import closest_point
 #: How far below the surface the middle of the body's shell lies [cells].
 _SHELL_DEPTH = 2.5
 #: Hair smaller than this gets cells as if it were that large [m].
-_SMALLEST_HAIR = 1.0e-4
+_SMALLEST_HAIR = 1.0e-9
 #: Optical depth of a cell of the body: exp(-30) is nothing.
 _OPAQUE = 30.0
 #: Segments that are cut up at once: numpy lets no other thread go on while it repeats and counts,

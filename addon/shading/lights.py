@@ -28,8 +28,8 @@ type Color = tuple[float, float, float]
 type Vector = tuple[float, float, float]
 
 LIGHT_CAPACITY = 8
-#: closer to a point light than this its irradiance no longer grows [m]
-NEAREST_DISTANCE = 1.0e-3
+#: closer to a point light than this its irradiance no longer grows [m]; far below any hair
+NEAREST_DISTANCE = 1.0e-6
 
 #: forms by the numbers under which lib_lights.glsl knows them
 _FORMS = ("sun", "point", "spot", "rectangle", "disk", "grid", "round grid")
@@ -212,7 +212,7 @@ def _cone_fraction(cone: Cone, away: Floats, width: Floats) -> Floats:
 
 
 def _unit(away: Floats) -> Floats:
-    return away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), NEAREST_DISTANCE)
+    return away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-15)
 
 
 def three_point_lights(view: Floats, strength: float = 1.0) -> tuple[Light, ...]:

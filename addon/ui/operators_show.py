@@ -9,7 +9,6 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes.groom_hashes import frame_rate
-from ..blender.base.images import write_png
 from ..blender.base.outcome import report
 from ..blender.pictures.sheet import Sheet
 from ..blender.pictures.showing import ShownGroom, file_name, shown_groom
@@ -161,7 +160,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
                     manager.progress_update(done)
             finally:
                 manager.progress_end()
-            write_png(Path(self.filepath), sheet.picture)
+            shown.studio.write(Path(self.filepath), sheet.picture)
         for note in shown.studio.notes:
             report(self, "WARNING", note)
         report(self, "INFO", f"Wrote {sheet.count} pictures to {self.filepath}")

@@ -5,11 +5,14 @@ import json
 import bpy
 import numpy as np
 import pytest
+from strand_files import hedgehog
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.cache import Cache
 from hairloom.addon.blender.base.images import read_texture
 from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.pictures import studio
+from hairloom.addon.render.frame import render_image
 
 LAST = 5
 
@@ -167,3 +170,45 @@ def test_what_is_not_baked_is_not_drawn(arguments, message, file, tmp_path, caps
     assert command_line.run([*whole, *arguments]) == 1
     assert message in capsys.readouterr().err
     assert not (tmp_path / "hair.png").exists()
+
+
+def _half_covered_head_that_swells(new_hair, sphere):
+    """A head with hair on one side alone, that a shape key deforms where it has none."""
+    strands = hedgehog()
+    hair = new_hair(sphere, strands.take(np.flatnonzero(strands.roots[:, 0] > 0.03)))
+    hair.hairloom.dynamics.collider_resolution = 8
+    hair.hairloom.dynamics.device = "numpy"
+    sphere.shape_key_add(name="Basis")
+    nose = sphere.shape_key_add(name="Nose")
+    for point in nose.points:
+        if point.co.x < 0.0:
+            point.co.x *= 2.0
+    for frame, value in ((1, 0.0), (LAST, 1.0)):
+        nose.value = value
+        nose.keyframe_insert("value", frame=frame)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    scene.frame_set(1)
+    return hair
+
+
+def test_the_whole_of_a_deformed_head_is_drawn(new_hair, sphere, evaluated, tmp_path, monkeypatch):
+    """Its drawn vertices are those that Blender evaluates, roots on them or not."""
+    _half_covered_head_that_swells(new_hair, sphere)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "wig.blend"))
+    assert command_line.run(["bake", "--save"]) == 0
+    drawn = []
+
+    def watched(snapshot, *arguments, **options):
+        drawn.append(snapshot.meshes[0].surface.positions)
+        return render_image(snapshot, *arguments, **options)
+
+    monkeypatch.setattr(studio, "render_image", watched)
+    arguments = ["render", "--groom", "Hair", "--bake", "--frame", str(LAST), "--width", "32"]
+    arguments += ["--height", "32", "--samples", "1", "--output", str(tmp_path / "hair.png")]
+    assert command_line.run(arguments) == 0
+    bpy.context.scene.frame_set(LAST)
+    head = bpy.data.objects["Head"].evaluated_get(evaluated())
+    expected = np.array([head.matrix_world @ vertex.co for vertex in head.to_mesh().vertices])
+    assert np.ptp(expected[:, 0]) > 0.29, "the shape key acts"
+    np.testing.assert_allclose(drawn[0], expected, atol=1e-6)

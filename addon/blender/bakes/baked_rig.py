@@ -1,6 +1,6 @@
 """A groom's rig as the arrays of a bake, and back: enough to place all strands without the scene.
 
-Of the head's moving vertices a frame keeps only those that carry a root.
+A frame keeps all vertices of the head, so that it is drawn whole wherever it bends.
 """
 
 from __future__ import annotations
@@ -30,40 +30,32 @@ class RestMatrices:
 
 @dataclass(frozen=True)
 class BakedRig:
-    """What all frames share.
-
-    used: (n,) the head's vertices that carry roots.
-    """
+    """What all frames share."""
 
     rig: Rig
     rests: RestMatrices
-    used: Ints
 
     def pose(self, frame: Arrays) -> Pose:
-        """Where the body was in a frame; vertices that carry nothing are at rest."""
-        if self.rig.head is None:
-            return Pose(None, frame["matrix"])
-        positions = self.rig.head.positions.copy()
-        positions[self.used] = frame["head"]
-        return Pose(positions, frame["matrix"])
+        """Where the body was in a frame."""
+        return Pose(frame.get("head"), frame["matrix"])
+
+    def fits(self, frame: Arrays) -> bool:
+        """Whether a frame is of this rig: as many guides, and as many vertices of the head."""
+        head = None if self.rig.head is None else self.rig.head.positions.shape
+        found = frame["head"].shape if "head" in frame else None
+        guides = (len(self.rig.guides), *self.rig.strands.grid.shape[1:])
+        return found == head and frame["guides"].shape == guides
 
     def strands(self, frame: Arrays) -> Floats:
         """All strands in a frame, (strand_count, cv_count, 3) float32 world [m]."""
         return pipeline.strands_at(self.rig, self.pose(frame), frame["guides"])
 
 
-def used_vertices(rig: Rig) -> Ints:
-    """The head's vertices that carry roots, sorted; none without a head."""
-    if rig.head is None or rig.strands.root_triangle is None:
-        return np.zeros(0, np.int32)
-    return np.unique(rig.head.triangles[rig.strands.root_triangle])
-
-
-def frame_arrays(pose: Pose, guides: Floats, used: Ints) -> Arrays:
+def frame_arrays(pose: Pose, guides: Floats) -> Arrays:
     """One frame: guides (guide_count, cv_count, 3) world [m], and what carries them."""
     arrays: Arrays = {"guides": guides, "matrix": np.asarray(pose.matrix, np.float64)}
     if pose.head_positions is not None:
-        arrays["head"] = pose.head_positions[used]
+        arrays["head"] = pose.head_positions
     return arrays
 
 
@@ -148,7 +140,7 @@ def _rig_of(arrays: Arrays) -> BakedRig:
         Widths.of(arrays["widths"], str(arrays["widths_reason"])),
     )
     rests = RestMatrices(arrays["hair_rest"], arrays.get("head_rest"))
-    return BakedRig(rig, rests, used_vertices(rig))
+    return BakedRig(rig, rests)
 
 
 def _check_indices(indices: Ints, count: int) -> None:

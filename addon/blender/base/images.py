@@ -26,7 +26,7 @@ def write_png(path: Path, linear: Floats) -> None:
     Raises:
         HairloomError: the folder or file cannot be written.
     """
-    _save_png(path, display_encoded(linear), has_alpha=True)
+    save_coded_png(path, display_encoded(linear))
 
 
 def write_texture(
@@ -55,7 +55,7 @@ def write_texture(
     coded = np.ones((*values.shape[:2], 4), np.float32)
     coded[..., :3] = srgb_encoded(values[..., :3]) if is_color else values[..., :3]
     coded[..., 3:] = values[..., 3:] if values.shape[2] == 4 else 1.0
-    _save_png(path, coded, has_alpha=values.shape[2] == 4)
+    save_coded_png(path, coded, has_alpha=values.shape[2] == 4)
 
 
 def read_texture(path: Path, *, is_color: bool) -> Floats:
@@ -118,12 +118,17 @@ def read_image(image: bpy.types.Image, *, is_color: bool, place: str) -> Floats:
 
 def display_encoded(linear: Floats) -> Floats:
     """Scene-linear premultiplied to sRGB-coded straight alpha, (..., 4) (IEC 61966-2-1)."""
-    alpha = np.clip(linear[..., 3:], 0.0, 1.0)
-    straight = np.divide(
-        linear[..., :3], alpha, out=np.zeros_like(linear[..., :3]), where=alpha > 0.0
-    )
-    coded = srgb_encoded(np.clip(straight, 0.0, 1.0))
-    return np.concatenate([coded, alpha], axis=-1).astype(np.float32)
+    straight = straight_alpha(linear)
+    coded = srgb_encoded(np.clip(straight[..., :3], 0.0, 1.0))
+    return np.concatenate([coded, straight[..., 3:]], axis=-1).astype(np.float32)
+
+
+def straight_alpha(premultiplied: Floats) -> Floats:
+    """Colours (..., 4) that are not multiplied with alpha, black where there is none; alpha in
+    [0, 1]."""
+    color, alpha = premultiplied[..., :3], np.clip(premultiplied[..., 3:], 0.0, 1.0)
+    straight = np.divide(color, alpha, out=np.zeros_like(color), where=alpha > 0.0)
+    return np.concatenate([straight, alpha], axis=-1)
 
 
 def contact_sheet(pictures: list[Floats], columns: int) -> Floats:
@@ -138,8 +143,12 @@ def contact_sheet(pictures: list[Floats], columns: int) -> Floats:
     return sheet
 
 
-def _save_png(path: Path, coded: Floats, *, has_alpha: bool) -> None:
-    """Write values that are coded already, (height, width, 4), in 8 bits."""
+def save_coded_png(path: Path, coded: Floats, *, has_alpha: bool = True) -> None:
+    """Write values that are coded already, (height, width, 4), in 8 bits.
+
+    Raises:
+        HairloomError: the folder or file cannot be written.
+    """
     height, width = coded.shape[:2]
     image = bpy.data.images.new("Hairloom", width, height, alpha=has_alpha)
     try:

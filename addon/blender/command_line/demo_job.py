@@ -8,7 +8,6 @@ from tempfile import TemporaryDirectory
 
 from ...exchange.tressfx import write_tfx
 from ...pipeline import Rig
-from ..base.images import write_png
 from ..cards.build import BuiltCards, MappedCards
 from ..cards.files import WrittenCards
 from ..cards.textures import named_pictures
@@ -51,7 +50,7 @@ def _write_card_still(
     shown = built.drawn(built.rest, job.settings)
     with job.report.stage("draw cards"):
         picture = studio.card_picture(shown, options.width, options.height, options.samples)
-    write_png(path, picture)
+    studio.write(path, picture)
     job.report.add_output(path)
 
 

@@ -15,7 +15,7 @@ from ...parameters import ALL_SETTINGS
 from ...params import Settings, SettingsMap
 from ..bakes.bake_settings import frame_range
 from ..base.report import STYLES
-from ..properties.presets import named_preset
+from ..properties.presets import named_preset, shipped
 from ..scene.principled import look_from_named
 from .object_settings import own_settings
 from .overrides import overrides
@@ -142,7 +142,7 @@ def add_moment_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_picture_options(parser: argparse.ArgumentParser, width: int, height: int) -> None:
-    """The size of a picture [pixels] and its samples."""
+    """The size of a picture [pixels], its samples and its stage."""
     picture = parser.add_argument_group("the picture")
     for name, default, what in (
         ("--width", width, "pixels across"),
@@ -151,6 +151,17 @@ def add_picture_options(parser: argparse.ArgumentParser, width: int, height: int
     ):
         about = f"{what} (default: {default})"
         picture.add_argument(name, type=int, default=default, metavar="COUNT", help=about)
+    picture.add_argument(
+        "--stage",
+        metavar="NAME",
+        help=f"lights, backdrop and film, over presets: {', '.join(_stages())}, or a preset file; "
+        "--set stage.key=6 changes a part (default: studio)",
+    )
+
+
+def _stages() -> list[str]:
+    """The stages that ship, by their short names."""
+    return [entry.path.stem for entry in shipped("stage")]
 
 
 def add_motion_options(parser: argparse.ArgumentParser) -> None:
@@ -283,6 +294,14 @@ _LIMITS = (
 )
 
 
+def _stage_preset(options: argparse.Namespace) -> list[str]:
+    """The preset that --stage names, if it is given."""
+    name = getattr(options, "stage", None)
+    if name is None:
+        return []
+    return [f"stage/{name}" if name in _stages() else name]
+
+
 def chosen_settings(options: argparse.Namespace) -> SettingsMap:
     """All parameter sets, the later over the earlier: the defaults, those of the hair object that
     --groom names, --preset or a material, --set."""
@@ -291,7 +310,7 @@ def chosen_settings(options: argparse.Namespace) -> SettingsMap:
     groom = bpy.data.objects.get(name or "")
     if groom is not None and groom.type == "CURVES":
         chosen |= own_settings(groom)
-    for name in options.preset:
+    for name in (*options.preset, *_stage_preset(options)):
         chosen |= {settings.section: settings for settings in named_preset(name).all}
     if hasattr(options, "groom") and getattr(options, "look_from_material", False):
         chosen["shading"], notes = look_from_named(name, chosen["shading"])

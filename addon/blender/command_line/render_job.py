@@ -55,7 +55,7 @@ def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> None:
         "parts": drawn.layers.parts,
     }
     with report.stage("write still"):
-        write_png(path, picture)
+        studio.write(path, picture)
     report.add_output(path)
 
 
@@ -69,7 +69,7 @@ def write_sheet(job: Job, path: Path, studio: Studio, motion: BakedGuides) -> No
         with job.report.stage("draw frame"):
             pictures.append(studio.picture(pose, points, 480, 360, samples=2))
         progress.show(len(pictures))
-    write_png(path, contact_sheet(pictures, SHEET_COLUMNS))
+    studio.write(path, contact_sheet(pictures, SHEET_COLUMNS))
     job.report.add_output(path)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-from ..base.images import write_png
 from ..pictures.sheet import Sheet
 from ..pictures.turntable import LIGHTS, Turntable, TurntableSettings
 from .job_options import add_moment_options, add_picture_options
@@ -49,7 +48,7 @@ def sheet(job: Job) -> None:
     with report.stage("draw contact sheet"):
         for done in drawn.steps():
             progress.show(done)
-    write_png(job.output, drawn.picture)
+    studio.write(job.output, drawn.picture)
     tell_notes(list(studio.notes), report)
     finish(job, job.output)
 

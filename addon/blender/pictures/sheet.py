@@ -11,20 +11,21 @@ import numpy as np
 from ...arrays import Floats
 from ...params import SettingsMap
 from ...pipeline import Pose
-from ...render.camera import Camera, frame_camera
+from ...render.camera import Camera
 from ...shading.settings import ShadingSettings
 from ...shading.shafts_settings import ShaftSettings
 from ..base.images import contact_sheet
 from ..properties.presets import named_preset, shipped
-from .studio import FIELD_OF_VIEW, MARGIN, VIEW_DIRECTION, Studio
+from .studio import Studio
 
-#: name of a view and the direction from the groom to the camera; heads face -Y
+#: name of a view, how far it is turned from the front [degrees], and its height, see
+#: GoodSide.turned; None is where the groom is best seen
 VIEWS = (
-    ("Front", (0.0, -1.0, 0.08)),
-    ("Three-quarter", VIEW_DIRECTION),
-    ("Side", (-1.0, 0.0, 0.08)),
-    ("Back", (0.0, 1.0, 0.08)),
-    ("Top", (0.0, -0.05, 1.0)),
+    ("Front", (0.0, 0.08)),
+    ("Three-quarter", None),
+    ("Side", (90.0, 0.08)),
+    ("Back", (180.0, 0.08)),
+    ("Top", (0.0, 20.0)),
 )
 CLOSE_UP = "Close-up"
 COLUMNS = 3
@@ -53,7 +54,7 @@ class Sheet:
     ) -> None:
         self._studio, self._pose, self._points = studio, pose, points
         self._size, self._samples, self._by_looks = size, samples, by_looks
-        self._bounds = studio.bounds(pose, points)
+        self._held = studio.held(pose, points)
         self._pictures: list[Floats] = []
 
     @property
@@ -72,13 +73,15 @@ class Sheet:
         return contact_sheet(self._pictures, COLUMNS)
 
     def _views(self) -> Iterator[tuple[str, Floats]]:
-        for name, direction in VIEWS:
-            yield name, self._seen(self._camera(direction, self._bounds))
-        yield CLOSE_UP, self._seen(self._camera(VIEW_DIRECTION, self._near_the_eye()))
+        side = self._studio.side
+        for name, turn in VIEWS:
+            direction = side.three_quarter if turn is None else side.turned(*turn)
+            yield name, self._seen(self._camera(direction, self._held))
+        yield CLOSE_UP, self._seen(self._camera(side.three_quarter, self._near_the_eye()))
 
     def _looks(self) -> Iterator[tuple[str, Floats]]:
         worn = self._studio.settings
-        camera = self._camera(VIEW_DIRECTION, self._bounds)
+        camera = self._camera(self._studio.side.three_quarter, self._held)
         try:
             for entry in shipped("shading"):
                 look = SettingsMap(*named_preset(entry.name).all)
@@ -91,18 +94,17 @@ class Sheet:
     def _seen(self, camera: Camera) -> Floats:
         return self._studio.picture(self._pose, self._points, *self._size, self._samples, camera)
 
-    def _camera(self, direction: tuple[float, float, float], held: tuple[Floats, Floats]) -> Camera:
-        aspect = self._size[0] / self._size[1]
-        return frame_camera(held, direction, FIELD_OF_VIEW, aspect, margin=MARGIN)
+    def _camera(self, direction: Floats, held: Floats) -> Camera:
+        return self._studio.framed(held, direction, self._size[0] / self._size[1])
 
-    def _near_the_eye(self) -> tuple[Floats, Floats]:
-        """A box around the nearest hair in the three-quarter view."""
+    def _near_the_eye(self) -> Floats:
+        """Points around the nearest hair in the three-quarter view."""
         middles = self._points[:, self._points.shape[1] // 2]
-        towards = middles @ np.array(VIEW_DIRECTION)
+        towards = middles @ self._studio.side.three_quarter
         count = max(round(_NEAREST_FRACTION * len(middles)), 1)
         middle = middles[np.argsort(towards)[-count:]].mean(axis=0)
-        reach = 0.5 * _CLOSE_FRACTION * float(np.max(self._bounds[1] - self._bounds[0]))
-        return middle - reach, middle + reach
+        reach = 0.5 * _CLOSE_FRACTION * float(np.ptp(self._held, axis=0).max())
+        return middle + reach * np.concatenate([np.eye(3), -np.eye(3)])
 
 
 _FONT = 0

@@ -1,24 +1,30 @@
-"""The studio of the command line: a groom on its head under three lights, before one camera."""
+"""The studio of the command line: a groom on its head, on a stage, before one camera."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
 from ...arrays import Floats
 from ...pipeline import Pose
-from ...render.camera import Camera, frame_camera
+from ...render.camera import Camera, frame_points
 from ...render.card_pass import CardPass
 from ...render.card_snapshot import CardSnapshot
 from ...render.frame import render_image
+from ...render.good_side import GoodSide, good_side
 from ...render.hair_ball import HairBall
 from ...render.mesh_pass import MeshPass
 from ...render.snapshot import MeshSnapshot, Snapshot
 from ...render.strand_pass import Statistics, StrandPass
-from ...shading.lights import Light, three_point_lights
+from ...shading.lights import Light
 from ...shading.skin.notes import skin_notes
+from ...shading.stage import backdrop, over, stage_lights
+from ...shading.stage_settings import StageSettings
+from ...shading.volume.light_frame import Ball
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
 from ..base.gpu_context import ensure_gpu
@@ -27,19 +33,15 @@ from ..cards.show import as_shown
 from ..properties.groom_settings import GroomSettings
 from ..sessions.prepared_groom import PreparedGroom
 from ..sessions.snapshots import snapshot_of, with_settings
+from .film import write_picture
 from .skin_picture import shown_skin_shadow
 from .slices import shown_slices
 
-#: three-quarter view from the front; heads face -Y
-VIEW_DIRECTION = (-0.55, -1.0, 0.18)
 FIELD_OF_VIEW = np.radians(30.0)
 #: how far around the groom its head is shown, as a fraction of the groom's size
 HEAD_ROOM = 0.25
-#: below 1, because nothing fills the corners of the box that the camera holds
-MARGIN = 0.85
-BACKDROP = (0.045, 0.05, 0.058, 1.0)
-
-type Rgba = tuple[float, float, float, float]
+#: room around what the camera holds
+MARGIN = 1.16
 
 
 class Studio:
@@ -77,7 +79,7 @@ class Studio:
         camera: Camera | None = None,
         *,
         lights: tuple[Light, ...] | None = None,
-        background: Rgba = BACKDROP,
+        is_transparent: bool = False,
     ) -> Floats:
         """Hair at these points on the head in this pose, (height, width, 4) scene-linear.
 
@@ -85,25 +87,31 @@ class Studio:
             points: (strand_count, cv_count, 3) [m], world space.
             samples: sub-pixels along each side of a pixel.
             camera: in place of the studio's own.
-            lights: in place of three that are attached to the camera.
-            background: premultiplied.
+            lights: in place of the stage's, which are attached to the camera.
+            is_transparent: without the backdrop.
         """
         camera, occluders = camera or self._camera(width / height), self._groom.occluders
         snapshot = replace(
             self._at_rest,
             strands=points,
             meshes=self._meshes(pose),
-            lights=three_point_lights(camera.view) if lights is None else lights,
+            lights=self.lights(camera) if lights is None else lights,
+            ambient=self.stage.ambient,
             occluder_spheres=None if occluders is None else occluders.at(pose),
             cards=self._cards_at(pose, points),
         )
+        picture = self._drawn(as_shown(snapshot), camera, width, height, samples)
+        return picture if is_transparent else over(picture, backdrop(self.stage, width, height))
+
+    def _drawn(
+        self, snapshot: Snapshot, camera: Camera, width: int, height: int, samples: int
+    ) -> Floats:
         picture = render_image(
-            as_shown(snapshot),
+            snapshot,
             camera,
             width,
             height,
             samples,
-            background=background,
             passes=self._passes,
             card_pass=self._card_pass,
         )
@@ -114,6 +122,32 @@ class Studio:
     def notes(self) -> tuple[str, ...]:
         """What the artist should know of all pictures so far, each with its remedy."""
         return tuple(self._notes)
+
+    def write(self, path: Path, picture: Floats) -> None:
+        """Write a picture, or several in one, as it looks on the stage's film.
+
+        Raises:
+            HairloomError: it cannot be written.
+        """
+        write_picture(path, picture, self.stage)
+
+    @property
+    def stage(self) -> StageSettings:
+        return self.settings[StageSettings]
+
+    def lights(self, camera: Camera) -> tuple[Light, ...]:
+        """The stage's, around the groom at rest, as they are attached to a camera."""
+        return stage_lights(self.stage, camera.view, self._ball)
+
+    @cached_property
+    def _ball(self) -> Ball:
+        low, high = self.bounds(self._rig.rest_pose, self._rig.strands.grid)
+        return Ball(0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)))
+
+    @cached_property
+    def side(self) -> GoodSide:
+        """From where the groom at rest is best seen."""
+        return good_side(self._rig.strands.grid, self._rig.head)
 
     def _cards_at(self, pose: Pose, points: Floats) -> CardSnapshot | None:
         """The cards riding on the guides among these strands, where cards are shown."""
@@ -147,7 +181,7 @@ class Studio:
             self._at_rest,
             strands=points,
             meshes=self._meshes(pose),
-            lights=three_point_lights(self._camera(1.0).view),
+            lights=self.lights(self._camera(1.0)),
         )
 
     def card_picture(
@@ -165,27 +199,20 @@ class Studio:
             strands=np.zeros((0, cv_count, 3), np.float32),
             radius=np.zeros((0, cv_count), np.float32),
             meshes=self._meshes(self._rig.rest_pose),
-            lights=three_point_lights(camera.view),
+            lights=self.lights(camera),
+            ambient=self.stage.ambient,
             shading=self._at_rest.shading,
             volume=self._at_rest.volume,
             skin=self._at_rest.skin,
             cards=cards,
         )
-        return render_image(
-            snapshot,
-            camera,
-            width,
-            height,
-            samples,
-            background=BACKDROP,
-            passes=self._passes,
-            card_pass=self._card_pass,
-        )
+        picture = self._drawn(snapshot, camera, width, height, samples)
+        return over(picture, backdrop(self.stage, width, height))
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the artist should know about shadows, in the studio's light."""
-        lights = three_point_lights(self._camera(1.0).view)
+        lights = self.lights(self._camera(1.0))
         snapshot = self._at_rest
         return (
             *shadow_warnings(lights, HairBall().of(snapshot), snapshot.volume),
@@ -197,21 +224,30 @@ class Studio:
         """What was drawn of the hair in the last picture."""
         return self._passes[1].statistics
 
-    def bounds(self, pose: Pose, points: Floats) -> tuple[Floats, Floats]:
-        """Lowest and highest corner [m] of hair and of what of the head is near it."""
+    def held(self, pose: Pose, points: Floats) -> Floats:
+        """What pictures show, (n, 3) [m]: the hair and what of the head is near it."""
         places = points.reshape(-1, 3)
+        if pose.head_positions is None:
+            return places
         low, high = places.min(axis=0), places.max(axis=0)
-        if pose.head_positions is not None:
-            room = HEAD_ROOM * float(np.max(high - low))
-            head_low, head_high = pose.head_positions.min(axis=0), pose.head_positions.max(axis=0)
-            low = np.minimum(low, np.maximum(head_low, low - room))
-            high = np.maximum(high, np.minimum(head_high, high + room))
-        return low, high
+        room = HEAD_ROOM * float(np.max(high - low))
+        head = pose.head_positions
+        is_near = ((head > low - room) & (head < high + room)).all(axis=1)
+        return np.concatenate([places, head[is_near]])
+
+    def bounds(self, pose: Pose, points: Floats) -> tuple[Floats, Floats]:
+        """Lowest and highest corner [m] of what pictures show."""
+        held = self.held(pose, points)
+        return held.min(axis=0), held.max(axis=0)
+
+    def framed(self, held: Floats, direction: Floats, aspect: float) -> Camera:
+        """The camera in a direction from points (n, 3) [m] that holds them, with room around."""
+        return frame_points(held, direction, FIELD_OF_VIEW, aspect, margin=MARGIN)
 
     def _camera(self, aspect: float) -> Camera:
         """Holds the groom at rest and what of the head is near it, with room for the motion."""
-        held = self.bounds(self._rig.rest_pose, self._rig.strands.grid)
-        return frame_camera(held, VIEW_DIRECTION, FIELD_OF_VIEW, aspect, margin=MARGIN)
+        held = self.held(self._rig.rest_pose, self._rig.strands.grid)
+        return self.framed(held, self.side.three_quarter, aspect)
 
     def _meshes(self, pose: Pose) -> tuple[MeshSnapshot, ...]:
         if self._rig.head is None or pose.head_positions is None:

@@ -20,9 +20,8 @@ from ...errors import HairloomError
 from ...exchange.files.stale_temp_files import remove_stale_files, temporary_beside
 from ...pipeline import Pose
 from ...render.camera import Camera, frame_camera
-from ...shading.lights import Light, three_point_lights
-from ..base.images import write_png
-from .studio import BACKDROP, FIELD_OF_VIEW, MARGIN, Studio
+from ...shading.lights import Light
+from .studio import FIELD_OF_VIEW, Studio
 from .video import write_video
 
 #: what the lights move with: identifier, label, description
@@ -36,8 +35,10 @@ LIGHTS = (
 )
 #: frame count and sides of pictures [pixels], min and max
 FRAMES, SIDES = (1, 10_000), (16, 4096)
-#: from the groom to the camera, at the first frame; heads face -Y
-_FIRST_DIRECTION = (0.0, -1.0, 0.14)
+#: how far above the groom the camera stands, as z of a direction of unit length across
+_HEIGHT = 0.14
+#: below 1, because nothing fills the corners of the box that the camera holds
+_MARGIN = 0.9
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ class Turntable:
             chosen.samples,
             self.camera(frame),
             lights=self._lights(frame),
-            background=(0.0, 0.0, 0.0, 0.0) if chosen.transparent else BACKDROP,
+            is_transparent=chosen.transparent,
         )
 
     def camera(self, frame: int) -> Camera:
@@ -132,7 +133,8 @@ class Turntable:
         around = np.array([reach, reach, float(high[2] - low[2]) / 2.0])
         aspect = self.settings.width / self.settings.height
         held = middle - around, middle + around
-        first = frame_camera(held, _FIRST_DIRECTION, FIELD_OF_VIEW, aspect, margin=MARGIN)
+        direction = self.studio.side.turned(0.0, _HEIGHT)
+        first = frame_camera(held, direction, FIELD_OF_VIEW, aspect, margin=_MARGIN)
         return replace(first, view=first.view @ _turned_about(middle, frame / self.settings.frames))
 
     def steps(self) -> Generator[int]:
@@ -145,7 +147,7 @@ class Turntable:
         with _moved_when_done(self.folder) as beside:
             frames = [beside / path.name for path in self.files[: chosen.frames]]
             for index, path in enumerate(frames):
-                write_png(path, self.picture(index))
+                self.studio.write(path, self.picture(index))
                 yield index + 1
             if chosen.video:
                 self._write_video(beside, frames)
@@ -161,7 +163,7 @@ class Turntable:
 
     def _lights(self, frame: int) -> tuple[Light, ...]:
         follows = self.settings.lights == "camera"
-        return three_point_lights(self.camera(frame if follows else 0).view)
+        return self.studio.lights(self.camera(frame if follows else 0))
 
 
 def _turned_about(middle: Floats, turns: float) -> Floats:

@@ -21,7 +21,6 @@ from ...groom.settings import GuideSettings
 from ...pipeline import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet, Surface
-from ..bakes.baked_rig import used_vertices
 from ..properties.groom_settings import GroomSettings
 from ..scene.rigs import rig_from
 from ..scene.source import Source
@@ -65,7 +64,6 @@ class BuildRequest:
 class PreparedGroom:
     """A groom made ready to be shown.
 
-    used: the head's vertices that carry roots.
     ambient: what its occlusion was made by.
     occlusion: (strand_count, cv_count) in [0, 1], at rest; None where it was left out.
     rank: (strand_count,), see `pipeline.strand_ranks`; None where it was left out.
@@ -74,12 +72,18 @@ class PreparedGroom:
     """
 
     rig: Rig
-    used: Ints
     ambient: AmbientSettings
     occlusion: Floats | None = None
     rank: Floats | None = None
     occluders: OccluderSpheres | None = None
     is_placeholder: bool = False
+
+    @cached_property
+    def used(self) -> Ints:
+        """The head's vertices that carry roots, sorted; none without a head."""
+        if self.rig.head is None or self.rig.strands.root_triangle is None:
+            return np.zeros(0, np.int32)
+        return np.unique(self.rig.head.triangles[self.rig.strands.root_triangle])
 
     @cached_property
     def head_occlusion(self) -> Floats | None:
@@ -132,7 +136,7 @@ def build(
     rig = known.rig if known is not None and is_same else rig_of(request)
     ambient = request.settings[AmbientSettings]
     if not is_drawn:
-        return PreparedGroom(rig, used_vertices(rig), ambient)
+        return PreparedGroom(rig, ambient)
     return prepared(rig, ambient, known, report=report)
 
 
@@ -164,7 +168,7 @@ def prepared(
     if occluders is None and rig.head is not None and with_occluders:
         occluders = OccluderSpheres(rig.head, rig.strands.roots)
     rank = pipeline.strand_ranks(rig)
-    return PreparedGroom(rig, used_vertices(rig), ambient, occlusion, rank, occluders)
+    return PreparedGroom(rig, ambient, occlusion, rank, occluders)
 
 
 def placeholder(request: BuildRequest) -> PreparedGroom:
@@ -179,7 +183,7 @@ def placeholder(request: BuildRequest) -> PreparedGroom:
         few = source.strands.take(np.arange(0, count, max(count // _FEW, 1)))
         rig = _quickly_bound(few, source.head, request)
     ambient = request.settings[AmbientSettings]
-    return PreparedGroom(rig, used_vertices(rig), ambient, is_placeholder=True)
+    return PreparedGroom(rig, ambient, is_placeholder=True)
 
 
 def _quickly_bound(few: StrandSet, head: Surface | None, request: BuildRequest) -> Rig:

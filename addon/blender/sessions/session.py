@@ -370,7 +370,7 @@ class Session:
 
     def recorded(self) -> Arrays:
         """See `baked_rig.frame_arrays`."""
-        return frame_arrays(self.solver.pose, self.solver.guides(), self.groom.used)
+        return frame_arrays(self.solver.pose, self.solver.guides())
 
     def show_recorded(self, frame: Arrays) -> None:
         """Hair as it was recorded, on the head as that was.
@@ -378,11 +378,8 @@ class Session:
         Raises:
             HairloomError: the frame is of another groom.
         """
-        rig = self.rig
-        baked = BakedRig(rig, RestMatrices(self.hair.rest, None), self.groom.used)
-        shapes = [len(rig.guides), rig.strands.grid.shape[1], 3], len(self.groom.used)
-        found = list(frame["guides"].shape), len(frame.get("head", ()))
-        if found != shapes:
+        baked = BakedRig(self.rig, RestMatrices(self.hair.rest, None))
+        if not baked.fits(frame):
             raise HairloomError(
                 "its bake is of another groom, or of other guides",
                 place=self.name,

@@ -28,12 +28,13 @@ class SkinSettings(Settings):
         source=_GREEN,
     )
     softness: float = number(
-        0.003,
+        0.008,
         label="Softness",
-        description="Distance that light spreads along the skin",
-        soft=(0.0, 0.02),
+        description="Distance that light spreads along the skin, as a fraction of the head's size, "
+        "which is the square root of its area",
+        soft=(0.0, 0.04),
         hard=(0.0, 1.0),
-        unit="length",
+        unit="factor",
         source=_GREEN,
         active_when=_IS_SOFT,
     )

@@ -26,8 +26,8 @@ from ..lights import Light
 _ROOM = 1.02
 #: a tangent that is shorter in a map than this, in fractions of its side, points along the light
 SEEN_FROM_ITS_END = 1e-20
-#: [m] hair smaller than this gets a map as if it were so large
-_MIN_RADIUS = 1e-4
+#: [m] hair smaller than this, which has no extent, gets a map as if it were so large
+MIN_RADIUS = 1e-9
 #: a map opens no wider than this to each side [rad]: beyond, few texels hold most of the picture
 WIDEST = float(np.radians(75.0))
 #: a point light nearer to the middle of the hair than this, in radii, has hair all around it
@@ -131,7 +131,7 @@ def reach_of(strands: Floats) -> float:
 
 def stepped_ball(center: Floats, radius: float) -> Ball:
     """A sphere that holds this one; its centre and size move in steps."""
-    radius = max(radius, _MIN_RADIUS) * _ROOM
+    radius = max(radius, MIN_RADIUS) * _ROOM
     # a step up: the centre may move by half a step along each axis, and it still holds all
     stepped = radius * (1.0 + np.sqrt(3.0) * _PLACE_STEP)
     stepped = float(_SIZE_STEP ** np.ceil(np.log(stepped) / np.log(_SIZE_STEP)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ..lights import Light, light_irradiance
-from .light_frame import WIDEST, Ball, LightFrame, is_within, light_frame, shines_along
+from .light_frame import MIN_RADIUS, WIDEST, Ball, LightFrame, is_within, light_frame, shines_along
 from .map_size import size_note
 from .settings import VolumeSettings
 
@@ -16,8 +16,6 @@ from .settings import VolumeSettings
 _MUCH_LIGHT = 0.25
 #: at this extinction one strand, though it covers a hundredth of a texel, takes most of the light
 _HARD_EXTINCTION = 100.0
-#: [m] hair smaller than this has no extent
-_NO_EXTENT = 2e-4
 
 
 def shadow_frames(
@@ -76,7 +74,7 @@ def _setting_warnings(ball: Ball, settings: VolumeSettings) -> Iterator[str]:
         yield (
             "Shadows: no light throws any as long as Lights is 0. Raise it, or set Shadows to None."
         )
-    if ball.radius < _NO_EXTENT:
+    if ball.radius < 2.0 * MIN_RADIUS:
         yield (
             "Shadows: the hair has no extent, so it throws none that could be seen. Give its "
             "strands a length."

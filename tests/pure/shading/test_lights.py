@@ -147,7 +147,7 @@ def test_packed_lanes() -> None:
     vector, power, across, upward, along = block[1:].reshape(5, LIGHT_CAPACITY, 4)[:, :4]
     assert vector.tolist() == [[1, 0, 0, 0], [5, 6, 7, 1], [1, 2, 3, 2], [4, 5, 6, 3]]
     assert power[:2].tolist() == [[4.0, 2.0, 1.0, 0.0], [9.0, 9.0, 9.0, 0.25]]
-    assert across[2:] == pytest.approx(np.array([[1, 0, 0, 1e-6], [1, 0, 0, 0.5]]))
+    assert across[2:] == pytest.approx(np.array([[1, 0, 0, 1e-12], [1, 0, 0, 0.5]]), abs=1e-13)
     assert upward[2:] == pytest.approx(np.array([[0, 1, 0, 0.75], [0, 1, 0, 0.25]]))
     assert along[2:] == pytest.approx(np.array([[0, 0, 1, 0.25], [0, 0, -1, 1e8]]))
 

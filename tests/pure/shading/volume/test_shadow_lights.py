@@ -97,4 +97,4 @@ def test_maps_that_no_gpu_could_hold_are_told() -> None:
 
 
 def test_hair_without_extent_is_told() -> None:
-    assert "no extent" in told(SUN, ball=Ball(np.zeros(3), 1.2e-4))[0]
+    assert "no extent" in told(SUN, ball=Ball(np.zeros(3), 1.2e-9))[0]

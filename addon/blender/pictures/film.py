@@ -1,0 +1,58 @@
+"""Pictures of the studio as files, shown by Blender's own view transform."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...shading.stage_settings import StageSettings
+from ..base.images import save_coded_png, straight_alpha
+from ..viewport.view_transform import View, shown_by_blender
+
+#: view of the settings -> Blender's names of transform and look
+_TRANSFORMS = {
+    "agx": ("AgX", "None"),
+    "agx_contrast": ("AgX", "AgX - Medium High Contrast"),
+    "filmic": ("Filmic", "None"),
+    "standard": ("Standard", "None"),
+}
+
+
+def write_picture(path: Path, linear: Floats, stage: StageSettings) -> None:
+    """Write a picture as it looks on this stage's film, as PNG in 8 bits.
+
+    Args:
+        linear: (height, width, 4) scene-linear Rec.709, premultiplied alpha, row 0 at the bottom.
+
+    Raises:
+        HairloomError: it cannot be written, or this Blender has no such view transform.
+    """
+    straight = straight_alpha(linear)
+    coded = _developed(straight[..., :3], stage)
+    save_coded_png(path, _dithered(np.concatenate([coded, straight[..., 3:]], axis=-1)))
+
+
+def _developed(colors: Floats, stage: StageSettings) -> Floats:
+    """Code values in [0, 1] of scene-linear colours."""
+    transform, look = _TRANSFORMS[stage.view]
+    view = View(transform=transform, look=look, exposure=stage.exposure)
+    try:
+        return shown_by_blender(view, colors)
+    except TypeError as error:  # this Blender has another configuration of colours
+        raise HairloomError(
+            f"this Blender has no view transform '{transform}' with the look '{look}'",
+            place="stage.view",
+            remedy="Choose another one, such as --set stage.view=standard",
+        ) from error
+
+
+def _dithered(coded: Floats) -> Floats:
+    """Each colour moved by up to half a step of 8 bits, always the same way, so that a soft
+    backdrop has no bands. What is quite black or white stays so."""
+    noise = np.random.default_rng(0).random((*coded.shape[:2], 3), np.float32) - 0.5
+    moved = coded.copy()
+    moved[..., :3] = np.clip(coded[..., :3] + noise / 255.0, 0.0, 1.0)
+    return moved

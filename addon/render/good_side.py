@@ -1,0 +1,175 @@
+"""From which side hair is best seen, found from where it grows.
+
+A candidate direction of view is as good as much hair is seen from there, and as much of the face:
+what of the body is bare amidst the hair. Their product is largest between the front and the side of
+a head, in front of a patch of fur, and beside a beast with its head towards the eye. It is never
+large from the edge of a sheet, nor from behind a face.
+
+Pure numpy: importable without gpu.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..groom.nearest import nearest_points
+from ..strands import Surface
+
+#: directions around the hair that are tried
+_AROUND = 16
+#: how far above the hair the eye may be, as z of a direction of unit length across; and how good
+#: it is to look from there, since one looks at a head from its own height
+_HEIGHTS = ((0.16, 1.0), (0.7, 0.8), (1.7, 0.6))
+#: a three-quarter view is turned by this from the front [rad]
+_THREE_QUARTER = float(np.radians(29.0))
+#: what counts where no face is seen, as a fraction of the whole face
+_WITHOUT_FACE = 0.35
+#: a face is seen at least as large as this, as a fraction of the hair
+_MIN_FACE = 0.02
+#: there is a front where the directions' goodness leans to one side by this fraction
+_MIN_LEAN = 0.06
+#: how much better the front in Blender's sense, towards -Y, is than the back, and one three-quarter
+#: view than the other, where all else is equal
+_PREFERENCE = 0.04
+#: bare is what is farther from all roots than these neighbours are apart, times this; and than
+#: this fraction of the roots' extent
+_BARE_SPACINGS, _BARE_FRACTION = 4.0, 0.12
+#: a face lies within the roots' extent, times this
+_FACE_REACH = 1.35
+#: points that stand for hair, roots and body, and cells across what is seen
+_HAIR, _ROOTS, _BODY, _CELLS = 20_000, 3_000, 16_000, 56
+
+
+@dataclass(frozen=True)
+class GoodSide:
+    """Directions from the hair towards an eye, (3,) each.
+
+    front: level, of unit length. three_quarter: where it is best seen.
+    """
+
+    front: Floats
+    three_quarter: Floats
+
+    def turned(self, degrees: float, height: float) -> Floats:
+        """The front turned to the side on which the three-quarter view is; height: its z."""
+        left = self.front[0] * self.three_quarter[1] - self.front[1] * self.three_quarter[0]
+        turned = _turned(self.front, np.copysign(np.radians(degrees), left))
+        return np.array([turned[0], turned[1], height])
+
+
+def good_side(strands: Floats, body: Surface | None) -> GoodSide:
+    """Of hair at rest on its body.
+
+    Args:
+        strands: (strand_count, cv_count, 3) [m], world space, root first.
+    """
+    seen = _Seen.of(strands, body)
+    angles = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
+    level = np.stack([np.sin(angles), -np.cos(angles), np.zeros(_AROUND)], axis=1)
+    areas = np.array([seen.areas(_raised(each, _HEIGHTS[0][0])) for each in level])
+    whole = areas.max(axis=0)
+    good = _goodness(areas, whole) * (1.0 - 0.5 * _PREFERENCE * level[:, 1])
+    lean = (good[:, None] * level).sum(axis=0)
+    if np.linalg.norm(lean) > _MIN_LEAN * good.sum():
+        front = lean / np.linalg.norm(lean)
+    else:  # the best is the three-quarter view
+        front = _turned(level[good.argmax()], _THREE_QUARTER)
+    # in this order, so that of equals the first wins
+    candidates = [
+        (_raised(_turned(front, turn), height), factor * preferred)
+        for height, factor in _HEIGHTS
+        for turn, preferred in ((-_THREE_QUARTER, 1.0 + _PREFERENCE), (_THREE_QUARTER, 1.0))
+    ]
+    asked = np.array([seen.areas(direction) for direction, _ in candidates])
+    factors = np.array([factor for _, factor in candidates])
+    best = (_goodness(asked, np.maximum(whole, asked.max(axis=0))) * factors).argmax()
+    return GoodSide(front, candidates[best][0])
+
+
+def _goodness(areas: Floats, whole: Floats) -> Floats:
+    """Of areas (n, 2) of hair and face, where the largest of them are `whole`."""
+    hair, face = areas[:, 0] / max(whole[0], 1.0), areas[:, 1] / max(whole[1], 1.0)
+    return hair * (_WITHOUT_FACE + face) if whole[1] > _MIN_FACE * whole[0] else hair
+
+
+def _raised(level: Floats, height: float) -> Floats:
+    return np.array([level[0], level[1], height])
+
+
+def _turned(direction: Floats, angle: float) -> Floats:
+    cosine, sine = np.cos(angle), np.sin(angle)
+    x, y, z = direction
+    return np.array([cosine * x - sine * y, sine * x + cosine * y, z])
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Points that stand for hair and body, as a picture of few cells sees them.
+
+    points: (n, 3) [m] from the middle. kind: (n,) 0 body, 1 hair, 2 face. cell: its side [m].
+    """
+
+    points: Floats
+    kind: Ints
+    cell: float
+
+    @classmethod
+    def of(cls, strands: Floats, body: Surface | None) -> _Seen:
+        # without roots, which are seen from both sides of a sheet
+        hair: Floats = _some(strands[:, 1:].reshape(-1, 3), _HAIR).astype(np.float64)
+        middle = 0.5 * (hair.min(axis=0) + hair.max(axis=0))
+        radius = max(float(np.linalg.norm(hair - middle, axis=1).max()), 1e-30)
+        points: list[Floats] = [hair]
+        kind = [np.ones(len(hair), int)]
+        if body is not None and len(body.triangles):
+            places = _places_on(body, middle, 2.0 * radius)
+            points.append(places)
+            kind.append(np.where(_is_face(places, strands[:, 0].astype(np.float64)), 2, 0))
+        return cls(np.concatenate(points) - middle, np.concatenate(kind), 2.0 * radius / _CELLS)
+
+    def areas(self, direction: Floats) -> tuple[int, int]:
+        """In how many cells hair is seen, and in how many the face."""
+        towards = direction / np.linalg.norm(direction)
+        right = np.cross([0.0, 0.0, 1.0], towards)
+        right /= np.linalg.norm(right)
+        across = np.stack([right, np.cross(towards, right)], axis=1)
+        column, row = np.clip(self.points @ across // self.cell, -_CELLS, _CELLS - 1).astype(int).T
+        order = np.argsort(self.points @ towards, kind="stable")
+        nearest = np.zeros((2 * _CELLS) ** 2, int)
+        nearest[(row * 2 * _CELLS + column)[order]] = self.kind[order]  # the last one stays
+        return int((nearest == 1).sum()), int((nearest == 2).sum())
+
+
+def _some(points: Floats, count: int) -> Floats:
+    """Evenly many of the points, or all."""
+    return points[:: -(-len(points) // count)]
+
+
+def _places_on(body: Surface, middle: Floats, reach: float) -> Floats:
+    """Points (n, 3) spread over what of the body is within reach of the hair's middle."""
+    corners = body.corners.astype(np.float64)
+    near = np.linalg.norm(corners - middle, axis=2).min(axis=1) < reach
+    corners = corners[near] if near.any() else corners
+    a, b, c = corners.transpose(1, 0, 2)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    random = np.random.default_rng(0)
+    ends = np.cumsum(area)
+    chosen = np.searchsorted(ends, random.random(_BODY) * ends[-1]).clip(0, len(ends) - 1)
+    u, v = np.sort(random.random((2, _BODY)), axis=0)[:, :, None]
+    return u * a[chosen] + (v - u) * b[chosen] + (1.0 - v) * c[chosen]
+
+
+def _is_face(places: Floats, roots: Floats) -> Bools:
+    """Which of the places are bare, with the hair around them."""
+    roots = _some(roots, _ROOTS)
+    middle = roots.mean(axis=0)
+    extent = float(np.linalg.norm(roots - middle, axis=1).max())
+    spacing = float(np.median(nearest_points(roots, roots, 2)[1][:, -1]))
+    reach = max(_BARE_SPACINGS * spacing, _BARE_FRACTION * extent)
+    is_near = np.linalg.norm(places - middle, axis=1) < _FACE_REACH * extent
+    found = np.zeros(len(places), bool)
+    found[is_near] = nearest_points(places[is_near], roots, 1)[1][:, 0] > reach
+    return found

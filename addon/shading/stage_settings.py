@@ -1,0 +1,113 @@
+"""What the artist sets about the stage on which pictures without a scene are taken."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..params import Settings, choice, color, number
+
+VIEWS = (
+    ("agx", "AgX", "Blender's default: bright colours fade to white as on film"),
+    ("agx_contrast", "AgX, High Contrast", "The same with deeper shadows"),
+    ("filmic", "Filmic", "What Blender had before AgX"),
+    ("standard", "Standard", "No tone mapping: what is brighter than white is cut off"),
+)
+
+
+def _strength(default: float, label: str, description: str) -> Any:
+    return number(
+        default,
+        label=label,
+        description=f"{description}, in W/m² where the hair is",
+        soft=(0.0, 20.0),
+        hard=(0.0, 10_000.0),
+    )
+
+
+def _angle(default: float, label: str, description: str, most: float) -> Any:
+    """Of the view [degrees]."""
+    span = float(np.radians(-most)), float(np.radians(most))
+    return number(
+        float(np.radians(default)),
+        label=label,
+        description=description,
+        soft=span,
+        hard=span,
+        unit="angle",
+    )
+
+
+def _side(default: float, label: str, light: str) -> Any:
+    return _angle(default, label, f"Angle of the {light} to the right of the camera", 180.0)
+
+
+def _height(default: float, label: str, light: str) -> Any:
+    return _angle(default, label, f"Angle of the {light} above the camera", 90.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageSettings(Settings):
+    """Three lights that go with the camera, the light from all sides, the backdrop and the film."""
+
+    section = "stage"
+    title = "Stage"
+    owner = "job"
+
+    key: float = _strength(4.2, "Key", "Main light")
+    key_side: float = _side(42.0, "Key Side", "main light")
+    key_height: float = _height(40.0, "Key Height", "main light")
+    fill: float = _strength(1.1, "Fill", "Light into the shadows of the main light")
+    fill_side: float = _side(-60.0, "Fill Side", "fill light")
+    fill_height: float = _height(5.0, "Fill Height", "fill light")
+    rim: float = _strength(7.0, "Rim", "Light from behind, which shines through the hair")
+    rim_side: float = _side(-148.0, "Rim Side", "light from behind")
+    rim_height: float = _height(35.0, "Rim Height", "light from behind")
+    distance: float = number(
+        5.0,
+        label="Distance",
+        description="Distance of the lights, in radii of what is shown; the nearer, the more the "
+        "light falls off",
+        soft=(2.0, 20.0),
+        hard=(1.5, 1000.0),
+    )
+    warmth: float = number(
+        0.4,
+        label="Warmth",
+        description="Warm main light and cool other lights; below 0 the other way round",
+        soft=(-1.0, 1.0),
+        hard=(-1.0, 1.0),
+    )
+    ambient: tuple[float, float, float] = color(
+        (0.05, 0.06, 0.08),
+        label="Ambient",
+        description="Light from all sides",
+        maximum=100.0,
+    )
+    backdrop_center: tuple[float, float, float] = color(
+        (0.085, 0.105, 0.135),
+        label="Backdrop Centre",
+        description="Colour of the backdrop behind the hair",
+        maximum=100.0,
+    )
+    backdrop_edge: tuple[float, float, float] = color(
+        (0.009, 0.012, 0.018),
+        label="Backdrop Edge",
+        description="Colour of the backdrop in the corners of the picture",
+        maximum=100.0,
+    )
+    exposure: float = number(
+        0.0,
+        label="Exposure",
+        description="Brightness of the picture, in stops",
+        soft=(-3.0, 3.0),
+        hard=(-20.0, 20.0),
+    )
+    view: str = choice(
+        "agx_contrast",
+        VIEWS,
+        label="View",
+        description="Blender's view transform by which pictures are shown",
+    )

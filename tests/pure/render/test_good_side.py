@@ -1,0 +1,135 @@
+"""From which side hair is seen: before the face, before a sheet, beside a beast."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.render.camera import frame_points
+from hairloom.addon.render.good_side import good_side
+from hairloom.addon.strands import Surface
+
+TURNS = (0.0, 75.0, 180.0, 262.0)
+
+
+def ball(radius: float, squeeze: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Surface:
+    """A sphere of triangles, squeezed along the axes."""
+    rows, columns = 20, 40
+    down, around = np.meshgrid(
+        np.linspace(0.0, np.pi, rows + 1), 2.0 * np.pi * np.arange(columns) / columns, indexing="ij"
+    )
+    points = np.stack(
+        [np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down)], axis=-1
+    )
+    row, column = np.indices((rows, columns))
+    here, beside = row * columns + column, row * columns + (column + 1) % columns
+    triangles = np.concatenate(
+        [
+            np.stack([here, beside + columns, beside], axis=-1).reshape(-1, 3),
+            np.stack([here, here + columns, beside + columns], axis=-1).reshape(-1, 3),
+        ]
+    )
+    return Surface((points.reshape(-1, 3) * squeeze * radius).astype(np.float32), triangles)
+
+
+def spikes(roots: np.ndarray, outward: np.ndarray, length: float) -> np.ndarray:
+    """Straight strands, (n, 6, 3)."""
+    along = np.linspace(0.0, length, 6)
+    return roots[:, None] + along[None, :, None] * outward[:, None]
+
+
+def head() -> tuple[np.ndarray, Surface]:
+    """A ball with hair all over but for a face towards -Y."""
+    outward = np.random.default_rng(3).normal(size=(1500, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    outward = outward[(outward[:, 1] > -0.55) & (outward[:, 2] > -0.6)]
+    return spikes(0.1 * outward, outward, 0.03), ball(0.1)
+
+
+def sheet() -> tuple[np.ndarray, Surface]:
+    """Hair that hangs before a wall, which is bare behind."""
+    places = np.random.default_rng(4).uniform(-0.5, 0.5, (900, 2))
+    roots = np.stack([places[:, 0], np.zeros(900), places[:, 1]], axis=1)
+    corners = np.array([[-0.5, 0, -0.5], [0.5, 0, -0.5], [0.5, 0, 0.5], [-0.5, 0, 0.5]], np.float32)
+    wall = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]]))
+    return spikes(roots, np.tile([0.0, -0.5, -0.866], (900, 1)), 0.05), wall
+
+
+def beast() -> tuple[np.ndarray, Surface]:
+    """Fur all over a long body but for the snout at its end towards -Y."""
+    outward = np.random.default_rng(5).normal(size=(3000, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    outward = outward[outward[:, 1] > -0.8]
+    squeeze = (0.5, 1.6, 0.6)
+    return spikes(outward * squeeze, outward, 0.04), ball(1.0, squeeze)
+
+
+def turned(strands: np.ndarray, body: Surface, degrees: float) -> tuple[np.ndarray, Surface]:
+    angle = np.radians(degrees)
+    rotation = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    positions = (body.positions @ rotation.T).astype(np.float32)
+    return strands @ rotation.T, Surface(positions, body.triangles)
+
+
+def away(direction: np.ndarray, degrees: float) -> float:
+    """Angle [degrees] to where -Y has been turned, seen from above."""
+    angle = np.arctan2(direction[0], -direction[1]) - np.radians(degrees)
+    return abs(float(np.degrees((angle + np.pi) % (2.0 * np.pi) - np.pi)))
+
+
+@pytest.mark.parametrize("shape", [head, sheet, beast])
+@pytest.mark.parametrize("degrees", TURNS)
+def test_the_front_is_found_wherever_it_is(shape, degrees: float) -> None:
+    side = good_side(*turned(*shape(), degrees))
+    assert away(side.front, degrees) < 12.0
+    assert 15.0 < away(side.three_quarter, degrees) < 45.0
+
+
+def test_a_carpet_is_seen_from_above() -> None:
+    strands, wall = sheet()
+    flat = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # the wall's front turned up
+    surface = Surface((wall.positions @ flat.T).astype(np.float32), wall.triangles)
+    side = good_side(spikes(strands[:, 0] @ flat.T, np.tile([0, 0, 1.0], (900, 1)), 0.02), surface)
+    assert side.three_quarter[2] > 0.5 > good_side(*head()).three_quarter[2]
+
+
+def test_a_sheet_without_a_body_is_not_seen_from_its_edge() -> None:
+    strands, _ = sheet()
+    for degrees in TURNS:
+        rotated, _ = turned(strands, ball(1.0), degrees)
+        seen = away(good_side(rotated, None).three_quarter, degrees)
+        assert min(seen, 180.0 - seen) < 50.0
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_size_and_place_do_not_matter(scale: float) -> None:
+    strands, body = head()
+    place = scale * np.array([0.3, -0.2, 1.5])
+    moved = Surface((body.positions * scale + place).astype(np.float32), body.triangles)
+    one, other = good_side(strands, body), good_side(strands * scale + place, moved)
+    np.testing.assert_allclose(one.three_quarter, other.three_quarter, atol=0.05)
+
+
+def test_views_turn_to_the_side_that_is_seen() -> None:
+    side = good_side(*head())
+    np.testing.assert_allclose(side.turned(0.0, 0.0), side.front, atol=1e-12)
+    np.testing.assert_allclose(side.turned(180.0, 0.0), -side.front, atol=1e-12)
+    aside = side.turned(90.0, 0.0)
+    assert aside @ side.front == pytest.approx(0.0, abs=1e-12)
+    assert aside[:2] @ side.three_quarter[:2] > 0.0
+
+
+@pytest.mark.parametrize("aspect", [0.5, 1.0, 1.8])
+def test_points_touch_the_frame_and_stay_within(aspect: float) -> None:
+    """One axis is filled from border to border, the other is in the middle."""
+    points = np.random.default_rng(2).normal(size=(500, 3)) * (3.0, 0.4, 1.0) + (7.0, 5.0, -2.0)
+    camera = frame_points(points, (-0.4, -1.0, 0.3), 0.6, aspect, margin=1.25)
+    clip = np.append(points, np.ones((500, 1)), axis=1) @ (camera.projection @ camera.view).T
+    places = clip[:, :2] / clip[:, 3:]
+    low, high = places.min(axis=0) * 1.25, places.max(axis=0) * 1.25
+    assert (np.abs(clip[:, 2]) < clip[:, 3]).all()
+    assert max(high) == pytest.approx(1.0) and min(low) == pytest.approx(-1.0)
+    fills = int(np.argmax(high - low))
+    assert low[fills] == pytest.approx(-1.0) and high[fills] == pytest.approx(1.0)
