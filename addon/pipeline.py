@@ -7,7 +7,6 @@ artist's buttons and from the command line alike.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
 from .strands import StrandSet, Surface
+from .strands.join import joined
 from .strands.resample import resample
 
 NO_WIND = np.zeros(3)
@@ -164,22 +164,11 @@ def _with_children(
         )
         return Rig(guides, None, own, GuideWeights(each, alone), None, (note,))
     made = make_children(guides, head, settings, density, place=place)
-    strands = _joined(guides, made.strands)
+    strands = joined(guides, made.strands)
     weights = GuideWeights(
         np.concatenate([each, made.weights.guide]), np.concatenate([alone, made.weights.weight])
     )
     return Rig(strands, head, own, weights, _frames(strands, head), made.notes)
-
-
-def _joined(one: StrandSet, other: StrandSet) -> StrandSet:
-    """Both, one after the other; what only one of them knows of its roots is left out."""
-    both: dict[str, Any] = {}
-    for name in ("points", "radius", "group", "root_uv", "root_triangle", "root_barycentric"):
-        parts = [getattr(one, name), getattr(other, name)]
-        both[name] = None if any(part is None for part in parts) else np.concatenate(parts)
-    return StrandSet(
-        offsets=np.concatenate([one.offsets, other.offsets[1:] + one.offsets[-1]]), **both
-    )
 
 
 def _frames(strands: StrandSet, head: Surface | None) -> RootFrames | None:

@@ -1,9 +1,10 @@
 """What a surface reflects at its boundary: microfacets of the GGX distribution, of a dielectric.
 
-References: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces"; Heitz 2014,
-"Understanding the Masking-Shadowing Function", with the height-correlated form of Smith; Karis 2014,
-"Physically Based Shading on Mobile", for the fraction of all light. As in Blender's Principled BSDF,
-the width of the lobe is the square of the roughness, and what is reflected is missing below.
+References: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces"; Heitz
+2014, "Understanding the Masking-Shadowing Function", with the height-correlated form of Smith;
+Karis 2014, "Physically Based Shading on Mobile", for the fraction of all light. As in Blender's
+Principled BSDF, the width of the lobe is the square of the roughness, and what is reflected is
+missing below.
 
 Twin: gpu_shaders/lib_microfacet.glsl.
 """
