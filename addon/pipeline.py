@@ -7,7 +7,6 @@ artist's buttons and from the command line alike.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -30,7 +29,7 @@ from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
 from .strands import StrandSet, Surface
-from .strands.colors import joined_colors
+from .strands.join import joined
 from .strands.resample import resample
 
 NO_WIND = np.zeros(3)
@@ -171,7 +170,7 @@ def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None,
         )
         return replace(rig, notes=(*rig.notes, note))
     made = make_children(own, head, settings, density, place=place)
-    strands = _joined(own, made.strands)
+    strands = joined(own, made.strands)
     weights = made.weights
     if len(rig.guides) < own.strand_count:
         # shaped by their neighbours among all strands, they move as guides do
@@ -187,20 +186,6 @@ def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None,
         _frames(strands, head),
         (*rig.notes, *made.notes),
         own_count=own.strand_count,
-    )
-
-
-def _joined(one: StrandSet, other: StrandSet) -> StrandSet:
-    """Both, one after the other; what only one of them knows of its roots is left out."""
-    both: dict[str, Any] = {}
-    for name in ("points", "radius", "group", "root_uv", "root_triangle", "root_barycentric"):
-        parts = [getattr(one, name), getattr(other, name)]
-        both[name] = None if any(part is None for part in parts) else np.concatenate(parts)
-    return StrandSet(
-        offsets=np.concatenate([one.offsets, other.offsets[1:] + one.offsets[-1]]),
-        has_widths=one.has_widths and other.has_widths,
-        color=joined_colors([one, other]),
-        **both,
     )
 
 

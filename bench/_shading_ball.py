@@ -117,7 +117,7 @@ def snapshot_of(
     return Snapshot(
         grid,
         np.full(grid.shape[:2], RADIUS, np.float32),
-        meshes=(replace(MeshSnapshot.of(core, color=(0.0, 0.0, 0.0)), sheen=0.0),),
+        meshes=(replace(MeshSnapshot.of(core, color=(0.0, 0.0, 0.0)), specular=0.0),),
         lights=(Light.sun(np.negative(towards), (1.0, 1.0, 1.0), 1.0),),
         ambient=(0.0, 0.0, 0.0),
         shading=shading,

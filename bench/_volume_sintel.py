@@ -186,7 +186,7 @@ def snapshot_of(
     return Snapshot(
         sitter.strands,
         np.full(sitter.strands.shape[:2], RADIUS, np.float32),
-        meshes=(replace(MeshSnapshot.of(sitter.head, color=SKIN), sheen=0.0),),
+        meshes=(replace(MeshSnapshot.of(sitter.head, color=SKIN), specular=0.0),),
         lights=(Light.sun(-SUN, (1.0, 1.0, 1.0), STRENGTH),),
         ambient=(0.0, 0.0, 0.0),
         shading=hair_settings(absorption, stand_ins),

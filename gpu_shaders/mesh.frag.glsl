@@ -1,9 +1,10 @@
-// Meshes, fragment stage: Lambert, the world's light, and a soft sheen (Blinn 1977) as skin has. Hair
+// Meshes, fragment stage: Lambert under a boundary of microfacets, and the world's light. Hair
 // throws SHADOWS on them, and meshes do; where a light has no map of hair, the occlusion stands in.
 // OTHERS: there is more hair in the way than the maps hold. On SKIN the
 // shadow is looked up where it has been spread. PICTURES of the material take the place of its colour,
 // and bend its normals. HASHED and BLENDED: it does not cover all.
 #include "lib_lights.glsl"
+#include "lib_microfacet.glsl"
 #include "lib_shadows.glsl"
 #include "lib_output.glsl"
 #ifdef SKIN
@@ -12,8 +13,6 @@
 #ifdef HASHED
 #  include "lib_hashed.glsl"
 #endif
-
-const float SHEEN_EXPONENT = 18.0;
 
 #ifdef PICTURES
 // A normal of tangent space, whose axes are those along which the map's u and v grow (Schueler 2013,
@@ -27,12 +26,13 @@ vec3 bent_normal(vec3 normal, vec3 mapped, float bump)
   vec3 along_y = turn * cross(point_y, normal), along_x = turn * cross(normal, point_x);
   vec3 tangent = along_y * uv_x.x + along_x * uv_y.x;
   vec3 bitangent = along_y * uv_x.y + along_x * uv_y.y;
-  float largest = max(dot(tangent, tangent), dot(bitangent, bitangent));
-  if (largest <= 0.0) {
+  float across = dot(tangent, tangent), upward = dot(bitangent, bitangent);
+  if (min(across, upward) <= 0.0) {
     return normal;
   }
-  float scale = inversesqrt(largest);
-  vec3 bent = normalize(scale * (tangent * mapped.x + bitangent * mapped.y) + normal * mapped.z);
+  // both of one length, however the map is stretched, as Blender has them
+  vec3 bent = tangent * (mapped.x * inversesqrt(across)) + bitangent * (mapped.y * inversesqrt(upward));
+  bent = normalize(bent + normal * mapped.z);
   return normalize(mix(normal, bent, bump));
 }
 #endif
@@ -72,7 +72,9 @@ void main()
                                round(mesh_skin.z),
                                known);
 #endif
-  vec3 radiance = base * lights.ambient_and_count.xyz * mesh_occlusion;
+  float reflected = reflected_fraction(dot(normal, to_eye), mesh_specular, mesh_roughness);
+  vec3 matt = base * (1.0 - reflected);
+  vec3 radiance = (matt + reflected) * lights.ambient_and_count.xyz * mesh_occlusion;
 #ifdef OTHER_TAU
   vec4 between = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
 #endif
@@ -95,14 +97,9 @@ void main()
 #ifdef OTHER_TAU
     reaching *= exp((index < {{other_tau_lights}} ? -between[index] : 0.0) * (1.0 - hair_forward));
 #endif
-    irradiance *= reaching / LIGHT_PI;
     float facing = max(0.0, dot(normal, to_light));
-    // between light and eye; of no length where the light comes straight from behind
-    vec3 between = to_light + to_eye;
-    float across = max(0.0, dot(normal, between)) * inversesqrt(max(dot(between, between), 1.0e-12));
-    // (n + 8) / 8 keeps the sheen's energy the same whatever its sharpness
-    float sheen = mesh_sheen * (SHEEN_EXPONENT + 8.0) / 8.0 * pow(across, SHEEN_EXPONENT);
-    radiance += irradiance * facing * (base + sheen);
+    float shine = ggx_reflection(normal, to_light, to_eye, mesh_specular, mesh_roughness);
+    radiance += irradiance * reaching * facing * (matt / LIGHT_PI + shine);
   }
   // a holdout covers nothing itself and hides what is behind it
 #ifdef BLENDED

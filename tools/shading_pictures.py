@@ -51,7 +51,7 @@ def main(folder: Path) -> None:
     volume = of_addon("parameters").ALL_SETTINGS["volume"]
     strands = combed_strands(STRANDS)
     skin = of_addon("strands").Surface(*ball_mesh())
-    ball = replace(frame.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), sheen=0.0)
+    ball = replace(frame.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), specular=0.0)
     camera = frame.Camera(
         frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
         frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),

@@ -101,7 +101,7 @@ def shadow_pictures(strands: Any) -> list[Any]:
     settings = of_addon("parameters").ALL_SETTINGS
     frame, lights = of_addon("render.frame"), of_addon("shading.lights")
     skin = of_addon("strands").Surface(*ball_mesh())
-    ball = replace(frame.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), sheen=0.0)
+    ball = replace(frame.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), specular=0.0)
     camera = frame.Camera(
         frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
         frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),

@@ -116,7 +116,8 @@ class MeshPass:
         """What the program of one mesh has: its surface, its soft shadow, its pictures."""
         yield ShaderFeature(
             numbers={
-                "mesh_sheen": ("FLOAT", mesh.sheen),
+                "mesh_specular": ("FLOAT", mesh.specular),
+                "mesh_roughness": ("FLOAT", mesh.roughness),
                 "mesh_cover": ("FLOAT", 0.0 if mesh.is_holdout else 1.0),
             }
         )

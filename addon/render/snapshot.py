@@ -30,7 +30,7 @@ type Color = tuple[float, float, float]
 TRANSPARENCIES = ("opaque", "hashed", "blended")
 SKIN: Color = (0.55, 0.38, 0.31)
 #: an index of refraction of 1.4 gives ((1.4 - 1) / (1.4 + 1))^2
-SKIN_SHEEN = 0.028
+SKIN_SPECULAR, SKIN_ROUGHNESS = 0.028, 0.45
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,8 @@ class MeshSnapshot:
     vertex_normals: (vertex_count, 3) unit vectors.
     color: scene-linear albedo.
     occlusion: (vertex_count,) light that arrives, 0 to 1; None is 1 everywhere.
-    sheen: the fraction of the light that the surface throws back as it is, head on.
+    specular: the fraction of the light that the boundary reflects where it falls straight in.
+    roughness: of the boundary, as Principled has it.
     number: what object masks hold where it is seen.
     is_holdout: it hides what is behind it and is a hole in the picture itself.
     skin: the head that it is a part of; None is no skin, on which shadows have hard edges.
@@ -82,7 +83,8 @@ class MeshSnapshot:
     vertex_normals: Floats
     color: Color = SKIN
     occlusion: Floats | None = None
-    sheen: float = SKIN_SHEEN
+    specular: float = SKIN_SPECULAR
+    roughness: float = SKIN_ROUGHNESS
     number: int = 0
     is_holdout: bool = False
     skin: Skin | None = None

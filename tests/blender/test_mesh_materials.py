@@ -30,7 +30,7 @@ def picture(name: str, pixels: np.ndarray, space: str = "sRGB") -> bpy.types.Ima
 
 @pytest.fixture
 def material() -> bpy.types.Material:
-    """Principled, without any sheen."""
+    """Principled, with nothing that shines."""
     made = bpy.data.materials.new("Skin")
     node = made.node_tree.nodes["Principled BSDF"]
     node.inputs["Roughness"].default_value = 1.0
@@ -61,7 +61,7 @@ def test_values_are_read(material: bpy.types.Material) -> None:
     inputs["Base Color"].default_value = (0.2, 0.4, 0.6, 1.0)
     inputs["Alpha"].default_value = 0.3
     found = material_of(material)
-    assert found.color == pytest.approx((0.2, 0.4, 0.6)) and found.sheen == 0.0
+    assert found.color == pytest.approx((0.2, 0.4, 0.6)) and found.specular == 0.0
     assert (found.alpha, found.transparency) == (pytest.approx(0.3), "hashed")
     material.surface_render_method = "BLENDED"
     assert material_of(material).transparency == "blended"
@@ -169,11 +169,20 @@ def of_cycles(material: bpy.types.Material, sun: np.ndarray, folder: Path) -> np
 
 
 @pytest.mark.usefixtures("gpu_context")
-@pytest.mark.parametrize("bump", [1.0, 0.5])
+@pytest.mark.parametrize(
+    ("bump", "level", "roughness"),
+    [(1.0, 0.0, 1.0), (0.5, 0.0, 1.0), (1.0, 0.5, 0.45), (1.0, 0.5, 0.3)],
+    ids=["bumps", "lower", "skin", "glossy"],
+)
 def test_a_plane_with_pictures_is_as_in_cycles(
-    material: bpy.types.Material, tmp_path: Path, bump: float
+    material: bpy.types.Material, tmp_path: Path, bump: float, level: float, roughness: float
 ) -> None:
+    """Matt, and with the boundary that Principled has."""
     from hairloom.addon.render import frame
+
+    inputs = material.node_tree.nodes["Principled BSDF"].inputs
+    inputs["Specular IOR Level"].default_value, inputs["IOR"].default_value = level, 1.4
+    inputs["Roughness"].default_value = roughness
 
     color, normal = waves()
     give(material, picture("Color", color), "Base Color")
@@ -189,7 +198,8 @@ def test_a_plane_with_pictures_is_as_in_cycles(
         surface,
         np.tile(np.float32([0, 0, 1]), (4, 1)),
         color=read.color,
-        sheen=read.sheen,
+        specular=read.specular,
+        roughness=read.roughness,
         pictures=read.pictures,
     )
     snapshot = frame.Snapshot(
@@ -223,12 +233,12 @@ def test_meshes_cover_as_much_as_their_alpha_says(transparency: str) -> None:
             surface,
             up,
             color=(1.0, 0.0, 0.0),
-            sheen=0.0,
+            specular=0.0,
             pictures=pictures,
             alpha=alpha,
             transparency=transparency,
         )
-        floor = frame.MeshSnapshot(behind, up, color=(0.0, 0.0, 1.0), sheen=0.0)
+        floor = frame.MeshSnapshot(behind, up, color=(0.0, 0.0, 1.0), specular=0.0)
         snapshot = frame.Snapshot(
             none, none[..., 0], meshes=(sheet, floor), ambient=(1.0, 1.0, 1.0)
         )
@@ -252,7 +262,7 @@ def test_blended_meshes_are_drawn_from_far_to_near() -> None:
             Surface(surface.positions + np.float32([0, 0, z]), surface.triangles),
             up,
             color=color,
-            sheen=0.0,
+            specular=0.0,
             alpha=0.5,
             transparency="blended",
         )

@@ -61,7 +61,7 @@ def drawn(
     snapshot = frame.Snapshot(
         strands,
         np.full(strands.shape[:2], RADIUS, np.float32),
-        meshes=(replace(mesh, sheen=0.0, is_holdout=True),),
+        meshes=(replace(mesh, specular=0.0, is_holdout=True),),
         lights=(Light.sun(np.negative(SUN), (1.0, 1.0, 1.0), 1.0),),
         ambient=(0.0, 0.0, 0.0),
         shading=settings_from(node, alike)[0],

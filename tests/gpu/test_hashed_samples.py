@@ -30,7 +30,7 @@ def sheet(frame: Any, height: float, color: tuple[float, float, float], **looks:
         triangles = triangles[:, ::-1].copy()
     up = np.tile(np.float32([0, 0, 1]), (4, 1))
     surface = Surface(corners, triangles)
-    return frame.MeshSnapshot(surface, up, color=color, sheen=0.0, **looks)
+    return frame.MeshSnapshot(surface, up, color=color, specular=0.0, **looks)
 
 
 def samples_of(frame: Any, snapshot: Any, camera: Any, count: int) -> np.ndarray:

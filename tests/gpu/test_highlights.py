@@ -37,7 +37,7 @@ def draw() -> Callable[..., np.ndarray]:
 
     strands = combed_strands(12_000, cv_count=8, lift=0.004)
     radius = np.full(strands.shape[:2], 0.006, np.float32)
-    ball = replace(frame.MeshSnapshot.of(Surface(*ball_mesh()), color=BLACK), sheen=0.0)
+    ball = replace(frame.MeshSnapshot.of(Surface(*ball_mesh()), color=BLACK), specular=0.0)
     camera = frame.Camera(
         frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
         frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),

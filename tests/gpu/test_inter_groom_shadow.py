@@ -61,7 +61,7 @@ def picture(*grooms: DrawnGroom, camera: Camera = CAMERA, **scene: Any) -> np.nd
     from hairloom.addon.render.scene_pass import ScenePass
     from hairloom.addon.render.textures import texture_to_array
 
-    floor = replace(MeshSnapshot.of(FLOOR, (1.0, 1.0, 1.0)), sheen=0.0)
+    floor = replace(MeshSnapshot.of(FLOOR, (1.0, 1.0, 1.0)), specular=0.0)
     whole = SceneSnapshot(**{"meshes": (floor,), "grooms": grooms, "lights": (SUN,), **scene})
     target = Target()
     ScenePass().draw(whole, camera, target, (SIZE, SIZE), (0.0, 0.0, 0.0, 0.0))

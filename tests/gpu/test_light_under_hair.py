@@ -38,7 +38,7 @@ def snapshot_of(shading: ShadingSettings, *, scattering: bool, is_skin: bool) ->
     strands[..., 0] += 0.1 * random.normal(size=(900, 1)) * np.linspace(-1, 1, 6)
     strands[..., 1] = np.linspace(-0.6, 0.6, 6)
     strands[..., 2] = random.uniform(0.3, 0.5, (900, 1))
-    mesh = replace(MeshSnapshot.of(FLOOR, (1.0, 1.0, 1.0), is_skin=is_skin), sheen=0.0)
+    mesh = replace(MeshSnapshot.of(FLOOR, (1.0, 1.0, 1.0), is_skin=is_skin), specular=0.0)
     return Snapshot(
         strands,
         np.full(strands.shape[:2], 2e-3, np.float32),
@@ -134,7 +134,7 @@ def test_the_shadow_of_a_mesh_goes_on_beyond_the_map_of_hair() -> None:
     )
     snapshot = replace(
         snapshot,
-        meshes=(replace(MeshSnapshot.of(wide, (1.0, 1.0, 1.0)), sheen=0.0),),
+        meshes=(replace(MeshSnapshot.of(wide, (1.0, 1.0, 1.0)), specular=0.0),),
         casters=(Surface(plank, TRIANGLES),),
         volume=replace(snapshot.volume, extinction=0.0, resolution=256),
     )

@@ -94,7 +94,7 @@ def ours(light: Light) -> np.ndarray:
     snapshot = Snapshot(
         np.zeros((0, 2, 3), np.float32),
         np.zeros((0, 2), np.float32),
-        meshes=(MeshSnapshot(square, square.vertex_normals(), ALBEDO, sheen=0.0),),
+        meshes=(MeshSnapshot(square, square.vertex_normals(), ALBEDO, specular=0.0),),
         lights=(light,),
         ambient=WORLD,
     )

@@ -14,6 +14,7 @@ from hairloom.addon.params import Settings, choice, color, integer, number, togg
 from hairloom.addon.params.glsl import struct_values
 from hairloom.addon.shading.kajiya_kay import kajiya_kay, strand_base, strand_normal
 from hairloom.addon.shading.lights import Light, light_at, light_irradiance, pack_lights
+from hairloom.addon.shading.microfacet import ggx_reflection, reflected_fraction
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.strand_noise import hash_integer, hash_unit, strand_noise
 
@@ -116,6 +117,38 @@ def test_noise_agrees_bit_by_bit(compute: Callable[..., np.ndarray]) -> None:
     for c in range(4):
         noise = strand_noise(seed, c, queries[..., 2])
         assert np.abs(found[..., 3] - noise)[channel == c].max() < 1e-6
+
+
+def test_microfacets(compute: Callable[..., np.ndarray]) -> None:
+    """From mirror to chalk, from all sides, and where there is nothing to reflect."""
+    random = np.random.default_rng(17)
+    rows, columns = 12, 400
+    kinds = [(f, r) for f in (0.0, 0.028, 0.25) for r in (0.0, 0.15, 0.45, 1.0)]
+    specular, roughness = np.array(kinds, np.float32).T
+    normals = random.normal(size=(rows, columns, 3)).astype(np.float32)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    eyes = random.normal(size=normals.shape).astype(np.float32)
+    eyes /= np.linalg.norm(eyes, axis=-1, keepdims=True)
+    lights = random.normal(size=normals.shape).astype(np.float32)
+    # half of them beside the mirror's direction
+    mirrored = 2.0 * np.sum(normals * eyes, axis=-1, keepdims=True) * normals - eyes
+    lights[:, ::2] = (mirrored + 0.05 * lights)[:, ::2]
+    lights /= np.linalg.norm(lights, axis=-1, keepdims=True)
+    found = compute(
+        "microfacet.glsl",
+        (columns, rows),
+        textures={
+            "normals": with_lane(normals),
+            "lights": with_lane(lights, specular[:, None]),
+            "eyes": with_lane(eyes, roughness[:, None]),
+        },
+    )
+    for row, (f, r) in enumerate(kinds):
+        vectors = (each[row].astype(np.float64) for each in (normals, lights, eyes))
+        expected = ggx_reflection(*vectors, f, r)
+        assert np.allclose(found[row, :, 0], expected, rtol=2e-3, atol=1e-5)
+        seen = np.sum(normals[row] * eyes[row], axis=-1)
+        assert found[row, :, 1] == pytest.approx(reflected_fraction(seen, f, r), abs=1e-5)
 
 
 def test_lights(compute: Callable[..., np.ndarray]) -> None:

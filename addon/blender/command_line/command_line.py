@@ -173,6 +173,7 @@ def _sources(verb: Verb, options: argparse.Namespace) -> Sources:
         density_group=options.density_group,
         length_group=options.length_group,
         children_density=options.children_density or _own_density(options.groom),
+        skin=options.skin,
     )
 
 

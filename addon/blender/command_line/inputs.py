@@ -12,13 +12,15 @@ from ...errors import HairloomError
 from ...exchange.groom import Groom
 from ...exchange.strand_formats import SUFFIXES
 from ...exchange.strand_reading import read_strands
+from ...groom.face_hair import grow_face_hair
 from ...groom.grow import grow, scalp_density
 from ...groom.settings import GrowSettings
 from ...strands import StrandSet, Surface
 from ...strands.colors import color_notes
+from ...strands.join import joined
 from ..base.objects import head_of
 from ..base.vertex_weights import read_weights
-from ..scene.built_in_head import built_in_head
+from ..scene.built_in_head import HeadLook, built_in_head
 from ..scene.curves import read_curves
 from ..scene.mesh_files import read_mesh_file
 from ..scene.surfaces import read_surface
@@ -39,6 +41,7 @@ class Sources:
     density_group, length_group: vertex groups or attributes of a head in the open scene, by name,
         for hair that is grown here.
     children_density: the same for the children between guides.
+    skin: of the built-in head, one of bust_skin.TONES.
     """
 
     groom: str | None = None
@@ -51,6 +54,7 @@ class Sources:
     density_group: str = ""
     length_group: str = ""
     children_density: str = ""
+    skin: str = "light"
 
 
 @dataclass(frozen=True)
@@ -86,10 +90,7 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     else:
         head, dropped, groom, notes = _read_head(head_name, sources), {}, None, ()
         assert head is not None, "the built-in one is always there"
-        density = _weights(sources.density_group, head_name)
-        if density is None and grow_settings.method == "combed":
-            density = scalp_density(head)
-        strands = grow(head, grow_settings, density, _weights(sources.length_group, head_name))
+        strands = _grown(head, head_name, sources, grow_settings)
     collider = head
     if sources.collider is not None:
         collider = _read_mesh(sources.collider, need_uv=False)
@@ -106,12 +107,33 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     return Inputs(strands, dropped, groom, notes, name, head, found, collider, children)
 
 
+def _grown(
+    head: Surface, head_name: str | None, sources: Sources, settings: GrowSettings
+) -> StrandSet:
+    """Hair on this head; combed hair of the built-in one comes with brows and lashes."""
+    density = _weights(sources.density_group, head_name)
+    length = _weights(sources.length_group, head_name)
+    if settings.method != "combed":
+        return grow(head, settings, density, length)
+    if head_name is not None:
+        return grow(head, settings, scalp_density(head) if density is None else density, length)
+    weights = built_in_head().weights
+    face = grow_face_hair(head, weights["brows"], weights["lashes"])
+    return joined(grow(head, settings, weights["scalp"], length), face)
+
+
+def head_look(sources: Sources) -> HeadLook | None:
+    """How the built-in head is drawn, where these sources name no other."""
+    is_built_in = sources.groom is None and sources.head is None
+    return built_in_head().look(sources.skin) if is_built_in else None
+
+
 def _read_head(name: str | None, sources: Sources) -> Surface | None:
     """The head of this name; without one the built-in head, for hair that is grown here."""
     if name is not None:
         return _read_mesh(name, need_uv=sources.need_uv)
     if sources.groom is None:
-        return built_in_head()
+        return built_in_head().surface
     if sources.need_head:
         raise HairloomError(
             "it has no head to move with",

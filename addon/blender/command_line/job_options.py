@@ -16,6 +16,7 @@ from ...params import Settings, SettingsMap
 from ..bakes.bake_settings import frame_range
 from ..base.report import STYLES
 from ..properties.presets import named_preset, shipped
+from ..scene.bust_skin import TONES
 from ..scene.principled import look_from_named
 from .object_settings import own_settings
 from .overrides import overrides
@@ -55,6 +56,12 @@ def add_hair_options(parser: argparse.ArgumentParser) -> None:
         default="",
         metavar="NAME",
         help="the same for how densely children grow (--set children.method=multi)",
+    )
+    sources.add_argument(
+        "--skin",
+        choices=tuple(TONES),
+        default="light",
+        help="of the built-in head (default: light)",
     )
     sources.add_argument(
         "--strict", action="store_true", help="fail when a single strand must be dropped"

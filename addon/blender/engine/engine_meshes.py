@@ -97,7 +97,8 @@ def _with_material(mesh: MeshSnapshot, material: MeshMaterial) -> MeshSnapshot:
     return replace(
         mesh,
         color=material.color,
-        sheen=material.sheen,
+        specular=material.specular,
+        roughness=material.roughness,
         pictures=material.pictures,
         alpha=material.alpha,
         transparency=material.transparency,
@@ -128,7 +129,8 @@ def _looks(mesh: MeshSnapshot) -> tuple[object, ...]:
     """What decides how it is drawn, beside its surface."""
     pictures = mesh.pictures or MeshPictures()
     return (
-        *(mesh.color, mesh.sheen, mesh.number, mesh.is_holdout, mesh.skin is None),
+        *(mesh.color, mesh.specular, mesh.roughness),
+        *(mesh.number, mesh.is_holdout, mesh.skin is None),
         *(mesh.alpha, mesh.transparency, pictures.bump),
         *(id(pictures.color), id(pictures.normal)),
     )

@@ -31,9 +31,11 @@ from ..base.gpu_context import ensure_gpu
 from ..cards.build import BuiltCards, CardInputs, cards_key
 from ..cards.show import as_shown
 from ..properties.groom_settings import GroomSettings
+from ..scene.built_in_head import HeadLook
 from ..sessions.prepared_groom import PreparedGroom
 from ..sessions.snapshots import snapshot_of, with_settings
 from .film import write_picture
+from .head_parts import head_parts
 from .skin_picture import shown_skin_shadow
 from .slices import shown_slices
 
@@ -49,6 +51,7 @@ class Studio:
 
     Args:
         card_pictures: what takes the place of textures where cards are shown.
+        look: materials of the head; None is plain skin.
     """
 
     def __init__(
@@ -56,13 +59,14 @@ class Studio:
         groom: PreparedGroom,
         settings: GroomSettings,
         card_pictures: Mapping[str, Floats] | None = None,
+        look: HeadLook | None = None,
     ) -> None:
         ensure_gpu()
         self._groom, self._rig, self._snapshot = groom, groom.rig, snapshot_of(groom)
         self._passes, self._card_pass = (MeshPass(), StrandPass()), CardPass()
         self._notes: dict[str, None] = {}
         self._cards: tuple[Hashable, BuiltCards] | None = None
-        self._card_pictures = card_pictures or {}
+        self._card_pictures, self._look = card_pictures or {}, look
         self.settings = settings
 
     @property
@@ -254,4 +258,5 @@ class Studio:
             return ()
         head = self._rig.head
         surface = Surface(pose.head_positions, head.triangles, head.corner_uv)
-        return (MeshSnapshot.of(surface, occlusion=self._groom.head_occlusion, is_skin=True),)
+        whole = MeshSnapshot.of(surface, occlusion=self._groom.head_occlusion, is_skin=True)
+        return (whole,) if self._look is None else head_parts(whole, self._look)

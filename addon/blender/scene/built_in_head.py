@@ -1,38 +1,81 @@
-"""A head that is always available: Suzanne, which comes with every Blender."""
+"""A head that is always available: the bust that ships, as it is drawn and as hair grows on it."""
 
 from __future__ import annotations
 
-import bmesh
+from dataclasses import dataclass
+from functools import cache
+
 import bpy
 import numpy as np
 
+from ...arrays import Floats, Ints
+from ...render.snapshot import MeshPictures
 from ...strands import Surface
+from ..base.vertex_weights import read_weights
+from .bust import bust_object
+from .bust_data import EYES, HAIR_GROUPS, SKIN
+from .bust_skin import EYE_IOR, EYE_ROUGHNESS, SKIN_IOR, SKIN_ROUGHNESS, TONES, painted
+from .mesh_materials import MeshMaterial
 from .surfaces import read_surface
 
-HEAD_HEIGHT = 0.22  # [m], of a grown human, so that hair lengths and gravity look familiar
-_SUBDIVISIONS = 2
+#: which triangles of a head have which material
+type HeadLook = tuple[tuple[Ints, MeshMaterial], ...]
 
 
-def built_in_head() -> Surface:
-    """Suzanne as a smooth surface with UVs, facing -Y, centred on the origin, in metres."""
-    mesh = bpy.data.meshes.new("Hairloom head")
-    head = bpy.data.objects.new("Hairloom head", mesh)
-    shape = bmesh.new()
-    try:
-        shape.loops.layers.uv.new("UVMap")
-        bmesh.ops.create_monkey(shape, calc_uvs=True)
-        shape.to_mesh(mesh)
-        head.modifiers.new("Smooth", "SUBSURF").levels = _SUBDIVISIONS
-        bpy.context.scene.collection.objects.link(head)
-        surface = read_surface(
-            head, bpy.context.evaluated_depsgraph_get(), need_uv=True, place="built-in head"
+@dataclass(frozen=True, eq=False)
+class BuiltInHead:
+    """Subdivided, facing -Y, around the middle of its skull, in metres.
+
+    weights: (vertex_count,) of each of HAIR_GROUPS.
+    material: (triangle_count,) SKIN or EYES.
+    """
+
+    surface: Surface
+    weights: dict[str, Floats]
+    material: Ints
+
+    def look(self, tone: str) -> HeadLook:
+        """How it is drawn, for a tone of bust_skin.TONES."""
+        pictures = MeshPictures(color=painted(tone))
+        parts = ((SKIN, SKIN_IOR, SKIN_ROUGHNESS), (EYES, EYE_IOR, EYE_ROUGHNESS))
+        return tuple(
+            (
+                np.flatnonzero(self.material == part),
+                MeshMaterial(
+                    color=TONES[tone].skin,
+                    specular=((ior - 1.0) / (ior + 1.0)) ** 2,
+                    roughness=roughness,
+                    pictures=pictures,
+                ),
+            )
+            for part, ior, roughness in parts
         )
+
+
+@cache
+def built_in_head() -> BuiltInHead:
+    """The same each time; not to be changed."""
+    head = bust_object("Hairloom head", None)
+    mesh = head.data
+    try:
+        bpy.context.scene.collection.objects.link(head)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        surface = read_surface(head, depsgraph, need_uv=True, place="built-in head")
+        weights = {name: read_weights(head, depsgraph, name) for name in HAIR_GROUPS}
+        return BuiltInHead(surface, weights, _materials(head, depsgraph))
     finally:
-        shape.free()
         bpy.data.objects.remove(head)
         bpy.data.meshes.remove(mesh)
-    low, high = surface.bounds()
-    upright = np.eye(4)
-    upright[:3, :3] *= HEAD_HEIGHT / float(high[2] - low[2])
-    upright[:3, 3] = -upright[0, 0] * (low + high) / 2.0
-    return surface.transformed(upright)
+
+
+def _materials(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Ints:
+    """The material of each triangle of the evaluated mesh."""
+    evaluated = head.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        mesh.calc_loop_triangles()
+        slots = np.empty(len(mesh.loop_triangles), np.int32)
+        mesh.loop_triangles.foreach_get("material_index", slots)
+    finally:
+        evaluated.to_mesh_clear()
+    return slots

@@ -18,10 +18,10 @@ from ..base.images import read_image
 
 type Color = tuple[float, float, float]
 
-#: roughness of Blender's default material
 _GREY: Color = (0.8, 0.8, 0.8)
-#: fraction of light that Principled reflects at normal incidence, at its default IOR of 1.5
-_SHEEN = 0.04
+#: what Principled reflects where light falls straight in, at its default IOR of 1.5
+_SPECULAR = 0.04
+_ROUGHNESS = 0.5
 
 #: pictures by image and channel, kept until the image changes
 _pictures: dict[tuple[int, str], tuple[tuple[object, ...], Floats]] = {}
@@ -29,14 +29,14 @@ _pictures: dict[tuple[int, str], tuple[tuple[object, ...], Floats]] = {}
 
 @dataclass(frozen=True)
 class MeshMaterial:
-    """color: scene-linear albedo; for an image, its mean. sheen: fraction of light reflected at
-    normal incidence. The others: see MeshSnapshot.
+    """color: scene-linear albedo; for an image, its mean. The others: see MeshSnapshot.
 
     notes: what could not be read, each with its remedy.
     """
 
     color: Color = _GREY
-    sheen: float = _SHEEN
+    specular: float = _SPECULAR
+    roughness: float = _ROUGHNESS
     pictures: MeshPictures | None = None
     alpha: float = 1.0
     transparency: str = "opaque"
@@ -49,7 +49,7 @@ def material_of(material: bpy.types.Material | None) -> MeshMaterial:
         return MeshMaterial()
     node = _shader(material)
     if node is None:
-        return MeshMaterial(_color(material.diffuse_color), _SHEEN)
+        return MeshMaterial(_color(material.diffuse_color))
     reader = _Reader(material)
     is_diffuse = node.type == "BSDF_DIFFUSE"
     socket = node.inputs["Color" if is_diffuse else "Base Color"]
@@ -61,7 +61,8 @@ def material_of(material: bpy.types.Material | None) -> MeshMaterial:
     is_blended = material.surface_render_method == "BLENDED"
     return MeshMaterial(
         plain,
-        0.0 if is_diffuse else _sheen(node),
+        0.0 if is_diffuse else _specular(node),
+        _ROUGHNESS if is_diffuse else float(node.inputs["Roughness"].default_value),
         MeshPictures(color, normal, bump) if has_pictures else None,
         alpha,
         "opaque" if is_opaque else "blended" if is_blended else "hashed",
@@ -171,14 +172,11 @@ def _giver(socket: bpy.types.NodeSocket) -> tuple[bpy.types.Node, str] | None:
     return None
 
 
-def _sheen(node: bpy.types.Node) -> float:
-    """The rougher a surface, the wider its sheen is spread, until it cannot be seen."""
+def _specular(node: bpy.types.Node) -> float:
+    """The fraction of light that it reflects where light falls straight in."""
     ior = node.inputs["IOR"].default_value
-    sharp = 1.0 - node.inputs["Roughness"].default_value
-    head_on = (
-        ((ior - 1.0) / (ior + 1.0)) ** 2 * 2.0 * node.inputs["Specular IOR Level"].default_value
-    )
-    return max(0.0, min(head_on * sharp * 2.0, 1.0))
+    level = 2.0 * node.inputs["Specular IOR Level"].default_value
+    return float(min(((ior - 1.0) / (ior + 1.0)) ** 2 * level, 1.0))
 
 
 def _mean(picture: Floats) -> Color:

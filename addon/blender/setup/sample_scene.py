@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import bmesh
 import bpy
 import numpy as np
 from mathutils import Vector
 
 from ...groom.settings import GrowSettings
-from ..scene.built_in_head import HEAD_HEIGHT
+from ..scene.bust import bust_object
 from ..viewport.overlay import ENGINE
 from .starting import new_groom
 
 NAME = "Hairloom Sample"
-_SUBDIVISIONS = 2
 _FRAMES = 96
 #: frame -> turn about the vertical axis and nod [degrees]; the last equals the first
 _TURNS = ((1, 0.0, 0.0), (20, 35.0, -4.0), (34, 20.0, 8.0), (56, -35.0, -4.0), (76, -10.0, 6.0))
-_SKIN = (0.42, 0.27, 0.2, 1.0)
 #: name -> position [m], power [W], side [m], colour
 _LIGHTS = {
     "Key": ((-0.7, -0.9, 0.8), 9.0, 0.5, (1.0, 0.96, 0.9)),
@@ -32,11 +29,14 @@ _WORLD = (0.03, 0.034, 0.04, 1.0)
 _HAIR = GrowSettings(strand_count=3500, length=0.26)
 
 
-def add_sample_scene(presets: tuple[str, ...]) -> tuple[bpy.types.Scene, bpy.types.Object]:
+def add_sample_scene(
+    presets: tuple[str, ...], skin: str = "light"
+) -> tuple[bpy.types.Scene, bpy.types.Object]:
     """A new scene, rendered by Hairloom, with its groom; existing scenes are not changed.
 
     Args:
         presets: of the groom, by name.
+        skin: of the head, one of bust_skin.TONES.
     """
     scene = bpy.data.scenes.new(NAME)
     scene.frame_start, scene.frame_end, scene.frame_current = 1, _FRAMES, 1
@@ -44,7 +44,8 @@ def add_sample_scene(presets: tuple[str, ...]) -> tuple[bpy.types.Scene, bpy.typ
     scene.render.resolution_x, scene.render.resolution_y = 800, 800
     scene.world = _world()
     collection = scene.collection
-    head = _head()
+    head = bust_object("Head", skin)
+    head.rotation_mode = "XYZ"
     collection.objects.link(head)
     _animate(head)
     for name, (place, power, side, color) in _LIGHTS.items():
@@ -53,40 +54,17 @@ def add_sample_scene(presets: tuple[str, ...]) -> tuple[bpy.types.Scene, bpy.typ
     collection.objects.link(scene.camera)
     layer = scene.view_layers[0]
     layer.update()
-    hair = new_groom(head, layer.depsgraph, collection, _HAIR, presets=presets, fits=False)
+    hair = new_groom(
+        head,
+        layer.depsgraph,
+        collection,
+        _HAIR,
+        presets=presets,
+        fits=False,
+        density_group="scalp",
+    )
     hair.hairloom.bake.follows = True
     return scene, hair
-
-
-def _head() -> bpy.types.Object:
-    """Suzanne at the size of a human head, facing -Y, with UVs."""
-    mesh = bpy.data.meshes.new("Head")
-    shape = bmesh.new()
-    try:
-        shape.loops.layers.uv.new("UVMap")
-        bmesh.ops.create_monkey(shape, calc_uvs=True)
-        heights = [vertex.co.z for vertex in shape.verts]
-        bmesh.ops.scale(
-            shape, vec=(HEAD_HEIGHT / (max(heights) - min(heights)),) * 3, verts=shape.verts
-        )
-        shape.to_mesh(mesh)
-    finally:
-        shape.free()
-    mesh.shade_smooth()
-    mesh.materials.append(_skin())
-    head = bpy.data.objects.new("Head", mesh)
-    head.rotation_mode = "XYZ"
-    head.modifiers.new("Smooth", "SUBSURF").levels = _SUBDIVISIONS
-    return head
-
-
-def _skin() -> bpy.types.Material:
-    material = bpy.data.materials.new("Hairloom Skin")
-    shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
-    shader.inputs["Base Color"].default_value = _SKIN
-    shader.inputs["Roughness"].default_value = 0.55
-    material.diffuse_color = _SKIN
-    return material
 
 
 def _animate(head: bpy.types.Object) -> None:

@@ -1,0 +1,93 @@
+"""The bust as an object of Blender: its mesh, materials, vertex groups and UVs."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...exchange.textures.srgb import srgb_encoded
+from .bust_data import HAIR_GROUPS, Bust, load_bust
+from .bust_skin import (
+    EYE_IOR,
+    EYE_ROUGHNESS,
+    RESOLUTION,
+    SKIN_IOR,
+    SKIN_ROUGHNESS,
+    TONES,
+    painted,
+)
+
+#: how far light goes below the skin [m], and how much of it, in Cycles and EEVEE
+_SCATTERED, _DEPTH = 0.15, 0.004
+
+
+def bust_object(name: str, tone: str | None) -> bpy.types.Object:
+    """The bust around its origin, subdivided once; it is in no collection yet.
+
+    Args:
+        tone: one of TONES; None leaves the materials out.
+    """
+    bust = load_bust()
+    mesh = _mesh(name, bust)
+    obj = bpy.data.objects.new(name, mesh)
+    for group in HAIR_GROUPS:
+        _add_group(obj, group, bust)
+    modifier = obj.modifiers.new("Smooth", "SUBSURF")
+    modifier.levels = modifier.render_levels = 1
+    # the picture is painted over the map as it is
+    modifier.uv_smooth = "NONE"
+    if tone is not None:
+        picture = _picture(tone)
+        for kind in (
+            _material("Hairloom Skin", picture, tone, SKIN_ROUGHNESS, SKIN_IOR, _SCATTERED),
+            _material("Hairloom Eyes", picture, tone, EYE_ROUGHNESS, EYE_IOR, 0.0),
+        ):
+            mesh.materials.append(kind)
+    return obj
+
+
+def _mesh(name: str, bust: Bust) -> bpy.types.Mesh:
+    mesh = bpy.data.meshes.new(name)
+    polygons = np.split(bust.corner_vertex, np.cumsum(bust.sizes)[:-1])
+    mesh.from_pydata(bust.positions.tolist(), [], [polygon.tolist() for polygon in polygons])
+    mesh.uv_layers.new(name="UVMap").uv.foreach_set("vector", bust.uv[bust.corner_uv].ravel())
+    mesh.polygons.foreach_set("material_index", bust.material)
+    mesh.shade_smooth()
+    return mesh
+
+
+def _add_group(obj: bpy.types.Object, name: str, bust: Bust) -> None:
+    group, weights = obj.vertex_groups.new(name=name), bust.weights[name]
+    for weight in np.unique(weights[weights > 0.0]):
+        group.add(np.flatnonzero(weights == weight).tolist(), float(weight), "REPLACE")
+
+
+def _picture(tone: str) -> bpy.types.Image:
+    image = bpy.data.images.new(f"Hairloom Skin {tone}", RESOLUTION, RESOLUTION)
+    picture = painted(tone).copy()
+    picture[..., :3] = srgb_encoded(picture[..., :3])
+    image.pixels.foreach_set(picture.ravel())
+    image.pack()
+    return image
+
+
+def _material(
+    name: str, image: bpy.types.Image, tone: str, roughness: float, ior: float, scattered: float
+) -> bpy.types.Material:
+    material = bpy.data.materials.new(name)
+    tree = material.node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image, texture.location = image, (-300.0, 200.0)
+    tree.links.new(texture.outputs["Color"], shader.inputs["Base Color"])
+    values = {
+        "Roughness": roughness,
+        "IOR": ior,
+        "Subsurface Weight": scattered,
+        "Subsurface Radius": (1.0, 0.36, 0.2),
+        "Subsurface Scale": _DEPTH,
+    }
+    for socket, value in values.items():
+        shader.inputs[socket].default_value = value
+    material.diffuse_color = (*TONES[tone].skin, 1.0)
+    return material

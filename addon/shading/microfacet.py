@@ -1,0 +1,78 @@
+"""What a surface reflects at its boundary: microfacets of the GGX distribution, of a dielectric.
+
+References: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces"; Heitz
+2014, "Understanding the Masking-Shadowing Function", with the height-correlated form of Smith;
+Karis 2014, "Physically Based Shading on Mobile", for the fraction of all light. As in Blender's
+Principled BSDF, the width of the lobe is the square of the roughness, and what is reflected is
+missing below.
+
+Twin: gpu_shaders/lib_microfacet.glsl.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats
+
+#: a smoother surface would show lights without size as less than a pixel
+LEAST_ROUGHNESS = 0.08
+
+
+def dielectric_fresnel(cosine: Floats, specular: float) -> Floats:
+    """The fraction of light that a smooth dielectric reflects.
+
+    Args:
+        cosine: of the angle between light and normal, 0 to 1.
+        specular: that fraction where light falls straight in; it stands for the index of
+            refraction.
+    """
+    root = np.sqrt(min(specular, 0.999))
+    ior = (1.0 + root) / (1.0 - root)
+    refracted = np.sqrt(ior * ior - 1.0 + cosine * cosine)
+    across = (refracted - cosine) / np.maximum(refracted + cosine, 1e-6)
+    along = (cosine * refracted - 1.0 + cosine * cosine) / (
+        cosine * refracted + 1.0 - cosine * cosine
+    )
+    return 0.5 * across * across * (1.0 + along * along)
+
+
+def smith_height(cosine: Floats, alpha_squared: float) -> Floats:
+    return np.sqrt(alpha_squared + (1.0 - alpha_squared) * cosine * cosine)
+
+
+def ggx_reflection(
+    normal: Floats, to_light: Floats, to_eye: Floats, specular: float, roughness: float
+) -> Floats:
+    """The BRDF of the boundary [1/sr], (...,), for unit vectors (..., 3)."""
+    lit = np.sum(normal * to_light, axis=-1)
+    seen = np.sum(normal * to_eye, axis=-1)
+    between = to_light + to_eye
+    length = np.linalg.norm(between, axis=-1)
+    middle = between / np.maximum(length, 1e-20)[..., None]
+    alpha_squared = max(roughness, LEAST_ROUGHNESS) ** 4
+    aside = np.cross(normal, middle)
+    across = np.sum(normal * middle, axis=-1)
+    spread = np.sum(aside * aside, axis=-1) + alpha_squared * across * across
+    facets = alpha_squared / (np.pi * spread * spread)
+    is_met = (np.minimum(lit, seen) > 0.0) & (length > 0.0)
+    heights = lit * smith_height(seen, alpha_squared) + seen * smith_height(lit, alpha_squared)
+    visible = 0.5 / np.where(is_met, heights, 1.0)
+    cosine = np.clip(np.sum(middle * to_eye, axis=-1), 0.0, 1.0)
+    return np.where(is_met, facets * visible * dielectric_fresnel(cosine, specular), 0.0)
+
+
+def reflected_fraction(seen: Floats, specular: float, roughness: float) -> Floats:
+    """About the fraction of all light from around that the boundary reflects to an eye.
+
+    Args:
+        seen: cosine of the angle between eye and normal.
+    """
+    if specular <= 0.0:
+        return np.zeros_like(seen)
+    first = 1.0 - roughness
+    second = 0.0425 - 0.0275 * roughness
+    scale = 1.04 - 0.572 * roughness
+    bias = 0.022 * roughness - 0.04
+    grazing = np.minimum(first * first, np.exp2(-9.28 * np.maximum(seen, 0.0))) * first + second
+    return np.clip(specular * (scale - 1.04 * grazing) + bias + 1.04 * grazing, 0.0, 1.0)

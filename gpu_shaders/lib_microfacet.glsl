@@ -1,0 +1,46 @@
+// Twin of addon/shading/microfacet.py: what a surface reflects at its boundary. Holds no resources.
+
+const float MICROFACET_PI = 3.14159265358979;
+
+float dielectric_fresnel(float cosine, float specular)
+{
+  float root = sqrt(min(specular, 0.999));
+  float ior = (1.0 + root) / (1.0 - root);
+  float refracted = sqrt(ior * ior - 1.0 + cosine * cosine);
+  float across = (refracted - cosine) / max(refracted + cosine, 1.0e-6);
+  float along = (cosine * refracted - 1.0 + cosine * cosine) / (cosine * refracted + 1.0 - cosine * cosine);
+  return 0.5 * across * across * (1.0 + along * along);
+}
+
+float smith_height(float cosine, float alpha_squared)
+{
+  return sqrt(alpha_squared + (1.0 - alpha_squared) * cosine * cosine);
+}
+
+float ggx_reflection(vec3 normal, vec3 to_light, vec3 to_eye, float specular, float roughness)
+{
+  float lit = dot(normal, to_light), seen = dot(normal, to_eye);
+  vec3 between = to_light + to_eye;
+  float length_squared = dot(between, between);
+  if (min(lit, seen) <= 0.0 || length_squared <= 0.0) {
+    return 0.0;
+  }
+  vec3 middle = between * inversesqrt(length_squared);
+  float alpha_squared = pow(max(roughness, {{least_roughness}}), 4.0);
+  // the sine of the angle by its cross product: one minus its cosine would lose a sharp highlight
+  vec3 aside = cross(normal, middle);
+  float across = dot(normal, middle);
+  float spread = dot(aside, aside) + alpha_squared * across * across;
+  float facets = alpha_squared / (MICROFACET_PI * spread * spread);
+  float visible = 0.5 / (lit * smith_height(seen, alpha_squared) + seen * smith_height(lit, alpha_squared));
+  return facets * visible * dielectric_fresnel(clamp(dot(middle, to_eye), 0.0, 1.0), specular);
+}
+
+float reflected_fraction(float seen, float specular, float roughness)
+{
+  vec4 terms = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
+  float a = min(terms.x * terms.x, exp2(-9.28 * max(seen, 0.0))) * terms.x + terms.y;
+  vec2 scale_and_bias = vec2(-1.04, 1.04) * a + terms.zw;
+  return specular <= 0.0 ? 0.0 :
+                           clamp(specular * scale_and_bias.x + scale_and_bias.y, 0.0, 1.0);
+}
