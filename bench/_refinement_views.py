@@ -19,9 +19,9 @@ from typing import Any
 
 import gpu
 import numpy as np
+from _suzanne import suzanne
 from refinement_probes import adaptive_points, read_factors
 
-from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings
@@ -81,7 +81,7 @@ def groom() -> Groom:
     folder = Path(os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data"))
     if (folder / SINTEL).is_file():
         return Groom("Sintel", read_tfx(folder / SINTEL).strands.grid, 2.0e-4)
-    head = built_in_head()
+    head = suzanne()
     settings = GrowSettings(strand_count=STRANDS, cv_count=16)
     return Groom("grown", grow(head, settings, scalp_density(head)).grid, 2.0e-4)
 

@@ -18,12 +18,12 @@ from collections.abc import Callable
 import bpy
 import gpu
 import numpy as np
+from _suzanne import suzanne
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 from shaken import GRAVITY, shaken_poses
 
 from hairloom.addon import pipeline
-from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.grow import grow, scalp_density
@@ -88,7 +88,7 @@ def ridden(solver: ComputeSolver, snapshot: Snapshot) -> Snapshot:
 
 def main() -> None:
     gpu.init()
-    head = built_in_head()
+    head = suzanne()
     strands = grow(head, GrowSettings(strand_count=STRANDS), scalp_density(head))
     rig = pipeline.prepare(strands, head, GuideSettings(), place="bench")
     poses = shaken_poses(rig, FRAMES, 60.0)

@@ -26,7 +26,7 @@ float ggx_reflection(vec3 normal, vec3 to_light, vec3 to_eye, float specular, fl
     return 0.0;
   }
   vec3 middle = between * inversesqrt(length_squared);
-  float alpha_squared = pow(max(roughness, {{least_roughness}}), 4.0);
+  float alpha_squared = pow(max(roughness, {{min_roughness}}), 4.0);
   // the sine of the angle by its cross product: one minus its cosine would lose a sharp highlight
   vec3 aside = cross(normal, middle);
   float across = dot(normal, middle);

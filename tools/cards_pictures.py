@@ -27,10 +27,11 @@ class Shots:
 
     def __init__(self) -> None:
         settings = of_addon("parameters").ALL_SETTINGS
-        head = of_addon("blender.scene.built_in_head").built_in_head()
+        bust = of_addon("blender.scene.built_in_head").built_in_head()
+        head = bust.surface
         grow, studio = of_addon("groom.grow"), of_addon("blender.pictures.studio")
         grown = settings["grow"](strand_count=STRANDS, clump=0.4)
-        strands = grow.grow(head, grown, grow.scalp_density(head))
+        strands = grow.grow(head, grown, bust.weights["scalp"])
         self.settings, self._pipeline = settings, of_addon("pipeline")
         self.rig = self._pipeline.prepare(
             strands, head, settings["guides"](guide_count=CARDS), place="the built-in groom"

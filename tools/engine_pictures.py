@@ -2,7 +2,7 @@
 
 python tools/engine_pictures.py FOLDER
 
-FOLDER gets engine.png. The head is Blender's Suzanne with a groom, her face a material of its own,
+FOLDER gets engine.png. The head is the built-in one with a groom, her face a material of its own,
 before a wall; rendered as an artist would, by the engine, into a file of many layers.
 """
 
@@ -38,7 +38,7 @@ def material(name: str, color: tuple[float, float, float], roughness: float) -> 
 
 def head() -> Any:
     """The built-in head as an object."""
-    surface = of_addon("blender.scene.built_in_head").built_in_head()
+    surface = of_addon("blender.scene.built_in_head").built_in_head().surface
     mesh = bpy.data.meshes.new("Head")
     mesh.from_pydata(surface.positions, [], surface.triangles)
     mesh.uv_layers.new().data.foreach_set("uv", surface.corner_uv.ravel())

@@ -37,9 +37,10 @@ def wig() -> Any:
     """A snapshot of shoulder-long hair on the built-in head."""
     settings, pipeline = of_addon("parameters").ALL_SETTINGS, of_addon("pipeline")
     grown = settings["grow"](strand_count=STRANDS, wave=0.006, wave_length=0.09, clump=0.25)
-    head = of_addon("blender.scene.built_in_head").built_in_head()
+    bust = of_addon("blender.scene.built_in_head").built_in_head()
+    head = bust.surface
     grow = of_addon("groom.grow")
-    strands = grow.grow(head, grown, grow.scalp_density(head))
+    strands = grow.grow(head, grown, bust.weights["scalp"])
     rig = pipeline.prepare(strands, head, settings["guides"](), place="the built-in groom")
     ambient = settings["ambient"]()
     groom = of_addon("blender.sessions.prepared_groom").prepared(rig, ambient, with_occluders=False)

@@ -30,9 +30,10 @@ def wig() -> Any:
     """Shoulder-long hair on the built-in head, made ready to move."""
     settings, pipeline = of_addon("parameters").ALL_SETTINGS, of_addon("pipeline")
     grown = settings["grow"](strand_count=STRANDS)
-    head = of_addon("blender.scene.built_in_head").built_in_head()
+    bust = of_addon("blender.scene.built_in_head").built_in_head()
+    head = bust.surface
     grow = of_addon("groom.grow")
-    strands = grow.grow(head, grown, grow.scalp_density(head))
+    strands = grow.grow(head, grown, bust.weights["scalp"])
     return pipeline.prepare(strands, head, settings["guides"](), place="the built-in groom")
 
 

@@ -29,9 +29,10 @@ def wig(children: str) -> Any:
     """A rig of wavy guides on the built-in head, with or without children; each side is a group."""
     settings = of_addon("parameters").ALL_SETTINGS
     grown = settings["grow"](strand_count=GUIDES, wave=0.018, wave_length=0.06, clump=0.3)
-    head = of_addon("blender.scene.built_in_head").built_in_head()
+    bust = of_addon("blender.scene.built_in_head").built_in_head()
+    head = bust.surface
     grow = of_addon("groom.grow")
-    strands = grow.grow(head, grown, grow.scalp_density(head))
+    strands = grow.grow(head, grown, bust.weights["scalp"])
     return of_addon("pipeline").prepare(
         replace(strands, group=strands.roots[:, 0] > 0.0),
         head,

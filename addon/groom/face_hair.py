@@ -6,6 +6,7 @@ face is upright (Z up) and looks to -Y.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +15,10 @@ from ..arrays import Floats, Ints
 from ..strands import StrandSet, Surface
 from ..strands.join import joined
 from ..strands.vectors import unit
+from .grow import grow
 from .grown import bound_strands
 from .scalp import sample_roots
+from .settings import GrowSettings
 
 #: groups of the strands, so that guides on the scalp never move them
 BROWS, LASHES = 1, 2
@@ -39,6 +42,25 @@ class FaceHair:
     seed: int = 1
 
 
+def grow_with_face(
+    surface: Surface,
+    settings: GrowSettings,
+    weights: Mapping[str, Floats],
+    length: Floats | None = None,
+) -> StrandSet:
+    """Hair on the scalp, with brows and lashes.
+
+    Args:
+        weights: (vertex_count,) each, by the names `scalp`, `brows` and `lashes`.
+        length: see `grow`.
+
+    Raises:
+        HairloomError: see `grow`; or nowhere to grow.
+    """
+    hair = grow(surface, settings, weights["scalp"], length)
+    return joined(hair, grow_face_hair(surface, weights["brows"], weights["lashes"]))
+
+
 def grow_face_hair(
     surface: Surface, brows: Floats, lashes: Floats, hair: FaceHair | None = None
 ) -> StrandSet:
@@ -57,9 +79,8 @@ def grow_brows(surface: Surface, density: Floats, hair: FaceHair) -> StrandSet:
         HairloomError: nowhere to grow.
     """
     random = np.random.default_rng(hair.seed)
-    triangle, barycentric = sample_roots(
-        surface, hair.brow_count, np.maximum(density - _FAINT, 0.0) ** 2, random
-    )
+    grows = np.maximum(density - _FAINT, 0.0) ** 2
+    triangle, barycentric = sample_roots(surface, hair.brow_count, grows, random)
     root, normal = _at(surface, triangle, barycentric)
     outward, height = np.abs(root[:, 0]), root[:, 2]
     along = (outward - outward.min()) / max(float(np.ptp(outward)), 1e-6)

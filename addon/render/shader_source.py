@@ -24,7 +24,7 @@ from ..refine.settings import DetailSettings
 from ..shading.card_look import DARKEST, MEAN_FACING
 from ..shading.card_texture import LEVELS, SLACK
 from ..shading.lights import LIGHT_CAPACITY
-from ..shading.microfacet import LEAST_ROUGHNESS
+from ..shading.microfacet import MIN_ROUGHNESS
 from ..shading.skin.diffusion import KERNEL_REACH, KERNEL_TAPS, SKIN_LIGHTS
 from ..shading.skin.layout import CLOSING
 from ..shading.volume.card_opacity import MAX_ALPHA, MEAN_TURN, MIN_FACING, MIN_TAU
@@ -76,7 +76,7 @@ DETAIL_CHOICES = {
 CONSTANTS: Mapping[str, str] = MappingProxyType(
     {
         "light_capacity": str(LIGHT_CAPACITY),
-        "least_roughness": repr(LEAST_ROUGHNESS),
+        "min_roughness": repr(MIN_ROUGHNESS),
         "strand_rows": str(STRAND_ROWS),
         "pinned": str(PINNED),
         "contact_weight": repr(float(CONTACT_WEIGHT)),

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
-from ..strands.closest_point import closest_point
+from ..strands.closest_point import ClosestPointSearch
 
 #: How far below the surface the middle of the body's shell lies [cells].
 _SHELL_DEPTH = 2.5
@@ -105,11 +105,13 @@ def _inset(body: Surface, grid: Grid) -> tuple[Floats, Bools]:
     near = np.flatnonzero(((shell > low) & (shell < high)).all(axis=1))
     is_inside = np.ones(len(shell), bool)
     if len(near) and len(body.triangles):
-        closest = closest_point(shell[near], body)
+        # what is nearer than most of the way came out of a thin part; all else is on one side
+        enough = 0.7 * inward
+        closest = ClosestPointSearch(body).closest(shell[near], enough)
         corner_normals = normals[body.triangles[closest.triangle]]
         normal = np.einsum("nk,nkj->nj", closest.barycentric, corner_normals)
         height = np.einsum("ij,ij->i", shell[near] - closest.point, normal)
-        is_inside[near] = height < -0.7 * inward
+        is_inside[near] = (closest.distance > enough) & (height < 0.0)
     return shell, is_inside
 
 

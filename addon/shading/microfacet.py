@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays import Floats
 
 #: a smoother surface would show lights without size as less than a pixel
-LEAST_ROUGHNESS = 0.08
+MIN_ROUGHNESS = 0.08
 
 
 def dielectric_fresnel(cosine: Floats, specular: float) -> Floats:
@@ -50,7 +50,7 @@ def ggx_reflection(
     between = to_light + to_eye
     length = np.linalg.norm(between, axis=-1)
     middle = between / np.maximum(length, 1e-20)[..., None]
-    alpha_squared = max(roughness, LEAST_ROUGHNESS) ** 4
+    alpha_squared = max(roughness, MIN_ROUGHNESS) ** 4
     aside = np.cross(normal, middle)
     across = np.sum(normal * middle, axis=-1)
     spread = np.sum(aside * aside, axis=-1) + alpha_squared * across * across

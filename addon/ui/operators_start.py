@@ -8,10 +8,11 @@ from contextlib import suppress
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty
+from bpy.props import BoolProperty, EnumProperty
 
 from ..blender.base.outcome import report
 from ..blender.preview import previews
+from ..blender.scene.bust_skin import TONES
 from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
 from ..blender.setup.sample_scene import add_sample_scene
 from ..blender.setup.starting import new_groom, take_over
@@ -80,7 +81,15 @@ class HAIRLOOM_OT_sample_scene(bpy.types.Operator):
     bl_label = "Hairloom Sample Scene"
     bl_options = {"REGISTER", "UNDO"}
 
-    __annotations__ = dict(NEW_GROOM)
+    __annotations__ = {
+        **NEW_GROOM,
+        "skin": EnumProperty(
+            name="Skin",
+            description="Skin tone of the head",
+            items=[(name, name.title(), "") for name in TONES],
+            default="light",
+        ),
+    }
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -93,7 +102,7 @@ class HAIRLOOM_OT_sample_scene(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         with waiting(context):
-            scene, hair = add_sample_scene(chosen_presets(self))
+            scene, hair = add_sample_scene(chosen_presets(self), self.skin)
             if context.window is not None:
                 context.window.scene = scene
             with context.temp_override(scene=scene, view_layer=scene.view_layers[0]):

@@ -12,12 +12,11 @@ from ...errors import HairloomError
 from ...exchange.groom import Groom
 from ...exchange.strand_formats import SUFFIXES
 from ...exchange.strand_reading import read_strands
-from ...groom.face_hair import grow_face_hair
+from ...groom.face_hair import grow_with_face
 from ...groom.grow import grow, scalp_density
 from ...groom.settings import GrowSettings
 from ...strands import StrandSet, Surface
 from ...strands.colors import color_notes
-from ...strands.join import joined
 from ..base.objects import head_of
 from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import HeadLook, built_in_head
@@ -117,9 +116,7 @@ def _grown(
         return grow(head, settings, density, length)
     if head_name is not None:
         return grow(head, settings, scalp_density(head) if density is None else density, length)
-    weights = built_in_head().weights
-    face = grow_face_hair(head, weights["brows"], weights["lashes"])
-    return joined(grow(head, settings, weights["scalp"], length), face)
+    return grow_with_face(head, settings, built_in_head().weights, length)
 
 
 def head_look(sources: Sources) -> HeadLook | None:

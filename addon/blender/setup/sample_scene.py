@@ -6,10 +6,15 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ...groom.face_hair import grow_with_face
 from ...groom.settings import GrowSettings
+from ..base.vertex_weights import read_weights
 from ..scene.bust import bust_object
+from ..scene.bust_data import HAIR_GROUPS
+from ..scene.curves import write_curves
+from ..scene.surfaces import read_surface
 from ..viewport.overlay import ENGINE
-from .starting import new_groom
+from .starting import dress
 
 NAME = "Hairloom Sample"
 _FRAMES = 96
@@ -54,17 +59,20 @@ def add_sample_scene(
     collection.objects.link(scene.camera)
     layer = scene.view_layers[0]
     layer.update()
-    hair = new_groom(
-        head,
-        layer.depsgraph,
-        collection,
-        _HAIR,
-        presets=presets,
-        fits=False,
-        density_group="scalp",
-    )
+    hair = _grown(head, layer.depsgraph, collection)
+    dress(hair, presets)
     hair.hairloom.bake.follows = True
     return scene, hair
+
+
+def _grown(
+    head: bpy.types.Object, depsgraph: bpy.types.Depsgraph, collection: bpy.types.Collection
+) -> bpy.types.Object:
+    """Hair by the vertex groups of the head."""
+    surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
+    weights = {name: read_weights(head, depsgraph, name) for name in HAIR_GROUPS}
+    strands = grow_with_face(surface, _HAIR, weights)
+    return write_curves(f"{head.name} Hair", strands, head, collection)
 
 
 def _animate(head: bpy.types.Object) -> None:
