@@ -54,13 +54,16 @@ class CyclesRoom:
         self._scene.collection.objects.link(thing)
         return thing
 
-    def strands(self, points: np.ndarray, radius: float, casts_shadow: bool = True) -> None:
-        """In place of those before: (strand_count, cv_count, 3), root first."""
+    def strands(
+        self, points: np.ndarray, radius: float | np.ndarray, casts_shadow: bool = True
+    ) -> None:
+        """In place of those before: (strand_count, cv_count, 3), root first; radii or one."""
         curves = bpy.data.hair_curves.new("Strands")
         curves.add_curves([points.shape[1]] * points.shape[0])
         curves.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
         width = curves.attributes.get("radius") or curves.attributes.new("radius", "FLOAT", "POINT")
-        width.data.foreach_set("value", np.full(points[..., 0].size, radius, np.float32))
+        radii = np.broadcast_to(np.float32(radius), points.shape[:2])
+        width.data.foreach_set("value", radii.ravel())
         curves.materials.append(self._material)
         if self._strands is not None:
             bpy.data.objects.remove(self._strands)

@@ -12,10 +12,13 @@ import numpy as np
 from extension_loader import REPOSITORY
 
 from hairloom.addon import pipeline
+from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.mesh_files import read_mesh_file
 from hairloom.addon.exchange.joined_grooms import joined_grooms
 from hairloom.addon.exchange.tressfx import read_tfx
-from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.groom.children_settings import ChildrenSettings
+from hairloom.addon.groom.face_hair import grow_with_face
+from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.groom.width_settings import WidthSettings
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.strands import StrandSet, Surface
@@ -48,14 +51,6 @@ def mohawk() -> Pair:
     return _file(folder / "Ratboy_mohawk.tfx"), _mesh(folder / "ratboy_body.obj")
 
 
-GROOMS: dict[str, Callable[[], Pair]] = {
-    "sintel": sintel,
-    "ponytail": ponytail,
-    "bear": bear,
-    "mohawk": mohawk,
-}
-
-
 def scaled(pair: Pair, factor: float) -> Pair:
     strands, head = pair
     moved = strands.transformed(np.diag([factor, factor, factor, 1.0]))
@@ -66,6 +61,34 @@ def rig_of(pair: Pair, name: str) -> Rig:
     strands, head = pair
     widths = WidthSettings().method
     return pipeline.prepare(strands, head, GuideSettings(), place=name, widths=widths)
+
+
+def built_in() -> Pair:
+    head = built_in_head()
+    return grow_with_face(head.surface, GrowSettings(), head.weights), head.surface
+
+
+GROOMS: dict[str, Callable[[], Pair]] = {
+    "sintel": sintel,
+    "ponytail": ponytail,
+    "bear": bear,
+    "mohawk": mohawk,
+    "built_in": built_in,
+}
+
+
+def lost_curves() -> int:
+    """How many of an artist's curves are not drawn, with and without children."""
+    strands, head = sintel()
+    lost = 0
+    for method in ("none", "multi"):
+        children = ChildrenSettings(method=method, strand_count=5000)
+        rig = pipeline.prepare(strands, head, GuideSettings(), place="hair", children=children)
+        own = rig.strands.take(np.arange(rig.strands.strand_count - rig.child_count))
+        tips = strands.points[strands.offsets[1:] - 1]
+        kept = {tip.tobytes() for tip in own.points[own.offsets[1:] - 1]}
+        lost += sum(tip.tobytes() not in kept for tip in tips)
+    return lost
 
 
 def _hull(points: np.ndarray) -> Surface:

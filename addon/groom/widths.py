@@ -16,7 +16,7 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..strands import StrandSet
 from .nearest import nearest_points
 
@@ -32,7 +32,7 @@ _ALONE = 1.0 / 500.0
 #: this part of the spacing of strands.
 _TOO_THIN, _TOO_WIDE, _TOO_NEAR = 0.25, 2.0, 0.5
 #: Strands whose neighbours are looked at, and how many neighbours.
-_SAMPLES, _NEIGHBOURS = 3000, 8
+_SAMPLES, _NEIGHBOURS = 1500, 8
 #: Narrowest and widest of a groom's strands in terms of the median.
 _LEAST, _MOST = 0.5, 2.0
 
@@ -110,40 +110,53 @@ class _Found:
 
 
 def _found(strands: StrandSet) -> _Found:
+    """Widths that give the cover of a head, and in short or spread hair a few layers of it."""
     length = strands.lengths()
-    spacing = _spacing(strands)
-    middle = float(np.median(spacing))
+    first, last = strands.offsets[:-1], strands.offsets[1:] - 1
+    at_roots = _spacing(strands, first)
+    # the hair of a ponytail or a mohawk is wider apart further out
+    beyond = np.maximum(_spacing(strands, (first + last) // 2), _spacing(strands, last))
+    apart = np.maximum(at_roots, beyond)
+    middle = float(np.median(apart))
     if middle <= 0.0:
         return _Found(length * _ALONE, 0.0, 1.0, 1.0)
-    extent = middle * np.sqrt(strands.strand_count)
+    at_roots, apart = _evened(at_roots), _evened(apart)
     typical = np.clip(length, *np.percentile(length, (25, 95)))
-    spacing = np.clip(spacing, _LEAST * middle, _MOST * middle)
-    of_head = _HAIRS * _HAIR * spacing**2 / extent
-    wanted = np.maximum(of_head, _LAYERS * spacing**2 / typical)
-    width = np.minimum(wanted, np.minimum(_OF_SPACING * spacing, _OF_LENGTH * typical))
+    extent = float(np.median(at_roots if at_roots.any() else apart)) * strands.strand_count**0.5
+    of_head = _HAIRS * _HAIR * at_roots**2 / extent
+    of_layers = _LAYERS * apart**2 / typical
+    width = np.maximum(
+        np.minimum(of_head, _OF_SPACING * at_roots), np.minimum(of_layers, _OF_SPACING * apart)
+    )
+    width = np.minimum(width, _OF_LENGTH * typical)
+    wanted = np.maximum(np.maximum(of_head, of_layers), width)
     extinction = float((wanted * length).sum() / (width * length).sum())
     return _Found(width, middle, float(np.median(wanted)) / (_HAIR * extent), extinction)
 
 
-def _spacing(strands: StrandSet) -> Floats:
-    """How far strands are from their neighbours, at roots, half way or tips, whichever is most,
-    (strand_count,) [m]: the hair of a ponytail fans out behind its tie.
+def _evened(spacing: Floats) -> Floats:
+    """Without extremes, which borders and strays have."""
+    middle = np.median(spacing)
+    evened: Floats = np.clip(spacing, _LEAST * middle, _MOST * middle)
+    return evened
+
+
+def _spacing(strands: StrandSet, at: Ints) -> Floats:
+    """How far strands are from their neighbours at these points of theirs, (strand_count,) [m].
 
     It is the side of the square that a strand has for itself if its neighbours are spread evenly.
     """
-    count = strands.strand_count
+    count, places = strands.strand_count, strands.points[at]
     neighbours = min(_NEIGHBOURS, count - 1)
     if not neighbours:
         return np.zeros(count)
     chosen = np.unique(np.linspace(0, count - 1, min(count, _SAMPLES)).astype(np.int64))
-    first, last = strands.offsets[:-1], strands.offsets[1:] - 1
-    places = (strands.points[at] for at in (first, (first + last) // 2, last))
-    reach = [nearest_points(each[chosen], each, neighbours + 1)[1][:, -1] for each in places]
-    spacing = np.sqrt(np.pi / neighbours) * np.max(reach, axis=0)
+    reach = nearest_points(places[chosen], places, neighbours + 1)[1][:, -1]
+    spacing = _smoothed(np.sqrt(np.pi / neighbours) * reach, places[chosen])
     if len(chosen) == count:
-        return _smoothed(spacing, strands.roots)
-    near, _ = nearest_points(strands.roots, strands.roots[chosen], 1)
-    return _smoothed(spacing, strands.roots[chosen])[near[:, 0]]
+        return spacing
+    near, _ = nearest_points(places, places[chosen], 1)
+    return spacing[near[:, 0]]
 
 
 def _smoothed(values: Floats, places: Floats) -> Floats:

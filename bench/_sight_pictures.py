@@ -1,0 +1,138 @@
+"""Pictures of the studio with every setting as it ships: of any scale, of any number of strands,
+and beside Cycles.
+
+FLIP is Andersson et al.'s (2020) at its own 67 pixels a degree, over the pixels that hair changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import flip_evaluator
+import numpy as np
+from _shading_room import CyclesRoom
+from _sight_grooms import Pair, rig_of, scaled
+
+from hairloom.addon import pipeline
+from hairloom.addon.blender.pictures.studio import Studio
+from hairloom.addon.blender.properties.groom_settings import GroomSettings
+from hairloom.addon.blender.scene.built_in_head import built_in_head
+from hairloom.addon.blender.sessions.prepared_groom import prepared
+from hairloom.addon.exchange.textures.srgb import srgb_encoded
+from hairloom.addon.groom.face_hair import grow_with_face
+from hairloom.addon.groom.settings import GrowSettings
+from hairloom.addon.pipeline import Rig
+from hairloom.addon.render.snapshot import SKIN
+from hairloom.addon.shading.ambient_settings import AmbientSettings
+from hairloom.addon.shading.drawn_strands import drawn_radius
+from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.marschner.principled import PrincipledHair, settings_from
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.stage_settings import StageSettings
+
+SIZE, SAMPLES = 320, 3
+#: Cycles' pictures of one colour, each with a seed of its own and denoised; paths a pixel; bounces
+SEEDS, PATHS, BOUNCES = 3, 64, 64
+#: towards the sun, and its strength [W/m^2]
+SUN, STRENGTH = np.array([-0.2, -0.75, 0.6]), float(np.pi)
+#: absorption of the hair, per radius
+COLORS = {
+    "black": (2.4, 3.6, 5.7),
+    "brown": (0.63, 1.12, 2.4),
+    "red": (0.2, 0.8, 2.3),
+    "blond": (0.06, 0.12, 0.3),
+}
+#: the brightest tenth of the hair is so bright in a picture
+SHOWN = 0.5
+COUNTS = (5_000, 20_000, 100_000)
+#: a pixel that differs by more than this from the bald head's has hair
+_HAS_HAIR = 1e-3
+
+
+def scale_flip(pair: Pair, name: str) -> float:
+    """The same groom and head a thousand times smaller and larger."""
+    one, hair = _picture(rig_of(pair, name))
+    return max(
+        _flip(one, _picture(rig_of(scaled(pair, factor), name))[0], hair) for factor in (1e-3, 1e3)
+    )
+
+
+def count_figures() -> dict[str, float]:
+    """The built-in groom by all of its strands, and by even parts of them."""
+    head = built_in_head()
+    grown = grow_with_face(head.surface, GrowSettings(strand_count=COUNTS[-1]), head.weights)
+    whole = rig_of((grown, head.surface), "built-in")
+    order = np.argsort(pipeline.strand_ranks(whole), kind="stable")
+    pictures = []
+    for count in COUNTS:
+        part = grown.take(np.sort(order[:count])) if count < COUNTS[-1] else grown
+        pictures.append(_picture(rig_of((part, head.surface), "built-in")))
+    truth, hair = pictures[-1]
+    light = [picture[hair, :3].mean() for picture, _ in pictures]
+    return {
+        "count_flip": max(_flip(truth, picture, hair) for picture, _ in pictures[:-1]),
+        "count_light_percent": 100.0 * max(abs(each / light[-1] - 1.0) for each in light[:-1]),
+    }
+
+
+def cycles_figures() -> dict[str, float]:
+    """The built-in groom under one sun, path traced with the same curves and widths."""
+    head = built_in_head()
+    grown = grow_with_face(head.surface, GrowSettings(), head.weights)
+    rig = rig_of((grown, head.surface), "built-in")
+    room, camera = CyclesRoom(), _studio(rig)._camera(1.0)
+    drawn = drawn_radius(rig.strands.radius.reshape(rig.strands.strand_count, -1), StrandSettings())
+    room.strands(rig.strands.grid, drawn)
+    room.body(head.surface.positions, head.surface.triangles, SKIN, casts_shadow=True)
+    room.look(camera)
+    room.sun(SUN, STRENGTH)
+    found = {}
+    for name, absorption in COLORS.items():
+        node = PrincipledHair(parametrization="ABSORPTION", absorption_coefficient=absorption)
+        shading, _ = settings_from(node, ShadingSettings())
+        dark = replace(StageSettings(), ambient=(0.0, 0.0, 0.0))
+        settings = GroomSettings().with_settings(shading, dark)
+        sun = (Light.sun(-SUN, (1.0, 1.0, 1.0), STRENGTH),)
+        ours, hair = _picture(rig, settings, sun)
+        room.hair(
+            absorption,
+            Roughness=node.roughness,
+            Radial_Roughness=node.radial_roughness,
+            Offset=node.offset,
+        )
+        room.paths(PATHS, BOUNCES, is_denoised=True)
+        truth = np.mean([room.picture(SIZE, seed=seed) for seed in range(SEEDS)], axis=0)
+        exposure = SHOWN / np.percentile(truth[hair, :3].max(axis=-1), 90.0)
+        found[f"cycles_flip_{name}"] = _flip(truth * exposure, ours * exposure, hair)
+    return {"cycles_flip_hair": max(found.values()), **found}
+
+
+def _picture(
+    rig: Rig, settings: GroomSettings | None = None, lights: tuple[Light, ...] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The studio's, (SIZE, SIZE, 4), and where hair is in it."""
+    studio = _studio(rig, settings)
+    drawn = [
+        studio.picture(rig.rest_pose, points, SIZE, SIZE, SAMPLES, lights=lights)
+        for points in (rig.strands.grid, rig.strands.grid + 1e6 * _size(rig))
+    ]
+    return drawn[0], np.abs(drawn[0] - drawn[1]).max(axis=-1) > _HAS_HAIR
+
+
+def _studio(rig: Rig, settings: GroomSettings | None = None) -> Studio:
+    settings = settings or GroomSettings()
+    return Studio(prepared(rig, settings[AmbientSettings]), settings)
+
+
+def _size(rig: Rig) -> np.float32:
+    low, high = rig.strands.bounds()
+    return np.float32((high - low).max())
+
+
+def _flip(truth: np.ndarray, picture: np.ndarray, where: np.ndarray) -> float:
+    encoded = [
+        np.ascontiguousarray(srgb_encoded(np.clip(each[..., :3], 0.0, 1.0)), np.float32)
+        for each in (truth, picture)
+    ]
+    found, _, _ = flip_evaluator.evaluate(*encoded, "LDR", applyMagma=False)
+    return float(np.asarray(found).reshape(where.shape)[where].mean())
