@@ -19,8 +19,8 @@ from .groom.weights import guide_weights
 from .params import SettingsMap
 from .pipeline import Pose, Rig, rest_occlusion, root_normals, root_turns
 from .shading.ambient_settings import AmbientSettings
-from .shading.drawn_strands import drawn_radius
-from .shading.settings import StrandSettings
+from .shading.drawn_strands import drawn_color, drawn_radius
+from .shading.settings import ShadingSettings, StrandSettings
 
 _AS_THEY_ARE = StrandSettings()
 
@@ -43,7 +43,9 @@ def card_build_steps(
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
     """
     occlusion = rest_occlusion(rig, settings[AmbientSettings])
-    groom = replace(card_groom(rig, settings[StrandSettings]), occlusion=occlusion)
+    groom = card_groom(rig, settings[StrandSettings])
+    color = drawn_color(rig.strands.color, settings[ShadingSettings])
+    groom = replace(groom, strands=replace(groom.strands, color=color), occlusion=occlusion)
     sections = settings[CardSettings], settings[AtlasSettings], settings[CardOcclusionSettings]
     return card_steps(groom, *sections, alpha_of, others)
 

@@ -123,7 +123,7 @@ def _strands(rig: Rig, look: str, width: float, occlusion: np.ndarray) -> Snapsh
 
 def _as_cards(hair: Snapshot, cards: CardSnapshot) -> Snapshot:
     none = np.zeros((0, 2, 3), np.float32)
-    return replace(hair, strands=none, radius=none[..., 0], occlusion=None, cards=cards)
+    return replace(hair, strands=none, radius=none[..., 0], occlusion=None, color=None, cards=cards)
 
 
 def _drawn(

@@ -25,6 +25,10 @@ _MAX_STRANDS = 2
 _WIDTH_RANGE = (0.5, 2.0)
 #: A way aside that counts like another card being twice as wide: the sine of its angle.
 _WAVE = 0.2
+#: A difference of colour that counts as much, to the eye: of square roots of linear colours.
+_HUE = 0.15
+#: Beyond all colours, where a strand has none of its own.
+_NO_COLOR = 4.0
 _ROUNDS = 12
 _TINY = 1e-12
 
@@ -66,6 +70,7 @@ def plan_atlas(
     cluster: Ints,
     group: Ints,
     settings: AtlasSettings,
+    color: Floats | None = None,
 ) -> AtlasPlan:
     """Choose what the tiles show.
 
@@ -76,6 +81,7 @@ def plan_atlas(
         radius: (strand_count, cv_count) [m], as strands are drawn.
         cluster: (strand_count,) the card of each strand, from 0 without gaps.
         group: (strand_count,).
+        color: (strand_count, cv_count, 3) that strands are drawn in; None is the look's.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or no strand has a width.
@@ -90,7 +96,10 @@ def plan_atlas(
     shapes = _card_shapes(strips, grid, radius, cluster)
     kind = _kinds(cluster, group, shapes.strand_count, atlas.tile_count)
     random = np.random.default_rng(settings.seed)
-    tile, medoid = _shared_tiles(shapes.features, kind, atlas.tile_count, random)
+    features = shapes.features
+    if color is not None:
+        features = np.concatenate([features, _card_colors(color, cluster, len(strips))], axis=1)
+    tile, medoid = _shared_tiles(features, kind, atlas.tile_count, random)
     chosen = _of_cards(strips, medoid)
     strands, offsets, crowding = _baked_strands(cluster, medoid, settings, random)
     notes = (
@@ -140,6 +149,16 @@ def _card_shapes(strips: Strips, grid: Floats, radius: Floats, cluster: Ints) ->
     octaves = [np.log2(np.maximum(scale, _TINY)) for scale in scales]
     wave = np.bincount(cluster, _asides(strips.frames, grid, cluster), card_count) / count
     return _CardShapes(count, covered, spacing, np.stack([*octaves, wave / _WAVE], axis=1))
+
+
+def _card_colors(color: Floats, cluster: Ints, card_count: int) -> Floats:
+    """What tells the colours of cards apart, (card_count, 9): the means at root, middle and tip."""
+    stations = color[:, [0, color.shape[1] // 2, -1]].reshape(len(color), -1)
+    seen = np.sqrt(np.nan_to_num(stations, nan=_NO_COLOR))
+    sums = [np.bincount(cluster, channel, card_count) for channel in seen.T]
+    count = np.maximum(np.bincount(cluster, minlength=card_count), 1)
+    means: Floats = np.stack(sums, axis=1) / count[:, None] / _HUE
+    return means
 
 
 def _asides(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:

@@ -219,7 +219,9 @@ def uncut_cards(
     if not is_baked:
         return cards, None
     uncrossed = strips.of(np.arange(len(first)))
-    plan = plan_atlas(uncrossed, grid, groom.radius, cluster, strands.group, atlas)
+    plan = plan_atlas(
+        uncrossed, grid, groom.radius, cluster, strands.group, atlas, strands.color_grid
+    )
     strips = _wider(cards.strips, plan.width_factor[owner])
     return replace(cards, strips=strips, tile=plan.tile[owner], atlas=plan.grid), plan
 

@@ -13,16 +13,10 @@ from strand_files import hedgehog
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
 from hairloom.addon.blender.bakes.baked_rig import RestMatrices, rig_arrays, rig_of  # noqa: E402
-from hairloom.addon.blender.cards.build import (  # noqa: E402
-    BuiltCards,
-    CardInputs,
-    MappedCards,
-    build_steps,
-)
+from hairloom.addon.blender.cards.show import without_strands  # noqa: E402
 from hairloom.addon.blender.preview import previews, scene_events  # noqa: E402
 from hairloom.addon.blender.strands.read_hair import ExportRequest, still_hair  # noqa: E402
 from hairloom.addon.blender.viewport import overlay  # noqa: E402
-from hairloom.addon.cards.steps import result_of  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
 RED, BLUE = (0.8, 0.02, 0.03), (0.01, 0.05, 0.6)
@@ -46,6 +40,7 @@ def test_painting_the_curves_is_seen_in_the_preview(
 ) -> None:
     session = previews.start(hair, evaluated())
     shown = overlay.drawing_of(session.uid).snapshot
+    assert without_strands(shown).strand_count == 0, "where cards are shown"
     grid = two_colored().color_grid
     assert grid is not None
     np.testing.assert_allclose(shown.color[:, [0, -1]], grid[:, [0, -1]], atol=1e-6)
@@ -74,10 +69,9 @@ def test_cards_have_the_colours_of_their_strands(hair: Any, evaluated: Callable[
     groom.atlas.size = "512"
     groom.card_occlusion.rays, groom.cards.order_by = 1, "distance"
     groom.shading.color_variation = groom.shading.tip_tint = 0.0
+    groom.card_drawing.shown_as = "cards"
     session = previews.start(hair, evaluated())
-    inputs = CardInputs(session.rig, session.settings.sections)
-    made = result_of(build_steps(inputs))
-    cards = BuiltCards.of(session.rig, MappedCards(made.build, made.maps)).rest
+    cards = overlay.drawing_of(session.uid).snapshot.cards
     assert cards.base_color == pytest.approx(np.maximum(RED, BLUE), abs=1e-6)
     shown = cards.textures.base * np.array(cards.base_color)
     is_hair = cards.textures.alpha > 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -122,12 +123,11 @@ def test_point_counts_of_their_own_stay(new_hair: Any, tmp_path: Path) -> None:
 
 
 def test_what_the_hair_says_of_itself_is_in_the_file(new_hair: Any, tmp_path: Path) -> None:
-    hair, strands = new_hair(), hedgehog()
-    random = np.random.default_rng(3)
+    strands = replace(hedgehog(), color=np.random.default_rng(3).random((480, 3)))
+    hair = new_hair(strands=strands)
     is_guide = np.arange(60) % 20 < 2  # of both groups
     said = Groom(
         strands,
-        color=random.random((480, 3)),
         strand_id=np.arange(60) * 3 + 7,
         is_guide=is_guide,
         group_names={0: "crown", 1: "nape"},

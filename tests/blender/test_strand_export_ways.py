@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -175,10 +176,10 @@ def test_hair_of_guides_alone_is_written_as_strands(new_hair: Any, tmp_path: Pat
 def test_what_is_written_comes_in_again(
     new_hair: Any, sphere: Any, tmp_path: Path, operator: str, suffix: str, options: Any
 ) -> None:
-    hair, random = new_hair(sphere), np.random.default_rng(8)
+    strands = replace(hedgehog(), color=np.random.default_rng(8).random((480, 3)))
+    hair = new_hair(sphere, strands)
     said = Groom(
-        hedgehog(),
-        color=random.random((480, 3)),
+        strands,
         strand_id=np.arange(60) + 5,
         group_names={0: "crown", 1: "nape"},
     )

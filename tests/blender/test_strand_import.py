@@ -35,11 +35,11 @@ def hairdo(count=60, place=PLACE):
         radius=random.uniform(2e-5, 8e-5, count * 8),
         group=np.arange(count) % 3 * 2,
         root_uv=random.random((count, 2)),
+        color=random.random((count * 8, 3)),
     )
     ids = np.arange(count) + 100
     return Groom(
         strands,
-        color=random.random((strands.point_count, 3)),
         strand_id=ids,
         is_guide=np.arange(count) % 10 == 0,
         closest_guides=np.tile(ids[[0, 10, 20]], (count, 1)),

@@ -53,6 +53,7 @@ def without_strands(snapshot: Snapshot) -> Snapshot:
         group=None,
         rank=None,
         occluder_spheres=None,
+        color=None,
     )
 
 

@@ -66,6 +66,22 @@ def test_cards_that_look_alike_share_a_tile() -> None:
         assert len(np.unique(many(seed).tile)) == 3
 
 
+def test_cards_of_different_colours_share_no_tile() -> None:
+    """Shapes differ as well, but less to the eye; strands without a colour are of a kind too."""
+    random, kind = np.random.default_rng(5), np.arange(48) % 4
+    width = 0.02 * random.uniform(0.7, 1.4, 48)
+    parts = tufts(width, np.full(48, 0.2), np.full(48, 8), 1e-4)
+    none = (np.nan,) * 3
+    colors = np.array([(0.8, 0.02, 0.03), (0.01, 0.05, 0.6), (0.0, 0.0, 0.0), none])
+    color = np.repeat(colors[kind[parts[3]], None], ROWS, axis=1)
+    settings = AtlasSettings(size="512", columns=4, rows=1)
+    group = np.zeros(len(parts[1]), int)
+    plan = plan_atlas(*parts, group, settings, color)
+    assert len(np.unique(np.stack([kind, plan.tile]), axis=1).T) == 4
+    plain = plan_atlas(*parts, group, settings)
+    assert len(np.unique(np.stack([kind, plain.tile]), axis=1).T) > 4, "or this shows nothing"
+
+
 def test_the_same_seed_gives_the_same_plan() -> None:
     np.testing.assert_array_equal(many().strands, many().strands)
 
