@@ -21,8 +21,7 @@ from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.mesh_pass import MeshPass
-from hairloom.addon.render.skin_pass import SkinShadow
-from hairloom.addon.render.skin_pass import head_size
+from hairloom.addon.render.skin_pass import SkinShadow, head_size
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.render.strand_pass import StrandPass
 from hairloom.addon.shading.lights import three_point_lights
