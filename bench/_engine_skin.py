@@ -21,7 +21,7 @@ from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.mesh_pass import MeshPass
-from hairloom.addon.render.skin_pass import SkinShadow
+from hairloom.addon.render.skin_pass import SkinShadow, head_size
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.render.strand_pass import StrandPass
 from hairloom.addon.shading.lights import three_point_lights
@@ -32,7 +32,7 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 
 SHEET = REPOSITORY / "out" / "skin_sheet.png"
 SIZE, ROUNDS, PLACES = 512, 5, 17
-#: [m] no softness that could be seen
+#: no softness that could be seen
 HARD = 1e-6
 DEEP = VolumeSettings(shadows="deep", strand_fraction=1.0)
 
@@ -120,8 +120,9 @@ def milliseconds(snapshot: Snapshot) -> dict[str, float]:
     opacity = passes[1].opacity(snapshot)
     skin_pass = passes[0].skin
     found = {}
-    for name, softness in (("3mm", 0.003), ("10mm", 0.01)):
-        taken = []
+    size = head_size(mesh.surface)
+    for name, metres in (("3mm", 0.003), ("10mm", 0.01)):
+        softness, taken = metres / size, []
         for number in range(ROUNDS):
             # a little more each time, so that it is drawn each time
             settings = replace(snapshot.skin, softness=softness * (1.0 + 1e-4 * number))

@@ -56,17 +56,27 @@ float mesh_light(int light, vec3 point, vec3 normal)
   vec3 slope = mesh_slope(map, place, unit_normal);
   float depth = dot(mesh_shadows.map_depth[map], vec4(point, 1.0));
   vec2 own = (0.5 * place.xy + 0.5) * mesh_shadows.resolution - 0.5;
-  vec2 scaled = own + mesh_shadows.shift;
-  vec2 low = floor(scaled), fraction = scaled - low;
+  float radius = max({{mesh_blur}} * mesh_shadows.resolution, 1.0);
+  float bias = {{mesh_bias}} * (radius + 1.0) * slope.z;
+  mat2 turn = mat2(cos({{golden_angle}}),
+                   sin({{golden_angle}}),
+                   -sin({{golden_angle}}),
+                   cos({{golden_angle}}));
+  vec2 direction = vec2(radius, 0.0);
   float lit = 0.0;
-  for (int corner = 0; corner < 4; corner++) {
-    vec2 step_of = vec2(corner & 1, corner >> 1);
-    vec2 texel = low + step_of;
-    vec2 weights = mix(1.0 - fraction, fraction, step_of);
-    float there = min(depth + dot(slope.xy, texel - own), 1.0) - {{mesh_bias}} * slope.z;
-    ivec2 at = clamp(ivec2(texel), ivec2(0), ivec2(mesh_shadows.resolution) - 1);
-    float first = texelFetch(mesh_depths, ivec3(at, map), 0).x;
-    lit += there <= first ? weights.x * weights.y : 0.0;
+  for (int tap = 0; tap < {{mesh_taps}}; tap++) {
+    vec2 scaled = own + mesh_shadows.shift + direction * sqrt((float(tap) + 0.5) / {{mesh_taps}}.0);
+    vec2 low = floor(scaled), fraction = scaled - low;
+    for (int corner = 0; corner < 4; corner++) {
+      vec2 step_of = vec2(corner & 1, corner >> 1);
+      vec2 texel = low + step_of;
+      vec2 weights = mix(1.0 - fraction, fraction, step_of);
+      float there = min(depth + dot(slope.xy, texel - own), 1.0) - bias;
+      ivec2 at = clamp(ivec2(texel), ivec2(0), ivec2(mesh_shadows.resolution) - 1);
+      float first = texelFetch(mesh_depths, ivec3(at, map), 0).x;
+      lit += there <= first ? weights.x * weights.y : 0.0;
+    }
+    direction = turn * direction;
   }
-  return lit;
+  return lit / {{mesh_taps}}.0;
 }

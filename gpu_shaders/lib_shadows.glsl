@@ -19,9 +19,24 @@ vec3 shadow_path(int index, vec3 point)
   return vec3(-1.0, {{unknown_beyond}}, 1.0);
 }
 
+#if SHADOWS && defined(MESH_SHADOWS)
+// Whether the map of hair has smaller texels around a point than that of all meshes.
+bool map_is_finer(int index, vec3 point)
+{
+  int map = mesh_map_at(index, point);
+  if (map < 0) {
+    return true;
+  }
+  float w = dot(opacity.map_w[index], vec4(point, 1.0)), mesh_w = mesh_map_place(map, point).z;
+  float hair = length(opacity.map_x[index].xyz) * float(opacity.resolution);
+  float mesh = length(mesh_shadows.map_x[map].xyz) * mesh_shadows.resolution;
+  return hair * mesh_w > mesh * w;
+}
+#endif
+
 // As shadow_path, for a place of a mesh and the normal of its triangle. Meshes reach beyond the map of
-// hair: towards its border the map of all meshes takes over what they are in the way of, or else their
-// shadows fade, or they would end at a line.
+// hair: towards its border, and where it is the finer one, the map of all meshes takes over what they
+// are in the way of, or else their shadows fade, or they would end at a line.
 vec3 shadow_path_to_mesh(int index, vec3 point, vec3 normal)
 {
   vec3 path = shadow_path(index, point);
@@ -36,6 +51,7 @@ vec3 shadow_path_to_mesh(int index, vec3 point, vec3 normal)
 #  ifdef MESH_SHADOWS
     // depths before and behind all hair are not distinguished
     within = min(within, within_map(vec2(0.5, place.z - opacity.bias)));
+    within = map_is_finer(index, point) ? within : 0.0;
 #  endif
     path.z = mix(beyond, path.z, within);
     return path;

@@ -109,7 +109,7 @@ def frame_camera(
     """
     low, high = (np.asarray(corner, np.float64) for corner in bounds)
     center = (low + high) / 2.0
-    size = max(float(np.linalg.norm(high - low)), 1.0e-30)
+    size = max(float(np.linalg.norm(high - low)), 1.0e-9)
     turn = look_at(center + np.asarray(direction, np.float64), center, up)[:3, :3]
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     seen = (low + corners * (high - low) - center) @ turn.T
@@ -148,7 +148,7 @@ def frame_points(
     slope = np.tan(field_of_view / 2.0) / margin * np.array([aspect, 1.0])
     right = (seen[:, :2] + seen[:, 2:] * slope).max(axis=0)
     left = (seen[:, 2:] * slope - seen[:, :2]).max(axis=0)
-    size = max(float(np.linalg.norm(high - low)), 1.0e-30)
+    size = max(float(np.linalg.norm(high - low)), 1.0e-9)
     distance = max(float(((left + right) / (2.0 * slope)).max()), 0.01 * size)
     eye = center + turn.T @ np.array([*(right - left) / 2.0, distance])
     view = np.eye(4)

@@ -31,7 +31,14 @@ from ..shading.volume.card_opacity import MAX_ALPHA, MEAN_TURN, MIN_FACING, MIN_
 from ..shading.volume.dual import MIDPOINT, UNKNOWN_BEYOND
 from ..shading.volume.map_size import START_TEXELS
 from ..shading.volume.mesh_frames import MESH_FRAME_CAPACITY
-from ..shading.volume.mesh_light import EDGE_ON, MESH_BIAS, STEEPEST
+from ..shading.volume.mesh_light import (
+    EDGE_ON,
+    GOLDEN_ANGLE,
+    MESH_BIAS,
+    MESH_BLUR,
+    MESH_TAPS,
+    STEEPEST,
+)
 from ..shading.volume.opacity import MAP_BORDER, MIN_THICKNESS
 from ..shading.volume.transparency import UNSEEN_FRACTION
 from .pixel_parts import DEPTH_END
@@ -94,6 +101,9 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "covers": repr(COVERS),
         "other_tau_lights": str(OTHER_TAU_LIGHTS),
         "mesh_bias": repr(MESH_BIAS),
+        "mesh_blur": repr(MESH_BLUR),
+        "mesh_taps": str(MESH_TAPS),
+        "golden_angle": repr(GOLDEN_ANGLE),
         "steepest": repr(STEEPEST),
         "edge_on": repr(EDGE_ON),
         "start_texels": str(START_TEXELS),

@@ -13,7 +13,7 @@ from hairloom.addon.shading.area_lights import Panel
 from hairloom.addon.shading.lights import Cone, Light, light_irradiance
 from hairloom.addon.shading.mesh_shadow_settings import MeshShadowSettings
 from hairloom.addon.shading.volume.mesh_frames import ball_of_casters, extent_of, mesh_frames
-from hairloom.addon.shading.volume.mesh_light import mesh_light
+from hairloom.addon.shading.volume.mesh_light import disk_radius, mesh_light
 from hairloom.addon.strands import Surface
 
 WHITE = (1.0, 1.0, 1.0)
@@ -114,11 +114,13 @@ def texel_at(light: Light, points: np.ndarray) -> np.ndarray:
 def test_shadows_on_the_ground_are_those_of_rays(
     gpu_context: Any, compute: Callable[..., np.ndarray], name: str
 ) -> None:
-    """Wherever it shines, but within two texels of an edge; there are both light and shadow."""
+    """Wherever it shines, but as near to an edge as the disk is wide; there are both light and
+    shadow."""
     light, random = LIGHTS[name], np.random.default_rng(5)
     points = np.zeros((12000, 3))
     points[:, :2] = random.uniform(-4.0, 4.0, (12000, 2))
-    aside = 2.0 * texel_at(light, points)[:, None]
+    texels = disk_radius(SETTINGS.mesh_resolution) + 2.0
+    aside = texels * texel_at(light, points)[:, None]
     ways = [aside * np.array([np.cos(a), np.sin(a), 0.0]) for a in np.arange(0.0, 6.2, 0.7854)]
     expected = is_lit(light, points)
     is_clear = np.all([is_lit(light, points + way) == expected for way in ways], axis=0)
@@ -155,6 +157,42 @@ def test_an_edge_lies_where_it_should(
     # beside the box there is no gap between it and its shadow
     points[:, 0] = np.linspace(0.5 + 2.0 * texel, 0.9, 2001)
     assert found_light(compute, maps, points, UP)[:, 0].max() < 1e-6
+
+
+def along_an_edge(compute: Callable[..., np.ndarray], resolution: int) -> np.ndarray:
+    """What is left of a sun beside the oblique edge of a sheet's shadow: a row for each distance
+    from -0.1 to 0.1 m, (150, 100)."""
+    sheet, angle = ground(1.0, 1.0), np.radians(20.0)
+    along = np.array([np.cos(angle), np.sin(angle), 0.0])
+    across = np.cross(UP, along)
+    turned = sheet.positions @ np.stack([along, across, UP])
+    maps = maps_of(
+        (ground(), Surface(turned.astype(np.float32), sheet.triangles), box((0.0, 0.0, 0.1), 0.1)),
+        (Light.sun((0.0, 0.0, -1.0), WHITE, 3.0),),
+        replace(SETTINGS, mesh_resolution=resolution),
+    )
+    steps, distances = np.linspace(-0.5, 0.5, 100), np.linspace(-0.1, 0.1, 150)
+    points = steps[:, None] * along + (1.0 + distances)[:, None, None] * across
+    return found_light(compute, maps, points.reshape(-1, 3), UP)[:, 0].reshape(150, 100)
+
+
+def test_an_oblique_edge_has_no_steps(gpu_context: Any, compute: Callable[..., np.ndarray]) -> None:
+    """It is as bright all along; where texels alone decide it goes from dark to light."""
+    found = along_an_edge(compute, 1024)
+    assert found[0].max() == 0.0 and found[-1].min() > 0.999
+    assert np.ptp(found, axis=1).max() < 0.12
+    assert (np.diff(found.mean(axis=1)) > -1e-3).all()
+
+
+def test_an_edge_is_as_soft_at_any_resolution(
+    gpu_context: Any, compute: Callable[..., np.ndarray]
+) -> None:
+    widths = []
+    for resolution in (1024, 4096):
+        profile = along_an_edge(compute, resolution).mean(axis=1)
+        widths.append(((profile > 0.1) & (profile < 0.9)).sum())
+    assert widths[0] == pytest.approx(widths[1], rel=0.25)
+    assert widths[1] > 8
 
 
 def test_samples_of_a_picture_ask_places_all_around(gpu_context: Any) -> None:

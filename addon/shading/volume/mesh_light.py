@@ -1,9 +1,11 @@
 """How much of a light meshes let through to a place of a mesh, by the map of their depths.
 
-The fraction of the four texels around the place that see the light (percentage closer filtering;
-Reeves, Salesin and Cook 1987). Each of them is compared with the depth of the plane of the place's
-own triangle there: a slope does not shade itself, and edges stay where they are. Each sample of a
-picture asks texels shifted by up to one, so that the mean has smooth edges.
+The fraction of a disk around the place that sees the light (percentage closer filtering; Reeves,
+Salesin and Cook 1987). Its taps lie on Vogel's spiral, so that an edge in any direction meets them
+one after the other, and each is the mean of four texels: edges have no steps. The disk is a
+fraction of the map, as wide at any resolution. Each texel is compared with the depth of the plane
+of the place's own triangle there: a slope does not shade itself, and edges stay where they are.
+Each sample of a picture asks texels shifted by up to one.
 
 Reference of gpu_shaders/lib_mesh_shadows.glsl.
 """
@@ -15,7 +17,11 @@ import numpy as np
 from ...arrays import Floats
 from .light_frame import LightFrame
 
-#: how far in front of a place a mesh must be, in texels
+#: taps of the disk, and its radius as a fraction of the map's side; at least a texel
+MESH_TAPS, MESH_BLUR = 16, 0.003
+#: from one tap to the next [rad]
+GOLDEN_ANGLE = float(np.pi * (3.0 - np.sqrt(5.0)))
+#: how far in front of a place a mesh must be, as a fraction of the disk's radius and a texel
 MESH_BIAS = 0.5
 #: the steepest slope that is followed, as a tangent
 STEEPEST = 20.0
@@ -40,20 +46,33 @@ def mesh_light(
     size = len(depths)
     places, depth = frame.places(points)
     slope, unit = _slope(frame, points, normals, size)
-    scaled = places * size + shift - 0.5
-    low = np.floor(scaled)
-    fraction = scaled - low
-    lit = np.zeros(len(points))
-    for corner in range(4):
-        step = np.array([corner & 1, corner >> 1])
-        texel = low + step
-        weights = np.where(step == 1, fraction, 1.0 - fraction).prod(axis=1)
-        column, row = np.clip(texel, 0, size - 1).astype(int).T
-        offset = texel - (places * size - 0.5)
-        there = np.minimum(depth + (slope * offset).sum(axis=1), 1.0) - MESH_BIAS * unit
-        lit += weights * (there <= depths[row, column])
+    own, radius = places * size - 0.5, disk_radius(size)
+    bias, lit = MESH_BIAS * (radius + 1.0) * unit, np.zeros(len(points))
+    for tap in disk_taps():
+        scaled = own + shift + radius * tap
+        low = np.floor(scaled)
+        fraction = scaled - low
+        for corner in range(4):
+            step = np.array([corner & 1, corner >> 1])
+            texel = low + step
+            weights = np.where(step == 1, fraction, 1.0 - fraction).prod(axis=1)
+            column, row = np.clip(texel, 0, size - 1).astype(int).T
+            there = np.minimum(depth + (slope * (texel - own)).sum(axis=1), 1.0) - bias
+            lit += weights * (there <= depths[row, column])
     is_inside = ((places >= 0.0) & (places <= 1.0)).all(axis=1)
-    return np.where(is_inside, lit, 1.0)
+    return np.where(is_inside, lit / MESH_TAPS, 1.0)
+
+
+def disk_radius(size: int) -> float:
+    """Of the disk, in texels of a map of this side."""
+    return max(MESH_BLUR * size, 1.0)
+
+
+def disk_taps() -> Floats:
+    """Places in the unit disk, (MESH_TAPS, 2), each of which stands for as much of it."""
+    number = np.arange(MESH_TAPS)
+    away, angle = np.sqrt((number + 0.5) / MESH_TAPS), GOLDEN_ANGLE * number
+    return np.stack([away * np.cos(angle), away * np.sin(angle)], axis=1)
 
 
 def _slope(frame: LightFrame, points: Floats, normals: Floats, size: int) -> tuple[Floats, Floats]:
