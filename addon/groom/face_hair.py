@@ -48,7 +48,7 @@ def grow_with_face(
     weights: Mapping[str, Floats],
     length: Floats | None = None,
 ) -> StrandSet:
-    """Hair on the scalp, with brows and lashes.
+    """Hair on the scalp, with brows and lashes; of sparse hair fewer of those as well.
 
     Args:
         weights: (vertex_count,) each, by the names `scalp`, `brows` and `lashes`.
@@ -58,7 +58,14 @@ def grow_with_face(
         HairloomError: see `grow`; or nowhere to grow.
     """
     hair = grow(surface, settings, weights["scalp"], length)
-    return joined(hair, grow_face_hair(surface, weights["brows"], weights["lashes"]))
+    full, count = FaceHair(), settings.strand_count
+    face = replace(
+        full,
+        brow_count=min(full.brow_count, count // 4),
+        lash_count=min(full.lash_count, count // 10),
+        seed=settings.seed,
+    )
+    return joined(hair, grow_face_hair(surface, weights["brows"], weights["lashes"], face))
 
 
 def grow_face_hair(

@@ -105,14 +105,22 @@ def _inset(body: Surface, grid: Grid) -> tuple[Floats, Bools]:
     near = np.flatnonzero(((shell > low) & (shell < high)).all(axis=1))
     is_inside = np.ones(len(shell), bool)
     if len(near) and len(body.triangles):
-        # what is nearer than most of the way came out of a thin part; all else is on one side
-        enough = 0.7 * inward
-        closest = ClosestPointSearch(body).closest(shell[near], enough)
-        corner_normals = normals[body.triangles[closest.triangle]]
-        normal = np.einsum("nk,nkj->nj", closest.barycentric, corner_normals)
-        height = np.einsum("ij,ij->i", shell[near] - closest.point, normal)
-        is_inside[near] = (closest.distance > enough) & (height < 0.0)
+        # of those that lie in one cell and face the same way, one is asked for all
+        cells = np.floor(shell[near] / grid.cell).astype(np.int64)
+        alike = np.concatenate([cells, normals[near] > 0.0], axis=1)
+        _, asked, number = np.unique(alike, axis=0, return_index=True, return_inverse=True)
+        is_inside[near] = _is_below(shell[near[asked]], body, 0.7 * inward)[number.ravel()]
     return shell, is_inside
+
+
+def _is_below(points: Floats, body: Surface, depth: float) -> Bools:
+    """Which points lie inside the body, and at least this far from its surface [m], (n,)."""
+    closest = ClosestPointSearch(body).closest(points, depth)
+    corner_normals = body.vertex_normals()[body.triangles[closest.triangle]]
+    normal = np.einsum("nk,nkj->nj", closest.barycentric, corner_normals)
+    height = np.einsum("ij,ij->i", points - closest.point, normal)
+    result: Bools = (closest.distance > depth) & (height < 0.0)
+    return result
 
 
 def sample(values: Floats, coordinates: Floats) -> Floats:

@@ -271,7 +271,9 @@ def test_the_demo_writes_everything_the_report_names(tmp_path: Path, gpu_context
     report = json.loads((tmp_path / "report.json").read_text())
     for name in report["outputs"]:
         assert (tmp_path / name).stat().st_size > 0
-    assert report["strands"] == 300 and report["guides"] == 40 and report["children"] == 260
+    # with a quarter as many brow hairs, and a tenth as many lashes
+    assert report["strands"] == 300 + 75 + 30 and report["guides"] == 40
+    assert report["children"] == 405 - 40
     assert report["stretch_max_percent"] < 1.0
     assert report["backend"] and report["renderer"]
     assert re.fullmatch(r"\d+\.\d+\.\d+", report["hairloom"])
