@@ -45,7 +45,7 @@ class GrowSettings(Settings):
         shown_when=_HAS_THRESHOLD,
     )
     strand_count: int = integer(
-        4095,
+        12_000,
         label="Strands",
         description="Number of strands to grow",
         soft=(100, 20_000),
@@ -62,7 +62,7 @@ class GrowSettings(Settings):
         source=_NALU,
     )
     length: float = number(
-        0.24,
+        0.3,
         label="Length",
         description="Length of the longest strands",
         unit="length",
@@ -86,7 +86,7 @@ class GrowSettings(Settings):
         source=_NALU,
     )
     lift: float = number(
-        0.45,
+        0.5,
         label="Lift",
         description="Angle at which hair leaves the scalp: 0 lies flat, 1 stands up",
         unit="factor",
@@ -95,7 +95,7 @@ class GrowSettings(Settings):
         shown_when=when("grow.method", "combed"),
     )
     comb_back: float = number(
-        0.7,
+        0.55,
         label="Comb Back",
         description="Comb hair to the back of the head (world +Y) rather than to its sides",
         unit="factor",
@@ -123,7 +123,7 @@ class GrowSettings(Settings):
         shown_when=when("grow.method", "combed"),
     )
     clump: float = number(
-        0.85,
+        0.5,
         label="Clump",
         description="Amount by which the tips of a clump are drawn together",
         unit="factor",
@@ -132,7 +132,7 @@ class GrowSettings(Settings):
         shown_when=when("grow.method", "combed"),
     )
     clump_size: int = integer(
-        30,
+        60,
         label="Strands per Clump",
         description="Average number of strands in a clump",
         soft=(1, 100),
@@ -140,7 +140,7 @@ class GrowSettings(Settings):
         shown_when=when("grow.method", "combed"),
     )
     wave: float = number(
-        0.007,
+        0.006,
         label="Wave",
         description="Amplitude of the waves of clumps",
         unit="length",
@@ -149,7 +149,7 @@ class GrowSettings(Settings):
         shown_when=when("grow.method", "combed"),
     )
     wave_length: float = number(
-        0.075,
+        0.1,
         label="Wave Length",
         description="Length of hair from one crest to the next",
         unit="length",
@@ -158,7 +158,7 @@ class GrowSettings(Settings):
         shown_when=when("grow.method", "combed"),
     )
     frizz: float = number(
-        0.001,
+        0.0015,
         label="Frizz",
         description="Distance that single strands stray from their clump",
         unit="length",
@@ -176,7 +176,7 @@ class GrowSettings(Settings):
         shown_when=when("grow.method", "combed"),
     )
     volume: float = number(
-        0.018,
+        0.024,
         label="Volume",
         description="Thickness of the layer in which hair lies on the head",
         unit="length",

@@ -51,7 +51,7 @@ class Widths:
     median: the width of the median strand at its root [m].
     hairs: how many hairs a strand stands for.
     extinction: factor on the light that a strand blocks. It is above 1 where few strands stand for
-        so many hairs that, as wide as all of those, they would look like ribbons.
+        more hairs than it could be wide without looking like a ribbon.
     reason: why they were found; empty where they were not, or were asked for.
     """
 

@@ -6,8 +6,10 @@ import argparse
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from ...arrays import Floats
 from ...exchange.tressfx import write_tfx
 from ...pipeline import Rig
+from ..base.images import contact_sheet
 from ..cards.build import BuiltCards, MappedCards
 from ..cards.files import WrittenCards
 from ..cards.textures import named_pictures
@@ -28,11 +30,12 @@ def demo(job: Job) -> None:
     with TemporaryDirectory() as bake:
         motion = simulated(job, Path(bake) / "bake")
         studio = open_studio(job, rig)
-        write_still(job, folder / "still.png", studio, PosedHair.of_rest(rig))
+        still = write_still(job, folder / "still.png", studio, PosedHair.of_rest(rig))
+        _write_close_up(job, folder / "close_up.png", studio, rig)
         write_sheet(job, folder / "motion.png", studio, motion)
     tell_notes(list(studio.notes), report)
     written = written_cards(job, folder / "cards.glb", rig, pictures)
-    _write_card_still(job, folder / "cards.png", studio, rig, written)
+    _write_card_still(job, folder / "cards.png", studio, rig, written, still)
     with report.stage("write strands"):
         write_tfx(folder / "strands.tfx", rig.strands)
     report.add_output(folder / "strands.tfx")
@@ -41,16 +44,27 @@ def demo(job: Job) -> None:
     print(f"Wrote {', '.join(report.facts['outputs'])} and report.json into {folder}")
 
 
+def _write_close_up(job: Job, path: Path, studio: Studio, rig: Rig) -> None:
+    options = job.options
+    camera = studio.close_up(options.width / options.height)
+    with job.report.stage("draw close-up"):
+        picture = studio.picture(
+            rig.rest_pose, rig.strands.grid, options.width, options.height, options.samples, camera
+        )
+    studio.write(path, picture)
+    job.report.add_output(path)
+
+
 def _write_card_still(
-    job: Job, path: Path, studio: Studio, rig: Rig, written: WrittenCards
+    job: Job, path: Path, studio: Studio, rig: Rig, written: WrittenCards, still: Floats
 ) -> None:
-    """The cards where the strands are in the still."""
+    """The strands of the still, and beside them the cards."""
     options = job.options
     built = BuiltCards.of(rig, MappedCards(written.build, written.maps))
     shown = built.drawn(built.rest, job.settings)
     with job.report.stage("draw cards"):
         picture = studio.card_picture(shown, options.width, options.height, options.samples)
-    studio.write(path, picture)
+    studio.write(path, contact_sheet([still, picture], 2))
     job.report.add_output(path)
 
 

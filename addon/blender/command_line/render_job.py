@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...arrays import Floats
 from ...errors import HairloomError
 from ...shading.volume.settings import VolumeSettings
 from ..bakes.guide_motion import BakedGuides
@@ -39,8 +40,8 @@ def render(job: Job) -> None:
     finish(job, job.output)
 
 
-def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> None:
-    """One picture of the strands, and how much was drawn."""
+def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> Floats:
+    """One picture of the strands, which is returned, and how much was drawn."""
     print("drawing the still", flush=True)
     options, report = job.options, job.report
     with report.stage("draw still"):
@@ -57,6 +58,7 @@ def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> None:
     with report.stage("write still"):
         studio.write(path, picture)
     report.add_output(path)
+    return picture
 
 
 def write_sheet(job: Job, path: Path, studio: Studio, motion: BakedGuides) -> None:

@@ -42,6 +42,8 @@ from .slices import shown_slices
 FIELD_OF_VIEW = np.radians(30.0)
 #: how far around the groom its head is shown, as a fraction of the groom's size
 HEAD_ROOM = 0.25
+#: where a close-up looks from: degrees from the front, and z; how much of the groom it shows
+CLOSE_UP, CLOSE_REACH = (50.0, 0.3), 0.2
 #: room around what the camera holds
 MARGIN = 1.16
 
@@ -252,6 +254,14 @@ class Studio:
         """Holds the groom at rest and what of the head is near it, with room for the motion."""
         held = self.held(self._rig.rest_pose, self._rig.strands.grid)
         return self.framed(held, self.side.three_quarter, aspect)
+
+    def close_up(self, aspect: float) -> Camera:
+        """Holds a part of the groom at rest: that around the roots that are nearest to the eye."""
+        direction, roots = self.side.turned(*CLOSE_UP), self._rig.strands.roots
+        held = self.held(self._rig.rest_pose, self._rig.strands.grid)
+        nearest = roots[(roots @ direction).argmax()]
+        reach = CLOSE_REACH * float(np.ptp(held, axis=0).max())
+        return self.framed(held[np.linalg.norm(held - nearest, axis=1) < reach], direction, aspect)
 
     def _meshes(self, pose: Pose) -> tuple[MeshSnapshot, ...]:
         if self._rig.head is None or pose.head_positions is None:

@@ -31,7 +31,7 @@ _CAMERA_AT, _LENS = (-0.34, -0.68, 0.02), 50.0
 _LOOKED_AT = Vector((0.0, 0.0, -0.04))
 _WORLD = (0.03, 0.034, 0.04, 1.0)
 #: long enough to swing
-_HAIR = GrowSettings(strand_count=3500, length=0.26)
+_HAIR = GrowSettings(strand_count=6000, length=0.26)
 
 
 def add_sample_scene(
