@@ -112,18 +112,19 @@ uint sorted_layers(uint number)
 }
 
 // The list as it is found: the last layer waits until the next one is known.
-uint first_kept = 0u, last_kept = 0u, kept_count = 0u;
+uint kept[LAYERS];
+int kept_count = 0;
 uvec4 last_node;
 
 void keep_layer(uint number, uvec4 node, float fraction)
 {
-  if (last_kept == 0u) {
-    first_kept = number;
+  if (kept_count == LAYERS) {
+    return;
   }
-  else {
-    imageStore(layer_nodes, layer_texel(last_kept), uvec4(number, last_node.yzw));
+  if (kept_count > 0) {
+    imageStore(layer_nodes, layer_texel(kept[kept_count - 1]), uvec4(number, last_node.yzw));
   }
-  last_kept = number;
+  kept[kept_count] = number;
   last_node = uvec4(0u, floatBitsToUint(fraction), node.zw);
   kept_count++;
 }
@@ -230,25 +231,26 @@ void main()
   if (count > LAYERS && through - behind_all >= {{unseen_fraction}}) {
     uint sorted = sorted_layers(head);
     vec2 hidden = hidden_by(sorted);
-    behind_all = hidden.x;
-    front = hidden.y;
-    keep_some(sorted, 1.0 - behind_all);
+    keep_some(sorted, 1.0 - hidden.x);
+    behind_all = kept_count > 0 ? hidden.x : behind_all;
+    front = kept_count > 0 ? hidden.y : front;
   }
-  else {
+  // also where a software driver has ended the loops above too early: it does 65535 rounds of all of them
+  if (kept_count == 0) {
     for (int i = 0; i < LAYERS; i++) {
       if (i < seen) {
         keep_layer(nearest[i].x, nearest[i], fractions[i] / max(1.0 - through, 1.0e-6));
       }
     }
   }
-  imageStore(layer_nodes, layer_texel(last_kept), last_node);
+  imageStore(layer_nodes, layer_texel(kept[kept_count - 1]), last_node);
   imageStore(layer_fronts, pixel, vec4(front, 1.0 - behind_all, 0.0, 0.0));
-  imageStore(layer_heads, pixel, uvec4(first_kept));
-  uint at = imageAtomicAdd(layer_count, ivec2(2, 0), kept_count) + 1u;
-  number = first_kept;
-  while (number != 0u) {
-    imageStore(layer_seen, layer_texel(at), uvec4(number));
-    at++;
-    number = imageLoad(layer_nodes, layer_texel(number)).x;
+  imageStore(layer_heads, pixel, uvec4(kept[0]));
+  // no walk along the list, which might end too early: what is in it but not seen is no colour
+  uint at = imageAtomicAdd(layer_count, ivec2(2, 0), uint(kept_count)) + 1u;
+  for (int i = 0; i < LAYERS; i++) {
+    if (i < kept_count) {
+      imageStore(layer_seen, layer_texel(at + uint(i)), uvec4(kept[i]));
+    }
   }
 }

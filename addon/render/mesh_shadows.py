@@ -103,7 +103,7 @@ class MeshShadowPass:
     def _frames(
         self, casters: Sequence[Caster], lights: Sequence[Light]
     ) -> list[tuple[LightFrame, ...]]:
-        """Of each light, as many as there may be."""
+        """Of each light."""
         kept = {id(caster): extent for caster, extent in self._extents}
         self._extents = [
             (each, kept[id(each)] if id(each) in kept else extent_of(surface_of(each)))
@@ -111,14 +111,7 @@ class MeshShadowPass:
             if len(surface_of(each).triangles)
         ]
         ball = ball_of_casters([extent for _, extent in self._extents])
-        if ball is None:
-            return []
-        found, left = [], MESH_FRAME_CAPACITY
-        for light in lights[:LIGHT_CAPACITY]:
-            frames = mesh_frames(light, ball)
-            found.append(frames if len(frames) <= left else ())
-            left -= len(found[-1])
-        return found
+        return [] if ball is None else [mesh_frames(each, ball) for each in lights[:LIGHT_CAPACITY]]
 
     def _texture(self, side: int, layers: int) -> Any:
         """That of the draw before, where it is as large."""
@@ -134,7 +127,7 @@ def mesh_map_side(asked: int, layers: int, most: int) -> int:
 
 
 def pack_mesh_shadows(frames: Sequence[Sequence[LightFrame]], side: int) -> Floats:
-    """The block `MeshShadows` of gpu_shaders/struct_mesh_shadows.glsl in std140, (420,) float32.
+    """The block `MeshShadows` of gpu_shaders/struct_mesh_shadows.glsl in std140, (804,) float32.
 
     Args:
         frames: of each light. side: texels along a side of each map.

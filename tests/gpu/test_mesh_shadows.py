@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.shading.area_lights import Panel
-from hairloom.addon.shading.lights import Cone, Light, light_irradiance
+from hairloom.addon.shading.lights import LIGHT_CAPACITY, Cone, Light, light_irradiance
 from hairloom.addon.shading.mesh_shadow_settings import MeshShadowSettings
 from hairloom.addon.shading.volume.mesh_frames import ball_of_casters, extent_of, mesh_frames
 from hairloom.addon.shading.volume.mesh_light import disk_radius, mesh_light
@@ -255,6 +255,20 @@ def test_the_shader_agrees_with_its_twin(
         found = found_light(compute, maps, points, normals)[:, 0]
         # where a depth is the very one that it is compared with rounding decides
         assert (np.abs(found - expected) > 1e-3).mean() < 2e-3
+
+
+def test_each_light_has_its_maps_when_all_are_amidst_meshes(gpu_context: Any) -> None:
+    from hairloom.addon.render.mesh_shadows import pack_mesh_shadows
+
+    ball = ball_of_casters([extent_of(each) for each in SCENE])
+    assert ball is not None
+    places = np.linspace((-0.6, -1.0, 0.8), (0.9, -1.2, 1.0), LIGHT_CAPACITY)
+    lamps = [Light.point(tuple(place), WHITE, 100.0) for place in places.tolist()]
+    frames = [mesh_frames(lamp, ball) for lamp in lamps]
+    assert sum(map(len, frames)) > 4 * 6 and min(map(len, frames)) >= 5
+    settings = MeshShadowSettings(mesh_resolution=64)
+    values = maps_of(SCENE, lamps, settings).feature(0).blocks["mesh_shadows"][1]
+    assert (values == pack_mesh_shadows(frames, 64)).all()
 
 
 def test_alpha_lets_light_through(gpu_context: Any, compute: Callable[..., np.ndarray]) -> None:

@@ -231,3 +231,13 @@ def test_little_memory_makes_more_parts_and_not_a_crash(
     picture = frame.render_image(shown, front, SIZE, SIZE, 1, passes=(frame.MeshPass(), own))
     assert own.statistics.layers.parts > 3
     assert (picture == expected).all()
+
+
+def test_long_lists_leave_nothing_unshaded(frame: Any, front: Any, with_rows: Any) -> None:
+    """Thousands of white strands in a pixel are white, although a driver may end long loops."""
+    random = np.random.default_rng(8)
+    depths = random.uniform(-40.0, 40.0, 20000)
+    shown = replace(sheets(frame, depths, 4.0 / 4095.0), occlusion=None)
+    passes = frame.MeshPass(), with_rows(MANY)
+    picture = frame.render_image(shown, front, 2, 2, 1, passes=passes)
+    assert picture == pytest.approx(np.ones((2, 2, 4)), abs=2e-3)

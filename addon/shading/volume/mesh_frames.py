@@ -19,11 +19,11 @@ import numpy as np
 
 from ...arrays import Floats
 from ...strands import Surface
-from ..lights import Light
+from ..lights import LIGHT_CAPACITY, Light
 from .light_frame import Ball, LightFrame, frame_at, frame_of_sun, shines_along, stepped_ball
 
-#: frames of all lights together, at most: of four lamps amidst meshes
-MESH_FRAME_CAPACITY = 24
+#: frames of all lights together, at most: each light amidst meshes sees them in the sides of a cube
+MESH_FRAME_CAPACITY = 6 * LIGHT_CAPACITY
 #: one frame opens no wider than this to each side [rad]; what is wider takes the sides of a cube
 _WIDEST = float(np.radians(55.0))
 #: tangent of half the angle of a cube's side, with room for the filter at its border
