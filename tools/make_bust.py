@@ -29,12 +29,12 @@ SHOULDERS_DOWN, LIPS_CLOSED, MOUTH = 0.034, 0.0013, -0.0755
 CUT_HEIGHT, CUT_HALF, CUT_POWER = -0.10, (0.158, 0.158), 2.4
 #: corners this near to the cut are moved onto it, so that no slivers are left [m]
 SNAP = 0.004
-#: what lies deeper in the eye sockets is left out (y)
-DEEPEST_SOCKET = -0.062
+#: what lies deeper in the mouth and the eye sockets is left out (island, y)
+DEEPEST = {1: -0.07, 2: -0.062, 3: -0.062}
 
 EYE, EYE_RADIUS = np.array([0.0307767, -0.064535, -0.0065861]), 0.01495
 #: angles from the eye's axis [degrees] of its rings, and how many corners each has
-EYE_RINGS, EYE_CORNERS = (5, 9, 13, 18, 22, 25, 28, 34, 44, 58, 75, 95, 115), 24
+EYE_RINGS, EYE_CORNERS = (5, 10, 16, 22, 26, 30, 38, 50, 65, 82, 100), 16
 #: how far the cornea stands out [m], and the angle at which it ends [degrees]
 CORNEA, CORNEA_END = 0.0009, 30.0
 
@@ -232,11 +232,12 @@ def chosen(mesh: Mesh, wanted: np.ndarray) -> Mesh:
 
 
 def shallow(mesh: Mesh) -> Mesh:
-    """Without the depths of the eye sockets, which have islands of their own."""
+    """Without the depths of the mouth and the eye sockets, which have islands of their own."""
     first = np.concatenate([[0], np.cumsum(mesh.sizes)[:-1]])
     depth = np.minimum.reduceat(mesh.positions[mesh.corner_vertex, 1], first)
     island = island_of(mesh.uv)[mesh.corner_uv[first]]
-    return chosen(mesh, ~(np.isin(island, (2, 3)) & (depth > DEEPEST_SOCKET)))
+    limit = np.array([DEEPEST.get(number, np.inf) for number in range(len(ISLANDS))])
+    return chosen(mesh, depth <= limit[island])
 
 
 def island_of(uv: np.ndarray) -> np.ndarray:

@@ -47,7 +47,8 @@ SETTINGS = SettingsMap(
 def motion() -> GuideMotion:
     """Hair grown here on a head that shakes; the guides lag behind, each as a wave of its own."""
     grown = read_inputs(Sources(), GrowSettings(strand_count=400, length=0.12))
-    rig = pipeline.prepare(grown.strands, grown.head, GuideSettings(guide_count=60), place="x")
+    scalp = grown.strands.take(np.flatnonzero(grown.strands.group == 0))
+    rig = pipeline.prepare(scalp, grown.head, GuideSettings(guide_count=60), place="x")
     poses = shaken_poses(rig, FRAMES, RATE)
     carried = [pipeline.carried(rig, pose, rig.guides) for pose in poses]
     along = np.linspace(0.0, 1.0, carried[0].shape[1])[:, None] ** 2
@@ -175,8 +176,8 @@ def test_panda3d_plays_the_same(
         played = np.concatenate(
             [each.reshape(-1, 3) for each in Player(path).corners(frame / RATE)]
         )
-        np.testing.assert_allclose(low, played.min(axis=0), atol=1e-3)
-        np.testing.assert_allclose(high, played.max(axis=0), atol=1e-3)
+        np.testing.assert_allclose(low, played.min(axis=0), atol=1.5e-3)
+        np.testing.assert_allclose(high, played.max(axis=0), atol=1.5e-3)
     assert np.abs(bounds[1:] - bounds[0]).max() > 0.003
     assert written.motion["frames"]["count"] == FRAMES
 

@@ -22,13 +22,13 @@ _FRAMES = 96
 _TURNS = ((1, 0.0, 0.0), (20, 35.0, -4.0), (34, 20.0, 8.0), (56, -35.0, -4.0), (76, -10.0, 6.0))
 #: name -> position [m], power [W], side [m], colour
 _LIGHTS = {
-    "Key": ((-0.7, -0.9, 0.8), 9.0, 0.5, (1.0, 0.96, 0.9)),
-    "Fill": ((0.9, -0.7, 0.2), 4.0, 0.9, (0.85, 0.92, 1.0)),
-    "Rim": ((0.5, 0.9, 0.6), 4.0, 0.4, (1.0, 1.0, 1.0)),
+    "Key": ((-0.7, -0.9, 0.8), 14.0, 0.5, (1.0, 0.96, 0.9)),
+    "Fill": ((0.9, -0.7, 0.2), 6.0, 0.9, (0.85, 0.92, 1.0)),
+    "Rim": ((0.5, 0.9, 0.6), 6.0, 0.4, (1.0, 1.0, 1.0)),
 }
-_CAMERA_AT, _LENS = (-0.34, -0.68, 0.02), 50.0
-#: below the centre of the head, since hair hangs down
-_LOOKED_AT = Vector((0.0, 0.0, -0.04))
+_CAMERA_AT, _LENS = (-0.34, -0.68, 0.02), 58.0
+#: below the centre of the head, since hair hangs down and shoulders are below
+_LOOKED_AT = Vector((0.0, 0.0, -0.07))
 _WORLD = (0.03, 0.034, 0.04, 1.0)
 #: long enough to swing
 _HAIR = GrowSettings(strand_count=6000, length=0.26)
