@@ -147,8 +147,8 @@ def test_combed_hair_follows_the_length_weights_too(egg: Surface) -> None:
     plain = {"strand_count": 300, "length_variation": 0.0, "clump": 0.0, "wave": 0.0, "frizz": 0.0}
     strands = grow(egg, GrowSettings(**plain), length=length)
     height = strands.roots[:, 2]
-    assert strands.lengths()[height > 0.07] == pytest.approx(0.24, rel=0.02)
-    assert strands.lengths()[height < 0.03] == pytest.approx(0.12, rel=0.02)
+    assert strands.lengths()[height > 0.07] == pytest.approx(GrowSettings().length, rel=0.02)
+    assert strands.lengths()[height < 0.03] == pytest.approx(0.5 * GrowSettings().length, rel=0.02)
 
 
 def test_one_strand_a_vertex_above_the_threshold(sphere: Surface) -> None:
