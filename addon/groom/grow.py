@@ -28,6 +28,8 @@ __all__ = ["grow", "scalp_density"]
 _DOWN = np.array([0.0, 0.0, -1.0])
 #: The step for which `GrowSettings.droop` says how much the hair turns [m].
 _DROOP_STEP = 0.02
+#: How much the hair at the parting is combed aside, as a fraction of that at the sides.
+_PARTED = 0.5
 #: The sharpest turn from one segment to the next that a clump or a wave may make [rad].
 _SHARPEST_TURN = np.radians(60.0)
 
@@ -132,6 +134,8 @@ def _combed(surface: Surface, root: Floats, normal: Floats, settings: GrowSettin
     """Unit directions in which the hair is combed, along the skin, (strand_count, 3)."""
     cranium = find_cranium(surface.positions)
     side = np.clip((root[:, 0] - cranium.center[0]) / (0.5 * cranium.half_depth), -1.0, 1.0)
+    # away from the parting from the root on, or hair at the forehead would fall over the face
+    side = np.where(side < 0.0, -1.0, 1.0) * (_PARTED + (1.0 - _PARTED) * np.abs(side))
     comb = np.empty_like(root)
     comb[:, 0] = (1.0 - settings.comb_back) * side
     comb[:, 1] = settings.comb_back

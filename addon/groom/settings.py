@@ -45,7 +45,7 @@ class GrowSettings(Settings):
         shown_when=_HAS_THRESHOLD,
     )
     strand_count: int = integer(
-        12_000,
+        8_000,
         label="Strands",
         description="Number of strands to grow",
         soft=(100, 20_000),

@@ -96,7 +96,8 @@ def test_lift_raises_the_root_and_full_lift_follows_the_normal(egg: Surface) -> 
 
 def test_locks_draw_tips_together(egg: Surface) -> None:
     def nearest_tips(clump: float) -> float:
-        settings = GrowSettings(strand_count=400, clump=clump, wave=0.0, frizz=0.0, clump_size=20)
+        plain = {"strand_count": 400, "wave": 0.0, "frizz": 0.0, "volume": 0.01}
+        settings = GrowSettings(clump=clump, clump_size=20, **plain)
         tips = grow(egg, settings, scalp_density(egg)).grid[:, -1]
         apart = np.linalg.norm(tips[:, None] - tips[None], axis=2)
         np.fill_diagonal(apart, np.inf)
