@@ -95,7 +95,7 @@ class GrowSettings(Settings):
         shown_when=when("grow.method", "combed"),
     )
     comb_back: float = number(
-        0.55,
+        0.65,
         label="Comb Back",
         description="Comb hair to the back of the head (world +Y) rather than to its sides",
         unit="factor",

@@ -94,6 +94,8 @@ def with_widths(strands: StrandSet, method: str = "auto") -> tuple[StrandSet, Wi
     reason = "" if method == "found" else _why_not(strands, median, found)
     if method == "auto" and not reason:
         return strands, Widths(False, median)
+    if not found.spacing:
+        reason = "from their lengths alone, since there is no space between them"
     radius = np.repeat(0.5 * found.width, strands.point_counts)
     widths = Widths(True, float(np.median(found.width)), found.hairs, found.extinction, reason)
     return replace(strands, radius=radius, has_widths=True), widths
