@@ -42,8 +42,9 @@ def width(strands: StrandSet) -> float:
 
 
 def test_a_hundred_thousand_strands_are_hairs() -> None:
-    assert width(head_of_hair(100_000)) == pytest.approx(8e-5, rel=0.05)
-    assert with_widths(head_of_hair(100_000))[1].hairs == pytest.approx(1.0, rel=0.05)
+    all_of_them = with_widths(head_of_hair(100_000))[1]
+    assert all_of_them.median == pytest.approx(8e-5, rel=0.05)
+    assert all_of_them.hairs == pytest.approx(1.0, rel=0.05)
     assert with_widths(head_of_hair(10_000))[1].hairs == pytest.approx(10.0, rel=0.05)
 
 
@@ -56,7 +57,7 @@ def test_no_unit_of_length_is_assumed(factor: float) -> None:
 
 def test_few_strands_take_as_much_light_as_many() -> None:
     taken = []
-    for count in (2000, 20_000, 100_000):
+    for count in (2000, 20_000, 40_000):
         strands, widths = with_widths(head_of_hair(count))
         spacing = np.sqrt(AREA / count)
         assert 2.0 * strands.radius.max() <= 0.25 * spacing * 1.3, "a quarter of the spacing"
