@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from _sight_grooms import rig_of, scaled
 
-from hairloom.addon.blender.sessions.prepared_groom import PreparedGroom, used_vertices
+from hairloom.addon.blender.sessions.prepared_groom import PreparedGroom
 from hairloom.addon.blender.sessions.snapshots import snapshot_of
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.camera import Camera, frame_camera
@@ -30,7 +30,7 @@ SHOWS_THROUGH = 0.05
 def cover(pair, name: str, factor: float = 1.0) -> float:
     """The share of pixels in the outline through which no body is seen."""
     rig = rig_of(scaled(pair, factor), name)
-    groom = PreparedGroom(rig, used_vertices(rig), AmbientSettings())
+    groom = PreparedGroom(rig, AmbientSettings())
     plain = replace(
         snapshot_of(groom), lights=(), volume=VolumeSettings(shadows="none"), meshes=_holes(rig)
     )
