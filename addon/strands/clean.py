@@ -12,6 +12,8 @@ from .strand_set import DEFAULT_RADIUS, StrandSet
 
 #: A strand shorter than this is a point to the eye and has no direction in float32 [m].
 SHORTEST_STRAND = 1.0e-6
+#: A radius that is larger than the median of all by this factor is a broken number.
+_STRAY = 100.0
 #: A point farther from the origin is a broken number: float32 there cannot tell strands apart [m].
 FARTHEST_POINT = 1.0e4
 
@@ -39,8 +41,8 @@ def clean(
     Args:
         points: (point_count, 3) [m].
         offsets: (curve_count + 1,), ascending from 0 to point_count.
-        radius: (point_count,) [m]; the median takes the place of those that are not finite or not
-            positive, and 0.04 mm where there is none.
+        radius: (point_count,) [m]; a median takes the place of those that are not finite, not
+            positive or far larger than the others, and 0.04 mm where there is none.
         group: (curve_count,); absent: one group, 0.
         root_uv: (curve_count, 2); values that are not finite become 0.
         color: (point_count, 3) scene-linear; see `usable_colors`.
@@ -79,7 +81,7 @@ def clean(
         radius=_usable_radius(radius, len(points))[point_kept],
         group=np.zeros(len(kept), np.int32) if group is None else np.asarray(group)[kept],
         root_uv=None if root_uv is None else np.nan_to_num(root_uv, posinf=0, neginf=0)[kept],
-        has_widths=radius is not None and bool(_is_width(np.asarray(radius)).any()),
+        has_widths=radius is not None and bool(are_widths(np.asarray(radius)).any()),
         color=None if color is None else color[point_kept],
     )
     return Cleaned(strands, dropped, kept)
@@ -91,6 +93,8 @@ def _are_sound(points: Floats, offsets: Ints, radius: Floats, root_uv: Floats | 
         return False
     # a sum of squares is finite, or below a limit, only if every one of them is
     if not np.vdot(points, points) < FARTHEST_POINT**2 or np.min(radius) <= 0.0:
+        return False
+    if np.max(radius) > _STRAY * np.min(radius):
         return False
     others = [radius] if root_uv is None else [radius, root_uv]
     if not all(np.isfinite(np.vdot(each, each)) for each in others):
@@ -119,10 +123,22 @@ def _usable_radius(radius: Floats | None, point_count: int) -> Floats:
     if radius is None:
         return np.full(point_count, DEFAULT_RADIUS, np.float32)
     radius = np.asarray(radius, np.float32)
-    is_width = _is_width(radius)
-    known = np.median(radius[is_width]) if is_width.any() else DEFAULT_RADIUS
-    return np.where(is_width, radius, np.float32(known))
+    is_width = are_widths(radius)
+    known = _middle(radius[is_width]) if is_width.any() else np.float32(DEFAULT_RADIUS)
+    return np.where(is_width, radius, known)
 
 
-def _is_width(radius: Floats) -> Bools:
-    return np.isfinite(radius) & (radius > 0.0)
+def are_widths(radius: Floats) -> Bools:
+    """Which of these can be radii or widths of one groom: those that are finite, positive, and not
+    far larger than the others."""
+    is_width: Bools = np.isfinite(radius) & (radius > 0.0)
+    if is_width.any():
+        is_width &= radius <= _STRAY * _middle(radius[is_width])
+    return is_width
+
+
+def _middle(values: Floats) -> Floats:
+    """The median, or of two the larger one."""
+    half = len(values) // 2
+    middle: Floats = np.partition(values, half)[half]
+    return middle

@@ -35,7 +35,7 @@ SETTINGS = DynamicsSettings(bend=0.0)
 
 @pytest.fixture(scope="module")
 def rig() -> Rig:
-    head = built_in_head()
+    head = built_in_head().surface
     strands = grow(head, GrowSettings(strand_count=300), scalp_density(head))
     return pipeline.prepare(strands, head, GuideSettings(), place="test")
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Bools, Floats, Ints
 from ...strands.affine import mean_scale, moved
+from ...strands.clean import are_widths
 from .usd_basis import OnCurves, points_on_curves
 
 #: Where programs put the UVs of roots, Blender's among them; the first one found counts.
@@ -107,7 +108,7 @@ def curves_of(usd: ModuleType, prim: Any, matrix: Floats) -> Curves:
 
 
 def _radius(values: _Values, curves: Any, scale: float) -> tuple[Floats | None, tuple[str, ...]]:
-    """Half the widths [m], NaN where they cannot be hair's, and what to say of that."""
+    """Half the widths [m], and what to say of those that cannot be hair's."""
     widths = _array(_value(values.usd, curves.GetWidthsAttr()), np.float32)
     if widths is None or not len(widths):
         return None, ("it has no widths",)
@@ -116,7 +117,7 @@ def _radius(values: _Values, curves: Any, scale: float) -> tuple[Floats | None, 
         return None, ()
     with np.errstate(over="ignore", invalid="ignore"):
         radius = radius * np.float32(0.5 * scale)
-    wrong = int(np.isnan(radius).sum())
+    wrong = int((~are_widths(radius)).sum())
     notes = (f"{wrong:,} widths are none of hair and were replaced",) if wrong else ()
     return radius, notes
 

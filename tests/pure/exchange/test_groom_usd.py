@@ -428,7 +428,7 @@ def test_primvars_that_do_not_fit_are_left_out(tmp_path: Path) -> None:
     groom, notes = read.groom, "\n".join(read.notes)
     assert groom.color is groom.strand_id is groom.strands.root_uv is None
     assert groom.strands.group.tolist() == [0, 0]
-    assert np.allclose(groom.strands.radius, [5e-5, 4e-5, 4e-5, 4e-5, 5e-5])
+    assert np.allclose(groom.strands.radius, [5e-5] * 5)
     assert "its groom_color were left out: 3 values where 'vertex' wants 5" in notes
     assert "3 widths" in notes and "IDs were left out" in notes
 

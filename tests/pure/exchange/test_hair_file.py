@@ -13,8 +13,8 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file, write_hair_file
 from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.groom.widths import with_widths
 from hairloom.addon.strands import StrandSet
-from hairloom.addon.strands.strand_set import DEFAULT_RADIUS
 
 pytestmark = pytest.mark.portable
 
@@ -82,10 +82,11 @@ def test_what_has_no_array_comes_from_the_header(path: Path) -> None:
     assert read.strands.root_uv is None
 
 
-def test_a_thickness_that_is_no_diameter_falls_back_and_white_is_no_colour(path: Path) -> None:
+def test_a_thickness_that_is_no_diameter_is_found_and_white_is_no_colour(path: Path) -> None:
     path.write_bytes(packed(3, SEGMENT_BLOCK, floats(POINTS), thickness=1.0))
     read = read_hair_file(path)
-    np.testing.assert_array_equal(read.strands.radius, np.float32(DEFAULT_RADIUS))
+    found, widths = with_widths(read.strands)
+    assert widths.is_found and found.radius.max() < 0.1, "strands are a metre apart, and not long"
     assert read.groom.color is None
 
 

@@ -16,7 +16,6 @@ from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 from hairloom.addon.exchange.strand_writing import write_strands
 from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
 from hairloom.addon.strands import StrandSet
-from hairloom.addon.strands.strand_set import DEFAULT_RADIUS
 
 pytestmark = pytest.mark.portable
 
@@ -128,7 +127,7 @@ def test_thickness_that_is_no_radius_falls_back(tmp_path: Path, value: float) ->
     path = tmp_path / "groom.tfx"
     path.write_bytes(version_4(positions(), thickness=np.array([4e-5, value, 5e-5])))
     radius = read_tfx(path).strands.radius.reshape(STRANDS, VERTICES)
-    np.testing.assert_allclose(radius[:, 0], [4e-5, DEFAULT_RADIUS, 5e-5], rtol=1e-6)
+    np.testing.assert_allclose(radius[:, 0], [4e-5, 5e-5, 5e-5], rtol=1e-6)
 
 
 def test_bad_strands_are_dropped_counted_and_named(tmp_path: Path) -> None:

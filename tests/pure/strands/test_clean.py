@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from hairloom.addon.strands.clean import clean
-from hairloom.addon.strands.strand_set import DEFAULT_RADIUS
 
 STRAIGHT = [[0, 0, 0], [0, 0, 1]]
 CURVES = [
@@ -49,7 +48,7 @@ def test_what_belongs_to_a_curve_stays_with_it() -> None:
     assert strands.group.tolist() == [0, 6]
     assert strands.root_uv is not None
     assert strands.root_uv.tolist() == [[0.0, 1.0], [0.0, 0.5]]
-    assert strands.radius == pytest.approx([DEFAULT_RADIUS] * 2 + [1e-4] * 3)
+    assert strands.radius == pytest.approx([1e-4] * 5)
 
 
 @pytest.mark.parametrize("curves", [[], [[]], [[[0, 0, 0]]]])
