@@ -274,11 +274,7 @@ def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:
 def _ambient(rig: Rig, settings: AmbientSettings) -> AmbientSettings:
     """As strong as the hairs that strands stand for are."""
     factor = rig.widths.extinction
-    return replace(
-        settings,
-        extinction=settings.extinction * factor,
-        scalp_extinction=settings.scalp_extinction * factor,
-    )
+    return settings.multiplied(extinction=factor, scalp_extinction=factor)
 
 
 def strand_ranks(rig: Rig) -> Floats:

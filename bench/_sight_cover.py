@@ -14,6 +14,7 @@ from _sight_grooms import rig_of, scaled
 
 from hairloom.addon.blender.sessions.prepared_groom import PreparedGroom
 from hairloom.addon.blender.sessions.snapshots import snapshot_of
+from hairloom.addon.groom.widths import _found
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.camera import Camera, frame_camera
 from hairloom.addon.render.frame import render_image
@@ -47,6 +48,8 @@ def cover(pair, name: str, factor: float = 1.0) -> float:
 
 def _apart(rig: Rig) -> float:
     """How many times as wide strands would be, if they touched."""
+    width = 2.0 * float(np.median(rig.strands.radius[rig.strands.offsets[:-1]]))
+    return _found(rig.strands).spacing / width
 
 
 def _holes(rig: Rig) -> tuple[MeshSnapshot, ...]:

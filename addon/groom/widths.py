@@ -26,6 +26,9 @@ _HAIRS, _HAIR = 100_000, 0.08 / 245.0
 _LAYERS = 5.0
 #: The widest strand: a quarter of the spacing, and in terms of its own length.
 _OF_SPACING, _OF_LENGTH = 0.25, 1.0 / 12.0
+#: Most that a strand blocks of the light, in terms of what its width does: a few guides alone are
+#: not all the hair.
+_MOST_LIGHT = 6.0
 #: Without any spacing, a strand's width in terms of its length.
 _ALONE = 1.0 / 500.0
 #: Own widths are believed from this part of what is found on, up to this multiple of it, or up to
@@ -132,7 +135,7 @@ def _found(strands: StrandSet) -> _Found:
     )
     width = np.minimum(width, _OF_LENGTH * typical)
     wanted = np.maximum(np.maximum(of_head, of_layers), width)
-    extinction = float((wanted * length).sum() / (width * length).sum())
+    extinction = min(float((wanted * length).sum() / (width * length).sum()), _MOST_LIGHT)
     return _Found(width, middle, float(np.median(wanted)) / (_HAIR * extent), extinction)
 
 

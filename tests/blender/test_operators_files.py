@@ -197,7 +197,10 @@ def test_cards_are_written_with_their_sidecar(sphere, tmp_path, told):
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "cards.glb",
         "cards.hairloom.json",
-        *(f"cards_{name}.png" for name in ("alpha", "base", "noise", "shift", "tangent")),
+        *sorted(
+            [f"cards_{name}.png" for name in ("alpha", "base", "noise", "shift", "tangent")]
+            + [f"cards_{name}.exr" for name in ("azimuthal", "longitudinal", "paths")]
+        ),
     ]
     assert "20 cards" in told()
     assert {data.name_full for data in bpy.data.user_map()} == data_blocks

@@ -80,7 +80,7 @@ def test_only_meshes_that_are_no_head_or_body_change_the_lengths(size, factor):
     assert found == pytest.approx(factor)
     fitted = starting.fitted(GrowSettings(), found)
     assert fitted.length == pytest.approx(GrowSettings().length * factor)
-    assert fitted.radius == pytest.approx(GrowSettings().radius * factor)
+    assert fitted.volume == pytest.approx(GrowSettings().volume * factor)
     assert fitted.strand_count == GrowSettings().strand_count
 
 

@@ -51,8 +51,7 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
 def with_settings(snapshot: Snapshot, settings: GroomSettings) -> Snapshot:
     """The same groom by these settings."""
     sections: dict[str, Any] = {name: settings[kind] for name, kind in SECTIONS.items()}
-    volume = settings[VolumeSettings]
-    sections["volume"] = replace(volume, extinction=volume.extinction * snapshot.extinction)
+    sections["volume"] = settings[VolumeSettings].multiplied(extinction=snapshot.extinction)
     return replace(snapshot, debug_view=settings.debug_view, **sections)
 
 

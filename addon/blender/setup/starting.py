@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import bpy
@@ -11,7 +10,6 @@ import numpy as np
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.settings import GrowSettings
-from ...params import Settings
 from ..base.objects import head_of
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
@@ -55,7 +53,7 @@ def fitted(settings: GrowSettings, factor: float) -> GrowSettings:
     """The same hair on a head that is larger by a factor, within the declared limits."""
     if factor == 1.0:
         return settings
-    return replace(settings, **_grown(settings, dict.fromkeys(_LENGTHS, 1), factor))
+    return settings.multiplied(**dict.fromkeys(_LENGTHS, factor))
 
 
 def fit_motion(hair: bpy.types.Object, factor: float) -> None:
@@ -65,17 +63,10 @@ def fit_motion(hair: bpy.types.Object, factor: float) -> None:
     if factor == 1.0:
         return
     group = hair.hairloom.dynamics
-    for name, value in _grown(settings_of(group, DynamicsSettings), _MOTION, factor).items():
-        setattr(group, name, value)
-
-
-def _grown(settings: Settings, powers: dict[str, int], factor: float) -> dict[str, Any]:
-    """The settings that scale, each times a power of the factor, within its declared limits."""
-    limits = {p.name: p.hard_range or (-np.inf, np.inf) for p in settings.parameters()}
-    return {
-        name: float(np.clip(getattr(settings, name) * factor**power, *limits[name]))
-        for name, power in powers.items()
-    }
+    factors = {name: factor**power for name, power in _MOTION.items()}
+    fitted_motion = settings_of(group, DynamicsSettings).multiplied(**factors)
+    for name in factors:
+        setattr(group, name, getattr(fitted_motion, name))
 
 
 def new_groom(
