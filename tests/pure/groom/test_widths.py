@@ -102,7 +102,7 @@ def test_without_any_spacing_the_length_decides(count: int) -> None:
     strands = StrandSet(
         points, np.arange(count + 1) * 4, np.ones(4 * count), np.zeros(count), has_widths=False
     )
-    assert 0.0 < width(strands) <= LENGTH / 12.0
+    assert 0.0 < width(strands) <= LENGTH / 15.0
     widths = with_widths(strands)[1]
     assert widths.extinction == 1.0 and "lengths alone" in widths.line
 
