@@ -31,7 +31,7 @@ LIGHTS = (
 LOOK = {
     "lights": LIGHTS,
     "ambient": (0.1, 0.2, 0.3),
-    "shading": ShadingSettings(base_color=(0.8, 0.6, 0.4)),
+    "shading": ShadingSettings(model="kajiya_kay", base_color=(0.8, 0.6, 0.4)),
 }
 THREE = CardDrawingSettings(passes="three")
 #: the words of the paper, for each pass: alpha test, colour, depth write, depth test, culled faces

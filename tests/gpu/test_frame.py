@@ -17,6 +17,7 @@ from hairloom.addon.strands import Surface
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
 PLAIN = ShadingSettings(
+    model="kajiya_kay",
     base_color=(1.0, 1.0, 1.0),
     primary_strength=0.0,
     secondary_strength=0.0,
@@ -45,7 +46,7 @@ def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
     """One broad ribbon: positions, tangents, noise, lights and settings reach the shader right."""
     strand = np.array([[[-0.1, 0.0, 0.0], [0.1, 0.0, 0.02]]], np.float32)
     radius, occlusion = np.full((1, 2), 0.05, np.float32), np.array([[0.4, 0.8]], np.float32)
-    shading = ShadingSettings(noise_cells=7.0)
+    shading = ShadingSettings(model="kajiya_kay", noise_cells=7.0)
     lights = (
         Light.sun((0.2, 0.7, -1.0), (1.0, 0.9, 0.8), 3.0),
         Light.point((0.3, -0.4, 0.5), (0.5, 0.7, 1.0), 8.0),
@@ -134,9 +135,10 @@ def test_positive_shift_moves_the_highlight_to_the_tips(frame: Any, shift: float
 def test_a_mesh_hides_what_is_behind_it_only(frame: Any, front: Any) -> None:
     """Strands before, behind, and a square over the left half."""
     square = np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 0, 1], [0, 0, 1]], np.float32)
-    mesh = frame.MeshSnapshot.of(
+    blue = frame.MeshSnapshot.of(
         Surface(square, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 1.0)
     )
+    mesh = dataclasses.replace(blue, specular=0.0)
     x = np.array([0.1, 0.3, 0.6, 0.8])
     strands, radius = uprights(x, 0.02)
     strands[[0, 2], :, 1], strands[[1, 3], :, 1] = -0.5, 0.5

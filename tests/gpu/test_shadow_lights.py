@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 SIZE = 48
 FORMS = ["slices", "deep"]
 SUN = Light.sun((-0.5, 0.2, -0.6), (1.0, 1.0, 1.0), 3.0)
-PLAIN = ShadingSettings(color_variation=0.0, shift_noise=0.0, sparkle=0.0)
+PLAIN = ShadingSettings(model="kajiya_kay", color_variation=0.0, shift_noise=0.0, sparkle=0.0)
 
 
 @pytest.fixture

@@ -47,7 +47,9 @@ def hair(frame: Any, ends: np.ndarray, brightness: np.ndarray, **more: Any) -> A
     """Straight strands whose colour is their brightness."""
     settings = {
         "ambient": (1.0, 1.0, 1.0),
-        "shading": ShadingSettings(base_color=(1.0, 1.0, 1.0), color_variation=0.0),
+        "shading": ShadingSettings(
+            model="kajiya_kay", base_color=(1.0, 1.0, 1.0), color_variation=0.0
+        ),
         "strand_settings": StrandSettings(tip_width=1.0, opacity=0.6),
         "detail": DetailSettings(lod_height=0.0),
         "volume": VolumeSettings(shadows="none"),
@@ -73,7 +75,7 @@ def sheets(frame: Any, depths: np.ndarray, opacity: float) -> Any:
     ends = np.zeros((len(depths), 2, 3))
     ends[..., 0], ends[..., 1] = SIZE / 2, depths[:, None]
     ends[..., 2] = -SIZE, 2 * SIZE
-    settings = StrandSettings(tip_width=1.0, opacity=opacity, width_scale=500.0)
+    settings = StrandSettings(tip_width=1.0, opacity=opacity, fullness=500.0)
     return hair(frame, ends, brightness_of(depths), strand_settings=settings)
 
 

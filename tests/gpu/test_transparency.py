@@ -24,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 
 SIZE = 96
 #: the colour of a strand is its occlusion, and nothing else
-FLAT = ShadingSettings(base_color=(1.0, 1.0, 1.0), color_variation=0.0)
+FLAT = ShadingSettings(model="kajiya_kay", base_color=(1.0, 1.0, 1.0), color_variation=0.0)
 WHITE = (1.0, 1.0, 1.0)
 COLORED = replace(FLAT, tip_color=(0.1, 0.3, 1.0), tip_tint=1.0, tint_start=0.0, tint_end=1.0)
 
@@ -276,9 +276,10 @@ def test_no_order_of_strands_changes_the_picture(frame: Any, mode: str) -> None:
 
 def test_a_mesh_hides_layers_behind_it(frame: Any, front: Any) -> None:
     square = np.array([[0, 0, 0], [48, 0, 0], [48, 0, SIZE], [0, 0, SIZE]], np.float32)
-    mesh = frame.MeshSnapshot.of(
+    matt = frame.MeshSnapshot.of(
         Surface(square, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 0.0)
     )
+    mesh = replace(matt, specular=0.0)
     strand = np.array([[[-5.0, 0.0, 30.3], [SIZE + 5.0, 0.0, 30.3]]])
     behind, before = strand + [0, 20.0, 20.0], strand - [0, 20.0, 0]
     shown = snapshot_of(frame, np.concatenate([behind, before]), 0.2, meshes=(mesh,))

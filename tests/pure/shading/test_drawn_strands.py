@@ -42,7 +42,9 @@ def test_strands_vary_about_the_mean(model: str) -> None:
 
 
 def test_grey_strands_are_grey_on_the_card_as_well() -> None:
-    shading = ShadingSettings(base_color=BROWN, color_variation=0.0, grey_fraction=0.25)
+    shading = ShadingSettings(
+        model="kajiya_kay", base_color=BROWN, color_variation=0.0, grey_fraction=0.25
+    )
     factor = strand_variation(np.arange(4000), 3, shading)
     colors = factor * card_base(np.linspace(0.0, 1.0, 3), shading)
     is_grey = np.isclose(colors, GREY_COLOR, rtol=1e-4).all(axis=(1, 2))
