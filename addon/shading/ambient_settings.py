@@ -26,8 +26,7 @@ class AmbientSettings(Settings):
     extinction: float = number(
         2.0,
         label="Extinction",
-        description="Factor on the extinction given by the strand radius; raise it if there are "
-        "few strands",
+        description="Factor on the light that strands block on its way from all sides",
         soft=(0.0, 10.0),
         hard=(0.0, 10_000.0),
         source="Kajiya and Kay 1989, section 2; Kim and Neumann 2001, opacity shadow maps",
@@ -53,7 +52,7 @@ class AmbientSettings(Settings):
         12.0,
         label="Scalp Extinction",
         description="Extinction of light on its way to the skin; higher than Extinction, so that "
-        "the scalp does not show through if there are few strands",
+        "the scalp does not shine through",
         soft=(0.0, 30.0),
         hard=(0.0, 10_000.0),
     )
