@@ -28,7 +28,7 @@ _LAYERS = 5.0
 _OF_SPACING, _OF_LENGTH = 0.25, 1.0 / 15.0
 #: Most that a strand blocks of the light, in terms of what its width does: a few guides alone are
 #: not all the hair.
-_MOST_LIGHT = 6.0
+_MAX_EXTINCTION = 6.0
 #: Without any spacing, a strand's width in terms of its length.
 _ALONE = 1.0 / 500.0
 #: Own widths are believed from this part of what is found on, up to this multiple of it, or up to
@@ -135,7 +135,7 @@ def _found(strands: StrandSet) -> _Found:
     )
     width = np.minimum(width, _OF_LENGTH * typical)
     wanted = np.maximum(np.maximum(of_head, of_layers), width)
-    extinction = min(float((wanted * length).sum() / (width * length).sum()), _MOST_LIGHT)
+    extinction = min(float((wanted * length).sum() / (width * length).sum()), _MAX_EXTINCTION)
     return _Found(width, middle, float(np.median(wanted)) / (_HAIR * extent), extinction)
 
 
