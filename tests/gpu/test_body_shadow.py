@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from hairloom.addon.shading.lights import Light
-from hairloom.addon.shading.settings import StrandSettings
+from hairloom.addon.shading.marschner.look import fibre_of
+from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tables
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.volume.dual import fractions, mean_forward
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
 SIZE = 64
+#: hair that sends nothing on of what it takes
+BLACK = ShadingSettings(model="kajiya_kay")
 SUN = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 3.0)
 FLOOR = Surface(
     np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32),
@@ -34,6 +41,7 @@ def shadow(
     depth: float = 1.0,
     shadows: str = "deep",
     eye: tuple[float, float, float] = (0.0, -2.0, 0.6),
+    shading: ShadingSettings = BLACK,
 ) -> np.ndarray:
     """Over white, (SIZE, SIZE): what is left of it. Strands cover half of the middle."""
     import gpu
@@ -50,8 +58,10 @@ def shadow(
         lights=lights,
         ambient=(ambient,) * 3,
         casters=(FLOOR,),
+        shading=shading,
         strand_settings=StrandSettings(tip_width=1.0),
         volume=VolumeSettings(shadows=shadows, resolution=16, strand_fraction=1.0),
+        table_size=PREVIEW_SIZE,
     )
     maps = StrandPass().opacity(snapshot)
     assert maps is not None
@@ -67,7 +77,7 @@ def shadow(
     return picture[..., 0]
 
 
-def encoded(radiance: float) -> float:
+def encoded(radiance: Any) -> Any:
     return 1.055 * radiance ** (1.0 / 2.4) - 0.055
 
 
@@ -79,6 +89,21 @@ def test_skin_is_as_much_darker_on_the_screen_as_hair_leaves_of_its_light(shadow
     expected = encoded(grey * np.exp(-0.5)) / encoded(grey)
     assert found[30:34, 30:34].mean() == pytest.approx(expected, abs=0.04)
     assert found[30:34, 2:8].min() > 0.99
+
+
+def test_the_shadow_is_lighter_by_what_hair_sends_on() -> None:
+    blond = ShadingSettings(model="marschner", pigment="absorption", absorption=(0.06, 0.12, 0.3))
+    black, found = (
+        float(shadow(SUN, shading=shading)[30:34, 30:34].mean()) for shading in (BLACK, blond)
+    )
+    grey = 0.18 * 3.0 / np.pi
+    tau = np.linspace(0.0, 2.0, 2001)
+    tau = np.interp(-black, -encoded(grey * np.exp(-tau)) / encoded(grey), tau)
+    sides = fractions(marschner_tables(fibre_of(blond), PREVIEW_SIZE))
+    left = np.exp(-tau * (1.0 - mean_forward(sides.forward, blond)))
+    expected = encoded(grey * left) @ [0.2126, 0.7152, 0.0722] / encoded(grey)
+    assert found == pytest.approx(expected, abs=0.01)
+    assert found > black + 0.05
 
 
 def test_other_light_fills_the_shadow() -> None:
@@ -116,7 +141,9 @@ def test_a_mesh_that_is_there_already_is_covered_without_gaps() -> None:
     strands = curtain(50, 4.0e-3, 0.05)
     volume = VolumeSettings(resolution=16, strand_fraction=1.0)
     radius = np.full(strands.shape[:2], 2e-3, np.float32)
-    snapshot = Snapshot(strands, radius, lights=(SUN,), volume=volume, casters=(body,))
+    snapshot = Snapshot(
+        strands, radius, lights=(SUN,), shading=BLACK, volume=volume, casters=(body,)
+    )
     camera = Camera(look_at((0.2, -0.3, 0.3), (0.0, 0.0, 0.0)), perspective(0.6, 1.0, 0.01, 100.0))
     moved = Camera(camera.view @ np.eye(4), camera.projection * np.float32(1.0 + 1e-7))
     color = gpu.types.GPUTexture((256, 256), format="RGBA32F")

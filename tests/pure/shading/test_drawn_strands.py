@@ -52,8 +52,9 @@ def test_grey_strands_are_grey_on_the_card_as_well() -> None:
     np.testing.assert_allclose(colors[~is_grey], np.broadcast_to(BROWN, colors[~is_grey].shape))
 
 
-def test_grey_on_black_hair_stays_within_bounds() -> None:
-    shading = ShadingSettings(base_color=(0.0, 0.0, 0.0), grey_fraction=0.01)
+@pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
+def test_grey_on_black_hair_stays_within_bounds(model: str) -> None:
+    shading = ShadingSettings(model=model, base_color=(0.0, 0.0, 0.0), grey_fraction=0.01)
     factor = strand_variation(np.arange(1000), 3, shading)
     assert np.isfinite(factor).all()
     assert 0.0 <= factor.min() <= factor.max() == 4.0
