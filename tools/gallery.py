@@ -32,8 +32,8 @@ HEADING = """# Gallery
 
 Made by `make gallery` from the commands shown here. Do not edit this page. Each command can be
 repeated in a clone of the repository after `make setup`, and can be the start of your own:
-[command-line.md](command-line.md) explains verbs and options, [parameters.md](parameters.md) all that
-`--set` can change. Without `--width`, `--height` and `--samples`, pictures are larger and smoother.
+[command-line.md](command-line.md) explains verbs and options, [parameters.md](parameters.md) all
+that `--set` can change. Without `--width`, `--height` and `--samples`, pictures are larger and smoother.
 """
 
 
@@ -86,9 +86,8 @@ def grown(name: str, title: str, look: str, **settings: float) -> Picture:
 def fur(name: str, title: str, look: str, **settings: float) -> Picture:
     """The bear with hair along its normals."""
     sets = " ".join(f"--set grow.{setting}={value}" for setting, value in settings.items())
-    return Picture(
-        name, title, f"--head bear.obj --preset looks/{look} --set grow.method=normals {sets}"
-    )
+    sets = f"--set grow.method=normals {sets}"
+    return Picture(name, title, f"--head bear.obj --preset looks/{look} {sets}")
 
 
 SECTIONS = (
@@ -121,8 +120,9 @@ SECTIONS = (
             Picture(
                 "hair_tips",
                 "Tips of another colour",
-                "--preset looks/black --set shading.tip_color=0.05,0.45,0.6 --set shading.tip_tint=1"
-                " --set shading.tint_start=0.35 --set shading.tint_end=0.75",
+                "--preset looks/black --set shading.tip_color=0.05,0.45,0.6"
+                " --set shading.tip_tint=1 --set shading.tint_start=0.35"
+                " --set shading.tint_end=0.75",
             ),
             Picture(
                 "hair_beard",
@@ -145,7 +145,8 @@ SECTIONS = (
     ),
     Section(
         "Strands and cards",
-        "The strands, and each preset of [cards](cards.md) made from them.",
+        "The strands, and each preset of [cards](cards.md) made from them. *Mobile* and *Crowd* "
+        "are for hair far away.",
         (
             Picture("strands", "Strands", "--preset looks/brown"),
             *of_presets(
