@@ -1,6 +1,6 @@
 # All that one does here, in one place. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo lint test tests-of-a-commit test-ui test-engines test-all bench docs pictures zip lock clean
+.PHONY: help setup demo lint test tests-of-a-commit test-ui test-engines test-all bench docs gallery pictures zip lock clean
 
 PYTHON = .venv/bin/python
 OUT = out
@@ -49,6 +49,9 @@ bench: setup ## one benchmark: NAME=x runs bench/x.py, no NAME lists them
 
 docs: setup ## write what the documentation takes from the code
 	$(PYTHON) tools/make_docs.py
+
+gallery: setup ## draw docs/gallery.md: looks, stages, skins, kinds of hair, cards; NAME=x for one picture
+	$(PYTHON) tools/gallery.py $(NAME)
 
 pictures: setup ## draw the documentation's pictures again
 	$(PYTHON) tools/make_docs.py --pictures

@@ -1,24 +1,26 @@
 """Makes what comes from the code: tables of parameters and verbs, the figure of the flows, the
-texts to translate, the pictures.
+texts to translate, the page of the gallery, the pictures.
 
 python tools/make_docs.py [--check | --pictures]
 
 --check fails when docs/parameters.md is not what the code would write; --pictures also runs the
-demo, copies its pictures into docs/images, and draws those of docs/refinement.md,
-docs/shading.md and docs/engine.md with the thumbnails of the presets.
+demo, keeps its pictures in docs/images, and draws those of docs/refinement.md,
+docs/shading.md and docs/engine.md with the thumbnails of the presets. `make gallery` draws those of
+docs/gallery.md.
 """
 
 import argparse
 import importlib
 import json
-import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import flow_figure
+import gallery
 from extension_loader import PACKAGE, REPOSITORY, load_package
+from small_pictures import write_small
 
 PARAMETERS = REPOSITORY / "docs" / "parameters.md"
 VERBS = REPOSITORY / "docs" / "verbs.md"
@@ -67,11 +69,11 @@ def make_pictures() -> None:
     with tempfile.TemporaryDirectory() as folder:
         headless = [sys.executable, str(REPOSITORY / "tools" / "headless.py")]
         subprocess.run([*headless, "demo", "--output", folder], check=True)
-        for name in ("still.png", "motion.png"):
-            shutil.copyfile(Path(folder) / name, IMAGES / name)
+        for name in ("still", "close_up", "motion", "cards"):
+            write_small(Path(folder) / f"{name}.png", IMAGES / f"{name}.jpg")
         preset = ["--preset", "dynamics/under_water"]
         subprocess.run([*headless, "demo", *preset, "--output", folder], check=True)
-        shutil.copyfile(Path(folder) / "motion.png", IMAGES / "under_water.png")
+        write_small(Path(folder) / "motion.png", IMAGES / "under_water.jpg")
     tools = ("refinement", "preset", "shading", "volume", "engine", "quick_start")
     for name in (*(f"{each}_pictures" for each in tools), "preset_thumbnails"):
         tool = [sys.executable, str(REPOSITORY / "tools" / f"{name}.py")]
@@ -93,6 +95,7 @@ def main() -> int:
     flow_figure.FIGURE.write_text(flow_figure.figure(), encoding="utf-8")
     VERBS.write_text(verb_tables(), encoding="utf-8")
     TEXTS.write_text(texts_to_translate(), encoding="utf-8")
+    gallery.PAGE.write_text(gallery.page(), encoding="utf-8")
     if chosen.pictures:
         make_pictures()
     return 0

@@ -85,7 +85,7 @@ def main(folder: Path) -> None:
     close, closer = close_camera(full, reach=0.16), close_camera(full, reach=0.06)
     undivided = {"mode": "fixed", "subdivisions": 1}
     write("children", [picture(guides, {}), picture(full, {})])
-    write("close_up", [picture(full, dict(undivided), closer), picture(full, {}, closer)])
+    write("curl", [picture(full, dict(undivided), closer), picture(full, {}, closer)])
     views = [dict(undivided), {"mode": "fixed", "subdivisions": 64}, {}]
     shown = [picture(full, view | {"debug_view": "detail"}, close) for view in views]
     write("detail_view", shown)

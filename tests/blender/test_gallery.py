@@ -1,0 +1,54 @@
+"""The gallery shows every look, stage and kind of cards, by commands that are valid."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import gallery
+import pytest
+
+pytest.importorskip("bpy", reason="the command line runs inside Blender")
+
+from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.command_line.job_options import chosen_settings
+
+ALL = [picture for section in gallery.SECTIONS for picture in section.pictures]
+#: of a picture and of all of them, so that the page loads at once
+MOST_BYTES, MOST_BYTES_IN_ALL = 250_000, 4_000_000
+
+
+def test_the_page_is_current() -> None:
+    assert gallery.PAGE.read_text(encoding="utf-8") == gallery.page(), "run make docs"
+
+
+def test_the_page_shows_each_picture_that_is_there_and_small() -> None:
+    shown = re.findall(r"!\[[^\]]+\]\(images/gallery/([^)]+)\)", gallery.page())
+    sizes = {path.name: path.stat().st_size for path in gallery.PICTURES.iterdir()}
+    assert sorted(shown) == sorted(sizes), "run make gallery"
+    assert max(sizes.values()) < MOST_BYTES
+    assert sum(sizes.values()) < MOST_BYTES_IN_ALL
+
+
+@pytest.mark.parametrize("picture", ALL, ids=lambda picture: picture.name)
+def test_a_command_is_valid(picture: gallery.Picture) -> None:
+    """Its options are known, and so are its presets, its parameters and their values."""
+    tool, *arguments = shlex.split(picture.command)
+    options = command_line.parser().parse_args(arguments)
+    assert tool == gallery.HEADLESS
+    assert Path(options.output).stem == picture.name
+    chosen_settings(options)
+
+
+def test_every_preset_that_gives_a_look_is_shown() -> None:
+    commands = "\n".join(picture.command for picture in ALL)
+    folders = {"looks": "--preset looks/", "stage": "--stage ", "cards": "--preset cards/"}
+    shown = {
+        folder: set(re.findall(rf"{option}(\w+)", commands)) for folder, option in folders.items()
+    }
+    shipped = {
+        folder: {path.stem for path in (gallery.PRESETS / folder).glob("*.json")}
+        for folder in folders
+    }
+    assert shown == shipped
