@@ -53,6 +53,9 @@ def simulated(job: Job, folder: Path) -> BakedGuides:
         inputs = read_hair(job)
         with _scene_of(job, inputs) as hair:
             put_map(hair, job.settings)
+            widths = hair.data.hairloom.widths
+            if widths.method == "auto" and not inputs.strands.has_widths:
+                widths.method = "found"  # the curves have had them since they were written
             own = bpy.context.scene
             frames = range(own.frame_start, own.frame_end + 1)
             plan = Bake.of([hair], own, frames=frames, folder=folder.resolve())
