@@ -33,7 +33,8 @@ HEADING = """# Gallery
 Made by `make gallery` from the commands shown here. Do not edit this page. Each command can be
 repeated in a clone of the repository after `make setup`, and can be the start of your own:
 [command-line.md](command-line.md) explains verbs and options, [parameters.md](parameters.md) all
-that `--set` can change. Without `--width`, `--height` and `--samples`, pictures are larger and smoother.
+that `--set` can change. Without `--width`, `--height` and `--samples`, pictures are larger and
+smoother.
 """
 
 
