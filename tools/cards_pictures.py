@@ -34,7 +34,11 @@ class Shots:
         strands = grow.grow(head, grown, bust.weights["scalp"])
         self.settings, self._pipeline = settings, of_addon("pipeline")
         self.rig = self._pipeline.prepare(
-            strands, head, settings["guides"](guide_count=CARDS), place="the built-in groom"
+            strands,
+            head,
+            settings["guides"](guide_count=CARDS),
+            place="the built-in groom",
+            widths="auto",
         )
         groom = of_addon("blender.properties.groom_settings").GroomSettings()
         ambient = settings["ambient"]()

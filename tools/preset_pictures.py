@@ -19,8 +19,7 @@ from extension_loader import PACKAGE, REPOSITORY, load_package
 LOOKS = REPOSITORY / "presets" / "looks"
 #: [pixels]; thumbnails are square
 THUMBNAIL, WIDTH, HEIGHT, SAMPLES = 192, 210, 250, 2
-#: how many of them, and how much thicker than they are grown
-STRANDS, THICKER = 9000, 1.6
+STRANDS = 9000
 #: from behind the ear, where there is the most hair
 DIRECTION = (-0.9, 0.75, 0.35)
 NO_BACKDROP = (0.0, 0.0, 0.0, 0.0)
@@ -41,7 +40,9 @@ def wig() -> Any:
     head = bust.surface
     grow = of_addon("groom.grow")
     strands = grow.grow(head, grown, bust.weights["scalp"])
-    rig = pipeline.prepare(strands, head, settings["guides"](), place="the built-in groom")
+    rig = pipeline.prepare(
+        strands, head, settings["guides"](), place="the built-in groom", widths="auto"
+    )
     ambient = settings["ambient"]()
     groom = of_addon("blender.sessions.prepared_groom").prepared(rig, ambient, with_occluders=False)
     snapshot = of_addon("blender.sessions.snapshots").snapshot_of(groom)
@@ -49,7 +50,6 @@ def wig() -> Any:
         snapshot,
         meshes=(of_addon("render.snapshot").MeshSnapshot.of(head, occlusion=groom.head_occlusion),),
         detail=settings["detail"](lod_height=0.0),
-        strand_settings=settings["strands"](fullness=THICKER),
     )
 
 

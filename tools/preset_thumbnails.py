@@ -18,7 +18,7 @@ from preset_pictures import THUMBNAIL, coarse, of_addon
 
 PRESETS, SAMPLES = REPOSITORY / "presets", 2
 #: all hair is blond here: it shows shadows best
-LOOK, STRANDS, THICKER = "looks/blond", 5000, 1.8
+LOOK, STRANDS = "looks/blond", 5000
 #: the head turns by this much [rad] and stops; the picture is taken this many frames after it began
 TURN, TURNING, FRAMES, DURATION = np.radians(70.0), 8, 13, 1.0 / 24.0
 #: enough for a picture of this size
@@ -34,7 +34,9 @@ def wig() -> Any:
     head = bust.surface
     grow = of_addon("groom.grow")
     strands = grow.grow(head, grown, bust.weights["scalp"])
-    return pipeline.prepare(strands, head, settings["guides"](), place="the built-in groom")
+    return pipeline.prepare(
+        strands, head, settings["guides"](), place="the built-in groom", widths="auto"
+    )
 
 
 def turned(rig: Any, angle: float) -> Any:
@@ -68,7 +70,6 @@ def main(folder: Path) -> None:
     plain = of_addon("blender.properties.groom_settings").GroomSettings(
         of_addon("params").SettingsMap(
             shading,
-            settings["strands"](fullness=THICKER),
             settings["detail"](lod_height=0.0),
         )
     )

@@ -38,6 +38,7 @@ def wig(children: str) -> Any:
         head,
         settings["guides"](guide_count=GUIDES, cv_count=9),
         place="the built-in groom",
+        widths="auto",
         children=settings["children"](method=children, strand_count=CHILDREN),
     )
 
