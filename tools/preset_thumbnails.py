@@ -32,8 +32,7 @@ def wig() -> Any:
     grown = settings["grow"](strand_count=STRANDS)
     bust = of_addon("blender.scene.built_in_head").built_in_head()
     head = bust.surface
-    grow = of_addon("groom.grow")
-    strands = grow.grow(head, grown, bust.weights["scalp"])
+    strands = of_addon("groom.face_hair").grow_with_face(head, grown, bust.weights)
     return pipeline.prepare(
         strands, head, settings["guides"](), place="the built-in groom", widths="auto"
     )
@@ -74,7 +73,9 @@ def main(folder: Path) -> None:
         )
     )
     studio = studio_of.Studio(
-        of_addon("blender.sessions.prepared_groom").prepared(rig, ambient), plain
+        of_addon("blender.sessions.prepared_groom").prepared(rig, ambient),
+        plain,
+        look=of_addon("blender.scene.built_in_head").built_in_head().look("light"),
     )
 
     def look_and_motion(preset: Any) -> tuple[Any, tuple[Any, Any]]:

@@ -91,7 +91,7 @@ def plan_atlas(
         raise HairloomError(
             "no strand has a width, so that the atlas would be empty",
             place="strands",
-            remedy="Give the strands a radius, or raise Width Scale",
+            remedy="Give the strands a radius, or raise Fullness",
         )
     shapes = _card_shapes(strips, grid, radius, cluster)
     kind = _kinds(cluster, group, shapes.strand_count, atlas.tile_count)
