@@ -1,7 +1,8 @@
 """Whether hair covers the body that it grows on, from six sides.
 
-The groom's outline is where strands as wide as they are apart would hide all; in it the share of
-pixels is counted through which less than a twentieth of the body is seen. The body is drawn as a
+The groom's outline is where strands as wide as they are apart would hide all, less the margin by
+which these stand out further than the groom's own. In it the share of pixels is counted through
+which less than a twentieth of the body is seen. The body is drawn as a
 hole, so that alpha is what hair covers of it.
 """
 
@@ -39,17 +40,43 @@ def cover(pair, name: str, factor: float = 1.0) -> float:
     inside = covered = 0
     for side in SIDES:
         camera = frame_camera(rig.strands.bounds(), side, np.radians(30.0), 1.0)
-        outline = _alpha(wide, camera) > 0.95
+        margin = 0.5 * (_apart(rig) - 1.0) * _width(rig) * _pixels_per_metre(rig, camera)
+        outline = _eroded(_alpha(wide, camera) > 0.95, margin)
         shown = _body(rig, camera) * (1.0 - _alpha(plain, camera))
         inside += int(outline.sum())
         covered += int((outline & (shown < SHOWS_THROUGH)).sum())
     return covered / max(inside, 1)
 
 
+def _width(rig: Rig) -> float:
+    """Of the median strand at its root [m]."""
+    return 2.0 * float(np.median(rig.strands.radius[rig.strands.offsets[:-1]]))
+
+
 def _apart(rig: Rig) -> float:
     """How many times as wide strands would be, if they touched."""
-    width = 2.0 * float(np.median(rig.strands.radius[rig.strands.offsets[:-1]]))
-    return _found(rig.strands).spacing / width
+    return _found(rig.strands).spacing / _width(rig)
+
+
+def _pixels_per_metre(rig: Rig, camera: Camera) -> float:
+    """Of a picture, in the middle of the hair."""
+    low, high = rig.strands.bounds()
+    away = np.linalg.norm(camera.eye[:3] - (low + high) / 2.0)
+    return float(0.5 * SIZE * camera.projection[1, 1] / away)
+
+
+def _eroded(mask: np.ndarray, margin: float) -> np.ndarray:
+    """Without what is nearer to its edge than this [pixels]."""
+    reach = int(margin)
+    padded = np.pad(mask, reach)
+    inside = np.ones_like(mask)
+    for y in range(-reach, reach + 1):
+        for x in range(-reach, reach + 1):
+            if x * x + y * y <= margin * margin:
+                inside &= np.roll(padded, (y, x), (0, 1))[
+                    reach : reach + mask.shape[0], reach : reach + mask.shape[1]
+                ]
+    return inside
 
 
 def _holes(rig: Rig) -> tuple[MeshSnapshot, ...]:
