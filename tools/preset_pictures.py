@@ -75,7 +75,7 @@ def main(folder: Path) -> None:
     load_package().register()
     frame, images = of_addon("render.frame"), of_addon("blender.base.images")
     studio, lights = of_addon("blender.pictures.studio"), of_addon("shading.lights")
-    shading = of_addon("parameters").ALL_SETTINGS["shading"]
+    presets = of_addon("blender.properties.presets")
     hair = wig()
     points = hair.strands.reshape(-1, 3)
     box = points.min(axis=0), points.max(axis=0)
@@ -91,7 +91,7 @@ def main(folder: Path) -> None:
 
     sheet = []
     for path in sorted(LOOKS.glob("*.json")):
-        look = of_addon("params.preset").read_any_preset(path, {shading.section: shading}).settings
+        look = presets.named_preset(f"looks/{path.stem}").settings
         square = (THUMBNAIL, THUMBNAIL)
         thumbnail = picture(look, lights.three_point_lights, square, 0.75, NO_BACKDROP)
         images.write_png(path.with_suffix(".png"), coarse(thumbnail))

@@ -23,7 +23,7 @@ from .nearest import nearest_points
 #: of a head: how many hairs, and the width of one in terms of the root of the area they grow on.
 _HAIRS, _HAIR = 100_000, 0.08 / 245.0
 #: Layers of hair that lie over every place, at least, wherever that is wide enough to do so.
-_LAYERS = 5.0
+_LAYERS = 6.0
 #: The widest strand: a quarter of the spacing, and in terms of its own length.
 _OF_SPACING, _OF_LENGTH = 0.25, 1.0 / 15.0
 #: Most that a strand blocks of the light, in terms of what its width does: a few guides alone are

@@ -179,7 +179,10 @@ def hair_plays_as_cards():
 
 
 def a_look_is_chosen():
-    before, look = (yield from picture("look-before")), settings("shading")
+    look = settings("shading")
+    look.model = "kajiya_kay"
+    yield from until(are_shown, "cards of Kajiya-Kay do not come")
+    before = yield from picture("look-before")
     look.base_color = (0.9, 0.1, 0.05)
     red = yield from picture("look-red")
     assert changed(before, red, 0.05) > 0.005

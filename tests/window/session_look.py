@@ -126,7 +126,8 @@ def set_the_scene():
     bpy.context.collection.objects.link(hair)
     hair.select_set(True)
     bpy.context.view_layer.objects.active = hair
-    look = curves.hairloom.shading
+    look, curves.hairloom.widths.method = curves.hairloom.shading, "own"
+    look.model = "kajiya_kay"
     look.color_variation, look.tip_tint, look.tint_start, look.tint_end = 0.0, 1.0, 0.5, 0.5
     curves.hairloom.ambient.strength = 0.0
     overlays = viewport().spaces.active.overlay
