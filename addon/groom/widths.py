@@ -125,9 +125,10 @@ def _found(strands: StrandSet) -> _Found:
     middle = float(np.median(apart))
     if middle <= 0.0:
         return _Found(length * _ALONE, 0.0, 1.0, 1.0)
-    at_roots, apart = _evened(at_roots), _evened(apart)
+    # where most roots coincide, as in tufts, they do not tell how the hair is spread
+    at_roots, apart = _evened(at_roots if np.median(at_roots) else apart), _evened(apart)
     typical = np.clip(length, *np.percentile(length, (25, 95)))
-    extent = float(np.median(at_roots if at_roots.any() else apart)) * strands.strand_count**0.5
+    extent = float(np.median(at_roots)) * strands.strand_count**0.5
     of_head = _HAIRS * _HAIR * at_roots**2 / extent
     of_layers = _LAYERS * apart**2 / typical
     width = np.maximum(

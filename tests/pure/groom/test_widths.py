@@ -107,6 +107,18 @@ def test_without_any_spacing_the_length_decides(count: int) -> None:
     assert widths.extinction == 1.0 and "lengths alone" in widths.line
 
 
+def test_tufts_have_widths() -> None:
+    """Twenty strands out of each of a few places, beside some that stand alone."""
+    one = head_of_hair(600)
+    points = one.grid.copy()
+    points[100:] -= points[100:, :1] - np.repeat(points[100::20, :1], 20, axis=0)
+    points[:, 1:] += np.random.default_rng(1).normal(0.0, 0.02, points[:, 1:].shape)
+    tufts = replace(one, points=points.reshape(-1, 3))
+    found, widths = with_widths(tufts)
+    assert np.isfinite(found.radius).all() and found.radius.min() > 0.0
+    assert np.isfinite([widths.median, widths.hairs, widths.extinction]).all()
+
+
 def test_no_strands_have_no_widths() -> None:
     none = head_of_hair(1).take(np.zeros(0, np.int64))
     assert with_widths(none) == (none, Widths())
