@@ -256,6 +256,9 @@ def test_simulate_render_and_export_agree_on_the_motion(
     pixels = np.array(image.pixels[:]).reshape(48, 64, 4)
     bpy.data.images.remove(image)
     assert np.ptp(pixels[..., :3]) > 0.2, "the picture is empty"
+    # a bake brings its own head, which is not taken for the built-in one
+    alone = tmp_path / "alone.png"
+    assert command_line.run(["render", *drawn, "--output", str(alone)]) == 0 and alone.exists()
     wrong = ["--bake", str(bake), "--frame", "13", "--output", str(tmp_path / "none.png")]
     assert command_line.run(["render", *source, *wrong]) == 1
     assert not (tmp_path / "none.png").exists()

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
@@ -119,10 +120,15 @@ def _grown(
     return grow_with_face(head, settings, built_in_head().weights, length)
 
 
-def head_look(sources: Sources) -> HeadLook | None:
-    """How the built-in head is drawn, where these sources name no other."""
-    is_built_in = sources.groom is None and sources.head is None
-    return built_in_head().look(sources.skin) if is_built_in else None
+def head_look(sources: Sources, head: Surface | None) -> HeadLook | None:
+    """How this head is drawn if it is the built-in one; a bake may bring any other."""
+    if sources.groom is not None or sources.head is not None or head is None:
+        return None
+    built_in = built_in_head()
+    is_it = head.corner_uv is not None and np.array_equal(
+        head.triangles, built_in.surface.triangles
+    )
+    return built_in.look(sources.skin) if is_it else None
 
 
 def _read_head(name: str | None, sources: Sources) -> Surface | None:
@@ -141,8 +147,11 @@ def _read_head(name: str | None, sources: Sources) -> Surface | None:
 
 
 def head_of_sources(sources: Sources) -> Surface | None:
-    """The head that is named, or that hair curves of the scene name; None without one."""
+    """The head that is named, or that hair curves of the scene name; the built-in one where neither
+    hair nor head is; None without one."""
     name = sources.head or _surface_name(sources.groom)
+    if name is None and sources.groom is None:
+        return built_in_head().surface
     return None if name is None else _read_mesh(name, need_uv=sources.need_uv)
 
 

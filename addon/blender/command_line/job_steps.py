@@ -167,7 +167,7 @@ def open_studio(job: Job, rig: Rig) -> Studio:
     """What draws this job's hair in its look."""
     with job.report.stage("ambient occlusion"):
         groom = prepared(rig, job.settings[AmbientSettings])
-    studio = Studio(groom, GroomSettings(job.settings), look=head_look(job.sources))
+    studio = Studio(groom, GroomSettings(job.settings), look=head_look(job.sources, rig.head))
     tell_notes(list(studio.warnings), job.report)
     return studio
 
