@@ -121,7 +121,7 @@ def prepare(
     density: Floats | None = None,
     widths: str = "own",
 ) -> Rig:
-    """Bind strands to the head, choose the guides, weigh them for every strand, give it its width.
+    """Bind strands to the head, choose the guides, weigh them for every strand, find all widths.
 
     Args:
         strands: world space at rest.
