@@ -34,8 +34,9 @@ WIDEST = float(np.radians(75.0))
 _AMIDST = 0.25
 #: a light within the sphere that has less of it ahead, in radii, shines away from it
 _MIN_AHEAD = 0.05
-#: sizes of the sphere come in such steps, and its centre in such fractions of its radius
-_SIZE_STEP, _PLACE_STEP = 1.05, 1.0 / 64.0
+#: Sizes of the sphere come in such steps, and its centre in such fractions of its radius. A power
+#: of the step is ten, so that hair in another unit gets the same map.
+_SIZE_STEP, _PLACE_STEP = 10.0 ** (1.0 / 47.0), 1.0 / 64.0
 
 
 @dataclass(frozen=True)

@@ -136,6 +136,16 @@ def test_small_motion_moves_the_ball_by_whole_steps_or_not_at_all() -> None:
         assert (np.linalg.norm(shifted - ball.center, axis=1) <= ball.radius).all()
 
 
+@pytest.mark.parametrize("factor", [1e-6, 1e-3, 0.1, 10.0, 1e3])
+def test_hair_in_another_unit_has_the_same_ball(factor: float) -> None:
+    random = np.random.default_rng(5)
+    for _ in range(20):
+        points = random.normal(size=(50, 3)) * random.uniform(0.05, 0.5) + random.normal(size=3)
+        ball, other = ball_around(points), ball_around(factor * points)
+        assert other.radius == pytest.approx(factor * ball.radius, rel=1e-9)
+        assert other.center == pytest.approx(factor * ball.center, abs=1e-9 * other.radius)
+
+
 @pytest.mark.parametrize("points", [np.zeros((1, 3)), np.full((3, 2, 3), 5.0)])
 def test_hair_without_extent_still_has_a_ball(points: np.ndarray) -> None:
     ball = ball_around(points)
