@@ -5,7 +5,7 @@
 #include "lib_lengths.glsl"
 #include "lib_collider.glsl"
 
-#define SKIN {{contact_skin}}
+#define SKIN (frame.reach * {{skin_of_reach}})
 #define NO_PLANE -1.0e30
 
 // xyz normal outwards, w offset [m]: keep normal . x >= offset

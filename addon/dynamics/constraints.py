@@ -36,8 +36,9 @@ HELD = np.float32(0.99)
 #: Lengths below this count as zero [m].
 TINY = np.float32(1.0e-9)
 _TINY_SQUARED = TINY * TINY
-#: A length cannot be kept better, as float32 rounds world coordinates of some metres [m].
-ROUNDING = np.float32(1.0e-6)
+#: A length cannot be kept better, as float32 rounds world coordinates that are some times larger
+#: than the hair is long: in lengths of the hair.
+ROUNDING = 4.0e-6
 
 
 @dataclass(frozen=True)
@@ -138,22 +139,26 @@ def finish_lengths(
     tip_held: Floats | None,
     tolerance: float,
     iterations: int,
+    size: float,
 ) -> None:
     """Go on, with the guides that need it, until no segment is off by more than `tolerance`.
 
     Few guides do, and only when they are jerked around. One that is still off after `iterations`
     Newton steps is laid out again.
+
+    Args:
+        size: of the hair [m], see `state.Rest`.
     """
     if position.shape[1] <= PINNED:
         return
-    guide = _off_length(position, length, tolerance)
+    guide = _off_length(position, length, tolerance, size)
     for _ in range(iterations if guide.size else 0):
         some, some_length = position.take(guide, axis=2), length.take(guide, axis=1)
         touching = None if touched is None else touched.part(guide, length.shape[1])
         held = None if tip_held is None else tip_held[guide]
         _newton_step(some, some_length[1:], touching, held)
         position[:, :, guide] = some
-        guide = guide[_off_length(some, some_length, tolerance)]
+        guide = guide[_off_length(some, some_length, tolerance, size)]
         if not guide.size:
             return
     if guide.size:
@@ -178,7 +183,7 @@ def _laid_out(position: Floats, length: Floats, tip_held: Floats | None) -> Floa
     return position
 
 
-def _off_length(position: Floats, length: Floats, tolerance: float) -> Ints:
+def _off_length(position: Floats, length: Floats, tolerance: float, size: float) -> Ints:
     """Guides of which a segment is off by more than this fraction of its length."""
     segment = position[:, PINNED:] - position[:, PINNED - 1 : -1]
     error = dot_rows(segment, segment)
@@ -186,7 +191,7 @@ def _off_length(position: Floats, length: Floats, tolerance: float) -> Ints:
     error -= length[PINNED - 1 :]
     np.abs(error, out=error)
     allowed = length[PINNED - 1 :] * np.float32(tolerance)
-    allowed += ROUNDING
+    allowed += np.float32(ROUNDING * size)
     off: Ints = (error > allowed).any(axis=0).nonzero()[0]
     return off
 

@@ -26,10 +26,12 @@ from .colliders import Pose, transform_points
 from .constraints import PINNED, TINY, Touched, chosen
 from .settings import DynamicsSettings
 
-#: How far a CV may be brought by the length solve after contacts were found [m].
-REACH = 0.002
-#: Closer than this to its plane a CV counts as touching, so that lengths do not push it in [m].
-SKIN = np.float32(1.0e-4)
+#: How far a CV may be brought by the length solve after contacts were found, in sizes: these are
+#: the median length of hair, `state.Rest.size`, and `cloth.state.Fabric.size`.
+REACH = 0.008
+#: Closer than this to its plane a CV counts as touching, so that lengths do not push it in; in
+#: sizes.
+SKIN = 4.0e-4
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class Contacts:
     normal: (3, m) outwards, world. offset: (m,) [m], the point shall keep normal . x >= offset.
     origin: (3, m) world [m], where the point would be had it stayed with the collider.
     is_out: (m,) whether the offset leads all the way out.
+    skin: [m], closer than this it touches.
     push: (m,) [m], how far it was pushed so far in this substep.
     """
 
@@ -48,6 +51,7 @@ class Contacts:
     offset: Floats
     origin: Floats
     is_out: Bools
+    skin: np.float32
     push: Floats
 
     def push_out(self, position: Floats, friction: float) -> Bools:
@@ -62,7 +66,7 @@ class Contacts:
             here -= self._friction(here, push, friction)
         for row, value in zip(position, here, strict=True):
             row[self.index] = value
-        return (gap > -SKIN) & self.is_out
+        return (gap > -self.skin) & self.is_out
 
     def _friction(self, here: Floats, push: Floats, friction: float) -> Floats:
         slip = here - self.origin
@@ -90,6 +94,7 @@ def find_contacts(
     radius: Floats,
     poses: list[Pose],
     led_out: float,
+    size: float,
 ) -> list[Contacts]:
     """Planes for all points near a collider.
 
@@ -98,23 +103,26 @@ def find_contacts(
         radius: (n,) float32 [m], the distance that each point keeps; -inf: it has no contacts.
         poses: of the colliders at the substep's end.
         led_out: how far [m] a point that is inside may be led out in this substep.
+        size: of the hair or cloth [m].
     """
-    found = (_contacts_with(pose, position, previous, radius, led_out) for pose in poses)
+    found = (_contacts_with(pose, position, previous, radius, led_out, size) for pose in poses)
     return [contacts for contacts in found if len(contacts.index)]
 
 
-def cv_radius(settings: DynamicsSettings, cv_count: int) -> Floats:
+def cv_radius(settings: DynamicsSettings, cv_count: int, size: float) -> Floats:
     """Collision radius [m] of the free CVs, (cv_count - 2,), growing evenly along the guide."""
     along = np.linspace(0.0, 1.0, cv_count)[PINNED:]
     radius = settings.radius_root + (settings.radius_tip - settings.radius_root) * along
-    return radius.astype(np.float32)
+    return (size * radius).astype(np.float32)
 
 
 @lru_cache(maxsize=8)
-def radius_of_all(settings: DynamicsSettings, cv_count: int, guide_count: int) -> Floats:
+def radius_of_all(
+    settings: DynamicsSettings, cv_count: int, guide_count: int, size: float
+) -> Floats:
     """The same of all CVs of some guides, (cv_count * guide_count,); -inf for the pinned."""
     pinned = np.full(PINNED, -np.inf, np.float32)
-    radius = np.repeat(np.concatenate([pinned, cv_radius(settings, cv_count)]), guide_count)
+    radius = np.repeat(np.concatenate([pinned, cv_radius(settings, cv_count, size)]), guide_count)
     radius.flags.writeable = False
     return radius
 
@@ -136,9 +144,9 @@ def touched_by(contacts: list[Contacts], touching: list[Bools]) -> Touched | Non
 
 
 def _contacts_with(
-    pose: Pose, position: Floats, previous: Floats, radius: Floats, led_out: float
+    pose: Pose, position: Floats, previous: Floats, radius: Floats, led_out: float, size: float
 ) -> Contacts:
-    index, local, reach = _near(pose, position, radius)
+    index, local, reach = _near(pose, position, radius, REACH * size)
     distance, gradient = pose.collider.distance(local)
     # distance and normal in the world: the gradient transforms by the inverse transposed, and its
     # length says how much the distance is scaled along it
@@ -159,20 +167,23 @@ def _contacts_with(
     offset -= distance
     offset += np.minimum(own_radius, reached)
     is_out = reached >= own_radius
-    return Contacts(index, normal, offset, origin, is_out, np.zeros_like(offset))
+    skin = np.float32(SKIN * size)
+    return Contacts(index, normal, offset, origin, is_out, skin, np.zeros_like(offset))
 
 
-def _near(pose: Pose, position: Floats, radius: Floats) -> tuple[Ints, Floats, Floats]:
-    """Points that may be within their reach, their radius and a bit, where they are in object
-    space (3, n), and their reach [m] (n,).
+def _near(
+    pose: Pose, position: Floats, radius: Floats, beyond: float
+) -> tuple[Ints, Floats, Floats]:
+    """Points that may be within their reach, their radius and `beyond` [m], where they are in
+    object space (3, n), and their reach [m] (n,).
 
     A bounding sphere first, then the collider's own quick answer.
     """
     offset = position - pose.center[:, None]
-    farthest = pose.radius + float(radius.max()) + REACH
+    farthest = pose.radius + float(radius.max()) + beyond
     index = (dot_rows(offset, offset) < np.float32(farthest * farthest)).nonzero()[0]
     reach = radius.take(index)
-    reach += np.float32(REACH)
+    reach += np.float32(beyond)
     local = transform_points(pose.inverse, chosen(position, index))
     kept = pose.collider.near(local, reach / np.float32(pose.scale))
     return index.take(kept), chosen(local, kept), reach.take(kept)

@@ -109,6 +109,7 @@ class Frame:
     turn: Floats
     matrix: StyleBand
     air: Air | None
+    size: float  # of the hair [m], see `state.Rest`
 
     @classmethod
     def of(
@@ -125,7 +126,8 @@ class Frame:
             turn = rotation_from(state.rest.sample, (before + now) / 2.0)
         matrix = style_band(settings, state.cv_count, dt)
         air = air_of(settings, drive.scene_wind)
-        return cls(drive, settings, dt, duration, state.time, state.time_left, turn, matrix, air)
+        time, left, size = state.time, state.time_left, state.rest.size
+        return cls(drive, settings, dt, duration, time, left, turn, matrix, air, size)
 
     @property
     def carried_fraction(self) -> float:
@@ -190,7 +192,7 @@ class Block:
             bent,
             impulse,
             None if bent is None else bent * np.float32(frame.carried_fraction),
-            radius_of_all(settings, state.cv_count, before.shape[2]),
+            radius_of_all(settings, state.cv_count, before.shape[2], state.rest.size),
         )
 
     def style_at(self, moment: float) -> Floats:

@@ -108,12 +108,13 @@ class MotionSettings(Settings):
         panel="Collisions",
     )
     depenetration_speed: float = number(
-        0.5,
+        2.0,
         label="Depenetration Speed",
-        description="Speed at which points that start inside a collider are moved out of it",
-        soft=(0.05, 5.0),
-        hard=(0.001, 100.0),
-        unit="speed",
+        description="Speed at which points that start inside a collider are moved out of it, in "
+        "lengths of the hair per second; for cloth, in quarters of its extent",
+        soft=(0.2, 20.0),
+        hard=(0.001, 1000.0),
+        unit="rate",
         panel="Collisions",
     )
     collider_resolution: int = integer(

@@ -177,22 +177,22 @@ class DynamicsSettings(MotionSettings):
         panel="Collisions",
     )
     radius_root: float = number(
-        0.001,
+        0.004,
         label="Root Radius",
-        description="Distance of the first points from colliders",
-        soft=(0.0, 0.01),
-        hard=(0.0, 0.1),
-        unit="length",
+        description="Distance of the first points from colliders, as a fraction of the hair's "
+        "length",
+        soft=(0.0, 0.05),
+        hard=(0.0, 1.0),
         source='"Pearl" configuration, Nguyen and Donnelly 2005',
         panel="Collisions",
     )
     radius_tip: float = number(
-        0.004,
+        0.016,
         label="Tip Radius",
-        description="Distance of the tip from colliders, so that none slips between points",
-        soft=(0.0, 0.02),
-        hard=(0.0, 0.1),
-        unit="length",
+        description="Distance of the tip from colliders, as a fraction of the hair's length, so "
+        "that no collider slips between points",
+        soft=(0.0, 0.1),
+        hard=(0.0, 1.0),
         source='"Pearl" configuration, Nguyen and Donnelly 2005',
         panel="Collisions",
     )

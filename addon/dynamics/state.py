@@ -28,12 +28,14 @@ class Rest:
     shape: what is kept of it wherever the guides swing.
     tip_held: (guide_count,) float32, 1 where the style holds the tip as it does the root, as in a
         tied braid, else 0; None where all tips are free.
+    size: the median length of all guides [m], in which distances are given in the settings.
     """
 
     position: Floats
     length: Floats
     shape: LocalShape
     tip_held: Floats | None = None
+    size: float = 0.0
 
     @cached_property
     def sample(self) -> Floats:
@@ -49,6 +51,7 @@ class Rest:
             self.length[:, guides],
             self.shape.part(guides),
             None if self.tip_held is None else self.tip_held[guides],
+            self.size,
         )
 
 
@@ -115,11 +118,13 @@ def start(guide_grid: Floats, tip_held: Bools | None = None) -> DynamicsState:
             "a guide needs at least two CVs", place="guides", remedy="Raise the CV count"
         )
     segment = np.diff(position, axis=1)
+    length = np.sqrt((segment * segment).sum(axis=0))
     rest = Rest(
         position=position,
-        length=np.sqrt((segment * segment).sum(axis=0)),
+        length=length,
         shape=local_shape(position),
         tip_held=_held(tip_held, position.shape[1], position.shape[2]),
+        size=float(np.median(length.sum(axis=0))) if length.size else 0.0,
     )
     for array in (rest.length, rest.shape.curvature, rest.shape.hold, rest.shape.twist_cv):
         array.flags.writeable = False

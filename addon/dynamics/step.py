@@ -140,7 +140,12 @@ def _keep_outside(
     settings, rest, touched = frame.settings, block.rest, None
     here, was = (rows.reshape(3, -1) for rows in (position, previous))
     contacts = find_contacts(
-        here, was, block.radius, poses, settings.depenetration_speed * frame.dt
+        here,
+        was,
+        block.radius,
+        poses,
+        settings.depenetration_speed * rest.size * frame.dt,
+        rest.size,
     )
     for _ in range(settings.contact_passes if frame.drive.colliders else 0):
         touching = [one.push_out(here, settings.friction) for one in contacts]
@@ -148,6 +153,8 @@ def _keep_outside(
         _keep_lengths(position, rest, touched, settings)
     if settings.length_solver == "direct":
         tolerance, iterations = settings.length_tolerance, settings.length_iterations
-        finish_lengths(position, rest.length, touched, rest.tip_held, tolerance, iterations)
+        finish_lengths(
+            position, rest.length, touched, rest.tip_held, tolerance, iterations, rest.size
+        )
     for one in contacts:
         one.absorb(here, was)

@@ -79,12 +79,12 @@ def block_of(
         air_fraction(settings, dt),
         settings.drag,
         settings.friction,
-        settings.depenetration_speed * dt,
+        settings.depenetration_speed * frame.size * dt,
         speed_ratio,
-        REACH,
+        REACH * frame.size,
     )
     _fill_forces(values[_NUMBERS:].reshape(-1, 4), frame)
-    values[_NUMBERS + 4 * _VECTORS :] = _cv_values(settings, cv_count, dt)
+    values[_NUMBERS + 4 * _VECTORS :] = _cv_values(settings, cv_count, dt, frame.size)
     return values
 
 
@@ -103,7 +103,7 @@ def _fill_forces(vectors: Floats, frame: Frame) -> None:
 
 
 @lru_cache(maxsize=8)
-def _cv_values(settings: DynamicsSettings, cv_count: int, dt: float) -> Floats:
+def _cv_values(settings: DynamicsSettings, cv_count: int, dt: float, size: float) -> Floats:
     """`band` and `own` of the block, flat."""
     band, own = values = np.zeros((2, cv_count, 4), np.float32)
     if cv_count > PINNED:
@@ -113,5 +113,5 @@ def _cv_values(settings: DynamicsSettings, cv_count: int, dt: float) -> Floats:
         band[PINNED:, 2] = matrix.band.inverse_pivot
         band[PINNED:, 3] = matrix.pull[:, 0]
         own[1:-1, 0] = matrix.bend[:, 0]
-        own[PINNED:, 1] = cv_radius(settings, cv_count)
+        own[PINNED:, 1] = cv_radius(settings, cv_count, size)
     return values.ravel()

@@ -196,7 +196,7 @@ class DynamicsPass:
         spans = spans_of(frame, first, count)
         table = moments_of(frame, first, spans)
         if posed:
-            reach = REACH + max(settings.radius_root, settings.radius_tip)
+            reach = (REACH + max(settings.radius_root, settings.radius_tip)) * frame.size
             table = np.concatenate([table, colliders.moments(posed, spans, reach)], axis=1)
         textures = {**self._textures, "moments": texture_from(table, "RGBA32F")}
         textures |= {"rounds": colliders.rounds, "fields": colliders.fields}

@@ -17,7 +17,7 @@ from types import MappingProxyType
 
 from ..cards.bake import SAMPLES, SPARSE_RANGE, SPARSE_STEPS
 from ..dynamics.constraints import CONTACT_WEIGHT, HELD, PINNED
-from ..dynamics.contacts import SKIN
+from ..dynamics.contacts import REACH, SKIN
 from ..dynamics.wind import MODES
 from ..refine import detail
 from ..refine.settings import DetailSettings
@@ -88,7 +88,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "pinned": str(PINNED),
         "contact_weight": repr(float(CONTACT_WEIGHT)),
         "held_weight": repr(float(HELD)),
-        "contact_skin": repr(float(SKIN)),
+        "skin_of_reach": repr(SKIN / REACH),
         "wind_modes": str(MODES),
         "moment_texels": str(MOMENT_TEXELS),
         "collider_texels": str(COLLIDER_TEXELS),

@@ -31,8 +31,6 @@ _MOTION = {
     "wind_speed": 1,
     "gust_size": 1,
     "drag": -1,
-    "radius_root": 1,
-    "radius_tip": 1,
 }
 
 

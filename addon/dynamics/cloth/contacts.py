@@ -66,18 +66,19 @@ def planes_ahead(
     radius: Floats,
     poses: list[Pose],
     led_out: float,
+    size: float,
 ) -> list[MovingPlanes]:
     """Planes near where the substep of `steps` small ones would lead.
 
     Args:
         position, previous: (3, n) world [m], one small step apart.
         fall: (3, 1) [m] that gravity adds in a small step.
-        radius, poses, led_out: see `find_contacts`.
+        radius, poses, led_out, size: see `find_contacts`.
     """
     ahead = (position - previous) * np.float32(steps)
     ahead += position
     ahead += fall * np.float32(steps * (steps + 1) / 2)
-    found = find_contacts(ahead, position, radius, poses, led_out)
+    found = find_contacts(ahead, position, radius, poses, led_out, size)
     return [MovingPlanes.of(one, position) for one in found]
 
 

@@ -166,7 +166,8 @@ class _Cloth:
         self, x: list[Floats], before: list[Floats], begin: float, end: float
     ) -> list[_Plane]:
         """As in `contacts`, with the offset at the substep's begin of `MovingPlanes`."""
-        settings, planes = self.settings, []
+        settings, planes, size = self.settings, [], self.fabric.size
+        radius = settings.radius * size
         for posed in self.drive.colliders:
             old, new = posed.matrix_at(begin), posed.matrix_at(end)
             inverse = np.linalg.inv(new)
@@ -176,12 +177,12 @@ class _Cloth:
                 outward = inverse[:3, :3].T @ gradient[:, 0]
                 steepness = float(np.linalg.norm(outward))
                 normal, distance = outward / steepness, float(found[0]) / steepness
-                if self.pinned[v] or distance >= settings.radius + REACH:
+                if self.pinned[v] or distance >= radius + REACH * size:
                     continue
                 displacement = ((new - old) @ local)[:3]
                 reached = distance - normal @ (x[v] - before[v] - displacement)
-                reached += settings.depenetration_speed * self.dt
-                offset = normal @ x[v] - distance + min(settings.radius, reached)
+                reached += settings.depenetration_speed * size * self.dt
+                offset = normal @ x[v] - distance + min(radius, reached)
                 first = min(offset - normal @ displacement, normal @ before[v])
                 planes.append(_Plane(v, normal, displacement, first, offset))
         return planes

@@ -141,12 +141,11 @@ class FinSettings(MotionSettings):
         panel="Cloth",
     )
     radius: float = number(
-        0.003,
+        0.012,
         label="Collision Radius",
-        description="Distance of vertices from colliders",
-        soft=(0.0, 0.02),
-        hard=(0.0, 0.1),
-        unit="length",
+        description="Distance of vertices from colliders, in quarters of the cloth's extent",
+        soft=(0.0, 0.1),
+        hard=(0.0, 1.0),
         panel="Collisions",
     )
 

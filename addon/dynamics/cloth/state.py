@@ -51,6 +51,7 @@ class Fabric:
     edges, folds: edges and pairs across them, by colour.
     anchor, reach: (vertex_count,) the nearest pinned vertex of each, and the way there along the
         edges [m]; those that no way leads to are their own.
+    size: a quarter of the cloth's extent [m], in which distances are given in the settings.
     """
 
     position: Floats
@@ -62,6 +63,7 @@ class Fabric:
     folds: tuple[Color, ...]
     anchor: Ints
     reach: Floats
+    size: float
 
     @property
     def pinned(self) -> Bools:
@@ -142,6 +144,7 @@ def start_cloth(
         _colors(position, folds),
         np.where(tied, nearest, np.arange(count)),
         np.where(tied, distance, 0.0).astype(np.float32),
+        0.25 * float(np.linalg.norm(np.ptp(position, axis=1))),
     )
     return ClothState(position, position, fabric)
 

@@ -184,12 +184,13 @@ def _substep(
     span: tuple[float, float],
 ) -> tuple[Floats, Floats]:
     """Motion with edges and contacts; returns the new position and that one small step before."""
-    steps, led_out = settings.small_steps, settings.depenetration_speed * frame.dt
+    steps, size = settings.small_steps, fabric.size
+    led_out = settings.depenetration_speed * size * frame.dt
     fall, radius = frame.gravity * np.float32(frame.small**2), frame.radius
     poses = poses_through(frame.colliders, [span])[0] if fabric.pairs.size else []
     planes: list[MovingPlanes] = []
     if poses:
-        planes = planes_ahead(position, previous, fall, steps, radius, poses, led_out)
+        planes = planes_ahead(position, previous, fall, steps, radius, poses, led_out, size)
     before, spare, displacement = position.copy(), np.empty_like(position), np.empty_like(position)
     pinned, is_pulled = np.flatnonzero(fabric.pinned), bool(frame.pull.any())
     for number in range(steps):
@@ -207,7 +208,7 @@ def _substep(
         for one in planes:
             one.press(position, previous, number, steps, settings.friction)
     if poses:
-        contacts = find_contacts(position, before, radius, poses, led_out)
+        contacts = find_contacts(position, before, radius, poses, led_out, size)
         if contacts:
             push_out_at_end(position, previous, before, contacts, settings.friction, 1.0 / steps)
     return position, previous
@@ -256,5 +257,5 @@ def _prepare(state: ClothState, drive: Drive, settings: FinSettings, dt: float) 
         mobility=mobility,
         edge_fractions=edge_fractions(fabric, mobility, settings, small),
         fold_fractions=fold_fractions(fabric, settings, dt),
-        radius=np.where(fabric.pinned, -np.inf, settings.radius).astype(np.float32),
+        radius=np.where(fabric.pinned, -np.inf, settings.radius * fabric.size).astype(np.float32),
     )

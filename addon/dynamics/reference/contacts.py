@@ -33,6 +33,7 @@ class Plane:
     offset: float
     origin: Floats
     is_out: bool
+    skin: float  # [m]
     push: float = 0.0
 
     def push_out(self, x: Floats, friction: float) -> bool:
@@ -45,7 +46,7 @@ class Plane:
         slip = slip - self.normal * (self.normal @ slip)
         length = max(float(np.linalg.norm(slip)), 1.0e-9)
         x[self.cv] -= slip * min(friction * push / length, 1.0)
-        return bool(missing > -SKIN) and self.is_out
+        return bool(missing > -self.skin) and self.is_out
 
     def absorb(self, x: Floats, previous: Floats) -> None:
         """Take away the speed that pushing out has made."""
@@ -60,9 +61,14 @@ def push_out(planes: list[Plane], x: Floats, friction: float) -> dict[int, Float
 
 
 def planes_of(
-    posed: PosedCollider, x: Floats, previous: Floats, settings: DynamicsSettings, moment: Moment
+    posed: PosedCollider,
+    x: Floats,
+    previous: Floats,
+    settings: DynamicsSettings,
+    moment: Moment,
+    size: float,
 ) -> list[Plane]:
-    """Planes for all CVs of x (cv_count, 3) near a collider."""
+    """Planes for all CVs of x (cv_count, 3) near a collider; `size` [m] is the hair's."""
     planes: list[Plane] = []
     before, now = posed.matrix_at(moment.begin), posed.matrix_at(moment.end)
     if np.linalg.cond(now[:3, :3]) >= 1.0 / FLAT:
@@ -70,17 +76,17 @@ def planes_of(
     inverse = np.linalg.inv(now)
     for cv in range(PINNED, len(x)):
         along = cv / (len(x) - 1)
-        radius = settings.radius_root * (1.0 - along) + settings.radius_tip * along
+        radius = size * (settings.radius_root * (1.0 - along) + settings.radius_tip * along)
         local = inverse @ np.append(x[cv], 1.0)
         found, gradient = posed.collider.distance(local[:3, None])
         outward = inverse[:3, :3].T @ gradient[:, 0]
         steepness = float(np.linalg.norm(outward))
         normal, distance = outward / steepness, float(found[0]) / steepness
-        if distance >= radius + REACH:
+        if distance >= radius + REACH * size:
             continue
         origin = previous[cv] + ((now - before) @ local)[:3]
         was = distance - normal @ (x[cv] - origin)
-        reached = was + settings.depenetration_speed * moment.dt
+        reached = was + settings.depenetration_speed * size * moment.dt
         offset = float(normal @ x[cv]) - distance + min(radius, reached)
-        planes.append(Plane(cv, normal, offset, origin, reached >= radius))
+        planes.append(Plane(cv, normal, offset, origin, reached >= radius, SKIN * size))
     return planes

@@ -62,7 +62,7 @@ class _Guide:
         self.rest = points(state.rest.position)
         self.twist_cv = int(state.rest.shape.twist_cv[guide])
         self.length = [float(np.linalg.norm(b - a)) for a, b in pairwise(self.rest)]
-        held = state.rest.tip_held
+        held, self.size = state.rest.tip_held, state.rest.size
         self.is_held = held is not None and bool(held[guide])
         self.before = drive.target_before[guide].astype(np.float64)
         self.displacement = drive.target_now[guide].astype(np.float64) - self.before
@@ -89,7 +89,7 @@ class _Guide:
         planes = [
             plane
             for posed in drive.colliders
-            for plane in planes_of(posed, self.x, self.previous, settings, moment)
+            for plane in planes_of(posed, self.x, self.previous, settings, moment, self.size)
         ]
         normals: dict[int, Floats] = {}
         for _ in range(settings.contact_passes if drive.colliders else 0):
@@ -246,7 +246,8 @@ class _Guide:
 
     def _is_off(self, tolerance: float) -> bool:
         wanted = np.array(self.length[PINNED - 1 :])
-        return bool((np.abs(self._lengths() - wanted) > wanted * tolerance + ROUNDING).any())
+        allowed = wanted * tolerance + ROUNDING * self.size
+        return bool((np.abs(self._lengths() - wanted) > allowed).any())
 
     def _lay_out(self) -> None:
         if self.is_held:

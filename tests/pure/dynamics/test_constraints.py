@@ -136,7 +136,7 @@ def test_finish_reaches_the_tolerance_only_where_needed(disturbed):
     for _ in range(5):
         keep_lengths(good, length[:, :3], None, None)
     position[:, :, :3] = good
-    finish_lengths(position, length, None, None, 0.002, 8)
+    finish_lengths(position, length, None, None, 0.002, 8, 0.2)
     np.testing.assert_array_equal(position[:, :, :3], good)
     assert error(position, length) <= 0.002 * 1.001
 
@@ -145,7 +145,7 @@ def test_finish_never_gives_up_on_lengths(disturbed):
     """One Newton step cannot fix this; laying the guide out again does."""
     position, length = disturbed
     position[:, PINNED:] *= np.random.default_rng(2).uniform(-30, 30, position[:, PINNED:].shape)
-    finish_lengths(position, length, None, None, 0.002, 1)
+    finish_lengths(position, length, None, None, 0.002, 1, 0.2)
     assert error(position, length) <= 0.002 * 1.001
 
 
@@ -218,7 +218,7 @@ def test_finish_lays_guides_with_held_tips_out_towards_them(disturbed):
     away = {}
     for held in (None, np.ones(40, np.float32)):
         laid_out = position.copy()
-        finish_lengths(laid_out, length, None, held, 0.002, 1)
+        finish_lengths(laid_out, length, None, held, 0.002, 1, 0.2)
         assert error(laid_out, length) <= 0.002 * 1.02
         away[held is None] = np.median(np.linalg.norm(laid_out[:, -1] - tip, axis=0))
     assert away[False] < away[True]
