@@ -82,31 +82,34 @@ def _on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
     return p1 + t * (m1 + t * (3.0 * chord - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * chord)))
 
 
-def frizz(grid: Floats, settings: ChildrenSettings) -> None:
+def frizz(grid: Floats, settings: ChildrenSettings, size: float) -> None:
     """Let each strand stray from its path in waves, in place; roots stay.
 
     Two waves across each other, with each child's own direction, phase and pitch, and together no
-    further than `settings.frizz`.
+    further than `settings.frizz` says.
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
+        size: the median length of the guides [m], in which frizz is given.
     """
     if not settings.frizz:
         return
     random = np.random.default_rng([settings.seed, 3])
     own = random.random((len(grid), 2, 4))
-    fraction = settings.frizz * along(settings.frizz_along, np.linspace(0.0, 1.0, grid.shape[1]))
-    fraction[0] = 0.0
+    strayed = settings.frizz * along(settings.frizz_along, np.linspace(0.0, 1.0, grid.shape[1]))
+    strayed *= size
+    strayed[0] = 0.0
     for start in range(0, len(grid), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         reached = arc_length(grid[chunk])
         shortest = _SEGMENTS_PER_WAVE / (grid.shape[1] - 1) * reached[:, -1:]
-        turns = reached / np.maximum(settings.frizz_length, shortest)
+        wave_length = np.maximum(settings.frizz_length * size, shortest)
+        turns = np.divide(reached, wave_length, out=np.zeros_like(reached), where=wave_length > 0.0)
         for wave in range(2):
             height, around, phase, pitch = own[chunk, wave].T
             swing = np.sin(_TURN * (turns * (0.75 + 0.5 * pitch)[:, None] + phase[:, None]))
             direction = _on_sphere(height, around)[:, None]
-            grid[chunk] += (0.5 * fraction * swing)[..., None] * direction
+            grid[chunk] += (0.5 * strayed * swing)[..., None] * direction
 
 
 def arc_length(grid: Floats) -> Floats:

@@ -67,7 +67,7 @@ def make_children(
     grid = mixed(roots.point, guides.grid, weights)
     clump(grid, group, settings)
     shorten(grid, settings)
-    frizz(grid, settings)
+    frizz(grid, settings, float(np.median(guides.lengths())))
     cv_count = grid.shape[1]
     strands = StrandSet(
         points=grid.reshape(-1, 3),

@@ -86,11 +86,11 @@ class ChildrenSettings(Settings):
         active_when=when("children.clump"),
     )
     frizz: float = number(
-        0.001,
+        0.004,
         label="Frizz",
-        description="Distance that single children stray from their path",
-        unit="length",
-        soft=(0.0, 0.01),
+        description="Distance that single children stray from their path, as a fraction of the "
+        "hair's length",
+        soft=(0.0, 0.05),
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
     )
@@ -103,12 +103,11 @@ class ChildrenSettings(Settings):
         active_when=when("children.frizz"),
     )
     frizz_length: float = number(
-        0.03,
+        0.12,
         label="Frizz Length",
-        description="Length of hair from one stray to the next",
-        unit="length",
-        soft=(0.005, 0.2),
-        hard=(0.0001, 100.0),
+        description="Length of hair from one stray to the next, as a fraction of the hair's length",
+        soft=(0.02, 1.0),
+        hard=(0.001, 100.0),
         shown_when=when("children.method", "multi", "single"),
         active_when=when("children.frizz"),
     )

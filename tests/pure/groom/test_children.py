@@ -380,7 +380,7 @@ def test_frizz_strays_as_far_as_it_says_and_not_at_the_root(
         chosen = settings(strand_count=2000, frizz=0.004, **values)
         grid = make_children(groomed, egg, chosen, place="test").strands.grid
         assert (grid[:, 0] == calm[:, 0]).all()
-        return np.asarray(grid - calm)
+        return np.asarray(grid - calm) / float(np.median(groomed.lengths()))
 
     away = np.linalg.norm(strayed(frizz_along=flat), axis=2)[:, 1:]
     assert away.max() <= 0.004 * (1.0 + 1e-3)
@@ -395,20 +395,50 @@ def test_frizz_strays_as_far_as_it_says_and_not_at_the_root(
 def test_frizz_is_smooth_and_of_the_length_it_says(egg: Surface) -> None:
     """Between CVs it turns little: it changes sides about twice a wave, and never at each CV."""
     straight = GrowSettings(
-        method="normals", strand_count=200, cv_count=32, length=0.3, segment_ratio=1.0
+        method="normals",
+        strand_count=200,
+        cv_count=32,
+        length=0.3,
+        length_variation=0.0,
+        segment_ratio=1.0,
     )
     guides = grow(egg, straight)
     calm = make_children(guides, egg, settings(), place="test").strands.grid
 
     def sides(frizz_length: float) -> float:
-        chosen = settings(frizz=0.002, frizz_length=frizz_length)
+        chosen = settings(frizz=0.008, frizz_length=frizz_length / 0.3)
         stray = make_children(guides, egg, chosen, place="test").strands.grid - calm
         return float((np.diff(np.sign(stray[:, 1:, 0]), axis=1) != 0.0).sum(axis=1).mean())
 
-    long, short, shortest = sides(0.3), sides(0.06), sides(0.0001)
+    long, short, shortest = sides(0.3), sides(0.06), sides(0.0003)
     assert long < 3.5
     assert short == pytest.approx(2.0 * 0.3 / 0.06, rel=0.35)
     assert shortest < 0.85 * 31  # three segments a wave, which strands can still show
+
+
+# --- scale ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])
+@pytest.mark.parametrize("method", ["multi", "single"])
+def test_children_are_the_same_at_any_scale(
+    egg: Surface, groomed: StrandSet, method: str, factor: float
+) -> None:
+    """With all that shapes them: as many, on the same places, of the same shape."""
+    chosen = ChildrenSettings(method=method, strand_count=1000)
+    one = make_children(groomed, egg, chosen, place="test")
+    larger = replace(egg, positions=egg.positions * np.float32(factor))
+    guides = replace(
+        groomed,
+        points=groomed.points * np.float32(factor),
+        radius=groomed.radius * np.float32(factor),
+    )
+    other = make_children(guides, larger, chosen, place="test")
+    assert (other.strands.root_triangle == one.strands.root_triangle).all()
+    size = float(np.median(groomed.lengths()))
+    assert other.strands.points / factor == pytest.approx(one.strands.points, abs=1e-5 * size)
+    assert other.strands.radius / factor == pytest.approx(one.strands.radius, rel=1e-5)
+    assert other.notes == one.notes
 
 
 # --- bad input -----------------------------------------------------------------------------------
