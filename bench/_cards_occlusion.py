@@ -16,7 +16,7 @@ from mathutils.bvhtree import BVHTree
 from hairloom.addon.card_flow import card_build_steps
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.cards.occlusion import CardOccluder, vertex_occlusion
+from hairloom.addon.cards.occlusion import CardOccluder, extent_of, vertex_occlusion
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.steps import result_of
@@ -106,6 +106,7 @@ class _Scene:
     ) -> None:
         self._tree, self._mesh, self._alpha = tree, mesh, alpha
         self._corners, self._settings = corners, settings
+        self._extent = extent_of(mesh)  # which are all cards there are
 
     def light(self, start: np.ndarray, direction: np.ndarray, own: int) -> float:
         """What comes through along one ray."""
@@ -116,13 +117,14 @@ class _Scene:
             if index is None:
                 return light
             travelled += gap
-            if travelled > self._settings.reach:
+            if travelled > self._settings.reach * self._extent:
                 return light
             if index >= len(self._mesh.triangles):
                 if normal.dot(way) < 0.0:
                     return 0.0
             elif (
-                self._mesh.card[index] != own or travelled > self._settings.self_occlusion_distance
+                self._mesh.card[index] != own
+                or travelled > self._settings.self_occlusion_distance * self._extent
             ):
                 through = 1.0 - self._alpha_at(index, np.array(place))
                 light *= through**self._settings.extinction

@@ -146,7 +146,7 @@ def _card_shapes(strips: Strips, grid: Floats, radius: Floats, cluster: Ints) ->
     spacing = np.gradient(strips.frames.center, axis=1)
     spacing = np.linalg.norm(spacing, axis=-1)
     scales = (width.mean(axis=1), spacing.sum(axis=1), fill.mean(axis=1), count)
-    octaves = [np.log2(np.maximum(scale, _TINY)) for scale in scales]
+    octaves = [np.log2(np.maximum(scale / np.median(scale), _TINY)) for scale in scales]
     wave = np.bincount(cluster, _asides(strips.frames, grid, cluster), card_count) / count
     return _CardShapes(count, covered, spacing, np.stack([*octaves, wave / _WAVE], axis=1))
 

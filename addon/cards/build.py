@@ -109,7 +109,9 @@ def card_steps(
     yield "Cards from strands"
     cards, plan = uncut_cards(groom, settings, atlas)
     yield "Levels of detail"
-    error = settings.error if settings.source == "clusters" else None
+    error = None
+    if settings.source == "clusters":
+        error = settings.error * float(np.median(groom.strands.lengths()))
     levels = card_levels(cards, settings, error)
     meshes, errors = zip(*((level.mesh, level.error) for level in levels), strict=True)
     unsorted = tuple(mesh.triangles for mesh in meshes)

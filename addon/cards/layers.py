@@ -20,8 +20,9 @@ _MAX_OTHERS = 4096
 _SEEN = 6.0
 #: Cosine between the normals of two cards that belong to the same side of the head.
 _ALIKE = 0.3
-#: What is nearer than this to a card's own plane is neither below nor above it [m].
-_LEVEL = 1.0e-5
+#: What is nearer than this to a card's own plane, in terms of how wide a look is, is neither below
+#: nor above it.
+_LEVEL = 1.0e-3
 _CHUNK = 1024
 
 
@@ -77,7 +78,8 @@ def _counted(
         & (normal @ other_normal.T > _ALIKE)
         & (card[:, None] != other_card)
     )
-    below, above = height < -_LEVEL, height > _LEVEL
+    level = _LEVEL * reach**0.5
+    below, above = height < -level, height > level
     return (is_seen & below).sum(axis=1), (is_seen & above).sum(axis=1)
 
 

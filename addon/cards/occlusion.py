@@ -24,6 +24,7 @@ import os
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -35,8 +36,8 @@ from .parallel_rays import crossings, point_grid
 from .sort import card_of_vertex
 from .steps import result_of
 
-#: What is nearer than this is met by nobody: cards that cross at a vertex [m].
-_NEAREST = 1.0e-4
+#: What is nearer than this is met by nobody: cards that cross at a vertex. In extents of the cards.
+_NEAREST = 2.0e-4
 #: Optical depth of what is opaque: exp of its negative is 0 in float32.
 _OPAQUE = 100.0
 #: Directions at work at the same time; numpy lets other threads run most of the time.
@@ -114,6 +115,12 @@ def occlusion_steps(
     return shown
 
 
+def extent_of(*meshes: CardMesh) -> float:
+    """The diagonal of cards' bounds [m], in which distances are given in the settings."""
+    positions = np.concatenate([mesh.positions for mesh in meshes])
+    return float(np.linalg.norm(np.ptp(positions, axis=0)))
+
+
 def even_axes(count: int) -> Floats:
     """Unit vectors, one of each axis, (count, 3): with their opposites evenly over the sphere.
 
@@ -172,6 +179,24 @@ class _Layer:
         return depth
 
 
+@dataclass(frozen=True)
+class _Distances:
+    """From where to where along a ray cards and bodies occlude, and own cards from `own` on [m]."""
+
+    nearest: float
+    reach: float
+    own: float
+
+    @classmethod
+    def of(cls, settings: CardOcclusionSettings, extent: float, whole: float) -> Self:
+        """Args:
+        extent: of the cards that are shaded [m].
+            whole: of these and all that shade them.
+        """
+        own = settings.self_occlusion_distance * extent
+        return cls(_NEAREST * extent, settings.reach * whole, own)
+
+
 class _Scene:
     """What is shaded and what occluders, made ready for one axis after the other."""
 
@@ -186,7 +211,10 @@ class _Scene:
         self._points = np.ascontiguousarray((mesh.positions - middle).T)
         self._normals = mesh.normal
         self._card = card_of_vertex(mesh)
-        self._settings = settings
+        self._extinction = settings.extinction
+        self._distances = _Distances.of(
+            settings, extent_of(mesh), extent_of(mesh, *(each.mesh for each in occluders))
+        )
         self._bodies = [_Triangles(body.positions, body.triangles, middle) for body in bodies]
         self._layers = [_Layer(each, middle, each.mesh is mesh) for each in occluders]
 
@@ -197,12 +225,12 @@ class _Scene:
         side = np.where(leaning < 0.0, -1.0, 1.0).astype(np.float32)
         rays = _Rays(np.arange(len(leaning)), frame @ self._points, side, self._card)
         for body in self._bodies:
-            rays = rays.taken(~rays.enters(frame @ body.corners, body.height, self._settings))
+            rays = rays.taken(~rays.enters(frame @ body.corners, body.height, self._distances))
         depth = np.zeros(len(rays.vertex))
         for layer in self._layers:
-            depth += rays.depth(frame @ layer.triangles.corners, layer, self._settings)
+            depth += rays.depth(frame @ layer.triangles.corners, layer, self._distances)
         transmittance = np.zeros(len(leaning))
-        transmittance[rays.vertex] = np.exp(-self._settings.extinction * depth)
+        transmittance[rays.vertex] = np.exp(-self._extinction * depth)
         return np.abs(leaning), transmittance
 
 
@@ -236,29 +264,29 @@ class _Rays:
             self.vertex[index], self.places.take(index, axis=1), self.side[index], self.card[index]
         )
 
-    def enters(self, corners: Floats, height: float, settings: CardOcclusionSettings) -> Bools:
+    def enters(self, corners: Floats, height: float, distances: _Distances) -> Bools:
         """Which of the rays enter a body within the reach, (n,)."""
         one, two = corners[1] - corners[0], corners[2] - corners[0]
         facing = one[0] * two[1] - one[1] * two[0]
         found = np.zeros(len(self.vertex), bool)
-        for met in self._met(corners, height, settings.reach):
+        for met in self._met(corners, height, distances):
             enters = facing.take(met.triangle) * self.side.take(met.ray) < 0.0
             found[met.ray[enters]] = True
         return found
 
-    def depth(self, corners: Floats, layer: _Layer, settings: CardOcclusionSettings) -> Floats:
+    def depth(self, corners: Floats, layer: _Layer, distances: _Distances) -> Floats:
         """Optical depth of all cards of a layer that each ray meets, (n,)."""
         total = np.zeros(len(self.vertex))
-        for met in self._met(corners, layer.triangles.height, settings.reach):
+        for met in self._met(corners, layer.triangles.height, distances):
             is_own = layer.card.take(met.triangle) == self.card.take(met.ray)
-            kept = np.flatnonzero(~is_own | (met.distance > settings.self_occlusion_distance))
+            kept = np.flatnonzero(~is_own | (met.distance > distances.own))
             places = met.triangle.take(kept), met.second.take(kept), met.third.take(kept)
             depth = layer.depth_at(*places)
             total += np.bincount(met.ray.take(kept), depth, minlength=len(total))
         return total
 
-    def _met(self, corners: Floats, height: float, reach: float) -> Iterator[_Met]:
-        """All that rays meet ahead of them within the reach [m], in portions."""
+    def _met(self, corners: Floats, height: float, distances: _Distances) -> Iterator[_Met]:
+        """All that rays meet ahead of them within the reach, in portions."""
         if not len(self.vertex):
             return
         first, second, third = corners[:, 2]
@@ -267,7 +295,7 @@ class _Rays:
             plane = planes.take(pair.triangle, axis=0)
             met = plane[:, 0] + plane[:, 1] * pair.second + plane[:, 2] * pair.third
             distance = (met - self.places[2].take(pair.point)) * self.side.take(pair.point)
-            kept = np.flatnonzero((distance > _NEAREST) & (distance < reach))
+            kept = np.flatnonzero((distance > distances.nearest) & (distance < distances.reach))
             yield _Met(
                 pair.point.take(kept),
                 pair.triangle.take(kept),

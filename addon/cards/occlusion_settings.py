@@ -39,20 +39,19 @@ class CardOcclusionSettings(Settings):
         hard=(1, 65_536),
     )
     reach: float = number(
-        1.0,
+        2.0,
         label="Reach",
-        description="Maximum distance at which cards and bodies occlude",
-        unit="length",
-        soft=(0.02, 2.0),
+        description="Maximum distance at which cards and bodies occlude, relative to the extent of "
+        "all cards",
+        soft=(0.05, 4.0),
         hard=(0.0, 1_000.0),
     )
     self_occlusion_distance: float = number(
-        0.02,
+        0.03,
         label="Self-occlusion Distance",
-        description="Distance from which a card occludes itself; a little more than its width, so "
-        "that only curls do",
-        unit="length",
-        soft=(0.0, 0.1),
+        description="Distance from which a card occludes itself, relative to the extent of the "
+        "cards; a little more than its width, so that only curls do",
+        soft=(0.0, 0.2),
         hard=(0.0, 1_000.0),
     )
     others: bool = toggle(

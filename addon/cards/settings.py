@@ -33,13 +33,12 @@ class CardSettings(Settings):
         shown_when=when("cards.source", "clusters"),
     )
     error: float = number(
-        0.002,
+        0.008,
         label="Error",
-        description="Maximum distance of a card's edges from the path of its strands; less gives "
-        "more segments",
-        soft=(0.0005, 0.02),
+        description="Maximum distance of a card's edges from the path of its strands, as a "
+        "fraction of the hair's length; less gives more segments",
+        soft=(0.002, 0.1),
         hard=(0.0, 10.0),
-        unit="length",
         shown_when=when("cards.source", "clusters"),
     )
     cluster_width: float = number(

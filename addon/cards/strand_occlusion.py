@@ -17,7 +17,7 @@ from .sort import card_of_vertex
 #: Pairs of vertices and strands at work at the same time.
 _PAIRS = 1 << 20
 #: Columns that lie closer count as this far apart [m].
-_MIN_WIDTH = 1.0e-6
+_MIN_WIDTH = 1.0e-12
 
 
 def strands_occlusion(mesh: CardMesh, grid: Floats, occlusion: Floats, card: Ints) -> Floats:

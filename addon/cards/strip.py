@@ -24,8 +24,8 @@ from .sort import reordered
 
 #: Roots whose distance to their neighbours is measured.
 _SPACING_SAMPLES = 512
-#: For a single guide, which has no neighbour [m].
-_LONELY_SPACING = 0.01
+#: For a single guide, which has no neighbour, in terms of its length.
+_LONELY_SPACING = 0.04
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,8 @@ def guide_strips(guides: Floats, root_normal: Floats, settings: CardSettings) ->
     """
     frames = card_frames(guides, root_normal, settings.segment_count)
     along = np.linspace(0.0, 1.0, settings.segment_count + 1, dtype=np.float32)
-    width = settings.width_factor * mean_spacing(guides[:, 0]) * taper(along, settings.tip_width)
+    spacing = mean_spacing(guides[:, 0]) or _LONELY_SPACING * _length(guides)
+    width = settings.width_factor * spacing * taper(along, settings.tip_width)
     return Strips(frames, np.broadcast_to(width, (len(guides), len(along))))
 
 
@@ -182,7 +183,8 @@ def _facing_turn(normal: Floats, side: Floats, root_normal: Floats) -> Floats:
 
 
 def mean_spacing(roots: Floats) -> float:
-    """Mean distance from a root to its nearest neighbour [m], coinciding roots left out.
+    """Mean distance from a root to its nearest neighbour [m], coinciding roots left out; 0
+    where there is none.
 
     Estimated from at most `_SPACING_SAMPLES` roots, each measured against all.
     """
@@ -192,7 +194,14 @@ def mean_spacing(roots: Floats) -> float:
     squared = np.where(squared > 0.0, squared, np.inf)
     nearest = squared.min(axis=1, initial=np.inf)
     found = np.isfinite(nearest)
-    return float(np.sqrt(nearest[found]).mean()) if found.any() else _LONELY_SPACING
+    return float(np.sqrt(nearest[found]).mean()) if found.any() else 0.0
+
+
+def _length(guides: Floats) -> float:
+    """Median length of guides (guide_count, cv_count, 3) [m]; 0 without any."""
+    if not len(guides):
+        return 0.0
+    return float(np.median(np.linalg.norm(np.diff(guides, axis=1), axis=2).sum(axis=1)))
 
 
 def taper(along: Floats, tip_width: float) -> Floats:

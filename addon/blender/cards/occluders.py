@@ -32,7 +32,7 @@ from ..scene.surfaces import read_surface
 from .material import alpha_of
 from .mesh import CARD_ATTRIBUTES
 
-#: Hair that is nearer than this to where it was has not moved [m].
+#: Hair that is nearer than this to where it was has not moved, in terms of how far it reaches.
 _STILL = 1.0e-5
 _NO_MOTION = np.eye(4)
 
@@ -182,7 +182,10 @@ def _alike(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
 def _is_still(one: object, other: object) -> bool:
     if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
         return one is other or bool(one == other)
-    return one.shape == other.shape and np.allclose(one, other, rtol=_STILL, atol=_STILL)
+    if one.shape != other.shape:
+        return False
+    reach = float(np.abs(one).max(initial=0.0))
+    return np.allclose(one, other, rtol=0.0, atol=_STILL * reach)
 
 
 def occluder_objects(

@@ -82,6 +82,30 @@ def test_levels_share_one_atlas_and_all_that_is_known_of_cards(way: str, source:
         np.testing.assert_array_equal(finest.tile, build.plan.tile)
 
 
+@pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])
+@pytest.mark.parametrize(("method", "source"), [("clusters", "baked"), ("guides", "made")])
+def test_cards_are_the_same_at_any_scale(method: str, source: str, factor: float) -> None:
+    """Their number, shape, tiles, light and order."""
+
+    def at(scale: float) -> CardBuild:
+        strands = falling(300)
+        points, radius = (np.float32(scale) * each for each in (strands.points, strands.radius))
+        strands = replace(strands, points=points, radius=radius)
+        atlas = AtlasSettings(source=source, columns=8, rows=1)
+        return built(strands, atlas, source=method, card_count=16, levels=2)
+
+    one, other = at(1.0), at(factor)
+    assert other.notes == one.notes and other.wrong_fraction == one.wrong_fraction
+    assert other.errors == pytest.approx([factor * error for error in one.errors], rel=1e-3)
+    for mesh, same in zip(other.levels, one.levels, strict=True):
+        np.testing.assert_allclose(mesh.positions / factor, same.positions, atol=1e-6)
+        for name in ("uv", "along", "normal", "tangent", "occlusion"):
+            found, expected = getattr(mesh, name), getattr(same, name)
+            np.testing.assert_allclose(found, expected, atol=1e-3, err_msg=name)
+        for name in ("triangles", "card", "group", "layer", "tile"):
+            np.testing.assert_array_equal(getattr(mesh, name), getattr(same, name), err_msg=name)
+
+
 def test_crossed_cards_have_the_tile_and_group_of_their_pair() -> None:
     build = built(falling(800), AtlasSettings(columns=8, rows=2), crossed=True, fly_aways=0.0)
     count = build.finest.card_count // 2

@@ -9,7 +9,7 @@ import pytest
 from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import OF_VERTICES, CardMesh
-from hairloom.addon.cards.occlusion import CardOccluder, even_axes, vertex_occlusion
+from hairloom.addon.cards.occlusion import CardOccluder, even_axes, extent_of, vertex_occlusion
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.strands import Surface
@@ -117,7 +117,8 @@ def test_the_mean_error_against_brute_force_is_below_two_hundredths() -> None:
     found = vertex_occlusion(mesh, [CardOccluder(mesh, alpha)], [head], settings)
     chosen = np.random.default_rng(2).choice(len(found), 50, replace=False)
     through = (1.0 - alpha) ** settings.extinction
-    expected = brute_force(mesh, 1.0 - through, head, chosen, 512, settings.self_occlusion_distance)
+    own = settings.self_occlusion_distance * extent_of(mesh)
+    expected = brute_force(mesh, 1.0 - through, head, chosen, 512, own)
     assert expected.min() < 0.3 and expected.max() > 0.95  # it is not all alike
     error = found[chosen] - expected
     assert np.abs(error).mean() < 0.02
@@ -214,8 +215,8 @@ def test_a_card_that_curls_over_itself_shades_itself_beyond_its_own_reach() -> N
         np.array([[0, 0, 1]], np.float32),
         CardSettings(segment_count=40, width_factor=6.0, bend=0.0, roundness=0.0),
     )
-    inside = vertex_occlusion(mesh, [CardOccluder(mesh)], [], plain(self_occlusion_distance=0.02))
-    never = vertex_occlusion(mesh, [CardOccluder(mesh)], [], plain(self_occlusion_distance=1.0))
+    inside = vertex_occlusion(mesh, [CardOccluder(mesh)], [], plain(self_occlusion_distance=0.1))
+    never = vertex_occlusion(mesh, [CardOccluder(mesh)], [], plain(self_occlusion_distance=5.0))
     assert inside.max() < 0.8
     np.testing.assert_array_equal(never, 1.0)
 
@@ -224,10 +225,24 @@ def test_other_grooms_and_bodies_shade_as_well_and_only_within_the_reach() -> No
     mesh, other = stacked([0.0], size=0.01), stacked([0.2], size=50.0)
     body = Surface(*sheet(0.2, 50.0))
     below = Surface(body.positions, body.triangles[:, ::-1])
-    near, far = plain(reach=0.1), plain()
+    far = plain()
     for shades, bodies in (([CardOccluder(other)], []), ([], [below])):
+        near = plain(reach=0.1 / extent_of(mesh, *(each.mesh for each in shades)))
         np.testing.assert_array_equal(vertex_occlusion(mesh, shades, bodies, near), 1.0)
         assert vertex_occlusion(mesh, shades, bodies, far).max() < 0.02
+
+
+@pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])
+def test_occlusion_is_the_same_at_any_scale(factor: float) -> None:
+    def found(scale: float) -> np.ndarray:
+        mesh, head = hanging(40), ball()
+        mesh = replace(mesh, positions=mesh.positions * np.float32(scale))
+        head = replace(head, positions=head.positions * np.float32(scale))
+        return vertex_occlusion(mesh, [CardOccluder(mesh)], [head], CardOcclusionSettings(rays=64))
+
+    one = found(1.0)
+    assert one.min() < 0.5
+    np.testing.assert_allclose(found(factor), one, atol=1e-4)
 
 
 def test_a_mesh_of_other_cards_shades_as_the_cards_themselves() -> None:

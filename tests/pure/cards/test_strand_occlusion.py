@@ -26,7 +26,7 @@ from tests.pure.cards.test_build import falling
 
 MADE = AtlasSettings(source="made")
 FEW_RAYS = CardOcclusionSettings(rays=32)
-CLUSTERS = CardSettings(source="clusters", card_count=40, levels=1)
+CLUSTERS = CardSettings(source="clusters", card_count=40, levels=1, error=0.012)
 
 
 def rig_of(count: int) -> Rig:

@@ -161,8 +161,10 @@ def test_mean_spacing_on_a_lattice_and_without_neighbours() -> None:
     lattice = np.stack(np.meshgrid(*[np.arange(12.0)] * 2, [0.0]), axis=-1).reshape(-1, 3) * 0.007
     assert mean_spacing(lattice) == pytest.approx(0.007)
     assert mean_spacing(np.concatenate([lattice, lattice])) == pytest.approx(0.007)
-    assert mean_spacing(np.zeros((1, 3))) > 0.0
-    assert mean_spacing(np.zeros((5, 3))) > 0.0
+    assert mean_spacing(np.zeros((1, 3))) == 0.0
+    assert mean_spacing(np.zeros((5, 3))) == 0.0
+    alone = np.linspace(0.0, 1.0, 9)[None, :, None] * np.float32([0.0, 0.0, 0.2])
+    assert guide_strips(alone, np.float32([[0.0, 0.0, 1.0]]), CardSettings()).width.min() > 0.0
 
 
 def test_no_guides_give_no_cards() -> None:
