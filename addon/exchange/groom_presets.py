@@ -11,10 +11,10 @@ from ..arrays import Floats, Ints
 from .files.file_space import FileSpace
 from .groom import Groom
 
-#: Thinner than any hair [m]. A width of 0 makes Unity drop all widths.
-MIN_WIDTH = 1.0e-6
-#: Wider than any hair [m]: a mistake in units.
-WIDEST = 5.0e-3
+#: Thinner than any hair of any creature [m]. A width of 0 makes Unity drop all widths.
+MIN_WIDTH = 1.0e-9
+#: Wider than any hair, in terms of its length: a mistake in units.
+WIDEST = 0.1
 
 
 @dataclass(frozen=True)
@@ -144,9 +144,10 @@ def _warnings(groom: Groom, written: Groom, preset: GroomPreset) -> list[str]:
     warnings = []
     zero = int((strands.radius <= 0.0).sum())
     if zero:
-        warnings.append(f"{zero} points have no width: they are written as {MIN_WIDTH * 1e3} mm")
-    if strands.radius.max() * 2.0 > WIDEST:
-        warnings.append(f"Widths reach {strands.radius.max() * 2e3:.3g} mm: check the units")
+        warnings.append(f"{zero} points have no width: they are written as {MIN_WIDTH * 1e6:g} um")
+    widest = 2.0 * float(strands.radius.max()) / max(float(np.median(strands.lengths())), 1.0e-30)
+    if widest > WIDEST:
+        warnings.append(f"Widths reach {widest:.0%} of the strands' length: check the units")
     if len(np.unique(strands.group)) == 1:
         warnings.append("All strands are in one group: they can have only one material")
     if strands.root_uv is None:

@@ -10,12 +10,13 @@ from ..arrays import Bools, Floats, Ints
 from .colors import usable_colors
 from .strand_set import DEFAULT_RADIUS, StrandSet
 
-#: A strand shorter than this is a point to the eye and has no direction in float32 [m].
+#: A strand shorter than this has no direction in float32, in terms of how far from the origin
+#: it is.
 SHORTEST_STRAND = 1.0e-6
 #: A radius that is larger than the median of all by this factor is a broken number.
 _STRAY = 100.0
-#: A point farther from the origin is a broken number: float32 there cannot tell strands apart [m].
-FARTHEST_POINT = 1.0e4
+#: A point farther from the origin is a broken number, of hair of any size [m].
+FARTHEST_POINT = 1.0e6
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def clean(
     faults = {
         "fewer than two points": counts < 2,
         "a point that is not finite": _any_per_curve(~np.isfinite(points).all(axis=1), offsets),
-        "a point farther than 10 km away": _any_per_curve(
+        "a point farther than 1,000 km away": _any_per_curve(
             (np.abs(points) > FARTHEST_POINT).any(axis=1), offsets
         ),
         "no length": _no_length(points, offsets),
@@ -100,7 +101,8 @@ def _are_sound(points: Floats, offsets: Ints, radius: Floats, root_uv: Floats | 
     if not all(np.isfinite(np.vdot(each, each)) for each in others):
         return False
     reach = points[offsets[1:] - 1] - points[offsets[:-1]]
-    return bool((np.einsum("ij,ij->i", reach, reach) >= 3.0 * SHORTEST_STRAND**2).all())
+    shortest = SHORTEST_STRAND * float(np.abs(points).max())
+    return bool((np.einsum("ij,ij->i", reach, reach) >= 3.0 * shortest**2).all())
 
 
 def _any_per_curve(flags: Bools, offsets: Ints) -> Bools:
@@ -110,13 +112,14 @@ def _any_per_curve(flags: Bools, offsets: Ints) -> Bools:
 
 def _no_length(points: Floats, offsets: Ints) -> Bools:
     """Whether a curve's box has no extent; a curve of finite points then has no length either."""
-    box = np.zeros((len(offsets) - 1, 3), np.float32)
+    box, away = np.zeros((2, len(offsets) - 1, 3), np.float32)
     filled = np.flatnonzero(np.diff(offsets) > 0)
     if len(filled):
         starts = offsets[filled]
         finite = np.nan_to_num(points, nan=0.0, posinf=0.0, neginf=0.0)
         box[filled] = np.maximum.reduceat(finite, starts) - np.minimum.reduceat(finite, starts)
-    return (box < SHORTEST_STRAND).all(axis=1)
+        away[filled] = np.maximum.reduceat(np.abs(finite), starts)
+    return (box <= SHORTEST_STRAND * away.max(axis=1, keepdims=True)).all(axis=1)
 
 
 def _usable_radius(radius: Floats | None, point_count: int) -> Floats:

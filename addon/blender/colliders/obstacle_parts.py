@@ -23,7 +23,7 @@ from ...strands.affine import moved
 from .carriers import Carrier, scales_of
 from .fields import field_of
 
-#: A mesh that returns to its rest within this distance is the same mesh [m].
+#: A mesh that returns to its rest within this part of its extent is the same mesh.
 _SAME_SHAPE = 1.0e-5
 #: Axes whose lengths differ by less than this fraction count as equal.
 _EVEN = 0.01
@@ -131,7 +131,8 @@ class FieldPart:
         ):
             return False
         here = moved(self.surface.positions, matrix)
-        tolerance = _SAME_SHAPE + 1.0e-6 * float(np.abs(here).max(initial=0.0))
+        extent = float(np.linalg.norm(np.ptp(here, axis=0)))
+        tolerance = _SAME_SHAPE * extent + 1.0e-6 * float(np.abs(here).max(initial=0.0))
         return np.allclose(here, surface.positions, rtol=0.0, atol=tolerance)
 
 

@@ -243,7 +243,9 @@ def test_long_curves_alone_are_resampled(tmp_path: Path) -> None:
     read = read_groom_alembic(path)
     np.testing.assert_allclose(read.strands.points, expected, atol=1e-6)
     np.testing.assert_allclose(read.groom.color, expected, atol=1e-6)
-    np.testing.assert_allclose(read.strands.radius[:4], [3e-5, 2e-5, 1e-5, 5e-7], rtol=1e-3)
+    np.testing.assert_allclose(
+        read.strands.radius[:4], [3e-5, 2e-5, 1e-5, 0.5 * MIN_WIDTH], rtol=1e-3
+    )
     assert read.strands.group.tolist() == [1, 2]
     later = Abc.IArrayProperty(geometry(curves), "P").getValue(Abc.ISampleSelector(2 / 25.0))
     np.testing.assert_allclose(later, BLENDER.space.to_file(expected * 2), atol=1e-6)
@@ -491,7 +493,7 @@ def test_preflight_says_what_the_engine_will_see() -> None:
     ("change", "preset", "warning"),
     [
         ({"radius": np.zeros(27)}, UNREAL, "27 points have no width"),
-        ({"radius": np.full(27, 0.004)}, UNREAL, "Widths reach 8 mm"),
+        ({"radius": np.full(27, 0.1)}, UNREAL, "Widths reach"),
         ({"group": np.zeros(6)}, UNREAL, "in one group"),
         ({"root_uv": None}, UNREAL, "no root UVs"),
         ({}, replace(UNREAL, max_points=5), "2 strands are resampled to 5 points"),

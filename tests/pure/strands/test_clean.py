@@ -31,11 +31,21 @@ def test_each_fault_is_counted_once_and_named() -> None:
     assert cleaned.dropped == {
         "fewer than two points": 3,
         "a point that is not finite": 2,
-        "a point farther than 10 km away": 1,
+        "a point farther than 1,000 km away": 1,
         "no length": 1,
     }
     assert cleaned.kept.tolist() == [0, 6]
     assert [points.tolist() for points in cleaned.strands.strands()] == [CURVES[0], CURVES[6]]
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e3])
+def test_hair_of_any_size_is_kept(factor: float) -> None:
+    """Stubble of a millimetre on a face two metres up; what has no length never has one."""
+    roots = np.random.default_rng(1).uniform(-0.1, 0.1, (50, 1, 3)) + [0.0, 0.0, 2.0]
+    curves = roots + np.linspace(0.0, 1e-3, 5)[:, None] * [0.0, -1.0, 0.0]
+    curves[7] = curves[7, 0]
+    cleaned = clean(factor * curves.reshape(-1, 3), np.arange(51) * 5)
+    assert cleaned.dropped == {"no length": 1} and 7 not in cleaned.kept
 
 
 def test_what_belongs_to_a_curve_stays_with_it() -> None:
