@@ -104,6 +104,17 @@ def with_widths(strands: StrandSet, method: str = "auto") -> tuple[StrandSet, Wi
     return replace(strands, radius=radius, has_widths=True), widths
 
 
+def as_wide(strands: StrandSet, drawn: StrandSet) -> StrandSet:
+    """The strands as wide at their roots as they are drawn.
+
+    Args:
+        drawn: the same strands with another number of points, after `with_widths`, which measures
+            them by their points.
+    """
+    width = drawn.radius[drawn.offsets[:-1]]
+    return replace(strands, radius=np.repeat(width, strands.point_counts), has_widths=True)
+
+
 @dataclass(frozen=True)
 class _Found:
     """width: (strand_count,) [m]. spacing: the median distance of neighbours [m]; 0 without any."""

@@ -17,8 +17,7 @@ from ...exchange.groom import Groom
 from ...exchange.strand_check import check_lines
 from ...exchange.strand_export_settings import StrandExportSettings
 from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat, format_of
-from ...groom.width_settings import WidthSettings
-from ...groom.widths import with_widths
+from ...groom.widths import as_wide
 from ...pipeline import Rig
 from ...shading.settings import ShadingSettings
 from ..strands.groom_motion import BakedMotion
@@ -109,7 +108,7 @@ def _of_rig(
                 remedy="Give a bake with --bake, or hair of the scene with --object",
             )
         rig, inputs = read_rig(job)
-        own = _groom(rig, inputs, job.settings[WidthSettings].method)
+        own = _groom(rig, inputs)
         groom = hair_of_rig(rig, own, needs, look).groom
         return StrandExport(groom, settings, kind, inputs.dropped)
     at = frames if job.options.frame is None else range(job.options.frame, job.options.frame + 1)
@@ -130,12 +129,12 @@ def _of_rig(
     return plan
 
 
-def _groom(rig: Rig, inputs: Inputs, widths: str) -> Groom:
+def _groom(rig: Rig, inputs: Inputs) -> Groom:
     """The strands with their own points; those of the rig where they are children."""
     name = Path(inputs.groom_name).stem
     if inputs.strands.strand_count != rig.strands.strand_count:
         return Groom(rig.strands, name)
-    own, _ = with_widths(inputs.strands, widths)
+    own = as_wide(inputs.strands, rig.strands) if rig.widths.is_found else inputs.strands
     if inputs.groom is None:
         return Groom(own, name)
     return replace(inputs.groom, name=name, strands=own)

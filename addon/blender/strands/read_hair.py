@@ -13,7 +13,7 @@ from ...arrays import Floats, Ints
 from ...exchange.groom import Groom, points_of, with_guide_copies
 from ...groom.roots import bind_roots
 from ...groom.weights import guide_weights
-from ...groom.widths import with_widths
+from ...groom.widths import as_wide, with_widths
 from ...pipeline import Rig
 from ...shading.drawn_strands import drawn_color, look_color
 from ...shading.settings import ShadingSettings
@@ -159,7 +159,9 @@ def _with_notes(
 
 
 def _as_wide_as_drawn(hair: bpy.types.Object, strands: StrandSet) -> StrandSet:
-    return with_widths(strands, hair.data.hairloom.widths.method)[0]
+    settings = hair.data.hairloom
+    drawn, widths = with_widths(resample(strands, settings.guides.cv_count), settings.widths.method)
+    return as_wide(strands, drawn) if widths.is_found else strands
 
 
 def _bound_as(strands: StrandSet, bound: StrandSet) -> StrandSet:
