@@ -22,6 +22,7 @@ from damaged_files import sample
 from hairloom.addon.exchange.alembic.groom_alembic import is_finished, write_groom_alembic
 from hairloom.addon.exchange.files.atomic import write_text_atomic
 from hairloom.addon.exchange.files.file_set import written_together
+from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files
 from hairloom.addon.exchange.hair_file import write_hair_file
 from hairloom.addon.exchange.tfxbone import strongest_bones, write_tfxbone
 from hairloom.addon.exchange.tressfx import write_tfx
@@ -86,7 +87,7 @@ def killed(
     Returns:
         trials; failures: a file that is neither the old one nor the new one; amid: kills that left
         something half-written beside the target, those that came in time; mixed: sets with old and
-        new files; leftovers: what still lies beside the target after one write more.
+        new files once the next writer looks at the folder; leftovers: what still lies beside the target after one write more.
     """
     random = np.random.default_rng(seed)
     folder, versions, seconds = target.parent, [], 0.0
@@ -99,13 +100,14 @@ def killed(
     known: set[str] = set()
     for _ in range(trials):
         _kill_one(write, target, float(random.uniform(0.0, WRITES * seconds)))
+        beside = {name for name in os.listdir(folder) if name.startswith(".")}
+        found["amid"] += bool(beside - known)
+        remove_stale_files(folder)  # as the next writer does
+        known = {name for name in os.listdir(folder) if name.startswith(".")}
         content = _content(folder)
         is_whole = all(content.get(n) in [v[n] for v in versions] for n in versions[0])
         found["failures"] += not is_whole
         found["mixed"] += is_whole and content not in versions
-        beside = set(os.listdir(folder)) - set(content)
-        found["amid"] += bool(beside - known)
-        known = beside
         if not is_whole:
             _write_apart(write, target, 0)
     _write_apart(write, target, 0)

@@ -6,21 +6,26 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ...errors import HairloomError
+from .moving import flush, flush_names, free_name, move
 from .stale_temp_files import remove_stale_files, temporary_beside
 
 
 @contextmanager
-def atomic_write(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path, check: Callable[[], object] = lambda: None) -> Iterator[Path]:
     """A path beside `path` to write to; it takes the place of `path` when the block ends well.
 
     The temporary path has the same suffix, so that exporters accept it. Missing folders are made.
     When the block fails or is interrupted, what was at `path` before stays as it was. What a killed
-    process left in the folder is removed.
+    process left in the folder is removed. A file that is whole but cannot take its place, since
+    another program holds the old one, is kept beside it.
+
+    Args:
+        check: is called when the file is whole; what it raises leaves all as it was.
 
     Raises:
         HairloomError: nothing can be written there, or the block wrote no file.
@@ -28,14 +33,19 @@ def atomic_write(path: Path) -> Iterator[Path]:
     target = Path(os.path.realpath(path))  # through a link, as plain writing would go
     temporary = temporary_beside(target)
     try:
-        _check_writable(target, temporary)
+        _check_writable(target)
     except OSError as error:
         raise unwritable(path, error.strerror or str(error)) from error
     try:
         yield temporary
         if not temporary.is_file():
             raise unwritable(path, "nothing was written")
-        _replace(temporary, target)
+        if target.exists():
+            shutil.copymode(target, temporary)
+        flush(temporary)
+        check()
+        _replace(temporary, target, path)
+        flush_names(target.parent)
     except OSError as error:
         raise unwritable(path, error.strerror or str(error)) from error
     finally:
@@ -61,32 +71,29 @@ def write_text_atomic(path: Path, text: str) -> None:
     write_bytes_atomic(path, text.encode("utf-8"))
 
 
-def _check_writable(target: Path, temporary: Path) -> None:
+def _check_writable(target: Path) -> None:
     """Fail now rather than after a long export."""
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, "a folder has this name")
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_stale_files(target.parent)
-    temporary.touch(exist_ok=False)
-    temporary.unlink()
+    # under another name: nobody else shall know the right one before it is taken
+    trial = temporary_beside(target)
+    trial.touch(exist_ok=False)
+    trial.unlink()
 
 
-def _replace(temporary: Path, target: Path) -> None:
-    if target.exists():
-        shutil.copymode(target, temporary)
-    flush_to_disk(temporary, os.O_RDWR)
-    os.replace(temporary, target)
-    if os.name == "posix":  # elsewhere a folder cannot be opened
-        flush_to_disk(target.parent, os.O_RDONLY)
-
-
-def flush_to_disk(path: Path, flags: int) -> None:
-    """Wait until a file, or a folder's list of files, is on the disk."""
-    descriptor = os.open(path, flags)
+def _replace(temporary: Path, target: Path, path: Path) -> None:
     try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        move(temporary, target)
+    except PermissionError as error:
+        kept = free_name(target.with_name(f"{target.stem} new{target.suffix}"))
+        os.rename(temporary, kept)
+        raise HairloomError(
+            f"this file cannot be replaced ({error.strerror or error}); it is as it was",
+            place=str(path),
+            remedy=f"Close other programs that use it. The new file is beside it as {kept.name}",
+        ) from error
 
 
 def check_place(path: Path) -> None:

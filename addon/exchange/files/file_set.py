@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ...errors import HairloomError
-from .atomic import flush_to_disk, unwritable
-from .stale_temp_files import remove_stale_files, temporary_beside
+from .atomic import unwritable
+from .moving import flush, flush_names, free_name, move
+from .stale_temp_files import COMPLETE, remove_stale_files, temporary_beside
 
 
 @contextmanager
-def written_together(path: Path) -> Iterator[Path]:
+def written_together(path: Path, check: Callable[[], object] = lambda: None) -> Iterator[Path]:
     """A new, hidden folder beside `path`; its files move beside `path` when the block ends well.
 
     They keep their names, so that they may name each other. Missing folders are made. When the
     block fails or is interrupted, or when one of the files cannot be put into its place, all that
     was there before stays as it was. What a killed process left in the folder is removed.
+
+    Args:
+        check: is called when all files are whole; what it raises leaves all as it was.
 
     Raises:
         HairloomError: nothing can be written there, or the block wrote no file of `path`'s name.
@@ -38,7 +42,11 @@ def written_together(path: Path) -> Iterator[Path]:
         yield staging
         if not (staging / path.name).is_file():
             raise unwritable(path, "nothing was written")
-        _put_in_place(staging, folder)
+        check()
+        try:
+            _put_in_place(staging, folder)
+        except PermissionError as error:
+            raise _kept(staging, path, error) from error
     except OSError as error:
         raise unwritable(path, error.strerror or str(error)) from error
     except HairloomError as error:
@@ -50,25 +58,30 @@ def written_together(path: Path) -> Iterator[Path]:
 
 
 def _put_in_place(staging: Path, folder: Path) -> None:
-    """Replace file by file; when one fails, those before it get their old content back."""
+    """Replace file by file; when one fails, those before it get their old content back.
+
+    A process that is killed in between leaves a complete set, which the next writer puts in place.
+    """
     files = sorted(file for file in staging.iterdir() if file.is_file())
     backups = staging / "old"
     backups.mkdir()
     for file in files:
         _check_and_flush(file, folder / file.name)
-    done: list[Path] = []
+    (staging / COMPLETE).touch()
+    flush_names(staging)
+    done: list[tuple[Path, Path]] = []
     try:
         for file in files:
             target = Path(os.path.realpath(folder / file.name))  # through a link
             _keep(target, backups / file.name)
-            done.append(target)
-            shutil.move(file, target) if target.parent != folder else os.replace(file, target)
+            done.append((file, target))
+            move(file, target)
     except BaseException:
-        for target, file in zip(done, files, strict=False):
-            _restore(target, backups / file.name)
+        (staging / COMPLETE).unlink()
+        for file, target in done:
+            _restore(file, target, backups / file.name)
         raise
-    if os.name == "posix":
-        flush_to_disk(folder, os.O_RDONLY)
+    flush_names(folder)
 
 
 def _check_and_flush(file: Path, target: Path) -> None:
@@ -76,7 +89,7 @@ def _check_and_flush(file: Path, target: Path) -> None:
         raise unwritable(target, "a folder has this name")
     if target.exists():
         shutil.copymode(target, file)
-    flush_to_disk(file, os.O_RDWR)
+    flush(file)
 
 
 def _keep(target: Path, backup: Path) -> None:
@@ -89,8 +102,23 @@ def _keep(target: Path, backup: Path) -> None:
         shutil.copy2(target, backup)
 
 
-def _restore(target: Path, backup: Path) -> None:
+def _restore(file: Path, target: Path, backup: Path) -> None:
+    """The old file again, or none where there was none; the new one is staged again."""
+    if not file.exists():
+        move(target, file)
     if backup.exists():
-        os.replace(backup, target)
-    else:
-        target.unlink(missing_ok=True)
+        move(backup, target)
+
+
+def _kept(staging: Path, path: Path, error: PermissionError) -> HairloomError:
+    """Files that took minutes to write stay where they can be found."""
+    for left in (staging / "old").iterdir():
+        left.unlink()
+    (staging / "old").rmdir()
+    kept = free_name(path.with_name(f"{path.stem} new"))
+    os.rename(staging, kept)
+    return HairloomError(
+        f"a file cannot be replaced ({error.strerror or error}); all are as they were",
+        place=str(error.filename2 or error.filename or path),
+        remedy=f"Close other programs that use it. The new files are beside it in {kept.name}",
+    )

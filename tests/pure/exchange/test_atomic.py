@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.files import moving
 from hairloom.addon.exchange.files.atomic import (
     atomic_write,
     check_place,
@@ -101,3 +102,74 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
     write_bytes_atomic(link, b"content")
     assert link.is_symlink()
     assert (tmp_path / "real" / "groom.tfx").read_bytes() == b"content"
+
+
+def test_a_file_that_another_program_holds_stays_and_the_new_one_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By Windows' rules: what is open is not replaced."""
+    target = tmp_path / "groom.tfx"
+    target.write_bytes(b"old")
+    (tmp_path / "groom new.tfx").write_bytes(b"from before")
+    monkeypatch.setattr(moving.os, "replace", held)
+    with pytest.raises(HairloomError, match=r"groom new 2\.tfx"):
+        write_bytes_atomic(target, b"new")
+    assert target.read_bytes() == b"old"
+    assert (tmp_path / "groom new 2.tfx").read_bytes() == b"new"
+    assert len(names(tmp_path)) == 3
+
+
+def held(_source: Path, _target: Path) -> None:
+    raise PermissionError(13, "Access is denied")
+
+
+def test_a_file_that_is_held_for_a_moment_is_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace, tries = os.replace, []
+
+    def at_first(source: Path, target: Path) -> None:
+        tries.append(target)
+        if len(tries) < 3:
+            held(source, target)
+        replace(source, target)
+
+    monkeypatch.setattr(moving, "PATIENCE", 10.0)
+    monkeypatch.setattr(moving, "_PAUSE", 0.001)
+    monkeypatch.setattr(moving.os, "replace", at_first)
+    write_bytes_atomic(tmp_path / "groom.tfx", b"new")
+    assert (tmp_path / "groom.tfx").read_bytes() == b"new" and len(tries) == 3
+
+
+def test_what_is_given_up_when_it_is_whole_replaces_nothing(tmp_path: Path) -> None:
+    target = tmp_path / "groom.tfx"
+    target.write_bytes(b"old")
+
+    def given_up() -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), atomic_write(target, given_up) as temporary:
+        temporary.write_bytes(b"new")
+    assert target.read_bytes() == b"old" and names(tmp_path) == ["groom.tfx"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="folders are not flushed on Windows")
+def test_a_drive_that_flushes_no_names_is_no_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fsync = os.fsync
+
+    def refused(descriptor: int) -> None:
+        if os.path.isdir(f"/proc/self/fd/{descriptor}"):
+            raise OSError(22, "Invalid argument")
+        fsync(descriptor)
+
+    monkeypatch.setattr(moving.os, "fsync", refused)
+    write_bytes_atomic(tmp_path / "groom.tfx", b"new")
+    assert (tmp_path / "groom.tfx").read_bytes() == b"new"
+
+
+def test_a_name_of_255_bytes_is_written(tmp_path: Path) -> None:
+    name = "x" * 251 + ".tfx"
+    write_bytes_atomic(tmp_path / name, b"new")
+    assert names(tmp_path) == [name]

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files import file_set
+from hairloom.addon.exchange.files import file_set, moving, stale_temp_files
+from hairloom.addon.exchange.files.atomic import write_bytes_atomic
 from hairloom.addon.exchange.files.file_set import written_together
 
 pytestmark = pytest.mark.portable
@@ -63,13 +66,14 @@ def test_a_disk_that_fills_up_while_files_are_replaced_leaves_what_was_there(
     replace, left = os.replace, [last]
 
     def full(source: Path, target: Path) -> None:
-        if "old" not in Path(source).parts:  # what was there can be put back
+        # what was there can be put back
+        if "old" not in Path(source).parts and Path(target).parent == tmp_path:
             left[0] -= 1
             if left[0] == -1:
                 raise OSError(errno.ENOSPC, "No space left on device")
         replace(source, target)
 
-    monkeypatch.setattr(file_set.os, "replace", full)
+    monkeypatch.setattr(moving.os, "replace", full)
     with (
         pytest.raises(HairloomError, match="No space left"),
         written_together(tmp_path / "hair.glb") as folder,
@@ -118,3 +122,77 @@ def test_a_link_stays_a_link_and_keeps_its_content_in_a_failure(tmp_path: Path) 
     with written_together(link) as folder:
         write(folder, "new")
     assert link.is_symlink() and real.read_text() == "new"
+
+
+@pytest.mark.parametrize("moved", range(4))
+def test_a_writer_killed_while_files_are_replaced_is_finished_by_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moved: int
+) -> None:
+    """Killed after so many files: never old ones and new ones for good."""
+    write(tmp_path, "old", FILES[:2])
+    replace, left = os.replace, [moved]
+
+    class KilledError(BaseException):
+        pass
+
+    def killed(source: Path, target: Path) -> None:
+        if not left[0]:
+            raise KilledError
+        left[0] -= 1
+        replace(source, target)
+
+    with monkeypatch.context() as dying:
+        dying.setattr(moving.os, "replace", killed)
+        dying.setattr(file_set, "_restore", lambda *_: None)
+        dying.setattr(file_set.shutil, "rmtree", lambda *_, **__: None)
+        dying.setattr(Path, "unlink", lambda *_, **__: None)
+        dying.setattr(stale_temp_files.os, "getpid", lambda: 4_000_000)
+        with contextlib.suppress(KilledError), written_together(tmp_path / "hair.glb") as folder:
+            write(folder, "new")
+    write_bytes_atomic(tmp_path / "another.tfx", b"")
+    (tmp_path / "another.tfx").unlink()
+    assert contents(tmp_path) == dict.fromkeys(sorted(FILES), "new")
+
+
+def test_a_file_that_was_saved_since_is_newer_than_a_killed_writers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as dying:
+        dying.setattr(stale_temp_files.os, "getpid", lambda: 4_000_000)
+        staging = stale_temp_files.temporary_beside(tmp_path / "hair.glb", "")
+    staging.mkdir()
+    write(staging, "new")
+    (staging / stale_temp_files.COMPLETE).touch()
+    os.utime(staging / stale_temp_files.COMPLETE, (1, 1))
+    write(tmp_path, "artist's", FILES[:1])
+    stale_temp_files.remove_stale_files(tmp_path)
+    assert contents(tmp_path) == {
+        "hair.glb": "artist's",
+        "hair.json": "new",
+        "hair_base.png": "new",
+    }
+
+
+@pytest.mark.parametrize("held", FILES)
+def test_a_file_that_another_program_holds_keeps_all_and_the_new_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, held: str
+) -> None:
+    """By Windows' rules: what is open is not replaced."""
+    write(tmp_path, "old")
+    replace = os.replace
+
+    def refused(source: Path, target: Path) -> None:
+        if Path(target) == tmp_path / held:
+            raise PermissionError(errno.EACCES, "Access is denied", str(source), None, str(target))
+        replace(source, target)
+
+    monkeypatch.setattr(moving.os, "replace", refused)
+    with (
+        pytest.raises(HairloomError, match="hair new") as caught,
+        written_together(tmp_path / "hair.glb") as folder,
+    ):
+        write(folder, "new")
+    assert caught.value.place == str(tmp_path / held)
+    assert contents(tmp_path / "hair new") == dict.fromkeys(sorted(FILES), "new")
+    shutil.rmtree(tmp_path / "hair new")
+    assert contents(tmp_path) == dict.fromkeys(sorted(FILES), "old")

@@ -67,6 +67,7 @@ def test_a_killed_writer_leaves_the_old_file_or_the_new_one(kind: str) -> None:
     """And what it leaves beside goes with the next write."""
     found = report("kill_writes", kind, str(KILLS))
     assert (found["trials"], found["failures"], found["leftovers"]) == (KILLS, 0, 0)
+    assert found["mixed"] == 0
 
 
 def test_killing_a_plain_writer_is_seen() -> None:
