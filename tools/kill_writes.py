@@ -87,7 +87,8 @@ def killed(
     Returns:
         trials; failures: a file that is neither the old one nor the new one; amid: kills that left
         something half-written beside the target, those that came in time; mixed: sets with old and
-        new files once the next writer looks at the folder; leftovers: what still lies beside the target after one write more.
+        new files once the next writer looks at the folder; leftovers: what still lies beside the
+        target after one write more.
     """
     random = np.random.default_rng(seed)
     folder, versions, seconds = target.parent, [], 0.0

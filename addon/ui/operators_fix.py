@@ -8,6 +8,7 @@ from typing import Any
 
 import bpy
 
+from ..blender.bakes.baked_copy import is_copy_gone, remove
 from ..blender.base.objects import head_of, objects_in
 from ..blender.base.outcome import report
 from ..blender.preview.diagnostics import is_unevenly_scaled, set_surface, surface_for
@@ -100,6 +101,29 @@ class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class HAIRLOOM_OT_show_in_renders(bpy.types.Operator):
+    """Let renders show hair whose baked copy was deleted"""
+
+    bl_idname = "hairloom.show_in_renders"
+    bl_label = "Show in Renders"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not _can_fix(cls, context):
+            return False
+        if any(is_copy_gone(hair) for hair in chosen_hair(context)):
+            return True
+        cls.poll_message_set("Renders show it already, or a copy that shows its bake")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for hair in chosen_hair(context):
+            if is_copy_gone(hair):
+                remove(hair)
+        return {"FINISHED"}
+
+
 class HAIRLOOM_OT_apply_scale(bpy.types.Operator):
     """Apply the scale of the active hair's object to its curves. The hair does not move"""
 
@@ -123,14 +147,15 @@ class HAIRLOOM_OT_apply_scale(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
+        if hair.parent is not None and is_unevenly_scaled(hair.parent):
+            raise HairloomError(
+                f"its parent, {hair.parent.name}, is scaled unevenly too",
+                place=hair.name,
+                remedy="Apply the scale of the parent (Ctrl A) first; until then widths are "
+                "averaged",
+            )
         with _alone(context, hair):
             bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
-        if is_unevenly_scaled(hair):
-            raise HairloomError(
-                "its parent is scaled unevenly too",
-                place=hair.name,
-                remedy="Apply the scale of the parent (Ctrl A); until then widths are averaged",
-            )
         return {"FINISHED"}
 
 
@@ -182,4 +207,5 @@ CLASSES: tuple[type[Any], ...] = (
     HAIRLOOM_OT_snap_roots,
     HAIRLOOM_OT_unwrap_surface,
     HAIRLOOM_OT_apply_scale,
+    HAIRLOOM_OT_show_in_renders,
 )

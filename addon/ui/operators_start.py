@@ -16,6 +16,7 @@ from ..blender.scene.bust_skin import TONES
 from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
 from ..blender.setup.sample_scene import add_sample_scene
 from ..blender.setup.starting import new_groom, take_over
+from ..errors import HairloomError
 from .grow_options import GROW_PROPERTIES, draw_grow
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences
@@ -138,12 +139,17 @@ class HAIRLOOM_OT_use_groom(bpy.types.Operator):
         with waiting(context):
             for hair in chosen_hair(context):
                 name, depsgraph = hair.name, context.evaluated_depsgraph_get()
-                ready, done = take_over(hair, depsgraph, chosen_presets(chosen))
+                try:
+                    ready, done = take_over(hair, depsgraph, chosen_presets(chosen))
+                except HairloomError as error:  # the others are taken all the same
+                    report(self, "ERROR", error)
+                    continue
                 for one in done:
                     report(self, "INFO", f"{name}: {one}")
                 taken.append(ready)
-            _begin(self, context, taken, plays=chosen.plays)
-        return {"FINISHED"}
+            if taken:
+                _begin(self, context, taken, plays=chosen.plays)
+        return {"FINISHED"} if taken else {"CANCELLED"}
 
 
 class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
@@ -216,7 +222,10 @@ def _begin(
     *,
     plays: bool,
 ) -> None:
-    """Select, preview and, in a window, play."""
+    """Select, preview and, in a window, play.
+
+    The grooms are there by now and are to be undone in one step, so that an error is reported here.
+    """
     chosen = preferences(context)
     for hair in grooms:
         hair.hairloom.bake.follows = chosen.follows
@@ -224,7 +233,11 @@ def _begin(
         if chosen.device != "automatic":
             hair.hairloom.dynamics.device = chosen.device
     make_active(context, grooms)
-    start_preview(operator, context, grooms)
+    try:
+        start_preview(operator, context, grooms)
+    except HairloomError as error:
+        report(operator, "ERROR", error)
+        return
     if not plays or bpy.app.background:
         return
     if previews.is_playing():

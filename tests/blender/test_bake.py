@@ -1,19 +1,23 @@
 """Baking: equal to what playback shows, whole or not at all, and shown again."""
 
 import json
+import os
 import shutil
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
+from bake_files import contents, frames_in
 
 from hairloom.addon.blender.bakes import groom_hashes, playback
-from hairloom.addon.blender.bakes.cache import Cache
+from hairloom.addon.blender.bakes.cache import Cache, CacheWriter, Facts
 from hairloom.addon.blender.bakes.simulated import SOLVER_VERSION
 from hairloom.addon.blender.base.suspension import is_suspended
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake, free
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.files import moving, stale_temp_files
 
 LAST = 8
 
@@ -227,16 +231,16 @@ def test_a_bake_can_be_left_out_and_is_simulated_again(swinging, evaluated):
 def test_cancelling_leaves_the_bake_before_untouched(swinging, evaluated, tmp_path):
     hair, _ = swinging
     bake(hair)
-    before = {path.name: path.read_bytes() for path in (tmp_path / "bake").iterdir()}
+    before = contents(tmp_path / "bake")
     hair.hairloom.dynamics.damping = 9.0
     bpy.context.scene.frame_set(6)
     steps = Bake.of([hair], bpy.context.scene).steps()
     assert [next(steps), next(steps)] == [1, 2]
-    assert (tmp_path / "bake.new").is_dir()
+    assert len(list((tmp_path / "bake").glob("frames-*"))) == 2
     steps.close()
     assert bpy.context.scene.frame_current == 6
     assert [path.name for path in tmp_path.iterdir()] == ["bake"]
-    assert {path.name: path.read_bytes() for path in (tmp_path / "bake").iterdir()} == before
+    assert contents(tmp_path / "bake") == before
     assert not is_suspended()
 
 
@@ -270,21 +274,101 @@ def test_hair_that_blender_simulates_is_not_baked(swinging, tmp_path):
     assert bake(hair)[-1] == LAST
 
 
-@pytest.mark.parametrize("broken_off", ["while writing", "before the swap", "in the swap"])
-def test_a_crash_leaves_a_whole_bake(broken_off, swinging, tmp_path):
+def test_what_a_killed_bake_leaves_goes_with_the_next(swinging, tmp_path, monkeypatch):
     hair, _ = swinging
     bake(hair)
-    folder, new, old = (tmp_path / f"bake{ending}" for ending in ("", ".new", ".old"))
-    damping = Cache(folder).facts.rig_hash
-    shutil.copytree(folder, new)
-    if broken_off == "while writing":
-        (new / "cache.json").unlink()
-    elif broken_off == "in the swap":
-        folder.rename(old)
-    assert Cache(folder).facts.rig_hash == damping
+    folder, shown = tmp_path / "bake", frames_in(tmp_path / "bake")
+    with monkeypatch.context() as dying:
+        dying.setattr(stale_temp_files.os, "getpid", lambda: 4_000_000)
+        left = folder / f"frames-{stale_temp_files.mark()}"
+    shutil.copytree(shown, left)
     assert Cache(folder).frame(LAST)["guides"].shape == (60, 16, 3)
+    assert frames_in(folder) == shown
     bake(hair)
-    assert [path.name for path in tmp_path.iterdir()] == ["bake"]
+    assert {path.name for path in folder.iterdir()} == {"cache.json", frames_in(folder).name}
+    assert frames_in(folder) not in (shown, left)
+
+
+def test_two_who_bake_into_one_folder_never_mix_their_frames(tmp_path):
+    """Each has frames of its own; the last one to finish is shown, whole."""
+    folder = tmp_path / "bake"
+    writers = [CacheWriter(folder), CacheWriter(folder)]
+    for value, writer in enumerate(writers):
+        writer.add_constants({"value": np.array(value)})
+    for frame in (1, 2):
+        for value, writer in enumerate(writers):
+            writer.add(frame, {"value": np.array(value)}, "hair=00")
+    for value, writer in enumerate(writers):
+        writer.finish(Facts("Hair", 1, 2, 24.0, "numpy", "hair=00", "0.1.0"))
+        writer.publish()
+        writer.clean()
+        shown = Cache(folder)
+        arrays = [shown.constants(), shown.frame(1), shown.frame(2)]
+        assert [int(each["value"]) for each in arrays] == [value] * 3
+
+
+def test_a_bake_that_cannot_take_its_place_is_kept(swinging, tmp_path, monkeypatch):
+    """By Windows' rules: what is open is not replaced."""
+    hair, _ = swinging
+    bake(hair)
+    folder, shown = tmp_path / "bake", frames_in(tmp_path / "bake")
+    replace = os.replace
+
+    def held(source, target):
+        if Path(target) == folder / "cache.json":
+            raise PermissionError(13, "Access is denied")
+        replace(source, target)
+
+    with monkeypatch.context() as windows:
+        windows.setattr(moving.os, "replace", held)
+        with pytest.raises(HairloomError, match="cannot take the place") as raised:
+            bake(hair)
+    assert frames_in(folder) == shown and Cache(folder).frame(LAST)
+    (kept,) = (path for path in folder.glob("frames-*") if path != shown)
+    assert str(kept) in raised.value.remedy
+    assert Cache(kept).frame(LAST)["guides"].shape == (60, 16, 3)
+
+
+def test_of_several_bakes_all_are_replaced_or_none(swinging, tmp_path, monkeypatch):
+    hair, _ = swinging
+    twin = hair.copy()
+    bpy.context.collection.objects.link(twin)
+    twin.hairloom.bake.folder = str(tmp_path / "twin")
+    bake(hair, twin)
+    shown = [frames_in(tmp_path / name) for name in ("bake", "twin")]
+    replace = os.replace
+
+    def held(source, target):
+        if Path(target) == tmp_path / "twin" / "cache.json":
+            raise PermissionError(13, "Access is denied")
+        replace(source, target)
+
+    with monkeypatch.context() as windows:
+        windows.setattr(moving.os, "replace", held)
+        with pytest.raises(HairloomError, match="cannot take the place"):
+            bake(hair, twin)
+    assert [frames_in(tmp_path / name) for name in ("bake", "twin")] == shown
+    assert all(Cache(tmp_path / name).frame(LAST) for name in ("bake", "twin"))
+
+
+def test_a_bake_through_a_link_stays_on_the_other_disk(swinging, tmp_path):
+    hair, _ = swinging
+    (tmp_path / "large_disk").mkdir()
+    (tmp_path / "bake").symlink_to(tmp_path / "large_disk")
+    bake(hair)
+    bake(hair)
+    assert (tmp_path / "bake").is_symlink()
+    assert Cache(tmp_path / "large_disk").frame(LAST)["guides"].shape == (60, 16, 3)
+
+
+def test_a_folder_beside_that_is_called_old_is_not_touched(swinging, evaluated, tmp_path):
+    hair, _ = swinging
+    (tmp_path / "bake.old").mkdir()
+    (tmp_path / "bake.old" / "project.txt").write_text("mine")
+    previews.start(hair, evaluated())
+    assert playback.cache_of(hair) is None
+    bake(hair)
+    assert (tmp_path / "bake.old" / "project.txt").read_text() == "mine"
 
 
 def test_a_folder_with_other_files_is_not_touched(swinging, tmp_path):
@@ -295,6 +379,7 @@ def test_a_folder_with_other_files_is_not_touched(swinging, tmp_path):
         bake(hair)
     assert (tmp_path / "bake" / "diary.txt").read_text() == "mine"
     assert [path.name for path in tmp_path.iterdir()] == ["bake"]
+    assert [path.name for path in (tmp_path / "bake").iterdir()] == ["diary.txt"]
 
 
 def test_deleting_a_bake_leaves_what_is_not_its_own(swinging, evaluated, tmp_path):
@@ -315,8 +400,40 @@ def test_an_unsaved_file_needs_a_folder_of_its_own(swinging, tmp_path):
         bpy.ops.hairloom.bake()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "wig.blend"))
     assert bpy.ops.hairloom.bake() == {"FINISHED"}
-    assert hair.hairloom.bake.folder == "//hairloom_cache/Hair"
-    assert (tmp_path / "hairloom_cache" / "Hair" / "cache.json").is_file()
+    assert hair.hairloom.bake.folder == "//hairloom_cache/wig/Hair"
+    assert (tmp_path / "hairloom_cache" / "wig" / "Hair" / "cache.json").is_file()
+
+
+def test_every_file_has_bakes_of_its_own(swinging, tmp_path):
+    """A second version of a file shows the bake of the first until it is baked itself."""
+    hair, _ = swinging
+    hair.hairloom.bake.folder = ""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot_v1.blend"))
+    bake(hair)
+    first = tmp_path / "hairloom_cache" / "shot_v1" / "Hair"
+    shown = frames_in(first)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot_v2.blend"))
+    hair = bpy.data.objects["Hair"]
+    assert playback.cache_of(hair).facts.file == "shot_v1.blend"
+    bake(hair)
+    assert hair.hairloom.bake.folder == "//hairloom_cache/shot_v2/Hair"
+    assert playback.cache_of(hair).facts.file == "shot_v2.blend"
+    assert frames_in(first) == shown
+
+
+def test_a_folder_with_the_bake_of_another_file_is_refused(swinging, evaluated, tmp_path):
+    hair, _ = swinging
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot_v1.blend"))
+    bake(hair)
+    shown = frames_in(tmp_path / "bake")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot_v2.blend"))
+    hair = bpy.data.objects["Hair"]
+    with pytest.raises(HairloomError, match=r"the bake of Hair in shot_v1\.blend"):
+        bake(hair)
+    free(hair, evaluated())
+    assert hair.hairloom.bake.folder == "" and frames_in(tmp_path / "bake") == shown
+    bake(hair, folder=tmp_path / "bake")  # who names it means it
+    assert Cache(tmp_path / "bake").facts.file == "shot_v2.blend"
 
 
 def test_a_duplicate_is_baked_into_a_folder_of_its_own(swinging, tmp_path):
@@ -327,7 +444,10 @@ def test_a_duplicate_is_baked_into_a_folder_of_its_own(swinging, tmp_path):
     twin = hair.copy()
     bpy.context.collection.objects.link(twin)
     bake(twin)
-    assert {path.name for path in (tmp_path / "hairloom_cache").iterdir()} == {"Hair", "Hair.001"}
+    assert {path.name for path in (tmp_path / "hairloom_cache" / "wig").iterdir()} == {
+        "Hair",
+        "Hair.001",
+    }
 
 
 @pytest.mark.parametrize(
@@ -338,7 +458,7 @@ def test_a_damaged_bake_is_told_and_the_hair_simulated(damage, swinging, evaluat
     hair, _ = swinging
     bake(hair)
     folder = tmp_path / "bake"
-    frame = folder / "frame_000003.npz"
+    frame = frames_in(folder) / "frame_000003.npz"
     if damage == "no frame":
         frame.unlink()
     elif damage == "cut off":
@@ -353,7 +473,7 @@ def test_a_damaged_bake_is_told_and_the_hair_simulated(damage, swinging, evaluat
         facts = json.loads((folder / "cache.json").read_text())
         (folder / "cache.json").write_text(json.dumps(facts | {"version": 99}))
     elif damage == "no constants":
-        (folder / "constants.npz").unlink()
+        (frames_in(folder) / "constants.npz").unlink()
     session = previews.start(hair, evaluated())
     if damage == "no constants":  # only renders need them
         with pytest.raises(HairloomError, match="Bake again"):

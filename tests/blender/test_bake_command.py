@@ -38,7 +38,7 @@ def test_a_scene_is_baked_and_saved(file, tmp_path):
     report = tmp_path / "report.json"
     arguments = ["bake", "--scene", str(file), "--save", "--report", str(report)]
     assert command_line.run(arguments) == 0
-    folder = tmp_path / "hairloom_cache" / "Hair"
+    folder = tmp_path / "hairloom_cache" / "wig" / "Hair"
     assert Cache(folder).facts.last == LAST
     (baked,) = json.loads(report.read_text())["baked"]
     assert baked == {

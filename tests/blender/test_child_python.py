@@ -10,7 +10,8 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
 from hairloom.addon.blender.strands import child_python  # noqa: E402
-from hairloom.addon.exchange.files.subprocess_reader import run_reader, same_packages, this_python  # noqa: E402
+from hairloom.addon.exchange.files.child_process import same_packages  # noqa: E402
+from hairloom.addon.exchange.files.subprocess_reader import run_reader, this_python  # noqa: E402
 
 SCRIPT = "import os, sys, numpy\nopen(sys.argv[-1], 'w').write(numpy.__file__)\nos._exit({code})\n"
 

@@ -20,6 +20,7 @@ def bake(tmp_path):
     for frame in (1, 2):
         writer.add(frame, {"points": np.full((2, 3), frame, np.float32)}, "hair=00")
     writer.finish(Facts("Hair", 1, 2, 24.0, "numpy", "hair=00", "0.1.0"))
+    writer.publish()
     return folder
 
 
@@ -38,6 +39,9 @@ def bake(tmp_path):
         {"layout": {"points": 3}},
         {"layout": []},
         {"version": "1"},
+        {"frames": "../elsewhere"},
+        {"frames": "/"},
+        {"frames": None},
     ],
 )
 def test_facts_that_cannot_be_are_told(bake, change):
@@ -62,7 +66,7 @@ def test_facts_of_any_size_are_refused_before_they_are_read(bake, monkeypatch):
 
 def test_bytes_by_chance_in_a_bake_are_told_or_read(bake):
     random = np.random.default_rng(2)
-    whole = {path: path.read_bytes() for path in bake.iterdir()}
+    whole = {path: path.read_bytes() for path in bake.rglob("*") if path.is_file()}
     told = 0
     for _ in range(300):
         path = list(whole)[int(random.integers(len(whole)))]

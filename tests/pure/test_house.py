@@ -7,10 +7,12 @@ is in tools/house_rules.py.
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from house_rules import (
     ADDON,
     BLENDER_ROOMS,
@@ -72,6 +74,51 @@ def test_forbidden_imports_and_circles_are_seen(tmp_path: Path) -> None:
         ".blender.scene.curves",
     ]
     assert {"strands.one", "strands.two"} <= set(import_circle(tmp_path))
+
+
+def test_processes_are_started_in_one_place() -> None:
+    """Where their folder, environment, input and end are thought of."""
+    starters = {path.name for path in ADDON.rglob("*.py") if _starts_processes(path.read_text())}
+    assert starters == {"child_process.py"}
+
+
+@pytest.mark.parametrize(
+    ("code", "starts"),
+    [
+        ("import subprocess", True),
+        ("import numpy, subprocess as s", True),
+        ("from subprocess import run, TimeoutExpired", True),
+        ("from subprocess import TimeoutExpired", False),
+        ("import multiprocessing.pool", True),
+        ("from concurrent.futures import ProcessPoolExecutor", True),
+        ("os.system('ls')", True),
+        ("os.execv('ls', [])", True),
+        ("import os", False),
+    ],
+)
+def test_starting_a_process_is_seen(code: str, starts: bool) -> None:
+    assert _starts_processes(code) is starts
+
+
+def _starts_processes(code: str) -> bool:
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Import):
+            if any(each.name.split(".")[0] in _STARTERS for each in node.names):
+                return True
+        elif isinstance(node, ast.ImportFrom):
+            names = {each.name for each in node.names}
+            if names & {"ProcessPoolExecutor"} or (
+                node.module in _STARTERS and names != {"TimeoutExpired"}
+            ):
+                return True
+        elif isinstance(node, ast.Attribute):
+            is_os = isinstance(node.value, ast.Name) and node.value.id == "os"
+            if is_os and node.attr.startswith(("system", "popen", "exec", "spawn", "posix_spawn")):
+                return True
+    return False
+
+
+_STARTERS = {"subprocess", "multiprocessing", "pty"}
 
 
 def test_nothing_is_there_for_tests_alone() -> None:

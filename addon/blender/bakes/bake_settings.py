@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
 
 from ...errors import HairloomError
+from ...exchange.files.names import as_compared, folder_name
+from .cache import owner_of
 
-#: Folder for all bakes of a file, beside it.
+#: Folder beside files, which has a folder for the bakes of each file.
 _BESIDE = "//hairloom_cache"
-#: What a file name may hold on every system.
-_UNSAFE = re.compile(r"[^\w\-. ]+")
 
 
 def frames_of(obj: bpy.types.Object, scene: bpy.types.Scene) -> range:
@@ -57,14 +57,19 @@ def absolute(folder: str, library: bpy.types.Library | None) -> Path | None:
 def choose_folder(obj: bpy.types.Object) -> Path:
     """The folder to bake into, written to the object where it named none of its own.
 
-    An object that was duplicated names the folder of its original; it gets another one.
+    A bake belongs to one object of one file. An object that was duplicated names the folder of its
+    original, and a file that was saved under another name those of the first; both get others.
 
     Raises:
         HairloomError: a folder beside a file that has not been saved.
     """
     bake = obj.hairloom.bake
-    if not bake.folder or bake.folder in folders_of_others(obj):
-        bake.folder = _own_folder(obj)
+    beside = _beside(obj)
+    is_of_another_file = bake.folder.startswith(f"{_BESIDE}/") and not bake.folder.startswith(
+        f"{beside}/"
+    )
+    if not bake.folder or is_of_another_file or bake.folder in folders_of_others(obj):
+        bake.folder = _own_folder(obj, beside)
     folder = folder_of(obj)
     if folder is None:
         raise HairloomError(
@@ -75,11 +80,59 @@ def choose_folder(obj: bpy.types.Object) -> Path:
     return folder
 
 
-def _own_folder(obj: bpy.types.Object) -> str:
-    taken = folders_of_others(obj)
-    name = _UNSAFE.sub("_", obj.name).strip(". ") or "hair"
-    choices = (f"{_BESIDE}/{name}{ending}" for ending in ("", *(f"_{n}" for n in range(2, 10000))))
-    return next(folder for folder in choices if folder not in taken)
+def check_owner(obj: bpy.types.Object, folder: Path) -> None:
+    """Refuse a folder that holds the bake of another object or another file.
+
+    Raises:
+        HairloomError: naming them.
+    """
+    other = _other_owner(obj, folder)
+    if other:
+        raise HairloomError(
+            f"this folder holds the bake of {other}",
+            place=str(folder),
+            remedy="Choose another folder for this bake, or delete that one first",
+        )
+
+
+def is_own(obj: bpy.types.Object, folder: Path) -> bool:
+    """Whether the bake in the folder that an object names is of no other object or file."""
+    is_shared = obj.hairloom.bake.folder in folders_of_others(obj)
+    return not (is_shared or _other_owner(obj, folder))
+
+
+def _other_owner(obj: bpy.types.Object, folder: Path) -> str:
+    """Another object or file whose bake is in a folder; empty where there is none."""
+    owner, file = owner_of(folder)
+    if file and file != file_name(obj):
+        return f"{owner} in {file}"
+    return owner if owner != obj.name and owner in bpy.data.objects else ""
+
+
+def file_name(obj: bpy.types.Object) -> str:
+    """Of the Blender file that the object is from; empty where that was not saved."""
+    path = bpy.data.filepath if obj.library is None else obj.library.filepath
+    return bpy.path.basename(path)
+
+
+def folder_names(objects: Sequence[bpy.types.Object]) -> list[str]:
+    """A folder for each of some objects, no two of them alike on any system."""
+    taken: set[str] = set()
+    names = []
+    for obj in objects:
+        names.append(folder_name(obj.name, taken))
+        taken.add(as_compared(names[-1]))
+    return names
+
+
+def _beside(obj: bpy.types.Object) -> str:
+    stem = Path(file_name(obj)).stem
+    return f"{_BESIDE}/{folder_name(stem, fallback='file')}"
+
+
+def _own_folder(obj: bpy.types.Object, beside: str) -> str:
+    taken = {as_compared(Path(folder).name) for folder in folders_of_others(obj)}
+    return f"{beside}/{folder_name(obj.name, taken)}"
 
 
 def folders_of_others(obj: bpy.types.Object) -> set[str]:

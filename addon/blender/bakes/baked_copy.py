@@ -31,12 +31,14 @@ def show_in_renders(
     copy = bake.copy
     if copy is None or copy.hairloom.bake.stands_for not in (None, hair):  # its original's
         curves = bpy.data.hair_curves.new(f"{hair.name} Baked")
-        copy = bake.copy = bpy.data.objects.new(curves.name, curves)
+        copy = bpy.data.objects.new(curves.name, curves)
+    _link_beside(copy, hair, depsgraph.scene)
+    _fill(copy.data, hair, rig, depsgraph)
+    bake.copy = copy
     if not bake.hides:
         bake.hides, bake.was_hidden = True, hair.hide_render
-    _link_beside(copy, hair)
-    _fill(copy.data, hair, rig, depsgraph)
     copy.data.hairloom.baked_in = bake.folder
+    copy.data.hairloom.baked_rig = cache.facts.rig_hash
     # what a copy names is evaluated in renders though it is hidden there: so are its settings
     copy.hairloom.bake.stands_for = hair
     copy.hide_viewport = copy.hide_select = True
@@ -68,8 +70,31 @@ def remove(hair: bpy.types.Object) -> None:
         bpy.data.hair_curves.remove(curves)
 
 
-def _link_beside(copy: bpy.types.Object, hair: bpy.types.Object) -> None:
-    for collection in hair.users_collection:
+def heal() -> list[str]:
+    """Let renders show hair again whose copy is gone: deleted, or unlinked from all scenes.
+
+    Returns:
+        the names of such hair.
+    """
+    healed = []
+    for hair in bpy.data.objects:
+        if is_copy_gone(hair) and hair.library is None:
+            remove(hair)
+            healed.append(hair.name)
+    return healed
+
+
+def is_copy_gone(hair: bpy.types.Object) -> bool:
+    """Whether renders leave hair out in favour of a copy that is in no scene."""
+    bake = hair.hairloom.bake
+    return bool(bake.hides and not (bake.copy and bake.copy.users_scene))
+
+
+def _link_beside(copy: bpy.types.Object, hair: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Into the collections of the hair, or the scene's where those are linked or overridden."""
+    editable = [each for each in hair.users_collection if each.is_editable]
+    own = [each for each in editable if each.override_library is None]
+    for collection in own or [scene.collection]:
         if copy.name not in collection.objects:
             collection.objects.link(copy)
 

@@ -1,20 +1,24 @@
-"""A bake on disk: one folder, which is there whole or not at all.
+"""A bake on disk: one folder, which holds a whole bake or none.
 
-    cache.json          version, frames, rate, shapes, hashes (see `Facts`)
-    constants.npz       what all frames share
-    frame_000123.npz    one frame
+    cache.json              version, frames, rate, shapes, hashes (see `Facts`), and `frames`:
+    frames-hl-.../          the folder in it with
+        constants.npz       what all frames share
+        frame_000123.npz    one frame
+        cache.json          the same once more, so that this folder is a bake by itself
 
-Numpy's own format without pickles, so that a file from elsewhere can do no harm. A new bake is
-written to NAME.new beside NAME and takes its place when it is whole; what breaks off in between
-leaves the old one as it was, and is tidied up by the next who opens the folder.
+Numpy's own format without pickles, so that a file from elsewhere can do no harm. Every writer has a
+folder for its frames that nobody else takes, and replaces cache.json at last, in one step. So two
+writers never mix their frames, no moment is without a whole bake, and none of this needs anything
+to be renamed that a reader holds open.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
-import os
 import re
+import shutil
 from collections import OrderedDict
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -24,11 +28,15 @@ import numpy as np
 
 from ...errors import HairloomError
 from ...exchange.files.array_file import read_arrays
+from ...exchange.files.atomic import write_bytes_atomic
+from ...exchange.files.moving import flush, flush_names
+from ...exchange.files.stale_temp_files import MARK, is_stale, is_temporary, mark
 from .simulated import Arrays
 
 VERSION = 1
 FACTS, CONSTANTS = "cache.json", "constants.npz"
 _OURS = re.compile(r"cache\.json|constants\.npz|frame_-?\d{5,7}\.npz")
+_FRAMES = re.compile(rf"frames-{MARK}")
 #: A frame has some hundred bytes there; JSON may take twenty times its size in memory.
 _LARGEST_FACTS = 1 << 25
 #: Frames kept in memory: the one that is shown, and its neighbours for motion blur.
@@ -39,6 +47,7 @@ _KEPT = 3
 class Facts:
     """What is known of a bake without reading its frames.
 
+    owner, file: the object, and the name of its Blender file; empty where that was not saved.
     first, last: scene frames. frame_rate: [1/s].
     form: what computed it. rig_hash, frame_hashes (one for each frame): see `simulated.hashes`.
     hairloom: the version that wrote it.
@@ -51,6 +60,7 @@ class Facts:
     form: str
     rig_hash: str
     hairloom: str
+    file: str = ""
     frame_hashes: tuple[str, ...] = ()
 
     @property
@@ -59,7 +69,10 @@ class Facts:
 
 
 class CacheWriter:
-    """Writes a bake, frame after frame; `finish` puts it in place, `abandon` removes it.
+    """Writes a bake, frame after frame.
+
+    `finish` makes it whole, `publish` puts it in the place of the one before, and `abandon` removes
+    what was not published.
 
     Raises:
         HairloomError: the folder cannot be written, or holds files that are not of a bake.
@@ -67,15 +80,17 @@ class CacheWriter:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._new, self._old = _beside(folder, ".new"), _beside(folder, ".old")
+        self._frames = folder / f"frames-{mark()}"
         self._frame_hashes: list[str] = []
         self._layout: dict[str, list[Any]] = {}
+        self._content: dict[str, Any] = {}
+        self._before: bytes | None = None
+        self._is_whole = self._is_published = False
         try:
-            recover(folder)
             if folder.exists():
                 _check_ours(folder)
-            _remove(self._new)
-            self._new.mkdir(parents=True)
+                _remove_stale(folder)
+            self._frames.mkdir(parents=True)
         except OSError as error:
             raise _unwritable(folder, error) from error
 
@@ -91,31 +106,64 @@ class CacheWriter:
         self._save(_frame_name(frame), arrays)
 
     def finish(self, facts: Facts) -> None:
-        """Replace the earlier bake by this one, complete."""
+        """All frames are written: they are a bake now, which nobody looks at yet.
+
+        Raises:
+            HairloomError: it cannot be written.
+        """
         assert len(self._frame_hashes) == facts.frame_count, "all frames are there"
-        content = {"version": VERSION, **asdict(facts), "layout": self._layout}
-        content["frame_hashes"] = self._frame_hashes
+        self._content = {"version": VERSION, **asdict(facts), "layout": self._layout}
+        self._content["frame_hashes"] = self._frame_hashes
+        write_bytes_atomic(self._frames / FACTS, _text(self._content, "."))
+        flush_names(self.folder)
+        self._is_whole = True
+
+    def publish(self) -> None:
+        """Replace the earlier bake by this one, in one step.
+
+        Raises:
+            HairloomError: it cannot be replaced. The new one is kept where the message says.
+        """
+        current = self.folder / FACTS
         try:
-            with open(self._new / FACTS, "w", encoding="utf-8") as file:
-                json.dump(content, file, indent=1)
-                file.flush()
-                os.fsync(file.fileno())
-            _remove(self._old)
-            if self.folder.exists():
-                os.replace(self.folder, self._old)
-            os.replace(self._new, self.folder)
-            _remove(self._old)
-        except OSError as error:
-            raise _unwritable(self.folder, error) from error
+            self._before = current.read_bytes() if current.is_file() else None
+            write_bytes_atomic(current, _text(self._content, self._frames.name))
+        except (OSError, HairloomError) as error:
+            raise HairloomError(
+                "the bake is done but cannot take the place of the one before",
+                place=str(self.folder),
+                remedy=f"Choose {self._frames} as the folder of the bake, "
+                "or close other programs that use this one and bake again",
+            ) from error
+        self._is_published = True
+
+    def take_back(self) -> None:
+        """Show the earlier bake again, since another object's could not be published."""
+        if self._is_published and self._before is not None:
+            write_bytes_atomic(self.folder / FACTS, self._before)
+        elif self._is_published:
+            (self.folder / FACTS).unlink(missing_ok=True)
+        self._is_published = False
+
+    def clean(self) -> None:
+        """Remove the frames of the bake before this one.
+
+        Those that another program holds open stay until the next bake.
+        """
+        if self._before is not None:
+            _remove_frames(self.folder, _frames_named(self._before))
 
     def abandon(self) -> None:
-        """Leave the folder as it was."""
-        _remove(self._new)
+        """Leave the folder as it was; but what is whole may be hours of work, and stays."""
+        if not self._is_whole:
+            shutil.rmtree(self._frames, ignore_errors=True)
+            _remove_if_empty(self.folder)
 
     def _save(self, name: str, arrays: Arrays) -> None:
         try:
-            with open(self._new / name, "wb") as file:
+            with open(self._frames / name, "wb") as file:
                 np.savez(file, allow_pickle=False, **arrays)
+            flush(self._frames / name)
         except OSError as error:
             raise _unwritable(self.folder, error) from error
 
@@ -128,10 +176,10 @@ class Cache:
     """
 
     def __init__(self, folder: Path) -> None:
-        recover(folder)
         self.folder = folder
         content = _read_facts(folder / FACTS)
         try:
+            self._frame_folder = folder / _checked_name(content["frames"])
             self._layout = {str(n): (str(d), tuple(s)) for n, (d, s) in content["layout"].items()}
             names = [name for name in Facts.__dataclass_fields__ if name != "frame_hashes"]
             self.facts = Facts(
@@ -152,7 +200,7 @@ class Cache:
 
     def constants(self) -> Arrays:
         if self._constants is None:
-            self._constants = _read_arrays(self.folder / CONSTANTS)
+            self._constants = _read_arrays(self._frame_folder / CONSTANTS)
         return self._constants
 
     def frame(self, frame: int) -> Arrays:
@@ -162,7 +210,7 @@ class Cache:
             HairloomError: the file is gone or damaged.
         """
         if frame not in self._frames:
-            path = self.folder / _frame_name(frame)
+            path = self._frame_folder / _frame_name(frame)
             arrays = _read_arrays(path)
             found = {name: (str(a.dtype), tuple(a.shape)) for name, a in arrays.items()}
             if found != self._layout:
@@ -176,16 +224,16 @@ class Cache:
     @classmethod
     def found(cls, folder: Path) -> Self | None:
         """The bake in this folder; None where there is none."""
-        recover(folder)
         return cls(folder) if (folder / FACTS).is_file() else None
 
 
-def recover(folder: Path) -> None:
-    """Finish, or take back, a replacement that was broken off between its two steps."""
-    new, old = _beside(folder, ".new"), _beside(folder, ".old")
-    if folder.exists() or not old.is_dir():
-        return
-    os.replace(new if (new / FACTS).is_file() else old, folder)
+def owner_of(folder: Path) -> tuple[str, str]:
+    """The object and the file whose bake is in a folder; empty where that is not known."""
+    try:
+        cache = Cache.found(folder)
+    except HairloomError:  # a damaged one may be replaced by anybody
+        return "", ""
+    return (cache.facts.owner, cache.facts.file) if cache is not None else ("", "")
 
 
 def delete(folder: Path) -> None:
@@ -195,38 +243,88 @@ def delete(folder: Path) -> None:
         HairloomError: a file cannot be deleted.
     """
     try:
-        for each in (folder, _beside(folder, ".new"), _beside(folder, ".old")):
-            _remove(each)
+        content = (folder / FACTS).read_bytes() if (folder / FACTS).is_file() else b""
+        # the facts go first: without them nobody takes what is left for a bake
+        (folder / FACTS).unlink(missing_ok=True)
+        _remove(folder / _frames_named(content))
+        if folder.is_dir():
+            _remove_stale(folder)
+            _remove_if_empty(folder)
     except OSError as error:
         raise _unwritable(folder, error) from error
 
 
+def _text(content: dict[str, Any], frames: str) -> bytes:
+    return json.dumps(content | {"frames": frames}, indent=1).encode()
+
+
+def _checked_name(frames: object) -> str:
+    """A name of frames as we give them: no path, which could lead anywhere."""
+    if not isinstance(frames, str) or not (frames == "." or _FRAMES.fullmatch(frames)):
+        raise ValueError("its frames are in no folder of its own")
+    return frames
+
+
+def _frames_named(facts: bytes) -> str:
+    """The folder of frames that this content of cache.json names; "." where it names none."""
+    try:
+        return _checked_name(json.loads(facts)["frames"])
+    except (ValueError, TypeError, KeyError, RecursionError):
+        return "."
+
+
 def _remove(folder: Path) -> None:
-    if not folder.is_dir():
-        return
-    rest = 0
-    # the facts go first: without them nobody takes what is left for a bake
-    for path in sorted(folder.iterdir()):
+    """Remove what is ours in a folder, and the folder if that was all.
+
+    Raises:
+        OSError: a file cannot be removed.
+    """
+    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
         if _OURS.fullmatch(path.name):
             path.unlink()
-        else:
-            rest += 1
-    if not rest:
+    _remove_if_empty(folder)
+
+
+def _remove_if_empty(folder: Path) -> None:
+    if folder.is_dir() and not folder.is_symlink() and not any(folder.iterdir()):
         folder.rmdir()
 
 
+def _remove_frames(folder: Path, name: str) -> None:
+    """Remove the frames of a bake that was replaced, but for those that a program holds open."""
+    if name != ".":
+        shutil.rmtree(folder / name, ignore_errors=True)
+        return
+    for path in folder.iterdir():
+        if path.name != FACTS and _OURS.fullmatch(path.name):
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+def _remove_stale(folder: Path) -> None:
+    """Remove frames that nobody looks at and whose writers are gone."""
+    facts = folder / FACTS
+    current = _frames_named(facts.read_bytes()) if facts.is_file() else ""
+    for path in folder.iterdir():
+        name = _FRAMES.fullmatch(path.name)
+        if name is not None and path.name != current and is_stale(path, name):
+            shutil.rmtree(path, ignore_errors=True)
+
+
 def _check_ours(folder: Path) -> None:
-    foreign = [path.name for path in folder.iterdir() if not _OURS.fullmatch(path.name)]
+    """Raise HairloomError if a folder holds what is not of a bake."""
+    foreign = [
+        path.name
+        for path in folder.iterdir()
+        if not (_OURS.fullmatch(path.name) or _FRAMES.fullmatch(path.name))
+        and not is_temporary(path.name)
+    ]
     if foreign:
         raise HairloomError(
             f"this folder holds other files too, such as {foreign[0]}",
             place=str(folder),
             remedy="Choose an empty folder, or a new one, for the bake",
         )
-
-
-def _beside(folder: Path, ending: str) -> Path:
-    return folder.with_name(folder.name + ending)
 
 
 def _frame_name(frame: int) -> str:
@@ -258,7 +356,14 @@ def _check(facts: Facts) -> None:
     """Raise ValueError or TypeError for what no bake says of itself."""
     if not (isinstance(facts.first, int) and isinstance(facts.last, int)):
         raise TypeError("its frames are no whole numbers")
-    texts = (facts.owner, facts.form, facts.rig_hash, facts.hairloom, *facts.frame_hashes)
+    texts = (
+        facts.owner,
+        facts.file,
+        facts.form,
+        facts.rig_hash,
+        facts.hairloom,
+        *facts.frame_hashes,
+    )
     if not all(isinstance(text, str) for text in texts):
         raise TypeError("names and hashes are no texts")
     if len(facts.frame_hashes) != facts.frame_count:

@@ -5,6 +5,9 @@ In a render nothing is evaluated and nothing simulated: strands come from the ba
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -22,12 +25,14 @@ from .cache import FACTS, Cache
 class _Known:
     """What is kept of bakes, by folder.
 
-    caches: when a bake was written, and the bake. rigs: of which bake, and its rig.
+    caches: which file of facts it was, and the bake. rigs: of which bake, and its rig.
     problems: why a bake cannot be shown in renders; reported once.
+    lock: renders read bakes in their own thread.
     """
 
     def __init__(self) -> None:
-        self.caches: dict[Path, tuple[int, Cache]] = {}
+        self.lock = threading.RLock()
+        self.caches: dict[Path, tuple[tuple[int, int], Cache]] = {}
         self.rigs: dict[Path, tuple[Cache, BakedRig]] = {}
         self.problems: dict[Path, str] = {}
         self.is_rendering = False
@@ -42,16 +47,18 @@ def cache_in(folder: Path) -> Cache | None:
     Raises:
         HairloomError: it is damaged.
     """
-    try:
-        written = (folder / FACTS).stat().st_mtime_ns
-    except OSError:
-        _known.caches.pop(folder, None)
-        _known.rigs.pop(folder, None)
-        return Cache.found(folder)  # a replacement may have been broken off
-    if folder not in _known.caches or _known.caches[folder][0] != written:
-        _known.caches[folder] = written, Cache(folder)
-        _known.problems.pop(folder, None)
-    return _known.caches[folder][1]
+    with _known.lock:
+        try:
+            facts = (folder / FACTS).stat()
+        except OSError:
+            _known.caches.pop(folder, None)
+            _known.rigs.pop(folder, None)
+            return None
+        written = facts.st_mtime_ns, facts.st_ino
+        if folder not in _known.caches or _known.caches[folder][0] != written:
+            _known.caches[folder] = written, Cache(folder)
+            _known.problems.pop(folder, None)
+        return _known.caches[folder][1]
 
 
 def cache_of(obj: bpy.types.Object) -> Cache | None:
@@ -70,10 +77,11 @@ def rig_in(cache: Cache) -> BakedRig:
     Raises:
         HairloomError: it is damaged.
     """
-    known = _known.rigs.get(cache.folder)
-    if known is None or known[0] is not cache:
-        known = _known.rigs[cache.folder] = cache, rig_of(cache.constants(), str(cache.folder))
-    return known[1]
+    with _known.lock:
+        known = _known.rigs.get(cache.folder)
+        if known is None or known[0] is not cache:
+            known = _known.rigs[cache.folder] = cache, rig_of(cache.constants(), str(cache.folder))
+        return known[1]
 
 
 def strands_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
@@ -120,10 +128,7 @@ def show_fins(scene: bpy.types.Scene) -> None:
     for obj in bpy.data.objects if has_fins() else ():
         folder = folder_of(obj) if is_baked_fin(obj) else None
         if folder is not None:
-            try:
-                _show_fin(obj, cache_in(folder), scene.frame_current)
-            except HairloomError as error:
-                _tell(folder, str(error))
+            _attempt(folder, partial(_show_fin, obj, folder, scene.frame_current))
 
 
 def is_baked_fin(obj: bpy.types.Object) -> bool:
@@ -136,7 +141,8 @@ def is_baked_fin(obj: bpy.types.Object) -> bool:
     )
 
 
-def _show_fin(obj: bpy.types.Object, cache: Cache | None, frame: int) -> None:
+def _show_fin(obj: bpy.types.Object, folder: Path, frame: int) -> None:
+    cache = cache_in(folder)
     if cache is not None and cache.holds(frame):
         show(obj.data, cache.frame(frame)["position"])
     else:
@@ -148,10 +154,7 @@ def show_in_copies(scene: bpy.types.Scene) -> None:
     for curves in bpy.data.hair_curves:
         folder = absolute(curves.hairloom.baked_in, curves.library)
         if folder is not None:
-            try:
-                _write(curves, folder, scene)
-            except HairloomError as error:
-                _tell(folder, str(error))
+            _attempt(folder, partial(_write, curves, folder, scene))
 
 
 def _write(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> None:
@@ -159,12 +162,26 @@ def _write(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> No
     if cache is None:
         raise HairloomError("there is no bake here", place=str(folder), remedy="Bake again")
     points = strands_in(cache, scene.frame_current, scene.frame_subframe)
-    if len(curves.position_data) != points.shape[0] * points.shape[1]:
+    is_same = curves.hairloom.baked_rig in ("", cache.facts.rig_hash)
+    if len(curves.position_data) != points.shape[0] * points.shape[1] or not is_same:
         raise HairloomError(
             "these curves are not those of the bake", place=curves.name, remedy="Bake again"
         )
     curves.position_data.foreach_set("vector", points.ravel())
     curves.update_tag()
+
+
+def _attempt(folder: Path, show: Callable[[], object]) -> None:
+    """Show a bake, which may be anybody's and hold anything; what it raises is reported once.
+
+    Blender would go on showing an error of a handler at every frame, and skip the bakes after it.
+    """
+    try:
+        show()
+    except HairloomError as error:
+        _tell(folder, str(error))
+    except Exception as error:
+        _tell(folder, f"{folder}: this bake is damaged ({type(error).__name__}: {error})")
 
 
 def _tell(folder: Path, problem: str) -> None:

@@ -14,6 +14,7 @@ import argparse
 import hashlib
 import json
 import os
+import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,7 @@ class Stamp:
         self.path = output.with_name(output.name + SUFFIX)
         self._folder = Path(os.path.abspath(self.path.parent))
         self._asked = _asked(options, self._folder)
+        self._begun = time.time_ns()
         self._inputs = {path: digest(Path(path)) for path in _named_files(options)}
 
     def why_not_done(self) -> str:
@@ -80,7 +82,7 @@ class Stamp:
         """
         outputs = [os.path.abspath(path) for path in report.outputs]
         found = [os.path.abspath(path) for path in report.inputs] + _files_of_scene()
-        inputs = {path: digest(Path(path)) for path in found} | self._inputs
+        inputs = {path: self._digest_as_read(Path(path)) for path in found} | self._inputs
         content = {
             "asked": self._asked,
             "inputs": {
@@ -91,6 +93,12 @@ class Stamp:
             "outputs": {_seen_from(self._folder, path): digest(Path(path)) for path in outputs},
         }
         write_text_atomic(self.path, json.dumps(content, indent=2) + "\n")
+
+    def _digest_as_read(self, path: Path) -> str:
+        """Of what the job has read; "" where that has changed since, so that it is done again."""
+        files = path.rglob("*") if path.is_dir() else (path,) if path.exists() else ()
+        is_newer = any(file.stat().st_mtime_ns > self._begun for file in files)
+        return "" if is_newer else digest(path)
 
 
 def digest(path: Path) -> str:

@@ -5,14 +5,15 @@ Where there is no driver that draws, asking crashes Blender; so another process 
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from functools import cache
+from subprocess import TimeoutExpired
 
 import bpy
 import gpu
 
 from ...errors import HairloomError
+from ...exchange.files.child_process import run_child
 from ..base.gpu_context import gpu_in_use
 
 #: Exits with 0 where OpenGL or Vulkan finds a device without a window, as Blender's do.
@@ -50,6 +51,10 @@ sys.exit(0 if works(opengl) or works(vulkan) else 1)
 """
 
 
+#: Seconds for a driver to answer, on a busy machine too.
+_PATIENCE = 60.0
+
+
 def ensure_gpu_for_render() -> None:
     """A GPU context for this thread.
 
@@ -73,6 +78,8 @@ def _can_draw() -> bool:
     if not sys.platform.startswith("linux"):
         return True
     try:
-        return subprocess.run([sys.executable, "-c", _TRIAL], capture_output=True).returncode == 0
+        return run_child([sys.executable, "-I", "-c", _TRIAL], seconds=_PATIENCE).returncode == 0
+    except TimeoutExpired:  # Blender would wait for the same driver
+        return False
     except OSError:  # this Blender has no Python of its own to ask with
         return True

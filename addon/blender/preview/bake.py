@@ -14,7 +14,15 @@ import bpy
 
 from ...errors import HairloomError
 from ..bakes import baked_copy, playback
-from ..bakes.bake_settings import choose_folder, folder_of, folders_of_others, frames_of
+from ..bakes.bake_settings import (
+    check_owner,
+    choose_folder,
+    file_name,
+    folder_names,
+    folder_of,
+    frames_of,
+    is_own,
+)
 from ..bakes.cache import CacheWriter, Facts, delete
 from ..bakes.groom_hashes import frame_rate
 from ..bakes.simulated import Simulated
@@ -59,6 +67,7 @@ class _Part:
         self.writer.add(frame, session.recorded(), session.frame_hash(depsgraph))
 
     def finish(self, rate: float) -> None:
+        """All its frames are written."""
         assert self.writer is not None and self.session is not None
         self.writer.finish(
             Facts(
@@ -69,9 +78,9 @@ class _Part:
                 form=form_of_session(self.session),
                 rig_hash=self.rig_hash,
                 hairloom=environment()["hairloom"],
+                file=file_name(self.found()),
             )
         )
-        self.writer = None
 
     def abandon(self) -> None:
         """Leave nothing half written."""
@@ -104,7 +113,8 @@ class Bake:
 
         Args:
             frames: in place of those that the objects ask for.
-            folder: in place of the objects' own folders; several objects get one below it each.
+            folder: in place of the objects' own folders, whoever's bake it holds; several objects
+                get one below it each.
 
         Raises:
             HairloomError: nothing to bake, no frames, no place to write to, or no such weights as
@@ -115,13 +125,16 @@ class Bake:
                 "there is nothing to bake", place=scene.name, remedy="Select hair curves or cloth"
             )
         parts = []
-        for obj in objects:
+        for obj, name in zip(objects, folder_names(objects), strict=True):
             if obj.type == "CURVES":
                 wanted_density(obj, bpy.context.evaluated_depsgraph_get())
             if folder is not None:
-                obj.hairloom.bake.folder = str(folder / obj.name if len(objects) > 1 else folder)
+                obj.hairloom.bake.folder = str(folder / name if len(objects) > 1 else folder)
             own = frames_of(obj, scene) if frames is None else frames
-            parts.append(_Part(Handle.of(obj), own, choose_folder(obj)))
+            chosen = choose_folder(obj)
+            if folder is None:
+                check_owner(obj, chosen)
+            parts.append(_Part(Handle.of(obj), own, chosen))
         return cls(parts)
 
     @property
@@ -159,6 +172,7 @@ class Bake:
                 yield from self._frames(scene)
                 for part in self.parts:
                     part.finish(frame_rate(scene))
+                self._publish()
         finally:
             for part in self.parts:
                 part.abandon()
@@ -180,6 +194,19 @@ class Bake:
                         remedy=error.remedy,
                     ) from error
             yield done
+
+    def _publish(self) -> None:
+        """All of them take the places of those before, or none does."""
+        writers = [part.writer for part in self.parts if part.writer is not None]
+        try:
+            for writer in writers:
+                writer.publish()
+        except HairloomError:
+            for writer in writers:
+                writer.take_back()
+            raise
+        for writer in writers:
+            writer.clean()
 
     def _show(self) -> None:
         """Previewed grooms show the new bake, or what they showed before."""
@@ -240,17 +267,18 @@ def show_in_renders(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgr
 def free(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
     """Delete the bake of a groom or fin from disk; renders show the object itself again.
 
+    A bake that belongs to another object or another file stays, and is shown here no longer.
+
     Raises:
         HairloomError: the files cannot be deleted.
     """
     folder = folder_of(obj)
-    is_shared = obj.hairloom.bake.folder in folders_of_others(obj)
-    if folder is not None and not is_shared:
+    if folder is not None and is_own(obj, folder):
         delete(folder)
+    else:
+        obj.hairloom.bake.folder = ""
     if obj.type == "CURVES":
         baked_copy.remove(obj)
     elif fin_modifier(obj) is not None:
         clear(obj.data)
-    if is_shared:
-        obj.hairloom.bake.folder = ""
     previews.bake_changed(obj, depsgraph)

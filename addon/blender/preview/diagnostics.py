@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...errors import HairloomError
+from ..bakes.baked_copy import is_copy_gone
 from ..base.objects import head_of, objects_in
 from ..scene.curves import read_curves
 from ..scene.source import dynamics_warnings, own_dynamics
@@ -74,6 +75,9 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
     if is_unevenly_scaled(hair):
         text = "Its object is scaled unevenly, so strands are as wide as the mean of the scales"
         found.append(Issue(text, "hairloom.apply_scale", "Apply Scale"))
+    if is_copy_gone(hair):
+        text = "Renders leave it out for a copy that showed its bake and is gone"
+        found.append(Issue(text, "hairloom.show_in_renders", "Show in Renders"))
     baked = previews.bake_of(hair)
     if baked is not None and baked.changed:
         text = f"Its bake is out of date ({', '.join(baked.changed)})"

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ..bakes import playback
+from ..bakes import baked_copy, playback
 from ..base import suspension
 from ..properties import changed, library_overrides
 from . import previews as registry
@@ -24,11 +24,24 @@ def on_load_pre(*_: Any) -> None:
 @persistent
 def on_load_post(*_: Any) -> None:
     registry.forget_all()
+    _heal()
+
+
+@persistent
+def on_load_fail(*_: Any) -> None:
+    """The scene that was open stays, and its hair, which is previewed no longer, is to be seen."""
+    registry.show_all_originals()
 
 
 @persistent
 def on_save_pre(*_: Any) -> None:
     library_overrides.make_last()
+    _heal()
+
+
+def _heal() -> None:
+    for name in baked_copy.heal():
+        print(f"Hairloom: {name} is in renders again, since the copy that showed its bake is gone")
 
 
 @persistent
@@ -82,6 +95,7 @@ def _react(reaction: Callable[[bpy.types.Depsgraph], None], depsgraph: bpy.types
 HANDLERS = (
     (bpy.app.handlers.load_pre, on_load_pre),
     (bpy.app.handlers.load_post, on_load_post),
+    (bpy.app.handlers.load_post_fail, on_load_fail),
     (bpy.app.handlers.save_pre, on_save_pre),
     (bpy.app.handlers.undo_post, on_undo_post),
     (bpy.app.handlers.redo_post, on_undo_post),

@@ -118,6 +118,14 @@ def stop(session: Simulated) -> None:
         refresh_views()
 
 
+def show_all_originals() -> None:
+    """Blender draws all hair itself, whatever was previewed."""
+    for hair in bpy.data.objects:
+        for depsgraph in all_depsgraphs() if hair.type == "CURVES" else ():
+            show_originals(hair, depsgraph, show=True)
+    refresh_views()
+
+
 def stop_all() -> None:
     for session in simulated():
         stop(session)

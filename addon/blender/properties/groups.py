@@ -157,6 +157,13 @@ class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
+        "baked_rig": StringProperty(
+            name="Baked Rig",
+            description="Hash of the strands that these curves were made from; another bake in the "
+            "folder is not shown",
+            options={"HIDDEN"},
+            override=OVERRIDABLE,
+        ),
     }
 
 

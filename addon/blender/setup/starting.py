@@ -130,13 +130,12 @@ def take_over(
     Raises:
         HairloomError: it has no curves, and no surface on which some could grow.
     """
-    done = []
-    if mute_own_dynamics(hair):
-        done.append("turned off Blender's Hair Dynamics")
-    factor = 1.0
+    done, factor = [], 1.0
     if not len(hair.data.curves) and not read_curves(hair, depsgraph).strands.strand_count:
         hair, factor = _grown_in_place(hair, depsgraph)
         done.append("grew hair, since there was none")
+    elif mute_own_dynamics(hair):
+        done.append("turned off Blender's Hair Dynamics")
     if is_untouched(hair):
         dress(hair, presets)
         fit_motion(hair, factor)

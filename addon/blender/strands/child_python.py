@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import shutil
-import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from subprocess import TimeoutExpired
 
 import bpy
 
-from ...exchange.files.subprocess_reader import NO_WINDOW, python_program, same_packages
+from ...exchange.files.child_process import python_program, run_child
 from ...exchange.strand_formats import ALEMBIC, USD, strand_format
 
 #: Packages whose files another process reads, and what of them must load there.
@@ -66,21 +65,22 @@ def _programs() -> Iterator[str]:
         own = Path(sys.prefix) / "bin" / name
         if own.is_file():
             yield str(own)
-    of_the_system = shutil.which(version)
-    if of_the_system:
-        yield of_the_system
+    yield from _in_search_path(version)
+
+
+def _in_search_path(name: str) -> Iterator[str]:
+    """Where the system's own is found. A relative folder of the path may hold anything, and so may
+    the current one, where Windows looks first; there official builds have a Python."""
+    for folder in os.get_exec_path() if os.name == "posix" else ():
+        program = os.path.join(folder, name)
+        if os.path.isabs(folder) and os.access(program, os.X_OK):
+            yield program
+            return
 
 
 def _loads(command: tuple[str, ...], modules: list[str]) -> bool:
+    code = ["-c", "import " + ", ".join(modules)]
     try:
-        done = subprocess.run(
-            [*command, "-c", "import " + ", ".join(modules)],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            env=os.environ | same_packages(),
-            timeout=_PATIENCE,
-            creationflags=NO_WINDOW,
-        )
-    except (OSError, subprocess.TimeoutExpired):
+        return run_child([*command, *code], seconds=_PATIENCE).returncode == 0
+    except (OSError, TimeoutExpired):
         return False  # so that the next one is tried
-    return done.returncode == 0

@@ -16,16 +16,19 @@ from .stale_temp_files import remove_stale_files, temporary_beside
 
 
 @contextmanager
-def atomic_write(path: Path, check: Callable[[], object] = lambda: None) -> Iterator[Path]:
+def atomic_write(
+    path: Path, check: Callable[[], object] = lambda: None, *, keeps: bool = True
+) -> Iterator[Path]:
     """A path beside `path` to write to; it takes the place of `path` when the block ends well.
 
     The temporary path has the same suffix, so that exporters accept it. Missing folders are made.
     When the block fails or is interrupted, what was at `path` before stays as it was. What a killed
-    process left in the folder is removed. A file that is whole but cannot take its place, since
-    another program holds the old one, is kept beside it.
+    process left in the folder is removed.
 
     Args:
         check: is called when the file is whole; what it raises leaves all as it was.
+        keeps: keep a file that is whole but cannot take its place, since another program holds the
+            old one, beside it; it may have taken minutes to write.
 
     Raises:
         HairloomError: nothing can be written there, or the block wrote no file.
@@ -44,7 +47,12 @@ def atomic_write(path: Path, check: Callable[[], object] = lambda: None) -> Iter
             shutil.copymode(target, temporary)
         flush(temporary)
         check()
-        _replace(temporary, target, path)
+        try:
+            move(temporary, target)
+        except PermissionError as error:
+            if not keeps:
+                raise
+            raise _kept(temporary, target, path, error) from error
         flush_names(target.parent)
     except OSError as error:
         raise unwritable(path, error.strerror or str(error)) from error
@@ -58,7 +66,7 @@ def write_bytes_atomic(path: Path, content: bytes | bytearray | memoryview) -> N
     Raises:
         HairloomError: nothing can be written there.
     """
-    with atomic_write(path) as temporary:
+    with atomic_write(path, keeps=False) as temporary:
         temporary.write_bytes(content)
 
 
@@ -83,17 +91,14 @@ def _check_writable(target: Path) -> None:
     trial.unlink()
 
 
-def _replace(temporary: Path, target: Path, path: Path) -> None:
-    try:
-        move(temporary, target)
-    except PermissionError as error:
-        kept = free_name(target.with_name(f"{target.stem} new{target.suffix}"))
-        os.rename(temporary, kept)
-        raise HairloomError(
-            f"this file cannot be replaced ({error.strerror or error}); it is as it was",
-            place=str(path),
-            remedy=f"Close other programs that use it. The new file is beside it as {kept.name}",
-        ) from error
+def _kept(temporary: Path, target: Path, path: Path, error: OSError) -> HairloomError:
+    kept = free_name(target.with_name(f"{target.stem} new{target.suffix}"))
+    os.rename(temporary, kept)
+    return HairloomError(
+        f"this file cannot be replaced ({error.strerror or error}); it is as it was",
+        place=str(path),
+        remedy=f"Close other programs that use it. The new file is beside it as {kept.name}",
+    )
 
 
 def check_place(path: Path) -> None:

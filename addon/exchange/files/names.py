@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
+from collections.abc import Container
+
+#: Names that Windows keeps for devices, with any suffix.
+_DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(\..*)?", re.IGNORECASE)
+_UNSAFE = re.compile(r"[^\w\-. ]+")
+#: Letters of a folder's name, at most 200 bytes; Windows has 260 for a whole path.
+_MOST_LETTERS = 50
 
 
 def plain_name(name: str, fallback: str = "hair") -> str:
@@ -16,3 +24,22 @@ def plain_name(name: str, fallback: str = "hair") -> str:
     if not plain.strip("_"):
         return fallback
     return plain if plain.isidentifier() else f"_{plain}"
+
+
+def folder_name(name: str, taken: Container[str] = (), fallback: str = "hair") -> str:
+    """A name for a folder that every system takes, and that leads nowhere else.
+
+    Args:
+        taken: names that others have, in the form of `as_compared`.
+    """
+    composed = unicodedata.normalize("NFC", name)
+    plain = _UNSAFE.sub("_", composed)[:_MOST_LETTERS].strip(". ") or fallback
+    if _DEVICES.fullmatch(plain):
+        plain = f"_{plain}"
+    choices = (plain, *(f"{plain}_{number}" for number in range(2, 10_000)))
+    return next(each for each in choices if as_compared(each) not in taken)
+
+
+def as_compared(name: str) -> str:
+    """The same for names that are one to any system: Windows and macOS ignore case."""
+    return unicodedata.normalize("NFC", name).casefold()

@@ -20,8 +20,9 @@ from pathlib import Path
 
 from .moving import move
 
-_MARK = r"hl-(?P<place>[0-9a-f]{8})-(?P<process>\d{1,10})-[0-9a-f]{8}"
-_OURS = re.compile(rf"\..*\.{_MARK}(\.[^.]*)?")
+#: What such a name holds.
+MARK = r"hl-(?P<place>[0-9a-f]{8})-(?P<process>\d{1,10})-[0-9a-f]{8}"
+_OURS = re.compile(rf"\..*\.{MARK}(\.[^.]*)?")
 #: In a folder of files that belong together: all of them are there.
 COMPLETE = ".complete"
 #: Seconds without a change after which a file has no writer, where none can be asked for.
@@ -37,6 +38,11 @@ def temporary_beside(path: Path, suffix: str | None = None) -> Path:
 def mark() -> str:
     """A part of a name that tells which process writes there; nobody else takes it."""
     return f"hl-{_here()}-{os.getpid()}-{secrets.token_hex(4)}"
+
+
+def is_temporary(name: str) -> bool:
+    """Whether it is such a name."""
+    return _OURS.fullmatch(name) is not None
 
 
 def is_stale(path: str | Path, name: re.Match[str]) -> bool:

@@ -7,16 +7,14 @@ that it has written to stderr.
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from subprocess import TimeoutExpired
 
 from ...errors import HairloomError
+from .child_process import python_program, run_child
 
-#: for a process on Windows, which else would show one
-NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 #: exit code of a script that says why on stderr
 REPORTED = 3
 #: Seconds for any file, and bytes that a slow disk gives in another one.
@@ -43,18 +41,12 @@ def run_reader(
     Raises:
         HairloomError: no Python can be started, it takes too long, or it ends otherwise.
     """
-    command = [*(python or this_python(path)), str(script), "--", str(path), *map(str, results)]
+    files = [str(each.absolute()) for each in (path, *results)]
+    command = [*(python or this_python(path)), str(script.absolute()), "--", *files]
     patience = _PATIENCE + path.stat().st_size / _BYTES_A_SECOND
     try:
-        done = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            env=os.environ | same_packages() | dict(settings or {}),
-            timeout=patience,
-            creationflags=NO_WINDOW,
-        )
-    except subprocess.TimeoutExpired as error:
+        done = run_child(command, seconds=patience, settings=settings)
+    except TimeoutExpired as error:
         raise damaged(
             path, f"{library}'s library could not read it within {patience:.0f} s"
         ) from error
@@ -76,16 +68,6 @@ def this_python(path: Path) -> tuple[str, ...]:
     if not Path(sys.executable).stem.lower().startswith("python"):
         raise _no_python(path, f"this one is a part of {sys.executable or 'another program'}")
     return python_program(sys.executable)
-
-
-def python_program(program: str) -> tuple[str, ...]:
-    """The command of a Python that takes modules from PYTHONPATH and from its own folders alone."""
-    return (program, "-s", "-P")
-
-
-def same_packages() -> dict[str, str]:
-    """What a Python's environment must hold so that it finds all packages that this one does."""
-    return {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 
 
 def refusal(library: str, reason: str) -> str:

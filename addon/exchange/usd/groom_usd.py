@@ -29,7 +29,7 @@ from ..files.axes import from_z_up
 from ..files.names import plain_name
 from ..groom import Groom, GroomMotion, points_of
 from .usd_library import SUFFIXES, usd_library
-from .usd_probe import summary
+from .usd_reader import summary
 
 #: The version of Epic's conventions that the names of primvars are from.
 GROOM_VERSION = (1, 5)

@@ -7,10 +7,8 @@ point instancers are not, and of other geometry only its number is reported.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -23,10 +21,8 @@ from ..files.axes import to_z_up
 from ..groom import Groom
 from ..read_groom import ReadGroom
 from .usd_curves import Curves, UnusableCurvesError, curves_of
-from .usd_library import damage_reported, opened_stage, usd_library
-
-#: More than any groom; their positions alone take 3 GiB.
-MAX_POINTS = 1 << 28
+from .usd_library import prims_of, usd_arrays
+from .usd_reader import Arrays
 
 
 def read_usd(
@@ -53,75 +49,49 @@ def read_usd(
     Raises:
         HairloomError: no OpenUSD, a file that cannot be read, or one without a usable strand.
     """
-    usd = usd_library(path)
-    stage = opened_stage(path, python)
-    with damage_reported(path):
-        reading = _Reading(usd, stage, path, up, scale, factor)
-        pieces = list(reading.pieces())
-        if not pieces:
-            raise reading.nothing_found()
-        version, name = reading.version(), reading.name()
-    groom = _joined(pieces, path, name, reading.notes)
-    return ReadGroom(groom, version, tuple(f"{path.name}: {note}." for note in reading.notes))
+    reading = _Reading(usd_arrays(path, python), path, up, scale, factor)
+    pieces = list(reading.pieces())
+    if not pieces:
+        raise reading.nothing_found()
+    groom = _joined(pieces, path, reading.name(), reading.notes)
+    notes = tuple(f"{path.name}: {note}." for note in reading.notes)
+    return ReadGroom(groom, reading.version(), notes)
 
 
 class _Reading:
-    """A walk over a stage, and what there is to say of it."""
+    """What a file holds, and what there is to say of it."""
 
     def __init__(
-        self,
-        usd: ModuleType,
-        stage: Any,
-        path: Path,
-        up: str | None,
-        scale: float | None,
-        factor: float,
+        self, arrays: Arrays, path: Path, up: str | None, scale: float | None, factor: float
     ) -> None:
         self.notes: list[str] = []
-        self._usd, self._stage, self._path = usd, stage, path
+        self._arrays, self._path = arrays, path
         self._problems: list[str] = []
-        geometry = usd.UsdGeom
-        unit = geometry.GetStageMetersPerUnit(stage) if scale is None else scale
-        if scale is None and not stage.HasAuthoredMetadata("metersPerUnit"):
+        unit = float(arrays["unit"]) if scale is None else scale
+        if scale is None and not arrays["has_unit"]:
             self.notes.append("it names no unit, so that lengths were taken as centimetres")
         if not (np.isfinite(unit) and unit > 0.0):
             self.notes.append(f"its unit of {unit} m makes no sense and was taken as a metre")
             unit = 1.0
-        axes = to_z_up(np.eye(3), up or str(geometry.GetStageUpAxis(stage))).T
+        axes = to_z_up(np.eye(3), up or str(arrays["up"])).T
         self._to_blender = np.eye(4)
         self._to_blender[:3, :3] = axes * (unit * factor)
 
     def pieces(self) -> Iterator[Curves]:
         """The curves of each prim that has usable ones."""
-        usd, total = self._usd, 0
-        cache = usd.UsdGeom.XformCache(usd.Usd.TimeCode.EarliestTime())
-        others: Counter[str] = Counter()
-        walk = iter(
-            usd.Usd.PrimRange(self._stage.GetPseudoRoot(), usd.Usd.TraverseInstanceProxies())
-        )
-        for prim in walk:
-            if prim.IsA(usd.UsdGeom.BasisCurves):
-                local = np.array(cache.GetLocalToWorldTransform(prim)).T  # USD has row vectors
-                try:
-                    piece = curves_of(usd, prim, self._to_blender @ local)
-                except UnusableCurvesError as error:
-                    self._problems.append(f"{prim.GetPath()} was left out: {error}")
-                    continue
-                total += len(piece.points)
-                if total > MAX_POINTS:
-                    raise self._error(
-                        f"it has more than {MAX_POINTS:,} points", "Export fewer strands"
-                    )
-                self.notes += [f"{prim.GetPath()}: {note}" for note in piece.notes]
-                yield piece
-            elif prim.IsA(usd.UsdGeom.PointInstancer):
-                others["PointInstancer"] += 1
-                walk.PruneChildren()
-            elif prim.IsA(usd.UsdGeom.Gprim):
-                others[str(prim.GetTypeName())] += 1
+        for prim in prims_of(self._arrays):
+            local = prim["matrix"].T  # USD has row vectors
+            try:
+                piece = curves_of(prim, self._to_blender @ local)
+            except UnusableCurvesError as error:
+                self._problems.append(f"{prim['path']} was left out: {error}")
+                continue
+            self.notes += [f"{prim['path']}: {note}" for note in piece.notes]
+            yield piece
         self.notes += self._problems
-        if others:
-            counts = ", ".join(f"{count:,} {kind}" for kind, count in sorted(others.items()))
+        others = zip(self._arrays["others"], self._arrays["other_counts"], strict=True)
+        counts = ", ".join(f"{count:,} {kind}" for kind, count in others)
+        if counts:
             self.notes.append(f"prims that are no BasisCurves were left out ({counts})")
 
     def nothing_found(self) -> HairloomError:
@@ -136,22 +106,14 @@ class _Reading:
         )
 
     def version(self) -> float:
-        """Of the conventions for grooms, as the topmost prim says."""
-        prim = self._stage.GetDefaultPrim()
-        if not prim:
-            return 0.0
-        major = prim.GetAttribute("userProperties:groom_version_major").Get()
-        minor = prim.GetAttribute("userProperties:groom_version_minor").Get()
-        if not (isinstance(major, int) and isinstance(minor, int)):
-            return 0.0
-        return float(f"{abs(major)}.{abs(minor)}")
+        """Of the conventions for grooms, as the topmost prim says; 0 where it does not."""
+        major, minor = self._arrays["version"].tolist()
+        return float(f"{major}.{minor}") if major >= 0 else 0.0
 
     def name(self) -> str:
         """The topmost prim's, unless that is Blender's "root"."""
-        prim = self._stage.GetDefaultPrim()
-        if not prim or prim.GetName() == "root":
-            return self._path.stem
-        return str(prim.GetDisplayName() or prim.GetName())
+        name, label = map(str, self._arrays["prim_names"])
+        return self._path.stem if name in ("", "root") else label or name
 
     def _error(self, problem: str, remedy: str) -> HairloomError:
         return HairloomError(problem, place=str(self._path), remedy=remedy)

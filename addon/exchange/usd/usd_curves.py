@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,6 +12,7 @@ from ...arrays import Bools, Floats, Ints
 from ...strands.affine import mean_scale, moved
 from ...strands.clean import are_widths
 from .usd_basis import OnCurves, points_on_curves
+from .usd_reader import Arrays
 
 #: Where programs put the UVs of roots, Blender's among them; the first one found counts.
 _ROOT_UVS = ("groom_root_uv", "surface_uv_coordinate", "st", "uv", "map1")
@@ -50,19 +49,18 @@ class UnusableCurvesError(Exception):
     """Why nothing of a prim can be used."""
 
 
-def curves_of(usd: ModuleType, prim: Any, matrix: Floats) -> Curves:
-    """Read a prim.
+def curves_of(prim: Arrays, matrix: Floats) -> Curves:
+    """What a prim holds, as strands.
 
     Args:
-        prim: a UsdGeomBasisCurves.
+        prim: the arrays of a prim, by the names of `usd_reader`.
         matrix: (4, 4), from the prim's space to Blender's, in metres.
 
     Raises:
         UnusableCurvesError: it has no curves, counts that do not fit, or is closed.
     """
-    curves = usd.UsdGeom.BasisCurves(prim)
-    points = _array(_value(usd, curves.GetPointsAttr()), np.float32, 3)
-    counts = _array(_value(usd, curves.GetCurveVertexCountsAttr()), np.int64)
+    points = _array(prim.get("points"), np.float32, 3)
+    counts = _array(prim.get("counts"), np.int64)
     if points is None or counts is None or not len(points) or not len(counts):
         raise UnusableCurvesError("it has no curves")
     if counts.min() < 0 or int(counts.sum()) != len(points):
@@ -70,16 +68,16 @@ def curves_of(usd: ModuleType, prim: Any, matrix: Floats) -> Curves:
             f"its {len(counts):,} counts of points add up to {int(counts.sum()):,}, and it has "
             f"{len(points):,} points"
         )
-    wrap, basis = str(_value(usd, curves.GetWrapAttr())), "linear"
-    if str(_value(usd, curves.GetTypeAttr())) != "linear":
-        basis = str(_value(usd, curves.GetBasisAttr()))
+    wrap, kind, basis, widths_interpolation = map(str, prim["traits"])
+    if kind == "linear":
+        basis = "linear"
     if wrap == "periodic":
         raise UnusableCurvesError("its curves are closed")
-    values = _Values(usd, prim, points_on_curves(basis, wrap == "pinned", counts), counts)
-    radius, notes = _radius(values, curves, mean_scale(matrix))
+    values = _Values(prim, points_on_curves(basis, wrap == "pinned", counts), counts)
+    radius, notes = _radius(values, widths_interpolation, mean_scale(matrix))
     if values.on_curves.vertex is not None:
         notes += (f"its {basis} curves became points on the curves",)
-    if curves.GetPointsAttr().GetNumTimeSamples() > 1:
+    if int(prim["samples"]) > 1:
         notes += ("its motion was left out",)
     wrong = values.on_curves.wrong_count
     if wrong:
@@ -91,7 +89,7 @@ def curves_of(usd: ModuleType, prim: Any, matrix: Floats) -> Curves:
     guide = values.of_strands("groom_guide", np.int32)
     uvs = (values.of_strands(name, np.float32, 2) for name in _ROOT_UVS)
     return Curves(
-        name=prim.GetName(),
+        name=str(prim["name"]),
         points=moved(values.mixed(points), matrix),
         offsets=values.on_curves.offsets,
         radius=radius,
@@ -107,12 +105,14 @@ def curves_of(usd: ModuleType, prim: Any, matrix: Floats) -> Curves:
     )
 
 
-def _radius(values: _Values, curves: Any, scale: float) -> tuple[Floats | None, tuple[str, ...]]:
+def _radius(
+    values: _Values, interpolation: str, scale: float
+) -> tuple[Floats | None, tuple[str, ...]]:
     """Half the widths [m], and what to say of those that cannot be hair's."""
-    widths = _array(_value(values.usd, curves.GetWidthsAttr()), np.float32)
+    widths = _array(values.prim.get("widths"), np.float32)
     if widths is None or not len(widths):
         return None, ("it has no widths",)
-    radius = values.on_points(widths, str(curves.GetWidthsInterpolation()), "widths")
+    radius = values.on_points(widths, interpolation, "widths")
     if radius is None:
         return None, ()
     with np.errstate(over="ignore", invalid="ignore"):
@@ -125,11 +125,10 @@ def _radius(values: _Values, curves: Any, scale: float) -> tuple[Floats | None, 
 class _Values:
     """A prim's primvars for each strand or each of its points, whatever their interpolation."""
 
-    def __init__(self, usd: ModuleType, prim: Any, on_curves: OnCurves, counts: Ints) -> None:
-        self.usd = usd
+    def __init__(self, prim: Arrays, on_curves: OnCurves, counts: Ints) -> None:
+        self.prim = prim
         self.on_curves = on_curves
         self.notes: list[str] = []
-        self._primvars = usd.UsdGeom.PrimvarsAPI(prim)
         self._counts = counts
         self._point_count = int(counts.sum())
 
@@ -168,7 +167,7 @@ class _Values:
 
     def texts_of_strands(self, name: str) -> list[str] | None:
         texts, interpolation = self._flattened(name)
-        if texts is None or isinstance(texts, str) or not isinstance(texts, Iterable):
+        if texts is None or texts.ndim != 1:
             return None
         names = [str(each) for each in texts]
         rows = self._rows(name, len(names), interpolation) if names else None
@@ -205,16 +204,10 @@ class _Values:
         array = _array(values, dtype, width)
         return (array if array is not None and len(array) else None), interpolation
 
-    def _flattened(self, name: str) -> tuple[Any, str]:
+    def _flattened(self, name: str) -> tuple[NDArray[Any] | None, str]:
         """A primvar without its indices, and its interpolation."""
-        primvar = self._primvars.GetPrimvar(name)
-        if not primvar or not primvar.HasValue():
-            return None, ""
-        time = self.usd.Usd.TimeCode
-        value = primvar.ComputeFlattened(time.Default())
-        if value is None:
-            value = primvar.ComputeFlattened(time.EarliestTime())
-        return value, str(primvar.GetInterpolation())
+        values = self.prim.get(f"primvar/{name}")
+        return values, "" if values is None else str(self.prim[f"interpolation/{name}"])
 
     def _unfit(self, name: str, count: int, expected: int, interpolation: str) -> None:
         self.notes.append(
@@ -222,22 +215,12 @@ class _Values:
         )
 
 
-def _value(usd: ModuleType, attribute: Any) -> Any:
-    """At no time; where an attribute has time samples alone, the first of them."""
-    value = attribute.Get()
-    return attribute.Get(usd.Usd.TimeCode.EarliestTime()) if value is None else value
-
-
-def _array(value: Any, dtype: type, width: int = 1) -> NDArray[Any] | None:
-    """(count,) or (count, width), or None for a value of another shape or kind."""
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind not in "biuf":
-            return None
-        if array.ndim == (0 if width == 1 else 1):
-            array = array[None]
-        with np.errstate(invalid="ignore", over="ignore"):
-            array = array.astype(dtype, copy=False)
-    except (TypeError, ValueError):
+def _array(array: NDArray[Any] | None, dtype: type, width: int = 1) -> NDArray[Any] | None:
+    """(count,) or (count, width), or None for values of another shape or kind."""
+    if array is None or array.dtype.kind not in "biuf":
         return None
+    if array.ndim == (0 if width == 1 else 1):
+        array = array[None]
+    with np.errstate(invalid="ignore", over="ignore"):
+        array = array.astype(dtype, copy=False)
     return array if array.shape[1:] == ((width,) if width > 1 else ()) else None

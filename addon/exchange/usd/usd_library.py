@@ -1,4 +1,4 @@
-"""OpenUSD's Python modules, which official builds of Blender bring along, and files opened by them.
+"""OpenUSD's Python modules, which official builds of Blender bring along, and what they read.
 
 The bpy module from PyPI has them in a folder that Python does not search: there usd-core takes
 their place, in one process with Blender's own. Some Linux distributions build Blender without.
@@ -6,21 +6,21 @@ their place, in one process with Blender's own. Some Linux distributions build B
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+
+import numpy as np
 
 from ...errors import HairloomError
-from ..files.subprocess_reader import damaged, refusal, run_reader
+from ..files.subprocess_reader import run_reader
+from . import usd_reader
 from .usd_crate import CRATE, check_crate
-from .usd_probe import summary
+from .usd_reader import Arrays
 
 #: either of both, binary (crate), text
 SUFFIXES = (".usd", ".usdc", ".usda")
-#: reads all of a binary file first, in another process: damaged ones make the library crash
-PROBE = Path(__file__).with_name("usd_probe.py")
 
 
 def usd_library(place: Path) -> ModuleType:
@@ -41,15 +41,15 @@ def usd_library(place: Path) -> ModuleType:
     return pxr
 
 
-def opened_stage(path: Path, python: Sequence[str] | None = None) -> Any:
-    """The stage of a file, with all its payloads.
+def usd_arrays(path: Path, python: Sequence[str] | None = None) -> Arrays:
+    """What another process finds in a file, see `usd_reader`: this one never opens it.
 
     python: the command that starts another Python, see `run_reader`.
 
     Raises:
         HairloomError: no OpenUSD, no such file, or none that can be read as USD.
     """
-    usd = usd_library(path)
+    usd_library(path)  # for its message, should it be missing
     if path.suffix.lower() not in SUFFIXES:
         raise _unusable(path, f"'{path.suffix}' is no suffix of USD files", "Choose a .usd file")
     try:
@@ -71,27 +71,24 @@ def opened_stage(path: Path, python: Sequence[str] | None = None) -> Any:
             "this is no USD file: it begins neither as a binary one nor as a text",
             "Choose a .usd, .usdc or .usda file, or export the groom again",
         )
-    if beginning == CRATE:
+    with tempfile.TemporaryDirectory(prefix="hairloom-") as folder:
+        result = Path(folder) / "curves.npz"
         # One thread: each further one reserves memory of its own, which would count.
         one_thread = {"PXR_WORK_THREAD_LIMIT": "1"}
-        run_reader(PROBE, path, library="USD", python=python, settings=one_thread)
-    with damage_reported(path):
-        return usd.Usd.Stage.Open(str(path))
+        script = Path(usd_reader.__file__)
+        run_reader(script, path, [result], library="USD", python=python, settings=one_thread)
+        with np.load(result, allow_pickle=False) as arrays:
+            return dict(arrays)
 
 
-@contextmanager
-def damage_reported(path: Path) -> Iterator[None]:
-    """Let the library's complaints about what a file holds become ours.
-
-    Raises:
-        HairloomError: in place of the library's errors.
-    """
-    usd = usd_library(path)
-    try:
-        yield
-    # Beside its own error the library lets C++ exceptions through, as whatever Python has for them.
-    except (usd.Tf.ErrorException, RuntimeError, ValueError, MemoryError) as error:
-        raise damaged(path, refusal("USD", summary(error))) from error
+def prims_of(arrays: Arrays) -> Iterator[Arrays]:
+    """The arrays of each prim of curves, by their names without its number."""
+    prims: dict[str, Arrays] = {}
+    for name, array in arrays.items():
+        number, slash, own_name = name.partition("/")
+        if slash:
+            prims.setdefault(number, {})[own_name] = array
+    yield from prims.values()
 
 
 def _unusable(path: Path, problem: str, remedy: str) -> HairloomError:

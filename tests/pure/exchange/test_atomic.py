@@ -112,8 +112,13 @@ def test_a_file_that_another_program_holds_stays_and_the_new_one_is_kept(
     target.write_bytes(b"old")
     (tmp_path / "groom new.tfx").write_bytes(b"from before")
     monkeypatch.setattr(moving.os, "replace", held)
-    with pytest.raises(HairloomError, match=r"groom new 2\.tfx"):
-        write_bytes_atomic(target, b"new")
+    with (
+        pytest.raises(HairloomError, match=r"groom new 2\.tfx"),
+        atomic_write(target) as temporary,
+    ):
+        temporary.write_bytes(b"new")
+    with pytest.raises(HairloomError, match="Access is denied"):
+        write_bytes_atomic(target, b"in a moment")
     assert target.read_bytes() == b"old"
     assert (tmp_path / "groom new 2.tfx").read_bytes() == b"new"
     assert len(names(tmp_path)) == 3

@@ -20,7 +20,7 @@ from extension_loader import REPOSITORY
 from tiers import few_in_commits
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files.subprocess_reader import same_packages
+from hairloom.addon.exchange.files.child_process import same_packages
 
 
 def with_library(kind: str, package: str) -> Any:

@@ -19,8 +19,9 @@ import pytest
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic
+from hairloom.addon.exchange.files.child_process import same_packages
 from hairloom.addon.exchange.files.file_space import FileSpace
-from hairloom.addon.exchange.files.subprocess_reader import same_packages, this_python
+from hairloom.addon.exchange.files.subprocess_reader import this_python
 from hairloom.addon.exchange.groom import Groom, GroomMotion
 from hairloom.addon.exchange.groom_presets import BLENDER, MIN_WIDTH, UNITY, UNREAL, preflight
 from hairloom.addon.strands import StrandSet

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -71,3 +72,29 @@ def test_where_no_python_is_known_that_is_said(path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(sys, "executable", "/opt/blender/blender")
     with pytest.raises(HairloomError, match=r"no Python can be started .*/opt/blender/blender"):
         run(path, "")
+
+
+PLANTED = "import pathlib; pathlib.Path(__file__).with_name('it_ran').touch()"
+
+
+def test_no_code_of_the_current_folder_or_the_environment_is_run(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in a downloaded project, or with a variable that another program has set."""
+    planted = tmp_path / "planted"
+    planted.mkdir()
+    for module in ("ctypes", "numpy", "sitecustomize", "usercustomize", "json"):
+        (planted / f"{module}.py").write_text(PLANTED)
+    monkeypatch.chdir(planted)
+    monkeypatch.setattr(sys, "path", ["", ".", *sys.path])
+    for name in ("PYTHONPATH", "PYTHONHOME", "PYTHONUSERBASE"):
+        monkeypatch.setenv(name, str(planted))
+    monkeypatch.setenv("PYTHONSTARTUP", str(planted / "json.py"))
+    monkeypatch.setenv("PYTHONINSPECT", "1")
+    run(path, "import ctypes, numpy, json, sys; open(sys.argv[-1], 'w').write('read')")
+    assert path.with_name("result").read_text() == "read"
+    assert not (planted / "it_ran").exists()
+    monkeypatch.delenv("PYTHONHOME")  # without which the trap would not start at all
+    environment = dict(os.environ)
+    subprocess.run([sys.executable, "-c", "import numpy"], env=environment, capture_output=True)
+    assert (planted / "it_ran").exists(), "the trap works"

@@ -1,0 +1,213 @@
+"""The curves of a USD file as plain arrays: a program of its own, for another process.
+
+    python usd_reader.py -- FILE RESULT.npz
+
+A damaged file makes OpenUSD crash, and a text of a few kilobytes can describe more prims than any
+machine holds. So only this process opens files, and it has limits of time, memory and prims. It
+imports no other module of ours. It ends with REPORTED, and a line on stderr, after an error.
+
+The result has, for the BasisCurves number N in the file's order, "N/name", "N/path", "N/matrix"
+(4, 4) that takes row vectors to the stage, "N/points", "N/counts", "N/widths", "N/samples" of
+points over time, "N/traits" (wrap, type, basis, interpolation of widths) and, for each primvar of
+PRIMVARS that it has, "N/primvar/NAME" without indices and "N/interpolation/NAME"; and of the stage
+"up", "unit", "has_unit", "prim_names" (name and label of the topmost one), "version" (major and
+minor; -1 where it names none), "others" (types of other geometry) and "other_counts".
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+type Arrays = dict[str, NDArray[Any]]
+
+#: as `run_reader` expects it
+REPORTED = 3
+#: What grooms have beside points and widths.
+PRIMVARS = (
+    "groom_id",
+    "groom_guide",
+    "groom_group_id",
+    "groom_group_name",
+    "groom_color",
+    "displayColor",
+    "groom_closest_guides",
+    "groom_guide_weights",
+    "groom_root_uv",
+    "surface_uv_coordinate",
+    "st",
+    "uv",
+    "map1",
+)
+_PARTS = ("major", "minor")
+#: More than any groom; their positions alone take 3 GiB.
+MAX_POINTS = 1 << 28
+#: More than any scene that is sent for its hair, counted with all instances.
+MAX_PRIMS = 1_000_000
+#: Memory that a file may take beside its own size [bytes], and as a multiple of it.
+_BESIDE, _MAX_TIMES = 1 << 30, 30
+#: Time of the processor for any file [s], and bytes that take a second more.
+_SECONDS, _BYTES_A_SECOND = 8, 1_000_000
+
+
+class _TooMuchError(Exception):
+    """The file describes more than can be meant."""
+
+
+def read_curves(path: str) -> Arrays:
+    """All curves of a file, at no time or the first one that there is."""
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(path)
+    found = _of_stage(stage)
+    cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
+    others: Counter[str] = Counter()
+    number = points = 0
+    walk = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
+    for prims, prim in enumerate(walk):
+        if prims > MAX_PRIMS:
+            raise _TooMuchError(f"it has more than {MAX_PRIMS:,} prims with all instances")
+        if prim.IsA(UsdGeom.BasisCurves):
+            curves = _of_curves(prim)
+            points += len(curves.get("points", ()))
+            if points > MAX_POINTS:
+                raise _TooMuchError(f"it has more than {MAX_POINTS:,} points")
+            matrix = np.array(cache.GetLocalToWorldTransform(prim), np.float64)
+            found |= {f"{number}/{name}": array for name, array in curves.items()}
+            found[f"{number}/matrix"] = matrix
+            number += 1
+        elif prim.IsA(UsdGeom.PointInstancer):
+            others["PointInstancer"] += 1
+            walk.PruneChildren()
+        elif prim.IsA(UsdGeom.Gprim):
+            others[str(prim.GetTypeName())] += 1
+    found["others"] = np.array(sorted(others), np.str_)
+    found["other_counts"] = np.array([others[kind] for kind in sorted(others)], np.int64)
+    return found
+
+
+def _of_stage(stage: Any) -> Arrays:
+    from pxr import UsdGeom
+
+    prim = stage.GetDefaultPrim()
+    names, version = ("", ""), (-1, -1)
+    if prim:
+        names = prim.GetName(), prim.GetDisplayName()
+        parts = [prim.GetAttribute(f"userProperties:groom_version_{each}").Get() for each in _PARTS]
+        if all(isinstance(part, int) for part in parts):
+            version = abs(parts[0]), abs(parts[1])
+    return {
+        "up": np.array(str(UsdGeom.GetStageUpAxis(stage))),
+        "unit": np.array(float(UsdGeom.GetStageMetersPerUnit(stage))),
+        "has_unit": np.array(bool(stage.HasAuthoredMetadata("metersPerUnit"))),
+        "prim_names": np.array(names, np.str_),
+        "version": np.array(version, np.int64),
+    }
+
+
+def _of_curves(prim: Any) -> Arrays:
+    from pxr import UsdGeom
+
+    curves, primvars = UsdGeom.BasisCurves(prim), UsdGeom.PrimvarsAPI(prim)
+    traits = [_value(curves.GetWrapAttr()), _value(curves.GetTypeAttr())]
+    traits += [_value(curves.GetBasisAttr()), curves.GetWidthsInterpolation()]
+    values = {
+        "points": _value(curves.GetPointsAttr()),
+        "counts": _value(curves.GetCurveVertexCountsAttr()),
+        "widths": _value(curves.GetWidthsAttr()),
+        "name": prim.GetName(),
+        "path": str(prim.GetPath()),
+        "traits": [str(trait) for trait in traits],
+        "samples": curves.GetPointsAttr().GetNumTimeSamples(),
+    }
+    for name in PRIMVARS:
+        primvar = primvars.GetPrimvar(name)
+        if primvar and primvar.HasValue():
+            values[f"primvar/{name}"] = _flattened(primvar)
+            values[f"interpolation/{name}"] = str(primvar.GetInterpolation())
+    arrays = {name: _array(value) for name, value in values.items()}
+    return {name: array for name, array in arrays.items() if array is not None}
+
+
+def _value(attribute: Any) -> Any:
+    """At no time; where an attribute has time samples alone, the first of them."""
+    from pxr import Usd
+
+    value = attribute.Get()
+    return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
+
+
+def _flattened(primvar: Any) -> Any:
+    """Without its indices."""
+    from pxr import Usd
+
+    value = primvar.ComputeFlattened(Usd.TimeCode.Default())
+    return primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()) if value is None else value
+
+
+def _array(value: Any) -> NDArray[Any] | None:
+    """Numbers or texts; None for values of other kinds."""
+    if value is None:
+        return None
+    if isinstance(value, str):
+        return np.array(value)
+    with contextlib.suppress(TypeError, ValueError):
+        array = np.asarray(value)
+        if array.dtype.kind in "biuf":
+            return array
+        if isinstance(value, Iterable):  # tokens and the like
+            return np.array([str(each) for each in value], np.str_)
+    return None
+
+
+def summary(error: BaseException) -> str:
+    """An error of the library in one line, without where in its code it was."""
+    try:
+        text = str(error)
+    except UnicodeDecodeError:  # it quotes bytes of a damaged text
+        text = ""
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    last = lines[-1] if lines else type(error).__name__
+    return last.rpartition("-- ")[2].strip("'. ")
+
+
+def _limit(path: Path) -> None:
+    """Of memory and time for this process; only Linux says how much memory it has."""
+    if not sys.platform.startswith("linux"):
+        return
+    import resource
+
+    size = path.stat().st_size
+    seconds = int(sum(os.times()[:2])) + _SECONDS + size // _BYTES_A_SECOND
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    memory = pages * resource.getpagesize() + _BESIDE + _MAX_TIMES * size
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+
+
+def _main(path: str, result: str) -> int:
+    from pxr import Tf
+
+    _limit(Path(path))
+    try:
+        found = read_curves(path)
+        with open(result, "wb") as file:
+            np.savez(file, allow_pickle=False, **found)
+    except (Tf.ErrorException, _TooMuchError, RuntimeError, ValueError, MemoryError) as error:
+        print(ascii(summary(error)), file=sys.stderr)
+        return REPORTED
+    return 0
+
+
+if __name__ == "__main__":
+    code = _main(*sys.argv[-2:])
+    sys.stderr.flush()
+    os._exit(code)  # at once: the library's own end may fail on what it has read
