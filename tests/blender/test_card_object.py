@@ -115,18 +115,43 @@ def test_pressing_again_keeps_the_object_and_what_the_artist_added(hair):
     assert "Hair Cards LOD2" not in bpy.data.objects and len(bpy.data.meshes) == 3
 
 
-def test_a_copy_of_the_cards_is_left_alone(hair):
+@pytest.mark.parametrize("name", ["Backup", "Hair Cards", "Zoë's"])
+@pytest.mark.parametrize("reopened", [False, True])
+def test_a_copy_of_the_cards_is_left_alone(hair, name, reopened, tmp_path):
+    """Whatever it is called, even as the cards were called before."""
+    press()
+    obj = card_objects(hair)[0]
+    obj.name = "Fringe"
+    copy = obj.copy()
+    copy.data = obj.data.copy()
+    copy.name = name
+    bpy.context.collection.objects.link(copy)
+    count = len(copy.data.polygons)
+    if reopened:
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "cards.blend"))
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "cards.blend"))
+        hair = bpy.data.objects["Hair"]
+        bpy.context.view_layer.objects.active = hair
+        hair.select_set(True)
+    hair.data.hairloom.cards.card_count = 4
+    press()
+    assert len(bpy.data.objects[name].data.polygons) == count
+    assert len(bpy.data.objects["Fringe"].data.polygons) != count
+    assert [cards.name for cards in card_objects(hair)] == ["Fringe"]
+
+
+def test_where_the_cards_are_gone_their_copy_is_left_alone(hair):
     press()
     obj = card_objects(hair)[0]
     copy = obj.copy()
     copy.data = obj.data.copy()
-    copy.name = "Kept"
     bpy.context.collection.objects.link(copy)
+    bpy.data.objects.remove(obj)
     count = len(copy.data.polygons)
     hair.data.hairloom.cards.card_count = 4
     press()
     assert len(copy.data.polygons) == count
-    assert len(obj.data.polygons) != count
+    assert len(card_objects(hair)[0].data.polygons) != count
 
 
 @pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (-2.0, 0.5, 1.0)])

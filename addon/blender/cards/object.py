@@ -1,8 +1,8 @@
 """Hair cards as mesh objects in the artist's scene, one a level of detail.
 
 They are made once, and later only filled again: object, modifiers, materials and whatever else
-the artist has added stay. Their mesh lies in the space of the hair object, so cards that were
-moved aside stay there.
+the artist has added stay. Copies of them are the artist's and are never filled, whatever they are
+called. Their mesh lies in the space of the hair object, so cards that were moved aside stay there.
 """
 
 from __future__ import annotations
@@ -66,13 +66,38 @@ class CardObjectJob:
 
 
 def card_objects(hair: bpy.types.Object) -> list[bpy.types.Object]:
-    """The objects that hold the cards of a groom, finest first."""
-    found = [
-        obj
-        for obj in bpy.data.objects
-        if obj.type == "MESH" and obj.hairloom.card_object.groom == hair
-    ]
-    return sorted(found, key=lambda obj: (obj.hairloom.card_object.level, obj.name))
+    """The objects that hold the cards of a groom, finest first; none of their copies."""
+    of_groom = [obj for obj in _all_cards() if obj.hairloom.card_object.groom == hair]
+    made = {obj.hairloom.card_object.level: obj for obj in of_groom if _has_made_name(obj)}
+    made |= {obj.hairloom.card_object.level: obj for obj in of_groom if _has_made_uid(obj)}
+    return [made[level] for level in sorted(made)]
+
+
+def remember_names() -> None:
+    """Before a file is saved: in another session the numbers of its objects are others."""
+    for obj in _all_cards():
+        if _has_made_uid(obj):
+            obj.hairloom.card_object.made_name = obj.name
+
+
+def remember_numbers() -> None:
+    """After a file was opened: its objects may be renamed and copied from now on."""
+    for obj in _all_cards():
+        is_made = _has_made_name(obj) and obj.library is None
+        obj.hairloom.card_object.made_uid = obj.session_uid if is_made else 0
+
+
+def _all_cards() -> list[bpy.types.Object]:
+    meshes = (obj for obj in bpy.data.objects if obj.type == "MESH")
+    return [obj for obj in meshes if obj.hairloom.card_object.groom is not None]
+
+
+def _has_made_uid(obj: bpy.types.Object) -> bool:
+    return bool(obj.hairloom.card_object.made_uid == obj.session_uid)
+
+
+def _has_made_name(obj: bpy.types.Object) -> bool:
+    return bool(obj.hairloom.card_object.made_name == obj.name)
 
 
 def _check_editable(obj: bpy.types.Object) -> None:
@@ -140,7 +165,9 @@ def _new_object(hair: bpy.types.Object, level: int, matrix: Floats) -> bpy.types
     obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
     for collection in hair.users_collection or [bpy.context.scene.collection]:
         collection.objects.link(obj)
-    obj.hairloom.card_object.groom, obj.hairloom.card_object.level = hair, level
+    card_object = obj.hairloom.card_object
+    card_object.groom, card_object.level = hair, level
+    card_object.made_name, card_object.made_uid = obj.name, obj.session_uid
     carrier = head_of(hair) or hair.parent
     if carrier is not None:
         obj.parent = carrier

@@ -10,6 +10,7 @@ from bpy.app.handlers import persistent
 
 from ..bakes import baked_copy, playback
 from ..base import suspension
+from ..cards.object import remember_names, remember_numbers
 from ..properties import changed, library_overrides
 from . import previews as registry
 from . import scene_events
@@ -24,6 +25,7 @@ def on_load_pre(*_: Any) -> None:
 @persistent
 def on_load_post(*_: Any) -> None:
     registry.forget_all()
+    remember_numbers()
     _heal()
 
 
@@ -36,6 +38,7 @@ def on_load_fail(*_: Any) -> None:
 @persistent
 def on_save_pre(*_: Any) -> None:
     library_overrides.make_last()
+    remember_names()
     _heal()
 
 

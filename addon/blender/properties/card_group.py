@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import FloatProperty, IntProperty, PointerProperty
+from bpy.props import FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from .properties import OVERRIDABLE
 
@@ -28,6 +28,18 @@ class HAIRLOOM_PG_card_object(bpy.types.PropertyGroup):
         "level": IntProperty(
             name="Level",
             description="Level of detail, 0 is the finest",
+            options={"HIDDEN"},
+            override=OVERRIDABLE,
+        ),
+        "made_name": StringProperty(
+            name="Made As",
+            description="Name under which Make Cards knows this object; a copy has another one",
+            options={"HIDDEN"},
+            override=OVERRIDABLE,
+        ),
+        "made_uid": IntProperty(
+            name="Made In",
+            description="Number of this object while the file is open; a copy has another one",
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
