@@ -111,6 +111,7 @@ def _steps() -> tuple[Step, ...]:
         (groups.register, groups.unregister),
         (engine_panels.register, engine_panels.unregister),
         (previews.register, previews.unregister),
+        (operators_preview.register, operators_preview.unregister),
         (panels.register, panels.unregister),
         (translations.register, translations.unregister),
         (operators_adopted.register, operators_adopted.unregister),

@@ -30,11 +30,13 @@ class Progress(NamedTuple):
 
     fraction: of all work, 0 to 1; None where it is unknown.
     is_idle: there is nothing to do just now, since a thread works.
+    is_committed: it is too late to cancel it; it ends in a moment.
     """
 
     text: str
     fraction: float | None = None
     is_idle: bool = False
+    is_committed: bool = False
 
 
 type Steps[Result] = Generator[Progress, None, Result]
@@ -93,7 +95,7 @@ class LongWork:
         """Block all other events: edits in between would affect only part of the work."""
         if _running is None:
             return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
+        if event.type == "ESC" and event.value == "PRESS" and not _running.progress.is_committed:
             stop()
             report(self, "INFO", f"{self.bl_label} was cancelled; {self.unharmed}")
             return {"CANCELLED"}
@@ -190,7 +192,7 @@ def draw_progress(layout: bpy.types.UILayout, operator: type[LongWork]) -> bool:
     """Draw the progress instead of the operator's button. Returns False if it does not run."""
     if _running is None or _running.operator is not operator:
         return False
-    text, fraction, _ = _running.progress
+    text, fraction, *_ = _running.progress
     if fraction is None:
         layout.label(text=text, icon="SORTTIME")
     else:
@@ -221,7 +223,8 @@ def threaded[Result](work: ThreadWork[Result]) -> Steps[Result]:
     """Work in a thread, which reports its progress; closing the generator abandons it."""
     try:
         while not work.run_main_thread_steps():
-            yield Progress(work.stage, is_idle=not work.wants_main_thread)
+            is_idle = not work.wants_main_thread
+            yield Progress(work.stage, is_idle=is_idle, is_committed=work.is_committed)
         return work.result()
     finally:
         work.give_up()

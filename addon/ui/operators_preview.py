@@ -3,16 +3,21 @@
 Play is independent of the timeline: hair moves in real time, at the scene's frame rate, while the
 artist moves the head or the sliders. Blender's own playback also moves hair, frame by frame, and
 takes over if it starts during Play. Only Esc is used as a key, to stop; Space remains Blender's.
+
+A timer drives Play. A modal operator would keep Blender from saving automatically.
 """
 
 from __future__ import annotations
 
 import time
+from functools import partial
 
 import bpy
 
 from ..blender.bakes.groom_hashes import frame_rate
 from ..blender.base.frame_clock import FrameClock
+from ..blender.base.latest_job import is_watched, unwatch, watch
+from ..blender.base.objects import is_elsewhere
 from ..blender.base.outcome import Outcome, report
 from ..blender.base.suspension import is_suspended
 from ..blender.preview import fins, previews
@@ -21,14 +26,12 @@ from ..blender.sessions.fins import any_enabled
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
 
-#: Minimum rate of ticks [1/s], so that a frame is delayed by a fraction of its length only.
+#: Rate of ticks [1/s], so that a frame is delayed by a fraction of its length only.
 TICKS_PER_SECOND = 120.0
+#: The key of `latest_job.watch` by which ticks are known.
+TICKS = "play"
 STATUS = "Hairloom plays. Move the head or the sliders. Esc: stop, the hair returns to its style"
 PAUSED = "Hairloom is paused: press Resume in its panel. Esc: stop"
-
-
-#: ticks while hair plays; kept here because Blender does not notify an operator of being disabled
-_timer: bpy.types.Timer | None = None
 
 
 class HAIRLOOM_OT_preview(bpy.types.Operator):
@@ -58,9 +61,6 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
     bl_idname = "hairloom.play"
     bl_label = "Play"
 
-    _clock: FrameClock
-    _ticks: bpy.types.Timer
-
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if bpy.app.background:
@@ -77,7 +77,8 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
     def _start_or_stop(self, context: bpy.types.Context) -> set[str]:
         if previews.is_playing():
             previews.rest(context.evaluated_depsgraph_get(), keep_playing=False)
-            return {"FINISHED"}  # the operator that plays sees it and ends
+            stop_ticking()
+            return {"FINISHED"}
         with waiting(context):
             if not previews.simulated():
                 start_preview(self, context, chosen_hair(context))
@@ -87,38 +88,27 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
                 report(self, "WARNING", warning)
         if not previews.is_playing():
             return {"CANCELLED"}
-        self._ticks = start_ticking(context)
-        self._clock = FrameClock(time.perf_counter())
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+        start_ticking()
+        return {"FINISHED"}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if self._ticks is not _timer:
-            return {"FINISHED"}  # another Play has taken over
-        if not previews.is_playing():
-            stop_ticking()
-            return {"FINISHED"}
-        if event.type == "ESC" and event.value == "PRESS":
-            previews.rest(context.evaluated_depsgraph_get(), keep_playing=False)
-            stop_ticking()
-            return {"CANCELLED"}
-        if event.type == "TIMER":
-            self._tick(context)
-        return {"PASS_THROUGH"}
 
-    def cancel(self, _context: bpy.types.Context) -> None:
-        """Blender ends the operator: a file is loaded or its window closed."""
+class HAIRLOOM_OT_stop(bpy.types.Operator):
+    """Stop hair and fins that play. They return to their style"""
+
+    bl_idname = "hairloom.stop"
+    bl_label = "Stop Hair"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        if previews.is_playing():
+            return True
+        cls.poll_message_set("No hair is playing")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        previews.rest(context.evaluated_depsgraph_get(), keep_playing=False)
         stop_ticking()
-
-    def _tick(self, context: bpy.types.Context) -> None:
-        """Simulate the scene's frames that are due, in one step: the head has moved only once."""
-        now, rate = time.perf_counter(), frame_rate(context.scene)
-        if previews.is_paused() or is_suspended():
-            self._clock.skip(now)
-            return
-        frames = self._clock.due(now, rate)
-        if frames:
-            previews.advance(context.evaluated_depsgraph_get(), frames / rate)
+        return {"FINISHED"}
 
 
 class HAIRLOOM_OT_pause(bpy.types.Operator):
@@ -134,10 +124,9 @@ class HAIRLOOM_OT_pause(bpy.types.Operator):
         cls.poll_message_set("No hair is playing: press Play first")
         return False
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, _context: bpy.types.Context) -> set[str]:
         previews.pause(not previews.is_paused())
-        if _timer is not None:
-            context.workspace.status_text_set(PAUSED if previews.is_paused() else STATUS)
+        _show_status(PAUSED if previews.is_paused() else STATUS)
         return {"FINISHED"}
 
 
@@ -181,23 +170,46 @@ class HAIRLOOM_OT_reset(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def start_ticking(context: bpy.types.Context) -> bpy.types.Timer:
-    global _timer
-    stop_ticking()
-    _timer = context.window_manager.event_timer_add(1.0 / TICKS_PER_SECOND, window=context.window)
-    context.workspace.status_text_set(STATUS)
-    return _timer
+def start_ticking() -> None:
+    watch(TICKS, partial(_tick, FrameClock(time.perf_counter())))
+    _show_status(STATUS)
 
 
 def stop_ticking() -> None:
-    """Remove the timer and the text in the status bar, however Play ends."""
-    global _timer
-    if _timer is None:
-        return
-    bpy.context.window_manager.event_timer_remove(_timer)
-    _timer = None
-    if bpy.context.workspace is not None:
-        bpy.context.workspace.status_text_set(None)
+    """Take no step any more, and remove the text in the status bar."""
+    if is_watched(TICKS):
+        unwatch(TICKS)
+        _show_status(None)
+
+
+def _tick(clock: FrameClock) -> float | None:
+    """Simulate the scene's frames that are due, in one step: the head has moved only once."""
+    if not previews.is_playing():
+        _show_status(None)
+        return None
+    now, window = time.perf_counter(), _window_of_play()
+    if previews.is_paused() or is_suspended() or window is None:
+        clock.skip(now)
+        return 1.0 / TICKS_PER_SECOND
+    rate = frame_rate(window.scene)
+    frames = clock.due(now, rate)
+    if frames:
+        with bpy.context.temp_override(window=window):
+            previews.advance(bpy.context.evaluated_depsgraph_get(), frames / rate)
+    return 1.0 / TICKS_PER_SECOND
+
+
+def _window_of_play() -> bpy.types.Window | None:
+    """One that shows a scene with what plays."""
+    for window in bpy.context.window_manager.windows:
+        if any(not is_elsewhere(s.uid, s.name, window.scene) for s in previews.simulated()):
+            return window
+    return None
+
+
+def _show_status(text: str | None) -> None:
+    for window in bpy.context.window_manager.windows:
+        window.workspace.status_text_set(text)
 
 
 def start_preview(
@@ -225,7 +237,26 @@ def stop_preview(hair: list[bpy.types.Object]) -> None:
 CLASSES = (
     HAIRLOOM_OT_preview,
     HAIRLOOM_OT_play,
+    HAIRLOOM_OT_stop,
     HAIRLOOM_OT_pause,
     HAIRLOOM_OT_reset,
     HAIRLOOM_OT_mute_hair_dynamics,
 )
+
+
+def register() -> None:
+    """Esc stops hair that plays. While none does, it is whatever it was."""
+    keys = bpy.context.window_manager.keyconfigs.addon
+    if keys is not None:  # there are none without a window
+        keymap = keys.keymaps.new(name="Window")
+        keymap.keymap_items.new(HAIRLOOM_OT_stop.bl_idname, "ESC", "PRESS")
+
+
+def unregister() -> None:
+    keys = bpy.context.window_manager.keyconfigs.addon
+    keymap = None if keys is None else keys.keymaps.get("Window")
+    if keymap is None:
+        return
+    for item in tuple(keymap.keymap_items):
+        if item.idname == HAIRLOOM_OT_stop.bl_idname:
+            keymap.keymap_items.remove(item)

@@ -211,8 +211,12 @@ def _in_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:
         work = plan.writing(path, positions)
         try:
             while not work.run_main_thread_steps():
-                text = f"{plan.done:,} of {total:,} frames"
-                yield Progress(text, plan.done / total, is_idle=not work.wants_main_thread)
+                yield Progress(
+                    f"{plan.done:,} of {total:,} frames",
+                    plan.done / total,
+                    is_idle=not work.wants_main_thread,
+                    is_committed=work.is_committed,
+                )
             return work.result()
         finally:
             work.give_up()

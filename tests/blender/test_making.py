@@ -400,3 +400,14 @@ def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, evalu
             make_it(order)
         told.append(str(error.value))
     assert told[0] == told[1] and "another scale" in told[0]
+
+
+def test_hair_of_another_scene_is_not_waited_for(hair, evaluated, in_window):
+    """Previewed in one scene, and another is shown before it is made."""
+    previews.start(hair, evaluated())
+    elsewhere = bpy.data.scenes.new("Elsewhere")
+    session = previews.session_of(hair)
+    with bpy.context.temp_override(scene=elsewhere, view_layer=elsewhere.view_layers[0]):
+        assert chosen_hair(bpy.context) == []
+        with pytest.raises(HairloomError, match="another scene"):
+            previews.finish(session, elsewhere.view_layers[0].depsgraph)

@@ -74,6 +74,6 @@ def of_previews() -> dict[str, Any]:
         "previews": [each.name for each in of_hairloom("previews").simulated()],
         "draw handlers": of_hairloom("overlay")._overlay.handles,
         "drawn": sorted(of_hairloom("overlay").drawn()),
-        "ticks": of_hairloom("preview_operators")._timer,
+        "ticks": of_hairloom("latest_job").is_watched("play"),
         "work": of_hairloom("long_work").running(),
     }

@@ -46,6 +46,11 @@ def watch(key: Hashable, step: Step) -> None:
         bpy.app.timers.register(take_steps, first_interval=ARRIVAL_TIME)
 
 
+def is_watched(key: Hashable) -> bool:
+    """Whether there is such a step to be taken again."""
+    return key in _steps
+
+
 def unwatch(key: Hashable) -> None:
     _steps.pop(key, None)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Future
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,9 +40,9 @@ class ThreadWork[T]:
         self._work = work
         self._lock = threading.Lock()
         self._request: _Request | None = None
-        self._is_given_up = False
+        self._is_given_up = self._is_committed = False
         self._result: list[T] = []
-        self._error: Exception | None = None
+        self._error: BaseException | None = None
         # a daemon, so that Blender may quit whatever is being done
         self._thread = threading.Thread(target=self._run, daemon=True, name=name)
         self._thread.start()
@@ -69,6 +70,24 @@ class ThreadWork[T]:
             self._request = request
         result: R = request.answer.result()
         return result
+
+    @contextmanager
+    def committing(self) -> Iterator[None]:
+        """In the thread, for `exchange.files.moving.committing`: from here on it is not given up.
+
+        Raises:
+            GivenUpError: it was before.
+        """
+        with self._lock:
+            if self._is_given_up:
+                raise GivenUpError
+            self._is_committed = True
+            yield
+
+    @property
+    def is_committed(self) -> bool:
+        """Whether its files take their places, or have."""
+        return self._is_committed
 
     @property
     def wants_main_thread(self) -> bool:
@@ -124,5 +143,5 @@ class ThreadWork[T]:
     def _run(self) -> None:
         try:
             self._result.append(self._work(self))
-        except Exception as error:  # kept for whoever asks for the result
+        except BaseException as error:  # kept for whoever asks for the result
             self._error = error

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...dynamics.colliders import DistanceField
 from ...dynamics.settings import DynamicsSettings
+from ...errors import HairloomError
 from ...strands import Surface
 from ..base.thread_work import ThreadWork
 
@@ -51,7 +52,13 @@ def field_of(
         trim()
     elif not work.is_done:
         raise NotMadeYetError
-    return work.result()
+    try:
+        return work.result()
+    except HairloomError:
+        raise  # a surface that cannot be one stays so
+    except Exception:
+        _works.pop(key, None)  # as where memory ran out, which may go well the next time
+        raise
 
 
 def are_made() -> bool:

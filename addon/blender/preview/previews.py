@@ -357,8 +357,18 @@ def _take_arrivals(session: Session) -> None:
 
 
 def finish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
-    """Wait for hair that is being made; one that cannot be made ends its preview."""
+    """Wait for hair that is being made; one that cannot be made ends its preview.
+
+    Raises:
+        HairloomError: it is in another scene, where it is made when that is shown again.
+    """
     preview = previews[session.uid]
+    if is_elsewhere(session.uid, session.name, depsgraph.scene):
+        raise HairloomError(
+            "it is in another scene",
+            place=session.name,
+            remedy="Show that scene, or select hair of this one",
+        )
     while session.is_pending and previews.get(session.uid) is preview:
         take = partial(_take_made, preview, session, depsgraph)
         attempt(preview, depsgraph, take, needs_gpu=False)

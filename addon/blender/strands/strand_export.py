@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 
 from ...arrays import Floats
+from ...exchange.files.moving import committing
 from ...exchange.groom import Groom, GroomMotion
 from ...exchange.groom_presets import chosen_parts
 from ...exchange.joined_grooms import joined_bones, joined_grooms
@@ -132,6 +133,7 @@ class StrandExport:
         """The same in a thread, which asks the main thread for each frame of `positions`."""
 
         def work(thread: ThreadWork[Outcome]) -> Outcome:
+            committing.set(thread.committing)  # of this thread alone
             return self.write(path, _asked(thread, positions))
 
         return ThreadWork(work, "Hairloom strands")

@@ -6,19 +6,17 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ...errors import HairloomError
-from .moving import flush, flush_names, free_name, move
+from .moving import committing, flush, flush_names, free_name, move
 from .stale_temp_files import remove_stale_files, temporary_beside
 
 
 @contextmanager
-def atomic_write(
-    path: Path, check: Callable[[], object] = lambda: None, *, keeps: bool = True
-) -> Iterator[Path]:
+def atomic_write(path: Path, *, keeps: bool = True) -> Iterator[Path]:
     """A path beside `path` to write to; it takes the place of `path` when the block ends well.
 
     The temporary path has the same suffix, so that exporters accept it. Missing folders are made.
@@ -26,7 +24,6 @@ def atomic_write(
     process left in the folder is removed.
 
     Args:
-        check: is called when the file is whole; what it raises leaves all as it was.
         keeps: keep a file that is whole but cannot take its place, since another program holds the
             old one, beside it; it may have taken minutes to write.
 
@@ -46,9 +43,9 @@ def atomic_write(
         if target.exists():
             shutil.copymode(target, temporary)
         flush(temporary)
-        check()
         try:
-            move(temporary, target)
+            with committing.get()():
+                move(temporary, target)
         except PermissionError as error:
             if not keeps:
                 raise

@@ -4,26 +4,23 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ...errors import HairloomError
 from .atomic import unwritable
-from .moving import flush, flush_names, free_name, move
+from .moving import committing, flush, flush_names, free_name, move
 from .stale_temp_files import COMPLETE, remove_stale_files, temporary_beside
 
 
 @contextmanager
-def written_together(path: Path, check: Callable[[], object] = lambda: None) -> Iterator[Path]:
+def written_together(path: Path) -> Iterator[Path]:
     """A new, hidden folder beside `path`; its files move beside `path` when the block ends well.
 
     They keep their names, so that they may name each other. Missing folders are made. When the
     block fails or is interrupted, or when one of the files cannot be put into its place, all that
     was there before stays as it was. What a killed process left in the folder is removed.
-
-    Args:
-        check: is called when all files are whole; what it raises leaves all as it was.
 
     Raises:
         HairloomError: nothing can be written there, or the block wrote no file of `path`'s name.
@@ -42,9 +39,9 @@ def written_together(path: Path, check: Callable[[], object] = lambda: None) -> 
         yield staging
         if not (staging / path.name).is_file():
             raise unwritable(path, "nothing was written")
-        check()
         try:
-            _put_in_place(staging, folder)
+            with committing.get()():
+                _put_in_place(staging, folder)
         except PermissionError as error:
             raise _kept(staging, path, error) from error
     except OSError as error:

@@ -6,8 +6,16 @@ import errno
 import os
 import shutil
 import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from contextvars import ContextVar
 from pathlib import Path
 
+#: What surrounds the moment in which new files take the places of old ones; who may give up the
+#: work sets it, and it may raise instead, which leaves all as it was.
+committing: ContextVar[Callable[[], AbstractContextManager[object]]] = ContextVar(
+    "committing", default=nullcontext
+)
 #: Seconds for which another program may hold a file: a virus scanner, an indexer, a backup. Only
 #: Windows refuses to replace a file that is open.
 PATIENCE = 10.0 if os.name == "nt" else 0.0

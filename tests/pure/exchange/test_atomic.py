@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,7 @@ from hairloom.addon.exchange.files.atomic import (
     write_bytes_atomic,
     write_text_atomic,
 )
+from hairloom.addon.exchange.files.file_set import written_together
 
 pytestmark = pytest.mark.portable
 
@@ -146,15 +149,32 @@ def test_a_file_that_is_held_for_a_moment_is_waited_for(
     assert (tmp_path / "groom.tfx").read_bytes() == b"new" and len(tries) == 3
 
 
+def write_alone(target: Path) -> None:
+    with atomic_write(target) as temporary:
+        temporary.write_bytes(b"new")
+
+
+def write_set(target: Path) -> None:
+    with written_together(target) as folder:
+        (folder / target.name).write_bytes(b"new")
+
+
 def test_what_is_given_up_when_it_is_whole_replaces_nothing(tmp_path: Path) -> None:
     target = tmp_path / "groom.tfx"
     target.write_bytes(b"old")
 
-    def given_up() -> None:
+    @contextmanager
+    def given_up() -> Iterator[None]:
         raise KeyboardInterrupt
+        yield
 
-    with pytest.raises(KeyboardInterrupt), atomic_write(target, given_up) as temporary:
-        temporary.write_bytes(b"new")
+    token = moving.committing.set(given_up)
+    try:
+        for write in (write_alone, write_set):
+            with pytest.raises(KeyboardInterrupt):
+                write(target)
+    finally:
+        moving.committing.reset(token)
     assert target.read_bytes() == b"old" and names(tmp_path) == ["groom.tfx"]
 
 
