@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .alembic.groom_alembic import write_groom_alembic
-from .files.file_set import written_together
+from .files.file_set import kept_aside, written_together
 from .files.names import plain_name
 from .groom import Groom, GroomMotion, points_of
 from .groom_presets import GroomPreset, chosen_strands
@@ -158,6 +158,7 @@ def _write_files(
     with written_together(next(iter(files))) as folder:
         for file, strands in files.items():
             notes += write(folder / file.name, groom.take(strands))
+        notes += kept_aside(folder, path)
         written = sorted(
             (path.with_name(file.name) for file in folder.iterdir()),
             key=lambda file: (file not in files, file.name),

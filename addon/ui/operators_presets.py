@@ -6,7 +6,15 @@ import bpy
 from bpy.props import StringProperty
 
 from ..blender.base.outcome import report
-from ..blender.properties.presets import apply, delete_own, kept_settings, named_preset, save_own
+from ..blender.properties.presets import (
+    apply,
+    delete_own,
+    free_title,
+    kept_settings,
+    named_preset,
+    replaced_preset,
+    save_own,
+)
 from ..blender.properties.properties import settings_of
 from ..blender.scene.principled import has_principled_hair, look_from_material
 from .preset_chooser import KIND
@@ -56,7 +64,7 @@ class HAIRLOOM_OT_save_preset(bpy.types.Operator):
         return needs_hair(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        self.title = chosen_hair(context)[0].name
+        self.title = free_title(chosen_hair(context)[0].name, self.section)
         return context.window_manager.invoke_props_dialog(self)
 
     @reporting
@@ -67,6 +75,8 @@ class HAIRLOOM_OT_save_preset(bpy.types.Operator):
 
     def draw(self, _context: bpy.types.Context) -> None:
         self.layout.prop(self, "title")
+        if replaced_preset(self.title, self.section):
+            self.layout.label(text="Replaces your preset of this name", icon="ERROR")
 
 
 class HAIRLOOM_OT_delete_preset(bpy.types.Operator):

@@ -360,3 +360,17 @@ def test_real_cards_leave_blender_in_their_order(
         if line.startswith("f ")
     ]
     assert faces == [tuple(face.vertices) for face in hair.data.polygons]
+
+
+@pytest.mark.parametrize("taken", ["Occlusion", "occlusion", "along"])
+def test_what_the_artist_has_called_like_ours_is_not_replaced(shells, sphere, evaluated, taken):
+    mesh = shells.data
+    if taken == "Occlusion":
+        mesh.uv_layers.new(name=taken)
+    else:
+        mesh.attributes.new(taken, "INT", "FACE")
+    before = polygons(mesh)
+    with pytest.raises(HairloomError, match=f"{taken} already"):
+        sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK))
+    assert polygons(mesh) == before
+    sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=None))

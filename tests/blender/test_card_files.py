@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -165,7 +166,7 @@ def test_a_failure_in_the_middle_leaves_the_old_files(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(files, "sidecar_text", full)
-    assert cards(tmp_path / f"hair{suffix}", "--set", "grow.length=0.3", "--levels", "2") == 1
+    assert cards(tmp_path / f"hair{suffix}", "--set", "grow.length=0.2", "--levels", "2") == 1
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
     told = capfd.readouterr().err
     assert f"{tmp_path / f'hair{suffix}'}: " in told and "No space left on device" in told
@@ -182,7 +183,7 @@ def test_a_folder_that_may_not_be_written_to_keeps_its_files(
         folder.chmod(0o555)
         try:
             with nobody():
-                assert cards(folder / "hair.glb", "--set", "grow.length=0.3") == 1
+                assert cards(folder / "hair.glb", "--set", "grow.length=0.2") == 1
         finally:
             folder.chmod(0o755)
         assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
@@ -219,9 +220,33 @@ def test_a_file_that_cannot_be_replaced_leaves_all_old_files(
         really(source, target)
 
     monkeypatch.setattr(os, "replace", replace)
-    assert cards(tmp_path / "hair.glb", "--set", "grow.length=0.3", "--levels", "1") == 1
+    assert cards(tmp_path / "hair.glb", "--set", "grow.length=0.2", "--levels", "1") == 1
     assert len(moves) == refused
+    kept = tmp_path / "hair new"
+    assert {path.name for path in kept.iterdir()} == set(before)
+    assert (kept / "hair.glb").read_bytes() != before["hair.glb"]
+    shutil.rmtree(kept)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_files_of_an_artist_are_kept_and_own_ones_replaced(tmp_path: Path, capfd: Any) -> None:
+    (tmp_path / "hair_base.png").write_bytes(b"painted")
+    assert cards(tmp_path / "hair.glb", "--levels", "1") == 0
+    assert (tmp_path / "hair_base old.png").read_bytes() == b"painted"
+    assert "hair_base.png was there already" in capfd.readouterr().out
+    names = {path.name for path in tmp_path.iterdir()}
+    assert cards(tmp_path / "hair.glb", "--set", "grow.length=0.2", "--levels", "1") == 0
+    assert {path.name for path in tmp_path.iterdir()} == names, "its own are no artist's"
+    assert "there already" not in capfd.readouterr().out
+
+
+def test_a_picture_is_not_replaced_by_what_is_made_of_it(tmp_path: Path, capfd: Any) -> None:
+    assert cards(tmp_path / "hair.glb", "--levels", "1") == 0
+    base = tmp_path / "hair_base.png"
+    before = base.read_bytes()
+    assert cards(tmp_path / "hair.glb", "--texture", f"base={base}", "--levels", "1") == 1
+    assert "under another name" in capfd.readouterr().err and base.read_bytes() == before
+    assert cards(tmp_path / "other.glb", "--texture", f"base={base}", "--levels", "1") == 0
 
 
 def test_the_format_may_be_named_and_others_are_refused(

@@ -160,7 +160,7 @@ def test_what_the_validator_does_not_check_is_right(wheels, manifest):
     assert re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
     assert "blender" not in manifest["name"].lower()
     assert len(manifest["tagline"]) <= 64 and manifest["tagline"][-1].isalnum()
-    assert set(manifest["permissions"]) == {"files"}
+    assert set(manifest["permissions"]) == used_permissions()
     assert all(reason[-1].isalnum() for reason in manifest["permissions"].values())
     known = {"schema_version", "id", "version", "name", "tagline", "maintainer", "type", "tags"}
     known |= {"blender_version_min", "license", "copyright", "permissions", "build", "website"}
@@ -168,6 +168,21 @@ def test_what_the_validator_does_not_check_is_right(wheels, manifest):
     assert set(manifest) <= known
     assert all((REPOSITORY / wheel).is_file() for wheel in manifest["wheels"])
     assert "GNU GENERAL PUBLIC LICENSE" in (REPOSITORY / "LICENSE").read_text(encoding="utf-8")
+
+
+def used_permissions():
+    """What the code uses of what Blender's extensions have to declare."""
+    code = "\n".join(
+        path.read_text(encoding="utf-8") for path in (REPOSITORY / "addon").rglob("*.py")
+    )
+    uses = {
+        "files": r"write_bytes|open\(",
+        "clipboard": r"\.clipboard\b",
+        "network": r"^\s*(import|from) (socket|ssl|urllib|http|requests|ftplib|smtplib)\b",
+        "camera": r"^\s*(import|from) cv2\b",
+        "microphone": r"^\s*(import|from) (pyaudio|sounddevice)\b",
+    }
+    return {name for name, pattern in uses.items() if re.search(pattern, code, re.MULTILINE)}
 
 
 def test_the_zip_holds_all_that_runs_and_nothing_else(names):

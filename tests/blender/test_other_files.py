@@ -11,7 +11,7 @@ from tiers import few_in_commits
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.engine import engine_hair
 from hairloom.addon.blender.preview import previews
-from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.blender.preview.bake import Bake, show_in_renders
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -250,3 +250,14 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
     list(Bake.of([hair], scene).steps())
     baked = playback.strands_in(playback.cache_of(hair), 6)
     np.testing.assert_array_equal(baked, blown)
+
+
+def test_an_override_is_baked_and_shown_in_renders(override, tmp_path):
+    """Its collection is overridden as well and takes no other objects, so the scene's does."""
+    override.hairloom.dynamics.collider_resolution = 8
+    override.hairloom.bake.folder = str(tmp_path / "bake")
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 2
+    list(Bake.of([override], bpy.context.scene).steps())
+    show_in_renders([override], bpy.context.evaluated_depsgraph_get())
+    copy = override.hairloom.bake.copy
+    assert override.hide_render and copy.users_scene == (bpy.context.scene,)

@@ -44,6 +44,8 @@ __all__ = [
 (ORDERS,) = (p.choices for p in CardSettings.parameters() if p.name == "order_by")
 #: Weight from which on a vertex belongs to a vertex group.
 _MEMBER = 0.5
+#: Marks a mesh whose occlusion is from here, so that it may be replaced.
+_OURS = "hairloom_occlusion"
 #: The group of cards that dangle.
 _DANGLING = 1
 
@@ -104,6 +106,8 @@ def sort_steps(
     Raises:
         HairloomError: not a mesh, in Edit Mode, no faces, no UVs, or no such vertex group.
     """
+    if options.occlusion is not None:
+        _check_names(obj)
     source = read_cards(obj, depsgraph, options)
     mesh = source.cards.mesh
     notes = list(source.notes)
@@ -165,6 +169,21 @@ def _check(obj: bpy.types.Object) -> None:
     if obj.mode == "EDIT":
         raise HairloomError(
             "it is in Edit Mode", place=obj.name, remedy="Leave Edit Mode and sort again"
+        )
+
+
+def _check_names(obj: bpy.types.Object) -> None:
+    """Refuse a mesh that has something of its own where occlusion would be written."""
+    mesh = obj.data
+    if mesh.get(_OURS) or obj.hairloom.card_object.groom is not None:
+        return
+    taken = [f"UV map {OCCLUSION_LAYER}"] if mesh.uv_layers.get(OCCLUSION_LAYER) else []
+    taken += [f"attribute {name}" for name in CARD_ATTRIBUTES if name in mesh.attributes]
+    if taken:
+        raise HairloomError(
+            f"it has the {taken[0]} already, which ambient occlusion would replace",
+            place=mesh.name,
+            remedy="Rename or delete that, or turn Ambient Occlusion off",
         )
 
 
@@ -241,6 +260,7 @@ def _write_occlusion(
         corner: (loop_count,) the value of each corner of a face.
         openness, along: (n,).
     """
+    mesh[_OURS] = True
     for name, values in zip(CARD_ATTRIBUTES, (openness, along), strict=True):
         set_attribute(mesh, name, "POINT", _at_source(values, vertex, len(mesh.vertices)))
     if not set_uv_map(mesh, OCCLUSION_LAYER, np.stack([openness, along], axis=1)[corner]):

@@ -3,7 +3,8 @@ the cards are drawn and what the hair's look is made of."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+import os
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,12 @@ from ...cards.export_settings import CardExportSettings
 from ...cards.settings import CardSettings
 from ...cards.steps import map_progress, result_of
 from ...cards.vertex_animation import motion_layout
+from ...errors import HairloomError
 from ...exchange.cards.card_formats import CardFormat, format_of
 from ...exchange.cards.index_buffer import index_buffer
-from ...exchange.cards.sidecar import SUFFIX, CardFile, sidecar_text
+from ...exchange.cards.sidecar import SUFFIX, CardFile, files_of_earlier, sidecar_text
 from ...exchange.files.atomic import check_place
-from ...exchange.files.file_set import written_together
+from ...exchange.files.file_set import kept_aside, written_together
 from ...params import Settings, SettingsMap
 from ...shading.card_look import VIEW_COMPENSATED_ALPHA
 from ...shading.drawn_strands import in_color
@@ -52,7 +54,7 @@ from .motion import (
     joint_motion_steps,
     moved_cards,
 )
-from .textures import texture_channels, texture_roles, write_tables, write_textures
+from .textures import picture_files, texture_channels, texture_roles, write_tables, write_textures
 
 _UNITS = {
     "length": "m",
@@ -148,6 +150,22 @@ def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> 
         check_motion(output.settings, motion, file_format)
 
 
+def check_no_input(path: Path, pictures: Iterable[Path]) -> None:
+    """Refuse to write textures over the pictures that they are made from.
+
+    Raises:
+        HairloomError: one of them has a name that the textures of this mesh get.
+    """
+    for picture in pictures:
+        is_beside = os.path.realpath(picture.parent) == os.path.realpath(path.parent)
+        if is_beside and picture.name.startswith(f"{path.stem}_"):
+            raise HairloomError(
+                f"the cards are made from {picture.name}, which their own textures may replace",
+                place=str(path),
+                remedy="Export under another name, or into another folder",
+            )
+
+
 def file_steps(
     path: Path,
     made: MappedCards,
@@ -166,6 +184,7 @@ def file_steps(
     with written_together(path) as folder:
         writer = _Writer(folder / path.name, made, settings, output, file_format, stage)
         said = yield from writer.steps(motion)
+        said += kept_aside(folder, path, files_of_earlier(path))
         names = {file.name for file in folder.iterdir() if file.is_file()}
     beside = sorted(names - {path.name, path.stem + SUFFIX})
     files = (path.name, *beside, path.stem + SUFFIX)
@@ -358,6 +377,7 @@ class CardExport:
         """
         motion = None if output.settings.motion == "none" else BakedGuides.of(hair, frames)
         check_output(path, output, motion)
+        check_no_input(path, picture_files(hair.data.hairloom.card_images))
         rig, stale = (None, ()) if motion is None else (motion.rig, motion.notes)
         inputs, notes, dropped = read_inputs(hair, depsgraph, rig)
         if levels is not None:

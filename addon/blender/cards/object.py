@@ -75,9 +75,13 @@ def card_objects(hair: bpy.types.Object) -> list[bpy.types.Object]:
 
 def remember_names() -> None:
     """Before a file is saved: in another session the numbers of its objects are others."""
-    for obj in _all_cards():
+    cards = _all_cards()
+    made = {_place(obj) for obj in cards if _has_made_uid(obj)}
+    for obj in cards:
         if _has_made_uid(obj):
             obj.hairloom.card_object.made_name = obj.name
+        elif _place(obj) in made:  # a copy may have been called as the first one was
+            obj.hairloom.card_object.made_name = ""
 
 
 def remember_numbers() -> None:
@@ -90,6 +94,11 @@ def remember_numbers() -> None:
 def _all_cards() -> list[bpy.types.Object]:
     meshes = (obj for obj in bpy.data.objects if obj.type == "MESH")
     return [obj for obj in meshes if obj.hairloom.card_object.groom is not None]
+
+
+def _place(obj: bpy.types.Object) -> tuple[bpy.types.Object, int]:
+    """Which groom's cards they are, and of which level."""
+    return obj.hairloom.card_object.groom, obj.hairloom.card_object.level
 
 
 def _has_made_uid(obj: bpy.types.Object) -> bool:

@@ -43,6 +43,13 @@ def chosen_pictures(group: Any) -> tuple[dict[str, Floats], tuple[str, ...]]:
     return pictures, tuple(warnings)
 
 
+def picture_files(group: Any) -> list[Path]:
+    """The files of an artist's own pictures."""
+    images = [getattr(group, name) for name in TEXTURES]
+    paths = [image.filepath_from_user() for image in images if image is not None]
+    return [Path(path) for path in paths if path]
+
+
 def named_pictures(arguments: list[str]) -> dict[str, Floats]:
     """The pictures that the command line names as NAME=FILE.
 

@@ -18,7 +18,7 @@ from ...exchange.cards.card_formats import FORMATS, format_of
 from ...pipeline import Rig
 from ..bakes.guide_motion import GuideMotion
 from ..cards.build import CardInputs, order_line
-from ..cards.files import CardOutput, WrittenCards, write_cards
+from ..cards.files import CardOutput, WrittenCards, check_no_input, write_cards
 from ..cards.occluders import read_occluders
 from ..cards.textures import chosen_pictures, named_pictures
 from .job_options import (
@@ -39,6 +39,7 @@ def cards(job: Job) -> None:
     pictures = _own_pictures(job) | named_pictures(options.texture)
     path, _ = format_of(job.output, options.format)
     settings = parameters_of(options, job.settings[CardExportSettings])
+    check_no_input(path, [Path(argument.partition("=")[2]) for argument in options.texture])
     output = CardOutput(options.format, settings=settings)
     rig, motion = _moving(job, settings)
     written_cards(job, path, rig, pictures, output, motion)

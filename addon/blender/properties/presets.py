@@ -126,6 +126,18 @@ def save_own(title: str, settings: Settings, *also: Settings) -> Path:
     return path
 
 
+def replaced_preset(title: str, section: str) -> bool:
+    """Whether the artist has a preset of this title, which saving another one would replace."""
+    wanted = " ".join(title.split())[:_LONGEST_TITLE].casefold()
+    return any(entry.title.casefold() == wanted for entry in own(section)[0])
+
+
+def free_title(title: str, section: str) -> str:
+    """This title, or one with a number that no preset of the artist's has."""
+    choices = (title, *(f"{title} {number}" for number in range(2, 10_000)))
+    return next(each for each in choices if not replaced_preset(each, section))
+
+
 def delete_own(name: str) -> None:
     """Delete one of the artist's own presets, with its picture.
 

@@ -9,8 +9,9 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -123,6 +124,31 @@ def sidecar_text(cards: CardFile) -> str:
     text = json.dumps(description(cards), indent=2, ensure_ascii=False)
     lists = re.compile(r"\[\s+(-?[\d.][^\[\]{}\"]*?)\s+\]")
     return lists.sub(lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
+
+
+def files_of_earlier(path: Path) -> set[str]:
+    """The names of the files that an earlier export of this mesh has written beside it.
+
+    path: of the mesh. Without a sidecar of ours there is none.
+    """
+    sidecar = path.with_name(path.stem + SUFFIX)
+    try:
+        content = json.loads(sidecar.read_text(encoding="utf-8"))
+        is_ours = content["file"] == path.name and "hairloom_sidecar" in content
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return set()
+    of_formats = {f"{path.stem}{suffix}" for suffix in (".mtl", ".bin")}
+    return {sidecar.name, *of_formats, *_texts(content)} if is_ours else set()
+
+
+def _texts(content: object) -> Iterator[str]:
+    if isinstance(content, str):
+        yield content
+    elif isinstance(content, dict):
+        yield from _texts(list(content.values()))
+    elif isinstance(content, list):
+        for each in content:
+            yield from _texts(each)
 
 
 def description(cards: CardFile) -> dict[str, Any]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import filecmp
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -52,6 +53,30 @@ def written_together(path: Path) -> Iterator[Path]:
         raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
+
+
+def kept_aside(staging: Path, path: Path, own: Container[str] = ()) -> tuple[str, ...]:
+    """Keep files that a set is about to replace and that were not made with it.
+
+    Only for `path` itself has the artist been asked whether it may be replaced. The others become
+    "NAME old", once; what was kept there before stays.
+
+    Args:
+        staging: the folder of `written_together`, with all files in it.
+        own: names of files that an earlier set of this path was made of.
+
+    Returns:
+        a sentence for each.
+    """
+    notes = []
+    for file in sorted(each for each in staging.iterdir() if each.is_file()):
+        there = path.with_name(file.name)
+        kept = there.with_name(f"{there.stem} old{there.suffix}")
+        is_foreign = file.name != path.name and file.name not in own and there.is_file()
+        if is_foreign and not kept.exists() and not filecmp.cmp(file, there, shallow=False):
+            shutil.copy2(there, kept)
+            notes.append(f"{file.name} was there already, and is kept as {kept.name}.")
+    return tuple(notes)
 
 
 def _put_in_place(staging: Path, folder: Path) -> None:
