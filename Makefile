@@ -61,6 +61,7 @@ zip: setup ## the extension's zip, into dist/
 	@rm -rf dist && mkdir dist
 	$(PYTHON) .venv/lib/python*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py \
 	    build --source-dir . --output-dir dist
+	$(PYTHON) tools/bill_of_materials.py dist/hairloom.cdx.json
 
 lock: ## write requirements.lock again from requirements.in (needs uv)
 	uv pip compile --quiet --universal --generate-hashes --python-version 3.13 --upgrade \

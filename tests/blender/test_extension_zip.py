@@ -14,6 +14,9 @@ from pathlib import Path
 
 import bpy
 import pytest
+from cyclonedx.output import OutputFormat
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation import make_schemabased_validator
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SCRIPTS = Path(bpy.utils.system_resource("SCRIPTS"))
@@ -183,6 +186,30 @@ def used_permissions():
         "microphone": r"^\s*(import|from) (pyaudio|sounddevice)\b",
     }
     return {name for name, pattern in uses.items() if re.search(pattern, code, re.MULTILINE)}
+
+
+def test_the_bill_of_materials_names_what_the_zip_carries(wheels, names, tmp_path):
+    """By the schema of CycloneDX; each part has a license that is known, and its text is there."""
+    path = tmp_path / "hairloom.cdx.json"
+    tool = REPOSITORY / "tools" / "bill_of_materials.py"
+    done = subprocess.run([sys.executable, tool, path], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    text = path.read_text(encoding="utf-8")
+    assert (
+        make_schemabased_validator(OutputFormat.JSON, SchemaVersion.V1_6).validate_str(text) is None
+    )
+    bill = json.loads(text)
+    carried = {name.rpartition("/")[2] for name in names if name.endswith(".whl")}
+    parts = {part["bom-ref"]: part for part in bill["components"]}
+    assert carried == set(wheels) == {name for name in parts if name.endswith(".whl")}
+    for name, part in parts.items():
+        (license,) = part["licenses"]
+        assert "id" in license.get("license", {}) or "expression" in license, (name, license)
+    for name in carried:
+        content = (REPOSITORY / "wheels" / name).read_bytes()
+        assert parts[name]["hashes"][0]["content"] == hashlib.sha256(content).hexdigest()
+        with zipfile.ZipFile(REPOSITORY / "wheels" / name) as wheel:
+            assert any("license" in file.lower() for file in wheel.namelist()), name
 
 
 def test_the_zip_holds_all_that_runs_and_nothing_else(names):
