@@ -90,7 +90,7 @@ def _classified(metadata: Message) -> str:
     """The license that PyPI's classifiers name."""
     lines = metadata.get_all("Classifier", [])
     names = [line.rpartition(" :: ")[2] for line in lines if line.startswith("License")]
-    return names[0] if names else "unknown"
+    return {"MIT License": "MIT"}.get(names[0], names[0]) if names else "unknown"
 
 
 if __name__ == "__main__":
