@@ -27,6 +27,8 @@ from packageurl import PackageURL
 
 #: What the zip holds beside wheels that is not ours: name, license, description.
 DATA = (("MakeHuman base mesh", "CC0-1.0", "addon/blender/scene/bust.npz is made from it"),)
+#: Licenses that a wheel names in words -> their identifiers.
+_IDENTIFIERS = {"MIT License": "MIT"}
 _NAMESPACE = UUID("6ba7b811-9dad-11d1-80b4-00c04fd430c8")
 
 
@@ -74,12 +76,13 @@ def _wheel(name: str, digest: str, licenses: LicenseFactory) -> Component:
         (path,) = (each for each in wheel.namelist() if each.endswith(".dist-info/METADATA"))
         metadata = HeaderParser().parsestr(wheel.read(path).decode("utf-8"))
     found = metadata["License-Expression"] or metadata["License"] or _classified(metadata)
+    found = found.strip().splitlines()[0]
     return Component(
         name=package,
         version=version,
         type=ComponentType.LIBRARY,
         description=metadata["Summary"],
-        licenses=[licenses.make_from_string(found.strip().splitlines()[0])],
+        licenses=[licenses.make_from_string(_IDENTIFIERS.get(found, found))],
         purl=PackageURL("pypi", None, package, version, {"file_name": name}),
         hashes=[HashType(alg=HashAlgorithm.SHA_256, content=digest)],
         bom_ref=name,
@@ -90,7 +93,7 @@ def _classified(metadata: Message) -> str:
     """The license that PyPI's classifiers name."""
     lines = metadata.get_all("Classifier", [])
     names = [line.rpartition(" :: ")[2] for line in lines if line.startswith("License")]
-    return {"MIT License": "MIT"}.get(names[0], names[0]) if names else "unknown"
+    return names[0] if names else "unknown"
 
 
 if __name__ == "__main__":
