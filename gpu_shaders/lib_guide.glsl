@@ -7,7 +7,7 @@
 #define PINNED {{pinned}}
 #define FREE (CV_COUNT - PINNED)
 #define FREE_SIZE (FREE > 0 ? FREE : 1)
-#define TINY 1.0e-9
+#define TINY 1.0e-12
 
 vec3 position[CV_COUNT];       // world [m]
 vec3 previous[CV_COUNT];       // the same a substep earlier
@@ -26,7 +26,7 @@ float tip_reach;  // [m] of the tip from the last pinned CV
 const bool tip_is_held = false;
 #endif
 
-// Never zero; what is added is lost to rounding above 1e-5 m.
+// Never zero; what is added is lost to rounding above 1e-8 m.
 float length_of(vec3 vector)
 {
   return sqrt(dot(vector, vector) + TINY * TINY);

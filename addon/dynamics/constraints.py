@@ -34,7 +34,7 @@ CONTACT_WEIGHT = np.float32(0.9)
 #: a straight guide between two ends that cannot move have no solution. The tip is put back at once.
 HELD = np.float32(0.99)
 #: Lengths below this count as zero [m].
-TINY = np.float32(1.0e-9)
+TINY = np.float32(1.0e-12)
 _TINY_SQUARED = TINY * TINY
 #: A length cannot be kept better, as float32 rounds world coordinates that are some times larger
 #: than the hair is long: in lengths of the hair.
@@ -278,7 +278,7 @@ def directions(position: Floats) -> tuple[Floats, Floats]:
 
 
 def _length(vector: Floats) -> Floats:
-    """Length over the first axis, never zero; what is added is lost to rounding above 1e-5 m."""
+    """Length over the first axis, never zero; what is added is lost to rounding above 1e-8 m."""
     squared = dot_rows(vector, vector)
     squared += _TINY_SQUARED
     length: Floats = np.sqrt(squared, out=squared)

@@ -1,0 +1,99 @@
+"""Scenes of any size and unit scale: the same motion, warnings, children and cards."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from hairloom.addon.blender.preview import previews
+from hairloom.addon.blender.preview.diagnostics import issues_of
+from hairloom.addon.blender.strands.export_check import ExportCheck
+from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
+from hairloom.addon.exchange.strand_formats import STRAND_FORMATS
+from hairloom.addon.strands import StrandSet
+
+FRAMES = 3
+
+
+def curled(scale: float) -> StrandSet:
+    """Hair that stands on the sphere of radius 0.1 m and begins to fall."""
+    outward = np.random.default_rng(1).normal(size=(60, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    along = np.linspace(0.0, 1.0, 8)[:, None]
+    points = outward[:, None] * (0.1 + 0.08 * along) + along**2 * [0.02, 0.0, 0.0]
+    return StrandSet(
+        points=scale * points.reshape(-1, 3),
+        offsets=np.arange(61) * 8,
+        radius=np.full(480, 5.0e-5 * scale),
+        group=np.zeros(60, int),
+    )
+
+
+def told(
+    sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], scale: float
+) -> tuple[np.ndarray, dict[str, Any]]:
+    """Strands of some frames of a head that moves, over its size; and all that is said of them."""
+    head = sphere.copy()
+    head.data = sphere.data.copy()
+    head.data.transform(Matrix.Scale(scale, 4))
+    bpy.context.collection.objects.link(head)
+    bpy.context.scene.gravity = (0.0, 0.0, -9.81 * scale)
+    hair = new_hair(head, curled(scale))
+    hair.data.hairloom.widths.method = "auto"
+    hair.data.hairloom.children.method = "multi"
+    hair.data.hairloom.children.strand_count = 100
+    hair.hairloom.dynamics.device = "numpy"
+    session = previews.start(hair, evaluated())
+    previews.play(evaluated())
+    frames = []
+    for _ in range(FRAMES):
+        head.location.x += 0.02 * scale
+        bpy.context.view_layer.update()
+        previews.advance(evaluated(), 1.0 / 24.0)
+        frames.append(np.asarray(session.strands, np.float64) / scale)
+    check = ExportCheck.of([hair])
+    warnings = {}
+    for kind in STRAND_FORMATS:
+        check.refresh(evaluated(), kind, StrandExportSettings())
+        warnings[kind.name] = check.warnings
+    said = {
+        "warnings": warnings,
+        "issues": [issue.text.replace(head.name, "head") for issue in issues_of(hair, session)],
+        "notes": session.rig.notes,
+        "widths": session.rig.widths.reason.partition(",")[0],
+        "hairs": round(session.rig.widths.hairs, 3),
+        "children": session.rig.child_count,
+        "loose": session.groom.loose_roots,
+    }
+    previews.end()
+    return np.array(frames), said
+
+
+# powers of two: on a sphere, whose triangles are alike, rounding decides where children come first
+@pytest.mark.parametrize("scale", [2.0**-10, 2.0**10])
+def test_a_scene_of_another_size_moves_and_warns_the_same(
+    sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], scale: float
+) -> None:
+    one, said = told(sphere, new_hair, evaluated, 1.0)
+    other, said_again = told(sphere, new_hair, evaluated, scale)
+    assert said_again == said
+    assert said["children"] == 100
+    assert np.abs(one[-1] - one[0] - [0.02 * (FRAMES - 1), 0.0, 0.0]).max() > 0.005
+    assert np.abs(other - one).max() < 1e-4  # a thousandth of the hair's length
+
+
+@pytest.mark.parametrize("unit", [0.01, 1000.0])
+def test_the_unit_scale_only_changes_how_numbers_are_shown(
+    sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], unit: float
+) -> None:
+    """As with Blender's own physics, which takes gravity in units of the scene."""
+    one, said = told(sphere, new_hair, evaluated, 1.0)
+    bpy.context.scene.unit_settings.scale_length = unit
+    other, said_again = told(sphere, new_hair, evaluated, 1.0)
+    np.testing.assert_array_equal(other, one)
+    assert said_again == said
