@@ -182,8 +182,8 @@ def _alike(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
 def _is_still(one: object, other: object) -> bool:
     if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
         return one is other or bool(one == other)
-    if one.shape != other.shape:
-        return False
+    if one.shape != other.shape or one.dtype.kind != "f":
+        return np.array_equal(one, other)
     reach = float(np.abs(one).max(initial=0.0))
     return np.allclose(one, other, rtol=0.0, atol=_STILL * reach)
 
