@@ -25,8 +25,9 @@ type Arrays = dict[str, NDArray[Any]]
 MEMORY = 4 << 30
 #: Objects below each other; a damaged file may have them in a circle.
 DEEPEST = 64
-#: Exit code after an error that is reported on stderr, as `run_reader` expects it.
-REPORTED = 3
+#: Exit codes, as `run_reader` expects them: after an error that is reported on stderr; where the
+#: results cannot be written.
+REPORTED, NO_ROOM = 3, 4
 
 _VECTORS = {2: "IV2fArrayProperty", 3: "IV3fArrayProperty"}
 
@@ -142,8 +143,11 @@ def _main(path: str, result: str) -> int:
     except (ImportError, RuntimeError, ValueError, LookupError, MemoryError) as error:
         print(str(error).strip() or type(error).__name__, file=sys.stderr)
         return REPORTED
-    with open(result, "wb") as file:
-        np.savez(file, allow_pickle=False, **found)
+    try:
+        with open(result, "wb") as file:
+            np.savez(file, allow_pickle=False, **found)
+    except OSError:
+        return NO_ROOM
     return 0
 
 

@@ -49,6 +49,8 @@ class BinaryFile:
             return np.fromfile(self.path, layout, count, offset=offset)
         except OSError as error:
             raise self._unreadable(error) from error
+        except MemoryError as error:
+            raise self._too_large() from error
 
     def content(self) -> bytes:
         """All bytes."""
@@ -56,6 +58,8 @@ class BinaryFile:
             return self.path.read_bytes()
         except OSError as error:
             raise self._unreadable(error) from error
+        except MemoryError as error:
+            raise self._too_large() from error
 
     def check(self, name: str, offset: int, byte_count: int) -> None:
         """That the file holds these bytes.
@@ -73,6 +77,12 @@ class BinaryFile:
 
     def error(self, problem: str, remedy: str) -> HairloomError:
         return HairloomError(problem, place=str(self.path), remedy=remedy)
+
+    def _too_large(self) -> HairloomError:
+        return self.error(
+            "there is not enough memory to read it",
+            "Close other programs, or read it on a machine with more memory",
+        )
 
     def _unreadable(self, error: OSError) -> HairloomError:
         return self.error(

@@ -8,6 +8,7 @@ that it has written to stderr.
 from __future__ import annotations
 
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from subprocess import TimeoutExpired
@@ -15,8 +16,10 @@ from subprocess import TimeoutExpired
 from ...errors import HairloomError
 from .child_process import python_program, run_child
 
-#: exit code of a script that says why on stderr
-REPORTED = 3
+#: exit code of a script that says why on stderr, and of one that cannot write its results
+REPORTED, NO_ROOM = 3, 4
+#: How Linux and macOS end a process that goes on for too long, or takes too much.
+_ENDED = {-24: "since it took too long for a file of this size", -9: "as where memory runs out"}
 #: Seconds for any file, and bytes that a slow disk gives in another one.
 _PATIENCE, _BYTES_A_SECOND = 60.0, 4.0e6
 
@@ -55,6 +58,19 @@ def run_reader(
     if done.returncode == REPORTED:
         lines = done.stderr.decode(errors="replace").strip().splitlines() or ["no reason"]
         raise damaged(path, refusal(library, lines[-1]))
+    if done.returncode in _ENDED:
+        raise HairloomError(
+            f"the process that read it was ended by the system, {_ENDED[done.returncode]}",
+            place=str(path),
+            remedy="Close other programs and try again; if that does not help, export it again "
+            "with fewer strands",
+        )
+    if done.returncode == NO_ROOM:
+        raise HairloomError(
+            "what is read cannot be put down in the folder for temporary files",
+            place=str(path),
+            remedy=f"Free some space in {tempfile.gettempdir()}",
+        )
     if done.returncode:
         raise damaged(path, f"{library}'s library failed on it, code {done.returncode}")
 

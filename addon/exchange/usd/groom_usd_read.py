@@ -67,6 +67,7 @@ class _Reading:
         self.notes: list[str] = []
         self._arrays, self._path = arrays, path
         self._problems: list[str] = []
+        self._left_out = ""
         unit = float(arrays["unit"]) if scale is None else scale
         if scale is None and not arrays["has_unit"]:
             self.notes.append("it names no unit, so that lengths were taken as centimetres")
@@ -92,7 +93,8 @@ class _Reading:
         others = zip(self._arrays["others"], self._arrays["other_counts"], strict=True)
         counts = ", ".join(f"{count:,} {kind}" for kind, count in others)
         if counts:
-            self.notes.append(f"prims that are no BasisCurves were left out ({counts})")
+            self._left_out = f"prims that are no BasisCurves were left out ({counts})"
+            self.notes.append(self._left_out)
 
     def nothing_found(self) -> HairloomError:
         if self._problems:
@@ -101,7 +103,7 @@ class _Reading:
                 "Export the groom again",
             )
         return self._error(
-            "it has no curves" + (f": {self.notes[-1]}" if self.notes else ""),
+            "it has no curves" + (f": {self._left_out}" if self._left_out else ""),
             "Choose a file with BasisCurves, or export hair as curves",
         )
 

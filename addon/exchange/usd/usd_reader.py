@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 
 type Arrays = dict[str, NDArray[Any]]
 
-#: as `run_reader` expects it
-REPORTED = 3
+#: as `run_reader` expects them: after an error that is on stderr; where results cannot be written
+REPORTED, NO_ROOM = 3, 4
 #: What grooms have beside points and widths.
 PRIMVARS = (
     "groom_id",
@@ -54,8 +54,8 @@ MAX_POINTS = 1 << 28
 MAX_PRIMS = 1_000_000
 #: Memory that a file may take beside its own size [bytes], and as a multiple of it.
 _BESIDE, _MAX_TIMES = 1 << 30, 30
-#: Time of the processor for any file [s], and bytes that take a second more.
-_SECONDS, _BYTES_A_SECOND = 8, 1_000_000
+#: Time of the processor for any file, with the start [s], and bytes that take a second more.
+_SECONDS, _BYTES_A_SECOND = 7, 1_000_000
 
 
 class _TooMuchError(Exception):
@@ -67,6 +67,7 @@ def read_curves(path: str) -> Arrays:
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.Open(path)
+    _limit(*(layer.realPath for layer in stage.GetUsedLayers()))
     found = _of_stage(stage)
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
     others: Counter[str] = Counter()
@@ -179,28 +180,34 @@ def summary(error: BaseException) -> str:
     return last.rpartition("-- ")[2].strip("'. ")
 
 
-def _limit(path: Path) -> None:
-    """Of memory and time for this process; only Linux says how much memory it has."""
+def _limit(*paths: str) -> None:
+    """Of memory and time for this process, by the size of these files; only Linux says how much
+    memory it has."""
     if not sys.platform.startswith("linux"):
         return
     import resource
 
-    size = path.stat().st_size
-    seconds = int(sum(os.times()[:2])) + _SECONDS + size // _BYTES_A_SECOND
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+    size = sum(os.path.getsize(path) for path in paths if os.path.isfile(path))
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-    memory = pages * resource.getpagesize() + _BESIDE + _MAX_TIMES * size
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    limits = {
+        resource.RLIMIT_CPU: _SECONDS + size // _BYTES_A_SECOND,
+        resource.RLIMIT_AS: pages * resource.getpagesize() + _BESIDE + _MAX_TIMES * size,
+    }
+    for limit, value in limits.items():
+        _, most = resource.getrlimit(limit)
+        resource.setrlimit(limit, (value, most))
 
 
 def _main(path: str, result: str) -> int:
     from pxr import Tf
 
-    _limit(Path(path))
+    _limit(path)
     try:
         found = read_curves(path)
         with open(result, "wb") as file:
             np.savez(file, allow_pickle=False, **found)
+    except OSError:
+        return NO_ROOM
     except (Tf.ErrorException, _TooMuchError, RuntimeError, ValueError, MemoryError) as error:
         print(ascii(summary(error)), file=sys.stderr)
         return REPORTED

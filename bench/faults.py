@@ -1,0 +1,123 @@
+"""Nothing lost, nothing taken over: faults while files are written, and files that mean harm.
+
+See `_fault_runs` and `_usd_attacks` for what is done. Exit code 1: a limit is missed.
+
+make bench NAME=faults                  half an hour
+tools/bench.py faults runs 1000         one part: runs, usda, planted, waits or autosave
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from _fault_runs import fault_runs, forget_sources
+from _report import start, tell
+from _usd_attacks import usd_attacks
+from extension_loader import REPOSITORY
+from waits import endless_waits
+
+from hairloom.addon.blender.engine.engine_gpu import _can_draw
+from hairloom.addon.blender.strands.child_python import python_command
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.usd.groom_usd_read import read_usd
+from hairloom.addon.exchange.usd.usd_library import usd_library
+
+REFERENCE = "the result before, or the new one; a limit of the system on what a file may take"
+SEED = 22
+#: figure -> the most, and the least, that it may be
+MOST = {
+    "fault_losses": 0,
+    "fault_mixed": 0,
+    "fault_untrue_messages": 0,
+    "usda_crashes": 0,
+    "longest_seconds": 10.0,
+    "memory_mb": 1024.0,
+    "planted_code_runs": 0,
+    "endless_waits": 0,
+}
+LEAST = {"fault_runs": 1000, "usda_attacks": 500, "autosaves_while_playing": 1}
+_PLANTED = "import pathlib; pathlib.Path(__file__).with_name('it_ran').touch()"
+
+
+def runs(count: int = 1000) -> dict[str, Any]:
+    try:
+        found, problems = fault_runs(count, SEED)
+    finally:
+        forget_sources()
+    print("\n".join(problems), flush=True)
+    return {
+        "fault_runs": found.runs,
+        "faults_in_time": found.broken,
+        "fault_losses": found.losses,
+        "fault_mixed": found.mixed,
+        "fault_untrue_messages": found.untrue,
+    }
+
+
+def planted() -> dict[str, int]:
+    """Modules in the current folder and the environment; every way to start a child."""
+    before, ran = os.getcwd(), 0
+    usd_library(Path())  # else this process, which is no Blender, would find the planted one
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for module in ("ctypes", "numpy", "pxr", "sitecustomize", "usercustomize", "json", "site"):
+            (folder / f"{module}.py").write_text(_PLANTED, encoding="utf-8")
+        (folder / "hair.usda").write_text("#usda 1.0\n", encoding="utf-8")
+        os.chdir(folder)
+        sys.path.insert(0, "")
+        os.environ["PYTHONPATH"] = os.environ["PYTHONUSERBASE"] = name
+        try:
+            for begin in (python_command, _can_draw):
+                begin.cache_clear()
+                begin()
+                ran += (folder / "it_ran").exists()
+            try:
+                read_usd(folder / "hair.usda", python=python_command())
+            except HairloomError as error:
+                print(error)  # it has no curves
+            ran += (folder / "it_ran").exists()
+        finally:
+            os.chdir(before)
+            sys.path.remove("")
+            del os.environ["PYTHONPATH"], os.environ["PYTHONUSERBASE"]
+    return {"planted_code_runs": ran}
+
+
+def autosave() -> dict[str, int]:
+    """In a Blender with a window that plays hair for two minutes."""
+    command = [sys.executable, "tools/test_ui.py", "session_autosave"]
+    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True)
+    saved = re.findall(r"autosaves while playing: (\d+)", done.stdout + done.stderr)
+    return {"autosaves_while_playing": min(map(int, saved), default=0)}
+
+
+PARTS: dict[str, Callable[..., dict[str, Any]]] = {
+    "runs": runs,
+    "usda": lambda count=500: usd_attacks(count, SEED),
+    "planted": planted,
+    "waits": lambda: {"endless_waits": len(endless_waits())},
+    "autosave": autosave,
+}
+
+
+def main(arguments: list[str]) -> int:
+    start()
+    chosen = PARTS if not arguments else {arguments[0]: PARTS[arguments[0]]}
+    found: dict[str, Any] = {}
+    for part in chosen.values():
+        found |= part(*map(int, arguments[1:]))
+    tell(found, REFERENCE)
+    missed = [name for name, most in MOST.items() if found.get(name, 0) > most]
+    missed += [name for name, least in LEAST.items() if found.get(name, least) < least]
+    print(f"missed: {', '.join(missed) or 'none'}")
+    return int(bool(missed))
+
+
+sys.exit(main(sys.argv[1:]))
