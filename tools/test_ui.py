@@ -44,8 +44,8 @@ TESTS_LIMIT_S = 3600
 SESSION_LIMIT_S = float(os.environ.get("HAIRLOOM_SESSION_LIMIT", "1800"))
 #: For a commit each session plays on one backend: these on Vulkan, for they look at what is drawn.
 ON_VULKAN = ("cards", "engine", "look", "shadows", "first_light", "random")
-#: It makes pictures of the documentation, and is played where all is.
-NOT_IN_COMMITS = ("guide_pictures",)
+#: One makes pictures of the documentation, one waits for minutes: they are played where all is.
+NOT_IN_COMMITS = ("guide_pictures", "autosave")
 #: Most of a session's time goes into drawing the window. Some need another screen than the usual
 #: one: long panels are pictured uncut, Blender's own texts and gizmos must be a small part of what
 #: is compared, and random actions need not look closely.

@@ -36,6 +36,7 @@ MODULES = {
     "fin_modifier": "blender.scene.fin_modifier",
     "groom_file": "exchange.groom",
     "hair_file": "exchange.hair_file",
+    "latest_job": "blender.base.latest_job",
     "long_work": "ui.long_work",
     "overlay": "blender.viewport.overlay",
     "pipeline": "pipeline",

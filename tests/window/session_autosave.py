@@ -1,0 +1,54 @@
+"""Blender saves automatically while hair plays, and Esc stops hair from wherever the mouse is."""
+
+import sys
+import time
+from pathlib import Path
+
+import bpy
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import (
+    click,
+    hair_is_made,
+    look_from_front,
+    new_head,
+    open_our_sidebar,
+    press,
+    sidebar_button,
+)
+from driver import of_hairloom, until
+
+FOLDER = Path(bpy.app.tempdir)
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    files = bpy.context.preferences.filepaths
+    files.use_auto_save_temporary_files, files.auto_save_time = True, 1  # minute, the shortest
+    new_head(keeps_light=True)
+    bpy.ops.hairloom.grow(strand_count=200, length=0.12)
+    look_from_front(0.9)
+    yield from open_our_sidebar()
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield from hair_is_made()
+    yield from click(*sidebar_button("hairloom.play"))
+    yield from until(of_hairloom("previews").is_playing, "the Play button did nothing")
+    begun = time.time()
+    yield from until(lambda: autosaves(begun), "nothing is saved while hair plays")
+    assert of_hairloom("previews").is_playing()
+    print(f"autosaves while playing: {len(autosaves(begun))} in {time.time() - begun:.0f} s")
+    yield from press("ESC")
+    yield from until(lambda: not of_hairloom("previews").is_playing(), "Esc does not stop it")
+    yield from until(lambda: not of_hairloom("latest_job").is_watched("play"), "it ticks on")
+
+
+def autosaves(since):
+    """Files that Blender has written for itself."""
+    folders = {FOLDER, FOLDER.parent, Path(bpy.context.preferences.filepaths.temporary_directory)}
+    found = (path for folder in folders for path in folder.glob("*autosave*.blend"))
+    return [path for path in found if path.stat().st_mtime > since]
+
+
+driver.play(steps())
