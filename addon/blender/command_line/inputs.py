@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
@@ -22,6 +21,7 @@ from ..base.objects import head_of
 from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import HeadLook, built_in_head
 from ..scene.curves import read_curves
+from ..scene.head_look import head_look
 from ..scene.mesh_files import read_mesh_file
 from ..scene.surfaces import read_surface
 from ..strands.child_python import python_for
@@ -41,7 +41,7 @@ class Sources:
     density_group, length_group: vertex groups or attributes of a head in the open scene, by name,
         for hair that is grown here.
     children_density: the same for the children between guides.
-    skin: of the built-in head, one of bust_skin.TONES.
+    skin: of the built-in head where it comes without materials, one of bust_skin.TONES.
     """
 
     groom: str | None = None
@@ -110,25 +110,27 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
 def _grown(
     head: Surface, head_name: str | None, sources: Sources, settings: GrowSettings
 ) -> StrandSet:
-    """Hair on this head; combed hair of the built-in one comes with brows and lashes."""
+    """Hair on this head; combed hair of a bust, the built-in one or one with the same vertex
+    groups, comes with brows and lashes."""
     density = _weights(sources.density_group, head_name)
     length = _weights(sources.length_group, head_name)
     if settings.method != "combed":
         return grow(head, settings, density, length)
-    if head_name is not None:
-        return grow(head, settings, scalp_density(head) if density is None else density, length)
-    return grow_with_face(head, settings, built_in_head().weights, length)
+    if head_name is None:
+        return grow_with_face(head, settings, built_in_head().weights, length)
+    if density is not None:
+        return grow(head, settings, density, length)
+    mesh = bpy.data.objects.get(head_name)
+    if mesh is None or not {"scalp", "brows", "lashes"} <= set(mesh.vertex_groups.keys()):
+        return grow(head, settings, scalp_density(head), length)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    weights = {name: read_weights(mesh, depsgraph, name) for name in ("scalp", "brows", "lashes")}
+    return grow_with_face(head, settings, weights, length)
 
 
-def head_look(sources: Sources, head: Surface | None) -> HeadLook | None:
-    """How this head is drawn if it is the built-in one; a bake may bring any other."""
-    if sources.groom is not None or sources.head is not None or head is None:
-        return None
-    built_in = built_in_head()
-    is_it = head.corner_uv is not None and np.array_equal(
-        head.triangles, built_in.surface.triangles
-    )
-    return built_in.look(sources.skin) if is_it else None
+def look_of_head(sources: Sources, head: Surface | None) -> HeadLook | None:
+    """How this head, or that of a bake, is drawn; see `head_look`."""
+    return head_look(sources.head or _surface_name(sources.groom), head, sources.skin)
 
 
 def _read_head(name: str | None, sources: Sources) -> Surface | None:

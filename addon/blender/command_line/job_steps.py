@@ -24,7 +24,7 @@ from ..base.report import Report
 from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
 from ..sessions.prepared_groom import prepared
-from .inputs import Inputs, Sources, head_look, head_of_sources, read_inputs
+from .inputs import Inputs, Sources, head_of_sources, look_of_head, read_inputs
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def open_studio(job: Job, rig: Rig) -> Studio:
     """What draws this job's hair in its look."""
     with job.report.stage("ambient occlusion"):
         groom = prepared(rig, job.settings[AmbientSettings])
-    studio = Studio(groom, GroomSettings(job.settings), look=head_look(job.sources, rig.head))
+    studio = Studio(groom, GroomSettings(job.settings), look=look_of_head(job.sources, rig.head))
     tell_notes(list(studio.warnings), job.report)
     return studio
 

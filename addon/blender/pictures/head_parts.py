@@ -15,20 +15,22 @@ def head_parts(whole: MeshSnapshot, look: HeadLook) -> tuple[MeshSnapshot, ...]:
         whole: the head with its normals and occlusion.
     """
     surface = whole.surface
-    assert surface.corner_uv is not None, "a head with pictures has UVs"
+    has_skin = whole.skin is not None and surface.corner_uv is not None
     return tuple(
         replace(
             whole,
             surface=replace(
                 surface,
                 triangles=surface.triangles[triangles],
-                corner_uv=surface.corner_uv[triangles],
+                corner_uv=None if surface.corner_uv is None else surface.corner_uv[triangles],
             ),
-            skin=Skin(surface, triangles),
+            skin=Skin(surface, triangles) if has_skin else None,
             color=material.color,
             specular=material.specular,
             roughness=material.roughness,
             pictures=material.pictures,
+            alpha=material.alpha,
+            transparency=material.transparency,
         )
         for triangles, material in look
     )

@@ -10,9 +10,11 @@ import bpy
 from ...arrays import Floats
 from ...pipeline import Pose
 from ...shading.ambient_settings import AmbientSettings
+from ..base.objects import head_of
 from ..cards.textures import chosen_pictures
 from ..preview import previews
 from ..properties.groom_settings import GroomSettings
+from ..scene.head_look import head_look
 from ..sessions.groom_source import GroomSource
 from ..sessions.prepared_groom import PreparedGroom, prepared, rig_of
 from ..sessions.session import Session
@@ -60,4 +62,6 @@ def file_name(name: str) -> str:
 
 def _studio(hair: bpy.types.Object, groom: PreparedGroom, settings: GroomSettings) -> Studio:
     pictures, _ = chosen_pictures(hair.data.hairloom.card_images)
-    return Studio(groom, settings, pictures)
+    head, surface = head_of(hair), groom.rig.head
+    name = None if head is None else head.name
+    return Studio(groom, settings, pictures, look=head_look(name, surface, "light"))

@@ -53,7 +53,7 @@ class Studio:
 
     Args:
         card_pictures: what takes the place of textures where cards are shown.
-        look: materials of the head; None is plain skin.
+        look: materials of the head, see head_look; None is plain skin.
     """
 
     def __init__(
@@ -223,6 +223,7 @@ class Studio:
         return (
             *shadow_warnings(lights, HairBall().of(snapshot), snapshot.volume),
             *skin_notes(self._rig.head, snapshot.skin, snapshot.volume),
+            *dict.fromkeys(note for _, material in self._look or () for note in material.notes),
         )
 
     @property

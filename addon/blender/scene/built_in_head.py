@@ -16,7 +16,7 @@ from .bust import bust_object
 from .bust_data import EYES, HAIR_GROUPS, SKIN
 from .bust_skin import EYE_IOR, EYE_ROUGHNESS, SKIN_IOR, SKIN_ROUGHNESS, TONES, painted
 from .mesh_materials import MeshMaterial
-from .surfaces import read_surface
+from .surfaces import read_material_slots, read_surface
 
 #: which triangles of a head have which material
 type HeadLook = tuple[tuple[Ints, MeshMaterial], ...]
@@ -62,20 +62,7 @@ def built_in_head() -> BuiltInHead:
         depsgraph = bpy.context.evaluated_depsgraph_get()
         surface = read_surface(head, depsgraph, need_uv=True, place="built-in head")
         weights = {name: read_weights(head, depsgraph, name) for name in HAIR_GROUPS}
-        return BuiltInHead(surface, weights, _materials(head, depsgraph))
+        return BuiltInHead(surface, weights, read_material_slots(head, depsgraph))
     finally:
         bpy.data.objects.remove(head)
         bpy.data.meshes.remove(mesh)
-
-
-def _materials(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Ints:
-    """The material of each triangle of the evaluated mesh."""
-    evaluated = head.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
-        mesh.calc_loop_triangles()
-        slots = np.empty(len(mesh.loop_triangles), np.int32)
-        mesh.loop_triangles.foreach_get("material_index", slots)
-    finally:
-        evaluated.to_mesh_clear()
-    return slots

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -35,14 +36,24 @@ def read_mesh_file(path: Path, *, need_uv: bool) -> Surface:
         HairloomError: no such file, a format that Blender does not read, no faces, or no UVs
             where they are needed.
     """
-    before = _data_blocks()
-    try:
-        meshes = _imported(path)
+    with meshes_of_file(path) as meshes:
         depsgraph = bpy.context.evaluated_depsgraph_get()
         parts = [read_surface(mesh, depsgraph, need_uv=need_uv, place=str(path)) for mesh in meshes]
+    return merged(parts)
+
+
+@contextmanager
+def meshes_of_file(path: Path) -> Iterator[list[bpy.types.Object]]:
+    """The file's mesh objects, sorted by name, in the open scene; gone at the end of the block.
+
+    Raises:
+        HairloomError: no such file, or a format that Blender does not read.
+    """
+    before = _data_blocks()
+    try:
+        yield _imported(path)
     finally:
         bpy.data.batch_remove(_data_blocks() - before)
-    return merged(parts)
 
 
 def import_mesh_file(path: Path) -> bpy.types.Object:

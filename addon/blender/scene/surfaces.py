@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import Surface
 
@@ -54,6 +54,19 @@ def read_positions(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, pla
         positions = _positions(mesh)
     matrix = np.array(obj.evaluated_get(depsgraph).matrix_world, np.float32)
     return positions @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def read_material_slots(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Ints:
+    """The material slot of each triangle of the evaluated mesh, (triangle_count,).
+
+    Raises:
+        HairloomError: not a mesh.
+    """
+    with _evaluated_mesh(obj, depsgraph, obj.name) as mesh:
+        mesh.calc_loop_triangles()
+        slots = np.empty(len(mesh.loop_triangles), np.int32)
+        mesh.loop_triangles.foreach_get("material_index", slots)
+    return slots
 
 
 @contextmanager

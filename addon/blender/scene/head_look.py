@@ -1,0 +1,71 @@
+"""How a head is drawn: by its own materials, as our bust, or as plain skin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...arrays import Ints
+from ...render.snapshot import SKIN, SKIN_ROUGHNESS, SKIN_SPECULAR
+from ...strands import Surface
+from .built_in_head import HeadLook, built_in_head
+from .mesh_files import meshes_of_file
+from .mesh_materials import MeshMaterial, material_of
+from .surfaces import read_material_slots
+
+#: faces without a material, as of a head without any
+_PLAIN = MeshMaterial(SKIN, SKIN_SPECULAR, SKIN_ROUGHNESS)
+
+
+def head_look(name: str | None, head: Surface | None, tone: str) -> HeadLook | None:
+    """The materials of a head: its own, if it has any; of a mesh that is our bust, however it got
+    here, the skin and eyes of the bust; None is plain skin.
+
+    Args:
+        name: of the head's object or file; None for the built-in one.
+        head: as it is drawn; materials count only where its mesh has as many triangles.
+        tone: of our bust, one of bust_skin.TONES.
+    """
+    if head is None:
+        return None
+    own = _own_look(name)
+    if own is not None and sum(len(triangles) for triangles, _ in own) == len(head.triangles):
+        return own
+    built_in = built_in_head()
+    is_ours = head.corner_uv is not None and np.array_equal(
+        head.triangles, built_in.surface.triangles
+    )
+    return built_in.look(tone) if is_ours else None
+
+
+def _own_look(name: str | None) -> HeadLook | None:
+    """The materials of an object of the scene or of a file; None where there are none."""
+    if name is None:
+        return None
+    found = bpy.data.objects.get(name)
+    if found is not None:
+        return _look_of([found])
+    path = Path(name)
+    if not (path.suffix and path.is_file()):
+        return None
+    with meshes_of_file(path) as meshes:
+        return _look_of(meshes)
+
+
+def _look_of(meshes: list[bpy.types.Object]) -> HeadLook | None:
+    """The materials of evaluated meshes, one after the other; None where no mesh has any."""
+    if not any(slot.material for mesh in meshes for slot in mesh.material_slots):
+        return None
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    parts, start = list[tuple[Ints, MeshMaterial]](), 0
+    for mesh in meshes:
+        materials = [slot.material for slot in mesh.material_slots] or [None]
+        slots = np.minimum(read_material_slots(mesh, depsgraph), len(materials) - 1)
+        for slot in np.unique(slots).tolist():
+            material = materials[slot]
+            known = _PLAIN if material is None else material_of(material)
+            parts.append((start + np.flatnonzero(slots == slot), known))
+        start += len(slots)
+    return tuple(parts)
