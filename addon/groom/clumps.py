@@ -8,18 +8,30 @@ from ..arrays import Floats, Ints
 from .settings import GrowSettings
 
 _TURN = 2.0 * np.pi
+#: A clump draws no strand aside by more than this fraction of the way from its root.
+_MAX_PULL = 0.25
 #: Strands given to their clump at once, to bound the memory.
 _CHUNK = 1024
 
 
-def assign_clumps(root: Floats, settings: GrowSettings, random: np.random.Generator) -> Ints:
-    """For each strand the strand in the middle of its clump, (strand_count,), itself included."""
+def assign_clumps(
+    root: Floats, settings: GrowSettings, random: np.random.Generator, side: Ints | None = None
+) -> Ints:
+    """For each strand the strand in the middle of its clump, (strand_count,), itself included.
+
+    Args:
+        side: (strand_count,) of the parting, -1 or 1; a clump keeps to the side of its middle, or
+            it would draw strands through the head. None: there is no parting.
+    """
     if not len(root):
         return np.zeros(0, np.int64)
     clump_count = max(1, round(len(root) / settings.clump_size))
     # strands come in an order that follows the scalp, so every n-th one is spread over it
     middles = np.linspace(0, len(root) - 1, clump_count).round().astype(np.int64)
     scattered = root + random.normal(0.0, 0.3, root.shape) * _clump_size(root, clump_count)
+    if side is not None and len(np.unique(side[middles])) > 1:
+        apart = 10.0 * np.linalg.norm(np.ptp(root, axis=0))
+        scattered[:, 0] += apart * side
     center = scattered[middles] - root.mean(axis=0)
     nearest = np.empty(len(root), np.int64)
     for start in range(0, len(root), _CHUNK):
@@ -40,9 +52,10 @@ def style_clumps(
     """
     fraction = np.linspace(0.0, 1.0, grid.shape[1])[None, :, None]
     pull = settings.clump * fraction**0.8 * (0.75 + 0.25 * random.random((len(grid), 1, 1)))
-    styled = grid + pull * (grid[clump] - grid)
     along = _arc_length(grid)
-    fade = np.minimum(fraction * 3.0, 1.0)
+    styled = grid + _limited(pull * (grid[clump] - grid), _MAX_PULL * along)
+    # hair shorter than a wave has only a part of it
+    fade = np.minimum(np.minimum(fraction * 3.0, along[..., None] / settings.wave_length), 1.0)
     swing = _swing(along / settings.wave_length, clump, random) * settings.wave
     stray = _swing(along / (0.6 * settings.wave_length), np.arange(len(grid)), random)
     return styled + fade * (swing + stray * settings.frizz * (0.5 + fraction))
@@ -61,6 +74,13 @@ def _swing(turns: Floats, owner: Ints, random: np.random.Generator) -> Floats:
         wave = np.sin(_TURN * (turns * pitch[owner, None] + phase[owner, None]))
         total += wave[..., None] * direction[owner, None] / np.sqrt(2.0)
     return total
+
+
+def _limited(offset: Floats, longest: Floats) -> Floats:
+    """Offsets (n, cv_count, 3), those that are longer than that (n, cv_count) shortened to it."""
+    length = np.linalg.norm(offset, axis=-1)
+    factor = np.minimum(1.0, longest / np.maximum(length, 1e-30))
+    return offset * factor[..., None]
 
 
 def _arc_length(grid: Floats) -> Floats:

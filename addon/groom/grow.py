@@ -1,5 +1,8 @@
 """Growing a groom on a head: out of the scalp, along the comb, down with gravity, around the head.
 
+Hair of some centimetres is combed. Hair too short for that lies as it grows: away from a whorl at
+the crown, around which it swirls.
+
 Segments that lengthen towards the tip are Nguyen and Donnelly's (2005, GPU Gems 2, chapter 23), as
 is growth along the normals (`normal_growth`); the comb, the fall around the head and the clumps are
 Hairloom's.
@@ -19,7 +22,7 @@ from ..strands.vectors import unit
 from .clumps import assign_clumps, style_clumps
 from .grown import at_roots, bound_strands, checked_weights, segment_fractions
 from .normal_growth import grow_along_normals, somewhere
-from .scalp import find_cranium, sample_roots, scalp_density
+from .scalp import Cranium, find_cranium, sample_roots, scalp_density
 from .settings import GrowSettings
 from .surface_points import GrowthSurface
 
@@ -30,6 +33,18 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 _DROOP_STEP = 0.02
 #: How much the hair at the parting is combed aside, as a fraction of that at the sides.
 _PARTED = 0.5
+#: Hair of this length grows as it will, and from that length on it is combed, in units of half the
+#: cranium's depth.
+_UNCOMBED, _COMBED = 0.45, 1.4
+#: The whorl in the same units, from the cranium's middle; how far its swirl reaches, and how much
+#: it turns the hair in its middle [rad], seen from above clockwise.
+_WHORL, _SWIRL_REACH, _SWIRL = (0.12, 0.55, 0.85), 0.45, np.radians(75.0)
+#: How much the direction and the lift of uncombed hair vary, of clumps and of single strands.
+_CLUMPS_STRAY, _STRANDS_STRAY, _LIFT_VARIES = np.radians(9.0), np.radians(11.0), 0.14
+#: Hair is piled up no higher than this fraction of its length, and kept as far from the skin.
+_MAX_PILE, _MAX_CLEARANCE = 0.12, 0.06
+#: Hair shorter than this turns within its own length, but is stiffer, as a shorter beam is [m].
+_STIFF = 0.05
 #: The sharpest turn from one segment to the next that a clump or a wave may make [rad].
 _SHARPEST_TURN = np.radians(60.0)
 
@@ -71,13 +86,18 @@ def _grow_combed(
     triangle, barycentric = sample_roots(surface, settings.strand_count, where, random)
     corners = surface.corners[triangle].astype(np.float64)
     root = np.einsum("sk,skj->sj", barycentric, corners)
-    clump = assign_clumps(root, settings, random)
+    cranium = find_cranium(surface.positions)
+    clump = assign_clumps(root, settings, random, np.where(root[:, 0] < cranium.center[0], -1, 1))
     factor = None if length is None else at_roots(length, surface, triangle, barycentric)
     plan = _plan(surface, clump, factor, settings, random)
 
     normal = plan.skin.normal(triangle, barycentric)
-    comb = _combed(surface, root, normal, settings)
-    grid = _fallen(root, normal, comb, plan, settings)
+    uncombed = settings.whorl * _uncombed(plan.length, cranium)
+    grown = _grown(cranium, root, normal, clump, random)
+    comb = _combed(cranium, root, normal, settings)
+    comb = unit(comb + uncombed[:, None] * (grown - comb))
+    lift = settings.lift * (1.0 + uncombed * random.normal(0.0, _LIFT_VARIES, len(root)))
+    grid = _fallen(root, normal, comb, np.clip(lift, 0.0, 1.0), plan, settings)
     grid = _laid(style_clumps(grid, clump, settings, random), plan)
     return bound_strands(grid, triangle, barycentric, surface)
 
@@ -91,6 +111,12 @@ class _Plan:
     segment: Floats
     height: Floats
     skin: GrowthSurface
+
+    @property
+    def length(self) -> Floats:
+        """Of each strand, (strand_count,) [m]."""
+        total: Floats = self.segment.sum(axis=1)
+        return total
 
     def step(self, cv: int, start: Floats, direction: Floats) -> Floats:
         """Where the segment that leads to this CV ends, (strand_count, 3)."""
@@ -107,7 +133,7 @@ def _plan(
     segment = _segments(clump, settings, random)
     if factor is not None:
         segment *= factor[:, None]
-    height = _heights(clump, settings, random)
+    height = _heights(clump, segment.sum(axis=1), settings, random)
     return _Plan(
         segment, height, GrowthSurface(surface, reach=float((segment + height).max(initial=0.0)))
     )
@@ -121,18 +147,49 @@ def _segments(clump: Ints, settings: GrowSettings, random: np.random.Generator) 
     return length[:, None] * segment_fractions(settings.cv_count, settings.segment_ratio)
 
 
-def _heights(clump: Ints, settings: GrowSettings, random: np.random.Generator) -> Floats:
-    """How far from the skin each segment's end stays, (strand_count, cv_count - 1) [m]."""
+def _heights(
+    clump: Ints, length: Floats, settings: GrowSettings, random: np.random.Generator
+) -> Floats:
+    """How far from the skin each segment's end stays, (strand_count, cv_count - 1) [m].
+
+    Args:
+        length: (strand_count,) of the strands [m].
+    """
     layer = 0.7 * random.random(len(clump))[clump] + 0.3 * random.random(len(clump))
     fraction = np.linspace(0.0, 1.0, settings.cv_count)[1:]
     rise = 1.0 - (1.0 - np.minimum(3.0 * fraction, 1.0)) ** 2
-    clearance = settings.clearance * np.minimum(5.0 * fraction, 1.0)
-    return clearance + settings.volume * rise * layer[:, None]
+    clearance = np.minimum(settings.clearance, _MAX_CLEARANCE * length)
+    pile = layer * np.minimum(settings.volume, _MAX_PILE * length)
+    return clearance[:, None] * np.minimum(5.0 * fraction, 1.0) + pile[:, None] * rise
 
 
-def _combed(surface: Surface, root: Floats, normal: Floats, settings: GrowSettings) -> Floats:
+def _uncombed(length: Floats, cranium: Cranium) -> Floats:
+    """How far hair is too short to be combed, (strand_count,) from 0 to 1."""
+    short = (_COMBED - length / cranium.half_depth) / (_COMBED - _UNCOMBED)
+    short = np.clip(short, 0.0, 1.0)
+    smooth: Floats = short * short * (3.0 - 2.0 * short)
+    return smooth
+
+
+def _grown(
+    cranium: Cranium, root: Floats, normal: Floats, clump: Ints, random: np.random.Generator
+) -> Floats:
+    """Unit directions in which hair grows by itself, along the skin, (strand_count, 3)."""
+    away = (root - cranium.center) / cranium.half_depth - _WHORL
+    reach = np.linalg.norm(away, axis=1)
+    stray = _CLUMPS_STRAY * random.standard_normal(len(root))[clump]
+    stray += _STRANDS_STRAY * random.standard_normal(len(root))
+    turn = (stray - _SWIRL * np.exp(-((reach / _SWIRL_REACH) ** 2)))[:, None]
+    out = unit(_along_skin(away, normal))
+    return np.cos(turn) * out + np.sin(turn) * np.cross(normal, out)
+
+
+def _along_skin(direction: Floats, normal: Floats) -> Floats:
+    return direction - normal * np.einsum("ij,ij->i", direction, normal)[:, None]
+
+
+def _combed(cranium: Cranium, root: Floats, normal: Floats, settings: GrowSettings) -> Floats:
     """Unit directions in which the hair is combed, along the skin, (strand_count, 3)."""
-    cranium = find_cranium(surface.positions)
     side = np.clip((root[:, 0] - cranium.center[0]) / (0.5 * cranium.half_depth), -1.0, 1.0)
     # away from the parting from the root on, or hair at the forehead would fall over the face
     side = np.where(side < 0.0, -1.0, 1.0) * (_PARTED + (1.0 - _PARTED) * np.abs(side))
@@ -140,20 +197,27 @@ def _combed(surface: Surface, root: Floats, normal: Floats, settings: GrowSettin
     comb[:, 0] = (1.0 - settings.comb_back) * side
     comb[:, 1] = settings.comb_back
     comb[:, 2] = -0.35
-    return unit(comb - normal * np.einsum("ij,ij->i", comb, normal)[:, None])
+    return unit(_along_skin(comb, normal))
 
 
 def _fallen(
-    root: Floats, normal: Floats, comb: Floats, plan: _Plan, settings: GrowSettings
+    root: Floats,
+    normal: Floats,
+    comb: Floats,
+    lift: Floats,
+    plan: _Plan,
+    settings: GrowSettings,
 ) -> Floats:
     """Grow segment by segment, turning from the comb to the fall, (strand_count, cv_count, 3)."""
     grid = np.repeat(root[:, None], settings.cv_count, axis=1)
-    direction = unit(settings.lift * normal + (1.0 - settings.lift) * comb)
+    direction = unit(lift[:, None] * normal + (1.0 - lift[:, None]) * comb)
+    step = _DROOP_STEP * np.sqrt(np.minimum(plan.length / _STIFF, 1.0))
+    step = np.maximum(step, 1e-30)
     for cv in range(1, settings.cv_count):
         fraction = cv / (settings.cv_count - 1)
         fall = min(fraction / settings.comb_fraction, 1.0) if settings.comb_fraction else 1.0
         aim = unit((1.0 - fall) * comb + fall * _DOWN)
-        turn = 1.0 - (1.0 - settings.droop) ** (plan.segment[:, cv - 1] / _DROOP_STEP)
+        turn = 1.0 - (1.0 - settings.droop) ** (plan.segment[:, cv - 1] / step)
         direction = unit(direction + turn[:, None] * (aim - direction))
         grid[:, cv] = plan.step(cv, grid[:, cv - 1], direction)
         direction = unit(grid[:, cv] - grid[:, cv - 1])

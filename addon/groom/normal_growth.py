@@ -1,8 +1,13 @@
-"""Strands that stand straight on a mesh, along its normals: the guides of the Nalu demo.
+"""Strands that stand on a mesh, or lie on it as fur does.
 
-"The control hairs are grown from a dedicated mesh, one from each vertex, along the normal; the
-segments get longer towards the tip" (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23). Here they
-may also grow from any number of points, spread over the mesh by area and density.
+Lifted fully they stand straight along its normals, the guides of the Nalu demo: "The control hairs
+are grown from a dedicated mesh, one from each vertex, along the normal; the segments get longer
+towards the tip" (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23). Here they may also grow from
+any number of points, spread over the mesh by area and density. Less lifted they lean back and down,
+the more the farther from the root, in tufts that each lean a little their own way.
+
+Limitations: fur leans by world space, for an upright animal that faces -Y, and does not keep out of
+folds of the mesh.
 """
 
 from __future__ import annotations
@@ -12,12 +17,20 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
+from ..strands.vectors import unit
+from .clumps import assign_clumps
 from .grown import at_roots, bound_strands, checked_weights, segment_fractions
 from .scalp import sample_roots
 from .settings import GrowSettings
 
 #: A mean of normals shorter than this points nowhere, as on two faces back to back.
 _NO_DIRECTION = 1.0e-3
+#: The way in which fur leans on an animal: back and down.
+_LEANING = np.array([0.0, 0.55, -0.65])
+#: By which fraction a strand's angle from the skin gets less up to its tip, where it is least.
+_BEND = 0.7
+#: How much the directions of tufts and of single strands vary [rad], and the strands' lift.
+_TUFTS_STRAY, _STRANDS_STRAY, _LIFT_VARIES = 0.3, 0.2, 0.18
 
 
 def grow_along_normals(
@@ -26,7 +39,9 @@ def grow_along_normals(
     density: Floats | None = None,
     length: Floats | None = None,
 ) -> StrandSet:
-    """Straight strands along the normals, bound, all of one CV count, in the surface's space.
+    """Strands along the normals, bound, all of one CV count, in the surface's space.
+
+    Straight with `settings.lift` 1.
 
     From `settings.strand_count` points, or with `settings.per_vertex` from each vertex whose
     density is above `settings.threshold`. The same input and seed give the same strands.
@@ -55,11 +70,34 @@ def grow_along_normals(
     )
     if length is not None:
         strand_length *= at_roots(length, surface, triangle, barycentric)
-    along = np.zeros(settings.cv_count)
-    along[1:] = segment_fractions(settings.cv_count, settings.segment_ratio).cumsum()
-    reach = strand_length[:, None] * along
-    grid = root[:, None] + reach[..., None] * _normals(surface, triangle, barycentric)[:, None]
+    normal = _normals(surface, triangle, barycentric)
+    direction = _directions(root, normal, settings, random)
+    segment = strand_length[:, None] * segment_fractions(settings.cv_count, settings.segment_ratio)
+    grid = np.repeat(root[:, None], settings.cv_count, axis=1)
+    grid[:, 1:] += (segment[..., None] * direction).cumsum(axis=1)
     return bound_strands(grid, triangle, barycentric, surface)
+
+
+def _directions(
+    root: Floats, normal: Floats, settings: GrowSettings, random: np.random.Generator
+) -> Floats:
+    """Unit direction of each segment, (strand_count, cv_count - 1, 3)."""
+    shape = len(root), settings.cv_count - 1, 3
+    if settings.lift >= 1.0 or not len(root):
+        return np.broadcast_to(normal[:, None], shape)
+    tuft = assign_clumps(root, settings, random)
+    across = _LEANING - normal * (normal @ _LEANING)[:, None]
+    # where it leans neither way, as on the breast, it stands
+    lean = np.linalg.norm(across, axis=1)
+    aside = unit(across)
+    turn = _TUFTS_STRAY * random.standard_normal(len(root))[tuft]
+    turn = (turn + _STRANDS_STRAY * random.standard_normal(len(root)))[:, None]
+    aside = np.cos(turn) * aside + np.sin(turn) * np.cross(normal, aside)
+    lift = settings.lift * (1.0 + _LIFT_VARIES * random.standard_normal(len(root)))
+    lift = 1.0 - np.minimum(1.5 * lean, 1.0) * (1.0 - np.clip(lift, 0.0, 1.0))
+    along = np.linspace(0.0, 1.0, settings.cv_count - 1)
+    angle = 0.5 * np.pi * lift[:, None] * (1.0 - _BEND * along * (1.0 - lift[:, None]))
+    return np.sin(angle)[..., None] * normal[:, None] + np.cos(angle)[..., None] * aside[:, None]
 
 
 def somewhere(density: Floats | None, length: Floats | None) -> Floats | None:

@@ -22,7 +22,7 @@ class GrowSettings(Settings):
         "combed",
         (
             ("combed", "Combed", "A groom on an upright head, combed and falling around it"),
-            ("normals", "Along Normals", "Straight out of any mesh, as guides to be styled"),
+            ("normals", "Along Normals", "Out of any mesh, as fur, or as guides to be styled"),
         ),
         label="Method",
         description="Direction in which hair grows from the mesh",
@@ -88,7 +88,17 @@ class GrowSettings(Settings):
     lift: float = number(
         0.5,
         label="Lift",
-        description="Angle at which hair leaves the scalp: 0 lies flat, 1 stands up",
+        description="Angle at which hair leaves the surface: 0 lies flat, 1 stands up, and along "
+        "normals it is straight then",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+    )
+    whorl: float = number(
+        1.0,
+        label="Whorl",
+        description="Amount by which hair that is too short to be combed lies as it grows, away "
+        "from a whorl at the crown",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),

@@ -31,6 +31,8 @@ _WITHOUT_FACE = 0.35
 _MIN_FACE = 0.02
 #: there is a front where the directions' goodness leans to one side by this fraction
 _MIN_LEAN = 0.06
+#: and where the directions from which a face is seen do by this
+_MIN_FACE_LEAN = 0.25
 #: how much better the front in Blender's sense, towards -Y, is than the back, and one three-quarter
 #: view than the other, where all else is equal
 _PREFERENCE = 0.04
@@ -39,6 +41,8 @@ _PREFERENCE = 0.04
 _BARE_SPACINGS, _BARE_FRACTION = 4.0, 0.12
 #: a face lies within the roots' extent, times this
 _FACE_REACH = 1.35
+#: and higher than this fraction of the roots
+_LOWEST = 0.03
 #: points that stand for hair, roots and body, and cells across what is seen
 _HAIR, _ROOTS, _BODY, _CELLS = 20_000, 3_000, 16_000, 56
 
@@ -72,10 +76,11 @@ def good_side(strands: Floats, body: Surface | None) -> GoodSide:
     areas = np.array([seen.areas(_raised(each, _HEIGHTS[0][0])) for each in level])
     whole = areas.max(axis=0)
     good = _goodness(areas, whole) * (1.0 - 0.5 * _PREFERENCE * level[:, 1])
-    lean = (good[:, None] * level).sum(axis=0)
-    if np.linalg.norm(lean) > _MIN_LEAN * good.sum():
-        front = lean / np.linalg.norm(lean)
-    else:  # the best is the three-quarter view
+    # short hair is seen as well from behind, but a face only from its front
+    front = _leaning(good, level, _MIN_LEAN)
+    if front is None and whole[1] > _MIN_FACE * whole[0]:
+        front = _leaning(areas[:, 1], level, _MIN_FACE_LEAN)
+    if front is None:  # the best is the three-quarter view
         front = _turned(level[good.argmax()], _THREE_QUARTER)
     # in this order, so that of equals the first wins
     candidates = [
@@ -87,6 +92,13 @@ def good_side(strands: Floats, body: Surface | None) -> GoodSide:
     factors = np.array([factor for _, factor in candidates])
     best = (_goodness(asked, np.maximum(whole, asked.max(axis=0))) * factors).argmax()
     return GoodSide(front, candidates[best][0])
+
+
+def _leaning(good: Floats, level: Floats, least: float) -> Floats | None:
+    """The unit direction to which the directions' goodness leans; None where by too little."""
+    lean: Floats = (good[:, None] * level).sum(axis=0)
+    length = np.linalg.norm(lean)
+    return lean / length if length > least * good.sum() else None
 
 
 def _goodness(areas: Floats, whole: Floats) -> Floats:
@@ -170,6 +182,8 @@ def _is_face(places: Floats, roots: Floats) -> Bools:
     spacing = float(np.median(nearest_points(roots, roots, 2)[1][:, -1]))
     reach = max(_BARE_SPACINGS * spacing, _BARE_FRACTION * extent)
     is_near = np.linalg.norm(places - middle, axis=1) < _FACE_REACH * extent
+    # a neck is seen from all sides and says nothing
+    is_near &= places[:, 2] > np.quantile(roots[:, 2], _LOWEST)
     found = np.zeros(len(places), bool)
     found[is_near] = nearest_points(places[is_near], roots, 1)[1][:, 0] > reach
     return found

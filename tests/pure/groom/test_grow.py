@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.grow import _WHORL, grow, scalp_density
 from hairloom.addon.groom.roots import bind_roots
+from hairloom.addon.groom.scalp import find_cranium
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.strands import StrandSet, Surface
 
@@ -104,6 +105,81 @@ def test_locks_draw_tips_together(egg: Surface) -> None:
         return float(np.median(apart.min(axis=1)))
 
     assert nearest_tips(0.95) < 0.6 * nearest_tips(0.0)
+
+
+def test_clumps_draw_no_strand_across_the_parting(egg: Surface) -> None:
+    """Or it would have to go through the head, and is pushed out over the face."""
+    settings = GrowSettings(strand_count=1500, wave=0.0, frizz=0.0)
+    grid = grow(egg, settings, scalp_density(egg)).grid
+    # at the back of the head both sides hang beside each other
+    at_front = grid[:, 0, 1] < 0.0
+    across = grid[at_front, -1, 0] * np.sign(grid[at_front, 0, 0])
+    assert across.min() > 0.0
+
+
+def along_skin(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """From root to tip of strands on the egg: the unit way along the skin there, (n, 3), and the
+    sine of the angle to it, (n,)."""
+    way = grid[:, -1] - grid[:, 0]
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    normal = grid[:, 0] / np.array([0.08, 0.1, 0.12]) ** 2
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    sine = np.einsum("ij,ij->i", way, normal)
+    flat = way - sine[:, None] * normal
+    return flat / np.linalg.norm(flat, axis=1, keepdims=True), sine
+
+
+@pytest.mark.parametrize("length", [0.012, 0.035])
+def test_short_hair_lies_as_it_grows(egg: Surface, length: float) -> None:
+    """Forward on the forehead, down at the nape, around the whorl, and no spines anywhere."""
+    settings = GrowSettings(strand_count=1500, length=length)
+    grid = grow(egg, settings, scalp_density(egg)).grid.astype(np.float64)
+    way, sine = along_skin(grid)
+    root = grid[:, 0]
+    assert np.degrees(np.arcsin(sine.mean())) < 50.0 and np.quantile(sine, 0.95) < 0.95
+    front = (np.abs(root[:, 0]) < 0.04) & (root[:, 1] < -0.04)
+    assert (way[front, 1] < 0.0).mean() > 0.95
+    low = (root[:, 1] > 0.03) & (root[:, 2] < 0.0)
+    assert (way[low, 2] < 0.0).mean() > 0.95
+    # seen from above it turns clockwise around the whorl, which is not in the middle
+    cranium = find_cranium(egg.positions)
+    away = root - cranium.center - cranium.half_depth * np.array(_WHORL)
+    distance = np.linalg.norm(away, axis=1)
+    turn = (away[:, 0] * way[:, 1] - away[:, 1] * way[:, 0]) / distance
+    near = distance < 0.03
+    assert near.sum() > 20 and turn[near].mean() < -0.15
+    # single strands differ from their neighbours in direction and length
+    far = np.linalg.norm(root[:, None] - root[None], axis=2)
+    np.fill_diagonal(far, np.inf)
+    beside = way[far.argmin(axis=1)]
+    assert 5.0 < np.degrees(np.arccos(np.clip((way * beside).sum(axis=1), -1, 1))).mean() < 45.0
+
+
+def test_long_hair_is_combed_whatever_the_whorl(egg: Surface) -> None:
+    one, other = (
+        grow(egg, GrowSettings(strand_count=100, length=0.3, whorl=whorl), scalp_density(egg))
+        for whorl in (0.0, 1.0)
+    )
+    np.testing.assert_array_equal(one.points, other.points)
+
+
+def test_hair_bends_over_its_length_not_over_centimetres(egg: Surface) -> None:
+    """Half as long on a head half as large is the same groom."""
+
+    def tips(scale: float) -> np.ndarray:
+        settings = GrowSettings(
+            strand_count=200,
+            length=0.03 * scale,
+            volume=0.024 * scale,
+            clearance=0.002 * scale,
+            wave=0.0,
+            frizz=0.0,
+            droop=0.0,
+        )
+        surface = Surface(egg.positions * np.float32(scale), egg.triangles)
+        return grow(surface, settings, scalp_density(egg)).grid[:, -1] / scale
+
+    np.testing.assert_allclose(tips(0.5), tips(1.0), atol=2e-4)
 
 
 def test_no_strand_folds_back_on_itself(egg: Surface) -> None:

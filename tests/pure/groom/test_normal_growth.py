@@ -1,6 +1,8 @@
-"""Strands along the normals: straight, as long as said, where the density says."""
+"""Strands along the normals: straight or lying, as long as said, where the density says."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ GUIDES = GrowSettings(
     length=0.1,
     length_variation=0.0,
     segment_ratio=1.2,
+    lift=1.0,
 )
 PER_VERTEX = GrowSettings(
     method="normals",
@@ -29,6 +32,7 @@ PER_VERTEX = GrowSettings(
     length=0.1,
     length_variation=0.0,
     segment_ratio=1.5,
+    lift=1.0,
 )
 
 
@@ -242,3 +246,23 @@ def test_nowhere_to_grow_is_told(egg: Surface) -> None:
     low = GrowSettings(**PER_VERTEX.as_dict() | {"threshold": 0.9})
     with pytest.raises(HairloomError, match="lower the threshold"):
         grow_along_normals(egg, low, density=top * 0.5)
+
+
+def test_fur_leans_back_and_down_and_bends_to_the_skin(sphere: Surface) -> None:
+    settings = replace(GUIDES, strand_count=2000, lift=0.5)
+    strands = grow_along_normals(sphere, settings)
+    assert strands.lengths() == pytest.approx(np.full(2000, 0.1), rel=1e-4)
+    step, normal = directions(strands), strands.roots.astype(np.float64)
+    rise = np.einsum("scj,sj->sc", step, normal)
+    # on the flanks, far from where it stands since it leans neither way
+    flank = np.abs(normal[:, 0]) > 0.5
+    angle = np.degrees(np.arcsin(np.clip(rise[flank], -1.0, 1.0)))
+    assert 35.0 < np.median(angle[:, 0]) < 55.0
+    assert (np.diff(angle, axis=1) < 0.0).mean() > 0.99, "ever nearer to the skin"
+    assert rise[flank].min() > 0.0, "and never into it"
+    way = strands.grid[flank, -1] - strands.grid[flank, 0]
+    assert (way[:, 2] < 0.0).mean() > 0.7 and (way[:, 1] > 0.0).mean() > 0.7
+    # tufts: neighbours lean more alike than any two do
+    flat = step[:, -1] - rise[:, -1:] * normal
+    alike = (flat[1:] * flat[:-1]).sum(axis=1)[flank[1:] & flank[:-1]]
+    assert np.median(alike) > np.median((flat[flank] @ flat[flank].T).ravel())

@@ -46,6 +46,21 @@ def head() -> tuple[np.ndarray, Surface]:
     return spikes(0.1 * outward, outward, 0.03), ball(0.1)
 
 
+def cropped() -> tuple[np.ndarray, Surface]:
+    """The same head with hair that is as short, on a long bare neck: its hair is seen best from
+    behind, and its neck from all sides."""
+    outward = np.random.default_rng(6).normal(size=(3000, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    x, y, z = outward.T
+    outward = outward[(z > -0.45) & ~((y < -0.35) & (np.abs(x) < 0.6) & (z < 0.6))]
+    skull, neck = ball(0.1), ball(0.06, (1.0, 1.0, 2.5))
+    positions = [skull.positions, neck.positions + np.float32([0.0, 0.0, -0.14])]
+    triangles = [skull.triangles, neck.triangles + len(skull.positions)]
+    return spikes(0.1 * outward, outward, 0.004), Surface(
+        np.concatenate(positions), np.concatenate(triangles)
+    )
+
+
 def sheet() -> tuple[np.ndarray, Surface]:
     """Hair that hangs before a wall, which is bare behind."""
     places = np.random.default_rng(4).uniform(-0.5, 0.5, (900, 2))
@@ -79,7 +94,7 @@ def away(direction: np.ndarray, degrees: float) -> float:
     return abs(float(np.degrees((angle + np.pi) % (2.0 * np.pi) - np.pi)))
 
 
-@pytest.mark.parametrize("shape", [head, sheet, beast])
+@pytest.mark.parametrize("shape", [head, cropped, sheet, beast])
 @pytest.mark.parametrize("degrees", TURNS)
 def test_the_front_is_found_wherever_it_is(shape, degrees: float) -> None:
     side = good_side(*turned(*shape(), degrees))
