@@ -19,7 +19,7 @@ from .groom.weights import guide_weights
 from .params import SettingsMap
 from .pipeline import Pose, Rig, rest_occlusion, root_normals, root_turns
 from .shading.ambient_settings import AmbientSettings
-from .shading.drawn_strands import drawn_color, drawn_radius
+from .shading.drawn_strands import drawn_radius, own_colors
 from .shading.settings import ShadingSettings, StrandSettings
 
 _AS_THEY_ARE = StrandSettings()
@@ -44,7 +44,8 @@ def card_build_steps(
     """
     occlusion = rest_occlusion(rig, settings[AmbientSettings])
     groom = card_groom(rig, settings[StrandSettings])
-    color = drawn_color(rig.strands.color, settings[ShadingSettings])
+    of_points = np.repeat(rig.strands.group, np.diff(rig.strands.offsets))
+    color = own_colors(rig.strands.color, of_points, settings[ShadingSettings])
     groom = replace(groom, strands=replace(groom.strands, color=color), occlusion=occlusion)
     sections = settings[CardSettings], settings[AtlasSettings], settings[CardOcclusionSettings]
     return card_steps(groom, *sections, alpha_of, others)

@@ -44,20 +44,25 @@ vec3 strand_radiance(vec3 point,
   float sparkle_noise = strand_noise(seed, 1u, cells);
   float color_noise = strand_noise(seed, 2u, 0.0);
   float grey_noise = strand_noise(seed, 3u, 0.0);
+  // a natural brow has no colour of the look, nor at its tip
+  float tinted = along;
+#ifdef OWN_COLOR
+  tinted = own.w > 1.5 ? 0.0 : along;
+#endif
   vec3 absorption = vec3(0.0);
 #if MARSCHNER
   vec3 root = fibre.root.xyz;
 #  ifdef OWN_COLOR
   root = own.w > 0.5 ? color_absorption(fibre, own.xyz) : root;
 #  endif
-  absorption = strand_absorption(fibre, along, color_noise, grey_noise, shading, root);
+  absorption = strand_absorption(fibre, tinted, color_noise, grey_noise, shading, root);
   vec3 hair = strand_color(fibre, absorption);
 #else
   vec3 root = shading.base_color;
 #  ifdef OWN_COLOR
   root = own.w > 0.5 ? own.xyz : root;
 #  endif
-  vec3 hair = strand_base(along, color_noise, grey_noise, shading, root);
+  vec3 hair = strand_base(tinted, color_noise, grey_noise, shading, root);
 #endif
 
   vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz * occlusion;

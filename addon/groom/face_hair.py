@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands import StrandSet, Surface
+from ..strands.face import BROWS, LASHES
 from ..strands.join import joined
 from ..strands.vectors import unit
 from .grow import grow
@@ -20,8 +21,6 @@ from .grown import bound_strands
 from .scalp import sample_roots
 from .settings import GrowSettings
 
-#: groups of the strands, so that guides on the scalp never move them
-BROWS, LASHES = 1, 2
 _UP = np.array([0.0, 0.0, 1.0])
 #: a lash's root is where the weight is highest: on the rim of the lid, not on the skin around it
 _RIM = 5.0
@@ -71,7 +70,10 @@ def grow_with_face(
 def grow_face_hair(
     surface: Surface, brows: Floats, lashes: Floats, hair: FaceHair | None = None
 ) -> StrandSet:
-    """Both, in groups of their own; see `grow_brows` and `grow_lashes`."""
+    """Both, in groups of their own, so that guides on the scalp never move them.
+
+    See `grow_brows` and `grow_lashes`.
+    """
     hair = hair or FaceHair()
     return joined(grow_brows(surface, brows, hair), grow_lashes(surface, lashes, hair))
 

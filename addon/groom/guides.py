@@ -6,24 +6,29 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands import StrandSet
+from ..strands.face import is_face_hair
 from .settings import GuideSettings
 
 #: Candidates a guide, at most: spreading gets no better with more, only slower.
 _CANDIDATES_PER_GUIDE = 100
+#: Brows and lashes hardly move: as many of them share a guide as if there were only one in this.
+_FACE_HAIR_PER_STRAND = 32
 
 
 def choose_guides(strands: StrandSet, settings: GuideSettings) -> Ints:
     """Indices of the strands that become guides, (guide_count,) int64, ascending.
 
-    Each group gets guides in proportion to its size, at least one, and spreads them over its roots
+    Each group gets guides in proportion to its size, at least one, brows and lashes hardly more,
+    and spreads them over its roots
     by farthest-point sampling (Gonzalez 1985): the next guide is the root farthest from all guides
     so far. The same seed gives the same guides. No more guides than strands, none of none.
     """
     random = np.random.default_rng(settings.seed)
-    _, group = np.unique(strands.group, return_inverse=True)
+    names, group = np.unique(strands.group, return_inverse=True)
     by_group = np.argsort(group, kind="stable")
     sizes = np.bincount(group)
-    fractions = group_fractions(sizes, settings.guide_count)
+    moving = np.where(is_face_hair(names), -(-sizes // _FACE_HAIR_PER_STRAND), sizes)
+    fractions = group_fractions(moving, settings.guide_count)
     members = np.split(by_group, np.cumsum(sizes)[:-1]) if len(sizes) else []
     chosen = [
         _spread(strands.roots, member, int(fraction), random)

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..params.glsl import struct_values
-from ..shading.drawn_strands import drawn_color
+from ..shading.drawn_strands import drawn_color, natural_strands, own_colors
 from ..shading.lights import kept_lights
 from ..shading.strand_noise import SEED_LIMIT
 from ..shading.volume.light_frame import Ball
@@ -276,11 +276,13 @@ class StrandPass:
             self._points_serial += 1
         looks = (snapshot.occlusion, snapshot.seed, snapshot.strands.shape)
         self._take("cv_looks", looks, lambda: texture_from(strand_rows(_looks(snapshot)), "RG32F"))
-        color = drawn_color(snapshot.color, snapshot.shading)
-        if color is None:
+        look = snapshot.shading
+        if not _has_own_colors(snapshot):
             self._drop("cv_colors")
         else:
-            self._take("cv_colors", (color,), partial(_colors_texture, color))
+            chosen = (look.color_source, look.brow_source, look.brow_color)
+            sources = (snapshot.color, snapshot.group, chosen)
+            self._take("cv_colors", sources, partial(_colors_texture, snapshot))
         if snapshot.debug_view in NUMBERED_VIEWS:
             numbers = getattr(snapshot, snapshot.debug_view)
             shown = (numbers, snapshot.strands.shape[:1])
@@ -320,9 +322,23 @@ def _points_texture(snapshot: Snapshot) -> Any:
     return texture_from(strand_rows(packed), "RGBA32F")
 
 
-def _colors_texture(color: Floats) -> Any:
+def _has_own_colors(snapshot: Snapshot) -> bool:
+    is_own = drawn_color(snapshot.color, snapshot.shading) is not None
+    return is_own or bool(natural_strands(snapshot.group, snapshot.shading).any())
+
+
+def _colors_texture(snapshot: Snapshot) -> Any:
+    """See the head of this file; w is 1 where strands have colours, and 2 where
+    tips have none of the look either."""
+    look, group = snapshot.shading, snapshot.group
+    every_cv = None if group is None else np.repeat(group[:, None], snapshot.cv_count, axis=1)
+    color = own_colors(snapshot.color, every_cv, look)
+    assert color is not None, "only coloured hair has such a texture"
     is_known = ~np.isnan(color[..., :1])
-    packed = np.concatenate([np.where(is_known, color, 0.0), is_known], axis=-1)
+    known = is_known.astype(np.float32)
+    if every_cv is not None:
+        known += natural_strands(every_cv, look)[..., None]
+    packed = np.concatenate([np.where(is_known, color, 0.0), known], axis=-1)
     return texture_from(strand_rows(np.minimum(packed, _BRIGHTEST)), "RGBA16F")
 
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
+from ..strands.face import is_face_hair
 from .card_look import card_base
 from .kajiya_kay import strand_base
 from .marschner.look import root_absorption, strand_absorption, strand_color
@@ -37,6 +38,31 @@ def drawn_radius(radius: Floats, settings: StrandSettings) -> Floats:
 def drawn_color(color: Floats | None, shading: ShadingSettings) -> Floats | None:
     """Strands' own colours where they are drawn in them; None where in the look's."""
     return color if shading.color_source == "own" else None
+
+
+def own_colors(color: Floats | None, group: Ints | None, shading: ShadingSettings) -> Floats | None:
+    """Strands' own colours as they are drawn, with those of brows and lashes that keep theirs;
+    None where all have the look's.
+
+    Args:
+        color: (..., 3) of strands or of their points; NaN or None where there are none.
+        group: (...,) of the same; None is no face hair.
+    """
+    own = drawn_color(color, shading)
+    is_natural = natural_strands(group, shading)
+    if group is None or not is_natural.any():
+        return own
+    colors = np.full((*group.shape, 3), np.nan, np.float32) if own is None else own.copy()
+    bare = is_natural & np.isnan(colors[..., 0])
+    colors[bare] = shading.brow_color
+    return colors
+
+
+def natural_strands(group: Ints | None, shading: ShadingSettings) -> Bools:
+    """Which strands, by their groups (...,), are brows or lashes that the look does not colour."""
+    if group is None or shading.brow_source != "natural":
+        return np.zeros(0 if group is None else group.shape, bool)
+    return is_face_hair(group)
 
 
 def look_color(shading: ShadingSettings) -> Floats:
@@ -76,7 +102,11 @@ def brightest_look(color: Floats | None, shading: ShadingSettings) -> ShadingSet
 
 
 def strand_variation(
-    seed: Ints, cv_count: int, shading: ShadingSettings, color: Floats | None = None
+    seed: Ints,
+    cv_count: int,
+    shading: ShadingSettings,
+    color: Floats | None = None,
+    group: Ints | None = None,
 ) -> Floats:
     """The colour of strands as a factor of the card's mean, (n, cv_count, 3), up to _MAX; where
     they have their own, of the mean by `brightest_look`.
@@ -84,21 +114,25 @@ def strand_variation(
     Args:
         seed: (n,) what the noise of a strand depends on, as in Snapshot.
         color: (n, cv_count, 3) as in Snapshot.
+        group: (n,) as in Snapshot.
     """
-    root = drawn_color(color, shading)
+    every_cv = None if group is None else np.repeat(group[:, None], cv_count, axis=1)
+    root = own_colors(color, every_cv, shading)
     root = None if root is None else _whole(root, shading)
     card = brightest_look(color, shading)
     along = np.linspace(0.0, 1.0, cv_count)[None, :]
+    is_natural = natural_strands(group, shading)
+    tinted = np.where(is_natural[:, None], 0.0, along) if is_natural.any() else along
     color_noise = strand_noise(seed, _COLOR, np.zeros(1))[:, None]
     grey_noise = strand_noise(seed, _GREY, np.zeros(1))[:, None]
     if shading.model == "marschner":
         absorbing = None if root is None else color_absorption(root)
-        own = strand_color(strand_absorption(shading, along, color_noise, grey_noise, absorbing))
+        own = strand_color(strand_absorption(shading, tinted, color_noise, grey_noise, absorbing))
         even = np.full_like(along, 0.5)
         colored, grey = (strand_absorption(card, along, even, even + s) for s in (1.0, -1.0))
         mean = strand_color(colored + (grey - colored) * shading.grey_fraction)
     else:
-        own = strand_base(along, color_noise, grey_noise, shading, root)
+        own = strand_base(tinted, color_noise, grey_noise, shading, root)
         mean = card_base(along, card)
     return np.clip(own / np.maximum(mean, _DARKEST), 0.0, _MAX)
 

@@ -30,6 +30,11 @@ COLOR_SOURCES = (
     ("look", "Look", "The look's colour alone"),
 )
 
+BROW_SOURCES = (
+    ("look", "Look", "The look's colour, as all hair"),
+    ("natural", "Natural", "A colour of their own, which dye on the head leaves as it is"),
+)
+
 TRANSPARENCIES = (
     ("layers", "Layers", "Blend strands by their coverage of each pixel, sorted by depth"),
     ("hashed", "Hashed", "Stochastic coverage: needs no memory, but is noisy"),
@@ -141,6 +146,20 @@ class SharedSettings(Settings):
         unit="factor",
         panel="Colour",
         active_when=when("shading.tip_tint"),
+    )
+    brow_source: str = choice(
+        "look",
+        BROW_SOURCES,
+        label="Brows and Lashes",
+        description="Colour of brows and lashes, which are strands of the groups 9001 and 9002",
+        panel="Colour",
+    )
+    brow_color: tuple[float, float, float] = color(
+        (0.03, 0.017, 0.011),
+        label="Brow Colour",
+        description="Colour of natural brows and lashes that have none of their own",
+        panel="Colour",
+        active_when=when("shading.brow_source", "natural"),
     )
     color_variation: float = number(
         0.3,

@@ -15,6 +15,7 @@ from hairloom.addon.groom.face_hair import FaceHair, grow_brows, grow_lashes, gr
 from hairloom.addon.groom.scalp import find_cranium
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.shading.skin.notes import uv_notes
+from hairloom.addon.strands.face import BROWS, LASHES
 
 
 def test_it_is_a_head_of_real_size_around_its_skull() -> None:
@@ -125,7 +126,7 @@ def test_brows_and_lashes_leave_the_skin_and_keep_their_places() -> None:
 def test_hair_has_a_group_for_each_part() -> None:
     head = built_in_head()
     strands = grow_with_face(head.surface, GrowSettings(strand_count=50, length=0.05), head.weights)
-    assert list(np.unique(strands.group)) == [0, 1, 2] and (strands.group == 0).sum() == 50
+    assert list(np.unique(strands.group)) == [0, BROWS, LASHES] and (strands.group == 0).sum() == 50
     assert strands.is_bound
 
 

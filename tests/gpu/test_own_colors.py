@@ -12,6 +12,7 @@ from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands.face import BROWS
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
@@ -133,3 +134,18 @@ def test_the_look_alone_and_other_colours_are_drawn_from_then_on(frame: Any) -> 
         np.testing.assert_allclose(
             picture, drawn(frame, plain, replace(shading, base_color=look)), atol=1.0 / 255.0
         )
+
+
+@pytest.mark.parametrize("transparency", ["hashed", "layers"])
+@pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
+def test_natural_brows_are_drawn_without_the_dye(frame: Any, model: str, transparency: str) -> None:
+    """As hair of that colour would, without tints: the left half of the strands are brows."""
+    dyed = replace(VARIED, model=model, base_color=BLUE, tip_tint=1.0, grey_fraction=0.0)
+    natural = replace(dyed, brow_source="natural", brow_color=RED)
+    group = np.where(np.arange(COUNT) < COUNT // 2, BROWS, 0)
+    more = {"transparency": transparency, "volume": VolumeSettings(shadows="none")}
+    found = drawn(frame, curtain() | {"group": group}, natural, **more)
+    left = drawn(frame, curtain(), replace(dyed, base_color=RED, tip_tint=0.0), **more)
+    right = drawn(frame, curtain(), dyed, **more)
+    expected = np.concatenate([left[:, : SIZE // 2], right[:, SIZE // 2 :]], axis=1)
+    np.testing.assert_allclose(found, expected, atol=1.0 / 255.0)

@@ -113,6 +113,7 @@ def cards_key(groom: GroomSettings) -> Hashable:
     return (
         groom.sections.only(*kinds, StrandSettings, AmbientSettings),
         (look.model, look.color_source, look.color_variation, look.grey_fraction),
+        (look.brow_source, look.brow_color),
         groom.card_pictures,
     )
 
@@ -259,7 +260,10 @@ def baked_atlas(
     grid = rig.strands.grid
     count, cv_count = grid.shape[:2]
     radius = drawn_radius(rig.strands.radius.reshape(count, cv_count), drawn)
-    colors = strand_variation(np.arange(count), cv_count, shading, rig.strands.color_grid)
+    strands = rig.strands
+    colors = strand_variation(
+        np.arange(count), cv_count, shading, strands.color_grid, strands.group
+    )
     flat = flat_strands(plan, grid, radius, colors)
     return dilated(draw(flat, plan.size), plan.grid)
 

@@ -69,6 +69,8 @@ _UNITS = {
 }
 #: of Marschner's model alone, though both models share the panel that they are drawn in
 _PIGMENT = {"pigment", "melanin", "redness", "absorption"}
+#: of strands alone: a material of cards has what they do in its textures
+_OF_STRANDS = {"model", "color_source", "brow_source", "brow_color"}
 _OF_KIND = {"color": "scene-linear Rec. 709", "choice": "name", "toggle": "true or false"}
 
 #: What is being done, and which fraction of it is done; None where that is unknown.
@@ -326,7 +328,9 @@ def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str
         tables: name -> file of the tables that lie beside it, see `write_tables`.
     """
     own: type[Settings] = KajiyaKaySettings if shading.model == "kajiya_kay" else MarschnerSettings
-    left_out = {"model", "color_source"} | (_PIGMENT if own is KajiyaKaySettings else set())
+    left_out = {"model", "color_source", "brow_source", "brow_color"} | (
+        _PIGMENT if own is KajiyaKaySettings else set()
+    )
     every = (*SharedSettings.parameters(), *own.parameters())
     parameters = [each for each in every if each.name not in left_out]
     content: dict[str, Any] = {

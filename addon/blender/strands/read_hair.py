@@ -15,7 +15,7 @@ from ...groom.roots import bind_roots
 from ...groom.weights import guide_weights
 from ...groom.widths import as_wide, with_widths
 from ...pipeline import Rig
-from ...shading.drawn_strands import drawn_color, look_color
+from ...shading.drawn_strands import look_color, own_colors
 from ...shading.settings import ShadingSettings
 from ...strands import StrandSet
 from ...strands.resample import resample
@@ -139,7 +139,8 @@ def _out(
     groom: Groom, rig: Rig | None, request: ExportRequest, look: ShadingSettings
 ) -> ExportStrands:
     """In the colours that are drawn, with the copies of the rig's guides if they are wanted."""
-    color = drawn_color(groom.color, look)
+    of_points = np.repeat(groom.strands.group, np.diff(groom.strands.offsets))
+    color = own_colors(groom.color, of_points, look)
     if color is not None or request.color:
         shape = groom.strands.point_count, 3
         color = np.full(shape, np.nan) if color is None else color

@@ -9,6 +9,7 @@ from hairloom.addon.arrays import Floats, Ints
 from hairloom.addon.groom.guides import choose_guides, group_fractions
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands.face import BROWS, LASHES
 
 
 def strands_at(root: Floats, group: Ints) -> StrandSet:
@@ -85,3 +86,16 @@ def test_more_guides_than_strands_takes_them_all_and_none_of_none() -> None:
 def test_roots_in_one_point_still_give_different_guides() -> None:
     strands = strands_at(np.zeros((50, 3)), np.zeros(50, np.int64))
     assert len(set(choose_guides(strands, GuideSettings(guide_count=10)).tolist())) == 10
+
+
+def test_brows_and_lashes_leave_the_guides_to_the_scalp() -> None:
+    sizes = {0: 8000, BROWS: 1000, LASHES: 420}
+    group = np.repeat(list(sizes), list(sizes.values()))
+    guides = choose_guides(strands_at(square(len(group)), group), GuideSettings())
+    of_face = {name: int((group[guides] == name).sum()) for name in sizes}
+    assert len(guides) == GuideSettings().guide_count
+    assert of_face[0] >= 0.99 * len(guides)
+    assert of_face[BROWS] >= 1 and of_face[LASHES] >= 1
+    # any other group has as many as its size asks for
+    plain = choose_guides(strands_at(square(9420), np.minimum(group, 2)), GuideSettings())
+    assert (np.minimum(group, 2)[plain] == 0).sum() < 0.9 * len(plain)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,12 +14,14 @@ from hairloom.addon.shading.drawn_strands import (
     drawn_radius,
     look_color,
     mean_look,
+    own_colors,
     strand_variation,
 )
-from hairloom.addon.shading.kajiya_kay import GREY_COLOR
+from hairloom.addon.shading.kajiya_kay import GREY_COLOR, strand_base
 from hairloom.addon.shading.marschner.look import strand_absorption
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.strand_noise import strand_noise
+from hairloom.addon.strands.face import BROWS, LASHES
 
 BROWN = (0.4, 0.25, 0.15)
 
@@ -85,7 +89,7 @@ def test_absorption_of_black_and_of_more_than_white_stays_within_bounds() -> Non
     np.testing.assert_array_equal(own_absorption(np.full(3, 0.01), np.full(3, 4.0)), 0.0)
 
 
-RED, BLUE = (0.8, 0.02, 0.03), (0.01, 0.05, 0.6)
+RED, BLUE, GREEN = (0.8, 0.02, 0.03), (0.01, 0.05, 0.6), (0.02, 0.4, 0.05)
 
 
 @pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
@@ -115,3 +119,32 @@ def test_the_look_alone_leaves_own_colours_out() -> None:
     np.testing.assert_array_equal(strand_variation(np.arange(9), 6, shading, color), plain)
     assert drawn_color(color, shading) is None
     assert mean_look(color, shading) is brightest_look(color, shading) is shading
+
+
+@pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
+def test_dye_leaves_natural_brows_as_they_are(model: str) -> None:
+    """Nor their tips; but all hair has the look's colour where the look says so."""
+    dyed = ShadingSettings(
+        model=model, base_color=RED, tip_color=BLUE, tip_tint=1.0, color_variation=0.0
+    )
+    natural = replace(dyed, brow_source="natural", brow_color=BROWN)
+    group = np.array([0, BROWS, LASHES, 7])
+    seeds = np.arange(4)
+    plain = strand_variation(seeds, 6, dyed)
+    np.testing.assert_array_equal(strand_variation(seeds, 6, dyed, None, group), plain)
+    found = strand_variation(seeds, 6, natural, None, group)
+    np.testing.assert_array_equal(found[[0, 3]], plain[[0, 3]])
+    assert own_colors(None, np.repeat(group[:, None], 6, axis=1), dyed) is None
+    # the factor times the mean of the card, which is dyed, is brown all along, up to its bound
+    if model == "kajiya_kay":
+        tints = found[1] / plain[1]
+        dye = strand_base(np.linspace(0, 1, 6), np.full(6, 0.5), np.ones(6), dyed)
+        is_bounded = found[1] < 4.0
+        np.testing.assert_allclose((tints * dye)[is_bounded], np.tile(BROWN, (6, 1))[is_bounded])
+    own = own_colors(None, np.repeat(group[:, None], 6, axis=1), natural)
+    assert own is not None
+    assert np.isnan(own[[0, 3]]).all()
+    np.testing.assert_allclose(own[[1, 2]], np.broadcast_to(BROWN, (2, 6, 3)), rtol=1e-6)
+    kept = np.broadcast_to(np.float32(GREEN), (4, 6, 3))
+    found = own_colors(kept, np.repeat(group[:, None], 6, axis=1), natural)
+    np.testing.assert_array_equal(found, kept)
