@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands import StrandSet, Surface
+from ..strands.face import is_face_hair
 from .atlas import AtlasPlan, plan_atlas
 from .atlas_grid import AtlasGrid
 from .atlas_settings import AtlasSettings
@@ -240,7 +241,9 @@ def _by_chance(
     layer = card_layers(strips, settings.layers)
     # loose strands lie on everything, as artists lay them
     is_loose = (strand_count == 1) & (strand_count.max() > 1)
-    layer = np.where(is_loose, settings.layers - 1, layer).astype(np.int32)
+    # and there is nothing above brows and lashes
+    is_outermost = is_loose | is_face_hair(group)
+    layer = np.where(is_outermost, settings.layers - 1, layer).astype(np.int32)
     atlas = AtlasGrid(columns=settings.atlas_columns)
     tile = scattered_tiles(len(strips), atlas, settings.seed)
     strips = _wider(strips, _base_widths(layer, settings))

@@ -10,11 +10,15 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..strands.face import is_face_hair
 
 #: Places along a strand that are compared.
 _STATIONS = 6
 #: How much more than another place the root counts: cards shall not reach over a parting.
 _ROOT_WEIGHT = 2.0
+#: Cards of brows and of lashes, however few there are in all: six a side make a brow, three a rim
+#: the lashes of a lid.
+_MIN_FACE_CARDS = 12
 #: Strands that the means are found from; the others only join the nearest.
 _MAX_LEARNT = 20_000
 _ROUNDS = 12
@@ -26,7 +30,8 @@ def cluster_strands(grid: Floats, group: Ints, count: int, seed: int = 0) -> Int
     """The cluster of each strand, (strand_count,) int32, numbered from 0 without gaps.
 
     No cluster holds strands of two groups. Each group gets clusters in proportion to its strands,
-    but at least one: there may be a few more than `count`, but never more than strands.
+    but at least one, and brows and lashes at least a dozen: there may be a few more than `count`,
+    but never more than strands.
 
     Args:
         grid: (strand_count, cv_count, 3) [m], root first.
@@ -39,7 +44,8 @@ def cluster_strands(grid: Floats, group: Ints, count: int, seed: int = 0) -> Int
     label = np.zeros(len(grid), np.int32)
     groups, sizes = np.unique(group, return_counts=True)
     first = 0
-    for name, wanted in zip(groups, shared_out(count, sizes), strict=True):
+    least = np.where(is_face_hair(groups), np.minimum(_MIN_FACE_CARDS, sizes), 1)
+    for name, wanted in zip(groups, np.maximum(shared_out(count, sizes), least), strict=True):
         own = np.flatnonzero(group == name)
         found = _k_means(features[own], int(wanted), random)
         label[own] = first + found

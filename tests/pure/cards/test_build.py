@@ -27,6 +27,7 @@ from hairloom.addon.params import SettingsMap
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands.face import BROWS
 
 MADE, BAKED = AtlasSettings(source="made"), AtlasSettings(columns=8, rows=2)
 FEW_RAYS = CardOcclusionSettings(rays=16)
@@ -167,6 +168,14 @@ def test_single_strands_are_the_outermost_layer() -> None:
     assert loose.sum() >= 12
     np.testing.assert_array_equal(cards.layer[loose], 2)
     assert set(cards.layer[~loose].tolist()) == {0, 1, 2}
+
+
+def test_brows_are_the_outermost_layer_and_not_widened() -> None:
+    strands = falling(1500)
+    strands = replace(strands, group=np.where(np.arange(1500) < 300, BROWS, 0).astype(np.int32))
+    cards, _ = uncut_cards(_groom(strands), CardSettings(source="clusters", card_count=60), MADE)
+    np.testing.assert_array_equal(cards.layer[cards.group == BROWS], 2)
+    assert set(cards.layer[cards.group == 0].tolist()) == {0, 1, 2}
 
 
 def _groom(strands: StrandSet) -> CardGroom:

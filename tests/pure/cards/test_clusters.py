@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hairloom.addon.cards.clusters import cluster_of_guides, cluster_strands, shared_out
+from hairloom.addon.strands.face import BROWS, LASHES
 
 
 def bundles(count: int, strands: int, spread: float = 0.002) -> tuple[np.ndarray, np.ndarray]:
@@ -115,3 +116,14 @@ def test_cards_are_shared_out_by_size() -> None:
     np.testing.assert_array_equal(shared_out(10, np.array([50, 30, 20])), [5, 3, 2])
     np.testing.assert_array_equal(shared_out(2, np.array([1000, 1, 1])), [2, 1, 1])
     np.testing.assert_array_equal(shared_out(100, np.array([3, 5])), [3, 5])
+
+
+def test_brows_and_lashes_keep_enough_cards() -> None:
+    """Of few cards in all they would get one or two, which are blocks."""
+    grid, _ = bundles(12, 60)
+    group = np.repeat([0, BROWS, LASHES], [600, 80, 40]).astype(np.int32)
+    label = cluster_strands(grid, group, 20)
+    cards = {name: len(np.unique(label[group == name])) for name in (0, BROWS, LASHES)}
+    assert cards[BROWS] == cards[LASHES] == 12 and cards[0] <= 20
+    few = cluster_strands(grid[:603], np.repeat([0, BROWS], [600, 3]), 20)
+    assert len(np.unique(few[600:])) == 3
