@@ -22,7 +22,7 @@ def build_stage(width: int, height: int, samples: int) -> Any:
     head = bpy.context.object
     head.name = "Head"
     bpy.ops.object.shade_smooth()
-    bpy.ops.hairloom.grow(method="normals", strand_count=1500, length=0.08)
+    bpy.ops.hairloom.grow(method="normals", lift=1.0, strand_count=1500, length=0.08)
     bpy.context.object.name = "Hair"
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy, sun.rotation_euler = 3.0, (0.9, 0.3, 0.0)

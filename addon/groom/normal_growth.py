@@ -1,6 +1,6 @@
 """Strands that stand on a mesh, or lie on it as fur does.
 
-Lifted fully they stand straight along its normals, the guides of the Nalu demo: "The control hairs
+From vertices, or lifted fully, they stand straight, the guides of the Nalu demo: "The control hairs
 are grown from a dedicated mesh, one from each vertex, along the normal; the segments get longer
 towards the tip" (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23). Here they may also grow from
 any number of points, spread over the mesh by area and density. Less lifted they lean back and down,
@@ -41,7 +41,7 @@ def grow_along_normals(
 ) -> StrandSet:
     """Strands along the normals, bound, all of one CV count, in the surface's space.
 
-    Straight with `settings.lift` 1.
+    Straight from vertices, or with `settings.lift` 1.
 
     From `settings.strand_count` points, or with `settings.per_vertex` from each vertex whose
     density is above `settings.threshold`. The same input and seed give the same strands.
@@ -83,7 +83,7 @@ def _directions(
 ) -> Floats:
     """Unit direction of each segment, (strand_count, cv_count - 1, 3)."""
     shape = len(root), settings.cv_count - 1, 3
-    if settings.lift >= 1.0 or not len(root):
+    if settings.per_vertex or settings.lift >= 1.0 or not len(root):
         return np.broadcast_to(normal[:, None], shape)
     tuft = assign_clumps(root, settings, random)
     across = _LEANING - normal * (normal @ _LEANING)[:, None]

@@ -93,6 +93,7 @@ class GrowSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
+        shown_when=_HAS_COUNT,
     )
     whorl: float = number(
         1.0,

@@ -45,7 +45,9 @@ def set_the_scene():
     group = head.vertex_groups.new(name="Crown")
     crown = [each.index for each in head.data.vertices if each.co.z > 0.075]
     group.add(crown, 1.0, "REPLACE")
-    bpy.ops.hairloom.grow(method="normals", strand_count=3000, length=0.08, density_group="Crown")
+    bpy.ops.hairloom.grow(
+        method="normals", lift=1.0, strand_count=3000, length=0.08, density_group="Crown"
+    )
     bpy.context.object.name = "Hair"
     bpy.ops.object.light_add(type="SUN", rotation=(np.radians(25.0), 0.0, 0.0))
     bpy.context.object.data.energy = 4.0

@@ -66,7 +66,7 @@ def steps():
 def set_the_scene():
     new_head()
     bpy.ops.object.shade_smooth()
-    bpy.ops.hairloom.grow(method="normals", strand_count=800, length=0.06)
+    bpy.ops.hairloom.grow(method="normals", lift=1.0, strand_count=800, length=0.06)
     bpy.context.object.name = "Hair"
     bpy.ops.object.light_add(type="SUN", rotation=(0.9, 0.3, 0.0))
     bpy.context.object.name = "Sun"

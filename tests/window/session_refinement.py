@@ -75,7 +75,7 @@ def steps():
 def set_the_scene():
     new_head(keeps_light=True)
     bpy.ops.object.shade_smooth()
-    bpy.ops.hairloom.grow(method="normals", strand_count=GUIDES, length=0.08)
+    bpy.ops.hairloom.grow(method="normals", lift=1.0, strand_count=GUIDES, length=0.08)
     bpy.context.object.name = "Hair"
     hair().data.hairloom.strands.fullness = 3.0  # so few strands that pictures hardly show them
     overlays = viewport().spaces.active.overlay

@@ -38,7 +38,7 @@ def steps():
 def set_the_scene():
     new_head()
     bpy.ops.object.shade_smooth()
-    bpy.ops.hairloom.grow(method="normals", strand_count=1500, length=0.06)
+    bpy.ops.hairloom.grow(method="normals", lift=1.0, strand_count=1500, length=0.06)
     bpy.context.object.name = "Hair"
     hide_floor()
     bpy.data.objects["Hair"].data.hairloom.shading.model = "marschner"

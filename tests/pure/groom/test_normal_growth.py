@@ -32,7 +32,6 @@ PER_VERTEX = GrowSettings(
     length=0.1,
     length_variation=0.0,
     segment_ratio=1.5,
-    lift=1.0,
 )
 
 
