@@ -62,7 +62,7 @@ class StageSettings(Settings):
     fill: float = _strength(1.1, "Fill", "Light into the shadows of the main light")
     fill_side: float = _side(-60.0, "Fill Side", "fill light")
     fill_height: float = _height(5.0, "Fill Height", "fill light")
-    rim: float = _strength(7.0, "Rim", "Light from behind, which shines through the hair")
+    rim: float = _strength(4.5, "Rim", "Light from behind, which shines through the hair")
     rim_side: float = _side(-148.0, "Rim Side", "light from behind")
     rim_height: float = _height(35.0, "Rim Height", "light from behind")
     distance: float = number(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,10 +17,12 @@ from hairloom.addon.blender.pictures.film import write_picture
 from hairloom.addon.blender.pictures.studio import Studio
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.properties.presets import named_preset, shipped
+from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.blender.sessions.prepared_groom import prepared
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.groom.face_hair import grow_with_face
+from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.params import SettingsMap
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.settings import StrandSettings
@@ -179,3 +182,26 @@ def test_a_film_that_this_blender_does_not_have_is_told(
     monkeypatch.setitem(film._TRANSFORMS, "agx", ("Kodak", "None"))
     with pytest.raises(HairloomError, match=r"no view transform .Kodak"):
         shown(np.ones((4, 4, 4)), tmp_path / "a.png", view="agx")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("gpu_context", "extension")
+def test_hardly_any_hair_is_burnt(tmp_path: Path) -> None:
+    """On every stage a channel of no more than half a percent of the hair's pixels is full."""
+    head, file = built_in_head(), tmp_path / "still.png"
+    grown = grow_with_face(head.surface, GrowSettings(strand_count=1500), head.weights)
+    rig = pipeline.prepare(grown, head.surface, GuideSettings(), place="hair", widths="found")
+    studio = Studio(prepared(rig, AmbientSettings()), GroomSettings())
+    for stage, look in itertools.product(sorted(STAGES), ("brown", "blond")):
+        chosen = (named_preset(name).settings for name in (f"stage/{stage}", f"looks/{look}"))
+        studio.settings = GroomSettings().with_settings(*chosen)
+        drawn = [
+            studio.picture(rig.rest_pose, points, 128, 128, 2)
+            for points in (rig.strands.grid, rig.strands.grid + np.float32(1e4))
+        ]
+        is_hair = np.abs(drawn[0] - drawn[1]).max(axis=-1) > 1e-3
+        studio.write(file, drawn[0])
+        shown = read_texture(file, is_color=False)[..., :3][is_hair]
+        assert is_hair.mean() > 0.05
+        burnt = (shown.max(axis=-1) > 0.98).mean()
+        assert burnt < 0.005, f"{look} on {stage}: {100.0 * burnt:.2f} %"
