@@ -162,10 +162,18 @@ def test_colours_of_tips_are_grey_until_they_act(new_hair: Any) -> None:
     assert "tip_color" not in grey
 
 
+def test_the_colour_of_brows_is_grey_until_they_have_one(new_hair: Any) -> None:
+    hair = new_hair()
+    assert "brow_color" in drawn_in_look(hair)[1]
+    hair.data.hairloom.shading.brow_source = "natural"
+    assert "brow_color" not in drawn_in_look(hair)[1]
+
+
 def test_what_replaces_shadows_and_scattering_is_grey_where_they_are(new_hair: Any) -> None:
     hair = new_hair()
     groom = hair.data.hairloom
     groom.shading.model, groom.shading.tip_tint = "marschner", 1.0
+    groom.shading.brow_source = "natural"
     assert drawn_in_look(hair)[1] == {"fake_scattering", "volume_shadow"}, "a new groom has both"
     groom.volume.scattering = False
     assert drawn_in_look(hair)[1] == {"volume_shadow"}
