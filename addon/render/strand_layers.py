@@ -87,7 +87,7 @@ class StrandLayers:
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw makes it again."""
         self._max_rows = self._wanted_rows
-        self._too_long = 0
+        self._pixel_count = self._too_long = 0  # of what was gathered last
         self._size = 0, 0
         self._count: Any = None
         self._heads: Any = None
@@ -141,7 +141,7 @@ class StrandLayers:
     ) -> int:
         """Gather all fragments, or those of a part; how many there are, with room or without."""
         self._store(lambda: drawing.gather(self._images, self._capacity, part), rows)
-        found, *_ = self._counts()
+        found, self._pixel_count, *_ = self._counts()
         return found
 
     def _counted(self, drawing: StrandDrawing) -> Ints:
@@ -167,7 +167,7 @@ class StrandLayers:
     def _is_finished(self, drawing: StrandDrawing, *, even_if_too_long: bool = False) -> bool:
         """Order, shade and show what is gathered; not where a list is too long for that."""
         self._too_long = 0
-        _, pixel_count, _, _ = self._counts()
+        pixel_count = self._pixel_count
         if not pixel_count:
             return True
         images = self._images
