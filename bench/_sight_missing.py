@@ -60,7 +60,7 @@ def coverages(
 
 def grown_hair(strand_count: int, aspect: float, width_factor: float) -> tuple[Snapshot, Camera]:
     """A groom on the built-in head, and the camera that holds it."""
-    head = built_in_head()
+    head = built_in_head().surface
     settings = GrowSettings(strand_count=strand_count, cv_count=CV_COUNT)
     strands = grow(head, settings, scalp_density(head))
     shown = Snapshot(

@@ -34,30 +34,37 @@ bool map_is_finer(int index, vec3 point)
 }
 #endif
 
-// As shadow_path, for a place of a mesh and the normal of its triangle. Meshes reach beyond the map of
-// hair: towards its border, and where it is the finer one, the map of all meshes takes over what they
-// are in the way of, or else their shadows fade, or they would end at a line.
-vec3 shadow_path_to_mesh(int index, vec3 point, vec3 normal)
+// The fraction of a light that no mesh is in the way of, at a place of a mesh. path: of shadow_path.
+// normal: of its triangle. Meshes reach beyond the map of hair: towards its border, and where it is the
+// finer one, the map of all meshes takes over, or else their shadows fade, or they would end at a line.
+float light_past_meshes(int index, vec3 point, vec3 normal, vec3 path)
 {
-  vec3 path = shadow_path(index, point);
-  float beyond = 1.0;
-#ifdef MESH_SHADOWS
-  beyond = mesh_light(index, point, normal);
-#endif
+  float within = 0.0;
 #if SHADOWS
   if (path.x >= 0.0) {
     vec3 place = map_place(opacity, index, point);
-    float within = within_map(place.xy);
+    within = within_map(place.xy);
 #  ifdef MESH_SHADOWS
     // depths before and behind all hair are not distinguished
     within = min(within, within_map(vec2(0.5, place.z - opacity.bias)));
     within = map_is_finer(index, point) ? within : 0.0;
 #  endif
-    path.z = mix(beyond, path.z, within);
-    return path;
   }
 #endif
-  return vec3(path.xy, beyond);
+  float beyond = 1.0;
+#ifdef MESH_SHADOWS
+  if (within < 1.0) {
+    beyond = mesh_light(index, point, normal);
+  }
+#endif
+  return mix(beyond, path.z, within);
+}
+
+// As shadow_path, for a place of a mesh and the normal of its triangle.
+vec3 shadow_path_to_mesh(int index, vec3 point, vec3 normal)
+{
+  vec3 path = shadow_path(index, point);
+  return vec3(path.xy, light_past_meshes(index, point, normal, path));
 }
 
 // The fraction of a light that hair and meshes in its way leave, by colour: of what strands take they

@@ -81,23 +81,33 @@ void main()
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, mesh_point, to_light, irradiance);
-    vec3 path = shadow_path_to_mesh(index, mesh_point, facet);
-    vec3 reaching = vec3(mesh_occlusion * path.z);
-#if SHADOWS
-    reaching = path.x < 0.0 ? reaching : light_left(path, hair_forward);
-#endif
+    float facing = dot(normal, to_light);
+    if (facing <= 0.0) {
+      continue;
+    }
+    vec3 path = shadow_path(index, mesh_point);
+    vec3 colored = vec3(0.0);
+    float is_spread = 0.0;
 #ifdef SKIN
     // what is not known of the skin is as it is without: where the head's UVs overlap
     int map = int(opacity.light[index].x);
     if (map >= 0 && map < {{skin_lights}}) {
-      vec3 colored = skin_colored(soft[map], path.x, hair_forward);
-      reaching = mix(reaching, colored, min(4.0 * known, 1.0));
+      colored = skin_colored(soft[map], path.x, hair_forward);
+      is_spread = min(4.0 * known, 1.0);
     }
 #endif
+    vec3 reaching = vec3(mesh_occlusion);
+    if (is_spread < 1.0) {
+      path.z = light_past_meshes(index, mesh_point, facet, path);
+      reaching *= path.z;
+#if SHADOWS
+      reaching = path.x < 0.0 ? reaching : light_left(path, hair_forward);
+#endif
+    }
+    reaching = mix(reaching, colored, is_spread);
 #ifdef OTHER_TAU
     reaching *= exp((index < {{other_tau_lights}} ? -between[index] : 0.0) * (1.0 - hair_forward));
 #endif
-    float facing = max(0.0, dot(normal, to_light));
     float shine = ggx_reflection(normal, to_light, to_eye, mesh_specular, mesh_roughness);
     radiance += irradiance * reaching * facing * (matt / LIGHT_PI + shine);
   }

@@ -215,6 +215,7 @@ void main()
     count++;
     number = node.x;
   }
+  imageAtomicMax(layer_count, ivec2(3, 0), uint(count));
 
   float fractions[LAYERS];
   float through = 1.0, front = 2.0;

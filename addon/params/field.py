@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 
 from ..errors import HairloomError
@@ -139,6 +140,7 @@ class Settings:
             object.__setattr__(self, parameter.name, value)
 
     @classmethod
+    @cache
     def parameters(cls) -> tuple[Parameter, ...]:
         """The declarations in the order in which they stand in the class."""
         return tuple(

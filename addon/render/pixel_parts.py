@@ -30,9 +30,15 @@ class PixelPart:
     @property
     def halves(self) -> tuple[PixelPart, ...]:
         """Two parts that are this one, the farther first; none where it cannot be cut."""
-        pixel, depth = (self.first + self.end) // 2, (self.near + self.far) // 2
+        pixel = (self.first + self.end) // 2
         if self.end - self.first > 1:
             return replace(self, end=pixel), replace(self, first=pixel)
+        return self.slabs
+
+    @property
+    def slabs(self) -> tuple[PixelPart, ...]:
+        """The farther half of its depths and the nearer one; none where it has but one depth."""
+        depth = (self.near + self.far) // 2
         if self.far - self.near > 1:
             return replace(self, near=depth), replace(self, far=depth)
         return ()

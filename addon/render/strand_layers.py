@@ -1,7 +1,7 @@
 """Strands as layers: the lists of all pixels, of which some stand for all, shaded and added up.
 
-    count   R32UI 3 x 1:   how many fragments there are, how many pixels that have some, and how
-                           many fragments are seen
+    count   R32UI 4 x 1:   how many fragments there are, how many pixels that have some, how many
+                           fragments are seen, and how many the longest list has
     heads   R32UI:         of each pixel the first one of its list, counted from 1; 0 is none
     pixels  R32UI:         those that have fragments, side by side: x, and y in the upper half
     nodes   RGBA32UI:      the fragments, see lib_layer_packing.glsl; later their colours
@@ -16,7 +16,8 @@ Fragments that have no room all at once are drawn in parts, see pixel_parts.py: 
 counts its own, then parts that have room are gathered, ordered, shaded and shown one by one. So
 memory decides how often strands are drawn, and never what is seen. A part of one pixel that has no
 room is drawn by depth, the farthest first, each over what is there: exact but for the colours of
-Blender's viewport, which are added up as they are encoded.
+Blender's viewport, which are added up as they are encoded. So is a part with a list too long for a
+software driver, whose shaders end after 65,535 rounds of all their loops.
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ from .textures import drawing_rows, drawing_state
 FIRST_ROWS, MAX_ROWS = 256, 3072
 #: a count that turned out too small is made this much larger than what was found
 _SPARE = 1.25
+#: fragments of a pixel that a software driver can order: each takes some 20 rounds of loops
+LONGEST_IN_SOFTWARE = 3072
 
 _ORDER_RECIPE = ShaderRecipe(
     name="strand_layers_order",
@@ -84,6 +87,7 @@ class StrandLayers:
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw makes it again."""
         self._max_rows = self._wanted_rows
+        self._pixel_count = self._too_long = 0  # of what was gathered last
         self._size = 0, 0
         self._count: Any = None
         self._heads: Any = None
@@ -107,8 +111,7 @@ class StrandLayers:
         """
         left, bottom, width, height = gpu.state.viewport_get()
         self._fit((left + width, bottom + height))
-        if not in_parts and self._is_gathered(drawing):
-            self._finish(drawing)
+        if not in_parts and self._is_gathered(drawing) and self._is_finished(drawing):
             return LayersDrawn(1)
         counts, drawn, missing = self._counted(drawing), 0, 0
         self._make_room(int(counts.sum(dtype=np.int64)))
@@ -120,8 +123,10 @@ class StrandLayers:
             if beyond > 0 and part.halves:
                 waiting += part.halves[::-1]
                 continue
-            self._finish(drawing)
-            drawn, missing = drawn + 1, missing + max(beyond, 0)
+            if not self._is_finished(drawing, even_if_too_long=not part.slabs):
+                waiting += part.slabs[::-1]
+                continue
+            drawn, missing = drawn + 1, missing + max(beyond, 0) + self._too_long
         return LayersDrawn(drawn, missing)
 
     def _is_gathered(self, drawing: StrandDrawing) -> bool:
@@ -136,7 +141,7 @@ class StrandLayers:
     ) -> int:
         """Gather all fragments, or those of a part; how many there are, with room or without."""
         self._store(lambda: drawing.gather(self._images, self._capacity, part), rows)
-        found, _, _ = self._counts()
+        found, self._pixel_count, *_ = self._counts()
         return found
 
     def _counted(self, drawing: StrandDrawing) -> Ints:
@@ -159,11 +164,12 @@ class StrandLayers:
         gpu.compute.dispatch(done.shader, 1, 1, 1)
         gpu.shader.unbind()
 
-    def _finish(self, drawing: StrandDrawing) -> None:
-        """Order, shade and show what is gathered."""
-        _, pixel_count, _ = self._counts()
+    def _is_finished(self, drawing: StrandDrawing, *, even_if_too_long: bool = False) -> bool:
+        """Order, shade and show what is gathered; not where a list is too long for that."""
+        self._too_long = 0
+        pixel_count = self._pixel_count
         if not pixel_count:
-            return
+            return True
         images = self._images
         order = program(_ORDER_RECIPE)
         order.bind(
@@ -171,18 +177,24 @@ class StrandLayers:
             integers={"pixel_count": pixel_count},
         )
         _dispatch(order, pixel_count, self._pixels.width)
-        _, _, seen_count = self._counts()
+        _, _, seen_count, longest = self._counts()
+        if is_software() and longest > LONGEST_IN_SOFTWARE:
+            if not even_if_too_long:
+                return False
+            self._too_long = longest - LONGEST_IN_SOFTWARE
         _dispatch(drawing.shade(images, seen_count), seen_count, LAYER_ROW)
         with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
             self._triangle.draw(drawing.show(images, writes_depth=False).shader)
         with drawing_state(depth_test="ALWAYS"):
             gpu.state.color_mask_set(False, False, False, False)
             self._triangle.draw(drawing.show(images, writes_depth=True).shader)
+        return True
 
-    def _counts(self) -> tuple[int, int, int]:
-        """How many fragments there are, pixels that have some, and fragments that are seen."""
-        found, pixels, seen = np.asarray(self._count.read()).ravel().tolist()
-        return int(found), int(pixels), int(seen)
+    def _counts(self) -> tuple[int, int, int, int]:
+        """How many fragments there are, pixels that have some, fragments that are seen, and the
+        fragments of the longest list."""
+        found, pixels, seen, longest = np.asarray(self._count.read()).ravel().tolist()
+        return int(found), int(pixels), int(seen), int(longest)
 
     @property
     def _images(self) -> dict[str, Any]:
@@ -228,7 +240,7 @@ class StrandLayers:
         if is_held and kept[0] * kept[1] <= 4 * max(wanted[0] * wanted[1], 1):
             return
         self._size = size
-        self._count = gpu.types.GPUTexture((3, 1), format="R32UI")
+        self._count = gpu.types.GPUTexture((4, 1), format="R32UI")
         self._heads = gpu.types.GPUTexture(size, format="R32UI")
         self._pixels = gpu.types.GPUTexture(size, format="R32UI")
         self._make_nodes(min(FIRST_ROWS, self._max_rows))
@@ -238,6 +250,11 @@ class StrandLayers:
             layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
             corners = gpu.types.GPUVertBuf(layout, 3)
             self._triangle = gpu.types.GPUBatch(type="TRIS", buf=corners)
+
+
+def is_software() -> bool:
+    """Whether a processor draws in place of a GPU."""
+    return str(gpu.platform.device_type_get()) == "SOFTWARE"
 
 
 def _dispatch(shader: ShaderProgram, count: int, across: int) -> None:

@@ -33,9 +33,6 @@ _WORTHWHILE, _CROWDED = 3, 512
 _HAIR = 1.0 + 1.0e-9
 
 
-type _Pairs = Iterator[tuple[Ints, Ints]]
-
-
 @dataclass(frozen=True)
 class ClosestPoints:
     """One answer a point, in the space of the surface.
@@ -139,26 +136,35 @@ class ClosestPointSearch:
 
     def _search(self, points: Floats, reach: float) -> Ints:
         """A good guess, then all that could be nearer."""
-        leaf = self._tree.leaf_triangles[self._tree.nearest_leaf(points)]
+        triangles = self._tree.leaf_triangles
+        leaf = triangles[self._tree.nearest_leaf(points)]
         best = _Best(np.full(len(points), np.inf), leaf[:, 0].astype(np.int64))
         self._improve(best, points, *_each(np.arange(len(points)), leaf))
         # a hair more than the reach, so that a point just within it is found
         within = np.minimum(best.distance, reach * reach * _HAIR)
-        for point, triangle in self._near_triangles(points, within):
-            self._improve(best, points, point, triangle)
+        for point, leaf, gap in self._near_leaves(points, within):
+            # the nearest box first: what it holds leaves few of the others
+            nearest = _first_least(point, gap)
+            self._improve(best, points, *_each(point[nearest], triangles[leaf[nearest]]))
+            is_near = gap < best.distance[point]
+            is_near[nearest] = False
+            self._improve(best, points, *_each(point[is_near], triangles[leaf[is_near]]))
         return best.triangle
 
-    def _near_triangles(self, points: Floats, squared_within: Floats) -> _Pairs:
-        """Pairs of point and triangle that may be so near, ascending by point, some at a time."""
+    def _near_leaves(
+        self, points: Floats, squared_within: Floats
+    ) -> Iterator[tuple[Ints, Ints, Floats]]:
+        """Pairs of point and leaf that may be so near, ascending by point, some at a time, and the
+        squared distance to the leaf's box."""
         limit = _PAIR_LIMIT if len(points) > 1 else sys.maxsize
-        pairs = self._tree.leaves_within(points, squared_within, limit)
-        if pairs is not None:
-            yield _each(pairs[0], self._tree.leaf_triangles[pairs[1]])
+        found = self._tree.leaves_within(points, squared_within, limit)
+        if found is not None:
+            yield found
             return
         half = len(points) // 2
-        yield from self._near_triangles(points[:half], squared_within[:half])
-        for point, triangle in self._near_triangles(points[half:], squared_within[half:]):
-            yield point + half, triangle
+        yield from self._near_leaves(points[:half], squared_within[:half])
+        for point, leaf, gap in self._near_leaves(points[half:], squared_within[half:]):
+            yield point + half, leaf, gap
 
     def _candidates(self, clusters: PointClusters, nearest: Ints, reach: float) -> _Candidates:
         """For each cluster, but for the triangle that is nearest to its middle."""
@@ -168,7 +174,8 @@ class ClosestPointSearch:
         found = []
         for start in range(0, len(middle), _CHUNK):
             part = slice(start, start + _CHUNK)
-            for near, triangle in self._near_triangles(middle[part], within[part] ** 2):
+            for near, leaf, _ in self._near_leaves(middle[part], within[part] ** 2):
+                near, triangle = _each(near, self._tree.leaf_triangles[leaf])
                 cluster = near + start
                 far = np.sqrt(self._forms.squared_distance(middle[cluster], triangle))
                 is_near = (far <= within[cluster]) & (triangle != nearest[cluster])
@@ -235,6 +242,16 @@ def closest_point(points: Floats, surface: Surface) -> ClosestPoints:
         HairloomError: the surface has no triangles.
     """
     return ClosestPointSearch(surface).closest(points)
+
+
+def _first_least(point: Ints, value: Floats) -> Ints:
+    """Where each of the points, ascending, has its least value for the first time."""
+    first = np.flatnonzero(np.diff(point, prepend=-1))
+    if not len(first):
+        return first
+    least = np.repeat(np.minimum.reduceat(value, first), np.diff(first, append=len(point)))
+    is_least = np.flatnonzero(value == least)
+    return is_least[np.flatnonzero(np.diff(point[is_least], prepend=-1))]
 
 
 def _each(point: Ints, triangles: Ints) -> tuple[Ints, Ints]:

@@ -47,21 +47,23 @@ class TriangleTree:
 
     def leaves_within(
         self, points: Floats, squared_reach: Floats, limit: int
-    ) -> tuple[Ints, Ints] | None:
-        """All (point, leaf) pairs whose box is nearer than the point's reach, ascending by point.
+    ) -> tuple[Ints, Ints, Floats] | None:
+        """All (point, leaf) pairs whose box is nearer than the point's reach, ascending by point,
+        and the squared distance of each.
 
         None where that takes more than `limit` pairs at once: ask again with fewer points.
         """
         point, node = np.arange(len(points)), np.zeros(len(points), np.int64)
+        distance: Floats = np.zeros(len(points))
         for low, high in self.levels[1:]:
             point, node = np.repeat(point, 2), np.repeat(2 * node, 2)
             node[1::2] += 1
             distance = _squared_distance(points[point], low[node], high[node])
             is_near = distance < squared_reach[point]
-            point, node = point[is_near], node[is_near]
+            point, node, distance = point[is_near], node[is_near], distance[is_near]
             if len(point) > limit:
                 return None
-        return point, node
+        return point, node, distance
 
 
 def build_tree(corners: Floats) -> TriangleTree:

@@ -58,34 +58,43 @@ def test_a_field_is_the_same_whoever_makes_it_and_is_made_once(sphere, evaluated
     alone = DistanceField.from_surface(surface, COARSE)
     assert np.array_equal(beside.values, alone.values) and beside.cell == alone.cell
     again = surface_of(sphere, evaluated)
-    assert fields.field_of(again, COARSE, place="Head", blocking=False) is beside
+    assert fields.field_of(again, COARSE, place="Another head", blocking=False) is beside
     finer = DynamicsSettings(collider_resolution=17)
     assert fields.field_of(again, finer, place="Head") is not beside
 
 
 def test_what_cannot_be_made_is_told_each_time_it_is_asked_for():
     flat = Surface(np.eye(3, dtype=np.float32), np.zeros((0, 3), np.int32))
-    for _ in range(2):
-        with pytest.raises(HairloomError, match="no faces"):
-            fields.field_of(flat, COARSE, place="Sheet")
+    for name in ("Sheet", "Same sheet", "Sheet"):
+        with pytest.raises(HairloomError, match="no faces") as caught:
+            fields.field_of(flat, COARSE, place=name)
+        assert caught.value.place == name
 
 
 def test_only_the_youngest_fields_are_kept(sphere, evaluated, extension):
     surface = surface_of(sphere, evaluated)
-    first = fields.field_of(surface, COARSE, place="0")
-    for number in range(1, fields.KEPT + 1):
-        fields.field_of(surface, COARSE, place=str(number))
-    assert fields.field_of(surface, COARSE, place="0") is not first
+    first, *others = fields_wanted()
+    oldest = fields.field_of(surface, first, place="Head")
+    for settings in others:
+        fields.field_of(surface, settings, place="Head")
+    assert fields.field_of(surface, first, place="Head") is not oldest
+
+
+def fields_wanted():
+    """Settings of one field more than are kept."""
+    return [DynamicsSettings(collider_resolution=16 + number) for number in range(fields.KEPT + 1)]
 
 
 def made_beside(surface):
     """More fields than are kept, as previews have them made; the oldest of them."""
-    names = [str(number) for number in range(fields.KEPT + 1)]
-    for name in names:
+    for settings in fields_wanted():
         with pytest.raises(fields.NotMadeYetError):
-            fields.field_of(surface, COARSE, place=name, blocking=False)
+            fields.field_of(surface, settings, place="Head", blocking=False)
     until_made()
-    made = [fields.field_of(surface, COARSE, place=name, blocking=False) for name in names]
+    made = [
+        fields.field_of(surface, settings, place="Head", blocking=False)
+        for settings in fields_wanted()
+    ]
     return weakref.ref(made[0])
 
 

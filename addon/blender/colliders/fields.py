@@ -40,12 +40,10 @@ def field_of(
         HairloomError: see `DistanceField.from_surface`.
         NotMadeYetError: it is being made, and nobody waits.
     """
-    key = _key(surface, settings, place)
+    key = _key(surface, settings)
     work = _works.pop(key, None)
     if work is None:
-        work = ThreadWork(
-            lambda _: DistanceField.from_surface(surface, settings, place=place), "distance field"
-        )
+        work = ThreadWork(lambda _: DistanceField.from_surface(surface, settings), "distance field")
     _works[key] = work  # now the youngest
     if blocking:
         work.wait()
@@ -54,8 +52,8 @@ def field_of(
         raise NotMadeYetError
     try:
         return work.result()
-    except HairloomError:
-        raise  # a surface that cannot be one stays so
+    except HairloomError as error:  # a surface that cannot be one stays so, under any name
+        raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     except Exception:
         _works.pop(key, None)  # as where memory ran out, which may go well the next time
         raise
@@ -78,10 +76,10 @@ def forget() -> None:
     _works.clear()
 
 
-def _key(surface: Surface, settings: DynamicsSettings, place: str) -> str:
+def _key(surface: Surface, settings: DynamicsSettings) -> str:
     state = hashlib.blake2b(digest_size=16)
     for array in (surface.positions, surface.triangles):
         state.update(f"{array.dtype} {array.shape}".encode())
         state.update(np.ascontiguousarray(array).tobytes())
-    state.update(f"{settings.collider_resolution} {place}".encode())
+    state.update(f"{settings.collider_resolution}".encode())
     return state.hexdigest()

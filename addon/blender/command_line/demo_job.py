@@ -18,7 +18,7 @@ from .cards_job import written_cards
 from .job_options import add_motion_options, add_picture_options, add_texture_option
 from .job_steps import Job, PosedHair, open_studio, read_rig, tell_notes
 from .render_job import write_sheet, write_still
-from .simulate_job import simulated
+from .simulate_job import at_rest, simulated
 from .verb import Verb
 
 
@@ -26,9 +26,10 @@ def demo(job: Job) -> None:
     """Do it all: simulate, stills, contact sheet, hair cards, strands and report.json."""
     report, folder = job.report, job.output
     pictures = named_pictures(job.options.texture)
-    rig, _ = read_rig(job)
     with TemporaryDirectory() as bake:
-        motion = simulated(job, Path(bake) / "bake")
+        with at_rest(job):
+            rig, inputs = read_rig(job)
+            motion = simulated(job, inputs, Path(bake) / "bake")
         studio = open_studio(job, rig)
         still = write_still(job, folder / "still.png", studio, PosedHair.of_rest(rig))
         _write_close_up(job, folder / "close_up.png", studio, rig)

@@ -15,13 +15,14 @@ import numpy as np
 
 from ... import pipeline
 from ...arrays import Floats
-from ...dynamics.colliders import DistanceField, PosedCollider
+from ...dynamics.colliders import PosedCollider
 from ...dynamics.measure import deepest_penetration, max_stretch
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...strands import Surface
 from ..bakes.guide_motion import BakedGuides
 from ..base.attributes import set_attribute
+from ..colliders.fields import field_of
 from ..preview.bake import Bake
 from ..scene.curves import write_curves
 from .bake_job import write_bake
@@ -40,35 +41,41 @@ _DENSITY = "children_density"
 
 def simulate(job: Job) -> None:
     """Simulate the hair and write its motion as a bake."""
-    simulated(job, job.output)
+    with at_rest(job):
+        simulated(job, read_hair(job), job.output)
     finish(job, job.output)
 
 
-def simulated(job: Job, folder: Path) -> BakedGuides:
-    """Bake the hair under the scene's animation or the shake."""
-    scene, shown = bpy.context.scene, bpy.context.scene.frame_current
-    try:
-        if job.options.animated:  # rest is where everything is in the first frame
-            scene.frame_set(scene.frame_start)
-        inputs = read_hair(job)
-        with _scene_of(job, inputs) as hair:
-            put_map(hair, job.settings)
-            widths = hair.data.hairloom.widths
-            if widths.method == "auto" and not inputs.strands.has_widths:
-                widths.method = "found"  # the curves have had them since they were written
-            own = bpy.context.scene
-            frames = range(own.frame_start, own.frame_end + 1)
-            plan = Bake.of([hair], own, frames=frames, folder=folder.resolve())
-            try:
-                write_bake(plan, job.report, "simulating", "simulate frame")
-            except HairloomError as error:
-                place = inputs.groom_name if error.place == hair.name else error.place
-                raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
-    finally:
-        scene.frame_set(shown)
+def simulated(job: Job, inputs: Inputs, folder: Path) -> BakedGuides:
+    """Bake the hair under the scene's animation or the shake; call it `at_rest`."""
+    with _scene_of(job, inputs) as hair:
+        put_map(hair, job.settings)
+        widths = hair.data.hairloom.widths
+        if widths.method == "auto" and not inputs.strands.has_widths:
+            widths.method = "found"  # the curves have had them since they were written
+        own = bpy.context.scene
+        frames = range(own.frame_start, own.frame_end + 1)
+        plan = Bake.of([hair], own, frames=frames, folder=folder.resolve())
+        try:
+            write_bake(plan, job.report, "simulating", "simulate frame")
+        except HairloomError as error:
+            place = inputs.groom_name if error.place == hair.name else error.place
+            raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     motion = BakedGuides.in_folder(folder.resolve())
     _tell_worst(job, inputs, motion)
     return motion
+
+
+@contextmanager
+def at_rest(job: Job) -> Iterator[None]:
+    """With --animated, rest is where everything is in the scene's first frame."""
+    scene, shown = bpy.context.scene, bpy.context.scene.frame_current
+    try:
+        if job.options.animated:
+            scene.frame_set(scene.frame_start)
+        yield
+    finally:
+        scene.frame_set(shown)
 
 
 @contextmanager
@@ -177,7 +184,7 @@ def _tell_worst(job: Job, inputs: Inputs, motion: BakedGuides) -> None:
     name = job.sources.collider or job.sources.head or "built-in head"
     with job.report.stage("measure"):
         settings = job.settings[DynamicsSettings]
-        collider = DistanceField.from_surface(inputs.collider, settings, place=name)
+        collider = field_of(inputs.collider, settings, place=name)
         state = pipeline.begin(motion.rig, motion.at(motion.frames[0])[0]).dynamics
         stretch, penetration = 0.0, 0.0
         for frame in motion.frames[1:]:
