@@ -69,13 +69,19 @@ class Timers:
         self._register(function, **settings)
 
     def pending(self) -> list[str]:
-        """Those that are still to come."""
+        """Those that are still to come, but for the ticks of hair that plays, which go on."""
         return [
             f"{each.__module__}.{each.__qualname__}"
             for each in self._seen
             if getattr(each, "__module__", "").startswith(EXTENSION)
             and bpy.app.timers.is_registered(each)
+            and not self._only_ticks(each)
         ]
+
+    @staticmethod
+    def _only_ticks(timer: Any) -> bool:
+        jobs = of_hairloom("latest_job")
+        return timer is jobs.take_steps and set(jobs._steps) == {"play"}
 
 
 timers = Timers()
