@@ -23,7 +23,7 @@ _PAUSE = 0.1
 
 
 def move(source: Path, target: Path) -> None:
-    """Put a file in the place of another one, in one step where both are on one disk.
+    """Let a file replace another one, in one step where both are on one disk.
 
     Raises:
         OSError: it cannot be done, or another program keeps one of them for too long.

@@ -10,7 +10,7 @@ from collections.abc import Container
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(\..*)?", re.IGNORECASE)
 _UNSAFE = re.compile(r"[^\w\-. ]+")
 #: Letters of a folder's name, at most 200 bytes; Windows has 260 for a whole path.
-_MOST_LETTERS = 50
+_MAX_LETTERS = 50
 
 
 def plain_name(name: str, fallback: str = "hair") -> str:
@@ -33,7 +33,7 @@ def folder_name(name: str, taken: Container[str] = (), fallback: str = "hair") -
         taken: names that others have, in the form of `as_compared`.
     """
     composed = unicodedata.normalize("NFC", name)
-    plain = _UNSAFE.sub("_", composed)[:_MOST_LETTERS].strip(". ") or fallback
+    plain = _UNSAFE.sub("_", composed)[:_MAX_LETTERS].strip(". ") or fallback
     if _DEVICES.fullmatch(plain):
         plain = f"_{plain}"
     choices = (plain, *(f"{plain}_{number}" for number in range(2, 10_000)))
