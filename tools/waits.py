@@ -12,6 +12,7 @@ ADDON = REPOSITORY / "addon"
 WAITING = {"wait", "sleep", "join", "result", "take_made", "attempt", "run_main_thread_steps"}
 #: function -> why it ends
 ENDS = {
+    "cards/order_pairs.py:pairs_by_view": "each turn takes one view",
     "exchange/files/moving.py:move": "after PATIENCE seconds",
     "blender/preview/previews.py:finish": "each turn takes one result; another scene is refused",
     "blender/sessions/session.py:finish": "each turn takes one result, of which none is begun here",

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,8 +75,15 @@ def pairs_by_view(
         both_directions = _both_directions(mesh, head, direction, size, alpha)
         return all_pairs([pairs_of(met, covers) for met, covers in both_directions])
 
+    # few at a time: who ends the work, or Blender, waits for those that have begun
     with ThreadPoolExecutor(_THREADS) as threads:
-        yield from threads.map(seen, view_directions(view_count))
+        begun: deque[Future[Pairs]] = deque()
+        for direction in view_directions(view_count):
+            begun.append(threads.submit(seen, direction))
+            if len(begun) > _THREADS:
+                yield begun.popleft().result()
+        while begun:
+            yield begun.popleft().result()
 
 
 def all_pairs(found: Sequence[Pairs]) -> Pairs:

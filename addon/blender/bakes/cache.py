@@ -71,8 +71,8 @@ class Facts:
 class CacheWriter:
     """Writes a bake, frame after frame.
 
-    `finish` makes it whole, `publish` lets it replace the one before, and `abandon` removes what was
-    not published.
+    `finish` makes it whole, `publish` lets it replace the one before, and `abandon` removes what is
+    not whole.
 
     Raises:
         HairloomError: the folder cannot be written, or holds files that are not of a bake.
