@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ...errors import HairloomError
 from .moving import committing, flush, flush_names, free_name, move
+from .names import check_name
 from .stale_temp_files import remove_stale_files, temporary_beside
 
 
@@ -78,6 +79,7 @@ def write_text_atomic(path: Path, text: str) -> None:
 
 def _check_writable(target: Path) -> None:
     """Fail now rather than after a long export."""
+    check_name(target)
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, "a folder has this name")
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -104,6 +106,7 @@ def check_place(path: Path) -> None:
     Raises:
         HairloomError: a folder has this name, or no file can be made in its folder.
     """
+    check_name(path)
     if path.is_dir():
         raise unwritable(path, "a folder has this name")
     folder = next(each for each in path.absolute().parents if each.exists())

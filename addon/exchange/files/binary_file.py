@@ -46,11 +46,17 @@ class BinaryFile:
         """
         self.check(name, offset, count * np.dtype(layout).itemsize)
         try:
-            return np.fromfile(self.path, layout, count, offset=offset)
+            items = np.fromfile(self.path, layout, count, offset=offset)
         except OSError as error:
             raise self._unreadable(error) from error
         except MemoryError as error:
             raise self._too_large() from error
+        if len(items) < count:
+            raise self.error(
+                f"the {name} is cut short, since the file changes while it is read",
+                "Wait until it is written",
+            )
+        return items
 
     def content(self) -> bytes:
         """All bytes."""

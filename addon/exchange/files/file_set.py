@@ -12,6 +12,7 @@ from pathlib import Path
 from ...errors import HairloomError
 from .atomic import unwritable
 from .moving import committing, flush, flush_names, free_name, move
+from .names import check_name
 from .stale_temp_files import COMPLETE, remove_stale_files, temporary_beside
 
 
@@ -26,6 +27,7 @@ def written_together(path: Path) -> Iterator[Path]:
     Raises:
         HairloomError: nothing can be written there, or the block wrote no file of `path`'s name.
     """
+    check_name(path)
     folder = path.parent
     staging = temporary_beside(path, suffix="")
     try:

@@ -5,12 +5,31 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Container
+from pathlib import Path
+
+from ...errors import HairloomError
 
 #: Names that Windows keeps for devices, with any suffix.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(\..*)?", re.IGNORECASE)
 _UNSAFE = re.compile(r"[^\w\-. ]+")
 #: Letters of a folder's name, at most 200 bytes; Windows has 260 for a whole path.
 _MAX_LETTERS = 50
+
+
+def check_name(path: Path) -> None:
+    """Refuse a path that most libraries cannot take.
+
+    Raises:
+        HairloomError: it is not UTF-8, as on a disk of another system.
+    """
+    try:
+        str(path).encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise HairloomError(
+            "this name is not UTF-8, so that few programs can open it",
+            place=ascii(str(path)),
+            remedy="Rename the file or the folder",
+        ) from error
 
 
 def plain_name(name: str, fallback: str = "hair") -> str:

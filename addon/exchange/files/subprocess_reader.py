@@ -15,6 +15,7 @@ from subprocess import TimeoutExpired
 
 from ...errors import HairloomError
 from .child_process import python_program, run_child
+from .names import check_name
 
 #: exit code of a script that says why on stderr, and of one that cannot write its results
 REPORTED, NO_ROOM = 3, 4
@@ -44,6 +45,7 @@ def run_reader(
     Raises:
         HairloomError: no Python can be started, it takes too long, or it ends otherwise.
     """
+    check_name(path)
     files = [str(each.absolute()) for each in (path, *results)]
     command = [*(python or this_python(path)), str(script.absolute()), "--", *files]
     patience = _PATIENCE + path.stat().st_size / _BYTES_A_SECOND

@@ -198,3 +198,13 @@ def test_a_name_of_255_bytes_is_written(tmp_path: Path) -> None:
     name = "x" * 251 + ".tfx"
     write_bytes_atomic(tmp_path / name, b"new")
     assert names(tmp_path) == [name]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names are UTF-16 on Windows")
+def test_a_name_that_is_not_utf_8_is_a_message(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"h\xffair.tfx")
+    for write in (write_alone, write_set, check_place):
+        with pytest.raises(HairloomError, match="not UTF-8") as caught:
+            write(path)
+        str(caught.value).encode("utf-8")
+    assert names(tmp_path) == []

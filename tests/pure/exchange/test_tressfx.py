@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.files.binary_file import BinaryFile
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 from hairloom.addon.exchange.strand_writing import write_strands
@@ -403,3 +404,12 @@ def test_folder_and_missing_file(tmp_path: Path) -> None:
         read_tfx(tmp_path)
     with pytest.raises(HairloomError, match="cannot be read"):
         read_tfx(tmp_path / "missing.tfx")
+
+
+def test_a_file_that_shrinks_while_it_is_read_is_a_message(tmp_path: Path) -> None:
+    path = tmp_path / "hair.tfx"
+    path.write_bytes(bytes(1000))
+    file = BinaryFile(path)
+    path.write_bytes(bytes(500))
+    with pytest.raises(HairloomError, match="changes while it is read"):
+        file.array("points", 0, "<f4", 200)
