@@ -18,7 +18,7 @@ def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
     candidates = [context.active_object, *context.selected_objects]
     selected = list(dict.fromkeys(obj for obj in candidates if obj is not None))
     hair = [obj for obj in selected if obj.type == "CURVES"]
-    return hair or _made_into(selected) or _grown_on(selected, context) or _previewed(context)
+    return hair or _made_into(selected) or _grown_on(selected, context) or _previewed()
 
 
 def _made_into(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
@@ -32,9 +32,9 @@ def _grown_on(meshes: list[bpy.types.Object], context: bpy.types.Context) -> lis
     return [obj for obj in everything if obj.type == "CURVES" and head_of(obj) in meshes]
 
 
-def _previewed(context: bpy.types.Context) -> list[bpy.types.Object]:
-    previewed = {session.uid for session in previews.sessions()}
-    return [obj for obj in objects_in(context.view_layer) if obj.session_uid in previewed]
+def _previewed() -> list[bpy.types.Object]:
+    found = [session.hair.handle.find() for session in previews.sessions()]
+    return [obj for obj in found if obj is not None]
 
 
 def active_mesh(context: bpy.types.Context) -> bpy.types.Object | None:

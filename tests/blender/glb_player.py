@@ -18,6 +18,13 @@ class Player:
 
     def corners(self, seconds: float) -> list[np.ndarray]:
         """The corners of all triangles of each skinned node, by name, in Blender's axes."""
+        return [points[index] for points, index in self._placed(seconds)]
+
+    def vertices(self, seconds: float) -> np.ndarray:
+        """All of all skinned nodes, also those of no triangle, in Blender's axes."""
+        return np.concatenate([points for points, _ in self._placed(seconds)])
+
+    def _placed(self, seconds: float) -> list[tuple[np.ndarray, np.ndarray]]:
         world = self._worlds(seconds)
         (skin,) = self.json["skins"]
         inverse = self.file.accessor(skin["inverseBindMatrices"]).reshape(-1, 4, 4)
@@ -34,7 +41,7 @@ class Player:
             placed = np.einsum("nab,nb->na", mixed[:, :3, :3], points) + mixed[:, :3, 3]
             index = self.file.accessor(primitive["indices"]).reshape(-1, 3)
             x, y, z = np.moveaxis(placed, -1, 0)
-            found.append(np.stack([x, -z, y], axis=-1)[index])
+            found.append((np.stack([x, -z, y], axis=-1), index))
         return found
 
     def _worlds(self, seconds: float) -> dict[int, np.ndarray]:

@@ -2,7 +2,7 @@
 
     python panda_motion.py FILE.glb BOUNDS.json RATE FRAME ...
 
-BOUNDS.json gets the lowest and the highest corner of all vertices at each frame, in Panda3D's axes,
+BOUNDS.json gets the 1st and the 99th percentile of all vertices at each frame, in Panda3D's axes,
 which are Blender's.
 """
 
@@ -40,7 +40,7 @@ def main(path: str, output: str, rate: float, frames: list[int]) -> None:
         control.pose(frame / rate * control.get_frame_rate())
         actor.update(force=True)
         vertices = places(actor)
-        bounds.append([vertices.min(axis=0).tolist(), vertices.max(axis=0).tolist()])
+        bounds.append(np.percentile(vertices, (1, 99), axis=0).tolist())
     with open(output, "w", encoding="utf-8") as file:
         json.dump(bounds, file)
 

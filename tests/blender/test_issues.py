@@ -128,7 +128,7 @@ def test_a_scale_of_shared_curves_or_of_a_parent_is_refused_with_a_reason(new_ha
     hair.scale, sphere.scale = (1.0, 1.0, 1.0), (1.0, 1.0, 2.0)
     bpy.context.view_layer.update()
     assert told(hair) == ["hairloom.apply_scale"]
-    with pytest.raises(RuntimeError, match="its parent is scaled unevenly"):
+    with pytest.raises(RuntimeError, match="its parent, Head, is scaled unevenly"):
         bpy.ops.hairloom.apply_scale()
 
 

@@ -24,6 +24,7 @@ WINDOW_ONLY = {
     "play",
     "pause",
     "reset",
+    "stop",
     "fin_preview",
     "fin_reset",
     "choose_preset",

@@ -44,7 +44,6 @@ MODULES = {
     "preferences": "ui.preferences",
     "previews": "blender.preview.previews",
     "presets": "blender.properties.presets",
-    "preview_operators": "ui.operators_preview",
     "registration": "registration",
     "self_test": "blender.setup.self_test",
     "strand_pass": "render.strand_pass",

@@ -28,7 +28,7 @@ from ..base.attributes import set_attribute
 from ..base.vertex_weights import weights_on
 from ..scene.surfaces import read_corner_uv, read_surface
 from .material import alpha_of
-from .mesh import CARD_ATTRIBUTES, OCCLUSION_LAYER, reorder_faces, set_uv_map
+from .mesh import CARD_ATTRIBUTES, OCCLUSION_IS_OURS, OCCLUSION_LAYER, reorder_faces, set_uv_map
 from .occluders import read_occluders
 
 __all__ = [
@@ -44,8 +44,6 @@ __all__ = [
 (ORDERS,) = (p.choices for p in CardSettings.parameters() if p.name == "order_by")
 #: Weight from which on a vertex belongs to a vertex group.
 _MEMBER = 0.5
-#: Marks a mesh whose occlusion is from here, so that it may be replaced.
-_OURS = "hairloom_occlusion"
 #: The group of cards that dangle.
 _DANGLING = 1
 
@@ -175,7 +173,7 @@ def _check(obj: bpy.types.Object) -> None:
 def _check_names(obj: bpy.types.Object) -> None:
     """Refuse a mesh that has something of its own where occlusion would be written."""
     mesh = obj.data
-    if mesh.get(_OURS) or obj.hairloom.card_object.groom is not None:
+    if mesh.get(OCCLUSION_IS_OURS):
         return
     taken = [f"UV map {OCCLUSION_LAYER}"] if mesh.uv_layers.get(OCCLUSION_LAYER) else []
     taken += [f"attribute {name}" for name in CARD_ATTRIBUTES if name in mesh.attributes]
@@ -260,7 +258,7 @@ def _write_occlusion(
         corner: (loop_count,) the value of each corner of a face.
         openness, along: (n,).
     """
-    mesh[_OURS] = True
+    mesh[OCCLUSION_IS_OURS] = True
     for name, values in zip(CARD_ATTRIBUTES, (openness, along), strict=True):
         set_attribute(mesh, name, "POINT", _at_source(values, vertex, len(mesh.vertices)))
     if not set_uv_map(mesh, OCCLUSION_LAYER, np.stack([openness, along], axis=1)[corner]):

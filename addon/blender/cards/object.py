@@ -20,7 +20,7 @@ from ..base.objects import Handle, head_of, matrix_of
 from ..base.thread_work import ThreadWork
 from .build import MappedCards, built_in_thread, order_line, read_inputs
 from .material import Color, fill_image, new_material
-from .mesh import OCCLUSION_LAYER, fill_mesh
+from .mesh import OCCLUSION_IS_OURS, OCCLUSION_LAYER, fill_mesh
 
 
 class CardObjectJob:
@@ -188,6 +188,7 @@ def _new_object(hair: bpy.types.Object, level: int, matrix: Floats) -> bpy.types
 
 
 def _fill(mesh: bpy.types.Mesh, cards: CardMesh, matrix: Floats) -> None:
+    mesh[OCCLUSION_IS_OURS] = True
     fill_mesh(
         mesh,
         cards,

@@ -26,6 +26,7 @@ _OF_SCENES = (
     "unwrap_surface",
     "snap_roots",
     "apply_scale",
+    "show_in_renders",
     "mute_hair_dynamics",
     "apply_preset",
     "look_from_material",

@@ -10,6 +10,7 @@ from bpy.app.handlers import persistent
 
 from ..bakes import baked_copy, playback
 from ..base import suspension
+from ..base.latest_job import unwatch_all
 from ..cards.object import remember_names, remember_numbers
 from ..properties import changed, library_overrides
 from . import previews as registry
@@ -20,6 +21,7 @@ from .previews import previews
 @persistent
 def on_load_pre(*_: Any) -> None:
     registry.forget_all()
+    unwatch_all()  # Blender drops the timer itself
 
 
 @persistent
