@@ -28,6 +28,8 @@ _MIN_WIDTH = 0.25
 _TIP_REACH = 1.3
 #: And before the mean root: sqrt(3) holds evenly spread roots, so that no parting is bald.
 _ROOT_REACH = 1.7
+#: Hair that leans out of the upright by more than this sine reaches back in full.
+_LEANING = 1.0 / 3.0
 
 
 def cluster_of_strands(grid: Floats, group: Ints, settings: CardSettings) -> Ints:
@@ -112,7 +114,8 @@ def _before_root(
 ) -> Floats:
     """From where a card begins to the mean root, so that it holds its rearmost roots, (n, 3) [m].
 
-    It runs back along the head. Hair that stands upright has no rearmost roots.
+    It runs back along the head, as far as its roots are spread, however steeply hair leaves it.
+    Hair that stands upright has no rearmost roots.
 
     Args:
         away: (strand_count, 3) from the mean root to each strand's.
@@ -121,8 +124,10 @@ def _before_root(
     up = outwards / np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-12)
     flat = tangent - up * np.einsum("ci,ci->c", tangent, up)[:, None]
     lying = np.linalg.norm(flat, axis=1, keepdims=True)
-    ahead = np.einsum("si,si->s", away, (flat / np.maximum(lying, 1e-12))[cluster])
-    reach: Floats = flat * (_ROOT_REACH * np.sqrt(mean.of(ahead * ahead)))[:, None]
+    forward = flat / np.maximum(lying, 1e-12)
+    ahead = np.einsum("si,si->s", away, forward[cluster])
+    deviation = np.sqrt(mean.of(ahead * ahead))[:, None]
+    reach: Floats = forward * np.minimum(lying / _LEANING, 1.0) * _ROOT_REACH * deviation
     return reach
 
 

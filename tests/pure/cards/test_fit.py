@@ -109,8 +109,9 @@ def test_a_card_reaches_to_where_most_of_its_strands_end() -> None:
 
 
 def test_a_card_reaches_back_to_its_rearmost_roots_along_the_head() -> None:
-    """Hair that rises at 45 degrees from roots spread over 4 cm along it; upright hair stays."""
-    for lean, begins in ((1.0, -0.02 * 1.7 / 3.0**0.5 * 0.5**0.5), (0.0, 0.0)):
+    """Roots spread along it, and hair that rises at 45 or at 63 degrees; upright hair stays."""
+    spread = 0.02 / 3.0**0.5
+    for lean, begins in ((1.0, -1.7 * spread), (0.5, -0.85 * spread), (0.0, 0.0)):
         grid = flat_bundle((0.2, 0.0, 0.0), 400)
         grid[..., 1] -= np.linspace(-0.02, 0.02, 400, dtype=np.float32)[:, None] * lean
         grid[..., 1] += lean * grid[..., 2]
