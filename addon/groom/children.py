@@ -64,7 +64,7 @@ def make_children(
     roots = child_roots(guides, surface, settings.strand_count, density, settings.seed)
     weights = _weights(roots, guides, settings)
     group = guides.group[weights.guide[:, 0]]
-    grid = mixed(roots.point, guides.grid, weights)
+    grid = mixed(_lifted(roots, guides, weights, surface), guides.grid, weights)
     clump(grid, group, settings)
     shorten(grid, settings)
     frizz(grid, settings, float(np.median(guides.lengths())))
@@ -81,6 +81,24 @@ def make_children(
         color=_color(guides, weights),
     )
     return Children(strands, weights, roots.notes + _notes(guides, settings))
+
+
+def _lifted(
+    roots: ChildRoots, guides: StrandSet, weights: GuideWeights, surface: Surface
+) -> Floats:
+    """Where children start, (child_count, 3) [m]: as high above the surface as their guides do.
+
+    Fur is often combed on a finer body than it is shown on. Guides that start below the surface
+    are hidden by it; their children are not.
+    """
+    triangle, barycentric = guides.root_triangle, guides.root_barycentric
+    assert triangle is not None and barycentric is not None
+    normal = surface.triangle_normals()
+    below = np.einsum("nk,nkj->nj", barycentric, surface.corners[triangle])
+    height = np.einsum("nj,nj->n", guides.roots - below, normal[triangle])
+    lift = (np.maximum(height, 0.0)[weights.guide] * weights.weight).sum(axis=1)
+    lifted: Floats = roots.point + lift[:, None] * normal[roots.triangle]
+    return lifted
 
 
 def _weights(roots: ChildRoots, guides: StrandSet, settings: ChildrenSettings) -> GuideWeights:

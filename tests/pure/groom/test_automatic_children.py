@@ -152,3 +152,11 @@ def test_all_in_one_place_is_left_alone() -> None:
     values: dict[str, Any] = {"offsets": np.arange(51) * 5, "radius": np.full(250, 4e-5)}
     tuft = StrandSet(np.tile(fur(1, 0.05).points, (50, 1)), group=np.zeros(50), **values)
     assert rig_of(tuft, sheet()).child_count == 0
+
+
+def test_children_start_as_high_as_their_curves() -> None:
+    """Fur is often combed on a finer body than it is shown on; buried curves do not bury theirs."""
+    for height, expected in ((0.004, 0.004), (-0.004, 0.0)):
+        floating = fur(15, 0.05).with_points(fur(15, 0.05).points + [0.0, 0.0, height])
+        rig = rig_of(floating, sheet())
+        np.testing.assert_allclose(rig.strands.roots[225:, 2], expected, atol=1e-6)
