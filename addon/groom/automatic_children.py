@@ -16,7 +16,7 @@ from .widths import strands_for_cover
 #: Most strands in all, and for each of the artist's own: no more than a viewport draws fluently,
 #: and no more than a few curves can lead.
 _MAX_STRANDS, _MAX_PER_CURVE = 300_000, 200.0
-#: By which part of their length children are shorter at the most, and stray, in waves of which part.
+#: Parts of their length by which children are shorter at the most, and stray; length of a wave.
 _SHORTER, _STRAY, _WAVE = 0.15, 0.01, 0.4
 
 
