@@ -1,7 +1,7 @@
 """How many children a groom needs: as many as cover its body, and none where its own curves do.
 
-A body of fur has too few strands at any number that an artist combs; TressFX draws follow hairs
-beside each of them (Martin et al. 2014, TressFX: advanced real-time hair rendering, GPU Pro 5).
+A few guides lead a whole head of hair; TressFX draws follow hairs beside each strand (Martin et al.
+2014, TressFX: advanced real-time hair rendering, GPU Pro 5).
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from ..strands import StrandSet
 from .children_settings import ChildrenSettings
 from .widths import strands_for_cover
 
-#: Most strands in all, and for each of the artist's own: no more than a viewport draws fluently,
-#: and no more than a few curves can lead.
-_MAX_STRANDS, _MAX_PER_CURVE = 300_000, 200.0
+#: Most strands in all: no more than a viewport draws fluently.
+_MAX_STRANDS = 300_000
 #: Parts of their length by which children are shorter at the most, and stray; length of a wave.
 _SHORTER, _STRAY, _WAVE = 0.15, 0.01, 0.4
 
@@ -25,8 +24,7 @@ def automatic(own: StrandSet, settings: ChildrenSettings) -> tuple[ChildrenSetti
     strands are drawn for each of those: 1 where these are enough.
     """
     count = own.strand_count
-    most = min(_MAX_STRANDS / max(count, 1), _MAX_PER_CURVE)
-    parts = max(min(strands_for_cover(own), most), 1.0)
+    parts = max(min(strands_for_cover(own), _MAX_STRANDS / max(count, 1)), 1.0)
     children = math.ceil((parts - 1.0) * count)
     if not children:
         return replace(settings, method="none"), 1.0

@@ -33,6 +33,8 @@ _MAX_EXTINCTION = 6.0
 #: like hair where strands are this many times as long as wide: as short hair is, 8 mm of a brow.
 #: Strands that lack less than this factor are enough.
 _ENOUGH, _SLENDER, _LACKING = 4.0, 100.0, 1.1
+#: Hair this many spacings long can be added to; shorter fur gets dark blotches from children.
+_LONG = 5.0
 #: Fewer strands than this are not hair yet. In a row, neighbours are further apart than on an area:
 #: the eighth is 4 times, not twice, as far as the second.
 _FEWEST, _IN_ROW = 3, 3.0
@@ -130,7 +132,7 @@ def as_wide(strands: StrandSet, drawn: StrandSet) -> StrandSet:
 
 def strands_for_cover(strands: StrandSet) -> float:
     """How many strands must be drawn for each of these to cover the body and look like hair: 1
-    where these do, and where they stand in a row, as lashes do.
+    where these do, where they stand in a row, as lashes do, and where they are short fur.
 
     Doubling the strands halves what each stands for, and their spacing falls by the root of two;
     so at a quarter of their spacing they lie in layers that grow by the root of two.
@@ -142,6 +144,8 @@ def strands_for_cover(strands: StrandSet) -> float:
     if not hair.middle:
         return 1.0
     length = np.maximum(hair.length, np.finfo(np.float32).tiny)
+    if float(np.median(length / hair.apart)) < _LONG:
+        return 1.0
     layers = float(np.median(hair.widest * length / hair.apart**2))
     slender = float(np.median(length / hair.widest))
     lacking = max(_ENOUGH / max(layers, 1e-6), _SLENDER / slender)
