@@ -17,6 +17,7 @@ from .dynamics.state import DynamicsState, start
 from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance as advance_dynamics
 from .errors import HairloomError
+from .groom.automatic_children import automatic
 from .groom.children import make_children
 from .groom.children_settings import ChildrenSettings
 from .groom.guides import choose_guides
@@ -58,6 +59,7 @@ class Rig:
     own_count: how many strands, the first ones, are the artist's own; children follow in the order
         in which they are grown. None: all.
     widths: how wide the strands are, and why.
+    children_line: what automatic children there are, and why; empty where there are none.
     """
 
     strands: StrandSet
@@ -68,6 +70,7 @@ class Rig:
     notes: tuple[str, ...] = ()
     own_count: int | None = None
     widths: Widths = field(default_factory=Widths)
+    children_line: str = ""
 
     @property
     def child_count(self) -> int:
@@ -143,10 +146,33 @@ def prepare(
     guides = choose_guides(uniform, settings)
     weights = _weights(uniform, uniform.take(guides))
     rig = Rig(uniform, head, guides, weights, _frames(uniform, head))
+    if children is not None and children.method == "auto":
+        return _automatic(rig, children, density, widths, place)
     if children is not None and children.method != "none":
         rig = _with_children(rig, children, density, place)
     strands, found = with_widths(rig.strands, widths)
     return replace(rig, strands=strands, widths=found)
+
+
+def _automatic(
+    rig: Rig, settings: ChildrenSettings, density: Floats | None, widths: str, place: str
+) -> Rig:
+    """With as many children as cover the body, each as wide as the strands around it: those stand
+    for so much less.
+    """
+    settings, parts = automatic(rig.strands, settings)
+    count, line = rig.strands.strand_count, ""
+    if parts > 1.0 and rig.head is None:
+        parts, line = 1.0, "Children: none, since the hair has no surface on which they could grow"
+    own, found = with_widths(rig.strands, widths, parts)
+    rig = replace(rig, strands=own, widths=found)
+    if parts > 1.0:
+        rig = replace(_with_children(rig, settings, density, place), widths=found)
+        line = (
+            f"Children: {rig.child_count:,} added, since {count:,} curves cannot cover the body."
+            " Set Method to None to see the curves alone"
+        )
+    return replace(rig, children_line=line)
 
 
 def _weights(strands: StrandSet, guides: StrandSet) -> GuideWeights:

@@ -60,7 +60,9 @@ def scaled(pair: Pair, factor: float) -> Pair:
 def rig_of(pair: Pair, name: str) -> Rig:
     strands, head = pair
     widths = WidthSettings().method
-    return pipeline.prepare(strands, head, GuideSettings(), place=name, widths=widths)
+    return pipeline.prepare(
+        strands, head, GuideSettings(), place=name, children=ChildrenSettings(), widths=widths
+    )
 
 
 def built_in() -> Pair:

@@ -68,7 +68,7 @@ def count_figures() -> dict[str, float]:
         part = grown.take(np.sort(order[:count])) if count < COUNTS[-1] else grown
         pictures.append(_picture(rig_of((part, head.surface), "built-in")))
     truth, hair = pictures[-1]
-    light = [picture[hair, :3].mean() for picture, _ in pictures]
+    light = [float(picture[hair, :3].mean()) for picture, _ in pictures]
     return {
         "count_flip": max(_flip(truth, picture, hair) for picture, _ in pictures[:-1]),
         "count_light_percent": 100.0 * max(abs(each / light[-1] - 1.0) for each in light[:-1]),

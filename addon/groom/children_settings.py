@@ -9,7 +9,7 @@ from ..params import Settings, choice, curve, either, integer, number, when
 
 _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
 _TARIQ = "Tariq 2008, Real-time hair rendering on the GPU"
-_PARTS = either(when("children.method", "multi"), when("children.clump"))
+_PARTS = either(when("children.method", "multi", "auto"), when("children.clump"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +26,11 @@ class ChildrenSettings(Settings):
             ("none", "None", "The curves are all the hair there is"),
             ("multi", "Between Guides", "Blend the three guides around each child"),
             ("single", "Around a Guide", "Place each child beside one guide"),
+            (
+                "auto",
+                "Automatic",
+                "Add as many children as cover the body; none where the curves already do",
+            ),
         ),
         label="Method",
         description="How children are interpolated from guides",
@@ -47,7 +52,7 @@ class ChildrenSettings(Settings):
         unit="angle",
         soft=(math.radians(10.0), math.radians(90.0)),
         hard=(0.0, math.pi),
-        shown_when=when("children.method", "multi", "single"),
+        shown_when=when("children.method", "multi", "single", "auto"),
         active_when=_PARTS,
     )
     length_variation: float = number(
@@ -125,5 +130,5 @@ class ChildrenSettings(Settings):
         description="Random seed of the children",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
-        shown_when=when("children.method", "multi", "single"),
+        shown_when=when("children.method", "multi", "single", "auto"),
     )

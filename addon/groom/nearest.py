@@ -53,6 +53,7 @@ def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Flo
 
 def _possible(point: Floats, chosen: Ints, kept: int, center: Floats, half: Floats) -> Ints:
     """Which of the chosen points may be among the `kept` nearest of any place in this box."""
-    away = np.sqrt(((point[chosen] - center) ** 2).sum(axis=1))
+    offset = point[chosen] - center
+    away = np.sqrt(np.einsum("ij,ij->i", offset, offset))
     reach = np.partition(away, kept - 1)[kept - 1] + 2.0 * np.sqrt((half**2).sum())
     return chosen[away <= reach * (1.0 + 1e-9) + 1e-300]

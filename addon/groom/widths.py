@@ -29,6 +29,15 @@ _OF_SPACING, _OF_LENGTH = 0.25, 1.0 / 15.0
 #: Most that a strand blocks of the light, in terms of what its width does: a few guides alone are
 #: not all the hair.
 _MAX_EXTINCTION = 6.0
+#: Hair covers its body by this many layers of strands that are as wide as they may be, and looks
+#: like hair where strands are this many times as long as wide: as short hair is, 8 mm of a brow.
+#: Strands that lack less than this factor are enough.
+_ENOUGH, _SLENDER, _LACKING = 4.0, 100.0, 1.1
+#: Hair this many spacings long can be added to; shorter fur gets dark blotches from children.
+_LONG = 5.0
+#: Fewer strands than this are not hair yet. In a row, neighbours are further apart than on an area:
+#: the eighth is 4 times, not twice, as far as the second.
+_FEWEST, _IN_ROW = 3, 3.0
 #: Without any spacing, a strand's width in terms of its length.
 _ALONE = 1.0 / 500.0
 #: Own widths are believed from this part of what is found on, up to this multiple of it, or up to
@@ -85,15 +94,21 @@ class Widths:
         return f"Strands are {width}, found from the groom{why}{stands}"
 
 
-def with_widths(strands: StrandSet, method: str = "auto") -> tuple[StrandSet, Widths]:
-    """The strands as wide as `METHODS` says, all in one space."""
+def with_widths(
+    strands: StrandSet, method: str = "auto", parts: float = 1.0
+) -> tuple[StrandSet, Widths]:
+    """The strands as wide as `METHODS` says, all in one space.
+
+    Args:
+        parts: how many strands are drawn for each of these, itself included.
+    """
     if not strands.strand_count:
         return strands, Widths()
     own = 2.0 * strands.radius[strands.offsets[:-1]]
     median = float(np.median(own))
     if method == "own":
         return strands, Widths(False, median)
-    found = _found(strands)
+    found = _found(strands, parts)
     reason = "" if method == "found" else _why_not(strands, median, found)
     if method == "auto" and not reason:
         return strands, Widths(False, median)
@@ -115,6 +130,28 @@ def as_wide(strands: StrandSet, drawn: StrandSet) -> StrandSet:
     return replace(strands, radius=np.repeat(width, strands.point_counts), has_widths=True)
 
 
+def strands_for_cover(strands: StrandSet) -> float:
+    """How many strands must be drawn for each of these to cover the body and look like hair: 1
+    where these do, where they stand in a row, as lashes do, and where they are short fur.
+
+    Doubling the strands halves what each stands for, and their spacing falls by the root of two;
+    so at a quarter of their spacing they lie in layers that grow by the root of two.
+    """
+    first = strands.offsets[:-1]
+    if strands.strand_count < _FEWEST or _is_row(strands.points[first]):
+        return 1.0
+    hair = _Hair.of(strands)
+    if not hair.middle:
+        return 1.0
+    length = np.maximum(hair.length, np.finfo(np.float32).tiny)
+    if float(np.median(length / hair.apart)) < _LONG:
+        return 1.0
+    layers = float(np.median(hair.widest * length / hair.apart**2))
+    slender = float(np.median(length / hair.widest))
+    lacking = max(_ENOUGH / max(layers, 1e-6), _SLENDER / slender)
+    return lacking**2 if lacking > _LACKING else 1.0
+
+
 @dataclass(frozen=True)
 class _Found:
     """width: (strand_count,) [m]. spacing: the median distance of neighbours [m]; 0 without any."""
@@ -125,30 +162,78 @@ class _Found:
     extinction: float
 
 
-def _found(strands: StrandSet) -> _Found:
-    """Widths that give the cover of a head, and in short or spread hair a few layers of it."""
-    length = strands.lengths()
-    first, last = strands.offsets[:-1], strands.offsets[1:] - 1
-    at_roots = _spacing(strands, first)
-    # the hair of a ponytail or a mohawk is wider apart further out
-    beyond = np.maximum(_spacing(strands, (first + last) // 2), _spacing(strands, last))
-    apart = np.maximum(at_roots, beyond)
-    middle = float(np.median(apart))
-    if middle <= 0.0:
-        return _Found(length * _ALONE, 0.0, 1.0, 1.0)
-    # where most roots coincide, as in tufts, they do not tell how the hair is spread
-    at_roots, apart = _evened(at_roots if np.median(at_roots) else apart), _evened(apart)
-    typical = np.clip(length, *np.percentile(length, (25, 95)))
-    extent = float(np.median(at_roots)) * strands.strand_count**0.5
-    of_head = _HAIRS * _HAIR * at_roots**2 / extent
-    of_layers = _LAYERS * apart**2 / typical
+@dataclass(frozen=True)
+class _Hair:
+    """What decides about widths; all (strand_count,) [m].
+
+    apart: how far strands are from their neighbours, at their roots or further out.
+    typical: lengths without extremes. of_head, of_layers: the width that gives the cover of a
+    head, and some layers of hair. widest: as wide as a strand may be.
+    middle: the median of `apart`; 0 if all strands are in one place, and the rest does not count.
+    """
+
+    length: Floats
+    typical: Floats
+    apart: Floats
+    at_roots: Floats
+    middle: float
+
+    @classmethod
+    def of(cls, strands: StrandSet) -> Self:
+        length = strands.lengths()
+        first, last = strands.offsets[:-1], strands.offsets[1:] - 1
+        at_roots = _spacing(strands, first)
+        # the hair of a ponytail or a mohawk is wider apart further out
+        beyond = np.maximum(_spacing(strands, (first + last) // 2), _spacing(strands, last))
+        apart = np.maximum(at_roots, beyond)
+        typical = np.clip(length, *np.percentile(length, (25, 95)))
+        # where most roots coincide, as in tufts, they do not tell how the hair is spread
+        roots = _evened(at_roots if np.median(at_roots) else apart)
+        return cls(length, typical, _evened(apart), roots, float(np.median(apart)))
+
+    @property
+    def extent(self) -> float:
+        """The root of the area that the hair grows on [m]."""
+        return float(np.median(self.at_roots)) * len(self.length) ** 0.5
+
+    @property
+    def of_head(self) -> Floats:
+        width: Floats = _HAIRS * _HAIR * self.at_roots**2 / self.extent
+        return width
+
+    @property
+    def of_layers(self) -> Floats:
+        width: Floats = _LAYERS * self.apart**2 / self.typical
+        return width
+
+    @property
+    def widest(self) -> Floats:
+        """As wide as a strand may be."""
+        return np.minimum(_OF_SPACING * self.apart, _OF_LENGTH * self.typical)
+
+
+def _found(strands: StrandSet, parts: float = 1.0) -> _Found:
+    """Widths that give the cover of a head, and in short or spread hair a few layers of it.
+
+    Args:
+        parts: how many strands are drawn for each of these, evenly spread between them. Where they
+            are to lie in layers, the spacing that bounds their width is that of these.
+    """
+    hair = _Hair.of(strands)
+    if hair.middle <= 0.0:
+        return _Found(hair.length * _ALONE, 0.0, 1.0, 1.0)
+    closer = parts**0.5
+    of_head, of_layers = hair.of_head / parts, hair.of_layers / parts
     width = np.maximum(
-        np.minimum(of_head, _OF_SPACING * at_roots), np.minimum(of_layers, _OF_SPACING * apart)
+        np.minimum(of_head, _OF_SPACING * hair.at_roots / closer),
+        np.minimum(of_layers, _OF_SPACING * hair.apart),
     )
-    width = np.minimum(width, _OF_LENGTH * typical)
+    width = np.minimum(width, _OF_LENGTH * hair.typical)
     wanted = np.maximum(np.maximum(of_head, of_layers), width)
+    length = hair.length
     extinction = min(float((wanted * length).sum() / (width * length).sum()), _MAX_EXTINCTION)
-    return _Found(width, middle, float(np.median(wanted)) / (_HAIR * extent), extinction)
+    hairs = float(np.median(wanted)) / (_HAIR * hair.extent)
+    return _Found(width, hair.middle / closer, hairs, extinction)
 
 
 def _evened(spacing: Floats) -> Floats:
@@ -174,6 +259,16 @@ def _spacing(strands: StrandSet, at: Ints) -> Floats:
         return spacing
     near, _ = nearest_points(places, places[chosen], 1)
     return spacing[near[:, 0]]
+
+
+def _is_row(roots: Floats) -> bool:
+    """Whether roots follow a line rather than fill an area."""
+    if len(roots) <= _NEIGHBOURS:
+        return False
+    some = roots[:: max(len(roots) // _SAMPLES, 1)]
+    gap = nearest_points(some, roots, _NEIGHBOURS + 1)[1][:, [2, _NEIGHBOURS]]
+    gap = gap[gap[:, 0] > 0.0]
+    return bool(len(gap)) and float(np.median(gap[:, 1] / gap[:, 0])) > _IN_ROW
 
 
 def _smoothed(values: Floats, places: Floats) -> Floats:

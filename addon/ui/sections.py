@@ -98,8 +98,10 @@ def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """Where there are none, only how to get some."""
-    groom = hair.data.hairloom
+    """What the preview has; where there are none, only how to get some."""
+    groom, session = hair.data.hairloom, previews.session_of(hair)
+    if session is not None and session.is_made and session.rig.children_line:
+        draw_lines(layout.column(align=True), bpy.context, f"{session.rig.children_line}.")
     layout.prop(groom.children, "method")
     if groom.children.method != "none":
         layout.prop(hair.hairloom, "children_density")

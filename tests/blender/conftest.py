@@ -74,7 +74,9 @@ def new_hair(extension: None) -> Callable[..., Any]:
     def make(head: Any = None, strands: StrandSet | None = None) -> Any:
         strands = hedgehog() if strands is None else strands
         hair = write_curves("Hair", strands, head, bpy.context.collection)
-        hair.data.hairloom.widths.method = "own"  # so few strands are no hair
+        # so few strands are no hair
+        hair.data.hairloom.widths.method = "own"
+        hair.data.hairloom.children.method = "none"
         for other in bpy.context.selected_objects:
             other.select_set(False)
         hair.select_set(True)

@@ -38,7 +38,14 @@ SCHEMA = json.loads(
     (Path(__file__).parents[2] / "docs" / "sidecar.schema.json").read_text(encoding="utf-8")
 )
 SMALL = (
-    *("--set", "grow.strand_count=100", "--set", "guides.guide_count=10"),
+    *(
+        "--set",
+        "children.method=none",
+        "--set",
+        "grow.strand_count=100",
+        "--set",
+        "guides.guide_count=10",
+    ),
     *("--set", "card_occlusion.rays=16", "--set", "cards.source=guides"),
     *("--set", "cards.order_by=distance"),
     *("--set", "atlas.source=made"),

@@ -20,7 +20,14 @@ from hairloom.addon.cards.export_settings import CardExportSettings  # noqa: E40
 @pytest.mark.usefixtures("extension")
 @pytest.mark.slow
 def test_the_command_line_writes_a_bake(tmp_path: Path, capfd: Any) -> None:
-    few = ["--set", "grow.strand_count=60", "--set", "guides.guide_count=12"]
+    few = [
+        "--set",
+        "children.method=none",
+        "--set",
+        "grow.strand_count=60",
+        "--set",
+        "guides.guide_count=12",
+    ]
     few += ["--set", "grow.length=0.06"]
     bake = str(tmp_path / "bake")
     assert command_line.run(["simulate", *few, "--seconds", "0.2", "--output", bake]) == 0

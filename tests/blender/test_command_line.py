@@ -223,7 +223,14 @@ def test_hair_grows_where_and_as_long_as_the_groups_say(
             chosen = np.flatnonzero(value == weight).tolist()
             group.add(chosen, float(weight), "REPLACE")
     arguments = ["export", "--set", "grow.method=normals", "--set", "grow.length=0.1"]
-    arguments += ["--set", "grow.length_variation=0", "--set", "grow.strand_count=200"]
+    arguments += [
+        "--set",
+        "grow.length_variation=0",
+        "--set",
+        "children.method=none",
+        "--set",
+        "grow.strand_count=200",
+    ]
     arguments += ["--output", str(tmp_path / "hair.tfx")]
     groups = ["--density-group", "Right", "--length-group", "Half"]
     assert command_line.run([*arguments, "--head", sphere.name, *groups]) == 0
@@ -266,7 +273,14 @@ def test_simulate_render_and_export_agree_on_the_motion(
 
 def test_the_demo_writes_everything_the_report_names(tmp_path: Path, gpu_context: object) -> None:
     """The built-in head and groom, small."""
-    small = ["--set", "grow.strand_count=300", "--set", "guides.guide_count=40"]
+    small = [
+        "--set",
+        "children.method=none",
+        "--set",
+        "grow.strand_count=300",
+        "--set",
+        "guides.guide_count=40",
+    ]
     small += ["--set", "atlas.size=512", "--set", "card_occlusion.rays=16"]
     small += ["--set", "cards.order_by=distance"]
     size = ["--width", "96", "--height", "72", "--samples", "1", "--seconds", "0.2"]

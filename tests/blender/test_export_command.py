@@ -98,7 +98,16 @@ def test_a_check_writes_nothing(
     run: Callable[..., Any],
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    source = ["--head", "Head", "--set", "grow.method=normals", "--set", "grow.strand_count=30"]
+    source = [
+        "--head",
+        "Head",
+        "--set",
+        "grow.method=normals",
+        "--set",
+        "children.method=none",
+        "--set",
+        "grow.strand_count=30",
+    ]
     run(*source, "--preflight", output="hair.abc")
     text = capfd.readouterr().out
     assert "left-handed" in text and "Warning: All strands are in one group" in text

@@ -83,7 +83,8 @@ from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 
 one, other = Path("one.strands"), Path("other.strands")
 facts["code"] = command_line.run(
-    ["export", "--set", "grow.strand_count=40", "--output", str(one)]
+    ["export", "--set", "children.method=none", "--set", "grow.strand_count=40"]
+    + ["--output", str(one)]
 )
 read = read_strands(one)
 write_strands(other, read.groom, StrandExportSettings())
@@ -94,8 +95,8 @@ facts["is_in_menu"] = hasattr(bpy.types, "HAIRLOOM_OT_export_plain")
 """,
     "A card format": """
 facts["code"] = command_line.run(
-    ["cards", "--set", "grow.strand_count=60", "--set", "cards.card_count=8"]
-    + ["--output", "cards.ply"]
+    ["cards", "--set", "children.method=none", "--set", "grow.strand_count=60"]
+    + ["--set", "cards.card_count=8", "--output", "cards.ply"]
 )
 facts["head"] = Path("cards.ply").read_bytes()[:3].decode()
 facts["sidecars"] = len(list(Path().glob("cards*.json")))

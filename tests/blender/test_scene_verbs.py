@@ -19,7 +19,16 @@ from hairloom.addon.blender.command_line.run_job import OPERATORS
 from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.scene.fin_modifier import fin_modifier
 
-FEW = ["--set", "grow.method=normals", "--set", "grow.strand_count=40", "--set", "grow.length=0.05"]
+FEW = [
+    "--set",
+    "grow.method=normals",
+    "--set",
+    "children.method=none",
+    "--set",
+    "grow.strand_count=40",
+    "--set",
+    "grow.length=0.05",
+]
 
 
 @pytest.fixture

@@ -22,7 +22,18 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 
 pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context")]
 
-SMALL = ["--set", "grow.strand_count=200", "--width", "32", "--height", "32", "--samples", "1"]
+SMALL = [
+    "--set",
+    "children.method=none",
+    "--set",
+    "grow.strand_count=200",
+    "--width",
+    "32",
+    "--height",
+    "32",
+    "--samples",
+    "1",
+]
 
 
 def test_render_writes_the_layers_side_by_side(

@@ -106,7 +106,7 @@ def test_a_stage_is_chosen_by_its_name_and_changed_by_set(tmp_path: Path) -> Non
     def corner(*options: str) -> np.ndarray:
         path = tmp_path / "still.png"
         size = ["--width", "24", "--height", "24", "--samples", "1"]
-        few = ["--set", "grow.strand_count=200"]
+        few = ["--set", "children.method=none", "--set", "grow.strand_count=200"]
         assert command_line.run(["render", "--output", str(path), *size, *few, *options]) == 0
         return read_texture(path, is_color=True)[0, 0, :3]
 

@@ -266,7 +266,14 @@ def test_names_of_data_blocks_become_names_of_files() -> None:
     assert file_name("..") == "groom"
 
 
-GROWN = ["--set", "grow.strand_count=60", "--set", "guides.guide_count=10"]
+GROWN = [
+    "--set",
+    "children.method=none",
+    "--set",
+    "grow.strand_count=60",
+    "--set",
+    "guides.guide_count=10",
+]
 
 
 @pytest.mark.slow

@@ -74,6 +74,7 @@ def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
         "own_count": np.array(strands.strand_count - rig.child_count),
         "widths": np.array(rig.widths.numbers),
         "widths_reason": np.array(rig.widths.reason, np.str_),
+        "children_line": np.array(rig.children_line, np.str_),
     }
     if strands.root_uv is not None:
         arrays["root_uv"] = strands.root_uv
@@ -138,6 +139,7 @@ def _rig_of(arrays: Arrays) -> BakedRig:
         notes,
         int(arrays["own_count"]),
         Widths.of(arrays["widths"], str(arrays["widths_reason"])),
+        str(arrays["children_line"]),
     )
     rests = RestMatrices(arrays["hair_rest"], arrays.get("head_rest"))
     return BakedRig(rig, rests)

@@ -65,7 +65,8 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
             widths=job.settings[WidthSettings].method,
         )
     tell_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
-    print(f"{rig.widths.line}.", flush=True)
+    for line in filter(None, (rig.children_line, rig.widths.line)):
+        print(f"{line}.", flush=True)
     tell_rig(report, rig, inputs.groom_name)
     return rig, inputs
 
@@ -78,6 +79,7 @@ def tell_rig(report: Report, rig: Rig, name: str) -> None:
         strands=rig.strands.strand_count,
         guides=len(rig.guides),
         children=rig.child_count,
+        children_line=rig.children_line,
         widths=rig.widths.line,
         cv_count=rig.strands.grid.shape[1],
         bounds_m=[low.round(5).tolist(), high.round(5).tolist()],

@@ -142,7 +142,7 @@ def moving_hair(
             f"{hair.name}: it has no bake, so it moves as Blender's own animation and modifiers "
             "move it. Bake it to write Hairloom's motion.",
         )
-    if hair.data.hairloom.children.method == "none":
+    if not out.has_children:
         return ShownMotion(out, Handle.of(hair), rate), notes
     return _children_motion(hair, depsgraph, out, rate), notes
 

@@ -52,6 +52,7 @@ class ExportStrands:
     copied: indices of the points of `seen` that are there once more behind them.
     dropped: reason -> number of curves left out.
     notes: what the artist should know.
+    has_children: whether there are strands that are no curves.
     """
 
     groom: Groom
@@ -59,6 +60,7 @@ class ExportStrands:
     copied: Ints
     dropped: Mapping[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    has_children: bool = False
 
     def points(self, seen: Floats) -> Floats:
         """The groom's points where those that are seen are at these, (point_count, 3)."""
@@ -76,13 +78,14 @@ def still_hair(
         HairloomError: no hair that can be used, or one of another scale than its head.
     """
     source = read_source(hair, depsgraph)
-    if hair.data.hairloom.children.method != "none":
-        rig = rig_of(hair, source)
+    rig = rig_of(hair, source) if hair.data.hairloom.children.method != "none" else None
+    if rig is not None and rig.own_count is not None:
         groom = Groom(rig.strands, hair.name, group_names=group_names(hair))
-        return _with_notes(hair, source, _out(groom, rig, request, _look(hair)), rig)
+        out = replace(_out(groom, rig, request, _look(hair)), has_children=True)
+        return _with_notes(hair, source, out, rig)
     said = _without_empty_marks(stored_groom(hair, depsgraph, source.kept))
     if request.guides and "is_guide" not in said:
-        rig = rig_of(hair, source)
+        rig = rig or rig_of(hair, source)
         strands = _as_wide_as_drawn(hair, source.strands)
         groom = Groom(_bound_as(strands, rig.strands), hair.name, **said)
         return _with_notes(hair, source, _out(groom, rig, request, _look(hair)), rig)
@@ -105,7 +108,7 @@ def baked_hair(
     """
     rig = playback.rig_in(cache).rig
     read, said = usable_curves(hair, depsgraph), dict[str, Any]()
-    is_plain = hair.data.hairloom.children.method == "none"
+    is_plain = hair.data.hairloom.children.method in ("none", "auto")
     if is_plain and rig.strands.strand_count == read.strands.strand_count:
         said = _without_empty_marks(stored_groom(hair, depsgraph, read.kept))
     notes: tuple[str, ...] = ()

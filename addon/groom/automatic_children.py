@@ -1,0 +1,40 @@
+"""How many children a groom needs: as many as cover its body, and none where its own curves do.
+
+A few guides lead a whole head of hair; TressFX draws follow hairs beside each strand (Martin et al.
+2014, TressFX: advanced real-time hair rendering, GPU Pro 5).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from ..strands import StrandSet
+from .children_settings import ChildrenSettings
+from .widths import strands_for_cover
+
+#: Most strands in all: no more than a viewport draws fluently.
+_MAX_STRANDS = 300_000
+#: Parts of their length by which children are shorter at the most, and stray; length of a wave.
+_SHORTER, _STRAY, _WAVE = 0.15, 0.01, 0.4
+
+
+def automatic(own: StrandSet, settings: ChildrenSettings) -> tuple[ChildrenSettings, float]:
+    """Settings with their number and shape found from the artist's own strands, and how many
+    strands are drawn for each of those: 1 where these are enough.
+    """
+    count = own.strand_count
+    parts = max(min(strands_for_cover(own), _MAX_STRANDS / max(count, 1)), 1.0)
+    children = math.ceil((parts - 1.0) * count)
+    if not children:
+        return replace(settings, method="none"), 1.0
+    return replace(
+        settings,
+        method="multi",
+        strand_count=children,
+        length_variation=_SHORTER,
+        clump=0.0,
+        frizz=_STRAY,
+        frizz_length=_WAVE,
+        width=1.0,
+    ), parts
