@@ -195,9 +195,10 @@ def test_the_bill_of_materials_names_what_the_zip_carries(wheels, names, tmp_pat
     done = subprocess.run([sys.executable, tool, path], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     text = path.read_text(encoding="utf-8")
-    assert (
-        make_schemabased_validator(OutputFormat.JSON, SchemaVersion.V1_6).validate_str(text) is None
+    validator = validation.make_schemabased_validator(
+        schema.OutputFormat.JSON, schema.SchemaVersion.V1_6
     )
+    assert validator.validate_str(text) is None
     bill = json.loads(text)
     carried = {name.rpartition("/")[2] for name in names if name.endswith(".whl")}
     parts = {part["bom-ref"]: part for part in bill["components"]}
