@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ...errors import HairloomError
@@ -80,6 +80,8 @@ def write_text_atomic(path: Path, text: str) -> None:
 def _check_writable(target: Path) -> None:
     """Fail now rather than after a long export."""
     check_name(target)
+    with suppress(FileNotFoundError):
+        os.stat(target)  # a name that is too long, or below a file
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, "a folder has this name")
     target.parent.mkdir(parents=True, exist_ok=True)
