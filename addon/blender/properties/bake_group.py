@@ -18,8 +18,8 @@ class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):
 
     folder: StringProperty(
         name="Cache",
-        description="Folder of the bake; empty: a folder named after the object, in "
-        "hairloom_cache beside the file",
+        description="Folder of the bake; empty: hairloom_cache beside the file, in folders named "
+        "after the file and the object",
         subtype="DIR_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         update=_changed,
