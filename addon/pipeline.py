@@ -17,7 +17,7 @@ from .dynamics.state import DynamicsState, start
 from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance as advance_dynamics
 from .errors import HairloomError
-from .groom.automatic_children import automatic
+from .groom.automatic_children import are_few, automatic
 from .groom.children import make_children
 from .groom.children_settings import ChildrenSettings
 from .groom.guides import choose_guides
@@ -30,6 +30,7 @@ from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
 from .strands import StrandSet, Surface
+from .strands.face import is_face_hair
 from .strands.join import joined
 from .strands.resample import resample
 
@@ -160,8 +161,14 @@ def _automatic(
     """With as many children as cover the body, each as wide as the strands around it: those stand
     for so much less.
     """
-    settings, parts = automatic(rig.strands, settings)
-    count, line = rig.strands.strand_count, ""
+    hair = rig.strands.take(_parents(rig.strands))
+    settings, parts = automatic(hair, settings)
+    count, line = hair.strand_count, ""
+    if are_few(hair):
+        line = (
+            f"Children: none, since {count:,} curves may be guides or a part of the hair. Set"
+            " Method to Between Guides to fill the space between them"
+        )
     if parts > 1.0 and rig.head is None:
         parts, line = 1.0, "Children: none, since the hair has no surface on which they could grow"
     own, found = with_widths(rig.strands, widths, parts)
@@ -169,8 +176,8 @@ def _automatic(
     if parts > 1.0:
         rig = replace(_with_children(rig, settings, density, place), widths=found)
         line = (
-            f"Children: {rig.child_count:,} added, since {count:,} curves cannot cover the body."
-            " Set Method to None to see the curves alone"
+            f"Children: {rig.child_count:,} added, since {count:,} curves are too few for a body of"
+            " hair. Set Method to None to see the curves alone"
         )
     return replace(rig, children_line=line)
 
@@ -195,12 +202,14 @@ def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None,
             "set Children to None."
         )
         return replace(rig, notes=(*rig.notes, note))
-    made = make_children(own, head, settings, density, place=place)
+    parents = _parents(own)
+    made = make_children(own.take(parents), head, settings, density, place=place)
     strands = joined(own, made.strands)
-    weights = made.weights
     if len(rig.guides) < own.strand_count:
         # shaped by their neighbours among all strands, they move as guides do
         weights = _weights(made.strands, own.take(rig.guides))
+    else:
+        weights = replace(made.weights, guide=parents[made.weights.guide])
     return Rig(
         strands,
         head,
@@ -213,6 +222,12 @@ def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None,
         (*rig.notes, *made.notes),
         own_count=own.strand_count,
     )
+
+
+def _parents(own: StrandSet) -> Ints:
+    """Which strands children grow between: of a head of hair, not its brows and lashes."""
+    is_face = is_face_hair(own.group)
+    return np.flatnonzero(~is_face | is_face.all()).astype(np.int32)
 
 
 def _frames(strands: StrandSet, head: Surface | None) -> RootFrames | None:

@@ -45,6 +45,8 @@ COLORS = {
 #: the brightest tenth of the hair is so bright in a picture
 SHOWN = 0.5
 COUNTS = (5_000, 20_000, 100_000)
+#: Cycles' room is black
+_UNLIT = ("ambient", "backdrop_center", "backdrop_edge")
 #: a pixel that differs by more than this from the bald head's has hair
 _HAS_HAIR = 1e-3
 
@@ -90,7 +92,7 @@ def cycles_figures() -> dict[str, float]:
     for name, absorption in COLORS.items():
         node = PrincipledHair(parametrization="ABSORPTION", absorption_coefficient=absorption)
         shading, _ = settings_from(node, ShadingSettings())
-        dark = replace(StageSettings(), ambient=(0.0, 0.0, 0.0))
+        dark = replace(StageSettings(), **dict.fromkeys(_UNLIT, (0.0, 0.0, 0.0)))
         settings = GroomSettings().with_settings(shading, dark)
         sun = (Light.sun(-SUN, (1.0, 1.0, 1.0), STRENGTH),)
         ours, hair = _picture(rig, settings, sun)

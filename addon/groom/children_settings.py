@@ -21,7 +21,7 @@ class ChildrenSettings(Settings):
     owner = "groom"
 
     method: str = choice(
-        "none",
+        "auto",
         (
             ("none", "None", "The curves are all the hair there is"),
             ("multi", "Between Guides", "Blend the three guides around each child"),

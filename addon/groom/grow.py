@@ -22,7 +22,7 @@ from ..strands.vectors import unit
 from .clumps import assign_clumps, style_clumps
 from .grown import at_roots, bound_strands, checked_weights, segment_fractions
 from .normal_growth import grow_along_normals, somewhere
-from .scalp import Cranium, find_cranium, sample_roots, scalp_density
+from .scalp import Cranium, find_cranium, sample_roots, scalp_density, smooth_step
 from .settings import GrowSettings
 from .surface_points import GrowthSurface
 
@@ -43,6 +43,8 @@ _WHORL, _SWIRL_REACH, _SWIRL = (0.12, 0.55, 0.85), 0.45, np.radians(75.0)
 _CLUMPS_STRAY, _STRANDS_STRAY, _LIFT_VARIES = np.radians(9.0), np.radians(11.0), 0.14
 #: Hair is piled up no higher than this fraction of its length, and kept as far from the skin.
 _MAX_PILE, _MAX_CLEARANCE = 0.12, 0.06
+#: It is as high as it will be at 1 / _RISEN of its length.
+_RISEN = 2.2
 #: Hair shorter than this turns within its own length, but is stiffer, as a shorter beam is [m].
 _STIFF = 0.05
 #: The sharpest turn from one segment to the next that a clump or a wave may make [rad].
@@ -157,7 +159,8 @@ def _heights(
     """
     layer = 0.7 * random.random(len(clump))[clump] + 0.3 * random.random(len(clump))
     fraction = np.linspace(0.0, 1.0, settings.cv_count)[1:]
-    rise = 1.0 - (1.0 - np.minimum(3.0 * fraction, 1.0)) ** 2
+    # it leaves the skin flat and rises on its way: at a parting it would stand up otherwise
+    rise = smooth_step(_RISEN * fraction)
     clearance = np.minimum(settings.clearance, _MAX_CLEARANCE * length)
     pile = layer * np.minimum(settings.volume, _MAX_PILE * length)
     return clearance[:, None] * np.minimum(5.0 * fraction, 1.0) + pile[:, None] * rise
@@ -166,9 +169,7 @@ def _heights(
 def _uncombed(length: Floats, cranium: Cranium) -> Floats:
     """How far hair is too short to be combed, (strand_count,) from 0 to 1."""
     short = (_COMBED - length / cranium.half_depth) / (_COMBED - _UNCOMBED)
-    short = np.clip(short, 0.0, 1.0)
-    smooth: Floats = short * short * (3.0 - 2.0 * short)
-    return smooth
+    return smooth_step(short)
 
 
 def _grown(

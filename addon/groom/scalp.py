@@ -61,9 +61,9 @@ def scalp_density(surface: Surface) -> Floats:
     normal = surface.vertex_normals()
     facing = 0.9 + normal[:, 1] + 0.6 * normal[:, 2] + np.maximum(z - 0.5, 0.0)
     edges = (above_hairline, _EARS - np.abs(x), facing)
-    hair = np.prod([_smooth_step(edge / _SOFTNESS) for edge in edges], axis=0)
+    hair = np.prod([smooth_step(edge / _SOFTNESS) for edge in edges], axis=0)
     # what grows at the front is combed away from there, and nothing falls over it
-    return (hair * (1.0 - _THINNER_BACK * _smooth_step(0.5 + y))).astype(np.float32)
+    return (hair * (1.0 - _THINNER_BACK * smooth_step(0.5 + y))).astype(np.float32)
 
 
 def sample_roots(
@@ -126,6 +126,8 @@ def _towards_density(barycentric: Floats, density: Floats, chance: Floats) -> Fl
     return turns[np.arange(len(turns)), taken]
 
 
-def _smooth_step(value: Floats) -> Floats:
+def smooth_step(value: Floats) -> Floats:
+    """Of what is below 0, 0; of what is above 1, 1; and between them without a corner."""
     x = np.clip(value, 0.0, 1.0)
-    return x * x * (3.0 - 2.0 * x)
+    smooth: Floats = x * x * (3.0 - 2.0 * x)
+    return smooth

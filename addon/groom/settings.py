@@ -45,7 +45,7 @@ class GrowSettings(Settings):
         shown_when=_HAS_THRESHOLD,
     )
     strand_count: int = integer(
-        8_000,
+        4_000,
         label="Strands",
         description="Number of strands to grow",
         soft=(100, 20_000),
@@ -62,7 +62,7 @@ class GrowSettings(Settings):
         source=_NALU,
     )
     length: float = number(
-        0.3,
+        0.25,
         label="Length",
         description="Length of the longest strands",
         unit="length",
@@ -86,7 +86,7 @@ class GrowSettings(Settings):
         source=_NALU,
     )
     lift: float = number(
-        0.5,
+        0.15,
         label="Lift",
         description="Angle at which hair leaves the surface: 0 lies flat, 1 stands up, and along "
         "normals it is straight then",
@@ -143,7 +143,7 @@ class GrowSettings(Settings):
         shown_when=when("grow.method", "combed"),
     )
     clump_size: int = integer(
-        60,
+        30,
         label="Strands per Clump",
         description="Average number of strands in a clump",
         soft=(1, 100),
@@ -187,7 +187,7 @@ class GrowSettings(Settings):
         shown_when=when("grow.method", "combed"),
     )
     volume: float = number(
-        0.024,
+        0.03,
         label="Volume",
         description="Thickness of the layer in which hair lies on the head",
         unit="length",

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands import StrandSet
+from ..strands.face import is_face_hair
 from .nearest import nearest_points
 
 #: of a head: how many hairs, and the width of one in terms of the root of the area they grow on.
@@ -33,8 +34,9 @@ _MAX_EXTINCTION = 6.0
 #: like hair where strands are this many times as long as wide: as short hair is, 8 mm of a brow.
 #: Strands that lack less than this factor are enough.
 _ENOUGH, _SLENDER, _LACKING = 4.0, 100.0, 1.1
-#: Hair this many spacings long can be added to; shorter fur gets dark blotches from children.
-_LONG = 5.0
+#: Hair this many spacings long hangs in locks. A strand of it that stands for more hairs than this
+#: looks like a noodle from near.
+_LONG, _MAX_HAIRS = 5.0, 3.0
 #: Fewer strands than this are not hair yet. In a row, neighbours are further apart than on an area:
 #: the eighth is 4 times, not twice, as far as the second.
 _FEWEST, _IN_ROW = 3, 3.0
@@ -132,7 +134,7 @@ def as_wide(strands: StrandSet, drawn: StrandSet) -> StrandSet:
 
 def strands_for_cover(strands: StrandSet) -> float:
     """How many strands must be drawn for each of these to cover the body and look like hair: 1
-    where these do, where they stand in a row, as lashes do, and where they are short fur.
+    where these do, and where they stand in a row, as lashes do.
 
     Doubling the strands halves what each stands for, and their spacing falls by the root of two;
     so at a quarter of their spacing they lie in layers that grow by the root of two.
@@ -144,12 +146,12 @@ def strands_for_cover(strands: StrandSet) -> float:
     if not hair.middle:
         return 1.0
     length = np.maximum(hair.length, np.finfo(np.float32).tiny)
-    if float(np.median(length / hair.apart)) < _LONG:
-        return 1.0
+    is_long = float(np.median(length / hair.apart)) >= _LONG
+    finer = _found_of(hair).hairs / _MAX_HAIRS if is_long else 1.0
     layers = float(np.median(hair.widest * length / hair.apart**2))
     slender = float(np.median(length / hair.widest))
     lacking = max(_ENOUGH / max(layers, 1e-6), _SLENDER / slender)
-    return lacking**2 if lacking > _LACKING else 1.0
+    return max(lacking**2 if lacking > _LACKING else 1.0, finer)
 
 
 @dataclass(frozen=True)
@@ -213,13 +215,29 @@ class _Hair:
 
 
 def _found(strands: StrandSet, parts: float = 1.0) -> _Found:
+    """Found widths of hair, and on their own those of brows and lashes, which are short and grow
+    close together however much hair is on the head.
+
+    Args:
+        parts: how many strands are drawn for each of these but brows and lashes.
+    """
+    is_face = is_face_hair(strands.group)
+    if is_face.all() or not is_face.any():
+        return _found_of(_Hair.of(strands), parts)
+    found = _found_of(_Hair.of(strands.take(np.flatnonzero(~is_face))), parts)
+    width = np.empty(strands.strand_count)
+    width[~is_face] = found.width
+    width[is_face] = _found_of(_Hair.of(strands.take(np.flatnonzero(is_face)))).width
+    return replace(found, width=width)
+
+
+def _found_of(hair: _Hair, parts: float = 1.0) -> _Found:
     """Widths that give the cover of a head, and in short or spread hair a few layers of it.
 
     Args:
         parts: how many strands are drawn for each of these, evenly spread between them. Where they
             are to lie in layers, the spacing that bounds their width is that of these.
     """
-    hair = _Hair.of(strands)
     if hair.middle <= 0.0:
         return _Found(hair.length * _ALONE, 0.0, 1.0, 1.0)
     closer = parts**0.5

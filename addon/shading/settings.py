@@ -74,7 +74,7 @@ class SharedSettings(Settings):
         shown_when=when("shading.model", "marschner"),
     )
     base_color: tuple[float, float, float] = color(
-        (0.055, 0.03, 0.018),
+        (0.03, 0.0145, 0.007),
         label="Colour",
         description="Colour of the hair; also tints the highlights",
         panel="Colour",

@@ -22,18 +22,25 @@ _WARM, _COOL = np.array([1.12, 0.98, 0.74]), np.array([0.84, 0.99, 1.22])
 _VIGNETTE = 3.2
 
 
-def stage_lights(stage: StageSettings, view: Floats, ball: Ball) -> tuple[Light, ...]:
+def stage_lights(
+    stage: StageSettings, view: Floats, ball: Ball, *, is_mirrored: bool = False
+) -> tuple[Light, ...]:
     """Key, fill and rim light, which are attached to the camera and fall off with the distance.
 
     Args:
         view: (4, 4) world to view space, a rigid motion.
         ball: around what is shown.
+        is_mirrored: left is right, as where a face looks to the right of the picture. So the main
+            light falls on the side of the hair that is seen, broad lighting of a portrait.
     """
     to_world = np.linalg.inv(np.asarray(view, np.float64))[:3, :3]
     radius, distance = _LIGHT_RADIUS * ball.radius, stage.distance * ball.radius
     power = 4.0 * np.pi * (distance * distance + radius * radius)
+    sides = np.array([-1.0 if is_mirrored else 1.0, 1.0, 1.0])
     return tuple(
-        Light.point(ball.center + distance * to_world @ towards, tint, power * strength, radius)
+        Light.point(
+            ball.center + distance * to_world @ (sides * towards), tint, power * strength, radius
+        )
         for towards, tint, strength in _lights(stage)
         if strength > 0.0
     )

@@ -41,7 +41,12 @@ def _angle(default: float, label: str, description: str, most: float) -> Any:
 
 
 def _side(default: float, label: str, light: str) -> Any:
-    return _angle(default, label, f"Angle of the {light} to the right of the camera", 180.0)
+    return _angle(
+        default,
+        label,
+        f"Angle of the {light} beside the camera, to the side of the hair that it sees",
+        180.0,
+    )
 
 
 def _height(default: float, label: str, light: str) -> Any:
@@ -59,10 +64,10 @@ class StageSettings(Settings):
     key: float = _strength(4.2, "Key", "Main light")
     key_side: float = _side(42.0, "Key Side", "main light")
     key_height: float = _height(40.0, "Key Height", "main light")
-    fill: float = _strength(1.1, "Fill", "Light into the shadows of the main light")
+    fill: float = _strength(1.4, "Fill", "Light into the shadows of the main light")
     fill_side: float = _side(-60.0, "Fill Side", "fill light")
     fill_height: float = _height(5.0, "Fill Height", "fill light")
-    rim: float = _strength(4.5, "Rim", "Light from behind, which shines through the hair")
+    rim: float = _strength(2.8, "Rim", "Light from behind, which shines through the hair")
     rim_side: float = _side(-148.0, "Rim Side", "light from behind")
     rim_height: float = _height(35.0, "Rim Height", "light from behind")
     distance: float = number(

@@ -27,6 +27,7 @@ def group_of(new_hair):
     """Gives the property group of a section on a new hair object."""
     hair = new_hair()
     hair.data.hairloom.widths.property_unset("method")
+    hair.data.hairloom.children.property_unset("method")
 
     def get(section):
         owners = {"groom": hair.data, "character": hair, "scene": bpy.context.scene}

@@ -142,8 +142,13 @@ class Studio:
         return self.settings[StageSettings]
 
     def lights(self, camera: Camera) -> tuple[Light, ...]:
-        """The stage's, around the groom at rest, as they are attached to a camera."""
-        return stage_lights(self.stage, camera.view, self._ball)
+        """The stage's, around the groom at rest, as they are attached to a camera.
+
+        The main light is on the side of the hair that the camera sees.
+        """
+        front, eye = self.side.front, np.linalg.inv(camera.view)[:3, 3] - self._ball.center
+        is_mirrored = bool(front[0] * eye[1] - front[1] * eye[0] < 0.0)
+        return stage_lights(self.stage, camera.view, self._ball, is_mirrored=is_mirrored)
 
     @cached_property
     def _ball(self) -> Ball:
