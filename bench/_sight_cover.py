@@ -1,9 +1,9 @@
 """Whether hair covers the body that it grows on, from six sides.
 
-The groom's outline is where strands as wide as they are apart would hide all, less the margin by
-which these stand out further than the groom's own. In it the share of pixels is counted through
-which less than a twentieth of the body is seen. The body is drawn as a
-hole, so that alpha is what hair covers of it.
+The groom's outline is where its own curves, without children, would hide all if they were as wide
+as they are apart, less the margin by which these stand out further than the curves do. In it the
+share of pixels is counted through which less than a twentieth of the body is seen. The body is
+drawn as a hole, so that alpha is what hair covers of it.
 """
 
 from __future__ import annotations
@@ -31,21 +31,25 @@ SHOWS_THROUGH = 0.05
 
 def cover(pair, name: str, factor: float = 1.0) -> float:
     """The share of pixels in the outline through which no body is seen."""
-    rig = rig_of(scaled(pair, factor), name)
-    groom = PreparedGroom(rig, AmbientSettings())
-    plain = replace(
-        snapshot_of(groom), lights=(), volume=VolumeSettings(shadows="none"), meshes=_holes(rig)
-    )
-    wide = replace(plain, radius=plain.radius * np.float32(_apart(rig)))
+    pair = scaled(pair, factor)
+    rig, own = rig_of(pair, name), rig_of(pair, name, "none")
+    plain, wide = _unlit(rig), _unlit(own)
+    wide = replace(wide, radius=wide.radius * np.float32(_apart(own)))
     inside = covered = 0
     for side in SIDES:
         camera = frame_camera(rig.strands.bounds(), side, np.radians(30.0), 1.0)
-        margin = 0.5 * (_apart(rig) - 1.0) * _width(rig) * _pixels_per_metre(rig, camera)
+        margin = 0.5 * (_apart(own) - 1.0) * _width(own) * _pixels_per_metre(rig, camera)
         outline = _eroded(_alpha(wide, camera) > 0.95, margin)
         shown = _body(rig, camera) * (1.0 - _alpha(plain, camera))
         inside += int(outline.sum())
         covered += int((outline & (shown < SHOWS_THROUGH)).sum())
     return covered / max(inside, 1)
+
+
+def _unlit(rig: Rig) -> Snapshot:
+    groom = PreparedGroom(rig, AmbientSettings())
+    shadows = VolumeSettings(shadows="none")
+    return replace(snapshot_of(groom), lights=(), volume=shadows, meshes=_holes(rig))
 
 
 def _width(rig: Rig) -> float:

@@ -57,11 +57,11 @@ def scaled(pair: Pair, factor: float) -> Pair:
     return moved, head and replace(head, positions=head.positions * np.float32(factor))
 
 
-def rig_of(pair: Pair, name: str) -> Rig:
+def rig_of(pair: Pair, name: str, children: str = ChildrenSettings().method) -> Rig:
     strands, head = pair
-    widths = WidthSettings().method
+    widths, settings = WidthSettings().method, ChildrenSettings(method=children)
     return pipeline.prepare(
-        strands, head, GuideSettings(), place=name, children=ChildrenSettings(), widths=widths
+        strands, head, GuideSettings(), place=name, children=settings, widths=widths
     )
 
 

@@ -31,8 +31,9 @@ __all__ = ["grow", "scalp_density"]
 _DOWN = np.array([0.0, 0.0, -1.0])
 #: The step for which `GrowSettings.droop` says how much the hair turns [m].
 _DROOP_STEP = 0.02
-#: How much the hair at the parting is combed aside, as a fraction of that at the sides.
-_PARTED = 0.5
+#: How much the hair at the parting is combed aside, as a fraction of that at the sides; and where
+#: the parting ends, behind the cranium's middle, in units of half its depth.
+_PARTED, _CROWN = 0.5, 0.7
 #: Hair of this length grows as it will, and from that length on it is combed, in units of half the
 #: cranium's depth.
 _UNCOMBED, _COMBED = 0.45, 1.4
@@ -193,7 +194,8 @@ def _combed(cranium: Cranium, root: Floats, normal: Floats, settings: GrowSettin
     """Unit directions in which the hair is combed, along the skin, (strand_count, 3)."""
     side = np.clip((root[:, 0] - cranium.center[0]) / (0.5 * cranium.half_depth), -1.0, 1.0)
     # away from the parting from the root on, or hair at the forehead would fall over the face
-    side = np.where(side < 0.0, -1.0, 1.0) * (_PARTED + (1.0 - _PARTED) * np.abs(side))
+    parted = _PARTED * smooth_step((cranium.center[1] - root[:, 1]) / cranium.half_depth + _CROWN)
+    side = np.where(side < 0.0, -1.0, 1.0) * (parted + (1.0 - parted) * np.abs(side))
     comb = np.empty_like(root)
     comb[:, 0] = (1.0 - settings.comb_back) * side
     comb[:, 1] = settings.comb_back

@@ -134,7 +134,7 @@ class GrowSettings(Settings):
         shown_when=when("grow.method", "combed"),
     )
     clump: float = number(
-        0.5,
+        0.3,
         label="Clump",
         description="Amount by which the tips of a clump are drawn together",
         unit="factor",

@@ -5,7 +5,7 @@ widths are missing, or would leave the body bald or bury it, they are found from
 strands, their lengths and their number alone. No unit of length is assumed: a groom that is a
 thousand times as large has strands a thousand times as wide.
 
-A head is the measure: about 100,000 hairs of 0.08 mm on 600 cm2 (Robbins 2012, Chemical and
+A head is the measure: about 120,000 hairs of 0.08 mm on 600 cm2 (Robbins 2012, Chemical and
 Physical Behavior of Human Hair, chapter 9). Any groom is given the cover that this is for its area.
 """
 
@@ -22,7 +22,7 @@ from ..strands.face import is_face_hair
 from .nearest import nearest_points
 
 #: of a head: how many hairs, and the width of one in terms of the root of the area they grow on.
-_HAIRS, _HAIR = 100_000, 0.08 / 245.0
+_HAIRS, _HAIR = 120_000, 0.08 / 245.0
 #: Layers of hair that lie over every place, at least, wherever that is wide enough to do so.
 _LAYERS = 6.0
 #: The widest strand: a quarter of the spacing, and in terms of its own length.
@@ -36,7 +36,7 @@ _MAX_EXTINCTION = 6.0
 _ENOUGH, _SLENDER, _LACKING = 4.0, 100.0, 1.1
 #: Hair this many spacings long hangs in locks. A strand of it that stands for more hairs than this
 #: looks like a noodle from near.
-_LONG, _MAX_HAIRS = 5.0, 3.0
+_LONG, _MAX_HAIRS = 5.0, 3.5
 #: Fewer strands than this are not hair yet. In a row, neighbours are further apart than on an area:
 #: the eighth is 4 times, not twice, as far as the second.
 _FEWEST, _IN_ROW = 3, 3.0

@@ -64,7 +64,7 @@ class StageSettings(Settings):
     key: float = _strength(4.2, "Key", "Main light")
     key_side: float = _side(42.0, "Key Side", "main light")
     key_height: float = _height(40.0, "Key Height", "main light")
-    fill: float = _strength(1.4, "Fill", "Light into the shadows of the main light")
+    fill: float = _strength(1.6, "Fill", "Light into the shadows of the main light")
     fill_side: float = _side(-60.0, "Fill Side", "fill light")
     fill_height: float = _height(5.0, "Fill Height", "fill light")
     rim: float = _strength(2.8, "Rim", "Light from behind, which shines through the hair")
@@ -86,7 +86,7 @@ class StageSettings(Settings):
         hard=(-1.0, 1.0),
     )
     ambient: tuple[float, float, float] = color(
-        (0.05, 0.06, 0.08),
+        (0.11, 0.125, 0.15),
         label="Ambient",
         description="Light from all sides",
         maximum=100.0,

@@ -154,7 +154,7 @@ def add_picture_options(parser: argparse.ArgumentParser, width: int, height: int
     for name, default, what in (
         ("--width", width, "pixels across"),
         ("--height", height, "pixels down"),
-        ("--samples", 3, "samples of a pixel along each side"),
+        ("--samples", 2, "samples of a pixel along each side"),
     ):
         about = f"{what} (default: {default})"
         picture.add_argument(name, type=int, default=default, metavar="COUNT", help=about)
