@@ -24,7 +24,7 @@ from extension_loader import REPOSITORY
 from waits import endless_waits
 
 from hairloom.addon.blender.engine.engine_gpu import _can_draw
-from hairloom.addon.blender.strands.child_python import python_command
+from hairloom.addon.blender.strands.child_python import found_python, python_command
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 from hairloom.addon.exchange.usd.usd_library import usd_library
@@ -74,7 +74,7 @@ def planted() -> dict[str, int]:
         sys.path.insert(0, "")
         os.environ["PYTHONPATH"] = os.environ["PYTHONUSERBASE"] = name
         try:
-            for begin in (python_command, _can_draw):
+            for begin in (found_python, _can_draw):
                 begin.cache_clear()
                 begin()
                 ran += (folder / "it_ran").exists()
