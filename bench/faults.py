@@ -23,7 +23,7 @@ from _usd_attacks import usd_attacks
 from extension_loader import REPOSITORY
 from waits import endless_waits
 
-from hairloom.addon.blender.engine.engine_gpu import _can_draw
+from hairloom.addon.blender.base.gpu_context import _can_draw
 from hairloom.addon.blender.strands.child_python import found_python, python_command
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.usd.groom_usd_read import read_usd
