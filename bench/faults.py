@@ -1,9 +1,10 @@
 """Nothing lost, nothing taken over: faults while files are written, and files that mean harm.
 
-See `_fault_runs` and `_usd_attacks` for what is done. Exit code 1: a limit is missed.
+See `_fault_runs`, `_verb_faults` and `_usd_attacks` for what is done. Exit code 1: a limit is
+missed.
 
 make bench NAME=faults                  half an hour
-tools/bench.py faults runs 1000         one part: runs, usda, planted, waits or autosave
+tools/bench.py faults runs 1000         one part: runs, verbs, usda, planted, waits or autosave
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Any
 from _fault_runs import fault_runs, forget_sources
 from _report import start, tell
 from _usd_attacks import usd_attacks
+from _verb_faults import verb_fault_runs
 from extension_loader import REPOSITORY
 from waits import endless_waits
 
@@ -36,13 +38,16 @@ MOST = {
     "fault_losses": 0,
     "fault_mixed": 0,
     "fault_untrue_messages": 0,
+    "verb_losses": 0,
+    "verb_mixed": 0,
+    "verb_untrue_messages": 0,
     "usda_crashes": 0,
     "longest_seconds": 10.0,
     "memory_mb": 1024.0,
     "planted_code_runs": 0,
     "endless_waits": 0,
 }
-LEAST = {"fault_runs": 1000, "usda_attacks": 500, "autosaves_while_playing": 1}
+LEAST = {"fault_runs": 1000, "verb_runs": 200, "usda_attacks": 500, "autosaves_while_playing": 1}
 _PLANTED = "import pathlib; pathlib.Path(__file__).with_name('it_ran').touch()"
 
 
@@ -58,6 +63,18 @@ def runs(count: int = 1000) -> dict[str, Any]:
         "fault_losses": found.losses,
         "fault_mixed": found.mixed,
         "fault_untrue_messages": found.untrue,
+    }
+
+
+def verbs(count: int = 255) -> dict[str, Any]:
+    found, problems = verb_fault_runs(count, SEED)
+    print("\n".join(problems), flush=True)
+    return {
+        "verb_runs": found.runs,
+        "verb_faults_in_time": found.broken,
+        "verb_losses": found.losses,
+        "verb_mixed": found.mixed,
+        "verb_untrue_messages": found.untrue,
     }
 
 
@@ -102,6 +119,7 @@ def autosave() -> dict[str, int]:
 
 PARTS: dict[str, Callable[..., dict[str, Any]]] = {
     "runs": runs,
+    "verbs": verbs,
     "usda": lambda count=500: usd_attacks(count, SEED),
     "planted": planted,
     "waits": lambda: {"endless_waits": len(endless_waits())},

@@ -7,6 +7,8 @@ asking crashes Blender; so another process tries first.
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from subprocess import TimeoutExpired
 
@@ -51,6 +53,8 @@ sys.exit(0 if works(opengl) or works(vulkan) else 1)
 """
 
 
+#: How errors of Blender's module begin where no texture or target can be made.
+_REFUSAL = "gpu."
 #: Seconds for a driver to answer, on a busy machine too.
 _PATIENCE = 60.0
 
@@ -83,6 +87,25 @@ def _can_draw() -> bool:
         return False
     except OSError:  # this Blender has no Python of its own to ask with
         return True
+
+
+@contextmanager
+def gpu_refusals() -> Iterator[None]:
+    """What the GPU refuses inside, such as memory, becomes a message.
+
+    Raises:
+        HairloomError: it has refused something.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        if not str(error).startswith(_REFUSAL):
+            raise
+        raise HairloomError(
+            f"the GPU refuses what drawing needs ({error})",
+            place="render",
+            remedy="Close other programs that use the GPU, or choose smaller pictures and textures",
+        ) from error
 
 
 def is_interrupted() -> bool:
