@@ -30,6 +30,7 @@ from ...errors import HairloomError
 from ...exchange.files.array_file import read_arrays
 from ...exchange.files.atomic import write_bytes_atomic
 from ...exchange.files.moving import flush, flush_names
+from ...exchange.files.names import length_remark
 from ...exchange.files.stale_temp_files import MARK, is_stale, is_temporary, mark
 from .simulated import Arrays
 
@@ -148,7 +149,7 @@ class CacheWriter:
     def clean(self) -> None:
         """Remove the frames of the bake before this one.
 
-        Those that another program holds open stay until the next bake.
+        Those that another program holds open stay until a Blender that begins later bakes here.
         """
         if self._before is not None:
             _remove_frames(self.folder, _frames_named(self._before))
@@ -391,8 +392,12 @@ def _damaged(path: Path, why: str) -> HairloomError:
 
 
 def _unwritable(folder: Path, error: OSError) -> HairloomError:
+    why = error.strerror or str(error)
+    remark = length_remark(folder / f"frames-{mark()}" / _frame_name(0), why)
     return HairloomError(
-        f"the bake cannot be written ({error.strerror or error})",
+        f"the bake cannot be written ({why}{remark})",
         place=str(folder),
-        remedy="Choose a folder that you may write to, with space left",
+        remedy="Choose a folder with a shorter path"
+        if remark
+        else "Choose a folder that you may write to, with space left",
     )
