@@ -3,6 +3,8 @@
 import json
 import os
 import shutil
+import threading
+from collections import OrderedDict
 from pathlib import Path
 
 import bpy
@@ -328,6 +330,33 @@ def test_a_bake_that_cannot_take_its_place_is_kept(swinging, tmp_path, monkeypat
     (kept,) = (path for path in folder.glob("frames-*") if path != shown)
     assert str(kept) in raised.value.remedy
     assert Cache(kept).frame(LAST)["guides"].shape == (60, 16, 3)
+
+
+def test_a_render_and_the_window_read_a_bake_at_the_same_time(tmp_path):
+    """One lets go of a frame that the other one has just found."""
+    writer = CacheWriter(tmp_path / "bake")
+    writer.add_constants({"value": np.zeros(1)})
+    frames = range(1, 9)
+    for frame in frames:
+        writer.add(frame, {"value": np.full(1, frame)}, "hash")
+    writer.finish(Facts("Hair", 1, len(frames), 24.0, "numpy", "hash", "0.1.0"))
+    writer.publish()
+    cache = Cache(tmp_path / "bake")
+    other = threading.Thread(target=lambda: [cache.frame(frame) for frame in frames])
+
+    class Interrupted(OrderedDict):
+        def __contains__(self, frame):
+            is_there = super().__contains__(frame)
+            if is_there and not other.ident:
+                other.start()
+                other.join(0.2)  # it reads all, unless it has to wait for this one
+            return is_there
+
+    cache.frame(1)
+    cache._frames = Interrupted(cache._frames)
+    assert cache.frame(1)["value"][0] == 1
+    other.join()
+    assert cache.frame(8)["value"][0] == 8
 
 
 def test_frames_that_are_open_elsewhere_go_when_their_writer_is_gone(tmp_path):

@@ -19,6 +19,7 @@ import json
 import math
 import re
 import shutil
+import threading
 from collections import OrderedDict
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -190,6 +191,7 @@ class Cache:
             _check(self.facts)
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise _damaged(folder / FACTS, str(error)) from error
+        self._lock = threading.Lock()  # renders read in their own thread
         self._frames: OrderedDict[int, Arrays] = OrderedDict()
         self._constants: Arrays | None = None
 
@@ -210,17 +212,21 @@ class Cache:
         Raises:
             HairloomError: the file is gone or damaged.
         """
-        if frame not in self._frames:
-            path = self._frame_folder / _frame_name(frame)
-            arrays = _read_arrays(path)
-            found = {name: (str(a.dtype), tuple(a.shape)) for name, a in arrays.items()}
-            if found != self._layout:
-                raise _damaged(path, "its arrays are not those of the other frames")
-            self._frames[frame] = arrays
-            while len(self._frames) > _KEPT:
-                self._frames.popitem(last=False)
-        self._frames.move_to_end(frame)
-        return self._frames[frame]
+        with self._lock:
+            if frame not in self._frames:
+                self._frames[frame] = self._read(_frame_name(frame))
+                while len(self._frames) > _KEPT:
+                    self._frames.popitem(last=False)
+            self._frames.move_to_end(frame)
+            return self._frames[frame]
+
+    def _read(self, name: str) -> Arrays:
+        path = self._frame_folder / name
+        arrays = _read_arrays(path)
+        found = {name: (str(a.dtype), tuple(a.shape)) for name, a in arrays.items()}
+        if found != self._layout:
+            raise _damaged(path, "its arrays are not those of the other frames")
+        return arrays
 
     @classmethod
     def found(cls, folder: Path) -> Self | None:
