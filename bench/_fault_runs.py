@@ -49,7 +49,10 @@ FAULTS = ("full", "read-only", "killed", "vanishes", "fails", "another", "memory
 WINDOWS = ("held", "held for a moment", "no links")
 
 
-class _EndedError(BaseException):
+type Contents = dict[str, bytes]
+
+
+class EndedError(BaseException):
     """A process that is killed does not tidy up."""
 
 
@@ -172,33 +175,58 @@ def _run(verb: Verb, fault: str, folder: Path, random: Any) -> tuple[str, bool]:
         remove_stale_files(folder)  # as the next writer does
         if verb.suffix == "" and path.is_dir():
             CacheWriter(path).abandon()
-    there = _contents(folder)
-    kept = {name: content for name, content in there.items() if " new" in name.partition(os.sep)[0]}
+    places = folder, SOURCES
+    return judged(places, old, new, _contents(folder), error, is_second=fault == "another")
+
+
+def judged(
+    places: tuple[Path, ...],
+    old: Contents,
+    new: Contents,
+    there: Contents,
+    error: BaseException | None,
+    *,
+    is_second: bool,
+) -> tuple[str, bool]:
+    """What is wrong, "" for nothing; and whether the fault came in time.
+
+    Args:
+        places: of which a message must name one.
+        there: what is in the folder after the run.
+        error: what the run has raised.
+        is_second: whether another writer may have come last, so that its result is shown.
+    """
+    kept = {
+        name: content
+        for name, content in there.items()
+        if any(part.partition(".")[0].endswith(" new") for part in name.split(os.sep))
+    }
     there = {name: content for name, content in there.items() if name not in kept}
-    is_killed = isinstance(error, _EndedError)
     if there not in (old, new):
         kind = "mixed" if set(there) == set(old) else "losses"
         return f"{kind}: {sorted(there)} after {error!r}", True
     if error is None:
-        is_other = fault == "another"  # who comes last is shown
-        return ("" if there == new or is_other else "losses: no error, and the old result"), False
-    if is_killed:
+        is_fine = there == new or is_second
+        return ("" if is_fine else "losses: no error, and the old result"), False
+    if isinstance(error, EndedError):
         return "", True
     if not isinstance(error, HairloomError):
         return f"untrue: {error!r} is no message", True
-    return (f"untrue: {error}" if _is_untrue(error, there == new, kept, folder) else ""), True
+    return (f"untrue: {error}" if _is_untrue(error, there == new, kept, places) else ""), True
 
 
-def _is_untrue(error: HairloomError, is_new: bool, kept: dict[str, bytes], folder: Path) -> bool:
+def _is_untrue(
+    error: HairloomError, is_new: bool, kept: Contents, places: tuple[Path, ...]
+) -> bool:
     """Whether a message says what is not so, or leaves out what to do."""
     text = str(error)
     named = re.search(r"beside it (?:as|in) (.+?)\.?$", error.remedy)
     if named is not None:
-        return named[1] not in {name.partition(os.sep)[0] for name in kept}
+        return named[1] not in {part for name in kept for part in name.split(os.sep)}
     chosen = re.search(r"Choose (/.+?) as the folder", error.remedy)
     if chosen is not None:
         return Cache.found(Path(chosen[1])) is None
-    is_placed = any(str(each) in text for each in (folder, SOURCES))
+    is_placed = any(str(each) in text for each in places)
     return bool(kept) or is_new or not error.remedy or not is_placed
 
 
@@ -206,14 +234,14 @@ def _write_with(verb: Verb, path: Path, fault: str, random: Any) -> BaseExceptio
     """Write the new result while that goes wrong; what was raised."""
     at = int(random.integers(1, 7))
     try:
-        with _FAULTS[fault](at, path, verb, random):
+        with FAULT_MAKERS[fault](at, path, verb, random):
             verb.write(path, 1)
-    except (Exception, _EndedError) as error:
+    except (Exception, EndedError) as error:
         return error
     return None
 
 
-type _Fault = Callable[[int, Path, Verb, Any], contextlib.AbstractContextManager[object]]
+type Fault = Callable[[int, Path, Verb, Any], contextlib.AbstractContextManager[object]]
 
 
 @contextlib.contextmanager
@@ -241,7 +269,7 @@ def _read_only(_at: int, path: Path, _verb: Verb, _random: Any) -> Iterator[None
 
 
 @contextlib.contextmanager
-def _at_call(at: int, act: Callable[..., object]) -> Iterator[None]:
+def at_call(at: int, act: Callable[..., object]) -> Iterator[None]:
     """Have something happen before the n-th rename, flush or link of all."""
     left = [at]
 
@@ -266,7 +294,7 @@ def _fails(
     def fail(*_: object) -> None:
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
-    return _at_call(at, fail)
+    return at_call(at, fail)
 
 
 def _vanishes(
@@ -277,13 +305,13 @@ def _vanishes(
         for each in hidden:
             each.unlink()
 
-    return _at_call(at, vanish)
+    return at_call(at, vanish)
 
 
 def _another(
     at: int, path: Path, verb: Verb, _random: Any
 ) -> contextlib.AbstractContextManager[None]:
-    return _at_call(at, lambda *_: verb.write(path, 0))
+    return at_call(at, lambda *_: verb.write(path, 0))
 
 
 @contextlib.contextmanager
@@ -292,12 +320,12 @@ def _killed(at: int, path: Path, verb: Verb, _random: Any) -> Iterator[None]:
     child = os.fork()
     if child == 0:
         try:
-            with _at_call(at, lambda *_: os._exit(9)):
+            with at_call(at, lambda *_: os._exit(9)):
                 verb.write(path, 1)
         finally:
             os._exit(0)
     _, status = os.waitpid(child, 0)
-    raise _EndedError(os.waitstatus_to_exitcode(status))
+    raise EndedError(os.waitstatus_to_exitcode(status))
     yield
 
 
@@ -367,7 +395,7 @@ def _no_links(_at: int, _path: Path, _verb: Verb, _random: Any) -> Iterator[None
         yield
 
 
-_FAULTS: dict[str, _Fault] = {
+FAULT_MAKERS: dict[str, Fault] = {
     "full": _full,
     "read-only": _read_only,
     "killed": _killed,

@@ -1,9 +1,10 @@
 """Nothing lost, nothing taken over: faults while files are written, and files that mean harm.
 
-See `_fault_runs` and `_usd_attacks` for what is done. Exit code 1: a limit is missed.
+See `_fault_runs`, `_verb_faults` and `_usd_attacks` for what is done. Exit code 1: a limit is
+missed.
 
 make bench NAME=faults                  half an hour
-tools/bench.py faults runs 1000         one part: runs, usda, planted, waits or autosave
+tools/bench.py faults runs 1000         one part: runs, verbs, usda, planted, waits or autosave
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ from typing import Any
 from _fault_runs import fault_runs, forget_sources
 from _report import start, tell
 from _usd_attacks import usd_attacks
+from _verb_faults import verb_fault_runs
 from extension_loader import REPOSITORY
 from waits import endless_waits
 
-from hairloom.addon.blender.engine.engine_gpu import _can_draw
-from hairloom.addon.blender.strands.child_python import python_command
+from hairloom.addon.blender.base.gpu_context import _can_draw
+from hairloom.addon.blender.strands.child_python import found_python, python_command
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 from hairloom.addon.exchange.usd.usd_library import usd_library
@@ -36,13 +38,16 @@ MOST = {
     "fault_losses": 0,
     "fault_mixed": 0,
     "fault_untrue_messages": 0,
+    "verb_losses": 0,
+    "verb_mixed": 0,
+    "verb_untrue_messages": 0,
     "usda_crashes": 0,
     "longest_seconds": 10.0,
     "memory_mb": 1024.0,
     "planted_code_runs": 0,
     "endless_waits": 0,
 }
-LEAST = {"fault_runs": 1000, "usda_attacks": 500, "autosaves_while_playing": 1}
+LEAST = {"fault_runs": 1000, "verb_runs": 200, "usda_attacks": 500, "autosaves_while_playing": 1}
 _PLANTED = "import pathlib; pathlib.Path(__file__).with_name('it_ran').touch()"
 
 
@@ -61,6 +66,18 @@ def runs(count: int = 1000) -> dict[str, Any]:
     }
 
 
+def verbs(count: int = 255) -> dict[str, Any]:
+    found, problems = verb_fault_runs(count, SEED)
+    print("\n".join(problems), flush=True)
+    return {
+        "verb_runs": found.runs,
+        "verb_faults_in_time": found.broken,
+        "verb_losses": found.losses,
+        "verb_mixed": found.mixed,
+        "verb_untrue_messages": found.untrue,
+    }
+
+
 def planted() -> dict[str, int]:
     """Modules in the current folder and the environment; every way to start a child."""
     before, ran = os.getcwd(), 0
@@ -74,7 +91,7 @@ def planted() -> dict[str, int]:
         sys.path.insert(0, "")
         os.environ["PYTHONPATH"] = os.environ["PYTHONUSERBASE"] = name
         try:
-            for begin in (python_command, _can_draw):
+            for begin in (found_python, _can_draw):
                 begin.cache_clear()
                 begin()
                 ran += (folder / "it_ran").exists()
@@ -102,6 +119,7 @@ def autosave() -> dict[str, int]:
 
 PARTS: dict[str, Callable[..., dict[str, Any]]] = {
     "runs": runs,
+    "verbs": verbs,
     "usda": lambda count=500: usd_attacks(count, SEED),
     "planted": planted,
     "waits": lambda: {"endless_waits": len(endless_waits())},

@@ -22,6 +22,7 @@ from ..errors import HairloomError
 from ..strands import StrandSet
 from .files.axes import from_z_up, to_z_up
 from .files.binary_file import BinaryFile, write_blocks
+from .files.file_space import FileSpace
 from .groom import Groom
 from .groom_presets import chosen_parts
 from .read_groom import ReadGroom, finite, kept_points, usable
@@ -116,7 +117,12 @@ def read_hair_file(path: Path, up: str = "Z", scale: float = 1.0) -> ReadHairFil
     if (transparency != 0.0).any():
         notes = (f"{path.name}: its transparency is not kept.",)
     return ReadHairFile(
-        groom, 0.0, notes, file.info, finite(kept_points(transparency, offsets, cleaned))
+        groom,
+        0.0,
+        FileSpace(up),
+        notes,
+        file.info,
+        finite(kept_points(transparency, offsets, cleaned)),
     )
 
 

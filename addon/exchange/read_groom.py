@@ -11,6 +11,7 @@ from ..arrays import Floats, Ints
 from ..strands import StrandSet
 from ..strands.clean import Cleaned, clean
 from .files.binary_file import BinaryFile
+from .files.file_space import FileSpace
 from .groom import Groom
 
 
@@ -20,11 +21,13 @@ class ReadGroom:
 
     groom: Z up, metres.
     version: as the file says, such as 4.0; 0 where the format has none.
+    axes: how the file's axes were read, in metres.
     notes: what the file also holds, and the groom does not.
     """
 
     groom: Groom
     version: float
+    axes: FileSpace
     notes: tuple[str, ...]
 
     @property

@@ -13,7 +13,7 @@ from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .alembic.groom_alembic import write_groom_alembic
 from .files.file_set import kept_aside, written_together
-from .files.names import plain_name
+from .files.names import as_compared, distinct_names, plain_name
 from .groom import Groom, GroomMotion, points_of
 from .groom_presets import GroomPreset, chosen_strands
 from .hair_file import write_hair_file
@@ -172,13 +172,15 @@ def _group_files(path: Path, groom: Groom) -> dict[Path, Ints]:
     if len(numbers) < 2:
         return {path: np.arange(groom.strands.strand_count)}
     names = [plain_name(groom.group_names.get(number, f"group{number}")) for number in numbers]
-    taken = Counter(name.casefold() for name in names)
-    files: dict[Path, Ints] = {}
-    for name, number in zip(names, numbers, strict=True):
-        ending = name if taken[name.casefold()] == 1 else f"{name}_{number}"
-        file = path.with_name(f"{path.stem}_{ending}{path.suffix}")
-        files[file] = np.flatnonzero(groom.strands.group == number)
-    return files
+    taken = Counter(map(as_compared, names))
+    endings = distinct_names(
+        name if taken[as_compared(name)] == 1 else f"{name}_{number}"
+        for name, number in zip(names, numbers, strict=True)
+    )
+    return {
+        path.with_stem(f"{path.stem}_{ending}"): np.flatnonzero(groom.strands.group == number)
+        for ending, number in zip(endings, numbers, strict=True)
+    }
 
 
 def _part(groom: Groom, chosen: Ints, parts: str) -> Groom:

@@ -25,6 +25,7 @@ from ..strands import StrandSet
 from ..strands.resample import resample
 from .files.axes import from_z_up, to_z_up
 from .files.binary_file import write_blocks
+from .files.file_space import FileSpace
 from .groom import Groom
 from .groom_presets import chosen_parts
 from .read_groom import ReadGroom, finite, kept_points, usable
@@ -89,6 +90,7 @@ def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadTressfx:
     return ReadTressfx(
         groom,
         file.version,
+        FileSpace(up),
         _reading_notes(path.name, file, color),
         is_held,
         None if vertex_uv is None else finite(kept_points(vertex_uv, offsets, cleaned)),

@@ -13,7 +13,7 @@ from bpy_extras.io_utils import ExportHelper
 from ..blender.bakes import playback
 from ..blender.bakes.bake_settings import frame_range
 from ..blender.bakes.stale_bakes import stale_notes
-from ..blender.base.file_names import file_of, file_stem
+from ..blender.base.file_names import file_stem, files_of
 from ..blender.base.outcome import Outcome
 from ..blender.cards.files import CardExport, CardOutput, FileSteps
 from ..blender.properties.groups import operator_properties
@@ -91,7 +91,8 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         hair = self._hair(context)
-        plans = [self._plan(context, each, is_alone=len(hair) == 1) for each in hair]
+        files = files_of(Path(bpy.path.abspath(self.filepath)), [each.name for each in hair])
+        plans = [self._plan(context, *each) for each in zip(hair, files, strict=True)]
         outcomes = []
         for plan in plans:
             made = yield from threaded(plan.building())
@@ -99,13 +100,10 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         for outcome in outcomes:
             tell(self, outcome)
 
-    def _plan(
-        self, context: bpy.types.Context, hair: bpy.types.Object, *, is_alone: bool
-    ) -> CardExport:
-        path, depsgraph = self._path(hair, is_alone=is_alone), context.evaluated_depsgraph_get()
+    def _plan(self, context: bpy.types.Context, hair: bpy.types.Object, path: Path) -> CardExport:
         return CardExport.of(
             hair,
-            depsgraph,
+            context.evaluated_depsgraph_get(),
             path,
             self._output(path, hair.name),
             levels=self.levels if self.own_levels else None,
@@ -132,11 +130,6 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         return hair or _refuse(
             f"Collection '{self.collection}'", "Link hair curves to it, or choose another one"
         )
-
-    def _path(self, hair: bpy.types.Object, *, is_alone: bool) -> Path:
-        """Where it goes; of several grooms each has its name behind the file's."""
-        path = Path(bpy.path.abspath(self.filepath))
-        return file_of(path, hair.name, is_alone=is_alone)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -1,4 +1,8 @@
-"""Strands of files in: File > Import, and files that are dropped into the viewport."""
+"""Strands of files in: File > Import, and files that are dropped into the viewport.
+
+In the window a thread reads them, and Esc cancels it. All files come into the scene in one step at
+the end.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +22,14 @@ from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
 from ..blender.base.outcome import report
 from ..blender.strands.import_groom import (
     FILE_KINDS,
-    Ground,
+    FileStrands,
     StrandImport,
-    import_strands,
+    add_to_scene,
     read_ground,
+    read_in_thread,
 )
-from ..errors import HairloomError
-from .reports import reporting, tell, waiting
+from .long_work import LongWork, Steps, threaded
+from .reports import tell
 from .selection import active_mesh, ground_mesh, make_active
 
 SUFFIXES = tuple(suffix for _, suffixes in FILE_KINDS for suffix in suffixes)
@@ -44,8 +49,8 @@ def _filter(suffixes: Iterable[str]) -> str:
     return ";".join(f"*{suffix}" for suffix in suffixes)
 
 
-class HAIRLOOM_OT_import_strands(bpy.types.Operator, ImportHelper):
-    """Import grooms as hair curves, onto the active mesh if one is selected"""
+class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
+    """Import grooms as hair curves, onto the active mesh if one is selected. Esc cancels"""
 
     bl_idname = "hairloom.import_strands"
     bl_label = "Import Hair Strands"
@@ -77,35 +82,30 @@ class HAIRLOOM_OT_import_strands(bpy.types.Operator, ImportHelper):
         default=True,
     )
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        imported: list[bpy.types.Object] = []
-        head = active_mesh(context) if self.onto_mesh else None
-        with waiting(context):
-            ground = head and read_ground(head, context.evaluated_depsgraph_get())
-            for path in self._paths():
-                imported += self._imported(context, path, ground)
-        if not imported:
-            return {"CANCELLED"}
-        make_active(context, imported[::-1])
-        return {"FINISHED"}
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return cls.is_free()
 
-    def _imported(
-        self, context: bpy.types.Context, path: Path, ground: Ground | None
-    ) -> list[bpy.types.Object]:
-        """The new objects; none where the file cannot be used, so that the others still come in."""
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        """Where a file cannot be used, the others still come in."""
+        head = active_mesh(context) if self.onto_mesh else None
+        ground = head and read_ground(head, context.evaluated_depsgraph_get())
         choices = StrandImport(
             up=None if self.up == "FILE" else self.up,
             scale=self.scale,
             guides=self.guides.lower(),
         )
-        try:
-            hair, outcome = import_strands(path, ground, context.collection, choices)
-        except HairloomError as error:
-            report(self, "ERROR", error)
-            return []
-        tell(self, outcome)
-        return hair
+        found = yield from threaded(read_in_thread(self._paths(), ground, choices))
+        imported: list[bpy.types.Object] = []
+        for each in found:
+            if isinstance(each, FileStrands):
+                imported += add_to_scene(each, ground, context.collection)
+                tell(self, each.outcome)
+            elif each is found[-1] and not imported:
+                raise each  # nothing came in, so there is nothing to undo
+            else:
+                report(self, "ERROR", each)
+        make_active(context, imported[::-1])
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         return self.invoke_popup(context)

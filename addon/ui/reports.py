@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 
+from ..blender.base.gpu_context import gpu_refusals
 from ..blender.base.outcome import Outcome, dropped_phrase, report
 from ..errors import HairloomError
 
@@ -19,7 +20,8 @@ def reporting(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
     @functools.wraps(execute)
     def reported(self: Any, context: bpy.types.Context) -> set[str]:
         try:
-            return execute(self, context)
+            with gpu_refusals():
+                return execute(self, context)
         except HairloomError as error:
             report(self, "ERROR", error)
             return {"CANCELLED"}

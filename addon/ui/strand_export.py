@@ -12,7 +12,7 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes.bake_settings import frame_range
-from ..blender.base.file_names import file_of, file_stem
+from ..blender.base.file_names import file_stem, files_of
 from ..blender.base.outcome import Outcome
 from ..blender.properties.properties import property_annotations, settings_of
 from ..blender.strands.strand_export import StrandExport
@@ -125,9 +125,10 @@ class StrandExportOperator(LongWork, ExportHelper):
         hair, path = self._hair(context), Path(bpy.path.abspath(self.filepath))
         parts = [hair] if self.several == "one" else [[each] for each in hair]
         depsgraph = context.evaluated_depsgraph_get()
+        files = files_of(path, [part[0].name for part in parts])
         return [
             (
-                file_of(path, part[0].name, is_alone=len(parts) == 1),
+                file,
                 StrandExport.of(
                     part,
                     depsgraph,
@@ -136,7 +137,7 @@ class StrandExportOperator(LongWork, ExportHelper):
                     frames=self._frames(context.scene),
                 ),
             )
-            for part in parts
+            for file, part in zip(files, parts, strict=True)
         ]
 
     def _frames(self: Any, scene: bpy.types.Scene) -> range | None:

@@ -3,12 +3,15 @@
 import json
 import os
 import shutil
+import threading
+from collections import OrderedDict
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 from bake_files import contents, frames_in
+from windows_rules import windows_rules
 
 from hairloom.addon.blender.bakes import groom_hashes, playback
 from hairloom.addon.blender.bakes.cache import Cache, CacheWriter, Facts
@@ -327,6 +330,65 @@ def test_a_bake_that_cannot_take_its_place_is_kept(swinging, tmp_path, monkeypat
     (kept,) = (path for path in folder.glob("frames-*") if path != shown)
     assert str(kept) in raised.value.remedy
     assert Cache(kept).frame(LAST)["guides"].shape == (60, 16, 3)
+
+
+def test_a_render_and_the_window_read_a_bake_at_the_same_time(tmp_path):
+    """One lets go of a frame that the other one has just found."""
+    writer = CacheWriter(tmp_path / "bake")
+    writer.add_constants({"value": np.zeros(1)})
+    frames = range(1, 9)
+    for frame in frames:
+        writer.add(frame, {"value": np.full(1, frame)}, "hash")
+    writer.finish(Facts("Hair", 1, len(frames), 24.0, "numpy", "hash", "0.1.0"))
+    writer.publish()
+    cache = Cache(tmp_path / "bake")
+    other = threading.Thread(target=lambda: [cache.frame(frame) for frame in frames])
+
+    class Interrupted(OrderedDict):
+        def __contains__(self, frame):
+            is_there = super().__contains__(frame)
+            if is_there and not other.ident:
+                other.start()
+                other.join(0.2)  # it reads all, unless it has to wait for this one
+            return is_there
+
+    cache.frame(1)
+    cache._frames = Interrupted(cache._frames)
+    assert cache.frame(1)["value"][0] == 1
+    other.join()
+    assert cache.frame(8)["value"][0] == 8
+
+
+def test_frames_that_are_open_elsewhere_go_when_their_writer_is_gone(tmp_path):
+    """By Windows' rules: a player reads the bake before."""
+    folder = tmp_path / "bake"
+
+    def bake(value):
+        writer = CacheWriter(folder)
+        writer.add_constants({"value": np.full(3, value)})
+        writer.add(1, {"value": np.full(3, value)}, "hash")
+        writer.finish(Facts("Hair", 1, 1, 24.0, "numpy", "hash", "0.1.0"))
+        writer.publish()
+        writer.clean()
+
+    bake(1)
+    (held,) = folder.glob("frames-*/frame_000001.npz")
+    with windows_rules(held=[held]):
+        bake(2)
+        assert Cache(folder).frame(1)["value"].tolist() == [2, 2, 2]
+    assert held.is_file()
+    held.parent.rename(folder / held.parent.name.replace(f"-{os.getpid()}-", "-99999999-"))
+    with windows_rules():
+        bake(3)
+    assert Cache(folder).frame(1)["value"].tolist() == [3, 3, 3]
+    assert len(list(folder.glob("frames-*"))) == 1
+
+
+def test_a_folder_whose_path_is_too_long_is_said_to_be(tmp_path):
+    folder = tmp_path / ("x" * 100) / ("y" * (150 - len(str(tmp_path)) % 50))
+    with windows_rules(), pytest.raises(HairloomError, match="259 work here") as raised:
+        CacheWriter(folder).add_constants({"value": np.zeros(3)})
+    assert raised.value.remedy == "Choose a folder with a shorter path"
 
 
 def test_of_several_bakes_all_are_replaced_or_none(swinging, tmp_path, monkeypatch):

@@ -33,6 +33,23 @@ def press():
     bpy.context.view_layer.update()
 
 
+def test_cards_that_are_cancelled_leave_the_scene_as_it_was(hair):
+    """Esc closes the steps, before the first cards and before they are made again."""
+    before = sorted(obj.name for obj in bpy.data.objects)
+    for _ in range(2):
+        points = {obj.name: world_points(obj) for obj in card_objects(hair)}
+        steps = bpy.types.HAIRLOOM_OT_make_cards.steps(SimpleNamespace(), bpy.context)
+        hair.data.hairloom.cards.card_count += 3
+        assert next(steps).text == "Reading the hair"
+        next(steps)
+        steps.close()
+        assert sorted(obj.name for obj in bpy.data.objects) == before
+        for obj in card_objects(hair):
+            np.testing.assert_array_equal(world_points(obj), points[obj.name])
+        press()
+        before = sorted(obj.name for obj in bpy.data.objects)
+
+
 def values(obj, name, width=1):
     attribute = obj.data.attributes[name]
     part = "vector" if width == 3 else "value"

@@ -10,7 +10,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
 from hairloom.addon.blender.strands import child_python  # noqa: E402
-from hairloom.addon.exchange.files.child_process import same_packages  # noqa: E402
+from hairloom.addon.exchange.files.child_process import python_program, same_packages  # noqa: E402
 from hairloom.addon.exchange.files.subprocess_reader import run_reader, this_python  # noqa: E402
 
 SCRIPT = "import os, sys, numpy\nopen(sys.argv[-1], 'w').write(numpy.__file__)\nos._exit({code})\n"
@@ -19,9 +19,9 @@ SCRIPT = "import os, sys, numpy\nopen(sys.argv[-1], 'w').write(numpy.__file__)\n
 @pytest.fixture
 def afresh():
     """The command is looked for once a session."""
-    child_python.python_command.cache_clear()
+    child_python.found_python.cache_clear()
     yield child_python.python_command
-    child_python.python_command.cache_clear()
+    child_python.found_python.cache_clear()
 
 
 def numpy_of(command, folder):
@@ -70,6 +70,38 @@ def test_a_python_without_the_packages_is_passed_over(afresh, monkeypatch, tmp_p
     monkeypatch.setattr(sys, "prefix", str(tmp_path))
     monkeypatch.setenv("PATH", str(tmp_path))
     assert afresh() == child_python.blender_command()
+
+
+def test_a_python_that_is_only_slow_is_tried_again(afresh, monkeypatch):
+    """A cold disk at the first import does not decide for the whole session."""
+    is_slow = True
+    real = child_python.run_child
+
+    def run(command, *, seconds):
+        if is_slow:
+            raise subprocess.TimeoutExpired(command, seconds)
+        return real(command, seconds=seconds)
+
+    monkeypatch.setattr(child_python, "run_child", run)
+    assert afresh() == child_python.blender_command()
+    is_slow = False
+    assert Path(afresh()[0]).stem.startswith("python")
+    is_slow = True
+    assert Path(afresh()[0]).stem.startswith("python"), "one that was found is kept"
+
+
+def test_a_slow_python_does_not_hide_the_next_one(afresh, monkeypatch):
+    slow = python_program("/slow/python")
+    real = child_python.run_child
+
+    def run(command, *, seconds):
+        if tuple(command[: len(slow)]) == slow:
+            raise subprocess.TimeoutExpired(command, seconds)
+        return real(command, seconds=seconds)
+
+    monkeypatch.setattr(child_python, "_programs", lambda: ["/slow/python", sys.executable])
+    monkeypatch.setattr(child_python, "run_child", run)
+    assert afresh() == python_program(sys.executable)
 
 
 def test_a_program_that_is_no_python_is_not_taken(monkeypatch, tmp_path):

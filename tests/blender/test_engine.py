@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -176,36 +173,6 @@ def curves_of(obj: Any) -> Iterator[Any]:
         for strip in layer.strips:
             for bag in strip.channelbags:
                 yield from bag.fcurves
-
-
-@pytest.mark.skipif(
-    not (sys.platform.startswith("linux") and bpy.app.module), reason="hides Linux's drivers"
-)
-def test_without_a_gpu_driver_it_says_so_and_does_not_crash() -> None:
-    hidden = ("__EGL_VENDOR_LIBRARY_FILENAMES", "VK_DRIVER_FILES", "LIBGL_DRIVERS_PATH")
-    script = NO_GPU.format(tools=str(Path(__file__).parents[2] / "tools"))
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        env=os.environ | dict.fromkeys(hidden, "/nowhere"),
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "there is no GPU here" in done.stdout
-
-
-NO_GPU = """
-import sys
-sys.path.insert(0, {tools!r})
-from extension_loader import load_package
-import bpy
-load_package().register()
-bpy.context.scene.render.engine = "HAIRLOOM"
-try:
-    bpy.ops.render.render()
-except RuntimeError as error:
-    print(error)
-"""
 
 
 def test_panels_serve_the_engine_and_let_go(empty_scene: None) -> None:

@@ -15,6 +15,7 @@ from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.blender.scene.groom_attributes import store_groom
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
+from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.strands import StrandSet
 
 
@@ -175,6 +176,21 @@ def test_several_hairs_are_groups_of_one_groom(new_hair: Any, sphere: Any, tmp_p
     (one,) = curves_of(tmp_path / "x_Brows.abc").values()
     assert len(one["counts"]) == 20
     assert scalp.name == "Hair"
+
+
+def test_hairs_whose_names_are_one_as_files_get_two(
+    new_hair: Any, sphere: Any, tmp_path: Path
+) -> None:
+    """Hair.001 and hair_001 are one file on Windows, where the second would replace the first."""
+    other = write_curves("hair_001", hedgehog(20, 5, seed=2), sphere, bpy.context.collection)
+    hair = new_hair(sphere)
+    hair.name = "Hair.001"
+    other.select_set(True)
+    bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "x.tfx"), several="each")
+    files = sorted(tmp_path.iterdir())
+    assert len({each.name.casefold() for each in files}) == len(files) == 2
+    counts = sorted(read_tfx(each).strands.strand_count for each in files)
+    assert counts == sorted([20, len(hair.data.curves)])
 
 
 def test_children_are_strands_and_their_guides_are_marked(

@@ -177,6 +177,22 @@ def test_a_fault_of_ours_is_in_the_report_too(
     assert facts["status"] == "failed" and "ZeroDivisionError" in facts["error"]["problem"]
 
 
+def test_the_report_of_a_task_that_is_killed_says_so(
+    task: Callable[..., dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As it is on the disk while the task runs."""
+    task()
+    found: list[str] = []
+
+    def look(*_: Any) -> int:
+        found.append(json.loads((tmp_path / "report.json").read_text())["status"])
+        return 0
+
+    monkeypatch.setattr(command_line, "_code", look)
+    task()
+    assert found == ["begun"]
+
+
 def test_a_farm_reads_status_and_progress(
     task: Callable[..., dict[str, Any]], capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -89,3 +89,38 @@ def test_work_that_was_given_up_asks_and_goes_on_no_more() -> None:
     given_up.set()
     until(work.run_main_thread_steps)
     assert ended == [True, True]
+
+
+def test_who_gives_up_ends_the_child_that_is_waited_for() -> None:
+    waiting, ended = threading.Event(), threading.Event()
+
+    def wait_for_a_child(work: ThreadWork[None]) -> None:
+        with work.ending(ended.set):
+            waiting.set()
+            assert ended.wait(PATIENCE_S)
+
+    work = ThreadWork(wait_for_a_child, "test")
+    assert waiting.wait(PATIENCE_S) and not ended.is_set()
+    work.give_up()
+    assert ended.is_set(), "it waits for the thread"
+    until(lambda: work.is_done)
+    with pytest.raises(GivenUpError):
+        work.result()
+
+
+def test_work_that_was_given_up_begins_no_child_and_one_that_has_ended_is_left_alone() -> None:
+    given_up, begun, ended = threading.Event(), [], []
+
+    def work_with_children(work: ThreadWork[None]) -> None:
+        with work.ending(lambda: ended.append("the first")):
+            begun.append("the first")
+        assert given_up.wait(PATIENCE_S)
+        with work.ending(lambda: ended.append("the second")):
+            begun.append("the second")
+
+    work = ThreadWork(work_with_children, "test")
+    until(lambda: begun)
+    work.give_up()
+    given_up.set()
+    until(lambda: work.is_done)
+    assert begun == ["the first"] and ended == []

@@ -16,6 +16,7 @@ from tiers import few_in_commits
 pytest.importorskip("bpy", reason="turntables are drawn inside Blender")
 
 import bpy
+import gpu
 
 from hairloom.addon.blender.base.images import read_texture
 from hairloom.addon.blender.command_line import command_line
@@ -26,7 +27,7 @@ from hairloom.addon.blender.pictures.showing import file_name, shown_groom
 from hairloom.addon.blender.pictures.turntable import Turntable, TurntableSettings
 from hairloom.addon.blender.properties.presets import shipped
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files import stale_temp_files
+from hairloom.addon.exchange.files import moving, stale_temp_files
 
 pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context")]
 
@@ -217,6 +218,53 @@ def test_a_folder_that_is_a_file_is_named(table: Turntable, tmp_path: Path) -> N
         list(table.steps())
     assert caught.value.place == str(table.folder)
     assert table.folder.read_text() == "mine"
+
+
+def test_a_picture_that_another_program_holds_keeps_all_and_the_new_ones(
+    table: Turntable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By Windows' rules: what is open is not replaced. A turn never is of two grooms."""
+    list(table.steps())
+    before = {path.name: path.read_bytes() for path in table.folder.iterdir()}
+    held, real = table.files[2], moving.os.replace
+
+    def replace(source: Any, target: Any) -> None:
+        if Path(target) == held:
+            raise PermissionError(13, "Access is denied", str(source), None, str(target))
+        real(source, target)
+
+    monkeypatch.setattr(moving.os, "replace", replace)
+    table.points = table.points * np.float32(1.5)
+    with pytest.raises(HairloomError, match="all are as they were") as raised:
+        list(table.steps())
+    assert raised.value.place == str(held)
+    kept = table.folder / "turntable_0001 new"
+    assert kept.name in raised.value.remedy
+    assert sorted(each.name for each in kept.iterdir()) == sorted(before)
+    assert all((kept / name).read_bytes() != content for name, content in before.items())
+    files = {each.name: each.read_bytes() for each in table.folder.iterdir() if each.is_file()}
+    assert files == before
+
+
+@pytest.mark.parametrize("how", ["button", "verb"])
+def test_a_gpu_without_memory_is_a_message(
+    hair: bpy.types.Object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str, capfd: Any
+) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
+        raise RuntimeError("gpu.offscreen.new(...) failed with 'Texture allocation failed.'")
+
+    for kind in ("GPUOffScreen", "GPUTexture"):
+        monkeypatch.setattr(gpu.types, kind, refuse)
+    if how == "button":
+        with pytest.raises(RuntimeError) as raised:
+            bpy.ops.hairloom.turntable(directory=str(tmp_path), frames=2, size=32, samples=1)
+        text = str(raised.value)
+    else:
+        sizes = ["--frames", "2", "--width", "32", "--height", "32", "--samples", "1"]
+        assert command_line.run(["turntable", *GROWN, *sizes, "--output", str(tmp_path)]) == 1
+        text = capfd.readouterr().err
+    assert "the GPU refuses what drawing needs" in text and "smaller pictures" in text
+    assert "Traceback" not in text and list(tmp_path.iterdir()) == []
 
 
 def test_without_hair_the_buttons_say_so(extension: None, tmp_path: Path) -> None:

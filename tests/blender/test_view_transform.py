@@ -5,13 +5,17 @@ That Blender's window shows it so: tests/window/session_look.py.
 
 from __future__ import annotations
 
+import gc
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import bpy
 import numpy as np
 import pytest
+from full_disk import full_disk
 
+from hairloom.addon.blender.pictures.film import write_picture
 from hairloom.addon.blender.viewport import view_transform
 from hairloom.addon.blender.viewport.view_transform import (
     View,
@@ -19,7 +23,9 @@ from hairloom.addon.blender.viewport.view_transform import (
     shown_by_blender,
     view_of,
 )
+from hairloom.addon.errors import HairloomError
 from hairloom.addon.render.display import Display, DisplayTable, table_radiances
+from hairloom.addon.shading.stage_settings import StageSettings
 
 pytestmark = pytest.mark.draws
 
@@ -185,3 +191,30 @@ def test_a_transform_that_cannot_be_read_is_told_and_not_tried_again(
     assert not view_transform._known.wanted
     view_transform.prepare()
     assert view_transform.problem() == ""
+
+
+@pytest.mark.parametrize("most_bytes", [0, 3000])
+def test_a_full_disk_is_no_other_colours_and_nothing_that_python_must_not_see(
+    most_bytes: int, tmp_path: Path
+) -> None:
+    """A picture that is cut short. The error must hold none of the data that Blender has freed:
+    garbage collection then would crash Blender."""
+    held = []
+    with full_disk(most_bytes), pytest.raises((OSError, RuntimeError)) as raised:
+        shown_by_blender(LOOKS["AgX"], hair_colours())
+    held.append(raised.value)
+    frame = raised.value.__traceback__
+    while frame is not None:
+        names = {type(each).__name__ for each in frame.tb_frame.f_locals.values()}
+        assert not names & {"BlendData", "Scene", "Image"}
+        frame = frame.tb_next
+    gc.collect()
+    stage = StageSettings(view="agx")
+    with full_disk(most_bytes), pytest.raises(HairloomError, match="temporary files") as told:
+        write_picture(tmp_path / "a.png", np.ones((8, 512, 4), np.float32), stage)
+    assert "Free some space" in told.value.remedy and list(tmp_path.iterdir()) == []
+
+
+def test_a_look_that_this_blender_lacks_is_named(tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="Nowhere"):
+        shown_by_blender(View(transform="Nowhere"), hair_colours(4))

@@ -30,12 +30,14 @@ EXTENSION = "bl_ext.user_default.hairloom"
 #: Where in the extension what sessions look at is. Each module is named here and nowhere else.
 MODULES = {
     "card_object": "blender.cards.object",
+    "child_process": "exchange.files.child_process",
     "diagnostics": "blender.preview.diagnostics",
     "engine": "blender.engine.engine",
     "export_check": "ui.operators_export_check",
     "fin_modifier": "blender.scene.fin_modifier",
     "groom_file": "exchange.groom",
     "hair_file": "exchange.hair_file",
+    "import_groom": "blender.strands.import_groom",
     "latest_job": "blender.base.latest_job",
     "long_work": "ui.long_work",
     "overlay": "blender.viewport.overlay",

@@ -1,5 +1,5 @@
-"""Grooms of files in the window: the file browser of a menu entry, the popup of dropped files, undo
-and redo."""
+"""Grooms of files in the window: the file browser of a menu entry, the popup of dropped files, Esc
+while a file is read, undo and redo."""
 
 import sys
 from pathlib import Path
@@ -20,6 +20,7 @@ def steps():
     driver.enable_extension()
     set_the_scene()
     yield from the_menu_opens_a_browser_for_its_format()
+    yield from esc_ends_the_process_that_reads()
     yield from dropped_files_come_in_after_the_popup()
     yield from undo_and_redo()
 
@@ -71,11 +72,10 @@ def the_menu_opens_a_browser_for_its_format():
     assert grooms() == {}
 
 
-def dropped_files_come_in_after_the_popup():
+def drop_files():
     """What Blender does when files are dropped: it calls the operator with their names."""
-    handler = bpy.types.HAIRLOOM_FH_strands
     with in_the_view():
-        assert handler.poll_drop(bpy.context)
+        assert bpy.types.HAIRLOOM_FH_strands.poll_drop(bpy.context)
         bpy.ops.hairloom.import_strands(
             "INVOKE_DEFAULT",
             True,
@@ -83,6 +83,39 @@ def dropped_files_come_in_after_the_popup():
             directory=str(FOLDER),
             files=[{"name": "first.tfx"}, {"name": "second.hair"}],
         )
+
+
+def esc_ends_the_process_that_reads():
+    """A process that never ends reads the second file; nothing of the first one stays either."""
+    module, number = of_hairloom("import_groom"), FOLDER / "number"
+    real = module.read_strands
+    script = f"echo $$ > '{number}'; exec sleep 600"
+
+    def read(path, **how):
+        if path.suffix == ".hair":
+            of_hairloom("child_process").run_child(["/bin/sh", "-c", script], seconds=600)
+        return real(path, **how)
+
+    module.read_strands = read
+    drop_files()
+    yield
+    yield from press("RET")
+    yield from until(lambda: number.is_file() and number.read_text(), "no process reads")
+    work = of_hairloom("long_work")
+    assert work.running() == "Import Hair Strands"
+    assert not bpy.ops.hairloom.import_strands.poll(), "another import may begin"
+    driver.screenshot("reading")
+    yield from press("ESC")
+    yield from until(lambda: not work.running(), "Esc does not cancel")
+    child = Path("/proc", number.read_text().strip())
+    yield from until(lambda: not child.exists(), "the process goes on")
+    assert grooms() == {}
+    module.read_strands = real
+    number.unlink()
+
+
+def dropped_files_come_in_after_the_popup():
+    drop_files()
     yield
     assert grooms() == {}, "it does not ask before"
     driver.screenshot("popup")

@@ -19,6 +19,7 @@ import json
 import math
 import re
 import shutil
+import threading
 from collections import OrderedDict
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -30,6 +31,7 @@ from ...errors import HairloomError
 from ...exchange.files.array_file import read_arrays
 from ...exchange.files.atomic import write_bytes_atomic
 from ...exchange.files.moving import flush, flush_names
+from ...exchange.files.names import length_remark
 from ...exchange.files.stale_temp_files import MARK, is_stale, is_temporary, mark
 from .simulated import Arrays
 
@@ -148,7 +150,7 @@ class CacheWriter:
     def clean(self) -> None:
         """Remove the frames of the bake before this one.
 
-        Those that another program holds open stay until the next bake.
+        Those that another program holds open stay until a Blender that begins later bakes here.
         """
         if self._before is not None:
             _remove_frames(self.folder, _frames_named(self._before))
@@ -189,6 +191,7 @@ class Cache:
             _check(self.facts)
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise _damaged(folder / FACTS, str(error)) from error
+        self._lock = threading.Lock()  # renders read in their own thread
         self._frames: OrderedDict[int, Arrays] = OrderedDict()
         self._constants: Arrays | None = None
 
@@ -209,17 +212,21 @@ class Cache:
         Raises:
             HairloomError: the file is gone or damaged.
         """
-        if frame not in self._frames:
-            path = self._frame_folder / _frame_name(frame)
-            arrays = _read_arrays(path)
-            found = {name: (str(a.dtype), tuple(a.shape)) for name, a in arrays.items()}
-            if found != self._layout:
-                raise _damaged(path, "its arrays are not those of the other frames")
-            self._frames[frame] = arrays
-            while len(self._frames) > _KEPT:
-                self._frames.popitem(last=False)
-        self._frames.move_to_end(frame)
-        return self._frames[frame]
+        with self._lock:
+            if frame not in self._frames:
+                self._frames[frame] = self._read(_frame_name(frame))
+                while len(self._frames) > _KEPT:
+                    self._frames.popitem(last=False)
+            self._frames.move_to_end(frame)
+            return self._frames[frame]
+
+    def _read(self, name: str) -> Arrays:
+        path = self._frame_folder / name
+        arrays = _read_arrays(path)
+        found = {name: (str(a.dtype), tuple(a.shape)) for name, a in arrays.items()}
+        if found != self._layout:
+            raise _damaged(path, "its arrays are not those of the other frames")
+        return arrays
 
     @classmethod
     def found(cls, folder: Path) -> Self | None:
@@ -391,8 +398,12 @@ def _damaged(path: Path, why: str) -> HairloomError:
 
 
 def _unwritable(folder: Path, error: OSError) -> HairloomError:
+    why = error.strerror or str(error)
+    remark = length_remark(folder / f"frames-{mark()}" / _frame_name(0), why)
     return HairloomError(
-        f"the bake cannot be written ({error.strerror or error})",
+        f"the bake cannot be written ({why}{remark})",
         place=str(folder),
-        remedy="Choose a folder that you may write to, with space left",
+        remedy="Choose a folder with a shorter path"
+        if remark
+        else "Choose a folder that you may write to, with space left",
     )

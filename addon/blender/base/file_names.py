@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from ...exchange.files.names import plain_name
+from ...exchange.files.names import distinct_names, no_device, plain_name
 
 
 def file_stem(hair_name: str) -> str:
     """What a file is called after the hair in it: no character that a file system refuses."""
-    return plain_name(hair_name)
+    return no_device(plain_name(hair_name))
 
 
-def file_of(path: Path, hair_name: str, *, is_alone: bool) -> Path:
-    """Where a hair goes; of several in a file each, it has its name behind the file's."""
-    return path if is_alone else path.with_stem(f"{path.stem}_{file_stem(hair_name)}")
+def files_of(path: Path, hair_names: Sequence[str]) -> list[Path]:
+    """Where each hair goes; of several in a file each, it has its name behind the file's.
+
+    Names that differ for Blender alone, such as "Hair.001" and "hair_001", get a number.
+    """
+    if len(hair_names) == 1:
+        return [path]
+    stems = distinct_names(f"{path.stem}_{file_stem(name)}" for name in hair_names)
+    return [path.with_stem(stem) for stem in stems]

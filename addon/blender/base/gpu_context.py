@@ -1,15 +1,111 @@
-"""The GPU context of this process, created if there is none, and the GPU's name."""
+"""The GPU context of this process, created if there is none, and the GPU's name.
+
+In the background Blender makes a context only when asked. Where there is no driver that draws,
+asking crashes Blender; so another process tries first.
+"""
 
 from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from subprocess import TimeoutExpired
 
 import bpy
 import gpu
 
+from ...errors import HairloomError
+from ...exchange.files.child_process import run_child
+
+#: Exits with 0 where OpenGL or Vulkan finds a device without a window, as Blender's do.
+_TRIAL = """
+import ctypes, sys
+
+def opengl():
+    egl = ctypes.CDLL("libEGL.so.1")
+    egl.eglGetDisplay.restype = ctypes.c_void_p
+    egl.eglGetDisplay.argtypes = [ctypes.c_void_p]
+    egl.eglGetPlatformDisplay.restype = ctypes.c_void_p
+    egl.eglGetPlatformDisplay.argtypes = [ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
+    egl.eglInitialize.argtypes = [ctypes.c_void_p] * 3
+    surfaceless = 0x31DD
+    displays = egl.eglGetDisplay(None), egl.eglGetPlatformDisplay(surfaceless, None, None)
+    return any(each and egl.eglInitialize(each, None, None) for each in displays)
+
+def vulkan():
+    vulkan = ctypes.CDLL("libvulkan.so.1")
+    class Info(ctypes.Structure):
+        _fields_ = [("type", ctypes.c_int)] + [(str(i), ctypes.c_void_p) for i in range(7)]
+    info, instance, count = Info(1), ctypes.c_void_p(), ctypes.c_uint32()
+    if vulkan.vkCreateInstance(ctypes.byref(info), None, ctypes.byref(instance)):
+        return False
+    vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None)
+    return count.value > 0
+
+def works(trial):
+    try:
+        return trial()
+    except (OSError, AttributeError):
+        return False
+
+sys.exit(0 if works(opengl) or works(vulkan) else 1)
+"""
+
+
+#: How errors of Blender's module begin where no texture or target can be made.
+_REFUSAL = "gpu."
+#: Seconds for a driver to answer, on a busy machine too.
+_PATIENCE = 60.0
+
 
 def ensure_gpu() -> None:
-    """A GPU context in background mode, where Blender makes one only when asked."""
-    if bpy.app.background:
-        gpu.init()
+    """A GPU context for this thread in background mode.
+
+    Raises:
+        HairloomError: there is none to be had.
+    """
+    if not bpy.app.background:
+        return
+    if not gpu_in_use()["backend"] and not _can_draw():
+        raise HairloomError(
+            "there is no GPU here, and no software driver in place of one",
+            place="render",
+            remedy="Install Mesa's drivers (libegl1, libgl1-mesa-dri) or render on another machine",
+        )
+    gpu.init()
+
+
+@cache
+def _can_draw() -> bool:
+    """Elsewhere than on Linux there always is a driver."""
+    if not sys.platform.startswith("linux"):
+        return True
+    try:
+        return run_child([sys.executable, "-I", "-c", _TRIAL], seconds=_PATIENCE).returncode == 0
+    except TimeoutExpired:  # Blender would wait for the same driver
+        return False
+    except OSError:  # this Blender has no Python of its own to ask with
+        return True
+
+
+@contextmanager
+def gpu_refusals() -> Iterator[None]:
+    """What the GPU refuses inside, such as memory, becomes a message.
+
+    Raises:
+        HairloomError: it has refused something.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        if not str(error).startswith(_REFUSAL):
+            raise
+        raise HairloomError(
+            f"the GPU refuses what drawing needs ({error})",
+            place="render",
+            remedy="Close other programs that use the GPU, or choose smaller pictures and textures",
+        ) from error
 
 
 def is_interrupted() -> bool:

@@ -41,6 +41,7 @@ class ThreadWork[T]:
         self._lock = threading.Lock()
         self._request: _Request | None = None
         self._is_given_up = self._is_committed = False
+        self._end: Callable[[], None] | None = None
         self._result: list[T] = []
         self._error: BaseException | None = None
         # a daemon, so that Blender may quit whatever is being done
@@ -83,6 +84,26 @@ class ThreadWork[T]:
                 raise GivenUpError
             self._is_committed = True
             yield
+
+    @contextmanager
+    def ending(self, end: Callable[[], None]) -> Iterator[None]:
+        """In the thread, for `exchange.files.child_process.ending`: whoever gives up the work
+        ends the child.
+
+        Raises:
+            GivenUpError: it is given up.
+        """
+        with self._lock:
+            if self._is_given_up:
+                raise GivenUpError
+            self._end = end
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._end = None
+        if self._is_given_up:
+            raise GivenUpError
 
     @property
     def is_committed(self) -> bool:
@@ -136,6 +157,8 @@ class ThreadWork[T]:
         with self._lock:
             self._is_given_up = True
             request, self._request = self._request, None
+            if self._end is not None:
+                self._end()
         if request is not None:
             request.steps.close()  # here, since it may hold what only this thread may free
             request.answer.set_exception(GivenUpError())

@@ -28,6 +28,7 @@ from ...cards.follow import CardBinding
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...cards.steps import map_progress, result_of
+from ...errors import HairloomError
 from ...params import SettingsMap
 from ...pipeline import Pose, Rig
 from ...render.atlas_pass import baked_maps, baking
@@ -273,7 +274,7 @@ def has_gpu() -> bool:
     try:
         ensure_gpu()
         gpu.platform.backend_type_get()
-    except (SystemError, RuntimeError):
+    except (HairloomError, SystemError, RuntimeError):
         return False
     return True
 

@@ -15,6 +15,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...params import SettingsMap
+from ..base.gpu_context import gpu_refusals
 from ..base.interruption import Interrupted, interruptible
 from ..base.report import Report
 from .bake_job import BAKE
@@ -87,7 +88,7 @@ def parser() -> argparse.ArgumentParser:
 def _code(verb: Verb, options: argparse.Namespace, report: Report) -> int:
     """Do it, and say how it went."""
     try:
-        with interruptible():
+        with interruptible(), gpu_refusals():
             _run(verb, options, report)
     except HairloomError as error:
         print(f"hairloom: {error}", file=sys.stderr)

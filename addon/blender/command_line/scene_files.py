@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import errno
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+import shutil
+import struct
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ...errors import HairloomError
-from ...exchange.files.atomic import unwritable
+from ...exchange.files.atomic import atomic_write, unwritable
+from ...exchange.files.stale_temp_files import temporary_beside
 from ..bakes.bake_settings import absolute, folder_of
 from ..base.suspension import suspended
+
+#: how compressed files begin and end, the number of their frames, and what a file's end needs
+_ZSTD, _SEEK_TABLE = b"\x28\xb5\x2f\xfd", b"\xb1\xea\x92\x8f"
+_COUNT, _END_SIZE, _END_BLOCK = struct.Struct("<I"), 64, 32
 
 
 def open_scene(path: Path) -> None:
@@ -60,9 +68,10 @@ def check_saving(output: Path | None, *, over: bool) -> None:
 
 
 def save_scene(path: Path | None = None) -> Path:
-    """Save the open scene, over its own file or as another one.
+    """Save the open scene, over its own file or as another one, whole or not at all.
 
-    Blender writes beside the file and renames at the end, so that it is there whole or not at all.
+    Blender says nothing when the disk fills up while it writes a compressed file, and replaces the
+    old one with what it has. So it writes a copy here, which is checked first.
 
     Raises:
         HairloomError: it has no file of its own, or it cannot be written.
@@ -70,26 +79,57 @@ def save_scene(path: Path | None = None) -> Path:
     check_saving(path, over=path is None)
     target = Path(bpy.data.filepath) if path is None else path
     _keep_bakes(target.resolve().parent)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with _backups(path is None):
-            bpy.ops.wm.save_as_mainfile(filepath=str(target.resolve()))
-    except (OSError, RuntimeError) as error:
-        raise unwritable(target, str(error).strip()) from error
+    with atomic_write(target) as temporary:
+        try:
+            bpy.ops.wm.save_as_mainfile(filepath=str(temporary), copy=True)
+        except RuntimeError as error:
+            raise unwritable(target, str(error).removeprefix("Error:").strip()) from error
+        if not is_whole(temporary):
+            raise unwritable(target, os.strerror(errno.ENOSPC))
+        if path is None:
+            _keep_versions(target.resolve())
     return target
 
 
-@contextmanager
-def _backups(are_kept: bool) -> Iterator[None]:
-    """An artist's own file keeps its backups (.blend1); what a job makes needs none."""
-    paths = bpy.context.preferences.filepaths
-    count = paths.save_version
-    if not are_kept:
-        paths.save_version = 0
-    try:
-        yield
-    finally:
-        paths.save_version = count
+def is_whole(path: Path) -> bool:
+    """Whether a .blend file has been written to its end.
+
+    A compressed one is a row of frames and a table of their sizes (Zstandard's seekable format),
+    another one ends with a block of this name.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        is_compressed = file.read(4) == _ZSTD
+        file.seek(max(size - _END_SIZE, 0))
+        end = file.read()
+        if not is_compressed:
+            return end[-_END_BLOCK:].startswith(b"ENDB")
+        if len(end) < _END_SIZE or not end.endswith(_SEEK_TABLE):
+            return False
+        (count,) = _COUNT.unpack_from(end, len(end) - 9)
+        table = 8 + 8 * count + 9
+        if table > size:
+            return False
+        file.seek(size - table + 8)
+        sizes = np.frombuffer(file.read(8 * count), "<u4")[::2]
+    return int(sizes.sum(dtype=np.int64)) + table == size
+
+
+def _keep_versions(path: Path) -> None:
+    """Keep the file before as PATH1, that one as PATH2 and so on, as Blender does, as many as the
+    preferences say."""
+    count = bpy.context.preferences.filepaths.save_version
+    names = [path, *(path.with_name(f"{path.name}{n}") for n in range(1, count + 1))]
+    for newer, older in reversed(list(pairwise(names[1:]))):
+        if newer.exists():
+            os.replace(newer, older)
+    if count:
+        beside = temporary_beside(path)
+        try:
+            shutil.copy2(path, beside)
+            os.replace(beside, names[1])
+        finally:
+            beside.unlink(missing_ok=True)
 
 
 def _keep_bakes(folder: Path) -> None:

@@ -18,9 +18,9 @@ from ...render.pixel_filter import jitters
 from ...render.scene_pass import Rgba, ScenePass
 from ...render.scene_snapshot import SceneSnapshot
 from ...shading.picture_settings import PictureSettings
+from ..base.gpu_context import ensure_gpu
 from ..properties.properties import settings_of
 from .engine_camera import border_window, camera_warnings, read_camera
-from .engine_gpu import ensure_gpu_for_render
 from .engine_scene import SceneReader
 
 COMBINED, DEPTH, NUMBERS = "Combined", "Depth", "Object Index"
@@ -67,7 +67,7 @@ class Still:
     """
 
     def __init__(self, engine: Any, depsgraph: bpy.types.Depsgraph) -> None:
-        ensure_gpu_for_render()
+        ensure_gpu()
         self._engine, self._depsgraph = engine, depsgraph
         self._render = depsgraph.scene.render
         self._settings = settings_of(depsgraph.scene.hairloom.picture, PictureSettings)

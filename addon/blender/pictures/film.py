@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,12 @@ def _developed(colors: Floats, stage: StageSettings) -> Floats:
             f"this Blender has no view transform '{transform}' with the look '{look}'",
             place="stage.view",
             remedy="Choose another one, such as --set stage.view=standard",
+        ) from error
+    except (OSError, RuntimeError) as error:
+        raise HairloomError(
+            "colours cannot be put down in the folder for temporary files",
+            place=tempfile.gettempdir(),
+            remedy="Free some space there, and check that you may write to it",
         ) from error
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import bpy
 
 from ...arrays import Floats
+from ...exchange.files.names import no_device
 from ...pipeline import Pose
 from ...shading.ambient_settings import AmbientSettings
 from ..base.objects import head_of
@@ -57,7 +58,7 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
 
 def file_name(name: str) -> str:
     """A data-block's name as that of a file."""
-    return re.sub(r"[^\w .-]+", "_", name).strip(" .") or "groom"
+    return no_device(re.sub(r"[^\w .-]+", "_", name).strip(" .") or "groom")
 
 
 def _studio(hair: bpy.types.Object, groom: PreparedGroom, settings: GroomSettings) -> Studio:

@@ -1,13 +1,11 @@
 """A turntable: the camera circles a groom once, one picture a frame, and a video of them.
 
-Pictures are written into a temporary folder and moved when all are done, so that a cancelled or
-failed turntable leaves nothing half-finished.
+Pictures are written into a temporary folder and moved together when all are done, so that a
+cancelled or failed turntable leaves nothing half-finished, and the one before as it was.
 """
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -17,7 +15,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...exchange.files.stale_temp_files import remove_stale_files, temporary_beside
+from ...exchange.files.file_set import written_together
 from ...pipeline import Pose
 from ...render.camera import Camera, frame_camera
 from ...shading.lights import Light
@@ -144,7 +142,7 @@ class Turntable:
             HairloomError: nothing can be written there.
         """
         chosen = self.settings
-        with _moved_when_done(self.folder) as beside:
+        with _written_when_done(self.files[0]) as beside:
             frames = [beside / path.name for path in self.files[: chosen.frames]]
             for index, path in enumerate(frames):
                 self.studio.write(path, self.picture(index))
@@ -177,33 +175,23 @@ def _turned_about(middle: Floats, turns: float) -> Floats:
 
 
 @contextmanager
-def _moved_when_done(folder: Path) -> Iterator[Path]:
-    """An empty folder. Its files move to `folder` if the block succeeds, else they are deleted."""
+def _written_when_done(first: Path) -> Iterator[Path]:
+    """An empty folder whose files move beside `first`, which is one of them, when the block ends
+    well. When it does not, a folder that was not there before goes again."""
+    folder = first.parent
     is_new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        remove_stale_files(folder)
-        beside = temporary_beside(folder / "turntable")
-        beside.mkdir()
     except OSError as error:
-        raise _unwritable(folder, error) from error
-    is_done = False
+        raise HairloomError(
+            f"nothing can be written into this folder ({error.strerror or error})",
+            place=str(folder),
+            remedy="Choose a folder that you may write to, with space left",
+        ) from error
     try:
-        yield beside
-        for file in sorted(beside.iterdir()):
-            os.replace(file, folder / file.name)
-        is_done = True
-    except OSError as error:
-        raise _unwritable(folder, error) from error
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-        if is_new and not is_done and not any(folder.iterdir()):
+        with written_together(first) as beside:
+            yield beside
+    except BaseException:
+        if is_new and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
-
-
-def _unwritable(folder: Path, error: OSError) -> HairloomError:
-    return HairloomError(
-        f"nothing can be written into this folder ({error.strerror or error})",
-        place=str(folder),
-        remedy="Choose a folder that you may write to, with space left",
-    )
+        raise

@@ -26,17 +26,36 @@ _PACKAGES = {"numpy": "numpy", "alembic3d": "alembic3d", "pxr": "pxr.Usd"}
 _PATIENCE = 30.0
 
 
-@cache
 def python_command() -> tuple[str, ...] | None:
     """The command, to which a script and its arguments are added.
 
     None: there is no Python with these packages, and no Blender to start either.
     """
+    try:
+        return found_python() or blender_command()
+    except TimeoutExpired:
+        return blender_command()
+
+
+@cache
+def found_python() -> tuple[str, ...] | None:
+    """The first Python with these packages, looked for once; None: there is none.
+
+    Raises:
+        TimeoutExpired: one was too slow to tell, and no other has them. That is not kept: next
+            time its files are in memory.
+    """
     loaded = [module for name, module in _PACKAGES.items() if importlib.util.find_spec(name)]
+    too_slow: TimeoutExpired | None = None
     for program in _programs():
-        if _loads(python_program(program), loaded):
-            return python_program(program)
-    return blender_command()
+        try:
+            if _loads(python_program(program), loaded):
+                return python_program(program)
+        except TimeoutExpired as error:
+            too_slow = error
+    if too_slow is not None:
+        raise too_slow
+    return None
 
 
 def python_for(path: Path) -> tuple[str, ...] | None:
@@ -82,5 +101,5 @@ def _loads(command: tuple[str, ...], modules: list[str]) -> bool:
     code = ["-c", "import " + ", ".join(modules)]
     try:
         return run_child([*command, *code], seconds=_PATIENCE).returncode == 0
-    except (OSError, TimeoutExpired):
+    except OSError:
         return False  # so that the next one is tried

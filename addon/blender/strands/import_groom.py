@@ -1,15 +1,22 @@
-"""Strands of files into the open scene: hair curves on a mesh, with all that the files say."""
+"""Strands of files into the open scene: hair curves on a mesh, with all that the files say.
+
+A file is read without Blender's data, so that a thread can do it: `read_in_thread`. What was read
+comes into the scene at once.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ...errors import HairloomError
+from ...exchange.files import child_process
+from ...exchange.files.file_space import FileSpace
 from ...exchange.groom import Groom
 from ...exchange.read_groom import ReadGroom
 from ...exchange.strand_formats import STRAND_FORMATS, strand_format
@@ -19,6 +26,7 @@ from ...groom.roots import bind_roots
 from ...strands import StrandSet, Surface
 from ...strands.closest_point import ClosestPointSearch
 from ..base.outcome import Outcome
+from ..base.thread_work import ThreadWork
 from ..scene.curves import write_curves
 from ..scene.groom_attributes import store_groom
 from ..scene.surfaces import read_surface
@@ -48,10 +56,22 @@ class StrandImport:
 
 @dataclass(frozen=True)
 class Ground:
-    """The mesh that imported hair is bound to, read once for all files."""
+    """The mesh that imported hair is bound to, read once for all files.
+
+    name: of the head, which a thread must not ask for.
+    """
 
     head: bpy.types.Object
+    name: str
     surface: Surface
+
+
+@dataclass(frozen=True)
+class FileStrands:
+    """What a file brings into the scene: hair of these names, and what is said of it."""
+
+    hair: tuple[tuple[Groom, str], ...]
+    outcome: Outcome
 
 
 def read_ground(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Ground:
@@ -60,7 +80,7 @@ def read_ground(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Groun
     Raises:
         HairloomError: it has no faces.
     """
-    return Ground(head, read_surface(head, depsgraph, need_uv=False, place=head.name))
+    return Ground(head, head.name, read_surface(head, depsgraph, need_uv=False, place=head.name))
 
 
 def import_strands(
@@ -77,25 +97,60 @@ def import_strands(
     Raises:
         HairloomError: the file cannot be read, or is of another scale or place than the mesh.
     """
-    choices = choices or StrandImport()
-    read = _read(path, choices)
-    groom, warnings = _bound(read.groom, ground, choices, path)
-    objects = [
-        _written(each, path.stem + ending, ground, collection)
-        for each, ending in _objects(groom, choices.guides)
-    ]
-    result = f"{path.name}: {_counts(groom)}, {_format(path, read)}"
-    return objects, Outcome(result, read.dropped, (*read.notes, *warnings))
+    read = read_file(path, ground, choices or StrandImport())
+    return add_to_scene(read, ground, collection), read.outcome
 
 
-def _read(path: Path, choices: StrandImport) -> ReadGroom:
-    return read_strands(
+def read_file(path: Path, ground: Ground | None, choices: StrandImport) -> FileStrands:
+    """Read a file and bind it to the mesh; touches nothing of Blender's.
+
+    Raises:
+        HairloomError: as `import_strands`.
+    """
+    read = read_strands(
         path,
         up=choices.up,
         scale=choices.scale,
         parts="strands" if choices.guides == "leave" else "both",
         python=choices.python or python_for(path),
     )
+    groom, warnings = _bound(read, ground, choices, path)
+    hair = tuple((each, path.stem + end) for each, end in _objects(groom, choices.guides))
+    result = f"{path.name}: {_counts(groom)}, {_format(path, read)}"
+    return FileStrands(hair, Outcome(result, read.dropped, (*read.notes, *warnings)))
+
+
+def read_in_thread(
+    paths: Sequence[Path], ground: Ground | None, choices: StrandImport
+) -> ThreadWork[list[FileStrands | HairloomError]]:
+    """Read files beside the window, each to what it holds or why it cannot be used.
+
+    Who gives the work up ends the process that reads.
+    """
+
+    def read(path: Path) -> FileStrands | HairloomError:
+        try:
+            return read_file(path, ground, choices)
+        except HairloomError as error:
+            return error
+
+    def work(thread: ThreadWork[list[FileStrands | HairloomError]]) -> Any:
+        child_process.ending.set(thread.ending)  # of this thread alone
+        found = []
+        for number, path in enumerate(paths, 1):
+            which = f", {number} of {len(paths)}" if len(paths) > 1 else ""
+            thread.report(f"Reading {path.name}{which}")
+            found.append(read(path))
+        return found
+
+    return ThreadWork(work, "Hairloom import")
+
+
+def add_to_scene(
+    read: FileStrands, ground: Ground | None, collection: bpy.types.Collection
+) -> list[bpy.types.Object]:
+    """The new objects, guides that stand apart last."""
+    return [_written(groom, name, ground, collection) for groom, name in read.hair]
 
 
 def _objects(groom: Groom, guides: str) -> list[tuple[Groom, str]]:
@@ -116,43 +171,45 @@ def _written(
 
 
 def _bound(
-    groom: Groom, ground: Ground | None, choices: StrandImport, path: Path
+    read: ReadGroom, ground: Ground | None, choices: StrandImport, path: Path
 ) -> tuple[Groom, tuple[str, ...]]:
     """Strands with the mesh's UVs at their roots, which Blender's own hair tools go by."""
+    groom = read.groom
     if ground is None:
         return groom, _size_warning(groom.strands, path)
-    head, surface = ground.head, ground.surface
+    surface = ground.surface
     loose = groom.strands if surface.corner_uv is None else replace(groom.strands, root_uv=None)
     try:
         bound = bind_roots(loose, surface, place=path.name)
     except HairloomError as error:
-        remedy = _remedy(loose, surface, choices, path)
+        remedy = _remedy(loose, read.axes, surface, choices)
         if remedy is None:
             raise
         raise HairloomError(error.problem, place=path.name, remedy=remedy) from error
     warnings = []
     distance = float(np.median(bound.distance))
     if distance > LOOSE_DISTANCE * float(np.linalg.norm(np.ptp(surface.positions, axis=0))):
-        remedy = _remedy(loose, surface, choices, path) or "Check the axes and the place of both"
+        remedy = _remedy(loose, read.axes, surface, choices)
+        remedy = remedy or "Check the axes and the place of both"
         warnings.append(
-            f"{path.name}: its roots lie {distance * 1e3:.3g} mm from {head.name} (median). "
+            f"{path.name}: its roots lie {distance * 1e3:.3g} mm from {ground.name} (median). "
             f"{remedy}."
         )
     if surface.corner_uv is None:
         warnings.append(
-            f"{head.name}: it has no UVs, so Blender's own hair tools cannot hold these strands. "
+            f"{ground.name}: it has no UVs, so Blender's own hair tools cannot hold these strands. "
             "Unwrap it (Edit Mode, UV > Unwrap)."
         )
     return replace(groom, strands=bound.strands), tuple(warnings)
 
 
-def _remedy(strands: StrandSet, surface: Surface, choices: StrandImport, path: Path) -> str | None:
-    """How the file would fit the mesh, if there is a way: it is read again to know."""
-    candidates = {"": strands.roots}
-    for up in ("Y", "Z"):
-        roots = _read(path, replace(choices, up=up)).strands.roots
-        if not np.array_equal(roots, strands.roots):
-            candidates[up] = roots
+def _remedy(
+    strands: StrandSet, axes: FileSpace, surface: Surface, choices: StrandImport
+) -> str | None:
+    """How the file would fit the mesh, if there is a way."""
+    up = "Y" if axes.up == "Z" else "Z"
+    in_file = axes.to_file(strands.roots)
+    candidates = {"": strands.roots, up: replace(axes, up=up).from_file(in_file)}
     fit = better_fit(candidates, ClosestPointSearch(surface))
     if fit is None:
         return None

@@ -15,6 +15,7 @@ done by a timer, once for each combination; drawing only looks up what is there.
 
 from __future__ import annotations
 
+import errno
 import tempfile
 import traceback
 from collections import OrderedDict
@@ -165,9 +166,23 @@ def shown_by_blender(view: View, radiances: Floats) -> Floats:
 
     Raises:
         OSError, RuntimeError: no picture can be written to the folder for temporary files.
+        TypeError: this Blender has no such transform or look.
     """
     pixels = np.ones((radiances.size // 3, 4), np.float32)
     pixels[:, :3] = radiances.reshape(-1, 3)
+    problem = _show(view, pixels)
+    if problem is not None:
+        raise problem
+    return pixels[:, :3].reshape(radiances.shape)
+
+
+def _show(view: View, pixels: Floats) -> Exception | None:
+    """Replace these colours, (count, 4), by what is shown of them.
+
+    Returns:
+        What has failed, without its traceback: that would hold data of Blender's that is freed by
+        then, and Blender crashes when Python's garbage collection comes across it.
+    """
     # one row is at most as long as pictures may be
     width = next(w for w in range(min(len(pixels), 8192), 0, -1) if len(pixels) % w == 0)
     with (
@@ -175,14 +190,19 @@ def shown_by_blender(view: View, radiances: Floats) -> Floats:
         bpy.data.temp_data() as data,
     ):
         path = Path(folder) / "colors.png"
-        scene = _scene_with(view, data)
-        colors = data.images.new("Colors", width, len(pixels) // width, float_buffer=True)
-        colors.pixels.foreach_set(pixels.ravel())
-        colors.save_render(str(path), scene=scene)
-        shown = data.images.load(str(path))
-        shown.colorspace_settings.is_data = True
-        shown.pixels.foreach_get(pixels.ravel())
-    return pixels[:, :3].reshape(radiances.shape)
+        try:
+            scene = _scene_with(view, data)
+            colors = data.images.new("Colors", width, len(pixels) // width, float_buffer=True)
+            colors.pixels.foreach_set(pixels.ravel())
+            colors.save_render(str(path), scene=scene)
+            shown = data.images.load(str(path))
+            shown.colorspace_settings.is_data = True
+            if len(shown.pixels) != pixels.size:
+                return OSError(errno.ENOSPC, "a picture was written only in part", folder)
+            shown.pixels.foreach_get(pixels.ravel())
+        except Exception as error:
+            return error.with_traceback(None)
+    return None
 
 
 def _scene_with(view: View, data: bpy.types.BlendData) -> bpy.types.Scene:

@@ -71,7 +71,8 @@ def read_groom_alembic(
     if not groom.strands.strand_count:
         raise _error(path, "it holds nothing but guides", "Read it with its guides")
     version = f"{_number(found, 'major')}.{_number(found, 'minor')}"
-    return ReadGroom(groom, float(version), tuple(f"{path.name}: {note}." for note in notes))
+    notes = [f"{path.name}: {note}." for note in notes]
+    return ReadGroom(groom, float(version), replace(space, per_metre=1.0), tuple(notes))
 
 
 def _check(path: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ...errors import HairloomError
 from .moving import committing, flush, flush_names, free_name, move
-from .names import check_name
+from .names import check_name, length_remark
 from .stale_temp_files import remove_stale_files, temporary_beside
 
 
@@ -120,10 +120,13 @@ def check_place(path: Path) -> None:
 
 def unwritable(path: Path, why: str) -> HairloomError:
     """The message for a place where nothing can be written."""
+    remark = length_remark(temporary_beside(path), why)
     return HairloomError(
-        f"this file cannot be written ({why})",
+        f"this file cannot be written ({why}{remark})",
         place=str(path),
-        remedy="Choose a folder that you may write to, with space left, "
+        remedy="Choose a folder with a shorter path"
+        if remark
+        else "Choose a folder that you may write to, with space left, "
         "and close other programs that use the file",
     )
 

@@ -2,7 +2,8 @@
 
 A child runs no code that somebody has put into the current folder or the environment. It works in
 a folder that comes with Python, Python's variables are not handed on, and the modules that it finds
-are those of this process. It gets no input, shows no window and has an end.
+are those of this process. It gets no input, shows no window and has an end, before which it can be
+ended by who no longer waits for it.
 """
 
 from __future__ import annotations
@@ -10,11 +11,19 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from contextvars import ContextVar
 from pathlib import Path
 
 #: for a process on Windows, which else would show one
 _NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)
+
+#: What surrounds a child's run, given what ends the child; who may give up the work sets it, and it
+#: may raise instead.
+ending: ContextVar[Callable[[Callable[[], None]], AbstractContextManager[object]]] = ContextVar(
+    "ending", default=nullcontext
+)
 
 
 def run_child(
@@ -30,15 +39,22 @@ def run_child(
     Raises:
         OSError: it cannot be started. subprocess.TimeoutExpired: it was killed.
     """
-    return subprocess.run(
+    child = subprocess.Popen(
         list(command),
         cwd=Path(os.__file__).parent,
         stdin=subprocess.DEVNULL,
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         env=_environment() | dict(settings or {}),
-        timeout=seconds,
         creationflags=_NO_WINDOW,
     )
+    with child:
+        try:
+            with ending.get()(child.kill):
+                output, errors = child.communicate(timeout=seconds)
+        finally:
+            child.kill()  # where it has ended this does nothing
+    return subprocess.CompletedProcess(list(command), child.returncode, output, errors)
 
 
 def python_program(program: str) -> tuple[str, ...]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import unicodedata
-from collections.abc import Container
+from collections.abc import Container, Iterable
 from pathlib import Path
 
 from ...errors import HairloomError
@@ -12,6 +14,8 @@ from ...errors import HairloomError
 #: Names that Windows keeps for devices, with any suffix.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(\..*)?", re.IGNORECASE)
 _UNSAFE = re.compile(r"[^\w\-. ]+")
+#: Letters of a path: Windows takes longer ones only where it and the program are set up for them.
+MAX_PATH = 259 if os.name == "nt" else 4095
 #: Letters of a folder's name, at most 200 bytes; Windows has 260 for a whole path.
 _MAX_LETTERS = 50
 
@@ -30,6 +34,14 @@ def check_name(path: Path) -> None:
             place=ascii(str(path)),
             remedy="Rename the file or the folder",
         ) from error
+
+
+def length_remark(path: Path, why: str) -> str:
+    """What else there is to say where the system calls a path unknown that is too long for it."""
+    length = len(os.path.abspath(path))
+    if why != os.strerror(errno.ENOENT) or length <= MAX_PATH:
+        return ""
+    return f"; while it is written it has a path of {length} letters, and {MAX_PATH} work here"
 
 
 def plain_name(name: str, fallback: str = "hair") -> str:
@@ -52,10 +64,27 @@ def folder_name(name: str, taken: Container[str] = (), fallback: str = "hair") -
         taken: names that others have, in the form of `as_compared`.
     """
     composed = unicodedata.normalize("NFC", name)
-    plain = _UNSAFE.sub("_", composed)[:_MAX_LETTERS].strip(". ") or fallback
-    if _DEVICES.fullmatch(plain):
-        plain = f"_{plain}"
-    choices = (plain, *(f"{plain}_{number}" for number in range(2, 10_000)))
+    plain = no_device(_UNSAFE.sub("_", composed)[:_MAX_LETTERS].strip(". ") or fallback)
+    return _free(plain, taken)
+
+
+def no_device(name: str) -> str:
+    """This name, or another one where Windows would open a device by it."""
+    return f"_{name}" if _DEVICES.fullmatch(name) else name
+
+
+def distinct_names(names: Iterable[str]) -> list[str]:
+    """These names, with a number behind those that are one with an earlier one on some system."""
+    found: list[str] = []
+    taken: set[str] = set()
+    for name in names:
+        found.append(_free(name, taken))
+        taken.add(as_compared(found[-1]))
+    return found
+
+
+def _free(name: str, taken: Container[str]) -> str:
+    choices = (name, *(f"{name}_{number}" for number in range(2, 10_000)))
     return next(each for each in choices if as_compared(each) not in taken)
 
 

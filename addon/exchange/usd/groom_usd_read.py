@@ -18,6 +18,7 @@ from ...arrays import Bools, Floats, Ints
 from ...errors import HairloomError
 from ...strands.clean import clean
 from ..files.axes import to_z_up
+from ..files.file_space import FileSpace
 from ..groom import Groom
 from ..read_groom import ReadGroom
 from .usd_curves import Curves, UnusableCurvesError, curves_of
@@ -55,7 +56,7 @@ def read_usd(
         raise reading.nothing_found()
     groom = _joined(pieces, path, reading.name(), reading.notes)
     notes = tuple(f"{path.name}: {note}." for note in reading.notes)
-    return ReadGroom(groom, reading.version(), notes)
+    return ReadGroom(groom, reading.version(), reading.axes, notes)
 
 
 class _Reading:
@@ -74,9 +75,9 @@ class _Reading:
         if not (np.isfinite(unit) and unit > 0.0):
             self.notes.append(f"its unit of {unit} m makes no sense and was taken as a metre")
             unit = 1.0
-        axes = to_z_up(np.eye(3), up or str(arrays["up"])).T
+        self.axes = FileSpace(up or str(arrays["up"]))
         self._to_blender = np.eye(4)
-        self._to_blender[:3, :3] = axes * (unit * factor)
+        self._to_blender[:3, :3] = to_z_up(np.eye(3), self.axes.up).T * (unit * factor)
 
     def pieces(self) -> Iterator[Curves]:
         """The curves of each prim that has usable ones."""

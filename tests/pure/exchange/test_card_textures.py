@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
+from full_disk import full_disk
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
 from hairloom.addon.errors import HairloomError
@@ -148,18 +147,6 @@ def test_without_the_compressor_other_formats_still_work(
     for file_format in ("png", "exr", "dds_plain"):
         assert len(write_card_textures(tmp_path / "a", smooth_maps(), "gltf",
                                        file_format=file_format)) == 4  # fmt: skip
-
-
-@contextmanager
-def full_disk(most_bytes: int) -> Iterator[None]:
-    """No file of this process may grow beyond this many bytes."""
-    resource = pytest.importorskip("resource", reason="limits are those of POSIX")
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.mark.parametrize("file_format", EACH_FORMAT)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from full_disk import full_disk
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
@@ -453,15 +453,8 @@ def test_a_full_disk_is_told(tmp_path: Path) -> None:
     """A limit on the size of files stands for the disk."""
     path = tmp_path / "a.abc"
     path.write_bytes(b"old")
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, before[1]))
-    try:
-        with pytest.raises(HairloomError, match="this file cannot be written"):
-            write_groom_alembic(path, groom())
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        signal.signal(signal.SIGXFSZ, handler)
+    with full_disk(2000), pytest.raises(HairloomError, match="this file cannot be written"):
+        write_groom_alembic(path, groom())
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
 

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import contextvars
 import os
 import signal
 import subprocess
 import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from typing import Any
+from unittest import mock
 
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files import subprocess_reader
+from hairloom.addon.exchange.files import child_process, subprocess_reader
 from hairloom.addon.exchange.files.subprocess_reader import run_reader
 
 pytestmark = pytest.mark.portable
@@ -64,6 +71,53 @@ def test_a_script_without_an_end_is_ended(path: Path, monkeypatch: pytest.Monkey
         run(path, script)
     with pytest.raises(ProcessLookupError):
         os.kill(int(number.read_text()), 0)
+
+
+def test_a_child_whose_work_is_given_up_is_ended(path: Path) -> None:
+    """By who no longer waits for it, in the midst of its work or right after its start."""
+    number = path.with_name("number")
+    endless = f"import os\nopen({str(number)!r}, 'w').write(str(os.getpid()))\nwhile True: pass"
+    path.with_name("script.py").write_text(endless)
+    command = [sys.executable, str(path.with_name("script.py"))]
+
+    @contextmanager
+    def soon(end: Callable[[], None]) -> Iterator[None]:
+        def end_it() -> None:
+            while not (number.is_file() and number.read_text()):
+                time.sleep(0.01)
+            end()
+
+        thread = threading.Thread(target=end_it)
+        thread.start()
+        yield
+        thread.join()
+
+    def run_it() -> int:
+        child_process.ending.set(soon)
+        return child_process.run_child(command, seconds=60.0).returncode
+
+    assert contextvars.Context().run(run_it) == -signal.SIGKILL
+
+    def at_once(_end: Callable[[], None]) -> AbstractContextManager[None]:
+        raise InterruptedError
+
+    def begin_it() -> None:
+        child_process.ending.set(at_once)
+        child_process.run_child(command, seconds=60.0)
+
+    before = subprocess.Popen
+    begun: list[subprocess.Popen[bytes]] = []
+
+    def popen(*arguments: Any, **options: Any) -> subprocess.Popen[bytes]:
+        begun.append(before(*arguments, **options))
+        return begun[-1]
+
+    with (
+        mock.patch.object(child_process.subprocess, "Popen", popen),
+        pytest.raises(InterruptedError),
+    ):
+        contextvars.Context().run(begin_it)
+    assert [each.returncode for each in begun] == [-signal.SIGKILL]
 
 
 def test_where_no_python_is_known_that_is_said(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

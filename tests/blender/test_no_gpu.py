@@ -1,0 +1,89 @@
+"""A machine without a GPU and without a software driver: a sentence, not a crash of Blender."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import pytest
+
+pytestmark = pytest.mark.skipif(
+    not (sys.platform.startswith("linux") and bpy.app.module), reason="hides Linux's drivers"
+)
+
+HIDDEN = ("__EGL_VENDOR_LIBRARY_FILENAMES", "VK_DRIVER_FILES", "LIBGL_DRIVERS_PATH")
+REFUSAL = "there is no GPU here, and no software driver in place of one"
+ENGINE = """
+bpy.context.scene.render.engine = "HAIRLOOM"
+try:
+    bpy.ops.render.render()
+except RuntimeError as error:
+    print(error)
+"""
+VERB = """
+from hairloom.addon.blender.command_line import command_line
+sys.exit(command_line.run(sys.argv[1:]))
+"""
+SCRIPT = """
+import sys
+sys.path.insert(0, {tools!r})
+from extension_loader import load_package
+import bpy
+load_package().register()
+{work}
+"""
+SMALL = ["--width", "64", "--height", "64"]
+FEW = [
+    f"--set={each}"
+    for each in (
+        "grow.method=normals",
+        "children.method=none",
+        "grow.strand_count=40",
+        "guides.guide_count=20",
+        "cards.card_count=20",
+        "cards.levels=1",
+        "atlas.size=512",
+    )
+]
+
+
+def without_gpu(work: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    script = SCRIPT.format(tools=str(Path(__file__).parents[2] / "tools"), work=work)
+    return subprocess.run(
+        [sys.executable, "-c", script, *arguments],
+        env=os.environ | dict.fromkeys(HIDDEN, "/nowhere"),
+        capture_output=True,
+        text=True,
+    )
+
+
+def test_the_engine_says_so() -> None:
+    done = without_gpu(ENGINE)
+    assert done.returncode == 0, done.stderr
+    assert REFUSAL in done.stdout
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["render", *SMALL, *FEW], ["turntable", "--frames", "2", *SMALL, *FEW], ["self-test"]],
+    ids=lambda arguments: arguments[0],
+)
+def test_verbs_that_draw_say_so_and_write_nothing(arguments: list[str], tmp_path: Path) -> None:
+    output = tmp_path / "still.png"
+    if arguments[0] != "self-test":
+        arguments = [*arguments, "--output", str(output)]
+    done = without_gpu(VERB, *arguments)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.count("hairloom: ") == 1 and REFUSAL in done.stderr
+    assert "Traceback" not in done.stderr and list(tmp_path.iterdir()) == []
+
+
+def test_cards_are_made_all_the_same(tmp_path: Path) -> None:
+    """Their atlas is drawn by numpy then."""
+    output = tmp_path / "cards.glb"
+    done = without_gpu(VERB, "cards", "--output", str(output), *FEW)
+    assert done.returncode == 0, done.stderr
+    assert output.is_file() and (tmp_path / "cards.hairloom.json").is_file()

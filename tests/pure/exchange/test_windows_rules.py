@@ -1,0 +1,132 @@
+"""Writers by Windows' rules: long paths, names without case, files that somebody has open."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from windows_rules import LIMIT, windows_rules
+
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.files.atomic import write_bytes_atomic
+from hairloom.addon.exchange.files.file_set import kept_aside, written_together
+from hairloom.addon.exchange.files.names import distinct_names, no_device
+from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files, temporary_beside
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="Windows has rules of its own")
+
+
+def write_set(path: Path) -> None:
+    with written_together(path) as folder:
+        (folder / path.name).write_bytes(b"new")
+        (folder / f"{path.stem}_base.png").write_bytes(b"new")
+        kept_aside(folder, path)
+
+
+def write_alone(path: Path) -> None:
+    write_bytes_atomic(path, b"new")
+
+
+def deep(folder: Path, length: int) -> Path:
+    """A folder whose path has this many letters."""
+    while len(str(folder)) < length:
+        folder /= "x" * min(50, max(length - len(str(folder)) - 1, 1))
+    folder.mkdir(parents=True)
+    return folder
+
+
+@pytest.mark.parametrize("write", [write_alone, write_set])
+def test_a_path_that_is_too_long_is_said_to_be(
+    tmp_path: Path, write: Callable[[Path], None]
+) -> None:
+    """The file's own path would be short enough, but not the one while it is written."""
+    path = deep(tmp_path, LIMIT - 30) / "groom.tfx"
+    path.write_bytes(b"old")
+    assert len(str(path)) < LIMIT
+    with windows_rules(), pytest.raises(HairloomError) as raised:
+        write(path)
+    assert f"and {LIMIT} work here" in raised.value.problem and raised.value.place == str(path)
+    assert raised.value.remedy == "Choose a folder with a shorter path"
+    assert path.read_bytes() == b"old" and list(path.parent.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("write", [write_alone, write_set])
+def test_a_path_that_is_just_short_enough_is_written(
+    tmp_path: Path, write: Callable[[Path], None]
+) -> None:
+    path = deep(tmp_path, LIMIT - 90) / "groom.tfx"
+    with windows_rules():
+        write(path)
+    assert path.read_bytes() == b"new"
+
+
+def test_another_reason_is_not_taken_for_the_length(tmp_path: Path) -> None:
+    (tmp_path / "groom.tfx").mkdir()
+    with windows_rules(), pytest.raises(HairloomError, match="a folder has this name") as raised:
+        write_alone(tmp_path / "groom.tfx")
+    assert "letters" not in raised.value.problem
+
+
+def test_a_neighbour_whose_name_differs_in_case_is_kept(tmp_path: Path) -> None:
+    """There both names are the same file, so that the new one would replace it."""
+    own = tmp_path / "HAIR_BASE.PNG"
+    own.write_bytes(b"the artist's")
+    with windows_rules():
+        write_set(tmp_path / "hair.glb")
+    contents = {each.name: each.read_bytes() for each in tmp_path.iterdir()}
+    assert contents["hair_base old.png"] == b"the artist's"
+    assert sorted(contents.values()) == [b"new", b"new", b"the artist's"]
+
+
+@pytest.mark.parametrize("write", [write_alone, write_set])
+def test_a_file_that_is_open_stays_and_the_new_ones_are_kept(
+    tmp_path: Path, write: Callable[[Path], None]
+) -> None:
+    path = tmp_path / "groom.tfx"
+    path.write_bytes(b"old")
+    with windows_rules(held=[path]), pytest.raises(HairloomError, match="Access is denied"):
+        write(path)
+    assert path.read_bytes() == b"old"
+    kept = tmp_path / "groom new"
+    assert not [each for each in tmp_path.iterdir() if each not in (path, kept)]
+    with windows_rules():
+        write(path)
+    assert path.read_bytes() == b"new"
+
+
+def test_what_a_killed_writer_left_may_be_open(tmp_path: Path) -> None:
+    """A virus scanner looks at it: it goes with a later writer."""
+    folder = temporary_beside(tmp_path / "a.tfx", suffix="")
+    file = temporary_beside(tmp_path / "b.tfx")
+    dead = [each.with_name(each.name.replace(f"-{os.getpid()}-", "-99999999-")) for each in
+            (folder, file)]  # fmt: skip
+    dead[0].mkdir()
+    (dead[0] / "a.tfx").touch()
+    dead[1].touch()
+    with windows_rules(held=[dead[0] / "a.tfx", dead[1]]):
+        remove_stale_files(tmp_path)
+        write_alone(tmp_path / "c.tfx")
+    assert all(each.exists() for each in dead)
+    with windows_rules():
+        remove_stale_files(tmp_path)
+    assert [each.name for each in tmp_path.iterdir()] == ["c.tfx"]
+
+
+def test_names_that_are_one_there_get_numbers() -> None:
+    names = ["Hair", "hair", "Caf\u00e9", "Cafe\u0301", "hair_2", "Beard"]
+    assert distinct_names(names) == [
+        "Hair",
+        "hair_2",
+        "Caf\u00e9",
+        "Cafe\u0301_2",
+        "hair_2_2",
+        "Beard",
+    ]
+    assert [no_device(each) for each in ("con", "Aux.001", "console", "nul")] == [
+        "_con",
+        "_Aux.001",
+        "console",
+        "_nul",
+    ]

@@ -1,0 +1,84 @@
+"""Windows' rules for files, on any system: long paths, names without case, files that are open.
+
+Only the calls that Hairloom's writers make go by them; what a test looks at afterwards does not.
+"""
+
+from __future__ import annotations
+
+import builtins
+import errno
+import io
+import os
+import shutil
+from collections.abc import Callable, Collection, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+from hairloom.addon.exchange.files import names
+
+LIMIT = 259
+#: functions that take a path first, and those that take two
+_ONE = (
+    *("open", "mkdir", "rmdir", "unlink", "stat", "lstat", "scandir", "listdir", "chmod"),
+    *("utime", "listxattr", "getxattr", "setxattr"),
+)
+_TWO = ("replace", "rename", "link")
+#: these need the file for themselves
+_ALONE = ("rmdir", "unlink", "replace", "rename")
+
+
+@contextmanager
+def windows_rules(held: Collection[Path] = ()) -> Iterator[None]:
+    """held: files that another program has open."""
+
+    def checked(real: Callable[..., Any], count: int) -> Callable[..., Any]:
+        def call(*arguments: Any, **options: Any) -> Any:
+            paths = [_as_there(each) for each in arguments[:count]]
+            if real.__name__ in _ALONE:
+                for path in paths:
+                    _refuse_held(path, held)
+            return real(*paths, *arguments[count:], **options)
+
+        return call
+
+    with ExitStack() as stack:
+        stack.enter_context(mock.patch.object(names, "MAX_PATH", LIMIT))
+        stack.enter_context(mock.patch.object(shutil, "_use_fd_functions", new=False))
+        for module, name, count in (
+            *((os, name, 1) for name in _ONE if hasattr(os, name)),
+            *((os, name, 2) for name in _TWO),
+            (builtins, "open", 1),
+            (io, "open", 1),
+        ):
+            wrapped = checked(getattr(module, name), count)
+            stack.enter_context(mock.patch.object(module, name, wrapped))
+        yield
+
+
+_real_listdir = os.listdir
+
+
+def _as_there(path: Any) -> Any:
+    """A path that is not too long, by the name that a file of it has, whatever its case."""
+    if not isinstance(path, (str, os.PathLike)):
+        return path
+    text = os.fspath(path)
+    if len(os.path.abspath(text)) > LIMIT:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), text)
+    folder, name = os.path.split(os.path.abspath(text))
+    try:
+        there = _real_listdir(folder)
+    except OSError:
+        return path
+    if name in there:
+        return path
+    return next(
+        (os.path.join(folder, each) for each in there if each.casefold() == name.casefold()), path
+    )
+
+
+def _refuse_held(path: Any, held: Collection[Path]) -> None:
+    if any(each == Path(path) or each.is_relative_to(path) for each in held):
+        raise PermissionError(errno.EACCES, "Access is denied", os.fspath(path), None, None)
