@@ -27,6 +27,8 @@ _HAIRS, _HAIR = 120_000, 0.08 / 245.0
 _LAYERS = 6.0
 #: The widest strand: a quarter of the spacing, and in terms of its own length.
 _OF_SPACING, _OF_LENGTH = 0.25, 1.0 / 15.0
+#: Brows and lashes are drawn hair by hair: 8 mm of a brow are 0.13 mm wide.
+_OF_FACE = 1.0 / 60.0
 #: Most that a strand blocks of the light, in terms of what its width does: a few guides alone are
 #: not all the hair.
 _MAX_EXTINCTION = 6.0
@@ -222,12 +224,16 @@ def _found(strands: StrandSet, parts: float = 1.0) -> _Found:
         parts: how many strands are drawn for each of these but brows and lashes.
     """
     is_face = is_face_hair(strands.group)
-    if is_face.all() or not is_face.any():
+    if not is_face.any():
         return _found_of(_Hair.of(strands), parts)
+    face = _Hair.of(strands.take(np.flatnonzero(is_face)))
+    of_face = _found_of(face)
+    of_face = replace(of_face, width=np.minimum(of_face.width, _OF_FACE * face.typical))
+    if is_face.all():
+        return of_face
     found = _found_of(_Hair.of(strands.take(np.flatnonzero(~is_face))), parts)
     width = np.empty(strands.strand_count)
-    width[~is_face] = found.width
-    width[is_face] = _found_of(_Hair.of(strands.take(np.flatnonzero(is_face)))).width
+    width[~is_face], width[is_face] = found.width, of_face.width
     return replace(found, width=width)
 
 
