@@ -70,10 +70,9 @@ def test_hairs_fill_the_space_between_strands_that_are_found_to_stand_for_them()
         widths = with_widths(head_of_hair(5000, factor))[1]
         assert widths.spacing == pytest.approx(np.sqrt(AREA / 5000) * factor, rel=0.3)
     assert with_widths(head_of_hair(5000), "own")[1].spacing == 0.0
-    assert Widths.of(np.array(widths.numbers), "") == widths
-    assert Widths.of(np.array(widths.numbers[:4]), "") == replace(widths, spacing=0.0), (
-        "an old bake"
-    )
+    assert Widths.of(np.array(widths.numbers), widths.reason) == widths
+    of_old_bake = Widths.of(np.array(widths.numbers[:4]), widths.reason)
+    assert of_old_bake == replace(widths, spacing=0.0)
 
 
 def test_own_widths_are_kept_where_they_can_be_hair() -> None:
