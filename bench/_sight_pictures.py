@@ -68,13 +68,15 @@ def scale_flip(pair: Pair, name: str) -> float:
 
 
 def count_figures() -> dict[str, float]:
-    """The built-in groom by all of its strands, and by even parts of them."""
+    """The built-in groom by all of its strands, and by even parts of them; children would make the
+    counts alike.
+    """
     head = built_in_head()
     grown = grow_with_face(head.surface, GrowSettings(strand_count=COUNTS[-1]), head.weights)
-    whole = rig_of((grown, head.surface), "built-in")
+    whole = rig_of((grown, head.surface), "built-in", "none")
     order = np.argsort(pipeline.strand_ranks(whole), kind="stable")
     parts = [order[:count] for count in COUNTS[:-1]] + [order[COUNTS[0] : 2 * COUNTS[0]]]
-    rigs = [rig_of((grown.take(np.sort(part)), head.surface), "built-in") for part in parts]
+    rigs = [rig_of((grown.take(np.sort(part)), head.surface), "built-in", "none") for part in parts]
     studio = _studio(whole)
     camera = studio._camera(1.0)
     lights = studio.lights(camera)
