@@ -2,6 +2,13 @@
 and beside Cycles.
 
 FLIP is Andersson et al.'s (2020) at its own 67 pixels a degree, over the pixels that hair changes.
+
+The same groom by fewer strands is other strands, pixel by pixel, in any renderer. So `count_flip`
+is that of hair seen from where a pixel is as wide as the fewest strands are apart: pictures are
+reduced by a whole number, in linear light. Two figures beside it have no limit: `count_flip_pixel`
+is that of the pictures themselves, `count_flip_of_equals` that between two grooms of the fewest
+strands, which share none. One camera and the same lights serve all: each groom by itself might be
+seen from its other side.
 """
 
 from __future__ import annotations
@@ -14,7 +21,7 @@ from _shading_room import CyclesRoom
 from _sight_grooms import Pair, rig_of, scaled
 
 from hairloom.addon import pipeline
-from hairloom.addon.blender.pictures.studio import Studio
+from hairloom.addon.blender.pictures.studio import FIELD_OF_VIEW, Studio
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.sessions.prepared_groom import prepared
@@ -22,6 +29,7 @@ from hairloom.addon.exchange.textures.srgb import srgb_encoded
 from hairloom.addon.groom.face_hair import grow_with_face
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.pipeline import Rig
+from hairloom.addon.render.camera import Camera
 from hairloom.addon.render.snapshot import SKIN
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.drawn_strands import drawn_radius
@@ -60,20 +68,33 @@ def scale_flip(pair: Pair, name: str) -> float:
 
 
 def count_figures() -> dict[str, float]:
-    """The built-in groom by all of its strands, and by even parts of them."""
+    """The built-in groom by all of its strands, and by even parts of them; children would make the
+    counts alike.
+    """
     head = built_in_head()
     grown = grow_with_face(head.surface, GrowSettings(strand_count=COUNTS[-1]), head.weights)
-    whole = rig_of((grown, head.surface), "built-in")
+    whole = rig_of((grown, head.surface), "built-in", "none")
     order = np.argsort(pipeline.strand_ranks(whole), kind="stable")
-    pictures = []
-    for count in COUNTS:
-        part = grown.take(np.sort(order[:count])) if count < COUNTS[-1] else grown
-        pictures.append(_picture(rig_of((part, head.surface), "built-in")))
-    truth, hair = pictures[-1]
-    light = [float(picture[hair, :3].mean()) for picture, _ in pictures]
+    parts = [order[:count] for count in COUNTS[:-1]] + [order[COUNTS[0] : 2 * COUNTS[0]]]
+    rigs = [rig_of((grown.take(np.sort(part)), head.surface), "built-in", "none") for part in parts]
+    studio = _studio(whole)
+    camera = studio._camera(1.0)
+    lights = studio.lights(camera)
+    truth, hair = _picture(whole, None, lights, camera)
+    *pictures, equal = (_picture(rig, None, lights, camera)[0] for rig in rigs)
+    size = int(np.ceil(rigs[0].widths.spacing / _pixel_size(camera, whole)))
+    seen, seen_hair = _reduced(truth, size), _reduced(hair[..., None], size)[..., 0] > 0.5
+    light = [
+        float(picture[hair, :3].mean()) / float(truth[hair, :3].mean()) for picture in pictures
+    ]
     return {
-        "count_flip": max(_flip(truth, picture, hair) for picture, _ in pictures[:-1]),
-        "count_light_percent": 100.0 * max(abs(each / light[-1] - 1.0) for each in light[:-1]),
+        "count_flip": max(_flip(seen, _reduced(each, size), seen_hair) for each in pictures),
+        "count_flip_pixel": max(_flip(truth, each, hair) for each in pictures),
+        "count_flip_of_equals": _flip(
+            _reduced(pictures[0], size), _reduced(equal, size), seen_hair
+        ),
+        "count_light_percent": 100.0 * max(abs(each - 1.0) for each in light),
+        "count_pixels_to_one": float(size),
     }
 
 
@@ -110,12 +131,15 @@ def cycles_figures() -> dict[str, float]:
 
 
 def _picture(
-    rig: Rig, settings: GroomSettings | None = None, lights: tuple[Light, ...] | None = None
+    rig: Rig,
+    settings: GroomSettings | None = None,
+    lights: tuple[Light, ...] | None = None,
+    camera: Camera | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The studio's, (SIZE, SIZE, 4), and where hair is in it."""
     studio = _studio(rig, settings)
     drawn = [
-        studio.picture(rig.rest_pose, points, SIZE, SIZE, SAMPLES, lights=lights)
+        studio.picture(rig.rest_pose, points, SIZE, SIZE, SAMPLES, camera, lights=lights)
         for points in (rig.strands.grid, rig.strands.grid + 1e6 * _size(rig))
     ]
     return drawn[0], np.abs(drawn[0] - drawn[1]).max(axis=-1) > _HAS_HAIR
@@ -124,6 +148,21 @@ def _picture(
 def _studio(rig: Rig, settings: GroomSettings | None = None) -> Studio:
     settings = settings or GroomSettings()
     return Studio(prepared(rig, settings[AmbientSettings]), settings)
+
+
+def _pixel_size(camera: Camera, rig: Rig) -> float:
+    """How wide a pixel of a picture is in the middle of the hair [m]."""
+    low, high = rig.strands.bounds()
+    depth = -(camera.view @ np.append(0.5 * (low + high), 1.0))[2]
+    return float(2.0 * depth * np.tan(0.5 * FIELD_OF_VIEW) / SIZE)
+
+
+def _reduced(picture: np.ndarray, size: int) -> np.ndarray:
+    """The mean of squares of so many pixels a side; what is left over at the border goes."""
+    rows, columns = (side // size for side in picture.shape[:2])
+    squares = picture[: rows * size, : columns * size].astype(np.float64)
+    found: np.ndarray = squares.reshape(rows, size, columns, size, -1).mean(axis=(1, 3))
+    return found
 
 
 def _size(rig: Rig) -> np.float32:

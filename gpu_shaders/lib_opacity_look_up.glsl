@@ -52,6 +52,26 @@ vec2 summed_layers(int map, vec2 place, ivec2 texel, vec2 depths)
   return tau;
 }
 
+// x the fraction of the light that no mesh is in the way of, y the depth of the nearest mesh around a
+// place. Meshes have texels of their own: strands that stand for many hairs have larger ones.
+vec2 mesh_path(int map, vec2 place, float depth)
+{
+  int side = textureSize(opacity_meshes, 0).x;
+  vec2 scaled = place * float(side) - 0.5;
+  vec2 fraction = scaled - floor(scaled);
+  ivec2 low = ivec2(floor(scaled));
+  vec2 found = vec2(0.0, 1.0);
+  for (int corner = 0; corner < 4; corner++) {
+    ivec2 step_of = ivec2(corner & 1, corner >> 1);
+    ivec2 texel = clamp(low + step_of, ivec2(0), ivec2(side - 1));
+    vec2 weights = mix(1.0 - fraction, fraction, vec2(step_of));
+    float mesh = texelFetch(opacity_meshes, ivec3(texel, map), 0).x;
+    found.x += depth <= mesh ? weights.x * weights.y : 0.0;
+    found.y = min(found.y, mesh);
+  }
+  return found;
+}
+
 // x tau between the light and a place, y tau from there on to the first mesh, z the fraction of the
 // light that no mesh is in the way of.
 vec3 light_path(int light, vec3 point)
@@ -62,27 +82,25 @@ vec3 light_path(int light, vec3 point)
     return vec3(0.0, 0.0, 1.0);
   }
   float depth = min(place.z, 1.0) - opacity.bias;
+  vec2 meshes = mesh_path(map, place.xy, depth), tau = vec2(0.0);
+#if DEEP
   vec2 scaled = place.xy * float(opacity.resolution) - 0.5;
   vec2 fraction = scaled - floor(scaled);
   ivec2 low = ivec2(floor(scaled));
-  vec2 tau = vec2(0.0);
-  float lit = 0.0, nearest = 1.0;
+  int mesh_side = textureSize(opacity_meshes, 0).x;
   for (int corner = 0; corner < 4; corner++) {
     ivec2 step_of = ivec2(corner & 1, corner >> 1);
     ivec2 texel = clamp(low + step_of, ivec2(0), ivec2(opacity.resolution - 1));
     vec2 weights = mix(1.0 - fraction, fraction, vec2(step_of));
     float weight = weights.x * weights.y;
-    float mesh = texelFetch(opacity_meshes, ivec3(texel, map), 0).x;
-    lit += depth <= mesh ? weight : 0.0;
-    nearest = min(nearest, mesh);
-#if DEEP
+    ivec2 middle = (2 * texel + 1) * mesh_side / (2 * opacity.resolution);
+    float mesh = texelFetch(opacity_meshes, ivec3(middle, map), 0).x;
     // each texel's layers start elsewhere, so that its own tau is found before they are blended
     vec2 span = layer_span(opacity_starts, texel, map, opacity.resolution);
     tau += weight * summed_layers(map, place.xy, texel, (vec2(depth, mesh) - span.x) * span.y);
-#endif
   }
-#if !DEEP
-  tau = summed_layers(map, place.xy, ivec2(0), vec2(depth, nearest));
+#else
+  tau = summed_layers(map, place.xy, ivec2(0), vec2(depth, meshes.y));
 #endif
-  return vec3(tau.x, max(tau.y - tau.x, 0.0), lit);
+  return vec3(tau.x, max(tau.y - tau.x, 0.0), meshes.x);
 }

@@ -28,7 +28,7 @@ bool map_is_finer(int index, vec3 point)
     return true;
   }
   float w = dot(opacity.map_w[index], vec4(point, 1.0)), mesh_w = mesh_map_place(map, point).z;
-  float hair = length(opacity.map_x[index].xyz) * float(opacity.resolution);
+  float hair = length(opacity.map_x[index].xyz) * float(textureSize(opacity_meshes, 0).x);
   float mesh = length(mesh_shadows.map_x[map].xyz) * mesh_shadows.resolution;
   return hair * mesh_w > mesh * w;
 }

@@ -69,6 +69,8 @@ class Widths:
     extinction: factor on the light that a strand blocks. It is above 1 where few strands stand for
         more hairs than it could be wide without looking like a ribbon.
     reason: why they were found; empty where they were not, or were asked for.
+    spacing: how far apart the strands are whose hairs fill the space between them [m]; 0 where
+        strands stand for themselves alone.
     """
 
     is_found: bool = False
@@ -76,16 +78,17 @@ class Widths:
     hairs: float = 1.0
     extinction: float = 1.0
     reason: str = ""
+    spacing: float = 0.0
 
     @property
-    def numbers(self) -> tuple[float, float, float, float]:
-        return float(self.is_found), self.median, self.hairs, self.extinction
+    def numbers(self) -> tuple[float, float, float, float, float]:
+        return float(self.is_found), self.median, self.hairs, self.extinction, self.spacing
 
     @classmethod
     def of(cls, numbers: Floats, reason: str) -> Self:
-        """Those that `numbers` were of."""
-        is_found, median, hairs, extinction = numbers.tolist()
-        return cls(bool(is_found), median, hairs, extinction, reason)
+        """Those that `numbers` were of; earlier versions had no spacing."""
+        is_found, median, hairs, extinction, *spacing = numbers.tolist()
+        return cls(bool(is_found), median, hairs, extinction, reason, *spacing)
 
     @property
     def line(self) -> str:
@@ -119,7 +122,8 @@ def with_widths(
     if not found.spacing:
         reason = "from their lengths alone, since there is no space between them"
     radius = np.repeat(0.5 * found.width, strands.point_counts)
-    widths = Widths(True, float(np.median(found.width)), found.hairs, found.extinction, reason)
+    median = float(np.median(found.width))
+    widths = Widths(True, median, found.hairs, found.extinction, reason, found.spacing)
     return replace(strands, radius=radius, has_widths=True), widths
 
 

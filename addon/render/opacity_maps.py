@@ -26,7 +26,7 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.lights import LIGHT_CAPACITY, Light
 from ..shading.volume.light_frame import Ball, LightFrame
-from ..shading.volume.map_size import START_TEXELS, MapSize, fitted_size, size_note
+from ..shading.volume.map_size import START_TEXELS, MapSize, even_size, fitted_size, size_note
 from ..shading.volume.opacity import layer_ends
 from ..shading.volume.settings import VolumeSettings
 from ..shading.volume.shadow_lights import shadow_frames
@@ -83,13 +83,13 @@ class OpacityMaps:
 
 def new_maps(values: Floats, size: MapSize) -> OpacityMaps:
     """Textures of this size; what they hold is to be drawn."""
-    square = size.side, size.side
+    square, mesh_square = (size.side, size.side), (size.mesh_side, size.mesh_side)
     # one texture alone would not be an array
     count = max(size.map_count * size.passes, 2)
     slots = range(size.slots)
     arrays = tuple(gpu.types.GPUTexture(square, layers=count, format="RGBA32F") for _ in slots)
     layers = max(size.map_count, 2)
-    meshes = gpu.types.GPUTexture(square, layers=layers, format="DEPTH_COMPONENT32F")
+    meshes = gpu.types.GPUTexture(mesh_square, layers=layers, format="DEPTH_COMPONENT32F")
     if not size.is_deep:
         return OpacityMaps(values, size, arrays, meshes)
     side = size.side // START_TEXELS
@@ -135,6 +135,7 @@ class OpacityDrawing:
         lights: Sequence[Light],
         settings: VolumeSettings,
         casters: tuple[Caster, ...],
+        spacing: float = 0.0,
     ) -> OpacityMaps:
         """The maps of a frame.
 
@@ -142,11 +143,13 @@ class OpacityDrawing:
             ball: around all hair.
             lights: in the order in which the shader knows them.
             casters: meshes, world space; another object whenever one is another.
+            spacing: of strands whose hairs fill the space between them [m]; 0: none do.
         """
         frames = shadow_frames(lights, ball, settings)
         count = sum(frame is not None for frame in frames)
         size = fitted_size(settings, count, gpu.capabilities.max_texture_size_get())
         self.note = size_note(settings, count, size)
+        size = even_size(size, spacing, ball.radius)
         values = pack_opacity(frames, settings, size)
         drawn = (hair.state, settings, values.tobytes(), tuple(map(id, casters)))
         if self._maps is None or self._drawn != drawn:

@@ -91,6 +91,7 @@ class OpacityPass:
         settings: VolumeSettings,
         strands: StrandSettings,
         casters: tuple[Caster, ...] = (),
+        spacing: float = 0.0,
     ) -> OpacityMaps:
         """The maps of a frame.
 
@@ -98,7 +99,7 @@ class OpacityPass:
             points: texture of CVs, xyz [m, world] and radius, in the layout of strand_rows.
             serial: another number whenever the points are others.
             shape: strand_count, cv_count.
-            ball, lights, casters: as in OpacityDrawing.maps.
+            ball, lights, casters, spacing: as in OpacityDrawing.maps.
         """
         strand_count, cv_count = shape
         drawn = max(round(strand_count * settings.strand_fraction), 1)
@@ -112,7 +113,7 @@ class OpacityPass:
         )
         state, strip = (serial, shape, strands), self._ribbon(cv_count)
         hair = _Strands(state, feature, look, self._blocks, cv_count, drawn, strip)
-        return self._drawing.maps(hair, ball, lights, settings, casters)
+        return self._drawing.maps(hair, ball, lights, settings, casters, spacing)
 
     def _ribbon(self, cv_count: int) -> Any:
         """A strip of vertices without attributes: two a CV."""

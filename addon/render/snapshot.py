@@ -150,7 +150,8 @@ class Snapshot:
 
     strands: (strand_count, cv_count, 3) float32 [m], world space, root first.
     radius: (strand_count, cv_count) float32 [m].
-    extinction: factor on the light that a strand blocks, see `groom.widths.Widths`.
+    extinction, spacing: factor on the light that a strand blocks, and how far apart [m] the strands
+        are whose hairs fill the space between them, see `groom.widths.Widths`.
     occlusion: (strand_count, cv_count) ambient light that arrives, 0 to 1; None is 1 everywhere.
     color: (strand_count, cv_count, 3) scene-linear, the strands' own; None is the look's, and so is
         NaN, all along a strand. Counts where the look wants it, see drawn_strands.drawn_color.
@@ -201,6 +202,7 @@ class Snapshot:
     table_size: int = DEFAULT_SIZE
     cards: CardSnapshot | None = None
     extinction: float = 1.0
+    spacing: float = 0.0
     color: Floats | None = None
 
     def __post_init__(self) -> None:

@@ -179,6 +179,7 @@ class StrandPass:
             snapshot.volume,
             snapshot.strand_settings,
             snapshot.all_casters,
+            snapshot.spacing,
         )
 
     def ball(self, snapshot: Snapshot) -> Ball:

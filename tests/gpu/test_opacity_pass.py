@@ -144,6 +144,45 @@ def test_look_up_agrees_with_its_twin(
         assert np.abs(found[:, number] - values).max() < (1e-3 if shadows == "deep" else 2e-2)
 
 
+@pytest.mark.parametrize("shadows", ["slices", "deep"])
+def test_strands_that_stand_for_many_are_blurred_and_meshes_are_not(
+    gpu_context: Any, compute: Callable[..., np.ndarray], shadows: str
+) -> None:
+    from hairloom.addon.render.opacity_pass import OpacityPass
+
+    strands, radius = dome()
+    ball, light = ball_around(strands), LIGHTS["sun"]
+    settings = VolumeSettings(shadows=shadows, slices=8, layers=8, resolution=96, bias=0.02)
+    frame = light_frame(light, ball)
+    assert frame is not None
+    mesh = Surface(ball.center + 0.1 * np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
+    maps = OpacityPass().maps(
+        points_of(strands, radius),
+        1,
+        strands.shape[:2],
+        ball,
+        (light,),
+        settings,
+        PLAIN,
+        (mesh,),
+        4.0 * ball.radius / 40.0,
+    )
+    assert maps.slots[0].width == 40 and maps.meshes.width == 96
+    points = ball.center + ball.radius * np.random.default_rng(1).uniform(-0.6, 0.6, (900, 3))
+    found = path_at(compute, maps, points)
+    starts, thickness = spans_of(maps)
+    place, depth = frame.places(points)
+    meshes = np.asarray(maps.meshes.read()).reshape(-1, 96, 96)[0].astype(np.float64)
+    ends, layers = layer_ends(settings), layers_of(maps)
+    expected = look_up(layers, starts, meshes, ends, place, depth, settings.bias, thickness)
+    assert 50 < (expected[2] < 0.5).sum() < 800 and (expected[0] > 0.1).sum() > 200
+    assert np.abs(found[:, 0] - expected[0]).max() < (1e-3 if shadows == "deep" else 2e-2)
+    # a place right at the depth of a mesh may lie on either side of it
+    assert np.quantile(np.abs(found[:, 2] - expected[2]), 0.99) < 1e-3
+    if shadows == "deep":
+        assert np.abs(found[:, 1] - expected[1]).max() < 1e-3
+
+
 def spans_of(maps: Any) -> tuple[np.ndarray, np.ndarray]:
     """Where the first map's layers start in each texel, and how thick they are together."""
     side = maps.slots[0].width

@@ -44,6 +44,7 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
         group=strands.group,
         rank=groom.rank,
         extinction=groom.rig.widths.extinction,
+        spacing=groom.rig.widths.spacing,
         color=strands.color_grid,
     )
 

@@ -3,6 +3,12 @@
 A map has as many texels a side as the settings say, as long as that fits: many lights with many
 layers at the largest resolution would be gigabytes, which are allocated before anything is drawn.
 What does not fit is drawn with fewer texels: blurred, and as dark as it should be.
+
+Strands that stand for many hairs get no finer map than the hairs' own evenness allows. In texels
+finer than strands are apart, light would pass between them, where the hairs are for which they
+stand: by Jensen's inequality the mean of exp(-tau) grows with the unevenness of tau. A look-up is a
+tent of two texels, so that texels of half the spacing blend over one spacing. Meshes keep the full
+number of texels, since their edges are sharp.
 """
 
 from __future__ import annotations
@@ -22,6 +28,8 @@ START_TEXELS = 4
 MAX_SLOTS = 6
 #: sums of four layers in float32; the depth of the first mesh; first and last hair in every block
 _LAYERS_BYTES, _MESH_BYTES, _SPAN_BYTES = 16, 4, 8
+#: texels across the spacing of strands that stand for more than themselves, and across all hair
+_TEXELS_APART, _FEWEST_TEXELS = 2.0, 16
 #: [texels] of a texture on every GPU that Blender supports
 _LARGEST_SIDE = 16384
 
@@ -34,6 +42,7 @@ class MapSize:
     slots: textures of four layers that are drawn into at once.
     passes: how often, and layers of each of these arrays that one map takes.
     map_count: maps, one a light.
+    mesh_side: texels along a side of the depths of meshes.
     """
 
     side: int
@@ -41,6 +50,7 @@ class MapSize:
     passes: int
     map_count: int
     is_deep: bool
+    mesh_side: int
 
     @property
     def texels(self) -> int:
@@ -54,7 +64,7 @@ class MapSize:
         arrays = max(self.map_count * self.passes, 2) * self.slots * _LAYERS_BYTES
         meshes = max(self.map_count, 2) * _MESH_BYTES
         spans = _SPAN_BYTES * self.map_count / START_TEXELS**2 if self.is_deep else 0.0
-        return int(self.side**2 * (arrays + meshes + spans))
+        return int(self.side**2 * (arrays + spans) + self.mesh_side**2 * meshes)
 
 
 def asked_size(settings: VolumeSettings, map_count: int) -> MapSize:
@@ -63,7 +73,7 @@ def asked_size(settings: VolumeSettings, map_count: int) -> MapSize:
     slots = min(-(-layers // 4), MAX_SLOTS)
     side = -(-settings.resolution // START_TEXELS) * START_TEXELS
     is_deep = settings.shadows == "deep"
-    return MapSize(side, slots, -(-layers // (4 * slots)), max(map_count, 1), is_deep)
+    return MapSize(side, slots, -(-layers // (4 * slots)), max(map_count, 1), is_deep, side)
 
 
 def fitted_size(
@@ -81,7 +91,22 @@ def fitted_size(
     side = min(size.side, largest_side, int(np.sqrt(MEMORY_LIMIT / per_texel)))
     if size.is_deep:
         side = min(side, largest_side * START_TEXELS // size.map_count)
-    return replace(size, side=max(side // START_TEXELS, 1) * START_TEXELS)
+    side = max(side // START_TEXELS, 1) * START_TEXELS
+    return replace(size, side=side, mesh_side=side)
+
+
+def even_size(size: MapSize, spacing: float, radius: float) -> MapSize:
+    """With no more texels for hair than show it as even as it is.
+
+    Args:
+        spacing: of strands whose hairs fill the space between them; 0: none do. radius: of the ball
+            around all hair; both in one unit.
+    """
+    if spacing <= 0.0:
+        return size
+    across = max(_TEXELS_APART * 2.0 * radius / spacing, _FEWEST_TEXELS)
+    side = -(-int(min(across, size.side)) // START_TEXELS) * START_TEXELS
+    return replace(size, side=min(side, size.side))
 
 
 def size_note(settings: VolumeSettings, map_count: int, drawn: MapSize | None = None) -> str:

@@ -19,6 +19,7 @@ tau is taken as linear. Reference of gpu_shaders/lib_opacity.glsl.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,7 +93,7 @@ def look_up(
     Args:
         layers: (resolution, resolution, n) sums, row by row.
         starts: (resolution, resolution) depth at which each texel's layers start.
-        meshes: (resolution, resolution) depth of the first mesh, 1 where there is none.
+        meshes: (side, side) depth of the first mesh, 1 where there is none; in texels of their own.
         ends: (n,).
         places: (m, 2) in 0..1. depth: (m,).
         bias: strands and meshes this close in front do not count.
@@ -105,24 +106,34 @@ def look_up(
     resolution = len(layers)
     thick = np.ones_like(starts) if thickness is None else thickness
     inside = np.minimum(depth, 1.0) - bias
-    scaled = places * resolution - 0.5
-    low = np.floor(scaled).astype(np.int64)
-    fraction = scaled - low
     tau, beyond, lit = np.zeros((3, len(places)))
-    for right, up in ((0, 0), (1, 0), (0, 1), (1, 1)):
-        column = np.clip(low[:, 0] + right, 0, resolution - 1)
-        row = np.clip(low[:, 1] + up, 0, resolution - 1)
-        weight = np.abs(1 - right - fraction[:, 0]) * np.abs(1 - up - fraction[:, 1])
-        sums, start, mesh = layers[row, column], starts[row, column], meshes[row, column]
+    for row, column, weight in _corners(places, len(meshes)):
+        lit += weight * (inside <= meshes[row, column])
+    for row, column, weight in _corners(places, resolution):
+        sums, start = layers[row, column], starts[row, column]
+        middle_row, middle_column = (
+            (2 * each + 1) * len(meshes) // (2 * resolution) for each in (row, column)
+        )
+        mesh = meshes[middle_row, middle_column]
         size = thick[row, column]
         weights = layer_weights((inside - start) / size, ends)
         tau += weight * np.einsum("mn,mn->m", sums, weights)
         weights = layer_weights((mesh - start) / size, ends)
         beyond += weight * np.einsum("mn,mn->m", sums, weights)
-        lit += weight * (inside <= mesh)
     is_inside = ((places >= 0.0) & (places <= 1.0)).all(axis=1)
     tau, beyond = np.where(is_inside, tau, 0.0), np.where(is_inside, beyond, 0.0)
     return tau, np.maximum(beyond - tau, 0.0), np.where(is_inside, lit, 1.0)
+
+
+def _corners(places: Floats, side: int) -> Iterator[tuple[Ints, Ints, Floats]]:
+    """Row, column and weight, (m,) each, of the four texels around places."""
+    scaled = places * side - 0.5
+    low = np.floor(scaled).astype(np.int64)
+    fraction = scaled - low
+    for right, up in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        column = np.clip(low[:, 0] + right, 0, side - 1)
+        row = np.clip(low[:, 1] + up, 0, side - 1)
+        yield row, column, np.abs(1 - right - fraction[:, 0]) * np.abs(1 - up - fraction[:, 1])
 
 
 def within_map(places: Floats) -> Floats:

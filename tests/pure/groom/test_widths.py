@@ -65,6 +65,16 @@ def test_few_strands_take_as_much_light_as_many() -> None:
     np.testing.assert_allclose(taken, taken[-1], rtol=0.06)
 
 
+def test_hairs_fill_the_space_between_strands_that_are_found_to_stand_for_them() -> None:
+    for factor in (1e-3, 1.0, 1e3):
+        widths = with_widths(head_of_hair(5000, factor))[1]
+        assert widths.spacing == pytest.approx(np.sqrt(AREA / 5000) * factor, rel=0.3)
+    assert with_widths(head_of_hair(5000), "own")[1].spacing == 0.0
+    assert Widths.of(np.array(widths.numbers), widths.reason) == widths
+    of_old_bake = Widths.of(np.array(widths.numbers[:4]), widths.reason)
+    assert of_old_bake == replace(widths, spacing=0.0)
+
+
 def test_own_widths_are_kept_where_they_can_be_hair() -> None:
     strands = head_of_hair(20_000, has_widths=True)
     own = replace(strands, radius=np.full(strands.point_count, 1e-4))

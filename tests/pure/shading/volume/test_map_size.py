@@ -8,6 +8,7 @@ from hairloom.addon.shading.volume.map_size import (
     MEMORY_LIMIT,
     START_TEXELS,
     asked_size,
+    even_size,
     fitted_size,
     size_note,
 )
@@ -54,3 +55,13 @@ def test_bytes_are_those_of_the_textures() -> None:
 def test_without_shadows_there_is_nothing_to_tell() -> None:
     settings = VolumeSettings(shadows="none", resolution=2048)
     assert size_note(settings, 8, fitted_size(LARGEST, 8)) == ""
+
+
+def test_strands_that_stand_for_many_get_texels_of_half_their_spacing() -> None:
+    full = asked_size(VolumeSettings(), 1)
+    assert even_size(full, 0.0, 0.3) == full  # they stand for themselves alone
+    assert even_size(full, 0.6 / 1024, 0.3) == full
+    sparse = even_size(full, 0.6 / 100, 0.3)
+    assert (sparse.side, sparse.mesh_side) == (200, 512)
+    assert even_size(full, 0.6 / 100 * 1e3, 0.3 * 1e3) == sparse
+    assert even_size(full, 1e3, 0.3).side == 16

@@ -10,6 +10,7 @@ from hair_ball import combed_strands
 
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.volume.light_frame import ball_around, light_frame
+from hairloom.addon.shading.volume.map_size import asked_size, even_size
 from hairloom.addon.shading.volume.opacity import (
     Coverage,
     adds_to,
@@ -270,3 +271,35 @@ def test_a_lamp_within_the_ball_counts_as_many_strands_as_its_rays_meet() -> Non
         counts = [crossed(strands, radius, lamp, point) for point in points]
         assert np.mean(counts) > 1.0
         assert tau.mean() == pytest.approx(np.mean(counts), rel=0.08)
+
+
+def light_through_slab(count: int, *, is_even: bool) -> float:
+    """The mean light behind strands that lie side by side, evenly, and are 2 layers together."""
+    random = np.random.default_rng(5)
+    strands = np.zeros((count, 2, 3))
+    strands[:, :, 0] = -1.0, 1.0
+    strands[:, :, 1] = (2.0 * (np.arange(count) + random.random(count)) / count - 1.0)[:, None]
+    strands[:, :, 2] = random.uniform(-0.1, 0.1, count)[:, None]
+    radius = np.full((count, 2), 2.0 / count)
+    ball = ball_around(strands)
+    frame = light_frame(SUN, ball)
+    assert frame is not None
+    # four of them lie one over another
+    spacing, asked = 4.0 * 2.0 / count, asked_size(VolumeSettings(resolution=256), 1)
+    size = even_size(asked, spacing if is_even else 0.0, ball.radius)
+    found = coverage(strands.astype(np.float32), radius, frame, size.side)
+    sums = np.bincount(found.texel, found.covered, size.side**2).reshape(size.side, size.side, 1)
+    behind = random.uniform((-0.8, -0.8, -0.3), (0.8, 0.8, -0.3), (4000, 3))
+    places, depth = frame.places(behind)
+    starts, meshes = np.zeros((size.side, size.side)), np.ones((size.mesh_side, size.mesh_side))
+    # all strands are in front of these places, so that one layer holds them
+    tau, _, lit = look_up(sums, starts, meshes, np.array([0.5]), places, depth, 0.0)
+    np.testing.assert_allclose(lit, 1.0)
+    return float(transmittance(tau, 1.0).mean())
+
+
+def test_a_slab_lets_as_much_light_through_by_few_strands_as_by_many() -> None:
+    """In texels that strands leave empty too much of it comes through (Jensen's inequality)."""
+    for count in (60, 240, 1200):
+        assert light_through_slab(count, is_even=True) == pytest.approx(np.exp(-2.0), rel=0.08)
+    assert light_through_slab(60, is_even=False) > 3.0 * np.exp(-2.0)
