@@ -13,12 +13,15 @@ from dataclasses import replace
 
 from ..strands import StrandSet
 from .children_settings import ChildrenSettings
-from .widths import strands_for_cover
+from .widths import is_long, strands_for_cover
 
 #: Most strands in all: no more than a viewport draws fluently. Fewer own strands get no children.
 _MAX_STRANDS, _MIN_STRANDS = 300_000, 1_000
 #: Parts of their length by which children are shorter at the most, and stray; length of a wave.
 _SHORTER, _STRAY, _WAVE = 0.06, 0.01, 0.4
+#: From how far short hair takes its shape. Strands that are as their nearest curves would lie in
+#: patches, each of which answers light in its own way.
+_SCATTER = 1.0
 
 
 def are_few(own: StrandSet) -> bool:
@@ -42,6 +45,7 @@ def automatic(own: StrandSet, settings: ChildrenSettings) -> tuple[ChildrenSetti
         method="multi",
         strand_count=children,
         length_variation=_SHORTER,
+        scatter=0.0 if is_long(own) else _SCATTER,
         clump=0.0,
         frizz=_STRAY,
         frizz_length=_WAVE,

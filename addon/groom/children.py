@@ -24,6 +24,9 @@ from .children_settings import ChildrenSettings
 from .nearest import nearest_points
 from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights
 
+#: Guides are as far apart as this neighbour is, in the middle.
+_NEIGHBOUR = 3
+
 
 @dataclass(frozen=True)
 class Children:
@@ -85,11 +88,22 @@ def make_children(
 
 def _weights(roots: ChildRoots, guides: StrandSet, settings: ChildrenSettings) -> GuideWeights:
     if settings.method != "single":
-        return child_weights(roots.point, guides.roots, guides.group, guides.grid, settings.parting)
+        place = _scattered(roots.point, guides.roots, settings)
+        return child_weights(place, guides.roots, guides.group, guides.grid, settings.parting)
     nearest, _ = nearest_points(roots.point, guides.roots, 1)
     weight = np.zeros((len(nearest), GUIDES_PER_STRAND), np.float32)
     weight[:, 0] = 1.0
     return GuideWeights(np.repeat(nearest, GUIDES_PER_STRAND, axis=1).astype(np.int32), weight)
+
+
+def _scattered(place: Floats, guide_root: Floats, settings: ChildrenSettings) -> Floats:
+    """Where children take their shapes from, (child_count, 3) [m]: from near them, at random."""
+    if not settings.scatter or len(guide_root) < 2:
+        return place
+    _, gap = nearest_points(guide_root, guide_root, min(_NEIGHBOUR + 1, len(guide_root)))
+    random = np.random.default_rng([settings.seed, 4])
+    reach = settings.scatter * float(np.median(gap[:, -1]))
+    return place + np.float32(reach) * random.standard_normal(place.shape, np.float32)
 
 
 def _radius(guides: StrandSet, weights: GuideWeights, settings: ChildrenSettings) -> Floats:

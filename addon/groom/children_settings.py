@@ -55,6 +55,15 @@ class ChildrenSettings(Settings):
         shown_when=when("children.method", "multi", "single", "auto"),
         active_when=_PARTS,
     )
+    scatter: float = number(
+        0.0,
+        label="Scatter",
+        description="Give each child the shape that hair has this far from it at random, in "
+        "distances between guides, as the hairs of fur differ from their neighbours",
+        soft=(0.0, 2.0),
+        hard=(0.0, 100.0),
+        shown_when=when("children.method", "multi"),
+    )
     length_variation: float = number(
         0.2,
         label="Length Variation",

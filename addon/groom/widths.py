@@ -33,9 +33,10 @@ _OF_FACE = 1.0 / 60.0
 #: not all the hair.
 _MAX_EXTINCTION = 6.0
 #: Hair covers its body by this many layers of strands that are as wide as they may be, and looks
-#: like hair where strands are this many times as long as wide: as short hair is, 8 mm of a brow.
+#: like hair where strands are this many times as long as wide: those of a buzz cut, 12 mm long, are
+#: 0.3 mm wide.
 #: Strands that lack less than this factor are enough.
-_ENOUGH, _SLENDER, _LACKING = 4.0, 100.0, 1.1
+_ENOUGH, _SLENDER, _LACKING = 4.0, 40.0, 1.1
 #: Hair this many spacings long hangs in locks. A strand of it that stands for more hairs than this
 #: looks like a noodle from near.
 _LONG, _MAX_HAIRS = 5.0, 3.5
@@ -138,6 +139,11 @@ def as_wide(strands: StrandSet, drawn: StrandSet) -> StrandSet:
     return replace(strands, radius=np.repeat(width, strands.point_counts), has_widths=True)
 
 
+def is_long(strands: StrandSet) -> bool:
+    """Whether hair is many times as long as it is apart."""
+    return _Hair.of(strands).is_long
+
+
 def strands_for_cover(strands: StrandSet) -> float:
     """How many strands must be drawn for each of these to cover the body and look like hair: 1
     where these do, and where they stand in a row, as lashes do.
@@ -152,8 +158,7 @@ def strands_for_cover(strands: StrandSet) -> float:
     if not hair.middle:
         return 1.0
     length = np.maximum(hair.length, np.finfo(np.float32).tiny)
-    is_long = float(np.median(length / hair.apart)) >= _LONG
-    finer = _found_of(hair).hairs / _MAX_HAIRS if is_long else 1.0
+    finer = _found_of(hair).hairs / _MAX_HAIRS if hair.is_long else 1.0
     layers = float(np.median(hair.widest * length / hair.apart**2))
     slender = float(np.median(length / hair.widest))
     lacking = max(_ENOUGH / max(layers, 1e-6), _SLENDER / slender)
@@ -198,6 +203,11 @@ class _Hair:
         # where most roots coincide, as in tufts, they do not tell how the hair is spread
         roots = _evened(at_roots if np.median(at_roots) else apart)
         return cls(length, typical, _evened(apart), roots, float(np.median(apart)))
+
+    @property
+    def is_long(self) -> bool:
+        """Whether it hangs in locks, rather than standing beside each other as fur does."""
+        return self.middle > 0.0 and float(np.median(self.length / self.apart)) >= _LONG
 
     @property
     def extent(self) -> float:

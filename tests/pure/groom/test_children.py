@@ -15,6 +15,7 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.children import Children, make_children
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.nearest import nearest_points
 from hairloom.addon.groom.roots import bind_roots, root_frames
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.strands import StrandSet, Surface
@@ -328,6 +329,35 @@ def test_lengths_lie_in_the_range_and_on_the_way_of_the_guides() -> None:
     assert away == pytest.approx(np.full(away.shape, 0.3), abs=1e-3)  # chords would be 1.4e-3 off
     segment = np.linalg.norm(np.diff(cut.grid, axis=1), axis=2)
     assert segment == pytest.approx(np.tile(segment.mean(1)[:, None], 8), rel=0.02)
+
+
+def test_scattered_children_differ_from_their_neighbours_as_guides_do() -> None:
+    """Else fur lies in patches around its guides, each of which answers light in its own way."""
+    surface, guides = sheet(), spread_guides(sheet(), 400)
+    ways = guides.grid[:, -1] - guides.grid[:, 0]
+
+    def unlike(scatter: float) -> float:
+        """How far the way of a child is from its nearest neighbour's, as a rule."""
+        made = make_children(
+            guides, surface, settings(strand_count=4000, scatter=scatter), place="test"
+        ).strands.grid
+        near, _ = nearest_points(made[:, 0], made[:, 0], 2)
+        way = made[:, -1] - made[:, 0]
+        return float(np.linalg.norm(way - way[near[:, 1]], axis=1).mean())
+
+    random = np.random.default_rng(1).permutation(len(ways))
+    of_guides = float(np.linalg.norm(ways - ways[random], axis=1).mean())
+    # a child is the mean of up to three guides
+    assert unlike(1.0) > 0.5 * of_guides > 1.5 * unlike(0.0)
+
+
+def test_more_scattered_children_move_none() -> None:
+    surface, guides = sheet(), spread_guides(sheet())
+    few, many = (
+        make_children(guides, surface, settings(strand_count=n, scatter=1.0), place="test")
+        for n in (100, 400)
+    )
+    np.testing.assert_array_equal(few.strands.grid, many.strands.grid[:100])
 
 
 def test_clump_draws_the_tips_of_locks_together() -> None:
