@@ -26,6 +26,7 @@ from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.sessions.prepared_groom import prepared
 from hairloom.addon.exchange.textures.srgb import srgb_encoded
+from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.face_hair import grow_with_face
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.pipeline import Rig
@@ -68,21 +69,29 @@ def scale_flip(pair: Pair, name: str) -> float:
 
 
 def count_figures() -> dict[str, float]:
-    """The built-in groom by all of its strands, and by even parts of them; children would make the
-    counts alike.
+    """The built-in groom by all of its strands, and by even parts of them: as it ships, when
+    children fill up what is few, and without them.
     """
+    shipped = _count_figures(ChildrenSettings().method)
+    bare = {f"{name}_without_children": value for name, value in _count_figures("none").items()}
+    return shipped | bare
+
+
+def _count_figures(children: str) -> dict[str, float]:
     head = built_in_head()
     grown = grow_with_face(head.surface, GrowSettings(strand_count=COUNTS[-1]), head.weights)
     whole = rig_of((grown, head.surface), "built-in", "none")
     order = np.argsort(pipeline.strand_ranks(whole), kind="stable")
     parts = [order[:count] for count in COUNTS[:-1]] + [order[COUNTS[0] : 2 * COUNTS[0]]]
-    rigs = [rig_of((grown.take(np.sort(part)), head.surface), "built-in", "none") for part in parts]
+    grooms = [grown.take(np.sort(part)) for part in parts]
+    rigs = [rig_of((groom, head.surface), "built-in", children) for groom in grooms]
     studio = _studio(whole)
     camera = studio._camera(1.0)
     lights = studio.lights(camera)
     truth, hair = _picture(whole, None, lights, camera)
     *pictures, equal = (_picture(rig, None, lights, camera)[0] for rig in rigs)
-    size = int(np.ceil(rigs[0].widths.spacing / _pixel_size(camera, whole)))
+    fewest = rig_of((grooms[0], head.surface), "built-in", "none")
+    size = int(np.ceil(fewest.widths.spacing / _pixel_size(camera, whole)))
     seen, seen_hair = _reduced(truth, size), _reduced(hair[..., None], size)[..., 0] > 0.5
     light = [
         float(picture[hair, :3].mean()) / float(truth[hair, :3].mean()) for picture in pictures
