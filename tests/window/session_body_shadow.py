@@ -49,6 +49,7 @@ def set_the_scene():
         method="normals", lift=1.0, strand_count=3000, length=0.08, density_group="Crown"
     )
     bpy.context.object.name = "Hair"
+    bpy.context.object.data.hairloom.children.method = "none"
     bpy.ops.object.light_add(type="SUN", rotation=(np.radians(25.0), 0.0, 0.0))
     bpy.context.object.data.energy = 4.0
     bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]

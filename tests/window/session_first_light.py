@@ -63,6 +63,7 @@ def set_the_scene():
     bpy.ops.object.shade_smooth()
     assert bpy.ops.hairloom.grow(strand_count=STRANDS, length=0.12) == {"FINISHED"}
     bpy.context.object.name = "Hair"
+    bpy.context.object.data.hairloom.children.method = "none"  # only its own strands are asked for
     hide_floor()
     look_from_front(DISTANCE)
     yield from open_our_sidebar()

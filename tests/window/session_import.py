@@ -1,5 +1,5 @@
 """Grooms of files in the window: the file browser of a menu entry, the popup of dropped files, Esc
-while a file is read, undo and redo."""
+while a file is read, undo and redo, and undo after a click."""
 
 import sys
 from pathlib import Path
@@ -9,7 +9,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import look_from_front, new_head, press, viewport
+from artist import click, confirm_file, look_from_front, new_head, press, viewport
 from driver import of_hairloom, until
 
 FOLDER = Path(bpy.app.tempdir) / "grooms"
@@ -23,6 +23,7 @@ def steps():
     yield from esc_ends_the_process_that_reads()
     yield from dropped_files_come_in_after_the_popup()
     yield from undo_and_redo()
+    yield from undo_after_a_click()
 
 
 def set_the_scene():
@@ -138,6 +139,45 @@ def undo_and_redo():
         bpy.ops.ed.redo()
     yield
     assert sorted(grooms()) == ["first", "second"]
+
+
+def undo_after_a_click():
+    """What a click imports is one step, and a click after it another: keys take back one each."""
+    yield from undo_by_keys()
+    assert grooms() == {}
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    with in_the_view():
+        bpy.ops.hairloom.import_strands("INVOKE_DEFAULT", True, filter_glob="*.tfx")
+    yield from until(lambda: bool(browsers()), "no file browser has come")
+    browsers()[0].spaces.active.params.filename = "first.tfx"
+    yield from confirm_file(FOLDER)
+    yield from until(lambda: sorted(grooms()) == ["first"], "the file does not come in")
+    yield
+    assert bpy.context.selected_objects == [grooms()["first"]]
+    yield from click(*beside_the_head())
+    yield from until(lambda: not bpy.context.selected_objects, "the click deselects nothing")
+    yield from undo_by_keys()
+    assert bpy.context.selected_objects == [grooms()["first"]]
+    yield from undo_by_keys()
+    assert grooms() == {}
+    assert bpy.context.selected_objects == [bpy.data.objects["Head"]]
+
+
+def beside_the_head():
+    """A pixel of the view that shows nothing which could be selected."""
+    view = next(each for each in viewport().regions if each.type == "WINDOW")
+    return view.x + 3 * view.width // 4, view.y + view.height // 8
+
+
+def undo_by_keys():
+    """Ctrl+Z with the mouse over the view."""
+    window, (x, y) = bpy.context.window, beside_the_head()
+    window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+    yield 1
+    for value in ("PRESS", "RELEASE"):
+        window.event_simulate("Z", value, x=x, y=y, ctrl=True)
+        yield 1
+    yield
 
 
 driver.play(steps())

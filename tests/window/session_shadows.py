@@ -40,6 +40,7 @@ def set_the_scene():
     bpy.ops.object.shade_smooth()
     bpy.ops.hairloom.grow(method="normals", lift=1.0, strand_count=1500, length=0.06)
     bpy.context.object.name = "Hair"
+    bpy.context.object.data.hairloom.children.method = "none"
     hide_floor()
     bpy.data.objects["Hair"].data.hairloom.shading.model = "marschner"
     look_from_front(0.7)

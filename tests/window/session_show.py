@@ -56,7 +56,7 @@ def a_cancelled_one():
     """Esc ends it between two pictures; those of the turn before stay as they are."""
     before = {path.name: path.stat().st_mtime_ns for path in FOLDER.iterdir()}
     turntable(frames=2000)
-    third = ".turntable.hl-*/*_0003.png"
+    third = ".Hair_0001.hl-*/*_0003.png"  # where they wait for the last one
     yield from until(lambda: any(FOLDER.glob(third)), "no picture is drawn")
     assert running() == "Turntable"
     driver.screenshot("turning")

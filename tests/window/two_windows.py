@@ -15,6 +15,7 @@ def set_the_scene():
     new_head()
     bpy.ops.hairloom.grow(strand_count=3000, length=0.12)
     bpy.context.object.name = "Hair"
+    bpy.context.object.data.hairloom.children.method = "none"
     collection = bpy.data.collections.new("Groom")
     bpy.context.scene.collection.children.link(collection)
     for obj in (bpy.data.objects["Head"], hair()):
