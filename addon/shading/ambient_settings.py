@@ -24,9 +24,10 @@ class AmbientSettings(Settings):
         hard=(0.0, 1.0),
     )
     extinction: float = number(
-        2.0,
+        0.4,
         label="Extinction",
-        description="Factor on the light that strands block on its way from all sides",
+        description="Factor on the light that strands block on its way from all sides; they send "
+        "about half of it on",
         soft=(0.0, 10.0),
         hard=(0.0, 10_000.0),
         source="Kajiya and Kay 1989, section 2; Kim and Neumann 2001, opacity shadow maps",
@@ -49,7 +50,7 @@ class AmbientSettings(Settings):
         hard=(0.05, 1.0),
     )
     scalp_extinction: float = number(
-        12.0,
+        2.0,
         label="Scalp Extinction",
         description="Extinction of light on its way to the skin; higher than Extinction, so that "
         "the scalp does not shine through",

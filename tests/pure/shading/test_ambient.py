@@ -169,7 +169,7 @@ def hair_on_ball() -> StrandSet:
 
 def test_open_at_the_outside_and_dark_at_the_scalp() -> None:
     strands = hair_on_ball()
-    settings = AmbientSettings(upper_fraction=0.0)
+    settings = AmbientSettings(extinction=2.0, upper_fraction=0.0)
     shade = ambient_occlusion(strands, strands.points, ball(0.08), settings).reshape(4000, 8)
     mean = shade.mean(axis=0)
     assert (np.diff(mean) > 0.0).all()
