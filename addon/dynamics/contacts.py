@@ -23,6 +23,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..strands.vectors import dot_rows
 from .colliders import Pose, transform_points
+from .colliders.posed import near_points, world_distance
 from .constraints import PINNED, TINY, Touched, chosen
 from .settings import DynamicsSettings
 
@@ -146,15 +147,8 @@ def touched_by(contacts: list[Contacts], touching: list[Bools]) -> Touched | Non
 def _contacts_with(
     pose: Pose, position: Floats, previous: Floats, radius: Floats, led_out: float, size: float
 ) -> Contacts:
-    index, local, reach = _near(pose, position, radius, REACH * size)
-    distance, gradient = pose.collider.distance(local)
-    # distance and normal in the world: the gradient transforms by the inverse transposed, and its
-    # length says how much the distance is scaled along it
-    normal = np.einsum("ji,jn->in", pose.inverse[:3, :3], gradient)
-    scale = np.maximum(np.sqrt(dot_rows(normal, normal)), TINY)
-    normal /= scale
-    distance /= scale
-
+    index, local, reach = near_points(pose, position, radius, REACH * size)
+    distance, normal = world_distance(pose, local)
     close = (distance < reach).nonzero()[0]
     index, distance = index.take(close), distance.take(close)
     local, normal = chosen(local, close), chosen(normal, close)
@@ -169,21 +163,3 @@ def _contacts_with(
     is_out = reached >= own_radius
     skin = np.float32(SKIN * size)
     return Contacts(index, normal, offset, origin, is_out, skin, np.zeros_like(offset))
-
-
-def _near(
-    pose: Pose, position: Floats, radius: Floats, beyond: float
-) -> tuple[Ints, Floats, Floats]:
-    """Points that may be within their reach, their radius and `beyond` [m], where they are in
-    object space (3, n), and their reach [m] (n,).
-
-    A bounding sphere first, then the collider's own quick answer.
-    """
-    offset = position - pose.center[:, None]
-    farthest = pose.radius + float(radius.max()) + beyond
-    index = (dot_rows(offset, offset) < np.float32(farthest * farthest)).nonzero()[0]
-    reach = radius.take(index)
-    reach += np.float32(beyond)
-    local = transform_points(pose.inverse, chosen(position, index))
-    kept = pose.collider.near(local, reach / np.float32(pose.scale))
-    return index.take(kept), chosen(local, kept), reach.take(kept)

@@ -75,6 +75,13 @@ class ColliderTextures:
             one.collider is other for one, other in zip(posed, self.colliders, strict=True)
         )
 
+    def solids(self, posed: tuple[PosedCollider, ...]) -> Any:
+        """The texture `solids` of lib_signed_distance.glsl: all colliders at the frame's end.
+
+        It is RGBA32F, COLLIDER_TEXELS texels a collider in one row, as `moments` has them.
+        """
+        return texture_from(self.moments(posed, np.array([[0.0, 1.0]]), 0.0), "RGBA32F")
+
     def moments(self, posed: tuple[PosedCollider, ...], spans: Floats, reach: float) -> Floats:
         """Rows of the table of moments, (substep_count, collider_count * COLLIDER_TEXELS, 4).
 

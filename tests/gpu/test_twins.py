@@ -9,7 +9,15 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.colliders import CapsuleCollider, DistanceField, SphereCollider
+from hairloom.addon.dynamics.colliders import (
+    CapsuleCollider,
+    Collider,
+    DistanceField,
+    PosedCollider,
+    SphereCollider,
+    SphereSetCollider,
+    signed_distance,
+)
 from hairloom.addon.params import Settings, choice, color, integer, number, toggle
 from hairloom.addon.params.glsl import struct_values
 from hairloom.addon.shading.kajiya_kay import kajiya_kay, strand_base, strand_normal
@@ -267,3 +275,44 @@ def test_collider_distance(
     # steps at the borders of cells, where rounding decides which cell a point is in
     off = np.abs(found[..., :3].reshape(-1, 3).T - gradient).max(axis=0)
     assert (off > (2e-3 if is_field else 1e-5)).sum() <= 4 * is_field
+
+
+@pytest.mark.parametrize("reach", [1.0e6, 0.05])
+def test_signed_distance(compute: Callable[..., np.ndarray], reach: float) -> None:
+    """Of several colliders of all kinds, moved, turned and scaled."""
+    from hairloom.addon.render.collider_textures import ColliderTextures
+
+    random = np.random.default_rng(8)
+    axis = np.linspace(-0.2, 0.2, 12)
+    nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    solids: tuple[Collider, ...] = (
+        CapsuleCollider(np.array([-0.2, 0.1, 0.0]), np.array([0.3, 0.2, -0.1]), 0.05),
+        DistanceField(np.abs(nodes).max(axis=-1) - 0.11, nodes[0, 0, 0], axis[1] - axis[0]),
+        SphereSetCollider(random.normal(0.0, 0.2, (9, 3)), random.uniform(0.02, 0.1, 9)),
+    )
+    posed = []
+    for collider in solids:
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.linalg.qr(random.normal(size=(3, 3)))[0] * [1.2, 0.8, 1.0]
+        matrix[:3, 3] = random.normal(0.0, 0.1, 3)
+        posed.append(PosedCollider(collider, np.eye(4), matrix))
+    points = random.uniform(-0.6, 0.6, (40, 32, 4)).astype(np.float32)
+    points[..., 3] = reach
+    textures = ColliderTextures.of(solids)
+    found = compute(
+        "signed_distance.glsl",
+        (32, 40),
+        textures={"points": points},
+        samplers={
+            "solids": ("FLOAT_2D", textures.solids(tuple(posed))),
+            "rounds": ("FLOAT_2D", textures.rounds),
+            "fields": ("FLOAT_2D", textures.fields),
+        },
+        defines=(("HAS_ROUNDS", 1), ("HAS_FIELDS", 1), ("solid_count", len(solids))),
+    )
+    distance, outward = signed_distance(points[..., :3].reshape(-1, 3), posed, reach)
+    assert (distance < 0.0).any() and (distance > 0.04).any()
+    assert np.abs(found[..., 3].ravel() - distance).max() < 2e-6
+    # at borders of cells, and where two solids are as near, rounding decides
+    off = np.abs(found[..., :3].reshape(-1, 3) - outward).max(axis=1)
+    assert (off > 1e-3).sum() <= 6

@@ -3,6 +3,7 @@
 from .distance_field import DistanceField
 from .posed import Collider, Pose, PosedCollider, poses_through, transform_points
 from .shapes import CapsuleCollider, SphereCollider
+from .signed_distance import signed_distance
 from .sphere_set import SphereSetCollider
 
 __all__ = [
@@ -14,5 +15,6 @@ __all__ = [
     "SphereCollider",
     "SphereSetCollider",
     "poses_through",
+    "signed_distance",
     "transform_points",
 ]

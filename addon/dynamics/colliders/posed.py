@@ -9,11 +9,14 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
+from ...strands.vectors import dot_rows
 from ..trajectory import at
 
 #: A collider that turns around within a frame is flat on its way; then it holds nothing out. A
 #: fraction of the largest scale.
 FLAT = 1.0e-3
+#: Lengths below this count as zero [m].
+TINY = np.float32(1.0e-12)
 
 
 class Collider(Protocol):
@@ -116,6 +119,39 @@ def poses_through(
         [pose for pose in (poses[number] for poses in found) if pose is not None]
         for number in range(len(spans))
     ]
+
+
+def near_points(
+    pose: Pose, position: Floats, reach: Floats, beyond: float = 0.0
+) -> tuple[Ints, Floats, Floats]:
+    """Points (3, n) world that may be within their reach, (n,) [m] and `beyond` [m]: their indices,
+    where they are in object space (3, m), and their reach [m] (m,).
+
+    A bounding sphere first, then the collider's own quick answer.
+    """
+    offset = position - pose.center[:, None]
+    farthest = pose.radius + float(reach.max()) + beyond
+    index = (dot_rows(offset, offset) < np.float32(farthest * farthest)).nonzero()[0]
+    reach = reach.take(index)
+    reach += np.float32(beyond)
+    local = transform_points(pose.inverse, position.take(index, axis=1, mode="clip"))
+    kept = pose.collider.near(local, reach / np.float32(pose.scale))
+    return index.take(kept), local.take(kept, axis=1, mode="clip"), reach.take(kept)
+
+
+def world_distance(pose: Pose, local: Floats) -> tuple[Floats, Floats]:
+    """Signed distance (n,) [m] and unit normal outwards (3, n), world, at points (3, n) of object
+    space.
+
+    The gradient transforms by the inverse transposed, and its length says how much the distance is
+    scaled along it.
+    """
+    distance, gradient = pose.collider.distance(local)
+    normal = np.einsum("ji,jn->in", pose.inverse[:3, :3], gradient)
+    scale = np.maximum(np.sqrt(dot_rows(normal, normal)), TINY)
+    normal /= scale
+    distance /= scale
+    return distance, normal
 
 
 def transform_points(matrix: Floats, points: Floats) -> Floats:

@@ -1,0 +1,45 @@
+"""How far points are from posed colliders, and which way leads out: for whoever is not the solver.
+
+The twin on the GPU is gpu_shaders/lib_signed_distance.glsl.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...arrays import Floats
+from .posed import PosedCollider, near_points, world_distance
+
+#: [m] colliders are asked for points that are at least this near, also inside of another.
+_LEAST = np.float32(1.0e-9)
+
+
+def signed_distance(
+    points: Floats, colliders: Sequence[PosedCollider], reach: float = np.inf
+) -> tuple[Floats, Floats]:
+    """Signed distance to the nearest collider, where all stand at the frame's end.
+
+    Args:
+        points: (n, 3) world [m].
+        reach: [m] how far is still told exactly; the smaller, the quicker.
+
+    Returns:
+        (n,) float32 [m], negative inside, `reach` where nothing is nearer; and the unit direction
+        (n, 3) float32 outwards, in which that distance grows; zero where nothing is nearer.
+    """
+    rows = np.ascontiguousarray(np.asarray(points, np.float32).T)
+    distance = np.full(rows.shape[1], reach, np.float32)
+    outward = np.zeros_like(rows)
+    for posed in colliders if rows.size else ():
+        (pose,) = posed.poses([(0.0, 1.0)])
+        if pose is None:
+            continue
+        index, local, _ = near_points(pose, rows, np.maximum(distance, _LEAST))
+        found, normal = world_distance(pose, local)
+        nearer = (found < distance.take(index)).nonzero()[0]
+        index = index.take(nearer)
+        distance[index] = found.take(nearer)
+        outward[:, index] = normal.take(nearer, axis=1)
+    return distance, np.ascontiguousarray(outward.T)

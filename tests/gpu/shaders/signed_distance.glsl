@@ -1,0 +1,12 @@
+// xyz: the way out of the nearest collider; w: how far it is, up to the point's w.
+#include "lib_signed_distance.glsl"
+
+void main()
+{
+  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(at, imageSize(result)))) {
+    return;
+  }
+  vec4 point = texelFetch(points, at, 0);
+  imageStore(result, at, signed_distance(point.xyz, point.w));
+}
