@@ -23,7 +23,7 @@ def signed_distance(
 
     Args:
         points: (n, 3) world [m].
-        reach: [m] how far is still told exactly; the smaller, the quicker.
+        reach: [m] distances beyond it are not looked for; the smaller, the quicker.
 
     Returns:
         (n,) float32 [m], negative inside, `reach` where nothing is nearer; and the unit direction
