@@ -38,7 +38,8 @@ def adaptive_points(points: Floats, factors: Ints) -> tuple[Floats, Ints]:
 def read_factors(order: DetailOrder, strand_count: int, cv_count: int) -> Ints:
     """The factors of an uneven order, read back, (strand_count, cv_count - 1)."""
     from hairloom.addon.render.detail_pass import factor_texels
-    from hairloom.addon.render.textures import from_strand_rows, texture_to_array
+    from hairloom.addon.render.strand_layout import from_strand_rows
+    from hairloom.addon.render.textures import texture_to_array
 
     texels = from_strand_rows(
         texture_to_array(order.factors), strand_count, factor_texels(cv_count)

@@ -28,7 +28,8 @@ from ..cards.bake import SAMPLES, Block, blocks_of, min_one_sample
 from ..cards.bake_strands import FlatStrands
 from ..cards.steps import result_of
 from .shader_program import ShaderProgram, ShaderRecipe, program
-from .textures import drawing_into, drawing_state, strand_rows, texture_from, texture_to_array
+from .strand_layout import strand_rows
+from .textures import drawing_into, drawing_state, texture_from, texture_to_array
 
 #: Texels that a compute group works on, along each side.
 _GROUP = 8

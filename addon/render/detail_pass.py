@@ -1,6 +1,6 @@
 """How finely each strand is drawn in one view, and which are: computed on the GPU.
 
-Two steps, with textures in the layout of textures.strand_rows:
+Two steps, with textures in the layout of strand_layout.strand_rows:
 
     cv_points ----> detail ----> factors, totals             one invocation a strand
     totals -------> numpy -----> order, classes              read back, 8 bytes a strand
@@ -30,17 +30,9 @@ from .detail_classes import DetailClass, detail_classes
 from .shader_program import ShaderRecipe, program
 from .shader_source import DETAIL_CHOICES, SHADE_CAPACITY
 from .snapshot import Snapshot
-from .textures import (
-    UniformBlock,
-    from_strand_rows,
-    strand_rows,
-    strand_rows_size,
-    texture_from,
-    texture_to_array,
-)
+from .strand_layout import FACTORS_IN_TEXEL, from_strand_rows, strand_rows, strand_rows_size
+from .textures import UniformBlock, texture_from, texture_to_array
 
-#: Segments whose factors lie in one texel.
-FACTORS_IN_TEXEL = 16
 #: How far a strand that covers pixels in part is drawn beyond its edge [pixels].
 EDGE = 0.75
 _BLOCKS = (("DetailView", "seen"), ("DetailSettings", "detail"))

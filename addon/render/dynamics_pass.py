@@ -1,6 +1,7 @@
 """Dynamics on the GPU: `dynamics.step.advance` as a compute shader, one invocation a guide.
 
-The guides stay on the GPU from frame to frame, in textures with the layout of textures.strand_rows:
+The guides stay on the GPU from frame to frame, in textures in the layout of
+strand_layout.strand_rows:
 
     positions      RGBA32F: xyz world [m], w the z of a substep earlier
     previous_positions   RG32F: x and y of a substep earlier; software drivers take time for each
@@ -36,13 +37,8 @@ from ..dynamics.state import DynamicsState, Rest, as_rows
 from .collider_textures import ColliderTextures
 from .dynamics_block import block_of, moments_of, spans_of
 from .shader_program import ShaderRecipe, program, released_with_shaders
-from .textures import (
-    UniformBlock,
-    from_strand_rows,
-    strand_rows,
-    texture_from,
-    texture_to_array,
-)
+from .strand_layout import from_strand_rows, strand_rows
+from .textures import UniformBlock, texture_from, texture_to_array
 
 #: Substeps of one dispatch at most: operating systems reset a GPU that does not answer for seconds.
 SUBSTEPS_AT_ONCE = 64
@@ -116,7 +112,7 @@ class DynamicsPass:
 
     @property
     def guides(self) -> Any:
-        """Texture RGBA32F in the layout of textures.strand_rows, xyz the CVs [m, world] at the
+        """Texture RGBA32F in the layout of strand_layout.strand_rows, xyz the CVs [m, world] at the
         end of the last frame, w anything; None before the first frame."""
         return self._textures.get("bridged" if self._is_bridged else "positions")
 

@@ -1,7 +1,7 @@
 """Strands that ride on guides, computed on the GPU: what StrandPass draws without an upload.
 
 The same as pipeline.strands_at, in three dispatches over textures in the layout of
-textures.strand_rows:
+strand_layout.strand_rows:
 
     vertices ------> ride_roots ------> root_motions                    one invocation a strand
     guides_now ----> ride_guides -----> guide_motions                   one a CV of the guides
@@ -31,13 +31,8 @@ from ..refine.ride import Weights
 from ..strands import StrandSet, Surface
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .snapshot import DevicePoints
-from .textures import (
-    from_strand_rows,
-    strand_rows,
-    strand_rows_size,
-    texture_from,
-    texture_to_array,
-)
+from .strand_layout import from_strand_rows, strand_rows, strand_rows_size
+from .textures import texture_from, texture_to_array
 
 ROOTS_RECIPE = ShaderRecipe(
     name="ride_roots",
@@ -118,7 +113,7 @@ class RidePass:
         Args:
             head_positions, matrix: as in `carry`.
             guides_now: (guide_count, cv_count, 3) [m], world space, or a texture RGBA32F that
-                holds them in the layout of textures.strand_rows.
+                holds them in the layout of strand_layout.strand_rows.
 
         Raises:
             ShaderError: a shader does not compile here.

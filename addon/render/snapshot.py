@@ -128,8 +128,8 @@ class DevicePoints:
     they are when it is drawn, and lets go of it when the GPU goes.
 
     shape: (strand_count, cv_count).
-    texture: RGBA32F in the layout of textures.strand_rows, xyz position [m, world] and w radius
-        [m]; None before the first moment and after the release.
+    texture: RGBA32F in the layout of strand_layout.strand_rows, xyz position [m, world] and w
+        radius [m]; None before the first moment and after the release.
     center: (3,) [m], the middle of all roots.
     serial: grows whenever the texture is written, so that others know what is out of date.
     """

@@ -1,6 +1,6 @@
 """Draws strands as ribbons that face the eye, shaded per pixel, into whatever target is bound.
 
-Packed textures, one row a strand (column blocks beyond 16384 rows, see textures.strand_rows):
+Packed textures, one row a strand (column blocks beyond 16384 rows, see strand_layout.strand_rows):
     cv_points RGBA32F: xyz position [m, world], w radius [m]     new with every new pose, unless
                                                                  it lies on the GPU already
     cv_looks  RG32F:   x ambient occlusion, y seed as a number   constant
@@ -41,7 +41,8 @@ from .shader_source import DEBUG_VIEWS, ShaderError, output_index
 from .snapshot import Snapshot
 from .strand_drawing import StrandDrawing
 from .strand_layers import LAYERS_OF_PIXELS, LayersDrawn
-from .textures import drawing_state, strand_rows, texture_from
+from .strand_layout import strand_rows
+from .textures import drawing_state, texture_from
 from .view_block import lights_feature, view_feature
 
 #: half floats end soon after

@@ -10,7 +10,6 @@ import gpu
 import numpy as np
 
 from ..arrays import Floats
-from .shader_source import STRAND_ROWS
 
 _CHANNELS = {"R16F": 1, "R32F": 1, "RG32F": 2, "RGBA32F": 4, "RGBA16F": 4}
 
@@ -38,45 +37,6 @@ def texture_to_array(texture: Any) -> Floats:
     """A float texture as (height, width, channels) float32, row 0 at the bottom."""
     pixels = np.asarray(texture.read(), np.float32)  # the memory that was read, without a copy
     return pixels.reshape(texture.height, texture.width, -1)
-
-
-def strand_rows(values: Floats) -> Floats:
-    """Per-CV values (strand_count, cv_count, channels) as texture rows, one a strand.
-
-    Strand s lies in row s % 16384, from column (s // 16384) * cv_count on: beyond 16384 strands,
-    the largest texture side, further column blocks follow. Unused texels are 0.
-
-    Raises:
-        ValueError: more strands than blocks of columns can hold.
-    """
-    strand_count, cv_count, channels = values.shape
-    width, _ = strand_rows_size(strand_count, cv_count)
-    if width == cv_count:
-        return values
-    blocks = width // cv_count
-    padded = np.zeros((blocks * STRAND_ROWS, cv_count, channels), np.float32)
-    padded[:strand_count] = values
-    columns = padded.reshape(blocks, STRAND_ROWS, cv_count, channels).swapaxes(0, 1)
-    return np.ascontiguousarray(columns).reshape(STRAND_ROWS, blocks * cv_count, channels)
-
-
-def strand_rows_size(strand_count: int, cv_count: int) -> tuple[int, int]:
-    """Width and height of a texture in that layout.
-
-    Raises:
-        ValueError: more strands than blocks of columns can hold.
-    """
-    blocks = max(-(-strand_count // STRAND_ROWS), 1)
-    if blocks * cv_count > STRAND_ROWS:
-        raise ValueError(f"{strand_count} strands of {cv_count} CVs do not fit a texture")
-    return blocks * cv_count, strand_count if blocks == 1 else STRAND_ROWS
-
-
-def from_strand_rows(pixels: Floats, strand_count: int, cv_count: int) -> Floats:
-    """What `strand_rows` has laid out, again as (strand_count, cv_count, channels)."""
-    height, width, channels = pixels.shape
-    blocks = pixels.reshape(height, width // cv_count, cv_count, channels).swapaxes(0, 1)
-    return blocks.reshape(-1, cv_count, channels)[:strand_count]
 
 
 class UniformBlock:

@@ -72,7 +72,8 @@ def computed(
     """Factors (strand_count, cv_count - 1) as the GPU finds them, and the order."""
     from hairloom.addon.render import frame
     from hairloom.addon.render.detail_pass import DetailPass
-    from hairloom.addon.render.textures import strand_rows, texture_from
+    from hairloom.addon.render.strand_layout import strand_rows
+    from hairloom.addon.render.textures import texture_from
 
     snapshot = snapshot_of(frame, strands, detail, **more)
     packed = np.concatenate([strands, snapshot.radius[..., None]], axis=-1)

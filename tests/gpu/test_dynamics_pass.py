@@ -185,7 +185,8 @@ def make_pass(gpu_context: Any) -> Callable[[DynamicsState], Any]:
 
 
 def guides_of(dynamics: Any, guide_count: int, cv_count: int) -> np.ndarray:
-    from hairloom.addon.render.textures import from_strand_rows, texture_to_array
+    from hairloom.addon.render.strand_layout import from_strand_rows
+    from hairloom.addon.render.textures import texture_to_array
 
     return from_strand_rows(texture_to_array(dynamics.guides), guide_count, cv_count)[..., :3]
 

@@ -185,7 +185,7 @@ def test_more_strands_than_a_texture_has_rows(frame: Any) -> None:
 
 
 def test_more_strands_than_a_texture_can_hold() -> None:
-    from hairloom.addon.render.textures import strand_rows
+    from hairloom.addon.render.strand_layout import strand_rows
 
     too_many = np.broadcast_to(np.float32(0.0), (16384 * 600, 30, 4))
     with pytest.raises(ValueError, match="do not fit"):

@@ -48,7 +48,8 @@ def dome(count: int = 3000, cv_count: int = 12, radius: float = 2e-4) -> tuple[A
 
 
 def points_of(strands: np.ndarray, radius: np.ndarray) -> Any:
-    from hairloom.addon.render.textures import strand_rows, texture_from
+    from hairloom.addon.render.strand_layout import strand_rows
+    from hairloom.addon.render.textures import texture_from
 
     return texture_from(
         strand_rows(np.concatenate([strands, radius[..., None]], axis=-1)), "RGBA32F"

@@ -34,7 +34,8 @@ def hair() -> np.ndarray:
 def tiles_of(settings: VolumeSettings, *lights: Light) -> tuple[Any, np.ndarray]:
     from hairloom.addon.render.opacity_pass import OpacityPass
     from hairloom.addon.render.opacity_tiles import opacity_tiles
-    from hairloom.addon.render.textures import strand_rows, texture_from
+    from hairloom.addon.render.strand_layout import strand_rows
+    from hairloom.addon.render.textures import texture_from
 
     strands = hair()
     radius = np.full((200, 4, 1), 5e-4, np.float32)

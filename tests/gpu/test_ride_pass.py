@@ -182,7 +182,8 @@ def test_strands_at_rest_stay_bit_for_bit() -> None:
 
 
 def test_guides_may_lie_on_the_gpu_already() -> None:
-    from hairloom.addon.render.textures import strand_rows, texture_from
+    from hairloom.addon.render.strand_layout import strand_rows
+    from hairloom.addon.render.textures import texture_from
 
     rig = rig_on(ball(), 300)
     pose = deformed(rig.head)

@@ -15,7 +15,8 @@ from ...pipeline import Motion, Pose, Rig
 from ...render.dynamics_pass import DynamicsPass
 from ...render.ride_pass import RidePass
 from ...render.snapshot import Snapshot
-from ...render.textures import from_strand_rows, texture_to_array
+from ...render.strand_layout import from_strand_rows
+from ...render.textures import texture_to_array
 from .numpy_solver import checked_guides, let_go
 
 
