@@ -121,6 +121,15 @@ void relax_lengths(int sweeps)
   }
 }
 
+// The point, no farther from another than this.
+vec3 brought_near(vec3 point, vec3 other, float farthest)
+{
+  vec3 offset = point - other;
+  return other + offset * min(farthest / max(length(offset), TINY), 1.0);
+}
+
+// No CV farther from the root than its length along the strand, neither in a straight line nor along
+// the strand; a guide with a held tip is shortened from the tip first.
 void hold_within_reach()
 {
   float reach = 0.0;
@@ -128,5 +137,14 @@ void hold_within_reach()
     reach += segment_length[i];
     vec3 offset = position[i + 2] - position[1];
     position[i + 2] = position[1] + offset * min(reach / max(length(offset), TINY), 1.0);
+  }
+#ifdef TIPS_HELD
+  for (int i = FREE - 2; i >= 0; i--) {
+    vec3 near = brought_near(position[i + 2], position[i + 3], segment_length[i + 1]);
+    position[i + 2] = tip_is_held ? near : position[i + 2];
+  }
+#endif
+  for (int i = 0; i < FREE; i++) {
+    position[i + 2] = brought_near(position[i + 2], position[i + 1], segment_length[i]);
   }
 }

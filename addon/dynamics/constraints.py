@@ -119,9 +119,9 @@ def relax_lengths(position: Floats, length: Floats, tip_held: Floats | None, swe
             position[:, cv] -= segment * upper
 
 
-def hold_within_reach(position: Floats, length: Floats) -> None:
+def hold_within_reach(position: Floats, length: Floats, tip_held: Floats | None) -> None:
     """No CV farther from the last pinned one than its length along the strand (Kim, Chentanez and
-    Mueller 2012, "Long Range Attachments")."""
+    Mueller 2012, "Long Range Attachments"), neither in a straight line nor along the strand."""
     root = position[:, PINNED - 1 : PINNED]
     displacement = position[:, PINNED:] - root
     reach = np.cumsum(length[PINNED - 1 :], axis=0)
@@ -130,6 +130,33 @@ def hold_within_reach(position: Floats, length: Floats) -> None:
     )
     displacement += root
     position[:, PINNED:] = displacement
+    shorten(position, length, tip_held)
+
+
+def shorten(position: Floats, length: Floats, tip_held: Floats | None) -> None:
+    """No segment longer than it should be: from root to tip each CV comes near enough to the one
+    before it. That shortens zigzags, which long-range attachments let pass.
+
+    Guides with held tips are shortened from the tip first; where both cannot be had, the length
+    counts and not the tip's place.
+    """
+    last = position.shape[1] - 1
+    if tip_held is not None:
+        for cv in range(last - 1, PINNED - 1, -1):
+            near = _brought_near(position[:, cv], position[:, cv + 1], length[cv])
+            np.copyto(position[:, cv], near, where=tip_held > 0.0)
+    for cv in range(PINNED, last + 1):
+        position[:, cv] = _brought_near(position[:, cv], position[:, cv - 1], length[cv - 1])
+
+
+def _brought_near(point: Floats, other: Floats, farthest: Floats) -> Floats:
+    """Points (3, n), no farther from the others than this (n,) [m]."""
+    offset = point - other
+    offset *= np.minimum(
+        farthest / np.maximum(np.sqrt(dot_rows(offset, offset)), TINY), np.float32(1.0)
+    )
+    offset += other
+    return offset
 
 
 def finish_lengths(

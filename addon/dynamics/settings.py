@@ -145,8 +145,8 @@ class DynamicsSettings(MotionSettings):
     long_range: bool = toggle(
         True,
         label="Long Range",
-        description="With relaxation, limit the distance of each point from its root to its "
-        "length along the strand",
+        description="With relaxation, let no point get farther from its root, along the strand "
+        "or straight, than it is at rest",
         source="Kim, Chentanez and Mueller 2012",
         panel="Lengths",
     )

@@ -127,7 +127,7 @@ def _keep_lengths(
         return
     relax_lengths(position, rest.length, rest.tip_held, settings.relaxations)
     if settings.long_range:
-        hold_within_reach(position, rest.length)
+        hold_within_reach(position, rest.length, rest.tip_held)
 
 
 def _keep_outside(

@@ -217,6 +217,18 @@ class _Guide:
             reach += self.length[cv - 1]
             displacement = self.x[cv] - root
             self.x[cv] = root + displacement * min(reach / float(np.linalg.norm(displacement)), 1.0)
+        last = len(self.x) - 1
+        if self.is_held:
+            for cv in range(last - 1, PINNED - 1, -1):
+                self._bring_near(cv, cv + 1, self.length[cv])
+        for cv in range(PINNED, last + 1):
+            self._bring_near(cv, cv - 1, self.length[cv - 1])
+
+    def _bring_near(self, cv: int, other: int, farthest: float) -> None:
+        offset = self.x[cv] - self.x[other]
+        away = float(np.linalg.norm(offset))
+        if away > farthest:
+            self.x[cv] = self.x[other] + offset * (farthest / away)
 
     def _newton_step(self, normals: dict[int, Floats]) -> None:
         free = len(self.x) - PINNED

@@ -170,11 +170,23 @@ def test_relaxation_leaves_held_tips_where_they_are(disturbed):
 def test_long_range_attachment_bounds_the_way_from_the_root(disturbed):
     position, length = disturbed
     position[:, PINNED:] *= 3.0
-    hold_within_reach(position, length)
+    hold_within_reach(position, length, None)
     away = np.linalg.norm(position[:, PINNED:] - position[:, PINNED - 1 : PINNED], axis=0)
     reach = np.cumsum(length[PINNED - 1 :], axis=0)
     assert (away <= reach * 1.00001).all()
     assert (away > 0.99 * reach).any()
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_long_range_attachment_leaves_no_zigzag(disturbed, held):
+    """A strand that goes to and fro near its root is within reach, and yet too long."""
+    position, length = disturbed
+    to_and_fro = (np.arange(position.shape[1]) % 2 * 0.05).astype(np.float32)
+    position[0, PINNED:] = position[0, PINNED - 1] + to_and_fro[PINNED:, None]
+    position[1:, PINNED:] = position[1:, PINNED - 1 : PINNED]
+    assert (directions(position)[1][1:].sum(axis=0) > 2.0 * length[1:].sum(axis=0)).any()
+    hold_within_reach(position, length, np.ones(40, np.float32) if held else None)
+    assert (directions(position)[1][1:] <= length[1:] * 1.00001).all()
 
 
 def test_long_range_attachment_leaves_what_is_near(disturbed):
@@ -183,7 +195,7 @@ def test_long_range_attachment_leaves_what_is_near(disturbed):
         position[:, PINNED:] - position[:, PINNED - 1 : PINNED]
     )
     before = position.copy()
-    hold_within_reach(position, length)
+    hold_within_reach(position, length, None)
     np.testing.assert_allclose(position, before, atol=1e-7)
 
 

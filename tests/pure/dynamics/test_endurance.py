@@ -15,8 +15,9 @@ from hairloom.addon.dynamics.step import advance
 sys.path.append(str(REPOSITORY / "bench"))
 from _random_runs import promises_length, random_run, reach_of, shaken
 
-#: Quick ones, with two to 24 CVs, all kinds of colliders, both length solvers, held tips.
-SEEDS = (1, 4, 5, 7, 9, 10, 12, 14, 15, 17, 20, 32, 36)
+#: Quick ones, with two to 24 CVs, all kinds of colliders, both length solvers, held tips. In the
+#: first two relaxation with long-range attachment used to leave zigzags of 1.4 times their length.
+SEEDS = (10, 15, 4, 1, 5, 7, 9, 12, 14, 17, 20, 32, 36)
 
 
 @pytest.mark.parametrize("seed", few_in_commits(SEEDS, 3))
@@ -27,7 +28,7 @@ def test_no_settings_and_colliders_break_the_hair(seed: int) -> None:
         state = advance(state, drive, run.settings, 1.0 / run.fps)
         reach = reach_of(state)
         assert reach.is_finite
-        assert reach.straight <= 1.02 or not promises_length(run.settings)
+        assert reach.along <= 1.02 or not promises_length(run.settings)
 
 
 def test_a_shaken_head_leaves_the_hair_its_length() -> None:

@@ -107,14 +107,14 @@ def test_best_rotation_of_one_straight_guide_is_the_smallest(kit):
 
 
 def farthest_reach(state):
-    """Largest distance of a CV from its guide's root, over the length along the strand to there.
+    """Largest length along a guide from its root to a CV, over what it should be.
 
     At rest at most 1. The segment of the pinned CVs counts with the length that the head gives it.
     """
     length = state.rest.length.copy()
     length[: PINNED - 1] = directions(state.position[:, :PINNED])[1]
-    away = np.linalg.norm(state.position[:, 1:] - state.position[:, :1], axis=0)
-    return float((away / np.maximum(np.cumsum(length, axis=0), TINY)).max())
+    along = np.cumsum(np.linalg.norm(np.diff(state.position, axis=1), axis=0), axis=0)
+    return float((along / np.maximum(np.cumsum(length, axis=0), TINY)).max())
 
 
 def end_at(kit, motion, fps, seconds=1.0):
