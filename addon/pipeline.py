@@ -279,7 +279,7 @@ def advance(
     target = carried(rig, pose, rig.guides)
     drive = motion.drive(target, colliders, gravity, duration, scene_wind)
     state = advance_dynamics(motion.dynamics, drive, settings, duration)
-    guides, before = grid_at_frame_end(state, drive), motion.carried_guides
+    guides, before = grid_at_frame_end(state, drive, duration), motion.carried_guides
     return Motion(state, guides, target, pose, before, duration)
 
 

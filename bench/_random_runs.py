@@ -22,6 +22,7 @@ from hairloom.addon.dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
+from hairloom.addon.dynamics.held import Held
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState
 from hairloom.addon.dynamics.step import Drive
@@ -79,7 +80,7 @@ class RandomRun:
     scene_wind: np.ndarray
     fps: float
     is_bent: bool
-    tip_held: np.ndarray | None
+    held: Held | None
 
     def begin(self) -> np.ndarray:
         """The guides where the head is at first."""
@@ -94,7 +95,9 @@ class RandomRun:
             earlier = targets[0] if self.is_bent and len(targets) == 3 else None
             colliders = tuple(self._posed(one, way, moments) for one, way in self.colliders)
             before, now = targets[-2:]
-            yield Drive(before, now, colliders, self.gravity, earlier, self.scene_wind)
+            yield Drive(
+                before, now, colliders, self.gravity, earlier, self.scene_wind, held=self.held
+            )
 
     def _posed(self, collider: Collider, way: Way, moments: list[float]) -> PosedCollider:
         matrices = [way.matrix(time) for time in moments]
@@ -142,7 +145,14 @@ def random_run(seed: int, guide_count: int = 12) -> RandomRun:
     )
     held = None
     if cv_count >= 4 and random.random() < 0.2:
-        held = random.random(guide_count) < 0.5
+        is_held = np.zeros((guide_count, cv_count), bool)
+        is_held[:, -1] = random.random(guide_count) < 0.5
+        ties = np.random.default_rng(seed)  # of their own, so that the runs stay what they were
+        first = ties.integers(0, cv_count - 1, guide_count)
+        is_tied = ties.random(guide_count) < 0.3
+        for step in (0, 1):
+            is_held[is_tied, first[is_tied] + step] = True
+        held = Held(is_held)
     return RandomRun(
         grid=_guides(random, guide_count, cv_count),
         settings=settings,
@@ -152,7 +162,7 @@ def random_run(seed: int, guide_count: int = 12) -> RandomRun:
         scene_wind=random.normal(size=3) * random.choice([0.0, 0.0, 3.0, 100.0]),
         fps=float(random.choice(FRAME_RATES)),
         is_bent=bool(random.random() < 0.7),
-        tip_held=held,
+        held=held,
     )
 
 
@@ -181,7 +191,7 @@ def shaken(guide_count: int) -> RandomRun:
         scene_wind=still,
         fps=60.0,
         is_bent=True,
-        tip_held=None,
+        held=None,
     )
 
 

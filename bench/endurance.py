@@ -87,7 +87,7 @@ def note(tally: Tally, seed: int, run: RandomRun, *, compute: bool) -> None:
         if not reach.is_finite:
             problem = "not finite"
 
-    begun = start(run.begin(), run.tip_held)
+    begun = start(run.begin())
     form: Form = ComputeForm(begun) if compute else NumpyForm(begun)
     try:
         play(form, run.drives(SECONDS), run.settings, run.fps, watch)

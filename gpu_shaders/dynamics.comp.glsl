@@ -1,7 +1,7 @@
 // One frame of dynamics: one invocation a guide, which goes through all substeps.
 //
 // Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION;
-// TIPS_HELD; HAS_AIR; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
+// HAS_HELD; HAS_AIR; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
 // kinds of colliders.
 //
 // Loops of an unknown number of turns ask at their end: drivers on CPUs go once more through the
@@ -17,6 +17,8 @@
 #if CONTACT_SLOTS > 0
 #include "lib_contacts.glsl"
 #endif
+
+#define NO_RADIUS -1.0e30  // of CVs that colliders do not move
 
 vec3 style_before[CV_COUNT];
 vec3 style_displacement[CV_COUNT];
@@ -46,20 +48,17 @@ void load_guide(int guide)
     style_displacement[cv] = texelFetch(styles_now, texel, 0).xyz - style_before[cv];
     style_curvature[cv] = curvature_of(texelFetch(styles_earlier, texel, 0).xyz, style_before[cv], style_displacement[cv]);
   }
-#ifdef TIPS_HELD
-  tip_is_held = texelFetch(rest_lengths, strand_texel(guide, CV_COUNT - 1, CV_COUNT), 0).x > 0.0;
-  tip_reach = 0.0;
-#endif
   for (int i = 0; i < FREE; i++) {
     ivec2 texel = strand_texel(guide, i + 1, CV_COUNT);
     shape[i] = texelFetch(rest_shapes, texel, 0);
     segment_length[i] = texelFetch(rest_lengths, texel, 0).x;
-#ifdef TIPS_HELD
-    tip_reach += segment_length[i];
-#endif
     band[i] = frame.band[i + 2];
     bend[i] = frame.own[i + 1].x;
     radius[i] = frame.own[i + 2].y;
+#ifdef HAS_HELD
+    held[i] = texelFetch(held_cvs, strand_texel(guide, i + 2, CV_COUNT), 0).x > 0.0;
+    radius[i] = held[i] ? NO_RADIUS : radius[i];
+#endif
   }
   int twist_cv = int(texelFetch(rest_shapes, strand_texel(guide, 0, CV_COUNT), 0).x);
   ivec2 texel = strand_texel(guide, twist_cv, CV_COUNT);
@@ -96,13 +95,22 @@ void predict(vec4 moment, vec3 air_displacement)
   }
 }
 
-// A held tip goes no farther than its length along the strand reaches.
-void pin_tip()
+// A held CV goes no farther from the one held before it than its length along the strand reaches. Two
+// that are neighbours keep their distance.
+void pin_held()
 {
-#ifdef TIPS_HELD
-  vec3 displacement = style[CV_COUNT - 1] - style[1];
-  float fraction = min(tip_reach / max(length(displacement), TINY), 1.0);
-  position[CV_COUNT - 1] = tip_is_held ? style[1] + displacement * fraction : position[CV_COUNT - 1];
+#ifdef HAS_HELD
+  vec3 start = style[1];
+  float reach = 0.0;
+  for (int i = 0; i < FREE; i++) {
+    reach += segment_length[i];
+    vec3 displacement = style[i + 2] - start;
+    float ratio = reach / max(length(displacement), TINY);
+    ratio = i == 0 || held[i - 1] ? ratio : min(ratio, 1.0);
+    start = held[i] ? start + displacement * ratio : start;
+    position[i + 2] = held[i] ? start : position[i + 2];
+    reach = held[i] ? 0.0 : reach;
+  }
 #endif
 }
 
@@ -112,7 +120,7 @@ void pin()
   previous[1] = position[1];
   position[0] = style[0];
   position[1] = style[1];
-  pin_tip();
+  pin_held();
 }
 
 void keep_lengths(bool has_normals)
@@ -188,7 +196,7 @@ void do_substep(int number)
   predict(moment, air_displacement);
   pin();
   restore_style();
-  pin_tip();
+  pin_held();
   keep_lengths(false);
 #if CONTACT_SLOTS > 0
   find_contacts(number);

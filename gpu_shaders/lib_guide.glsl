@@ -1,8 +1,8 @@
 // One guide in motion, as a compute shader holds it: each array has one entry a CV, a free CV or a
 // segment, all loops have constant bounds, so that compilers keep arrays in registers.
 //
-// Twin of addon/dynamics/state.py. Defines: CV_COUNT, at least 2; TIPS_HELD, where a guide's tip is
-// held. Holds no resources.
+// Twin of addon/dynamics/state.py. Defines: CV_COUNT, at least 2; HAS_HELD, where CVs are held by
+// ties. Holds no resources.
 
 #define PINNED {{pinned}}
 #define FREE (CV_COUNT - PINNED)
@@ -19,11 +19,8 @@ float segment_length[FREE_SIZE];  // [m] from CV i + 1 to CV i + 2
 vec4 band[FREE_SIZE];          // of free CV i: near and far factor, inverse pivot, pull
 float bend[FREE_SIZE];         // of CV i + 1
 float radius[FREE_SIZE];       // of free CV i [m], in collisions
-#ifdef TIPS_HELD
-bool tip_is_held;
-float tip_reach;  // [m] of the tip from the last pinned CV
-#else
-const bool tip_is_held = false;
+#ifdef HAS_HELD
+bool held[FREE_SIZE];  // of free CV i; twin of addon/dynamics/held.py
 #endif
 
 // Never zero; what is added is lost to rounding above 1e-8 m.

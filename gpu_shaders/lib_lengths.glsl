@@ -25,10 +25,12 @@ void newton_step(bool has_normals)
     float square = dot(segment[i], segment[i]) + TINY * TINY;
     float diagonal = i == 0 ? square : 2.0 * square;  // the last pinned CV does not move
     float beside = -dot(segment[i], segment_before);
-    if (i == FREE - 1 && tip_is_held) {
-      diagonal -= HELD * square;
-      touched_normal[i] = vec3(0.0);  // it does not slide
-    }
+#ifdef HAS_HELD
+    float light_before = i > 0 && held[i - 1] ? 1.0 - HELD : 1.0;
+    diagonal -= i > 0 ? square * (1.0 - light_before) : 0.0;
+    diagonal -= held[i] ? square * HELD : 0.0;
+    beside *= light_before;
+#endif
     if (has_normals) {
       float lower = dot(normal_before, segment[i]);
       float upper = dot(touched_normal[i], segment[i]);
@@ -54,9 +56,9 @@ void newton_step(bool has_normals)
     if (has_normals) {
       move -= touched_normal[i] * (CONTACT_WEIGHT * dot(touched_normal[i], move));
     }
-    if (i == FREE - 1 && tip_is_held) {
-      move = vec3(0.0);
-    }
+#ifdef HAS_HELD
+    move = held[i] ? vec3(0.0) : move;
+#endif
     position[i + 2] -= move;
   }
 }
@@ -76,20 +78,19 @@ bool is_off_length(float tolerance)
   return is_off;
 }
 
-// Lay the guide out again from the root, with its segments' directions; one with a held tip from the
-// tip first.
+// Lay the guide out again from the root, with its segments' directions; one with held CVs from these
+// to the root first.
 void lay_out()
 {
-#ifdef TIPS_HELD
+#ifdef HAS_HELD
   vec3 after = position[CV_COUNT - 1];
-  vec3 from_tip = after;
-  for (int i = FREE - 1; i >= 0; i--) {
+  bool is_beyond = false;
+  for (int i = FREE - 1; i > 0; i--) {  // CV i + 1 by the one beyond it
+    is_beyond = is_beyond || held[i];
     vec3 place = position[i + 1];
-    from_tip -= unit_of(after - place) * segment_length[i];
+    vec3 moved_place = position[i + 2] - unit_of(after - place) * segment_length[i];
     after = place;
-    if (i > 0 && tip_is_held) {
-      position[i + 1] = from_tip;
-    }
+    position[i + 1] = is_beyond && !held[i - 1] ? moved_place : place;
   }
 #endif
   vec3 before = position[1];
@@ -111,10 +112,13 @@ void relax_lengths(int sweeps)
       segment *= (now - segment_length[i]) / max(now, TINY);
       float lower = i == 0 ? 0.0 : 0.5;
       float upper = 1.0 - lower;
-      if (i == FREE - 1 && tip_is_held) {
-        upper = 0.0;
-        lower = i == 0 ? 0.0 : 1.0;
-      }
+#ifdef HAS_HELD
+      float free_lower = i == 0 || held[i - 1] ? 0.0 : 1.0;
+      float free_upper = held[i] ? 0.0 : 1.0;
+      float free = max(free_lower + free_upper, 1.0);
+      lower = free_lower / free;
+      upper = free_upper / free;
+#endif
       position[i + 1] += segment * lower;
       position[i + 2] -= segment * upper;
     }
@@ -129,7 +133,7 @@ vec3 brought_near(vec3 point, vec3 other, float farthest)
 }
 
 // No CV farther from the root than its length along the strand, neither in a straight line nor along
-// the strand; a guide with a held tip is shortened from the tip first.
+// the strand; a guide with held CVs is shortened from these to the root first.
 void hold_within_reach()
 {
   float reach = 0.0;
@@ -138,10 +142,12 @@ void hold_within_reach()
     vec3 offset = position[i + 2] - position[1];
     position[i + 2] = position[1] + offset * min(reach / max(length(offset), TINY), 1.0);
   }
-#ifdef TIPS_HELD
+#ifdef HAS_HELD
+  bool is_beyond = false;
   for (int i = FREE - 2; i >= 0; i--) {
+    is_beyond = is_beyond || held[i + 1];
     vec3 near = brought_near(position[i + 2], position[i + 3], segment_length[i + 1]);
-    position[i + 2] = tip_is_held ? near : position[i + 2];
+    position[i + 2] = is_beyond && !held[i] ? near : position[i + 2];
   }
 #endif
   for (int i = 0; i < FREE; i++) {

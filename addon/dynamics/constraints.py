@@ -12,16 +12,17 @@ relaxations. Each row and each unknown is multiplied by its |s_j|, which spares 
 
 where n is the normal of the collider that CV c touches, or zero. So a CV in contact is 1 / (1 - b)
 times heavier across the surface and slides along it, and keeping the length does not push it in.
-A held tip has nearly W = 0.
+A held CV has nearly W = 0.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..strands.vectors import dot_rows
 from .banded import solve_tridiagonal
 
@@ -30,8 +31,8 @@ PINNED = 2
 #: b above. At 1 a segment that stands straight on a collider could not change its length at all;
 #: at 0.98 hair with its root deep inside of a collider was seen to tremble, at 0.9 not.
 CONTACT_WEIGHT = np.float32(0.9)
-#: Mass that a held tip seems to have more than others, as a fraction: all but 1, as the lengths of
-#: a straight guide between two ends that cannot move have no solution. The tip is put back at once.
+#: Mass that a held CV seems to have more than others, as a fraction: all but 1, as the lengths of
+#: a straight guide between two ends that cannot move have no solution. It is put back at once.
 HELD = np.float32(0.99)
 #: Lengths below this count as zero [m].
 TINY = np.float32(1.0e-12)
@@ -59,32 +60,39 @@ class Touched:
         kept = np.flatnonzero(guides.take(place, mode="clip") == guide)
         return Touched(cv[kept] * len(guides) + place[kept], self.normal[:, kept])
 
-    def without_tips(self, held: Floats, cv_count: int) -> Touched:
-        """Tips that are held, see `state.Rest`, do not slide: normals of zero."""
-        first = self.index.searchsorted((cv_count - 1) * len(held))
-        normal = self.normal.copy()
-        normal[:, first:] *= np.float32(1.0) - held.take(self.index[first:] % len(held))
-        return Touched(self.index, normal)
 
+def pin(position: Floats, carried: Floats, length: Floats, held: Floats | None) -> None:
+    """Put the pinned CVs where the head carries them, and held ones where their ties do; they have
+    infinite mass.
 
-def pin(position: Floats, carried: Floats, length: Floats, tip_held: Floats | None) -> None:
-    """Put the pinned CVs where the head carries them; they have infinite mass.
+    A held CV goes no farther from the one held before it than its length along the strand reaches.
+    Two that are neighbours keep their distance.
 
-    A held tip goes no farther than its length along the strand reaches.
+    Args:
+        position, carried: (3, cv_count, guide_count) world [m].
+        length: (cv_count - 1, guide_count) [m].
+        held: see `held.Held.rows`; None where no CV is held.
     """
     position[:, :PINNED] = carried[:, :PINNED]
-    if tip_held is not None:
-        root = carried[:, PINNED - 1]
-        displacement = carried[:, -1] - root
-        reach = length[PINNED - 1 :].sum(axis=0)
-        displacement *= np.minimum(
-            reach / np.maximum(np.sqrt(dot_rows(displacement, displacement)), TINY), np.float32(1.0)
-        )
-        np.copyto(position[:, -1], root + displacement, where=tip_held > 0.0)
+    if held is None:
+        return
+    start, reach = carried[:, PINNED - 1], np.zeros_like(length[0])
+    for cv in range(PINNED, position.shape[1]):
+        reach = reach + length[cv - 1]
+        is_held = held[cv] > 0.0
+        if not is_held.any():
+            continue
+        displacement = carried[:, cv] - start
+        ratio = reach / np.maximum(np.sqrt(dot_rows(displacement, displacement)), TINY)
+        if cv > PINNED:  # else the pinned CV is its neighbour
+            ratio = np.where(held[cv - 1] > 0.0, ratio, np.minimum(ratio, np.float32(1.0)))
+        start = np.where(is_held, start + displacement * ratio, start)
+        np.copyto(position[:, cv], start, where=is_held)
+        reach[is_held] = 0.0
 
 
 def keep_lengths(
-    position: Floats, length: Floats, touched: Touched | None, tip_held: Floats | None
+    position: Floats, length: Floats, touched: Touched | None, held: Floats | None
 ) -> None:
     """Bring all segments of `position` towards their length, in place.
 
@@ -94,13 +102,13 @@ def keep_lengths(
         position: (3, cv_count, guide_count) world [m], in C order.
         length: (cv_count - 1, guide_count) [m].
         touched: None where nothing touches.
-        tip_held: see `state.Rest`.
+        held: see `pin`.
     """
     if position.shape[1] > PINNED:
-        _newton_step(position, length[1:], touched, tip_held)
+        _newton_step(position, length[1:], touched, held)
 
 
-def relax_lengths(position: Floats, length: Floats, tip_held: Floats | None, sweeps: int) -> None:
+def relax_lengths(position: Floats, length: Floats, held: Floats | None, sweeps: int) -> None:
     """Bring segments towards their length one after the other, from root to tip, again and again
     (Jakobsen 2001): each gives half of its error to both of its ends, all of it to a free one."""
     last = position.shape[1] - 1
@@ -109,17 +117,18 @@ def relax_lengths(position: Floats, length: Floats, tip_held: Floats | None, swe
             segment = position[:, cv] - position[:, cv - 1]
             now = np.sqrt(dot_rows(segment, segment))
             segment *= (now - length[cv - 1]) / np.maximum(now, TINY)
-            lower = np.float32(0.0 if cv == PINNED else 0.5)
+            lower: Floats | np.float32 = np.float32(0.0 if cv == PINNED else 0.5)
             upper: Floats | np.float32 = np.float32(1.0) - lower
-            if tip_held is not None and cv == last:
-                upper = upper * (np.float32(1.0) - tip_held)
-                position[:, cv - 1] += segment * (np.float32(1.0) - upper if cv > PINNED else lower)
-            else:
-                position[:, cv - 1] += segment * lower
+            if held is not None:
+                free_lower = np.float32(cv > PINNED) * (np.float32(1.0) - held[cv - 1])
+                free_upper = np.float32(1.0) - held[cv]
+                free = np.maximum(free_lower + free_upper, np.float32(1.0))
+                lower, upper = free_lower / free, free_upper / free
+            position[:, cv - 1] += segment * lower
             position[:, cv] -= segment * upper
 
 
-def hold_within_reach(position: Floats, length: Floats, tip_held: Floats | None) -> None:
+def hold_within_reach(position: Floats, length: Floats, held: Floats | None) -> None:
     """No CV farther from the last pinned one than its length along the strand (Kim, Chentanez and
     Mueller 2012, "Long Range Attachments"), neither in a straight line nor along the strand."""
     root = position[:, PINNED - 1 : PINNED]
@@ -130,21 +139,21 @@ def hold_within_reach(position: Floats, length: Floats, tip_held: Floats | None)
     )
     displacement += root
     position[:, PINNED:] = displacement
-    shorten(position, length, tip_held)
+    shorten(position, length, held)
 
 
-def shorten(position: Floats, length: Floats, tip_held: Floats | None) -> None:
+def shorten(position: Floats, length: Floats, held: Floats | None) -> None:
     """No segment longer than it should be: from root to tip each CV comes near enough to the one
     before it. That shortens zigzags, which long-range attachments let pass.
 
-    Guides with held tips are shortened from the tip first; where both cannot be had, the length
-    counts and not the tip's place.
+    Guides with held CVs are shortened from these to the root first; where both cannot be had, the
+    length counts and not the held CV's place.
     """
     last = position.shape[1] - 1
-    if tip_held is not None:
-        for cv in range(last - 1, PINNED - 1, -1):
+    if held is not None:
+        for cv, is_moved in _towards_root(held):
             near = _brought_near(position[:, cv], position[:, cv + 1], length[cv])
-            np.copyto(position[:, cv], near, where=tip_held > 0.0)
+            np.copyto(position[:, cv], near, where=is_moved)
     for cv in range(PINNED, last + 1):
         position[:, cv] = _brought_near(position[:, cv], position[:, cv - 1], length[cv - 1])
 
@@ -159,11 +168,20 @@ def _brought_near(point: Floats, other: Floats, farthest: Floats) -> Floats:
     return offset
 
 
+def _towards_root(held: Floats) -> Iterator[tuple[int, Bools]]:
+    """CVs from the last but one to the root, and which guides (guide_count,) are held somewhere
+    beyond them but not there."""
+    is_beyond = np.zeros(held.shape[1], bool)
+    for cv in range(len(held) - 2, PINNED - 1, -1):
+        is_beyond |= held[cv + 1] > 0.0
+        yield cv, is_beyond & (held[cv] == 0.0)
+
+
 def finish_lengths(
     position: Floats,
     length: Floats,
     touched: Touched | None,
-    tip_held: Floats | None,
+    held: Floats | None,
     tolerance: float,
     iterations: int,
     size: float,
@@ -182,28 +200,28 @@ def finish_lengths(
     for _ in range(iterations if guide.size else 0):
         some, some_length = position.take(guide, axis=2), length.take(guide, axis=1)
         touching = None if touched is None else touched.part(guide, length.shape[1])
-        held = None if tip_held is None else tip_held[guide]
-        _newton_step(some, some_length[1:], touching, held)
+        some_held = None if held is None else held[:, guide]
+        _newton_step(some, some_length[1:], touching, some_held)
         position[:, :, guide] = some
         guide = guide[_off_length(some, some_length, tolerance, size)]
         if not guide.size:
             return
     if guide.size:
-        held = None if tip_held is None else tip_held[guide]
-        position[:, :, guide] = _laid_out(position[:, :, guide], length[:, guide], held)
+        some_held = None if held is None else held[:, guide]
+        position[:, :, guide] = _laid_out(position[:, :, guide], length[:, guide], some_held)
 
 
-def _laid_out(position: Floats, length: Floats, tip_held: Floats | None) -> Floats:
+def _laid_out(position: Floats, length: Floats, held: Floats | None) -> Floats:
     """Guides with their segments' directions and exact lengths, from the root (follow the leader).
 
-    Those with held tips are laid out from the tip first, as FABRIK does (Aristidou and Lasenby
-    2011); where both cannot be had, the length counts and not the tip's place.
+    Those with held CVs are laid out from these to the root first, as FABRIK does (Aristidou and
+    Lasenby 2011); where both cannot be had, the length counts and not the held CV's place.
     """
-    if tip_held is not None:
-        direction, _ = directions(position[:, PINNED - 1 :])
-        from_tip = np.cumsum((direction * length[PINNED - 1 :])[:, ::-1], axis=1)[:, ::-1]
-        from_tip = position[:, -1:] - from_tip
-        np.copyto(position[:, PINNED:-1], from_tip[:, 1:], where=tip_held > 0.0)
+    if held is not None:
+        direction, _ = directions(position)
+        for cv, is_moved in _towards_root(held):
+            place = position[:, cv + 1] - direction[:, cv] * length[cv]
+            np.copyto(position[:, cv], place, where=is_moved)
     direction, _ = directions(position[:, PINNED - 1 :])
     displacement = np.cumsum(direction * length[PINNED - 1 :], axis=1)
     position[:, PINNED:] = position[:, PINNED - 1 : PINNED] + displacement
@@ -224,26 +242,26 @@ def _off_length(position: Floats, length: Floats, tolerance: float, size: float)
 
 
 def _newton_step(
-    position: Floats, length: Floats, touched: Touched | None, tip_held: Floats | None
+    position: Floats, length: Floats, touched: Touched | None, held: Floats | None
 ) -> None:
     segment, squared = segments(position[:, 1:])
     diagonal, beside = chain_matrix(segment, squared)
     right = np.sqrt(squared)
     right *= length
     np.subtract(squared, right, out=right)
-    if tip_held is not None:
-        tip = position[:, -1].copy()
-        diagonal[-1] -= HELD * tip_held * squared[-1]
-        if touched is not None:
-            touched = touched.without_tips(tip_held, position.shape[1])
+    if held is not None:
+        before, heavy = position[:, PINNED:].copy(), HELD * held[PINNED:]
+        diagonal -= heavy * squared
+        diagonal[1:] -= heavy[:-1] * squared[1:]
+        beside *= np.float32(1.0) - heavy[:-1]
     if touched is None:
         solve_tridiagonal(diagonal, beside, right)
     else:
         _solve_and_slide(position, segment, (diagonal, beside, right), touched)
     segment *= right
     position[:, PINNED:] -= less_next(segment)
-    if tip_held is not None:
-        np.copyto(position[:, -1], tip, where=tip_held > 0.0)
+    if held is not None:
+        np.copyto(position[:, PINNED:], before, where=held[PINNED:] > 0.0)
 
 
 def _solve_and_slide(

@@ -12,6 +12,7 @@ from ..errors import HairloomError
 from .colliders import PosedCollider
 from .contacts import radius_of_all
 from .forces import carried_fraction, felt_gravity
+from .held import Held
 from .settings import DynamicsSettings
 from .state import DynamicsState, Rest, StyleRows, as_rows, checked_grid
 from .style import StyleBand, style_band
@@ -32,6 +33,7 @@ class Drive:
         `trajectory.curvature`; None: straight.
     scene_wind: (3,) world [m/s], in addition to that of the settings.
     earlier_ratio: duration of that frame, over that of this one.
+    held: the CVs that go with these targets whatever the rest of the guide does; None: none.
 
     Hand the same array on from frame to frame, now to before to earlier: what is known of it then
     need not be worked out again.
@@ -44,6 +46,7 @@ class Drive:
     target_earlier: Floats | None = None
     scene_wind: Floats = field(default_factory=lambda: np.zeros(3))
     earlier_ratio: float = 1.0
+    held: Held | None = None
 
     @property
     def targets(self) -> tuple[Floats, ...]:
@@ -79,6 +82,13 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
                 place="dynamics",
                 remedy="Start the simulation again",
             )
+    if drive.held is not None and drive.held.is_held.shape != (state.guide_count, state.cv_count):
+        raise HairloomError(
+            f"ties hold {drive.held.is_held.shape} guides and CVs, "
+            f"the simulation has {(state.guide_count, state.cv_count)}",
+            place="dynamics",
+            remedy="Start the simulation again",
+        )
     for name, vector in (("gravity", drive.gravity), ("wind", drive.scene_wind)):
         if np.shape(vector) != (3,) or not np.isfinite(vector).all():
             raise HairloomError(
@@ -154,6 +164,7 @@ class Block:
         substep, and how
         that changes while the way of the style bends.
     radius: (cv_count * n,) [m], the distance that each CV keeps from colliders; not to be written.
+    held: (cv_count, n), see `held.Held.rows`; None where none of these guides is held.
     """
 
     position: Floats
@@ -165,6 +176,7 @@ class Block:
     impulse: Floats
     impulse_curvature: Floats | None
     radius: Floats
+    held: Floats | None
 
     @classmethod
     def of(
@@ -183,6 +195,12 @@ class Block:
         position, previous = state.position[:, :, guides].copy(), state.previous[:, :, guides]
         if state.substep and state.substep != dt:
             previous = position - (position - previous) * np.float32(dt / state.substep)
+        radius = radius_of_all(settings, state.cv_count, before.shape[2], state.rest.size)
+        held = None if drive.held is None else drive.held.rows[:, guides]
+        if held is not None and held.any():
+            radius = np.where(held.ravel() > 0.0, np.float32(-np.inf), radius)
+        else:
+            held = None
         return cls(
             position,
             previous.copy(),
@@ -192,7 +210,8 @@ class Block:
             bent,
             impulse,
             None if bent is None else bent * np.float32(frame.carried_fraction),
-            radius_of_all(settings, state.cv_count, before.shape[2], state.rest.size),
+            radius,
+            held,
         )
 
     def style_at(self, moment: float) -> Floats:

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats
+from ..arrays import Floats
 from ..errors import HairloomError
 from .constraints import PINNED
 from .style import LocalShape, local_shape
@@ -26,15 +26,12 @@ class Rest:
     position: (3, cv_count, guide_count) float32 world [m].
     length: (cv_count - 1, guide_count) float32 [m] of each segment.
     shape: what is kept of it wherever the guides swing.
-    tip_held: (guide_count,) float32, 1 where the style holds the tip as it does the root, as in a
-        tied braid, else 0; None where all tips are free.
     size: the median length of all guides [m], in which distances are given in the settings.
     """
 
     position: Floats
     length: Floats
     shape: LocalShape
-    tip_held: Floats | None = None
     size: float = 0.0
 
     @cached_property
@@ -50,7 +47,6 @@ class Rest:
             self.position[:, :, guides],
             self.length[:, guides],
             self.shape.part(guides),
-            None if self.tip_held is None else self.tip_held[guides],
             self.size,
         )
 
@@ -102,12 +98,11 @@ class DynamicsState:
         return np.ascontiguousarray(self.position.transpose(2, 1, 0))
 
 
-def start(guide_grid: Floats, tip_held: Bools | None = None) -> DynamicsState:
+def start(guide_grid: Floats) -> DynamicsState:
     """Guides at rest in their style.
 
     Args:
         guide_grid: (guide_count, cv_count, 3) world [m], cv_count at least 2.
-        tip_held: (guide_count,) the guides that are held at their tips too; these need four CVs.
 
     Raises:
         HairloomError: another shape, or a CV that is not finite.
@@ -123,25 +118,11 @@ def start(guide_grid: Floats, tip_held: Bools | None = None) -> DynamicsState:
         position=position,
         length=length,
         shape=local_shape(position),
-        tip_held=_held(tip_held, position.shape[1], position.shape[2]),
         size=float(np.median(length.sum(axis=0))) if length.size else 0.0,
     )
     for array in (rest.length, rest.shape.curvature, rest.shape.hold, rest.shape.twist_cv):
         array.flags.writeable = False
     return DynamicsState(position, position, rest)
-
-
-def _held(tip_held: Bools | None, cv_count: int, guide_count: int) -> Floats | None:
-    if tip_held is None or not np.any(tip_held):
-        return None
-    if np.shape(tip_held) != (guide_count,) or cv_count < PINNED + 2:
-        raise HairloomError(
-            f"{guide_count} guides of {cv_count} CVs cannot be held at their tips by an array of "
-            f"shape {np.shape(tip_held)}",
-            place="guides",
-            remedy="Give one value a guide, and guides of four CVs or more",
-        )
-    return np.asarray(tip_held, np.float32)
 
 
 def rows_of(grid: Floats, place: str) -> Floats:

@@ -3,7 +3,7 @@
     repeat substep_rate times a second:
         brake        drag by the square of the speed through the air
         predict      Verlet: inertia, damping, gravity, wind
-        pin          the head carries the first two CVs
+        pin          the head carries the first two CVs, ties carry what they hold
         style        global and local shape, one direct solve
         lengths      one direct solve, or relaxation
         contacts     found once, then in turn:  push out  |  keep lengths
@@ -42,10 +42,10 @@ from .forces import air_fraction, brake, predict, speed_kept
 from .frame import Block, Drive, Frame, check_drive, style_rows
 from .schedule import due_substeps
 from .settings import DynamicsSettings
-from .state import DynamicsState, Rest
+from .state import DynamicsState
 from .style import restore_style
 
-__all__ = ["Drive", "advance", "grid_at_frame_end"]
+__all__ = ["Drive", "advance", "displacement_beside_root", "grid_at_frame_end"]
 
 #: Guides that are advanced together, at most. Fewer, and numpy's calls cost more than the numbers;
 #: more, and the arrays of a substep leave the cache.
@@ -102,32 +102,56 @@ def _advance_block(
             impulse = impulse + air_displacement[:, None] * np.float32(blown)
         predict(position, previous, impulse, kept, out=spare)
         previous, position, spare = position, spare, previous
-        pin(position, style, rest.length, rest.tip_held)
+        pin(position, style, rest.length, block.held)
         restore_style(position, style, rest.shape, frame.matrix)
-        pin(position, style, rest.length, rest.tip_held)
-        _keep_lengths(position, rest, None, settings)
+        pin(position, style, rest.length, block.held)
+        _keep_lengths(position, block, None, settings)
         _keep_outside(position, previous, block, frame, poses[number])
     return position, previous
 
 
-def grid_at_frame_end(state: DynamicsState, drive: Drive) -> Floats:
+def grid_at_frame_end(state: DynamicsState, drive: Drive, duration: float) -> Floats:
     """CVs at the frame's very end, (guide_count, cv_count, 3) world [m], for drawing.
 
-    Bridges the time that is left over: each guide is moved as a whole to where its root is now.
+    Bridges the time that is left over: each guide is moved as a whole to where its root is now,
+    and what is held to where it is held.
+
+    Args:
+        duration: of the frame [s].
     """
-    root_displacement = drive.target_now[:, :1] - state.position[:, 0].T[:, None]
-    return (state.grid + root_displacement).astype(np.float32)
+    displacement: Floats = drive.target_now[:, :1] - state.position[:, 0].T[:, None]
+    beside_root = displacement_beside_root(state.time_left, drive, duration)
+    if beside_root is not None:
+        displacement = displacement + beside_root
+    return (state.grid + displacement).astype(np.float32)
+
+
+def displacement_beside_root(time_left: float, drive: Drive, duration: float) -> Floats | None:
+    """How much more than its root each CV of held guides moves in the time left over, in the shape
+    of the targets [m]; None where nothing is held, or no time is left."""
+    if drive.held is None or not time_left or not duration:
+        return None
+    left = min(time_left / duration, 1.0)
+    displacement: Floats = drive.target_now - drive.target_before
+    displacement *= np.float32(left)
+    if drive.target_curvature is not None:
+        displacement += drive.target_curvature * np.float32(left * (1.0 - left))
+    displacement -= displacement[:, :1]
+    displacement = drive.held.spread(displacement)
+    displacement[~drive.held.is_held.any(axis=1)] = 0.0
+    return displacement
 
 
 def _keep_lengths(
-    position: Floats, rest: Rest, touched: Touched | None, settings: DynamicsSettings
+    position: Floats, block: Block, touched: Touched | None, settings: DynamicsSettings
 ) -> None:
+    length, held = block.rest.length, block.held
     if settings.length_solver == "direct":
-        keep_lengths(position, rest.length, touched, rest.tip_held)
+        keep_lengths(position, length, touched, held)
         return
-    relax_lengths(position, rest.length, rest.tip_held, settings.relaxations)
+    relax_lengths(position, length, held, settings.relaxations)
     if settings.long_range:
-        hold_within_reach(position, rest.length, rest.tip_held)
+        hold_within_reach(position, length, held)
 
 
 def _keep_outside(
@@ -150,11 +174,9 @@ def _keep_outside(
     for _ in range(settings.contact_passes if frame.drive.colliders else 0):
         touching = [one.push_out(here, settings.friction) for one in contacts]
         touched = touched_by(contacts, touching)
-        _keep_lengths(position, rest, touched, settings)
+        _keep_lengths(position, block, touched, settings)
     if settings.length_solver == "direct":
         tolerance, iterations = settings.length_tolerance, settings.length_iterations
-        finish_lengths(
-            position, rest.length, touched, rest.tip_held, tolerance, iterations, rest.size
-        )
+        finish_lengths(position, rest.length, touched, block.held, tolerance, iterations, rest.size)
     for one in contacts:
         one.absorb(here, was)

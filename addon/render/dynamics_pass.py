@@ -10,7 +10,9 @@ strand_layout.strand_rows:
     styles_earlier, styles_before, styles_now   RGBA32F: xyz world [m], see frame.Drive
     rest_shapes    RGBA32F: of CV i xyz curvature [m] and w hold (style.LocalShape); of CV 0 x its
                    twist CV
-    rest_lengths   R32F: [m] to the next CV; at the tip whether it is held
+    rest_lengths   R32F: [m] to the next CV
+    held_cvs       R32F: 1 where a CV is held (held.Held), else 0
+    beside_root    RGBA32F: xyz [m], see step.displacement_beside_root; both only where CVs are held
 
 Limitations: a CV keeps two contacts at once, the most pressing ones, where numpy keeps one for each
 collider. A set of balls has each of its balls asked, numpy only near ones. Two forms that round
@@ -31,9 +33,11 @@ from ..arrays import Floats
 from ..dynamics.constraints import PINNED
 from ..dynamics.contacts import REACH
 from ..dynamics.frame import Drive, Frame, check_drive
+from ..dynamics.held import Held
 from ..dynamics.schedule import due_substeps
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.state import DynamicsState, Rest, as_rows
+from ..dynamics.step import displacement_beside_root
 from .collider_textures import ColliderTextures
 from .dynamics_block import block_of, moments_of, spans_of
 from .shader_program import ShaderRecipe, program, released_with_shaders
@@ -47,14 +51,20 @@ CONTACT_SLOTS = 2
 GROUP_SIZE = 32
 
 
-BRIDGE_RECIPE = ShaderRecipe(
-    name="dynamics_bridge",
-    compute="dynamics_bridge.comp.glsl",
-    textures=(("FLOAT_2D", "positions"), ("FLOAT_2D", "styles_now")),
-    images=(("RGBA32F", "bridged"),),
-    integers=("cv_count", "guide_count"),
-    group_size=(16, 4),
-)
+def _bridge_recipe(*, held: bool) -> ShaderRecipe:
+    names = ["positions", "styles_now", *["beside_root"] * held]
+    return ShaderRecipe(
+        name="dynamics_bridge",
+        compute="dynamics_bridge.comp.glsl",
+        textures=tuple(("FLOAT_2D", name) for name in names),
+        images=(("RGBA32F", "bridged"),),
+        integers=("cv_count", "guide_count"),
+        group_size=(16, 4),
+        defines=(("HAS_HELD", 1),) if held else (),
+    )
+
+
+BRIDGE_RECIPE, HELD_BRIDGE_RECIPE = _bridge_recipe(held=False), _bridge_recipe(held=True)
 
 
 @lru_cache(maxsize=32)
@@ -62,7 +72,7 @@ def dynamics_recipe(
     cv_count: int,
     *,
     relaxation: bool = False,
-    tips_held: bool = False,
+    held: bool = False,
     air: bool = False,
     collider_count: int = 0,
     rounds: bool = False,
@@ -71,13 +81,13 @@ def dynamics_recipe(
     """The program for guides of this many CVs, without what the scene does not need."""
     flags = {
         "RELAXATION": relaxation,
-        "TIPS_HELD": tips_held,
+        "HAS_HELD": held,
         "HAS_AIR": air,
         "HAS_ROUNDS": rounds,
         "HAS_FIELDS": fields,
     }
     textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
-    textures += ["moments"]
+    textures += ["moments"] + ["held_cvs"] * held
     textures += ["rounds"] * rounds + ["fields"] * fields
     return ShaderRecipe(
         name="dynamics",
@@ -133,7 +143,7 @@ class DynamicsPass:
                 self._advance(frame, count, dt / state.substep if state.substep else 1.0)
             self._is_bridged = left > 0.0 or not count
             if self._is_bridged:
-                self._bridge()
+                self._bridge(displacement_beside_root(left, drive, duration))
         self._state = replace(
             state,
             substep=dt if count else state.substep,
@@ -158,6 +168,7 @@ class DynamicsPass:
         self._block = UniformBlock()
         self._colliders: ColliderTextures | None = None
         self._styles: list[tuple[Floats, Any]] = []  # those of the last frame, and their textures
+        self._held: Held | None = None
 
     def _upload(self, drive: Drive) -> None:
         state, textures = self._state, self._textures
@@ -174,6 +185,10 @@ class DynamicsPass:
         textures["styles_earlier"] = earlier[0] if earlier else before  # which then counts nothing
         if self._colliders is None or not self._colliders.are_of(drive.colliders):
             self._colliders = ColliderTextures.of(tuple(one.collider for one in drive.colliders))
+        if drive.held is not None and drive.held is not self._held:
+            held = drive.held.rows.T[..., None]
+            textures["held_cvs"] = texture_from(strand_rows(held), "R32F")
+        self._held = drive.held
 
     def _style_texture(self, style: Floats) -> Any:
         known = (texture for other, texture in self._styles if other is style)
@@ -199,7 +214,7 @@ class DynamicsPass:
         recipe = dynamics_recipe(
             state.cv_count,
             relaxation=settings.length_solver == "relaxation",
-            tips_held=state.rest.tip_held is not None,
+            held=frame.drive.held is not None,
             air=frame.air is not None,
             collider_count=len(posed),
             rounds=colliders.rounds is not None,
@@ -215,16 +230,20 @@ class DynamicsPass:
         gpu.compute.dispatch(shader.shader, -(-state.guide_count // GROUP_SIZE), 1, 1)
         gpu.shader.unbind()
 
-    def _bridge(self) -> None:
+    def _bridge(self, beside_root: Floats | None) -> None:
         """Fill `bridged`."""
-        state, shader = self._state, program(BRIDGE_RECIPE)
-        names = "positions", "styles_now"
+        state, textures = self._state, dict(self._textures)
+        recipe = BRIDGE_RECIPE
+        if beside_root is not None:
+            recipe = HELD_BRIDGE_RECIPE
+            textures["beside_root"] = points_texture(beside_root)
+        shader = program(recipe)
         shader.bind(
-            textures={name: self._textures[name] for name in names},
+            textures={name: textures[name] for _, name in recipe.textures},
             images={"bridged": self._textures["bridged"]},
             integers={"cv_count": state.cv_count, "guide_count": state.guide_count},
         )
-        across, down = BRIDGE_RECIPE.group_size
+        across, down = recipe.group_size
         groups = -(-state.cv_count // across), -(-state.guide_count // down)
         gpu.compute.dispatch(shader.shader, *groups, 1)
         gpu.shader.unbind()
@@ -261,6 +280,4 @@ def rest_lengths(rest: Rest) -> Floats:
     """`rest_lengths`, (guide_count, cv_count, 1)."""
     lengths = np.zeros((*rest.position.shape[:0:-1], 1), np.float32)
     lengths[:, :-1, 0] = rest.length.T
-    if rest.tip_held is not None:
-        lengths[:, -1, 0] = rest.tip_held
     return lengths

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -19,6 +20,7 @@ from hairloom.addon.dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
+from hairloom.addon.dynamics.held import Held
 from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
@@ -81,7 +83,7 @@ class Scene:
     on_head: tuple[Collider, ...] = ()
     standing: tuple[Collider, ...] = ()
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    tips_held: bool = False
+    is_held: bool = False
     fps: float = 60.0
     is_bent: bool = True
 
@@ -95,8 +97,17 @@ class Scene:
         return (grid @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
 
     def start(self) -> DynamicsState:
-        held = np.arange(self.guide_count) % 2 == 0 if self.tips_held else None
-        return start(self.carried(0.0), held)
+        return start(self.carried(0.0))
+
+    @cached_property
+    def held(self) -> Held | None:
+        """Every second tip, and a tie around every third guide."""
+        if not self.is_held:
+            return None
+        held = np.zeros((self.guide_count, self.cv_count), bool)
+        held[::2, -1] = True
+        held[::3, self.cv_count // 2 : self.cv_count // 2 + 2] = True
+        return Held(held)
 
     def colliders(self, frame: int) -> tuple[PosedCollider, ...]:
         earlier, before, now = (shaking((frame + k) / self.fps) for k in (-1, 0, 1))
@@ -113,7 +124,8 @@ class Scene:
         drives = []
         for frame, (before, now) in enumerate(pairwise(grids)):
             earlier = grids[frame - 1] if self.is_bent and frame else None
-            drives.append(Drive(before, now, self.colliders(frame), gravity, earlier, wind))
+            colliders = self.colliders(frame)
+            drives.append(Drive(before, now, colliders, gravity, earlier, wind, held=self.held))
         return drives
 
 
@@ -141,10 +153,11 @@ IN_AIR = {
     "curves along": Scene(
         {"style_along": (1.0, 1.0, 0.2, 0.1, 0.3), "bend_along": (0.2, 1.0, 0.5, 0.0, 1.0)}
     ),
-    "held tips": Scene(tips_held=True),
+    "held": Scene(is_held=True),
+    "held at 24 frames a second": Scene({"substep_rate": 100.0}, fps=24.0, is_held=True),
     "relaxation": Scene({"length_solver": "relaxation"}),
     "relaxation without reach": Scene(
-        {"length_solver": "relaxation", "relaxations": 3, "long_range": False}, tips_held=True
+        {"length_solver": "relaxation", "relaxations": 3, "long_range": False}, is_held=True
     ),
     "two Newton steps at most": Scene({"length_iterations": 2, "substep_rate": 60.0, **LIMP}),
     "24 frames a second": Scene({"substep_rate": 100.0}, fps=24.0),
@@ -152,7 +165,7 @@ IN_AIR = {
     "many substeps": Scene({"substep_rate": 2000.0}, fps=24.0),
     "2 CVs": Scene(cv_count=2),
     "3 CVs": Scene(cv_count=3),
-    "4 CVs": Scene(cv_count=4, tips_held=True),
+    "4 CVs": Scene(cv_count=4, is_held=True),
     "32 CVs": Scene(cv_count=32),
     "64 CVs": Scene(cv_count=64, guide_count=9),
     "one guide": Scene(guide_count=1),
@@ -168,7 +181,7 @@ AT_COLLIDERS = {
     "three of all kinds": Scene(on_head=(CLUSTER, ball_field(0.08)), standing=(ROD,)),
     "one pass": Scene({"contact_passes": 1, **LIMP}, on_head=(BALL,)),
     "relaxation": Scene({"length_solver": "relaxation"}, on_head=(BALL,)),
-    "held tips": Scene(LIMP, on_head=(BALL,), standing=(IN_THE_WAY,), tips_held=True),
+    "held": Scene(LIMP, on_head=(BALL,), standing=(IN_THE_WAY,), is_held=True),
     "out of reach": Scene(standing=(SphereCollider(np.array([0.0, 0.0, 9.0]), 0.1),)),
     "64 CVs": Scene(cv_count=64, guide_count=9, on_head=(IN_THE_WAY,)),
     "3 CVs": Scene(cv_count=3, on_head=(AT_TIPS,)),
@@ -202,7 +215,7 @@ def assert_equal(scene: Scene, make_pass: Any, tolerance: float, seconds: float 
         assert np.abs(found.position - state.position).max() < tolerance
         assert np.abs(found.previous - state.previous).max() < tolerance
         shown = guides_of(dynamics, scene.guide_count, scene.cv_count)
-        assert np.abs(shown - grid_at_frame_end(state, drive)).max() < tolerance
+        assert np.abs(shown - grid_at_frame_end(state, drive, 1.0 / scene.fps)).max() < tolerance
         assert found.time_left == state.time_left
         assert (found.substep, found.time) == (state.substep, state.time)
         moved = max(moved, float(np.abs(state.position - drive.target_now.T).max()))

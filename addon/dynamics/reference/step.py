@@ -62,8 +62,10 @@ class _Guide:
         self.rest = points(state.rest.position)
         self.twist_cv = int(state.rest.shape.twist_cv[guide])
         self.length = [float(np.linalg.norm(b - a)) for a, b in pairwise(self.rest)]
-        held, self.size = state.rest.tip_held, state.rest.size
-        self.is_held = held is not None and bool(held[guide])
+        self.size = state.rest.size
+        self.held = [False] * len(self.x)
+        if drive.held is not None:
+            self.held[PINNED:] = drive.held.is_held[guide, PINNED:].tolist()
         self.before = drive.target_before[guide].astype(np.float64)
         self.displacement = drive.target_now[guide].astype(np.float64) - self.before
         curvature = drive.target_curvature
@@ -134,12 +136,21 @@ class _Guide:
 
     def _pin(self, style: Floats) -> None:
         self.x[:PINNED] = style[:PINNED]
-        if self.is_held:
-            displacement = style[-1] - style[PINNED - 1]
-            reach = sum(self.length[PINNED - 1 :])
-            self.x[-1] = style[PINNED - 1] + displacement * min(
-                reach / np.linalg.norm(displacement), 1.0
-            )
+        before = PINNED - 1
+        for cv in self._held_cvs():
+            displacement = style[cv] - self.x[before]
+            ratio = sum(self.length[before:cv]) / float(np.linalg.norm(displacement))
+            is_beside = cv == before + 1
+            self.x[cv] = self.x[before] + displacement * (ratio if is_beside else min(ratio, 1.0))
+            before = cv
+
+    def _held_cvs(self) -> list[int]:
+        return [cv for cv, is_held in enumerate(self.held) if is_held]
+
+    def _towards_root(self) -> list[int]:
+        """CVs that are not held themselves, but have a held one beyond them, the last first."""
+        last = max(self._held_cvs(), default=0)
+        return [cv for cv in range(last - 1, PINNED - 1, -1) if not self.held[cv]]
 
     def _felt_gravity(self, drive: Drive, settings: DynamicsSettings, turn: Floats) -> Floats:
         pull = np.asarray(drive.gravity, np.float64) * settings.gravity
@@ -204,10 +215,8 @@ class _Guide:
         for cv in range(PINNED, last + 1):
             displacement = self.x[cv] - self.x[cv - 1]
             excess = displacement * (1.0 - self.length[cv - 1] / np.linalg.norm(displacement))
-            lower = 0.0 if cv == PINNED else 0.5
-            upper = 1.0 - lower
-            if self.is_held and cv == last:
-                lower, upper = (0.0 if cv == PINNED else 1.0), 0.0
+            free = [cv > PINNED and not self.held[cv - 1], not self.held[cv]]
+            lower, upper = (one / max(sum(free), 1) for one in free)
             self.x[cv - 1] += excess * lower
             self.x[cv] -= excess * upper
 
@@ -218,9 +227,8 @@ class _Guide:
             displacement = self.x[cv] - root
             self.x[cv] = root + displacement * min(reach / float(np.linalg.norm(displacement)), 1.0)
         last = len(self.x) - 1
-        if self.is_held:
-            for cv in range(last - 1, PINNED - 1, -1):
-                self._bring_near(cv, cv + 1, self.length[cv])
+        for cv in self._towards_root():
+            self._bring_near(cv, cv + 1, self.length[cv])
         for cv in range(PINNED, last + 1):
             self._bring_near(cv, cv - 1, self.length[cv - 1])
 
@@ -239,14 +247,15 @@ class _Guide:
         for cv, normal in normals.items():
             at = slice(3 * (cv - PINNED), 3 * (cv - PINNED) + 3)
             mobility[at, at] -= float(CONTACT_WEIGHT) * np.outer(normal, normal)
-        if self.is_held:
-            mobility[-3:, -3:] = (1.0 - float(HELD)) * np.eye(3)
-        tip = self.x[-1].copy()
+        held = self._held_cvs()
+        for cv in held:
+            at = slice(3 * (cv - PINNED), 3 * (cv - PINNED) + 3)
+            mobility[at, at] = (1.0 - float(HELD)) * np.eye(3)
+        before = self.x[held].copy()
         error = self._lengths() - self.length[PINNED - 1 :]
         tension = np.linalg.solve(jacobian @ mobility @ jacobian.T, error)
         self.x[PINNED:] -= (mobility @ jacobian.T @ tension).reshape(free, 3)
-        if self.is_held:
-            self.x[-1] = tip
+        self.x[held] = before
 
     def _finish_lengths(self, normals: dict[int, Floats], settings: DynamicsSettings) -> None:
         for _ in range(settings.length_iterations):
@@ -262,10 +271,9 @@ class _Guide:
         return bool((np.abs(self._lengths() - wanted) > allowed).any())
 
     def _lay_out(self) -> None:
-        if self.is_held:
-            segment = self._segments()
-            for cv in range(len(self.x) - 2, PINNED - 1, -1):
-                self.x[cv] = self.x[cv + 1] - segment[cv]
+        segment = self._segments()
+        for cv in self._towards_root():
+            self.x[cv] = self.x[cv + 1] - segment[cv]
         segment = self._segments()
         for cv in range(PINNED, len(self.x)):
             self.x[cv] = self.x[cv - 1] + segment[cv - 1]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.dynamics.colliders import Collider, PosedCollider
+from hairloom.addon.dynamics.held import Held
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive, advance
@@ -66,6 +67,21 @@ def curly(guide_count: int, cv_count: int, length: float = 0.2, seed: int = 3) -
     phase = rng.uniform(0.0, 6.0, (guide_count, 1, 3))
     waves = np.sin(share[:, None] * rng.uniform(3.0, 9.0, (guide_count, 1, 3)) + phase)
     return (grid + 0.02 * share[:, None] * waves).astype(np.float32)
+
+
+def tips(is_held: Any, cv_count: int) -> np.ndarray:
+    """The tips of these guides (guide_count,), as `Scene.held`."""
+    held = np.zeros((len(is_held), cv_count), bool)
+    held[:, -1] = is_held
+    return held
+
+
+def tied(is_held: Any, cv_count: int, *first: int) -> np.ndarray:
+    """These guides, tied between each of these CVs and the next one, as `Scene.held`."""
+    held = np.zeros((len(is_held), cv_count), bool)
+    for cv in first:
+        held[is_held, cv : cv + 2] = True
+    return held
 
 
 def icosphere(radius: float, subdivisions: int = 4) -> Surface:
@@ -135,6 +151,7 @@ def random_settings(random: np.random.Generator, **fixed: Any) -> DynamicsSettin
 class Scene:
     """Guides on a head that moves by matrices, with colliders that go with it or stand still.
 
+    held: (guide_count, cv_count) the CVs that go with the head too, or None.
     bowed: whether the ways within a frame are smooth, as the pipeline makes them.
     """
 
@@ -145,12 +162,12 @@ class Scene:
     standing: tuple[Collider, ...] = ()
     gravity: np.ndarray = field(default_factory=lambda: EARTH)
     advance: Callable[..., DynamicsState] = advance
-    tip_held: Any = None
+    held: Any = None
     bowed: bool = False
     wind: Any = (0.0, 0.0, 0.0)
 
     def start(self) -> DynamicsState:
-        return start(moved(self.motion(0.0), self.grid), self.tip_held)
+        return start(moved(self.motion(0.0), self.grid))
 
     def colliders(self, before: float, now: float) -> tuple[PosedCollider, ...]:
         matrices = self.motion(before), self.motion(now)
@@ -164,7 +181,9 @@ class Scene:
         targets = [moved(self.motion(t), self.grid) for t in (2 * before - now, before, now)]
         earlier = targets[0] if self.bowed else None
         colliders = self.colliders(before, now)
-        return Drive(*targets[1:], colliders, self.gravity, earlier, np.asarray(self.wind))
+        held = None if self.held is None else Held(np.asarray(self.held, bool))
+        wind = np.asarray(self.wind)
+        return Drive(*targets[1:], colliders, self.gravity, earlier, wind, held=held)
 
     def play(self, seconds: float, fps: float = 60.0) -> list[DynamicsState]:
         """The states at all frames, the start first."""
@@ -185,6 +204,8 @@ class Kit:
     translation = staticmethod(translation)
     moved = staticmethod(moved)
     straight = staticmethod(straight)
+    tips = staticmethod(tips)
+    tied = staticmethod(tied)
     curly = staticmethod(curly)
     icosphere = staticmethod(icosphere)
     box = staticmethod(box)

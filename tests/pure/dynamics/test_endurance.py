@@ -23,7 +23,7 @@ SEEDS = (10, 15, 4, 1, 5, 7, 9, 12, 14, 17, 20, 32, 36)
 @pytest.mark.parametrize("seed", few_in_commits(SEEDS, 3))
 def test_no_settings_and_colliders_break_the_hair(seed: int) -> None:
     run = random_run(seed)
-    state = start(run.begin(), run.tip_held)
+    state = start(run.begin())
     for drive in run.drives(0.5):
         state = advance(state, drive, run.settings, 1.0 / run.fps)
         reach = reach_of(state)
@@ -46,7 +46,7 @@ def test_the_runs_are_what_they_say() -> None:
     assert {run.grid.shape[1] for run in runs} == {2, 3, 4, 8, 16, 24}
     kinds = {type(solid).__name__ for run in runs for solid, _ in run.colliders}
     assert len(kinds) == 4
-    assert any(run.tip_held is not None for run in runs)
+    assert any(run.held is not None for run in runs)
     assert {one.length_solver for one in settings} == {"direct", "relaxation"}
     assert max(one.wind_speed for one in settings) == 200.0
     assert min(one.gravity for one in settings) == -10.0

@@ -279,7 +279,7 @@ def test_a_strand_held_at_both_ends_hangs_as_a_catenary(kit, solver, rise):
     settings = DynamicsSettings(
         **kit.LIMP | {"damping": 4.0, "length_solver": solver, "relaxations": 32}
     )
-    scene = kit.Scene(grid, settings, tip_held=np.array([True]))
+    scene = kit.Scene(grid, settings, held=kit.tips([True], cv_count))
     hanging = scene.play(5.0)[-1].grid[0, 1:, [0, 2]].T
     expected = catenary((0.0, 0.0), tip, reach, share[:, 0])
     assert expected[:, 1].min() < -0.07

@@ -80,25 +80,24 @@ def test_each_feature(kit, shake, values, bowed):
 
 
 @pytest.mark.parametrize("solver", few_in_commits(["direct", "relaxation"]))
-def test_held_tips(kit, shake, solver):
+def test_held_cvs(kit, shake, solver):
     grid = kit.curly(6, 10)
-    held = np.arange(6) % 2 == 0
+    held = kit.tips(np.arange(6) % 2 == 0, 10) | kit.tied(np.arange(6) % 3 == 0, 10, 5)
     settings = DynamicsSettings(**TIGHT | {"length_solver": solver, "style_tip": 0.5})
-    fast, slow = both(kit, kit.Scene(grid, settings, shake, tip_held=held))
-    expected = kit.moved(shake(0.4), grid)[held, -1]
-    np.testing.assert_allclose(fast[-1].grid[held, -1], expected, atol=1e-4)
+    fast, slow = both(kit, kit.Scene(grid, settings, shake, held=held))
+    expected = kit.moved(shake(0.4), grid)[held]
+    np.testing.assert_allclose(fast[-1].grid[held], expected, atol=1e-4)
     for one, other in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one.position, other.position, atol=FREE)
 
 
 @pytest.mark.parametrize("iterations", [1, 8])
-def test_held_tips_that_tear(kit, iterations):
+def test_held_cvs_that_tear(kit, iterations):
     """Heads that turn by a right angle in a frame: both forms lay the same guides out again."""
     grid = kit.curly(6, 10)
     settings = DynamicsSettings(**TIGHT | {"length_iterations": iterations, "substep_rate": 50.0})
-    scene = kit.Scene(
-        grid, settings, lambda time: kit.rotation(0, 70.0 * time), tip_held=np.arange(6) % 2 == 0
-    )
+    held = kit.tips(np.arange(6) % 2 == 0, 10) | kit.tied(np.arange(6) % 3 == 0, 10, 3)
+    scene = kit.Scene(grid, settings, lambda time: kit.rotation(0, 70.0 * time), held=held)
     fast, slow = both(kit, scene, seconds=0.06)
     for one, other in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one.position, other.position, atol=TOUCHING)
