@@ -7,11 +7,13 @@ artist's buttons and from the command line alike.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from .arrays import Floats, Ints
 from .dynamics.colliders import PosedCollider
+from .dynamics.held import Held
 from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, start
 from .dynamics.step import Drive, grid_at_frame_end
@@ -20,11 +22,14 @@ from .errors import HairloomError
 from .groom.automatic_children import are_few, automatic
 from .groom.children import make_children
 from .groom.children_settings import ChildrenSettings
-from .groom.guides import choose_guides
+from .groom.guides import choose_guides, grouped
+from .groom.holds import Holds
 from .groom.roots import RootFrames, bind_roots, follow, root_frames
 from .groom.settings import GuideSettings
+from .groom.ties import NO_HOLDERS, Holders, find_holds, idle
 from .groom.weights import GuideWeights, guide_weights
 from .groom.widths import Widths, with_widths
+from .refine.hold import hold
 from .refine.ride import ride
 from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
@@ -43,10 +48,12 @@ class Pose:
 
     head_positions: (vertex_count, 3) [m], world space, or None for hair without a head.
     matrix: (4, 4), moves rest world space to now; carries hair without a head, and colliders.
+    anchors: what holds hair beside its roots, see `groom.holds.anchors_of`; None: nothing does.
     """
 
     head_positions: Floats | None
     matrix: Floats
+    anchors: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -61,6 +68,7 @@ class Rig:
         in which they are grown. None: all.
     widths: how wide the strands are, and why.
     children_line: what automatic children there are, and why; empty where there are none.
+    holds: where strands are held by ties or by a surface; None: nowhere.
     """
 
     strands: StrandSet
@@ -72,6 +80,12 @@ class Rig:
     own_count: int | None = None
     widths: Widths = field(default_factory=Widths)
     children_line: str = ""
+    holds: Holds | None = None
+
+    @cached_property
+    def guide_holds(self) -> Holds | None:
+        """The same of the guides alone, numbered as these."""
+        return None if self.holds is None else self.holds.of(self.guides)
 
     @property
     def child_count(self) -> int:
@@ -107,12 +121,13 @@ class Motion:
         gravity: Floats,
         duration: float,
         scene_wind: Floats,
+        held: Held | None = None,
     ) -> Drive:
         """What acts in a frame of `duration` [s] that carries the guides to `target`."""
         earlier = self.carried_earlier if duration else None
         ratio = self.duration / duration if duration else 1.0
         before = self.carried_guides
-        return Drive(before, target, colliders, gravity, earlier, scene_wind, ratio)
+        return Drive(before, target, colliders, gravity, earlier, scene_wind, ratio, held)
 
 
 def prepare(
@@ -124,8 +139,10 @@ def prepare(
     children: ChildrenSettings | None = None,
     density: Floats | None = None,
     widths: str = "own",
+    holders: Holders = NO_HOLDERS,
 ) -> Rig:
-    """Bind strands to the head, choose the guides, weigh them for every strand, find all widths.
+    """Bind strands to the head, choose the guides, weigh them for every strand, find all widths,
+    and what is held.
 
     Args:
         strands: world space at rest.
@@ -134,6 +151,7 @@ def prepare(
         children: None is none.
         density: (vertex_count,) how densely children grow; None: wherever guides are near.
         widths: one of `groom.widths.METHODS`.
+        holders: ties and a surface of tips, at rest.
 
     Raises:
         HairloomError: no strands, or a groom of another scale than the head.
@@ -144,19 +162,28 @@ def prepare(
         )
     bound = strands if head is None else bind_roots(strands, head, place=place).strands
     uniform = resample(bound, settings.cv_count)
-    guides = choose_guides(uniform, settings)
-    weights = _weights(uniform, uniform.take(guides))
-    rig = Rig(uniform, head, guides, weights, _frames(uniform, head))
+    holds = find_holds(uniform, holders)
+    kind = None if holds is None else holds.kinds(uniform.strand_count)
+    guides = choose_guides(uniform, settings, kind)
+    weights = _weights(uniform, uniform.take(guides), kind, None if kind is None else kind[guides])
+    rig = Rig(uniform, head, guides, weights, _frames(uniform, head), holds=holds)
     if children is not None and children.method == "auto":
-        return _automatic(rig, children, density, widths, place)
-    if children is not None and children.method != "none":
-        rig = _with_children(rig, children, density, place)
-    strands, found = with_widths(rig.strands, widths)
-    return replace(rig, strands=strands, widths=found)
+        rig = _automatic(rig, children, density, widths, place, holders)
+    else:
+        if children is not None and children.method != "none":
+            rig = _with_children(rig, children, density, place, holders)
+        strands, found = with_widths(rig.strands, widths)
+        rig = replace(rig, strands=strands, widths=found)
+    return rig if rig.holds is None else replace(rig, notes=(*rig.notes, *idle(rig.holds, holders)))
 
 
 def _automatic(
-    rig: Rig, settings: ChildrenSettings, density: Floats | None, widths: str, place: str
+    rig: Rig,
+    settings: ChildrenSettings,
+    density: Floats | None,
+    widths: str,
+    place: str,
+    holders: Holders,
 ) -> Rig:
     """With as many children as cover the body, each as wide as the strands around it: those stand
     for so much less.
@@ -174,7 +201,7 @@ def _automatic(
     own, found = with_widths(rig.strands, widths, parts)
     rig = replace(rig, strands=own, widths=found)
     if parts > 1.0:
-        rig = replace(_with_children(rig, settings, density, place), widths=found)
+        rig = replace(_with_children(rig, settings, density, place, holders), widths=found)
         line = (
             f"Children: {rig.child_count:,} added, since {count:,} curves are too few for a body of"
             " hair. Set Method to None to see the curves alone"
@@ -182,18 +209,30 @@ def _automatic(
     return replace(rig, children_line=line)
 
 
-def _weights(strands: StrandSet, guides: StrandSet) -> GuideWeights:
+def _weights(
+    strands: StrandSet,
+    guides: StrandSet,
+    kind: Ints | None = None,
+    guide_kind: Ints | None = None,
+) -> GuideWeights:
+    """Strands that are held follow guides that are held by the same."""
+    group, guide_group = strands.group, guides.group
+    if kind is not None and guide_kind is not None:
+        both = grouped(np.append(group, guide_group), np.append(kind, guide_kind))
+        group, guide_group = both[: len(kind)], both[len(kind) :]
     return guide_weights(
         strands.roots,
-        strands.group,
+        group,
         guides.roots,
-        guides.group,
+        guide_group,
         strand_grid=strands.grid,
         guide_grid=guides.grid,
     )
 
 
-def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None, place: str) -> Rig:
+def _with_children(
+    rig: Rig, settings: ChildrenSettings, density: Floats | None, place: str, holders: Holders
+) -> Rig:
     """The artist's own strands, and children grown between them."""
     own, head = rig.strands, rig.head
     if head is None:
@@ -221,6 +260,7 @@ def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None,
         _frames(strands, head),
         (*rig.notes, *made.notes),
         own_count=own.strand_count,
+        holds=find_holds(strands, holders),
     )
 
 
@@ -253,9 +293,33 @@ def carried(rig: Rig, pose: Pose, chosen: Ints | slice = slice(None)) -> Floats:
     return follow(grid, rest, now)
 
 
+def style_of_guides(rig: Rig, pose: Pose) -> Floats:
+    """Rest shapes of the guides, carried by their roots and by what holds them, (guide_count,
+    cv_count, 3)."""
+    by_root = carried(rig, pose, rig.guides)
+    holds = held_guides(rig, pose)
+    if holds is None or pose.anchors is None:
+        return by_root
+    return holds.carried(rig.strands.grid[rig.guides], by_root, pose.anchors)
+
+
+def held_guides(rig: Rig, pose: Pose) -> Holds | None:
+    """Where the guides are held in this pose; None: nowhere."""
+    holds = None if rig.guide_holds is None else rig.guide_holds.where(pose.anchors)
+    return None if holds is None or not len(holds.strand) else holds
+
+
+def held_cvs(rig: Rig, pose: Pose) -> Held | None:
+    """The same by CVs, as the dynamics takes it."""
+    holds = held_guides(rig, pose)
+    if holds is None:
+        return None
+    return Held(holds.held_cvs(len(rig.guides), rig.strands.grid.shape[1]))
+
+
 def begin(rig: Rig, pose: Pose) -> Motion:
     """Hair at rest in this pose."""
-    guides = carried(rig, pose, rig.guides)
+    guides = style_of_guides(rig, pose)
     return Motion(start(guides), guides, guides, pose)
 
 
@@ -276,8 +340,8 @@ def advance(
         duration: time since the motion's pose [s].
         scene_wind: (3,) [m/s], world space.
     """
-    target = carried(rig, pose, rig.guides)
-    drive = motion.drive(target, colliders, gravity, duration, scene_wind)
+    target = style_of_guides(rig, pose)
+    drive = motion.drive(target, colliders, gravity, duration, scene_wind, held_cvs(rig, pose))
     state = advance_dynamics(motion.dynamics, drive, settings, duration)
     guides, before = grid_at_frame_end(state, drive, duration), motion.carried_guides
     return Motion(state, guides, target, pose, before, duration)
@@ -295,7 +359,23 @@ def strands_at(rig: Rig, pose: Pose, guides_now: Floats) -> Floats:
         guides_now: (guide_count, cv_count, 3) [m], simulated or baked, world space.
     """
     strands = carried(rig, pose)
-    return ride(strands, strands[rig.guides], guides_now, rig.weights)
+    return held_strands(rig, pose, ride(strands, strands[rig.guides], guides_now, rig.weights))
+
+
+def strands_at_rest(rig: Rig, pose: Pose) -> Floats:
+    """All strands in their style, in the shape of `strands_at`."""
+    if held_guides(rig, pose) is None:
+        return held_strands(rig, pose, carried(rig, pose))  # guides at rest move nothing
+    return strands_at(rig, pose, style_of_guides(rig, pose))
+
+
+def held_strands(rig: Rig, pose: Pose, strands: Floats) -> Floats:
+    """Strands that follow their guides, brought to where they are held; in place."""
+    holds = None if rig.holds is None else rig.holds.where(pose.anchors)
+    if holds is None or pose.anchors is None or not len(holds.strand):
+        return strands
+    hold(strands, rig.strands.grid, holds, pose.anchors)
+    return strands
 
 
 def rest_occlusion(rig: Rig, settings: AmbientSettings) -> Floats:

@@ -23,11 +23,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from ..strands.strand_set import ROOT_POINTS
 from ..strands.vectors import dot_rows
 from .banded import solve_tridiagonal
 
 #: CVs of each guide that the head carries: the second gives the root's direction (TressFX).
-PINNED = 2
+PINNED = ROOT_POINTS
 #: b above. At 1 a segment that stands straight on a collider could not change its length at all;
 #: at 0.98 hair with its root deep inside of a collider was seen to tremble, at 0.9 not.
 CONTACT_WEIGHT = np.float32(0.9)

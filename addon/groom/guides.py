@@ -15,16 +15,21 @@ _CANDIDATES_PER_GUIDE = 100
 _FACE_HAIR_PER_STRAND = 32
 
 
-def choose_guides(strands: StrandSet, settings: GuideSettings) -> Ints:
+def choose_guides(strands: StrandSet, settings: GuideSettings, kind: Ints | None = None) -> Ints:
     """Indices of the strands that become guides, (guide_count,) int64, ascending.
 
-    Each group gets guides in proportion to its size, at least one, brows and lashes hardly more,
-    and spreads them over its roots
-    by farthest-point sampling (Gonzalez 1985): the next guide is the root farthest from all guides
-    so far. The same seed gives the same guides. No more guides than strands, none of none.
+    Each group, and each kind within it, gets guides in proportion to its size, at least one, brows
+    and lashes hardly more, and spreads them over its roots by farthest-point sampling (Gonzalez
+    1985): the next guide is the root farthest from all guides so far. The same seed gives the same
+    guides. No more guides than strands, none of none.
+
+    Args:
+        kind: (strand_count,) what the strands are held by, see `Holds.kinds`; None: all alike.
     """
     random = np.random.default_rng(settings.seed)
-    names, group = np.unique(strands.group, return_inverse=True)
+    group = grouped(strands.group, kind)
+    _, first, group = np.unique(group, return_index=True, return_inverse=True)
+    names = strands.group[first]
     by_group = np.argsort(group, kind="stable")
     sizes = np.bincount(group)
     moving = np.where(is_face_hair(names), -(-sizes // _FACE_HAIR_PER_STRAND), sizes)
@@ -35,6 +40,14 @@ def choose_guides(strands: StrandSet, settings: GuideSettings) -> Ints:
         for member, fraction in zip(members, fractions, strict=True)
     ]
     return np.sort(np.concatenate([np.zeros(0, np.int64), *chosen]))
+
+
+def grouped(group: Ints, kind: Ints | None) -> Ints:
+    """Groups that are of one kind each, (strand_count,): of these, strands share guides."""
+    if kind is None or not kind.any():
+        return group
+    _, both = np.unique(np.stack([group, kind], axis=1), axis=0, return_inverse=True)
+    return both.ravel()
 
 
 def group_fractions(sizes: Ints, guide_count: int) -> Ints:

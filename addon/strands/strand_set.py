@@ -15,6 +15,9 @@ from .affine import mean_scale, moved
 #: Of hair whose width nobody knows, until it is found (`groom.widths`).
 DEFAULT_RADIUS = 4.0e-5  # [m], half of 0.08 mm, a typical human hair
 
+#: Points of each strand that its root decides about: the second gives the root's direction.
+ROOT_POINTS = 2
+
 
 @dataclass(frozen=True)
 class StrandSet:

@@ -12,8 +12,6 @@ import numpy as np
 from ... import pipeline
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
-from ...groom.guides import choose_guides
-from ...groom.settings import GuideSettings
 from ...pipeline import Pose, Rig
 from ...strands.resample import resample
 from ..bakes import playback
@@ -23,7 +21,6 @@ from ..bakes.playback import check_frames
 from ..bakes.stale_bakes import stale_notes
 from ..base.objects import Body, Handle, head_of
 from ..base.suspension import suspended
-from ..properties.properties import settings_of
 from ..scene.rigs import rig_of
 from ..scene.source import read_source, usable_curves
 from ..scene.surfaces import read_positions
@@ -193,8 +190,6 @@ def _children_motion(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, out: ExportStrands, rate: float
 ) -> ChildrenMotion:
     source = read_source(hair, depsgraph)
-    settings = settings_of(hair.data.hairloom.guides, GuideSettings)
-    guides = choose_guides(resample(source.strands, settings.cv_count), settings)
     rig = rig_of(hair, source)
     head = head_of(hair)
     body = hair if head is None or rig.head is None else head
@@ -203,7 +198,7 @@ def _children_motion(
         Handle.of(hair),
         rate,
         rig,
-        guides,
+        rig.guides,
         source.strands.strand_count,
         Body.at_rest(body, depsgraph),
     )

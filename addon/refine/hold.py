@@ -1,0 +1,109 @@
+"""Strands that follow their guides are brought to where ties and surfaces hold them.
+
+A guide is held exactly; a strand between guides passes its tie a little beside its own place. So
+from root to tip each hold moves the strand there: evenly more on the way from the root, or from the
+hold before, and all beyond as a whole. On that way the segments get back their lengths, with both
+ends where they are (FABRIK; Aristidou and Lasenby 2011). What a tie would tear off goes as far as
+the strand is long.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..strands.strand_set import ROOT_POINTS
+
+#: Sweeps to and fro that give a strand its lengths back.
+SWEEPS = 4
+#: A strand nearer to where it is held than this part of its length is there already.
+NEAR = 1.0e-5
+_TINY = 1.0e-12
+
+
+class Holds(Protocol):
+    """See `groom.holds.Holds`."""
+
+    @property
+    def strand(self) -> Ints: ...
+
+    @property
+    def place(self) -> Floats: ...
+
+    @property
+    def anchor(self) -> Ints: ...
+
+
+def hold(strands: Floats, rest: Floats, holds: Holds, anchors: Floats) -> None:
+    """Bring strands (strand_count, cv_count, 3) world [m] to where they are held, in place.
+
+    Args:
+        rest: the same at rest, with the lengths to keep.
+        holds: those of one strand are one after the other, from root to tip.
+        anchors: (anchor_count, 4, 4), from world at rest to world now, all finite.
+    """
+    begins = np.flatnonzero(np.diff(holds.strand, prepend=-1))
+    order = np.arange(len(holds.strand)) - np.repeat(
+        begins, np.diff(begins, append=len(holds.strand))
+    )
+    before = np.full(len(strands), ROOT_POINTS - 1, np.int64)  # the last CV that is held so far
+    for number in range(int(order.max(initial=-1)) + 1):
+        one = np.flatnonzero(order == number)
+        strand, place = holds.strand[one], holds.place[one]
+        some, some_rest = strands[strand].astype(np.float64), rest[strand].astype(np.float64)
+        target = _moved(anchors[holds.anchor[one]], _at(some_rest, place))
+        strands[strand] = _held(some, some_rest, before[strand], place, target)
+        before[strand] = np.minimum(place.astype(np.int64) + 1, strands.shape[1] - 1)
+
+
+def _held(some: Floats, rest: Floats, before: Ints, place: Floats, target: Floats) -> Floats:
+    cv, first = np.arange(some.shape[1]), place.astype(np.int64)
+    length = np.linalg.norm(np.diff(rest, axis=1), axis=2)
+    error = target - _at(some, place)
+    is_off = np.linalg.norm(error, axis=1) > NEAR * length.sum(axis=1)
+    error = np.where(is_off[:, None], error, 0.0)
+    is_between = (cv[:-1] >= before[:, None]) & (cv[:-1] < first[:, None])
+    start, goal = _point(some, before), _point(some, first) + error
+    reach = np.where(is_between, length, 0.0).sum(axis=1)
+    away = np.linalg.norm(goal - start, axis=1)
+    error += (
+        (goal - start)
+        * (np.minimum(reach / np.maximum(away, _TINY), 1.0) - 1.0)[:, None]
+        * (is_off[:, None])
+    )
+    part = (cv - before[:, None]) / np.maximum(first - before, 1)[:, None]
+    some = some + np.clip(part, 0.0, 1.0)[..., None] * error[:, None]
+    for _ in range(SWEEPS):
+        _sweep(some, length, before, first, is_off)
+    return some
+
+
+def _sweep(some: Floats, length: Floats, before: Ints, first: Ints, is_off: Bools) -> None:
+    """Once from each hold towards the root and back, in place."""
+    cvs = range(1, some.shape[1] - 1)
+    for step in (-1, 1):
+        for cv in cvs[::step]:
+            beside, wanted = some[:, cv - step], length[:, cv if step < 0 else cv - 1]
+            segment = some[:, cv] - beside
+            scale = wanted / np.maximum(np.linalg.norm(segment, axis=1), _TINY)
+            is_moved = is_off & (cv > before) & (cv < first)
+            np.copyto(some[:, cv], beside + segment * scale[:, None], where=is_moved[:, None])
+
+
+def _point(grid: Floats, cv: Ints) -> Floats:
+    return grid[np.arange(len(grid)), cv]
+
+
+def _at(grid: Floats, place: Floats) -> Floats:
+    """Points at places along strands, (n, 3)."""
+    first = place.astype(np.int64)
+    part = (place - first)[:, None]
+    after = np.minimum(first + 1, grid.shape[1] - 1)
+    return _point(grid, first) * (1.0 - part) + _point(grid, after) * part
+
+
+def _moved(matrix: Floats, points: Floats) -> Floats:
+    moved: Floats = np.einsum("nij,nj->ni", matrix[:, :3, :3].astype(np.float64), points)
+    return moved + matrix[:, :3, 3]

@@ -1,0 +1,198 @@
+"""A ponytail on a moving head: what is held stays where it is held, and keeps its length."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon import pipeline
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.groom.holds import anchors_of
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.groom.ties import Holders, Tie, TipSurface
+from hairloom.addon.pipeline import Pose, Rig
+from hairloom.addon.strands import StrandSet, Surface
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+RING = np.array([0.0, 0.1, 0.05])
+
+
+def ponytail(count: int = 200, seed: int = 4) -> StrandSet:
+    """From a patch through a ring of 1 cm behind it, then down: 30 cm, with some strands beside."""
+    random = np.random.default_rng(seed)
+    roots = random.uniform([-0.06, -0.06, 0.0], [0.06, 0.06, 0.0], (count, 3))
+    across = random.normal(0.0, 0.003, (count, 1, 3)) * [1.0, 0.0, 1.0]
+    along = np.linspace(0.0, 1.0, 40)[:, None]
+    up = roots[:, None] + np.array([0.0, 0.02, 0.07]) * np.sin(np.pi * along)
+    to_ring = up * (1.0 - along) + (RING + across) * along
+    tail = RING + across + along * [0.0, 0.06, 0.0] + along**2 * [0.0, 0.0, -0.2]
+    points = np.concatenate([to_ring, tail[:, 1:]], axis=1)
+    points[::20, :, 1] -= 0.15 * np.linspace(0.0, 1.0, points.shape[1])  # these pass by
+    number = points.shape[1]
+    return StrandSet(
+        points.reshape(-1, 3),
+        np.arange(count + 1) * number,
+        np.full(count * number, 4e-5),
+        np.zeros(count, np.int32),
+    )
+
+
+def tie() -> Tie:
+    """Its axis along y."""
+    shape = np.eye(4)
+    shape[:3, :3] = 0.012 * np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]).T
+    shape[:3, 3] = RING
+    return Tie("Scrunchy", shape)
+
+
+def rig_of(holders: Holders, **settings: int) -> Rig:
+    chosen = GuideSettings(**{"guide_count": 40, "cv_count": 24, **settings})
+    return pipeline.prepare(ponytail(), None, chosen, place="hair", holders=holders)
+
+
+def shaking(time: float, turn: float = 25.0) -> np.ndarray:
+    swing = np.sin(np.pi * min(time, 0.5)) ** 2 * np.sin(2.0 * np.pi * time)
+    angle = np.radians(turn) * swing
+    matrix = np.eye(4)
+    matrix[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    matrix[0, 3] = 0.05 * swing
+    return matrix
+
+
+def pose_at(rig: Rig, matrix: np.ndarray, own: np.ndarray | None = None) -> Pose:
+    """Everything goes with the head; `own` moves the tie besides."""
+    assert rig.holds is not None
+    tie_matrix = matrix if own is None else matrix @ own
+    ties = np.broadcast_to(tie_matrix, (rig.holds.tie_count, 4, 4))
+    surface = rig.holds.surface
+    moved = None if surface is None else surface.positions @ matrix[:3, :3].T + matrix[:3, 3]
+    return Pose(None, matrix, anchors_of(rig.holds, ties, moved))
+
+
+def escape(rig: Rig, pose: Pose, strands: np.ndarray) -> np.ndarray:
+    """How far each held strand is from where it is held [m]."""
+    holds = rig.holds.where(pose.anchors)
+    first = holds.place.astype(int)
+    part = (holds.place - first)[:, None]
+
+    def at(grid):
+        here, after = grid[holds.strand, first], np.minimum(first + 1, grid.shape[1] - 1)
+        return here * (1.0 - part) + grid[holds.strand, after] * part
+
+    rest = np.concatenate([at(rig.strands.grid), np.ones((len(first), 1))], axis=1)
+    target = np.einsum("nij,nj->ni", pose.anchors[holds.anchor], rest)[:, :3]
+    return np.linalg.norm(at(strands) - target, axis=1)
+
+
+def lengths(strands: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(np.diff(strands, axis=1), axis=2).sum(axis=1)
+
+
+def played(rig: Rig, poses: list[Pose], settings: DynamicsSettings, fps: float):
+    motion = pipeline.begin(rig, poses[0])
+    for pose in poses[1:]:
+        motion = pipeline.advance(rig, motion, pose, (), settings, GRAVITY, 1.0 / fps)
+        yield motion
+
+
+TIPS = TipSurface(
+    "Bun",
+    Surface(np.array([[-1.0, -1, -0.155], [1, -1, -0.155], [0, 1, -0.155]]), np.array([[0, 1, 2]])),
+    0.01,
+)
+
+
+@pytest.mark.parametrize(
+    "holders", [Holders((tie(),)), Holders((tie(),), TIPS)], ids=["ponytail", "bun"]
+)
+def test_all_strands_stay_in_a_ring_that_turns_with_the_head(holders: Holders) -> None:
+    """At 24 frames a second, within 0.1 mm; drawn strands keep the lengths that guides do."""
+    rig = rig_of(holders)
+    assert rig.holds is not None and rig.notes == ()
+    assert 150 < len(np.unique(rig.holds.strand[~rig.holds.is_tip])) < 200
+    assert rig.holds.is_tip.any() == (holders.tip_surface is not None)
+    assert rig.guide_holds is not None and len(rig.guide_holds.strand) > 20
+    poses = [pose_at(rig, shaking(frame / 24.0)) for frame in range(30)]
+    rest, swung = lengths(rig.strands.grid), 0.0
+    for motion in played(rig, poses, DynamicsSettings(), 24.0):
+        strands = pipeline.strands_now(rig, motion)
+        assert escape(rig, motion.pose, strands).max() < 1e-4
+        away = np.abs(strands - pipeline.strands_at_rest(rig, motion.pose))
+        swung = max(swung, float(away.max()))
+        assert np.isfinite(strands).all()
+        assert np.abs(lengths(strands) / rest - 1.0).max() < 0.02
+    assert swung > 0.01
+
+
+def test_hair_beyond_a_tie_follows_the_tie_and_not_the_head() -> None:
+    """A ring that goes up by 2 cm while the head is still takes the tail along."""
+    rig = rig_of(Holders((tie(),)))
+    lifted = np.eye(4)
+    lifted[2, 3] = 0.02
+    style = pipeline.style_of_guides(rig, pose_at(rig, np.eye(4), lifted))
+    rest = rig.strands.grid[rig.guides]
+    held = np.unique(rig.guide_holds.strand)
+    np.testing.assert_allclose((style - rest)[held][:, -1], [[0, 0, 0.02]] * len(held), atol=1e-6)
+    np.testing.assert_array_equal(style[held][:, :2], rest[held][:, :2])
+    free = np.setdiff1d(np.arange(len(rig.guides)), held)
+    assert len(free)
+    np.testing.assert_array_equal(style[free], rest[free])
+
+
+def test_hair_at_rest_stays_as_it_is_to_the_last_bit() -> None:
+    rig = rig_of(Holders((tie(),), TIPS))
+    pose = pose_at(rig, np.eye(4))
+    np.testing.assert_array_equal(pipeline.strands_at_rest(rig, pose), rig.strands.grid)
+    guides = pipeline.style_of_guides(rig, pose)
+    np.testing.assert_array_equal(guides, rig.strands.grid[rig.guides])
+    np.testing.assert_array_equal(pipeline.strands_at(rig, pose, guides), rig.strands.grid)
+
+
+def test_a_tie_that_goes_away_in_mid_motion_lets_go() -> None:
+    rig = rig_of(Holders((tie(),)))
+    poses = [pose_at(rig, shaking(frame / 24.0)) for frame in range(24)]
+    gone = [replace(pose, anchors=np.full_like(pose.anchors, np.nan)) for pose in poses[12:]]
+    motions = list(played(rig, poses[:12] + gone, DynamicsSettings(), 24.0))
+    ends = [pipeline.strands_now(rig, motion) for motion in motions]
+    assert all(np.isfinite(end).all() for end in ends)
+    assert escape(rig, poses[11], ends[10]).max() < 1e-4
+    assert escape(rig, poses[-1], ends[-1]).max() > 1e-3
+
+
+def test_a_tie_that_is_torn_off_leaves_every_length() -> None:
+    rig = rig_of(Holders((tie(),)))
+    away = np.eye(4)
+    poses = []
+    for frame in range(24):
+        away = away.copy()
+        away[0, 3] = 0.05 * frame
+        poses.append(pose_at(rig, np.eye(4), away))
+    rest = lengths(rig.strands.grid[rig.guides])
+    for motion in played(rig, poses, DynamicsSettings(), 24.0):
+        strands = pipeline.strands_now(rig, motion)
+        assert np.isfinite(strands).all()
+        assert np.abs(lengths(motion.dynamics.grid) / rest - 1.0).max() < 0.005
+
+
+def test_held_strands_follow_guides_that_the_same_tie_holds() -> None:
+    rig = rig_of(Holders((tie(),)), guide_count=5)
+    kind = rig.holds.kinds(rig.strands.strand_count)
+    for column in range(3):
+        counts = rig.weights.weight[:, column] > 0.0
+        np.testing.assert_array_equal(
+            kind[rig.guides[rig.weights.guide[counts, column]]], kind[counts]
+        )
+
+
+def test_a_tie_without_hair_is_said_and_does_no_harm() -> None:
+    shape = tie().shape.copy()
+    shape[0, 3] = 9.0
+    far = Tie("Scrunchy", shape)
+    rig = rig_of(Holders((far,)))
+    assert len(rig.notes) == 1 and "Scrunchy" in rig.notes[0]
+    plain = pipeline.prepare(
+        ponytail(), None, GuideSettings(guide_count=40, cv_count=24), place="hair"
+    )
+    np.testing.assert_array_equal(rig.guides, plain.guides)
+    np.testing.assert_array_equal(rig.weights.weight, plain.weights.weight)
+    assert pipeline.held_cvs(rig, pose_at(rig, np.eye(4))) is None
