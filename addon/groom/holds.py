@@ -41,11 +41,6 @@ class Holds:
     def anchor_count(self) -> int:
         return self.tie_count + (0 if self.tip_triangle is None else len(self.tip_triangle))
 
-    @property
-    def is_tip(self) -> Bools:
-        """Which of them hold a tip on the surface."""
-        return self.anchor >= self.tie_count
-
     def of(self, chosen: Ints) -> Holds:
         """Those of some strands, ascending, which are numbered among these alone."""
         place = np.searchsorted(chosen, self.strand)

@@ -67,8 +67,9 @@ class ComputeSolver:
         motion = self._motion
         if self._dynamics is None:
             self._dynamics = DynamicsPass(motion.dynamics)
-        target = pipeline.carried(self._rig, pose, self._rig.guides)
-        drive = motion.drive(target, colliders, gravity, duration, scene_wind)
+        rig = self._rig
+        target, held = pipeline.style_of_guides(rig, pose), pipeline.held_cvs(rig, pose)
+        drive = motion.drive(target, colliders, gravity, duration, scene_wind, held)
         self._dynamics.advance(drive, settings, duration)
         self._motion = replace(
             motion,

@@ -37,7 +37,7 @@ class NumpySolver:
 
     def rest(self, pose: Pose) -> None:
         self._take(pipeline.begin(self._rig, pose))
-        self._strands = pipeline.carried(self._rig, pose)  # guides at rest move nothing
+        self._strands = pipeline.strands_at_rest(self._rig, pose)
 
     def advance(
         self,

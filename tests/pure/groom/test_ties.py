@@ -74,7 +74,6 @@ def test_tips_on_a_surface_are_held() -> None:
     assert holds.strand.tolist() == [0, 0, 1, 2]
     np.testing.assert_allclose(holds.place, [4.5, 10.0, 10.0, 4.5], atol=1e-3)
     assert holds.anchor.tolist() == [0, 1, 2, 0]
-    assert holds.is_tip.tolist() == [False, True, True, False]
     assert holds.held_cvs(4, 11)[0].nonzero()[0].tolist() == [4, 5, 10]
 
 
