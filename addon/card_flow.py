@@ -66,7 +66,7 @@ def occluder_of(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardOccluder:
 def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:
     """Cards at rest, tied to the guides that they ride on from then on."""
     used, lines = card_lines(mesh)
-    guides, guide_group = rig.strands.grid[rig.guides], rig.strands.group[rig.guides]
+    guides, guide_group = rig.guide_grid, rig.strands.group[rig.guides]
     group = mesh.group[used]
     if not np.isin(group, guide_group).all():  # cards that know of no groups
         group, guide_group = np.zeros_like(group), np.zeros_like(guide_group)

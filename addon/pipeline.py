@@ -30,7 +30,7 @@ from .groom.ties import NO_HOLDERS, Holders, find_holds, idle
 from .groom.weights import GuideWeights, guide_weights
 from .groom.widths import Widths, with_widths
 from .refine.hold import hold
-from .refine.ride import ride
+from .refine.ride import Riders, ride
 from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
@@ -62,6 +62,7 @@ class Rig:
 
     strands: uniform, world space at rest; bound when there is a head.
     guides: (guide_count,) indices of the strands that are simulated.
+    guide_grid: (guide_count, cv_count, 3) [m], the lines that are simulated in their place.
     rest_frames: of all strands, or None without a head.
     notes: what the artist should know, each with its remedy.
     own_count: how many strands, the first ones, are the artist's own; children follow in the order
@@ -74,6 +75,7 @@ class Rig:
     strands: StrandSet
     head: Surface | None
     guides: Ints
+    guide_grid: Floats
     weights: GuideWeights
     rest_frames: RootFrames | None
     notes: tuple[str, ...] = ()
@@ -91,6 +93,10 @@ class Rig:
     def child_count(self) -> int:
         own = self.own_count
         return 0 if own is None else self.strands.strand_count - own
+
+    @cached_property
+    def riders(self) -> Riders:
+        return Riders.of(self.strands.points, self.strands.offsets, self.guide_grid, self.weights)
 
     @property
     def rest_pose(self) -> Pose:
@@ -166,7 +172,8 @@ def prepare(
     kind = None if holds is None else holds.kinds(uniform.strand_count)
     guides = choose_guides(uniform, settings, kind)
     weights = _weights(uniform, uniform.take(guides), kind, None if kind is None else kind[guides])
-    rig = Rig(uniform, head, guides, weights, _frames(uniform, head), holds=holds)
+    grid = uniform.grid[guides]
+    rig = Rig(uniform, head, guides, grid, weights, _frames(uniform, head), holds=holds)
     if children is not None and children.method == "auto":
         rig = _automatic(rig, children, density, widths, place, holders)
     else:
@@ -253,6 +260,7 @@ def _with_children(
         strands,
         head,
         rig.guides,
+        rig.guide_grid,
         GuideWeights(
             np.concatenate([rig.weights.guide, weights.guide]),
             np.concatenate([rig.weights.weight, weights.weight]),
@@ -279,9 +287,17 @@ def _frames(strands: StrandSet, head: Surface | None) -> RootFrames | None:
     )
 
 
-def carried(rig: Rig, pose: Pose, chosen: Ints | slice = slice(None)) -> Floats:
-    """Rest shapes of the chosen strands, each carried rigidly by its own root, (n, cv_count, 3)."""
-    grid = rig.strands.grid[chosen]
+def carried(rig: Rig, pose: Pose) -> Floats:
+    """Rest shapes of all strands, each carried rigidly by its own root, (n, cv_count, 3)."""
+    return _carried(rig, rig.strands.grid, slice(None), pose)
+
+
+def carried_guides(rig: Rig, pose: Pose) -> Floats:
+    """The same of the guides, (guide_count, cv_count, 3)."""
+    return _carried(rig, rig.guide_grid, rig.guides, pose)
+
+
+def _carried(rig: Rig, grid: Floats, chosen: Ints | slice, pose: Pose) -> Floats:
     if rig.head is None or pose.head_positions is None or rig.rest_frames is None:
         return (grid @ pose.matrix[:3, :3].T + pose.matrix[:3, 3]).astype(np.float32)
     triangle, barycentric = rig.strands.root_triangle, rig.strands.root_barycentric
@@ -296,11 +312,11 @@ def carried(rig: Rig, pose: Pose, chosen: Ints | slice = slice(None)) -> Floats:
 def style_of_guides(rig: Rig, pose: Pose) -> Floats:
     """Rest shapes of the guides, carried by their roots and by what holds them, (guide_count,
     cv_count, 3)."""
-    by_root = carried(rig, pose, rig.guides)
+    by_root = carried_guides(rig, pose)
     holds = held_guides(rig, pose)
     if holds is None or pose.anchors is None:
         return by_root
-    return holds.carried(rig.strands.grid[rig.guides], by_root, pose.anchors)
+    return holds.carried(rig.guide_grid, by_root, pose.anchors)
 
 
 def held_guides(rig: Rig, pose: Pose) -> Holds | None:
@@ -314,7 +330,7 @@ def held_cvs(rig: Rig, pose: Pose) -> Held | None:
     holds = held_guides(rig, pose)
     if holds is None:
         return None
-    return Held(holds.held_cvs(len(rig.guides), rig.strands.grid.shape[1]))
+    return Held(holds.held_cvs(*rig.guide_grid.shape[:2]))
 
 
 def begin(rig: Rig, pose: Pose) -> Motion:
@@ -359,7 +375,8 @@ def strands_at(rig: Rig, pose: Pose, guides_now: Floats) -> Floats:
         guides_now: (guide_count, cv_count, 3) [m], simulated or baked, world space.
     """
     strands = carried(rig, pose)
-    return held_strands(rig, pose, ride(strands, strands[rig.guides], guides_now, rig.weights))
+    moved = ride(strands.reshape(-1, 3), rig.riders, carried_guides(rig, pose), guides_now)
+    return held_strands(rig, pose, moved.reshape(strands.shape))
 
 
 def strands_at_rest(rig: Rig, pose: Pose) -> Floats:

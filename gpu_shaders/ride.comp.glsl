@@ -1,8 +1,21 @@
-// Strands that ride on guides: carried by their own roots, they take on the guides' motion.
+// Strands that ride on guides: carried by their own roots, they turn with their guides.
 // Twin of ride in addon/refine/ride.py, behind follow in addon/groom/roots.py. One
-// invocation a strand: on a software driver that takes a quarter less time than one a CV.
+// invocation a strand.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"
+#include "lib_turn.glsl"
+
+// How a guide has turned at a place along it [segments].
+vec4 turn_at(int guide, float place)
+{
+  float last = float(segment_count - 1);
+  float held = clamp(place - 0.5, 0.0, last);
+  int before = int(held);
+  vec4 near = texelFetch(guide_turns, strand_texel(guide, before, segment_count + 1), 0);
+  int after = min(before + 1, segment_count - 1);
+  vec4 far = texelFetch(guide_turns, strand_texel(guide, after, segment_count + 1), 0);
+  return near + (held - float(before)) * (far - near);
+}
 
 void main()
 {
@@ -15,17 +28,38 @@ void main()
                                       texelFetch(root_motions, strand_texel(mover, 1, 4), 0),
                                       texelFetch(root_motions, strand_texel(mover, 2, 4), 0),
                                       texelFetch(root_motions, strand_texel(mover, 3, 4), 0));
-  // first texel: xyz the three guides; second: xyz their weights
-  ivec3 guide = ivec3(texelFetch(guide_weights, strand_texel(strand, 0, 2), 0).xyz);
-  vec3 weight = texelFetch(guide_weights, strand_texel(strand, 1, 2), 0).xyz;
+  // xyz of three texels: the guides, their weights, their segments a metre
+  ivec3 guide = ivec3(texelFetch(guide_weights, strand_texel(strand, 0, 3), 0).xyz);
+  vec3 weight = texelFetch(guide_weights, strand_texel(strand, 1, 3), 0).xyz;
+  vec3 per_meter = texelFetch(guide_weights, strand_texel(strand, 2, 3), 0).xyz;
 
+  // xyz position, w radius
+  vec4 rest = texelFetch(rest_points, strand_texel(strand, 0, cv_count), 0);
+  vec3 displacement = vec3(0.0);
+  for (int k = 0; k < 3; k++) {
+    ivec2 shift = strand_texel(guide[k], segment_count, segment_count + 1);
+    displacement += weight[k] * texelFetch(guide_turns, shift, 0).xyz;
+  }
+  float reached = 0.0;
   for (int cv = 0; cv < cv_count; cv++) {
-    ivec2 texel = strand_texel(strand, cv, cv_count);
-    vec4 rest = texelFetch(rest_points, texel, 0);  // xyz position, w radius
-    vec3 moved = follow(rest.xyz, motion);
-    for (int k = 0; k < 3; k++) {
-      moved += weight[k] * texelFetch(guide_motions, strand_texel(guide[k], cv, cv_count), 0).xyz;
+    imageStore(cv_points, strand_texel(strand, cv, cv_count),
+               vec4(follow(rest.xyz, motion) + displacement, rest.w));
+    if (cv + 1 == cv_count) {
+      break;
     }
-    imageStore(cv_points, texel, vec4(moved, rest.w));
+    vec4 next = texelFetch(rest_points, strand_texel(strand, cv + 1, cv_count), 0);
+    vec3 edge = next.xyz - rest.xyz;
+    float size = length(edge);
+    vec3 place = (reached + 0.5 * size) * per_meter;
+    vec4 blend = weight.x * turn_at(guide.x, place.x);
+    for (int k = 1; k < 3; k++) {
+      vec4 turn = turn_at(guide[k], place[k]);
+      // of two quaternions of one rotation the nearer
+      blend += (dot(turn, blend) < 0.0 ? -weight[k] : weight[k]) * turn;
+    }
+    blend.w += dot(blend, blend) < {{reversed_turn}} ? 1.0 : 0.0;
+    displacement += turn_change(blend, edge + motion.turn * edge);
+    reached += size;
+    rest = next;
   }
 }

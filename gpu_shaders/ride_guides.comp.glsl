@@ -1,13 +1,14 @@
-// How far the guides have left the shape in which their roots carry them; one invocation a CV.
+// How each segment of the guides has turned from the shape in which its root carries it, and behind
+// these how far the guide has left its root; one invocation a guide. Twin of guide_turns in
+// addon/refine/ride.py.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"
+#include "lib_turn.glsl"
 
 void main()
 {
-  ivec2 place = ivec2(gl_GlobalInvocationID.xy);
-  int cv = place.x;
-  int guide = place.y;
-  if (cv >= cv_count || guide >= guide_count) {
+  int guide = int(gl_GlobalInvocationID.x);
+  if (guide >= guide_count) {
     return;
   }
   int strand = int(texelFetch(guide_strands, strand_texel(guide, 0, 1), 0).x);
@@ -16,8 +17,19 @@ void main()
                                       texelFetch(root_motions, strand_texel(mover, 1, 4), 0),
                                       texelFetch(root_motions, strand_texel(mover, 2, 4), 0),
                                       texelFetch(root_motions, strand_texel(mover, 3, 4), 0));
-  vec3 rest = texelFetch(rest_points, strand_texel(strand, cv, cv_count), 0).xyz;
-  ivec2 texel = strand_texel(guide, cv, cv_count);
-  vec3 left = texelFetch(guides_now, texel, 0).xyz - follow(rest, motion);
-  imageStore(guide_motions, texel, vec4(left, 0.0));
+  vec3 was = follow(texelFetch(guide_points, strand_texel(guide, 0, segment_count + 1), 0).xyz, motion);
+  vec3 is = texelFetch(guides_now, strand_texel(guide, 0, segment_count + 1), 0).xyz;
+  imageStore(guide_turns, strand_texel(guide, segment_count, segment_count + 1), vec4(is - was, 0.0));
+  vec4 turn = vec4(0.0, 0.0, 0.0, 1.0);
+  for (int segment = 0; segment < segment_count; segment++) {
+    ivec2 texel = strand_texel(guide, segment + 1, segment_count + 1);
+    vec3 was_next = follow(texelFetch(guide_points, texel, 0).xyz, motion);
+    vec3 is_next = texelFetch(guides_now, texel, 0).xyz;
+    vec3 before = direction_of(was_next - was);
+    vec3 here = before + turn_change(turn, before);
+    turn = turn_product(least_turn(here, direction_of(is_next - is)), turn);
+    imageStore(guide_turns, strand_texel(guide, segment, segment_count + 1), turn);
+    was = was_next;
+    is = is_next;
+  }
 }

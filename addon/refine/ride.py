@@ -1,15 +1,33 @@
-"""Strands that ride on their guides: each keeps its rest shape and takes on the guides' motion."""
+"""Strands that ride on their guides: each turns as these do, and keeps its shape and its length.
+
+Each segment of a guide has turned since rest by the least rotation that takes on from that of the
+segment before it: no twist is added on the way from root to tip (Bishop 1975), and where a guide
+does not bend, nothing turns. A segment of a strand takes on the rotations of its three guides, as
+far from the root as it is itself, blended as quaternions. Its own segments, turned so and put
+together from the root on, are the strand; where guides leave their roots, so does its root. So
+lengths are kept whatever the guides do, strands of guides that turn rigidly turn rigidly, and a
+coil stays this coil on a guide that bends.
+
+Vectors lie as planes here, (3, n), and quaternions as (4, n), xyz and w last: that is several times
+as fast.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..strands.vectors import cross_rows, dot_rows
 
-#: Strands moved at once, so that they stay in the processor's cache.
-_CHUNK = 512
+#: Points moved at once, so that they stay in the processor's cache.
+_CHUNK = 8192
+#: Segments shorter than this [m] have no direction, so they turn as the one before them.
+SHORTEST = 1.0e-12
+#: Below this a quaternion that turns one direction into another is that of a full reversal.
+REVERSED = 1.0e-6
 
 
 class Weights(Protocol):
@@ -22,29 +40,204 @@ class Weights(Protocol):
     def weight(self) -> Floats: ...
 
 
-def ride(rest: Floats, guide_rest: Floats, guide_now: Floats, weights: Weights) -> Floats:
-    """rest + sum over k of w_k (guide_now - guide_rest)[guide_k], (strand_count, cv_count, 3).
+@dataclass(frozen=True, eq=False)
+class Riders:
+    """Strands and the guides they ride on, as they are at rest; constant.
 
-    All in one space [m]; the result is float32. Guides at rest leave every strand bit for bit.
+    offsets: (strand_count + 1,), strand s is points offsets[s]:offsets[s + 1].
+    weights: of all strands.
+    stations: (point_count,) float32 [m], how far along its guides the middle of the segment that
+        begins at a point takes its rotation from.
+    segments_per_meter: (guide_count,) float32 [1/m], of each guide.
+    """
+
+    offsets: Ints
+    weights: Weights
+    stations: Floats
+    segments_per_meter: Floats
+
+    @classmethod
+    def of(cls, points: Floats, offsets: Ints, guides: Floats, weights: Weights) -> Riders:
+        """Bind strands to guides.
+
+        Args:
+            points: (point_count, 3) [m] at rest.
+            guides: (guide_count, cv_count, 3) [m] at rest, CVs evenly along each.
+        """
+        lengths = np.linalg.norm(np.diff(guides, axis=1), axis=2).sum(axis=1, dtype=np.float64)
+        per_meter = (guides.shape[1] - 1) / np.maximum(lengths, SHORTEST)
+        return cls(offsets, weights, stations(points, offsets), per_meter.astype(np.float32))
+
+
+def stations(points: Floats, offsets: Ints) -> Floats:
+    """Distance along its strand [m] of the middle of the segment that begins at each point,
+    (point_count,) float32; that of the tip means nothing.
+    """
+    step = np.zeros(len(points))
+    step[:-1] = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    step[offsets[1:] - 1] = 0.0
+    reached = np.concatenate([[0.0], np.cumsum(step)])[:-1]
+    start = np.repeat(reached[offsets[:-1]], np.diff(offsets))
+    return (reached - start + 0.5 * step).astype(np.float32)
+
+
+def ride(points: Floats, riders: Riders, guide_rest: Floats, guide_now: Floats) -> Floats:
+    """Strands turned with their guides, (point_count, 3) float32, all in one space [m].
+
+    Guides at rest leave every strand bit for bit.
 
     Args:
-        rest: (strand_count, cv_count, 3), strands carried by their own roots to now.
+        points: (point_count, 3), strands carried by their own roots to now.
         guide_rest: (guide_count, cv_count, 3), guides carried by their own roots to now.
         guide_now: (guide_count, cv_count, 3), guides as simulated.
     """
-    moved = np.array(rest, np.float32)
-    width = rest.shape[1] * 3
-    flat = moved.reshape(len(rest), width)
-    motion = np.asarray(guide_now - guide_rest, np.float32).reshape(len(guide_rest), width)
-    part = np.empty((min(_CHUNK, len(flat)), width), np.float32)
-    for start in range(0, len(flat), _CHUNK):
-        chunk = flat[start : start + _CHUNK]
-        taken = part[: len(chunk)]
-        stop = start + len(chunk)
-        for guide, weight in zip(
-            weights.guide[start:stop].T, weights.weight[start:stop].T, strict=True
-        ):
-            np.take(motion, guide, axis=0, out=taken, mode="clip")
-            taken *= weight[:, None]
-            chunk += taken
+    moved = np.array(points, np.float32)
+    if not len(moved):
+        return moved
+    table = _turn_table(guide_turns(guide_rest, guide_now))
+    shifts = np.asarray(guide_now[:, 0] - guide_rest[:, 0], np.float32)
+    counts = np.diff(riders.offsets)
+    # whole strands a chunk, about as many points each
+    ends = np.searchsorted(riders.offsets, np.arange(_CHUNK, len(points) + _CHUNK, _CHUNK))
+    first = 0
+    for last in np.unique(np.minimum(ends, len(counts))).tolist():
+        chunk = slice(int(riders.offsets[first]), int(riders.offsets[last]))
+        strands = slice(first, last)
+        turned = _turned(moved[chunk], strands, counts[strands], riders, table)
+        turned += np.repeat(_mean_shift(shifts, riders.weights, strands), counts[strands], axis=0)
+        moved[chunk] += turned
+        first = last
     return moved
+
+
+def guide_turns(rest: Floats, now: Floats) -> Floats:
+    """How each segment of each guide has turned, (4, cv_count - 1, guide_count) float32
+    quaternions; exactly (0, 0, 0, 1) where it has not.
+
+    Args:
+        rest, now: (guide_count, cv_count, 3) [m].
+    """
+    was, way = _directions(rest), _directions(now)
+    turns = np.empty((4, *was.shape[1:]), np.float32)
+    turn = np.zeros((4, was.shape[2]), np.float32)
+    turn[3] = 1.0
+    for segment in range(was.shape[1]):
+        # further: from where the turns before have brought this segment to where it is
+        here = was[:, segment] + turn_change(turn, was[:, segment])
+        turn = _product(least_turn(here, way[:, segment]), turn)
+        turns[:, segment] = turn
+    return turns
+
+
+def least_turn(one: Floats, other: Floats) -> Floats:
+    """The quaternions (4, n) of the least rotations from unit vectors to others, (3, n) each; the
+    identity where either has no length.
+    """
+    # by the difference, so that there is exactly no rotation where there is none
+    change = other - one
+    turn = np.empty((4, one.shape[1]), np.float32)
+    turn[:3] = cross_rows(one, change)
+    turn[3] = np.float32(2.0) - np.float32(0.5) * dot_rows(change, change)
+    is_reversed = turn[3] < REVERSED
+    if is_reversed.any():
+        back = one[:, is_reversed]
+        axis = np.zeros_like(back)
+        axis[np.abs(back).argmin(axis=0), np.arange(back.shape[1])] = 1.0
+        turn[:3, is_reversed] = cross_rows(back, axis)
+        turn[3, is_reversed] = 0.0
+    has_none = ~(one.any(axis=0) & other.any(axis=0))
+    turn[:, has_none] = np.array([[0.0], [0.0], [0.0], [1.0]], np.float32)
+    turn /= np.sqrt(_dot(turn, turn))
+    return turn
+
+
+def turn_change(turn: Floats, vector: Floats) -> Floats:
+    """What quaternions (4, n) of any length add to vectors (3, n) by turning them."""
+    axis, real = turn[:3], turn[3]
+    across = cross_rows(axis, vector)
+    change = cross_rows(axis, across)
+    across *= real
+    change += across
+    change *= np.float32(2.0) / _dot(turn, turn)
+    return change
+
+
+def _directions(grid: Floats) -> Floats:
+    """Unit vectors along the segments, (3, cv_count - 1, guide_count) float32; 0 without length."""
+    edge = np.ascontiguousarray(np.diff(grid, axis=1).transpose(2, 1, 0), np.float32)
+    length = np.sqrt(dot_rows(edge, edge))
+    is_short = length < SHORTEST
+    edge /= np.where(is_short, np.float32(1.0), length)
+    edge[:, is_short] = 0.0
+    return edge
+
+
+def _dot(one: Floats, other: Floats) -> Floats:
+    """Of quaternions (4, n)."""
+    return np.asarray(np.einsum("in,in->n", one, other))
+
+
+def _product(left: Floats, right: Floats) -> Floats:
+    """Quaternions (4, n) that turn by `right` first, then by `left`."""
+    product = np.empty_like(right)
+    product[:3] = cross_rows(left[:3], right[:3])
+    product[:3] += left[3] * right[:3] + right[3] * left[:3]
+    product[3] = left[3] * right[3] - dot_rows(left[:3], right[:3])
+    return product
+
+
+def _turn_table(turns: Floats) -> Floats:
+    """Turns, and below them what takes each to that of the next segment,
+    (guide_count, segment_count, 8)."""
+    table = np.zeros((*turns.shape[:0:-1], 8), np.float32)
+    table[..., :4] = turns.transpose(2, 1, 0)
+    table[:, :-1, 4:] = table[:, 1:, :4] - table[:, :-1, :4]
+    return table
+
+
+def _mean_shift(shifts: Floats, weights: Weights, strands: slice) -> Floats:
+    """How far the guides of some strands have left their roots, (n, 3)."""
+    if not shifts.any():
+        return np.zeros((strands.stop - strands.start, 3), np.float32)
+    guide, weight = weights.guide[strands], weights.weight[strands]
+    return np.einsum("nk,nkc->nc", weight, shifts[guide]).astype(np.float32)
+
+
+def _turned(points: Floats, strands: slice, counts: Ints, riders: Riders, table: Floats) -> Floats:
+    """What turning adds to the points of some strands, (n, 3)."""
+    segment = np.zeros((3, len(points)), np.float32)
+    segment[:, :-1] = (points[1:] - points[:-1]).T
+    tips = np.cumsum(counts) - 1
+    segment[:, tips] = 0.0
+    first = riders.offsets[strands.start]
+    station = riders.stations[first : first + len(points)]
+    last = table.shape[1] - 1
+    flat = table.reshape(-1, 8)
+    blend: Floats | None = None
+    for guide, weight in zip(
+        riders.weights.guide[strands].T, riders.weights.weight[strands].T, strict=True
+    ):
+        place = np.repeat(riders.segments_per_meter[guide], counts) * station
+        place -= np.float32(0.5)
+        np.clip(place, 0.0, last, out=place)
+        before = place.astype(np.int64)
+        place -= before
+        before += np.repeat(guide.astype(np.int64) * (last + 1), counts)
+        near = np.ascontiguousarray(flat.take(before, axis=0, mode="clip").T)
+        turn = near[4:] * place
+        turn += near[:4]
+        fraction = np.repeat(weight, counts)
+        if blend is None:
+            blend = turn * fraction
+        else:  # of two quaternions of one rotation the nearer
+            turn *= np.copysign(fraction, _dot(turn, blend))
+            blend += turn
+    assert blend is not None
+    size = _dot(blend, blend)
+    blend[3] += size < REVERSED  # opposite turns that leave nothing
+    change = turn_change(blend, segment)
+    total = np.cumsum(change, axis=1, dtype=np.float64)
+    total -= change  # of the segments before each point
+    starts = tips + 1 - counts
+    total -= np.repeat(total[:, starts], counts, axis=1)
+    return total.T.astype(np.float32)

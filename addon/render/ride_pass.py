@@ -4,7 +4,7 @@ The same as pipeline.strands_at, in three dispatches over textures in the layout
 strand_layout.strand_rows:
 
     vertices ------> ride_roots ------> root_motions                    one invocation a strand
-    guides_now ----> ride_guides -----> guide_motions                   one a CV of the guides
+    guides_now ----> ride_guides -----> guide_turns                     one a guide
                      ride ------------> cv_points                       one a strand
 
 New with every frame are the head's vertices that hold a root, or a matrix, and the guides.
@@ -12,8 +12,12 @@ New with every frame are the head's vertices that hold a root, or a matrix, and 
     root_holds    RGBA32F: first texel xyz the triangle's vertices, second xy weights of b and c
     rest_frames   RGBA32F: xyz of four texels origin, tangent, bitangent, normal at rest
     rest_points   RGBA32F: xyz position at rest [m, world], w radius [m]
+    guide_points  RGBA32F: xyz CVs of the guides at rest [m, world]
     guide_strands R32F:    the strand that each guide is
-    guide_weights RGBA32F: first texel xyz the three guides, second xyz their weights
+    guide_turns   RGBA32F: the rotation of each segment of the guides since rest, a quaternion, and
+                           last xyz how far the guide has left its root [m]
+    rest_turns    RGBA32F: the same of guides at rest
+    guide_weights RGBA32F: xyz of three texels the guides, their weights, their segments a metre
     cv_points     RGBA32F: xyz position now [m, world], w radius [m]
 
 Whole numbers lie in them as floats, exact below 2^24.
@@ -27,7 +31,7 @@ import gpu
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..refine.ride import Weights
+from ..refine.ride import Riders, Weights
 from ..strands import StrandSet, Surface
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .snapshot import DevicePoints
@@ -49,11 +53,11 @@ GUIDES_RECIPE = ShaderRecipe(
         ("FLOAT_2D", "guides_now"),
         ("FLOAT_2D", "guide_strands"),
         ("FLOAT_2D", "root_motions"),
-        ("FLOAT_2D", "rest_points"),
+        ("FLOAT_2D", "guide_points"),
     ),
-    images=(("RGBA32F", "guide_motions"),),
-    integers=("cv_count", "guide_count", "mover_count"),
-    group_size=(16, 4),
+    images=(("RGBA32F", "guide_turns"),),
+    integers=("segment_count", "guide_count", "mover_count"),
+    group_size=(64, 1),
 )
 RIDE_RECIPE = ShaderRecipe(
     name="ride",
@@ -62,10 +66,10 @@ RIDE_RECIPE = ShaderRecipe(
         ("FLOAT_2D", "root_motions"),
         ("FLOAT_2D", "guide_weights"),
         ("FLOAT_2D", "rest_points"),
-        ("FLOAT_2D", "guide_motions"),
+        ("FLOAT_2D", "guide_turns"),
     ),
     images=(("RGBA32F", "cv_points"),),
-    integers=("cv_count", "strand_count", "mover_count"),
+    integers=("cv_count", "segment_count", "strand_count", "mover_count"),
     group_size=(64, 1),
 )
 
@@ -77,15 +81,21 @@ class RidePass:
         strands: uniform, world space at rest; bound when there is a head.
         head: world space at rest, or None for hair that one matrix carries.
         guides: (guide_count,) indices of the strands that are simulated.
+        guide_grid: (guide_count, cv_count, 3) [m], the lines that are simulated, at rest.
         weights: of all strands.
     """
 
     def __init__(
-        self, strands: StrandSet, head: Surface | None, guides: Ints, weights: Weights
+        self,
+        strands: StrandSet,
+        head: Surface | None,
+        guides: Ints,
+        guide_grid: Floats,
+        weights: Weights,
     ) -> None:
         self._strands = strands
-        self._guides = guides
-        self._weights = weights
+        self._guides, self._guide_grid = guides, guide_grid
+        self._riders = Riders.of(strands.points, strands.offsets, guide_grid, weights)
         self._holds = None if head is None else RootHolds(strands, head)
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
         self.points = DevicePoints((strands.strand_count, self._cv_count))
@@ -104,8 +114,7 @@ class RidePass:
             ShaderError: a shader does not compile here.
         """
         self._take_pose(head_positions, matrix)
-        self._textures["guide_motions"].clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
-        self._run_ride()
+        self._run_ride("rest_turns")
 
     def ride(self, head_positions: Floats | None, matrix: Floats, guides_now: Any) -> None:
         """Show every strand carried by its root and moved with its guides.
@@ -121,12 +130,12 @@ class RidePass:
         """
         self._take_pose(head_positions, matrix)
         if isinstance(guides_now, np.ndarray):
-            wanted = (len(self._guides), self._cv_count, 3)
-            if guides_now.shape != wanted:
+            if guides_now.shape != self._guide_grid.shape:
+                wanted = self._guide_grid.shape
                 raise ValueError(f"guides have shape {guides_now.shape}, not {wanted}")
             guides_now = texture_from(strand_rows(_padded(guides_now)), "RGBA32F")
         self._run_guides(guides_now)
-        self._run_ride()
+        self._run_ride("guide_turns")
 
     def read(self) -> Floats:
         """The strands as they are shown, (strand_count, cv_count, 3) float32 [m], world space."""
@@ -142,6 +151,11 @@ class RidePass:
     @property
     def _cv_count(self) -> int:
         return int(self._strands.grid.shape[1])
+
+    @property
+    def _segment_count(self) -> int:
+        """Of each guide."""
+        return int(self._guide_grid.shape[1]) - 1
 
     @property
     def _mover_count(self) -> int:
@@ -168,9 +182,16 @@ class RidePass:
         textures["rest_points"] = texture_from(strand_rows(points), "RGBA32F")
         guide_strands = self._guides[:, None, None].astype(np.float32)
         textures["guide_strands"] = texture_from(strand_rows(guide_strands), "R32F")
-        riding = np.stack([self._weights.guide, self._weights.weight], axis=1)
+        points = strand_rows(_padded(self._guide_grid))
+        textures["guide_points"] = texture_from(points, "RGBA32F")
+        weights = self._riders.weights
+        per_meter = self._riders.segments_per_meter[weights.guide]
+        riding = np.stack([weights.guide, weights.weight, per_meter], axis=1)
         textures["guide_weights"] = texture_from(strand_rows(_padded(riding)), "RGBA32F")
-        textures["guide_motions"] = _empty(len(self._guides), self._cv_count)
+        textures["guide_turns"] = _empty(*self._guide_grid.shape[:2])
+        at_rest = np.zeros((*self._guide_grid.shape[:2], 4))
+        at_rest[:, :-1, 3] = 1.0
+        textures["rest_turns"] = texture_from(strand_rows(at_rest), "RGBA32F")
         self.points.texture = _empty(count, self._cv_count)
         if self._holds is not None:
             holds = strand_rows(self._holds.texels)
@@ -201,26 +222,27 @@ class RidePass:
         shader.bind(
             textures={
                 "guides_now": guides_now,
-                **_named(textures, "guide_strands", "root_motions", "rest_points"),
+                **_named(textures, "guide_strands", "root_motions", "guide_points"),
             },
-            images=_named(textures, "guide_motions"),
+            images=_named(textures, "guide_turns"),
             integers={
-                "cv_count": self._cv_count,
+                "segment_count": self._segment_count,
                 "guide_count": count,
                 "mover_count": self._mover_count,
             },
         )
-        _dispatch(shader, self._cv_count, count)
+        _dispatch(shader, count, 1)
 
-    def _run_ride(self) -> None:
+    def _run_ride(self, turns: str) -> None:
         textures, count = self._textures, self._strands.strand_count
         shader = program(RIDE_RECIPE)
-        taken = "root_motions", "guide_weights", "rest_points", "guide_motions"
+        taken = "root_motions", "guide_weights", "rest_points"
         shader.bind(
-            textures=_named(textures, *taken),
+            textures=_named(textures, *taken) | {"guide_turns": textures[turns]},
             images={"cv_points": self.points.texture},
             integers={
                 "cv_count": self._cv_count,
+                "segment_count": self._segment_count,
                 "strand_count": count,
                 "mover_count": self._mover_count,
             },

@@ -19,7 +19,7 @@ from ..cards.bake import SAMPLES, SPARSE_RANGE, SPARSE_STEPS
 from ..dynamics.constraints import CONTACT_WEIGHT, HELD, PINNED
 from ..dynamics.contacts import REACH, SKIN
 from ..dynamics.wind import MODES
-from ..refine import detail
+from ..refine import detail, ride
 from ..refine.settings import DetailSettings
 from ..shading.card_look import DARKEST, MEAN_FACING
 from ..shading.card_texture import LEVELS, SLACK
@@ -89,6 +89,8 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "contact_weight": repr(float(CONTACT_WEIGHT)),
         "held_weight": repr(float(HELD)),
         "skin_of_reach": repr(SKIN / REACH),
+        "shortest_segment": repr(ride.SHORTEST),
+        "reversed_turn": repr(ride.REVERSED),
         "wind_modes": str(MODES),
         "moment_texels": str(MOMENT_TEXELS),
         "collider_texels": str(COLLIDER_TEXELS),

@@ -50,7 +50,7 @@ def motion() -> GuideMotion:
     scalp = grown.strands.take(np.flatnonzero(grown.strands.group == 0))
     rig = pipeline.prepare(scalp, grown.head, GuideSettings(guide_count=60), place="x")
     poses = shaken_poses(rig, FRAMES, RATE)
-    carried = [pipeline.carried(rig, pose, rig.guides) for pose in poses]
+    carried = [pipeline.carried_guides(rig, pose) for pose in poses]
     along = np.linspace(0.0, 1.0, carried[0].shape[1])[:, None] ** 2
 
     def moment(frame: int) -> tuple[Pose, np.ndarray]:

@@ -43,8 +43,7 @@ class BakedRig:
         """Whether a frame is of this rig: as many guides, and as many vertices of the head."""
         head = None if self.rig.head is None else self.rig.head.positions.shape
         found = frame["head"].shape if "head" in frame else None
-        guides = (len(self.rig.guides), *self.rig.strands.grid.shape[1:])
-        return found == head and frame["guides"].shape == guides
+        return found == head and frame["guides"].shape == self.rig.guide_grid.shape
 
     def strands(self, frame: Arrays) -> Floats:
         """All strands in a frame, (strand_count, cv_count, 3) float32 world [m]."""
@@ -67,6 +66,7 @@ def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
         "radius": strands.radius,
         "group": strands.group,
         "guides": rig.guides,
+        "guide_grid": rig.guide_grid,
         "weight_guide": rig.weights.guide,
         "weight": rig.weights.weight,
         "hair_rest": rests.hair,
@@ -134,6 +134,7 @@ def _rig_of(arrays: Arrays) -> BakedRig:
         strands,
         head,
         arrays["guides"],
+        arrays["guide_grid"],
         weights,
         frames,
         notes,

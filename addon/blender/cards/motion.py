@@ -81,7 +81,7 @@ def moved_cards(
         name: tuple(np.empty((len(mesh.positions), count, 3), np.float32) for mesh in levels)
         for name in names
     }
-    roots = rig.strands.grid[rig.guides, 0].astype(np.float64)
+    roots = rig.guide_grid[:, 0].astype(np.float64)
     carrier: Floats = np.tile(np.eye(4), (count, 1, 1))
     turn: Floats = np.eye(3)[None]
     for number, frame in enumerate(motion.frames):
@@ -96,7 +96,7 @@ def moved_cards(
                 offset = back[:3, 3] if name == "positions" else 0.0
                 arrays[name][level][:, number] = (getattr(mesh, name) - offset) @ back[:3, :3]
         yield (number + 1) / count
-    grid = rig.strands.grid[rig.guides]
+    grid = rig.guide_grid
     length = np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1).mean()
     tracks = CardTracks(
         tuple(levels),

@@ -35,7 +35,7 @@ class ComputeSolver:
         self._is_resting = motion is None
         self._is_drawn = False
         self._dynamics: DynamicsPass | None = None
-        self._ride = RidePass(rig.strands, rig.head, rig.guides, rig.weights)
+        self._ride = RidePass(rig.strands, rig.head, rig.guides, rig.guide_grid, rig.weights)
 
     @property
     def pose(self) -> Pose:

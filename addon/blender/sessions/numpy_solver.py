@@ -75,7 +75,7 @@ class NumpySolver:
 
 def checked_guides(rig: Rig, guides: Floats) -> Floats:
     """Baked guides as float32, if they belong to this rig."""
-    wanted = len(rig.guides), rig.strands.grid.shape[1], 3
+    wanted = rig.guide_grid.shape
     if guides.shape != wanted:
         raise HairloomError(
             f"it holds guides of shape {guides.shape}, this groom has {wanted}",

@@ -402,6 +402,4 @@ def _build_in_thread(
 
 def _same_guides(one: Rig, other: Rig) -> bool:
     """Whether what moves the guides of one moves those of the other."""
-    return one.head is other.head and np.array_equal(
-        one.strands.grid[one.guides], other.strands.grid[other.guides]
-    )
+    return one.head is other.head and np.array_equal(one.guide_grid, other.guide_grid)

@@ -210,7 +210,7 @@ def test_cards_of_a_rig_ride_as_its_strands_do() -> None:
     mesh = result_of(steps).finest
     binding = card_flow.bound_cards(rig, mesh)
     pose = Pose(None, np.eye(4))
-    guides = pipeline.carried(rig, pose, rig.guides)
+    guides = pipeline.carried_guides(rig, pose)
     far = rig.strands.group[rig.guides] == 7
     guides[far, :, 1] += np.linspace(0.0, 0.05, guides.shape[1], dtype=np.float32)
     moved = card_flow.cards_at(rig, binding, pose, guides)

@@ -1,0 +1,43 @@
+// Rotations of guides as quaternions, xyz and w last.
+//
+// Twin of least_turn and turn_change in addon/refine/ride.py. Holds no resources.
+
+// What a quaternion of any length adds to a vector by turning it.
+vec3 turn_change(vec4 turn, vec3 vector)
+{
+  vec3 across = cross(turn.xyz, vector);
+  return (turn.w * across + cross(turn.xyz, across)) * (2.0 / dot(turn, turn));
+}
+
+// The quaternion that turns by `right` first, then by `left`.
+vec4 turn_product(vec4 left, vec4 right)
+{
+  return vec4(left.w * right.xyz + right.w * left.xyz + cross(left.xyz, right.xyz),
+              left.w * right.w - dot(left.xyz, right.xyz));
+}
+
+// A vector of length 1, or 0 where it has no length.
+vec3 direction_of(vec3 edge)
+{
+  float size = length(edge);
+  return size < {{shortest_segment}} ? vec3(0.0) : edge / size;
+}
+
+// The least rotation from one unit vector to another; none where either has no length. By their
+// difference, so that there is exactly no rotation where there is none.
+vec4 least_turn(vec3 one, vec3 other)
+{
+  if (one == vec3(0.0) || other == vec3(0.0)) {
+    return vec4(0.0, 0.0, 0.0, 1.0);
+  }
+  vec3 change = other - one;
+  vec4 turn = vec4(cross(one, change), 2.0 - 0.5 * dot(change, change));
+  if (turn.w < {{reversed_turn}}) {
+    vec3 size = abs(one);
+    vec3 axis = size.x <= size.y && size.x <= size.z ? vec3(1.0, 0.0, 0.0) :
+                size.y <= size.z                     ? vec3(0.0, 1.0, 0.0) :
+                                                       vec3(0.0, 0.0, 1.0);
+    turn = vec4(cross(one, axis), 0.0);
+  }
+  return turn / sqrt(dot(turn, turn));
+}
