@@ -1,6 +1,6 @@
 // Rotations of guides as quaternions, xyz and w last.
 //
-// Twin of least_turn and turn_change in addon/refine/ride.py. Holds no resources.
+// Twin of minimal_rotation and turn_change in addon/refine/ride.py. Holds no resources.
 
 // What a quaternion of any length adds to a vector by turning it.
 vec3 turn_change(vec4 turn, vec3 vector)
@@ -25,7 +25,7 @@ vec3 direction_of(vec3 edge)
 
 // The least rotation from one unit vector to another; none where either has no length. By their
 // difference, so that there is exactly no rotation where there is none.
-vec4 least_turn(vec3 one, vec3 other)
+vec4 minimal_rotation(vec3 one, vec3 other)
 {
   if (one == vec3(0.0) || other == vec3(0.0)) {
     return vec4(0.0, 0.0, 0.0, 1.0);

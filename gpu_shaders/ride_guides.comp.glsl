@@ -27,7 +27,7 @@ void main()
     vec3 is_next = texelFetch(guides_now, texel, 0).xyz;
     vec3 before = direction_of(was_next - was);
     vec3 here = before + turn_change(turn, before);
-    turn = turn_product(least_turn(here, direction_of(is_next - is)), turn);
+    turn = turn_product(minimal_rotation(here, direction_of(is_next - is)), turn);
     imageStore(guide_turns, strand_texel(guide, segment, segment_count + 1), turn);
     was = was_next;
     is = is_next;

@@ -117,19 +117,19 @@ def guide_turns(rest: Floats, now: Floats) -> Floats:
     Args:
         rest, now: (guide_count, cv_count, 3) [m].
     """
-    was, way = _directions(rest), _directions(now)
-    turns = np.empty((4, *was.shape[1:]), np.float32)
-    turn = np.zeros((4, was.shape[2]), np.float32)
+    before, after = _directions(rest), _directions(now)
+    turns = np.empty((4, *before.shape[1:]), np.float32)
+    turn = np.zeros((4, before.shape[2]), np.float32)
     turn[3] = 1.0
-    for segment in range(was.shape[1]):
+    for segment in range(before.shape[1]):
         # further: from where the turns before have brought this segment to where it is
-        here = was[:, segment] + turn_change(turn, was[:, segment])
-        turn = _product(least_turn(here, way[:, segment]), turn)
+        here = before[:, segment] + turn_change(turn, before[:, segment])
+        turn = _product(minimal_rotation(here, after[:, segment]), turn)
         turns[:, segment] = turn
     return turns
 
 
-def least_turn(one: Floats, other: Floats) -> Floats:
+def minimal_rotation(one: Floats, other: Floats) -> Floats:
     """The quaternions (4, n) of the least rotations from unit vectors to others, (3, n) each; the
     identity where either has no length.
     """
