@@ -280,7 +280,7 @@ def test_points_that_the_gpu_moves_get_new_detail(frame: Any) -> None:
         group=np.zeros(200, np.int32),
     )
     no_guide = GuideWeights(np.zeros((200, 3), np.int32), np.zeros((200, 3), np.float32))
-    ride = RidePass(strands, None, np.zeros(1, np.int32), no_guide)
+    ride = RidePass(strands, None, np.zeros(1, np.int32), strands.grid[:1], no_guide)
     snapshot = snapshot_of(frame, grid, BARE, device_points=ride.points)
     passes, counts = (frame.MeshPass(), frame.StrandPass()), []
     for distance in (3.0, 0.0, 0.0, 3.0):

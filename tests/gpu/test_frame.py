@@ -235,7 +235,7 @@ def test_points_on_the_gpu_look_like_uploaded_ones(frame: Any) -> None:
         group=np.zeros(count, np.int32),
     )
     no_guide = GuideWeights(np.zeros((count, 3), np.int32), np.zeros((count, 3), np.float32))
-    ride = RidePass(strands, None, np.zeros(1, np.int32), no_guide)
+    ride = RidePass(strands, None, np.zeros(1, np.int32), strands.grid[:1], no_guide)
     turn = np.eye(4)
     turn[:3, :3] = [[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]
     camera = frame.frame_camera(
