@@ -168,20 +168,30 @@ def prepare(
         )
     bound = strands if head is None else bind_roots(strands, head, place=place).strands
     uniform = resample(bound, settings.cv_count)
-    holds = find_holds(uniform, holders)
+    reach = settings.tip_distance * _hair_length(uniform) if holders else 0.0
+    holds = find_holds(uniform, holders, reach)
     kind = None if holds is None else holds.kinds(uniform.strand_count)
     guides = choose_guides(uniform, settings, kind)
     weights = _weights(uniform, uniform.take(guides), kind, None if kind is None else kind[guides])
     grid = uniform.grid[guides]
-    rig = Rig(uniform, head, guides, grid, weights, _frames(uniform, head), holds=holds)
+    rig = Rig(uniform, head, guides, grid, weights, _frames(uniform, head))
     if children is not None and children.method == "auto":
-        rig = _automatic(rig, children, density, widths, place, holders)
+        rig = _automatic(rig, children, density, widths, place)
     else:
         if children is not None and children.method != "none":
-            rig = _with_children(rig, children, density, place, holders)
+            rig = _with_children(rig, children, density, place)
         strands, found = with_widths(rig.strands, widths)
         rig = replace(rig, strands=strands, widths=found)
-    return rig if rig.holds is None else replace(rig, notes=(*rig.notes, *idle(rig.holds, holders)))
+    if holds is None:
+        return rig
+    if rig.child_count:
+        holds = find_holds(rig.strands, holders, reach)
+    assert holds is not None
+    return replace(rig, holds=holds, notes=(*rig.notes, *idle(holds, holders)))
+
+
+def _hair_length(strands: StrandSet) -> float:
+    return float(np.median(strands.lengths()))
 
 
 def _automatic(
@@ -190,7 +200,6 @@ def _automatic(
     density: Floats | None,
     widths: str,
     place: str,
-    holders: Holders,
 ) -> Rig:
     """With as many children as cover the body, each as wide as the strands around it: those stand
     for so much less.
@@ -208,7 +217,7 @@ def _automatic(
     own, found = with_widths(rig.strands, widths, parts)
     rig = replace(rig, strands=own, widths=found)
     if parts > 1.0:
-        rig = replace(_with_children(rig, settings, density, place, holders), widths=found)
+        rig = replace(_with_children(rig, settings, density, place), widths=found)
         line = (
             f"Children: {rig.child_count:,} added, since {count:,} curves are too few for a body of"
             " hair. Set Method to None to see the curves alone"
@@ -237,9 +246,7 @@ def _weights(
     )
 
 
-def _with_children(
-    rig: Rig, settings: ChildrenSettings, density: Floats | None, place: str, holders: Holders
-) -> Rig:
+def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None, place: str) -> Rig:
     """The artist's own strands, and children grown between them."""
     own, head = rig.strands, rig.head
     if head is None:
@@ -268,7 +275,6 @@ def _with_children(
         _frames(strands, head),
         (*rig.notes, *made.notes),
         own_count=own.strand_count,
-        holds=find_holds(strands, holders),
     )
 
 

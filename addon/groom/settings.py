@@ -212,6 +212,7 @@ class GuideSettings(Settings):
     title = "Guides"
     owner = "groom"
     panel_after = "strands"
+    panels = ("Ties",)
 
     guide_count: int = integer(
         762,
@@ -236,4 +237,14 @@ class GuideSettings(Settings):
         description="Random seed for choosing the guides",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
+    )
+    tip_distance: float = number(
+        0.02,
+        label="Tip Distance",
+        description="Tips nearer than this to the object that holds tips are held by it, as a "
+        "fraction of the hair's length",
+        soft=(0.0, 0.1),
+        hard=(0.0, 1.0),
+        source="Hairloom",
+        panel="Ties",
     )

@@ -30,14 +30,13 @@ class Tie:
 
 @dataclass(frozen=True, eq=False)
 class TipSurface:
-    """A surface that holds the tips nearer to it than `distance` [m]; world space at rest."""
+    """A surface that holds the tips near to it; world space at rest."""
 
     name: str
     surface: Surface
-    distance: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Holders:
     """All that may hold a groom's hair."""
 
@@ -51,13 +50,16 @@ class Holders:
 NO_HOLDERS = Holders()
 
 
-def find_holds(strands: StrandSet, holders: Holders) -> Holds | None:
+def find_holds(strands: StrandSet, holders: Holders, tip_distance: float = 0.0) -> Holds | None:
     """Where strands of any point counts are held; None where nothing may hold them.
 
     A tie holds a strand at one place: a ring where the strand first passes through it, a ball where
     the strand is nearest to its middle. As the root decides about the first two points, no place is
     before the third; strands of two points are never held. Of two places that share a point the one
     nearer to the root counts.
+
+    Args:
+        tip_distance: tips nearer to their surface than this are held [m].
     """
     if not holders:
         return None
@@ -67,7 +69,7 @@ def find_holds(strands: StrandSet, holders: Holders) -> Holds | None:
         passing, places = _passing(strands, tie)
         found.append((passing, places, np.full(len(passing), number)))
     if holders.tip_surface is not None:
-        tips, triangle, barycentric = _tips_near(strands, holders.tip_surface)
+        tips, triangle, barycentric = _tips_near(strands, holders.tip_surface, tip_distance)
         found.append((tips, strands.point_counts[tips] - 1.0, tie_count + np.arange(len(tips))))
     strand = np.concatenate([one[0] for one in found])
     place = np.concatenate([one[1] for one in found]).astype(np.float32)
@@ -98,8 +100,8 @@ def idle(holds: Holds, holders: Holders) -> tuple[str, ...]:
     surface = holders.tip_surface
     if surface is not None and holds.tie_count not in busy:
         notes.append(
-            f"No tip is within {surface.distance:.3g} m of {surface.name}, so it holds none. Move "
-            "it, or raise Tip Distance."
+            f"No tip is near {surface.name}, so it holds none. Raise Tip Distance, or move it and "
+            "press Preview again."
         )
     return tuple(notes)
 
@@ -139,15 +141,15 @@ def _are_segments(strands: StrandSet) -> Bools:
     return are_segments
 
 
-def _tips_near(strands: StrandSet, tips: TipSurface) -> tuple[Ints, Ints, Floats]:
+def _tips_near(strands: StrandSet, tips: TipSurface, distance: float) -> tuple[Ints, Ints, Floats]:
     """The strands whose tips are held, and the triangles and barycentric coordinates of these."""
     points = strands.points[strands.offsets[1:] - 1]
     low, high = tips.surface.bounds()
-    is_near = ((points >= low - tips.distance) & (points <= high + tips.distance)).all(axis=1)
+    is_near = ((points >= low - distance) & (points <= high + distance)).all(axis=1)
     is_near &= strands.point_counts > ROOT_POINTS
     near = np.flatnonzero(is_near)
-    closest = ClosestPointSearch(tips.surface).closest(points[near], tips.distance)
-    kept = closest.distance <= tips.distance
+    closest = ClosestPointSearch(tips.surface).closest(points[near], distance)
+    kept = closest.distance <= distance
     barycentric: Floats = closest.barycentric[kept].astype(np.float32)
     return near[kept], closest.triangle[kept], barycentric
 

@@ -53,7 +53,7 @@ def hold(strands: Floats, rest: Floats, holds: Holds, anchors: Floats) -> None:
         one = np.flatnonzero(order == number)
         strand, place = holds.strand[one], holds.place[one]
         some, some_rest = strands[strand].astype(np.float64), rest[strand].astype(np.float64)
-        target = _moved(anchors[holds.anchor[one]], _at(some_rest, place))
+        target = _moved(anchors[holds.anchor[one]], places_at(some_rest, place))
         strands[strand] = _held(some, some_rest, before[strand], place, target)
         before[strand] = np.minimum(place.astype(np.int64) + 1, strands.shape[1] - 1)
 
@@ -61,7 +61,7 @@ def hold(strands: Floats, rest: Floats, holds: Holds, anchors: Floats) -> None:
 def _held(some: Floats, rest: Floats, before: Ints, place: Floats, target: Floats) -> Floats:
     cv, first = np.arange(some.shape[1]), place.astype(np.int64)
     length = np.linalg.norm(np.diff(rest, axis=1), axis=2)
-    error = target - _at(some, place)
+    error = target - places_at(some, place)
     is_off = np.linalg.norm(error, axis=1) > NEAR * length.sum(axis=1)
     error = np.where(is_off[:, None], error, 0.0)
     is_between = (cv[:-1] >= before[:, None]) & (cv[:-1] < first[:, None])
@@ -96,8 +96,8 @@ def _point(grid: Floats, cv: Ints) -> Floats:
     return grid[np.arange(len(grid)), cv]
 
 
-def _at(grid: Floats, place: Floats) -> Floats:
-    """Points at places along strands, (n, 3)."""
+def places_at(grid: Floats, place: Floats) -> Floats:
+    """Points of strands (n, cv_count, 3), each at one place in CVs, (n, 3)."""
     first = place.astype(np.int64)
     part = (place - first)[:, None]
     after = np.minimum(first + 1, grid.shape[1] - 1)

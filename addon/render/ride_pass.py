@@ -31,8 +31,10 @@ import gpu
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..groom.holds import Holds
 from ..refine.ride import Riders, Weights
 from ..strands import StrandSet, Surface
+from .hold_pass import HoldPass
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .snapshot import DevicePoints
 from .strand_layout import from_strand_rows, strand_rows, strand_rows_size
@@ -83,6 +85,7 @@ class RidePass:
         guides: (guide_count,) indices of the strands that are simulated.
         guide_grid: (guide_count, cv_count, 3) [m], the lines that are simulated, at rest.
         weights: of all strands.
+        holds: where strands are held by ties or by a surface; None: nowhere.
     """
 
     def __init__(
@@ -92,10 +95,12 @@ class RidePass:
         guides: Ints,
         guide_grid: Floats,
         weights: Weights,
+        holds: Holds | None = None,
     ) -> None:
         self._strands = strands
         self._guides, self._guide_grid = guides, guide_grid
         self._riders = Riders.of(strands.points, strands.offsets, guide_grid, weights)
+        self._held = None if holds is None else HoldPass(holds, strands.grid)
         self._holds = None if head is None else RootHolds(strands, head)
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
         self.points = DevicePoints((strands.strand_count, self._cv_count))
@@ -103,24 +108,34 @@ class RidePass:
         released_with_shaders(self)
         released_with_shaders(self.points)  # a snapshot may outlive this pass
 
-    def carry(self, head_positions: Floats | None, matrix: Floats) -> None:
-        """Show every strand in its rest shape, carried rigidly by its own root.
+    def carry(
+        self, head_positions: Floats | None, matrix: Floats, anchors: Floats | None = None
+    ) -> None:
+        """Show every strand in its rest shape, carried rigidly by its own root, and where it is
+        held.
 
         Args:
             head_positions: (vertex_count, 3) [m], world space; None for hair without a head.
             matrix: (4, 4), moves rest world space to now; carries hair without a head.
+            anchors: what holds strands, see `groom.holds.anchors_of`; None: nothing does.
 
         Raises:
             ShaderError: a shader does not compile here.
         """
         self._take_pose(head_positions, matrix)
-        self._run_ride("rest_turns")
+        self._run_ride("rest_turns", anchors)
 
-    def ride(self, head_positions: Floats | None, matrix: Floats, guides_now: Any) -> None:
+    def ride(
+        self,
+        head_positions: Floats | None,
+        matrix: Floats,
+        guides_now: Any,
+        anchors: Floats | None = None,
+    ) -> None:
         """Show every strand carried by its root and moved with its guides.
 
         Args:
-            head_positions, matrix: as in `carry`.
+            head_positions, matrix, anchors: as in `carry`.
             guides_now: (guide_count, cv_count, 3) [m], world space, or a texture RGBA32F that
                 holds them in the layout of strand_layout.strand_rows.
 
@@ -135,7 +150,7 @@ class RidePass:
                 raise ValueError(f"guides have shape {guides_now.shape}, not {wanted}")
             guides_now = texture_from(strand_rows(_padded(guides_now)), "RGBA32F")
         self._run_guides(guides_now)
-        self._run_ride("guide_turns")
+        self._run_ride("guide_turns", anchors)
 
     def read(self) -> Floats:
         """The strands as they are shown, (strand_count, cv_count, 3) float32 [m], world space."""
@@ -147,6 +162,8 @@ class RidePass:
         """Let go of all that lies on the GPU; the next frame uploads it again."""
         self._textures: dict[str, Any] = {}
         self.points.release()
+        if self._held is not None:
+            self._held.release()
 
     @property
     def _cv_count(self) -> int:
@@ -233,7 +250,7 @@ class RidePass:
         )
         _dispatch(shader, count, 1)
 
-    def _run_ride(self, turns: str) -> None:
+    def _run_ride(self, turns: str, anchors: Floats | None) -> None:
         textures, count = self._textures, self._strands.strand_count
         shader = program(RIDE_RECIPE)
         taken = "root_motions", "guide_weights", "rest_points"
@@ -248,6 +265,8 @@ class RidePass:
             },
         )
         _dispatch(shader, count, 1)
+        if self._held is not None:
+            self._held.hold(self.points.texture, textures["rest_points"], anchors)
         self.points.serial += 1
 
 

@@ -20,6 +20,7 @@ from ..dynamics.constraints import CONTACT_WEIGHT, HELD, PINNED
 from ..dynamics.contacts import REACH, SKIN
 from ..dynamics.wind import MODES
 from ..refine import detail, ride
+from ..refine.hold import NEAR, SWEEPS
 from ..refine.settings import DetailSettings
 from ..shading.card_look import DARKEST, MEAN_FACING
 from ..shading.card_texture import LEVELS, SLACK
@@ -88,6 +89,8 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "pinned": str(PINNED),
         "contact_weight": repr(float(CONTACT_WEIGHT)),
         "held_weight": repr(float(HELD)),
+        "hold_sweeps": str(SWEEPS),
+        "hold_near": repr(NEAR),
         "skin_of_reach": repr(SKIN / REACH),
         "shortest_segment": repr(ride.SHORTEST),
         "reversed_turn": repr(ride.REVERSED),

@@ -16,6 +16,7 @@ from .messages import draw_lines
 from .operators_bake import draw_bake
 from .operators_colliders import draw_colliders
 from .operators_show import draw_show
+from .operators_ties import draw_ties
 from .preset_chooser import draw_preset_row
 
 #: name, label, what draws it
@@ -139,7 +140,7 @@ SECTIONS = _with_declared(
     )
 )
 #: those that the sidebar has too: what is done to the hair, not what it is
-SESSION_SECTIONS = frozenset({"look", "dynamics", "bake", "show", "cards", "export"})
+SESSION_SECTIONS = frozenset({"look", "dynamics", "ties", "bake", "show", "cards", "export"})
 
 
 def _switch(section: str) -> tuple[Callable[[bpy.types.Object], Any], str]:
@@ -167,6 +168,7 @@ SUB_SECTIONS: dict[str, tuple[Section, ...]] = {
         ("medium", "Medium & Wind", _panel("dynamics", "Medium & Wind")),
         ("lengths", "Lengths", _panel("dynamics", "Lengths")),
         ("collisions", "Collisions", draw_collisions),
+        ("ties", "Ties", draw_ties),
         ("bake", "Bake", draw_bake),
     ),
     "cards": CARD_SECTIONS,

@@ -5,13 +5,14 @@ A frame keeps all vertices of the head, so that it is drawn whole wherever it be
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ... import pipeline
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
+from ...groom.holds import Holds
 from ...groom.roots import root_frames
 from ...groom.weights import GuideWeights
 from ...groom.widths import Widths
@@ -22,10 +23,14 @@ from .simulated import Arrays
 
 @dataclass(frozen=True)
 class RestMatrices:
-    """(4, 4) each, matrix_world of hair and head where the rig was made; head None without one."""
+    """(4, 4) each, matrix_world of hair and head where the rig was made; head None without one.
+
+    ties: (tie_count, 4, 4), the same of its ties.
+    """
 
     hair: Floats
     head: Floats | None
+    ties: Floats = field(default_factory=lambda: np.zeros((0, 4, 4)))
 
 
 @dataclass(frozen=True)
@@ -37,13 +42,16 @@ class BakedRig:
 
     def pose(self, frame: Arrays) -> Pose:
         """Where the body was in a frame."""
-        return Pose(frame.get("head"), frame["matrix"])
+        return Pose(frame.get("head"), frame["matrix"], frame.get("anchors"))
 
     def fits(self, frame: Arrays) -> bool:
-        """Whether a frame is of this rig: as many guides, and as many vertices of the head."""
+        """Whether a frame is of this rig: as many guides, vertices of the head, and anchors."""
         head = None if self.rig.head is None else self.rig.head.positions.shape
         found = frame["head"].shape if "head" in frame else None
-        return found == head and frame["guides"].shape == self.rig.guide_grid.shape
+        anchors = None if self.rig.holds is None else (self.rig.holds.anchor_count, 4, 4)
+        held = frame["anchors"].shape if "anchors" in frame else None
+        guides = self.rig.guide_grid.shape
+        return (found, held) == (head, anchors) and frame["guides"].shape == guides
 
     def strands(self, frame: Arrays) -> Floats:
         """All strands in a frame, (strand_count, cv_count, 3) float32 world [m]."""
@@ -55,6 +63,8 @@ def frame_arrays(pose: Pose, guides: Floats) -> Arrays:
     arrays: Arrays = {"guides": guides, "matrix": np.asarray(pose.matrix, np.float64)}
     if pose.head_positions is not None:
         arrays["head"] = pose.head_positions
+    if pose.anchors is not None:
+        arrays["anchors"] = pose.anchors
     return arrays
 
 
@@ -76,6 +86,8 @@ def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
         "widths_reason": np.array(rig.widths.reason, np.str_),
         "children_line": np.array(rig.children_line, np.str_),
     }
+    if rig.holds is not None:
+        arrays |= _hold_arrays(rig.holds) | {"tie_rests": rests.ties}
     if strands.root_uv is not None:
         arrays["root_uv"] = strands.root_uv
     if strands.color is not None:
@@ -90,6 +102,48 @@ def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
             "head_rest": rests.head,
         }
     return arrays
+
+
+def _hold_arrays(holds: Holds) -> Arrays:
+    arrays: Arrays = {
+        "hold_strand": holds.strand,
+        "hold_place": holds.place,
+        "hold_anchor": holds.anchor,
+        "tie_count": np.array(holds.tie_count),
+    }
+    if holds.surface is not None and holds.tip_triangle is not None:
+        assert holds.tip_barycentric is not None
+        arrays |= {
+            "tip_positions": holds.surface.positions,
+            "tip_triangles": holds.surface.triangles,
+            "tip_triangle": holds.tip_triangle,
+            "tip_barycentric": holds.tip_barycentric,
+        }
+    return arrays
+
+
+def _holds_of(arrays: Arrays, strand_count: int, cv_count: int) -> Holds | None:
+    if "hold_strand" not in arrays:
+        return None
+    surface = None
+    if "tip_positions" in arrays:
+        surface = Surface(arrays["tip_positions"], arrays["tip_triangles"])
+        _check_indices(arrays["tip_triangle"], len(surface.triangles))
+    holds = Holds(
+        arrays["hold_strand"],
+        arrays["hold_place"],
+        arrays["hold_anchor"],
+        int(arrays["tie_count"]),
+        surface,
+        arrays.get("tip_triangle"),
+        arrays.get("tip_barycentric"),
+    )
+    _check_indices(holds.strand, strand_count)
+    _check_indices(holds.place.astype(np.int64), cv_count)
+    _check_indices(holds.anchor, holds.anchor_count)
+    if not len(holds.strand) == len(holds.place) == len(holds.anchor):
+        raise ValueError("holds do not fit together")
+    return holds
 
 
 def rig_of(arrays: Arrays, place: str) -> BakedRig:
@@ -141,8 +195,10 @@ def _rig_of(arrays: Arrays) -> BakedRig:
         int(arrays["own_count"]),
         Widths.of(arrays["widths"], str(arrays["widths_reason"])),
         str(arrays["children_line"]),
+        _holds_of(arrays, count, cv_count),
     )
-    rests = RestMatrices(arrays["hair_rest"], arrays.get("head_rest"))
+    ties = arrays.get("tie_rests", np.zeros((0, 4, 4)))
+    rests = RestMatrices(arrays["hair_rest"], arrays.get("head_rest"), ties)
     return BakedRig(rig, rests)
 
 

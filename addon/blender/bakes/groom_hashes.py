@@ -20,8 +20,9 @@ from ...pipeline import Pose
 from ..base.attributes import read_attribute
 from ..base.objects import matrix_of
 from ..base.vertex_weights import weight_names, weights_on
-from ..colliders.carriers import is_deforming
+from ..colliders.carriers import is_deforming, is_left_out
 from ..colliders.obstacles import shape_of, sources_of
+from ..colliders.ties import holders_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import COLOR_ATTRIBUTE, GROUP_ATTRIBUTES
 from ..scene.surfaces import read_positions
@@ -29,7 +30,7 @@ from ..scene.wind import gravity_of, scene_wind
 from .simulated import SOLVER_VERSION, Hashed, hashes
 
 #: The parts of a rig hash that determine the rig; the others only matter to a bake.
-RIG_PARTS = ("hair", "head", "guides", "widths", "children")
+RIG_PARTS = ("hair", "head", "guides", "widths", "children", "ties")
 
 
 def groom_rig_hash(
@@ -45,6 +46,9 @@ def groom_rig_hash(
             settings[ChildrenSettings],
             _density_before_modifiers(head, settings),
         )
+    held = _tie_shapes(hair)
+    if held:
+        grown["ties"] = held
     return hashes(
         hair=_curves_parts(hair),
         head=() if head is None else mesh_parts(head),
@@ -68,10 +72,12 @@ def groom_frame_hash(
     Args:
         head: that carries it. pose: where it is, see `poses.read_pose`.
     """
+    ties = _tie_places(hair, depsgraph)
     return hashes(
         pose=pose.matrix if pose.head_positions is None else pose.head_positions,
         settings=_dynamics(hair),
         colliders=collider_places(hair, head, depsgraph),
+        **({"ties": ties} if ties else {}),
         forces=(gravity_of(depsgraph.scene), scene_wind(depsgraph)),
     )
 
@@ -109,6 +115,31 @@ def collider_shapes(
         parts.append(f"{shape} {obj.empty_display_size if obj.type == 'EMPTY' else ''}")
         if obj.type == "MESH" and shape != "none":
             parts += mesh_parts(obj)
+    return tuple(parts)
+
+
+def _tie_places(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats | str, ...]:
+    """Where all that holds hair beside its roots is now."""
+    places: list[Floats | str] = []
+    for obj in holders_of(hair):
+        places.append(f"{obj.name} {is_left_out(obj, depsgraph)}")
+        places.append(matrix_of(obj, depsgraph))
+        if obj.type == "MESH" and is_deforming(obj):
+            places.append(read_positions(obj, depsgraph, place=obj.name))
+    return tuple(places)
+
+
+def _tie_shapes(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
+    """What holds hair beside its roots, and where the artist has put it."""
+    parts: list[Floats | Ints | str] = []
+    for obj in holders_of(hair):
+        parts.append(f"{obj.name} {obj.type} {obj == hair.hairloom.tip_surface}")
+        if obj.type == "EMPTY":
+            parts.append(f"{obj.empty_display_type} {obj.empty_display_size}")
+        elif obj.type == "MESH":
+            parts += mesh_parts(obj)
+        if obj.animation_data is None and not len(obj.constraints):
+            parts += [np.array(obj.matrix_parent_inverse), np.array(obj.matrix_basis)]
     return tuple(parts)
 
 

@@ -114,10 +114,13 @@ def pose_in(cache: Cache, frame: int, subframe: float = 0.0) -> Pose:
         return here
     there = rig.pose(cache.frame(frame + 1))
     matrix = here.matrix + (there.matrix - here.matrix) * subframe
+    anchors = here.anchors
+    if anchors is not None and there.anchors is not None:
+        anchors = anchors + (there.anchors - anchors) * np.float32(subframe)
     if here.head_positions is None or there.head_positions is None:
-        return Pose(None, matrix)
+        return Pose(None, matrix, anchors)
     displacement = there.head_positions - here.head_positions
-    return Pose(here.head_positions + displacement * np.float32(subframe), matrix)
+    return Pose(here.head_positions + displacement * np.float32(subframe), matrix, anchors)
 
 
 def show_fins(scene: bpy.types.Scene) -> None:

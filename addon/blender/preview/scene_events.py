@@ -42,6 +42,7 @@ def settings_changed(owner: bpy.types.ID) -> None:
         hair = session.hair.handle.find()
         if hair is not None and owner in (hair, hair.data):
             attempt(preview, depsgraph, partial(_take_settings, preview, session, depsgraph))
+            session.is_stale |= session.has_other_holders(set())
             if session.is_stale:
                 _read_again_soon()
         elif occluders_changed(session, {owner.session_uid}, depsgraph.view_layer):
@@ -74,7 +75,11 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
     """Blender has evaluated the scene: follow what moved, read again what was edited."""
     moved, edited, light_changed = changes(depsgraph)
     for preview, session in _grooms():
-        if is_edited(session, edited) or weights_changed(session, edited):
+        if (
+            is_edited(session, edited)
+            or weights_changed(session, edited)
+            or session.has_other_holders(edited)
+        ):
             session.is_stale = True
             _read_again_soon()
         elif session.is_stale and not bpy.app.timers.is_registered(_read_again):
@@ -247,6 +252,7 @@ def occluders_changed(session: Session, changed: set[int], layer: bpy.types.View
 
 
 def is_among(session: Session, moved: set[int]) -> bool:
-    """Whether the groom or its head has moved."""
+    """Whether the groom, its head, or what holds its hair has moved."""
     bodies = (session.hair, session.head)
-    return any(body is not None and body.handle.uid in moved for body in bodies)
+    uids = {body.handle.uid for body in bodies if body is not None}
+    return not moved.isdisjoint(uids | session.holder_uids)

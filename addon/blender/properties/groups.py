@@ -230,6 +230,22 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             description="Collection of more objects that hair stays out of; read as Play begins",
             override=OVERRIDABLE,
         ),
+        "tie_collection": PointerProperty(
+            type=bpy.types.Collection,
+            name="Ties",
+            description="Collection of rings that hold the hair passing through them: circle "
+            "Empties, curves or meshes",
+            update=lambda self, _context: changed.settings(self.id_data),
+            override=OVERRIDABLE,
+        ),
+        "tip_surface": PointerProperty(
+            type=bpy.types.Object,
+            name="Held Tips",
+            description="Mesh that holds the tips near it, such as a bun",
+            poll=_is_mesh,
+            update=lambda self, _context: changed.settings(self.id_data),
+            override=OVERRIDABLE,
+        ),
         "collider_shape": EnumProperty(
             items=COLLIDER_SHAPES,
             name="Collides As",

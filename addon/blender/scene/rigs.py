@@ -31,6 +31,7 @@ def rig_from(source: Source, settings: SettingsMap, *, place: str) -> Rig:
         children=settings[ChildrenSettings],
         density=source.density,
         widths=settings[WidthSettings].method,
+        holders=source.holders,
     )
 
 

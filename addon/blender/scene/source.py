@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
+from ...groom.ties import NO_HOLDERS, Holders
 from ...strands import StrandSet, Surface
 from ...strands.clean import Cleaned
 from ...strands.colors import color_notes
@@ -30,6 +31,7 @@ class Source:
     density: (vertex_count,) how densely children grow on the head, or None.
     head_warning, density_warning: a warning with its remedy, or empty.
     color_warnings: about strands without a colour.
+    holders: what holds it beside its roots, at rest.
     """
 
     strands: StrandSet
@@ -40,6 +42,7 @@ class Source:
     head_warning: str = ""
     density_warning: str = ""
     color_warnings: tuple[str, ...] = ()
+    holders: Holders = NO_HOLDERS
 
     @property
     def warnings(self) -> tuple[str, ...]:

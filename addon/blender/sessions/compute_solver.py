@@ -35,7 +35,9 @@ class ComputeSolver:
         self._is_resting = motion is None
         self._is_drawn = False
         self._dynamics: DynamicsPass | None = None
-        self._ride = RidePass(rig.strands, rig.head, rig.guides, rig.guide_grid, rig.weights)
+        self._ride = RidePass(
+            rig.strands, rig.head, rig.guides, rig.guide_grid, rig.weights, rig.holds
+        )
 
     @property
     def pose(self) -> Pose:
@@ -124,10 +126,11 @@ class ComputeSolver:
         """Bring the strands on the GPU to this moment, once."""
         if self._is_drawn and self._ride.points.texture is not None:
             return
-        head, matrix = self.pose.head_positions, self.pose.matrix
-        if self._is_resting:
-            self._ride.carry(head, matrix)
+        pose, texture = self.pose, self._guides_texture
+        head, matrix, anchors = pose.head_positions, pose.matrix, pose.anchors
+        if self._is_resting and pipeline.held_guides(self._rig, pose) is None:
+            self._ride.carry(head, matrix, anchors)
         else:
-            texture = self._guides_texture
-            self._ride.ride(head, matrix, self._motion.guides if texture is None else texture)
+            guides = self._motion.guides if texture is None else texture
+            self._ride.ride(head, matrix, guides, anchors)
         self._is_drawn = True

@@ -18,6 +18,7 @@ from ...strands.colors import color_notes
 from ..bakes.baked_rig import BakedRig, RestMatrices
 from ..bakes.groom_hashes import groom_frame_hash, groom_rig_hash
 from ..base.objects import Body, head_of, matrix_of
+from ..colliders.ties import Holding
 from ..properties.groom_settings import GroomSettings
 from ..scene.poses import check_finite, read_pose
 from ..scene.source import read_density, read_source, usable_curves
@@ -40,12 +41,13 @@ class GroomSource:
     def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         head = head_of(hair)
         self.hair = Body.at_rest(hair, depsgraph)
-        self.source = read_source(hair, depsgraph)
+        self._holding = Holding.of(hair, depsgraph)
+        self.source = replace(read_source(hair, depsgraph), holders=self._holding.holders)
         uses_head = self.source.head is not None and head is not None
         self.head = Body.at_rest(head, depsgraph) if uses_head else None
         self._head_uid = head and head.session_uid
         self.settings = GroomSettings.of(hair, depsgraph)
-        self.request = BuildRequest(self.name, self.source, self.settings)
+        self.request = BuildRequest(self.name, self.source, self.settings, holding=self._holding)
         check_finite(hair.name, self.hair.rest)
 
     @property
@@ -54,7 +56,23 @@ class GroomSource:
 
     @property
     def rests(self) -> RestMatrices:
-        return RestMatrices(self.hair.rest, None if self.head is None else self.head.rest)
+        head = None if self.head is None else self.head.rest
+        return RestMatrices(self.hair.rest, head, self._holding.rests)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the artist should know about what was read, and about what holds the hair now."""
+        return (*self.source.warnings, *self._holding.warnings)
+
+    @property
+    def holder_uids(self) -> frozenset[int]:
+        """Session numbers of what holds the hair beside its roots."""
+        return self._holding.uids
+
+    def has_other_holders(self, edited: set[int]) -> bool:
+        """See `Holding.is_outdated`."""
+        hair = self.hair.handle.find()
+        return hair is not None and self.request.holding.is_outdated(hair, edited)
 
     def rig(self) -> Rig:
         """The groom made ready to move.
@@ -68,7 +86,8 @@ class GroomSource:
         """Request the rig of a bake of this very groom, to be the same to the bit."""
         if baked is not None and (baked.rests.head is None) == (self.head is None):
             rig = self._rig_of(baked)
-            self.request = BuildRequest(self.name, self.source, self.settings, rig)
+            self._holding = self._holding.at_rests(baked.rests.ties)
+            self.request = BuildRequest(self.name, self.source, self.settings, rig, self._holding)
 
     def _rig_of(self, baked: BakedRig) -> Rig:
         """The rig of a bake; rest is where hair and head were then."""
@@ -102,15 +121,17 @@ class GroomSource:
         if _same(strands, before.strands, back):
             strands = before.strands
         density, warning = read_density(hair, before.head, depsgraph)
+        holding = Holding.of(hair, depsgraph, known.holding, back)
         source = replace(
             before,
+            holders=holding.holders,
             strands=strands,
             dropped=read.dropped,
             density=density,
             density_warning=warning,
             color_warnings=color_notes(hair.name, strands),
         )
-        request = BuildRequest(self.name, source, GroomSettings.of(hair))
+        request = BuildRequest(self.name, source, GroomSettings.of(hair), holding=holding)
         if (
             request.gives_rig_of(known)
             and request.settings[AmbientSettings] == known.settings[AmbientSettings]
@@ -122,7 +143,7 @@ class GroomSource:
 
     def accept(self, request: BuildRequest) -> None:
         """Its hair is shown from now on; what acts at once is as it is set now."""
-        self.source = request.source
+        self.source, self._holding = request.source, request.holding
         self.settings = GroomSettings.of(self.hair.found()).at_once(request.settings)
 
     def take_settings(self) -> bool:
@@ -134,7 +155,10 @@ class GroomSource:
     def pose(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Pose:
         """Where the body is now; see `poses.read_pose`."""
         vertex_count = None if rig.head is None else len(rig.head.positions)
-        return read_pose(self.hair, self.head, vertex_count, depsgraph)
+        pose = read_pose(self.hair, self.head, vertex_count, depsgraph)
+        if rig.holds is None:
+            return pose
+        return replace(pose, anchors=self._holding.anchors(self.hair.found(), rig.holds, depsgraph))
 
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +21,7 @@ from ...groom.settings import GuideSettings
 from ...pipeline import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet, Surface
+from ..colliders.ties import Holding
 from ..properties.groom_settings import GroomSettings
 from ..scene.rigs import rig_from
 from ..scene.source import Source
@@ -42,12 +43,14 @@ class BuildRequest:
     """What a groom is to be made from.
 
     name: of the groom, in messages. rig: that of its bake; None: it is to be made.
+    holding: what holds the hair beside its roots, and follows these objects.
     """
 
     name: str
     source: Source
     settings: GroomSettings
     rig: Rig | None = None
+    holding: Holding = field(default_factory=Holding)
 
     def gives_rig_of(self, other: BuildRequest) -> bool:
         """Whether both give the same rig, as far as is known without building it."""
@@ -57,6 +60,7 @@ class BuildRequest:
             and one.strands is two.strands
             and one.head is two.head
             and np.array_equal(one.density, two.density)  # type: ignore[arg-type]
+            and one.holders == two.holders
         )
 
 

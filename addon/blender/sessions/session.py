@@ -14,7 +14,7 @@ from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...pipeline import Pose, Rig
 from ...render.snapshot import Snapshot
-from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays, rig_arrays
+from ..bakes.baked_rig import BakedRig, frame_arrays, rig_arrays
 from ..bakes.simulated import Arrays
 from ..base.latest_job import LatestJob
 from ..base.thread_work import ThreadWork
@@ -121,6 +121,19 @@ class Session:
         """Whether the artist has set another surface since the session began."""
         return self._source.has_another_head()
 
+    @property
+    def holder_uids(self) -> frozenset[int]:
+        """Session numbers of what holds the hair beside its roots."""
+        return self._source.holder_uids
+
+    def has_other_holders(self, edited: set[int]) -> bool:
+        """Whether ties have come or changed shape since the hair was read.
+
+        Args:
+            edited: session numbers of data-blocks whose geometry has changed.
+        """
+        return self._source.has_other_holders(edited)
+
     def constants(self) -> Arrays:
         """See `baked_rig.rig_arrays`."""
         return rig_arrays(self.rig, self._source.rests)
@@ -160,7 +173,7 @@ class Session:
         found = () if self.obstacles is None else self.obstacles.warnings
         notes = (f"{self.name}: {note}" for note in self.rig.notes)
         cards = (f"{self.name}: {note}" for note in self.cards.warnings)
-        return (*self.source.warnings, *notes, *cards, *doubled, *found, *self.picture.warnings)
+        return (*self._source.warnings, *notes, *cards, *doubled, *found, *self.picture.warnings)
 
     @property
     def computed_on(self) -> str:
@@ -300,6 +313,8 @@ class Session:
             HairloomError: as `rest`.
         """
         now, shown = self._pose(depsgraph), self.solver.pose
+        if not _same_anchors(now.anchors, shown.anchors):
+            return True
         if now.head_positions is None or shown.head_positions is None:
             return not np.array_equal(now.matrix, shown.matrix)
         return not np.array_equal(now.head_positions, shown.head_positions)
@@ -378,7 +393,7 @@ class Session:
         Raises:
             HairloomError: the frame is of another groom.
         """
-        baked = BakedRig(self.rig, RestMatrices(self.hair.rest, None))
+        baked = BakedRig(self.rig, self._source.rests)
         if not baked.fits(frame):
             raise HairloomError(
                 "its bake is of another groom, or of other guides",
@@ -398,6 +413,12 @@ def _build_in_thread(
     before: tuple[BuildRequest, PreparedGroom],
 ) -> tuple[BuildRequest, PreparedGroom]:
     return request, build(request, before, is_drawn=True, report=work.report)
+
+
+def _same_anchors(one: Floats | None, other: Floats | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other, equal_nan=True)
 
 
 def _same_guides(one: Rig, other: Rig) -> bool:

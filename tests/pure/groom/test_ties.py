@@ -68,8 +68,8 @@ def test_ties_that_share_a_point_do_not_both_hold_it() -> None:
 
 def test_tips_on_a_surface_are_held() -> None:
     hair = strands(straight(), straight(0.3), straight()[:9], straight(3.0))
-    surface = TipSurface("Bun", ground(z=-0.02), 0.05)
-    holds = find_holds(hair, Holders((ring(0.55, 0.1),), surface))
+    surface = TipSurface("Bun", ground(z=-0.02))
+    holds = find_holds(hair, Holders((ring(0.55, 0.1),), surface), 0.05)
     assert holds is not None and holds.tip_triangle is not None
     assert holds.strand.tolist() == [0, 0, 1, 2]
     np.testing.assert_allclose(holds.place, [4.5, 10.0, 10.0, 4.5], atol=1e-3)
@@ -89,8 +89,8 @@ def test_strands_that_the_same_holds_are_of_one_kind() -> None:
 
 def test_what_holds_nothing_is_named() -> None:
     hair = strands(straight())
-    holders = Holders((ring(0.5), ring(5.0)), TipSurface("Bun", ground(z=-9.0), 0.05))
-    holds = find_holds(hair, holders)
+    holders = Holders((ring(0.5), ring(5.0)), TipSurface("Bun", ground(z=-9.0)))
+    holds = find_holds(hair, holders, 0.05)
     assert holds is not None
     notes = idle(holds, holders)
     assert len(notes) == 2
@@ -107,7 +107,7 @@ def test_strange_strands_do_no_harm(ball: bool) -> None:
         [(0.0, 0.0, 0.5)] * 5, [*there[:7], *there[6:3:-1]], [*there[:5], there[4], *there[5:]],
         [*there, there[-1]],
     )  # fmt: skip
-    holds = find_holds(hair, Holders((ring(0.5, ball=ball),), TipSurface("Bun", ground(), 0.1)))
+    holds = find_holds(hair, Holders((ring(0.5, ball=ball),), TipSurface("Bun", ground())), 0.1)
     assert holds is not None
     assert np.isfinite(holds.place).all()
     assert (holds.place >= 2.0).all()
@@ -116,8 +116,8 @@ def test_strange_strands_do_no_harm(ball: bool) -> None:
 
 def test_anchors_are_the_motions_of_ties_and_of_places_on_the_surface() -> None:
     hair = strands(straight(), straight(0.3))
-    surface = TipSurface("Bun", ground(), 0.05)
-    holds = find_holds(hair, Holders((ring(0.55, 0.1),), surface))
+    surface = TipSurface("Bun", ground())
+    holds = find_holds(hair, Holders((ring(0.55, 0.1),), surface), 0.05)
     assert holds is not None
     tie = np.eye(4)
     tie[0, 3] = 2.0
@@ -134,7 +134,7 @@ def test_anchors_are_the_motions_of_ties_and_of_places_on_the_surface() -> None:
 
 def test_an_anchor_that_is_gone_holds_nothing() -> None:
     hair = strands(straight(), straight(0.3))
-    holds = find_holds(hair, Holders((ring(0.55, 0.1),), TipSurface("Bun", ground(), 0.05)))
+    holds = find_holds(hair, Holders((ring(0.55, 0.1),), TipSurface("Bun", ground())), 0.1)
     assert holds is not None
     gone = anchors_of(holds, np.full((1, 4, 4), np.nan), ground().positions)
     assert holds.where(gone).strand.tolist() == [0, 1]

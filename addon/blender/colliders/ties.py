@@ -1,0 +1,422 @@
+"""What holds the hair of one groom beside its roots: hair ties, and the surface that holds tips.
+
+The ties are the objects of the groom's collection. A circle Empty is a ring as large as it is
+drawn, any other Empty a ball. A curve or a mesh is a ring too, the ellipse that fits its points
+best, or a ball where it is as thick as wide. Ties move by their matrix, and as an armature deforms
+them. What is gone or disabled holds nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...dynamics.fitting.similarity import fit_similarity
+from ...errors import HairloomError
+from ...groom.holds import Holds, anchors_of
+from ...groom.ties import Holders, Tie, TipSurface, find_holds
+from ...strands.affine import moved
+from ..base.objects import Body, Handle, head_of, matrix_of
+from ..scene.source import usable_curves
+from ..scene.surfaces import read_positions, read_surface
+from .carriers import is_deforming, is_left_out
+from .obstacle_parts import is_solid_scale
+
+#: Types of objects whose points form a ring.
+_DRAWN = frozenset(("MESH", "CURVE", "SURFACE", "FONT"))
+TIE_TYPES = frozenset(("EMPTY",)) | _DRAWN
+#: As thick as this, in terms of its width, a mesh is a ball and no ring.
+_THICK = 0.5
+#: A ring narrower than this, in terms of its width, is a line.
+_LINE = 0.01
+#: Radius of a new ring, in terms of the hair's length.
+_NEW_RADIUS = 0.1
+#: Ties whose shape differs by less than this, in terms of their size, are unchanged.
+_SAME = 1.0e-4
+
+
+@dataclass
+class _TrackedTie:
+    """A tie, and what it is tracked by.
+
+    points: (n, 3) [m] world at rest, of a mesh that deforms; none of others.
+    """
+
+    body: Body
+    tie: Tie
+    points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def moved(self, depsgraph: bpy.types.Depsgraph) -> Floats:
+        """(4, 4), world space, from its rest to where it is now.
+
+        Raises:
+            HairloomError: it holds nothing now.
+        """
+        obj = self.body.found()
+        if is_left_out(obj, depsgraph):
+            raise _disabled(obj.name)
+        if not is_solid_scale(matrix_of(obj, depsgraph)):
+            raise HairloomError(
+                "its scale is zero, so it holds no hair", place=obj.name, remedy="Correct its scale"
+            )
+        matrix: Floats = self.body.moved(depsgraph)
+        if not len(self.points) or not is_deforming(obj):
+            return matrix
+        positions = read_positions(obj, depsgraph, place=obj.name)
+        if len(positions) != len(self.points):
+            return matrix
+        fit = fit_similarity(moved(self.points, matrix), positions)
+        return matrix if fit is None else np.asarray(fit.matrix @ matrix)
+
+
+@dataclass
+class Holding:
+    """The ties of one groom and the surface that holds its tips, at rest and now.
+
+    holders: at rest. warnings: what cannot hold hair and why, in the pose that was seen last.
+    """
+
+    holders: Holders = field(default_factory=Holders)
+    _ties: tuple[_TrackedTie, ...] = ()
+    _tips: Handle | None = None
+    _unusable: tuple[str, ...] = ()
+    _seen: dict[int, str] = field(default_factory=dict)
+    _idle: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        hair: bpy.types.Object,
+        depsgraph: bpy.types.Depsgraph,
+        known: Holding | None = None,
+        back: Floats | None = None,
+    ) -> Holding:
+        """What holds this hair, at rest in its present pose.
+
+        Args:
+            known: as it was read before: what is unchanged keeps its rest.
+            back: (4, 4), from the present pose to that in which the hair is at rest.
+        """
+        back = np.eye(4) if back is None else back
+        found, unusable = [], []
+        for obj in ties_of(hair):
+            try:
+                found.append(_again(_read_tie(obj, depsgraph, back), known))
+            except HairloomError as error:
+                unusable.append(str(error))
+        tips = None
+        try:
+            tips = _read_tips(hair, depsgraph, back)
+        except HairloomError as error:
+            unusable.append(str(error))
+        if tips is not None and known is not None:
+            tips = _same_surface(tips, known.holders.tip_surface)
+        surface = hair.hairloom.tip_surface
+        return cls(
+            Holders(tuple(one.tie for one in found), tips),
+            tuple(found),
+            None if tips is None else Handle.of(surface),
+            tuple(unusable),
+            {obj.session_uid: _drawn_as(obj) for obj in holders_of(hair)},
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return (*self._unusable, *self._idle)
+
+    @property
+    def uids(self) -> frozenset[int]:
+        """Session numbers of the objects."""
+        ties = {one.body.handle.uid for one in self._ties}
+        return frozenset(ties if self._tips is None else ties | {self._tips.uid})
+
+    @property
+    def rests(self) -> Floats:
+        """(tie_count, 4, 4), matrix_world of the ties at rest."""
+        return np.array([one.body.rest for one in self._ties]).reshape(-1, 4, 4)
+
+    def at_rests(self, rests: Floats) -> Holding:
+        """The same ties, at rest where they were when a bake was made."""
+        if len(rests) != len(self._ties):
+            return self
+        ties = []
+        for one, rest in zip(self._ties, rests, strict=True):
+            back = rest @ np.linalg.pinv(one.body.rest)
+            tie = Tie(one.tie.name, back @ one.tie.shape, one.tie.is_ball)
+            ties.append(_TrackedTie(Body(one.body.handle, rest), tie, moved(one.points, back)))
+        holders = Holders(tuple(one.tie for one in ties), self.holders.tip_surface)
+        return Holding(holders, tuple(ties), self._tips, self._unusable, self._seen)
+
+    def anchors(
+        self, hair: bpy.types.Object, holds: Holds, depsgraph: bpy.types.Depsgraph
+    ) -> Floats:
+        """Where all anchors are now, see `groom.holds.anchors_of`."""
+        idle = []
+        matrices = np.full((holds.tie_count, 4, 4), np.nan)
+        current = {obj.session_uid for obj in ties_of(hair)}
+        for number, one in enumerate(self._ties[: holds.tie_count]):
+            try:
+                matrix = one.moved(depsgraph)
+                if one.body.handle.uid in current and np.isfinite(matrix).all():
+                    matrices[number] = matrix
+            except HairloomError as error:
+                idle.append(str(_lost(one.body.handle.name, error)))
+        positions = None
+        try:
+            positions = self._tip_positions(hair, holds, depsgraph)
+        except HairloomError as error:
+            idle.append(str(error))
+        self._idle = tuple(idle)
+        return anchors_of(holds, matrices, positions)
+
+    def _tip_positions(
+        self, hair: bpy.types.Object, holds: Holds, depsgraph: bpy.types.Depsgraph
+    ) -> Floats | None:
+        obj = hair.hairloom.tip_surface
+        if holds.surface is None or obj is None:
+            return None
+        if is_left_out(obj, depsgraph):
+            raise _disabled(obj.name)
+        positions = read_positions(obj, depsgraph, place=obj.name)
+        if positions.shape != holds.surface.positions.shape:
+            raise HairloomError(
+                "its mesh has other vertices now, so it holds no tips",
+                place=obj.name,
+                remedy="Press Preview again",
+            )
+        if not np.isfinite(positions).all():
+            raise HairloomError(
+                "its position is not a finite number, so it holds no tips",
+                place=obj.name,
+                remedy="Fix the driver, constraint or modifier that moves it",
+            )
+        return positions
+
+    def is_outdated(self, hair: bpy.types.Object, edited: set[int]) -> bool:
+        """Whether there is more to be held by than was read, or it has another shape.
+
+        Args:
+            edited: session numbers of data-blocks whose geometry has changed.
+        """
+        return any(
+            self._seen.get(obj.session_uid) != _drawn_as(obj)
+            or (obj.data is not None and obj.data.session_uid in edited)
+            for obj in holders_of(hair)
+        )
+
+
+def ties_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
+    """The objects that may hold this hair as ties, each once."""
+    collection = hair.hairloom.tie_collection
+    objects = () if collection is None else collection.all_objects
+    return tuple(obj for obj in dict.fromkeys(objects) if obj is not None and obj != hair)
+
+
+def holders_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
+    """The same with the object that may hold tips, as the last."""
+    surface = hair.hairloom.tip_surface
+    return ties_of(hair) if surface is None else (*ties_of(hair), surface)
+
+
+def new_ring(hair: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Object:
+    """A ring at the 3D cursor that goes with the surface."""
+    ring = bpy.data.objects.new("Hair Tie", None)
+    ring.empty_display_type = "CIRCLE"
+    strands = usable_curves(hair, context.evaluated_depsgraph_get()).strands
+    ring.empty_display_size = _NEW_RADIUS * float(np.median(strands.lengths()))
+    hair.users_collection[0].objects.link(ring)
+    head = head_of(hair)
+    if head is not None:
+        ring.parent = head
+        ring.matrix_parent_inverse = head.matrix_world.inverted_safe()
+    ring.location = context.scene.cursor.location
+    ring.rotation_euler = context.scene.cursor.rotation_euler
+    context.view_layer.update()
+    return ring
+
+
+def add_ties(hair: bpy.types.Object, rings: list[bpy.types.Object], scene: bpy.types.Scene) -> None:
+    """Put rings into the hair's collection of ties, which is made where there is none."""
+    collection = hair.hairloom.tie_collection
+    if collection is None:
+        collection = bpy.data.collections.new(f"{hair.name} Ties")
+        scene.collection.children.link(collection)
+    for ring in rings:
+        if ring not in collection.all_objects.values():
+            collection.objects.link(ring)
+    hair.hairloom.tie_collection = collection
+
+
+def remove_tie(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> None:
+    """Take an object out of the hair's collection of ties, but not out of the scene.
+
+    Raises:
+        HairloomError: it is not in that collection itself.
+    """
+    collection = hair.hairloom.tie_collection
+    obj = None if collection is None else collection.objects.get(name)
+    if obj is None:
+        raise HairloomError(
+            "it is not in the collection of ties itself",
+            place=name or hair.name,
+            remedy="Name one of its objects, or take it out of the collection that it is in",
+        )
+    if len(obj.users_collection) == 1:
+        scene.collection.objects.link(obj)
+    collection.objects.unlink(obj)
+    hair.hairloom.tie_collection = collection
+
+
+def held_by(
+    hair: bpy.types.Object, ring: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[int, int]:
+    """How many of the hair's curves a ring holds where both are now, and how many there are.
+
+    Raises:
+        HairloomError: it cannot be a tie, or the hair has no curves.
+    """
+    strands = usable_curves(hair, depsgraph).strands
+    holds = find_holds(strands, Holders((_read_tie(ring, depsgraph, np.eye(4)).tie,)))
+    return (0 if holds is None else len(holds.strand)), strands.strand_count
+
+
+def _drawn_as(obj: bpy.types.Object) -> str:
+    """What an Empty's shape depends on; changing it edits no data."""
+    return f"{obj.empty_display_type} {obj.empty_display_size}" if obj.type == "EMPTY" else obj.type
+
+
+def _read_tie(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Floats) -> _TrackedTie:
+    """Raises:
+    HairloomError: it cannot be a tie.
+    """
+    if obj.type not in TIE_TYPES:
+        raise HairloomError(
+            f"it is a {obj.type.lower()} object, so no hair passes through it",
+            place=obj.name,
+            remedy="Use an Empty, a curve or a mesh as a tie",
+        )
+    if is_left_out(obj, depsgraph):
+        raise _disabled(obj.name)
+    matrix = matrix_of(obj, depsgraph)
+    if not np.isfinite(matrix).all() or not is_solid_scale(matrix):
+        raise HairloomError(
+            "its scale is zero, so it holds no hair", place=obj.name, remedy="Correct its scale"
+        )
+    rest = back @ matrix
+    body = Body(Handle.of(obj), rest)
+    if obj.type == "EMPTY":
+        shape, is_ball = _of_empty(obj)
+        return _TrackedTie(body, Tie(obj.name, rest @ shape, is_ball))
+    local = _points_of(obj, depsgraph)
+    shape, is_ball = _fitted(moved(local, rest).astype(np.float64), obj.name)
+    points = moved(local, rest) if obj.type == "MESH" else np.zeros((0, 3))
+    return _TrackedTie(body, Tie(obj.name, shape, is_ball), points)
+
+
+def _of_empty(obj: bpy.types.Object) -> tuple[Floats, bool]:
+    """Blender draws circles around the Empty's own y."""
+    size = obj.empty_display_size
+    shape = np.diag([size, size, size, 1.0])
+    if obj.empty_display_type != "CIRCLE":
+        return shape, True
+    return shape[:, [0, 2, 1, 3]], False
+
+
+def _points_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+    """(n, 3) object space, of a mesh or of a curve as it is drawn."""
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        count = 0 if mesh is None else len(mesh.vertices)
+        points = np.empty((count, 3), np.float32)
+        if count:
+            mesh.vertices.foreach_get("co", points.ravel())
+        return points
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def _fitted(points: Floats, name: str) -> tuple[Floats, bool]:
+    """The shape of a tie, and whether it is a ball, by the points (n, 3) around it.
+
+    Points spread evenly over an ellipse have half the square of each half-axis as their variance
+    along it; over an ellipsoid a third.
+    """
+    if len(points) >= 3 and np.isfinite(points).all():
+        middle = points.mean(axis=0)
+        _, size, axes = np.linalg.svd(points - middle, full_matrices=False)
+        size /= np.sqrt(len(points))
+        if size[1] > _LINE * size[0] > 0.0:
+            is_ball = bool(size[2] > _THICK * size[0])
+            half = size * np.sqrt(3.0 if is_ball else 2.0)
+            half[2] = half[2] if is_ball else half[0]  # across the ring, where it has no extent
+            shape = np.eye(4)
+            shape[:3, :3], shape[:3, 3] = axes.T * half, middle
+            return shape, is_ball
+    raise HairloomError(
+        "its points do not form a ring, so no hair passes through it",
+        place=name,
+        remedy="Use a circle, or a mesh around the hair",
+    )
+
+
+def _read_tips(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Floats
+) -> TipSurface | None:
+    obj = hair.hairloom.tip_surface
+    if obj is None:
+        return None
+    if is_left_out(obj, depsgraph):
+        raise _disabled(obj.name)
+    surface = read_surface(obj, depsgraph, need_uv=False, place=obj.name)
+    return TipSurface(obj.name, surface.transformed(back))
+
+
+def _again(read: _TrackedTie, known: Holding | None) -> _TrackedTie:
+    """As it was read before, unless it has another shape now; moving alone changes none."""
+    for one in () if known is None else known._ties:
+        if one.body.handle.uid != read.body.handle.uid:
+            continue
+        here, there = (np.linalg.pinv(each.body.rest) @ each.tie.shape for each in (read, one))
+        is_alike = read.tie.is_ball == one.tie.is_ball and len(read.points) == len(one.points)
+        # a ring's axes in its own plane are any, and so are their signs
+        squares = [each[:3, :3] @ each[:3, :3].T for each in (here, there)]
+        size = float(np.trace(squares[1]))
+        if (
+            is_alike
+            and np.abs(squares[0] - squares[1]).max() <= _SAME * size
+            and np.abs(here[:3, 3] - there[:3, 3]).max() <= _SAME * np.sqrt(size)
+        ):
+            return one
+        to_rest = one.body.rest @ np.linalg.pinv(read.body.rest)
+        tie = Tie(read.tie.name, to_rest @ read.tie.shape, read.tie.is_ball)
+        return _TrackedTie(one.body, tie, moved(read.points, to_rest))
+    return read
+
+
+def _same_surface(read: TipSurface, known: TipSurface | None) -> TipSurface:
+    """The one of before for the same mesh: it may be in another pose now."""
+    if known is None or known.name != read.name:
+        return read
+    one, other = read.surface.triangles, known.surface.triangles
+    is_same = one.shape == other.shape and bool((one == other).all())
+    return known if is_same else read
+
+
+def _disabled(name: str) -> HairloomError:
+    return HairloomError(
+        "it is disabled in viewports or excluded from the view layer, so it holds no hair",
+        place=name,
+        remedy="Enable it",
+    )
+
+
+def _lost(name: str, error: HairloomError) -> HairloomError:
+    if error.problem != "this object is gone":
+        return error
+    return HairloomError(
+        "this tie is gone, so it holds no hair", place=name, remedy="Undo that, or add another tie"
+    )

@@ -1,0 +1,94 @@
+"""Strands brought to where ties and surfaces hold them, on the GPU: `refine.hold.hold` behind
+RidePass, over textures in the layout of `strand_layout.strand_rows`.
+
+    rest_points   RGBA32F: xyz position at rest [m, world]
+    held_strands  RGBA32F: x a strand that is held, y its first hold, z how many it has
+    holds         RGBA32F: first texel x place in CVs, y anchor; second xyz that place at rest
+    anchors       RGBA32F: three texels each, rows of the matrix from world at rest to world now
+    cv_points     RGBA32F: xyz position now [m, world], changed in place
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats
+from ..groom.holds import Holds
+from ..refine.hold import places_at
+from .shader_program import ShaderRecipe, program
+from .strand_layout import strand_rows
+from .textures import texture_from
+
+HOLD_RECIPE = ShaderRecipe(
+    name="hold",
+    compute="hold.comp.glsl",
+    textures=(
+        ("FLOAT_2D", "rest_points"),
+        ("FLOAT_2D", "held_strands"),
+        ("FLOAT_2D", "holds"),
+        ("FLOAT_2D", "anchors"),
+    ),
+    images=(("RGBA32F", "cv_points", "READ_WRITE"),),
+    integers=("cv_count", "held_count"),
+    group_size=(64, 1),
+)
+
+
+class HoldPass:
+    """The holds of one groom on the GPU. Making one touches no GPU; `hold` does.
+
+    Args:
+        holds: of all strands.
+        rest: (strand_count, cv_count, 3) [m] world at rest.
+    """
+
+    def __init__(self, holds: Holds, rest: Floats) -> None:
+        self._all, self._rest = holds, rest
+        self.release()
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU."""
+        self._known: Holds | None = None
+        self._textures: dict[str, Any] = {}
+
+    def hold(self, cv_points: Any, rest_points: Any, anchors: Floats | None) -> None:
+        """Bring the strands in a texture to where they are held.
+
+        Args:
+            anchors: see `groom.holds.anchors_of`; None: nothing is held.
+
+        Raises:
+            ShaderError: the shader does not compile here.
+        """
+        holds = self._all.where(anchors)
+        if anchors is None or not len(holds.strand):
+            return
+        if holds is not self._known:
+            self._upload(holds)
+        anchor_rows = np.nan_to_num(anchors[:, :3])
+        textures = {**self._textures, "rest_points": rest_points}
+        textures["anchors"] = texture_from(strand_rows(anchor_rows), "RGBA32F")
+        count, shader = self._held_count, program(HOLD_RECIPE)
+        shader.bind(
+            textures=textures,
+            images={"cv_points": cv_points},
+            integers={"cv_count": self._rest.shape[1], "held_count": count},
+        )
+        gpu.compute.dispatch(shader.shader, -(-count // HOLD_RECIPE.group_size[0]), 1, 1)
+        gpu.shader.unbind()
+
+    def _upload(self, holds: Holds) -> None:
+        strand, first, count = np.unique(holds.strand, return_index=True, return_counts=True)
+        held = np.zeros((len(strand), 1, 4), np.float32)
+        held[:, 0, :3] = np.stack([strand, first, count], axis=1)
+        table = np.zeros((len(holds.strand), 2, 4), np.float32)
+        table[:, 0, 0], table[:, 0, 1] = holds.place, holds.anchor
+        table[:, 1, :3] = places_at(self._rest[holds.strand], holds.place)
+        self._known, self._held_count = holds, len(strand)
+        self._textures = {
+            "held_strands": texture_from(strand_rows(held), "RGBA32F"),
+            "holds": texture_from(strand_rows(table), "RGBA32F"),
+        }

@@ -1,0 +1,83 @@
+"""Hair ties: Add Hair Tie and Remove Hair Tie, and what holds hair in the panels."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import StringProperty
+
+from ..blender.base.objects import head_of
+from ..blender.base.outcome import report
+from ..blender.colliders import ties
+from .drawing import draw_section
+from .reports import reporting
+from .selection import chosen_hair, needs_hair
+
+
+class HAIRLOOM_OT_add_hair_tie(bpy.types.Operator):
+    """Hold the hair that passes through the selected rings: Empties, curves or meshes. If none is
+    selected, a new ring is added at the 3D cursor, as a child of the surface"""
+
+    bl_idname = "hairloom.add_hair_tie"
+    bl_label = "Add Hair Tie"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return needs_hair(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        hair = chosen_hair(context)[0]
+        rings = [obj for obj in context.selected_objects if _may_tie(obj, hair)]
+        if not rings:
+            rings = [ties.new_ring(hair, context)]
+        ties.add_ties(hair, rings, context.scene)
+        depsgraph = context.evaluated_depsgraph_get()
+        for ring in rings:
+            held, count = ties.held_by(hair, ring, depsgraph)
+            level = "INFO" if held else "WARNING"
+            remedy = "" if held else ". Move it so that hair passes through it"
+            report(self, level, f"{ring.name} holds {held:,} of {count:,} strands{remedy}")
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_remove_hair_tie(bpy.types.Operator):
+    """Let go of the hair that this tie holds. The object itself stays in the scene"""
+
+    bl_idname = "hairloom.remove_hair_tie"
+    bl_label = "Remove Hair Tie"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = {
+        "tie": StringProperty(name="Tie", description="Name of the object", options={"SKIP_SAVE"})
+    }
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return needs_hair(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        ties.remove_tie(chosen_hair(context)[0], self.tie, context.scene)
+        return {"FINISHED"}
+
+
+def draw_ties(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Draw what holds hair beside its roots."""
+    column = layout.column()
+    column.prop(hair.hairloom, "tie_collection")
+    for obj in ties.ties_of(hair):
+        row = column.row(align=True)
+        row.label(text=obj.name, icon="MESH_CIRCLE")
+        row.operator("hairloom.remove_hair_tie", text="", icon="X").tie = obj.name
+    column.operator("hairloom.add_hair_tie", icon="MESH_CIRCLE")
+    layout.column().prop(hair.hairloom, "tip_surface")
+    if hair.hairloom.tip_surface is not None:
+        draw_section(layout, hair.data.hairloom, "guides", "Ties")
+
+
+def _may_tie(obj: bpy.types.Object, hair: bpy.types.Object) -> bool:
+    return obj.type in ties.TIE_TYPES and obj not in (hair, head_of(hair))
+
+
+CLASSES = (HAIRLOOM_OT_add_hair_tie, HAIRLOOM_OT_remove_hair_tie)

@@ -1,0 +1,293 @@
+"""Hair ties in a scene: found, carried, baked, let go of."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.bakes.stale_bakes import changed_since
+from hairloom.addon.blender.preview import previews
+from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.strands import StrandSet
+
+LAST = 8
+RADIUS = 0.09
+
+
+def ring(kind="circle", place=(0.0, 0.0, 0.12)):
+    """A ring around z above the head, that goes with it."""
+    if kind in ("circle", "ball"):
+        obj = bpy.data.objects.new("Ring", None)
+        obj.empty_display_type = "CIRCLE" if kind == "circle" else "SPHERE"
+        obj.empty_display_size = RADIUS
+        obj.rotation_euler.x = np.pi / 2.0  # Blender draws circles around y
+        bpy.context.collection.objects.link(obj)
+    elif kind == "curve":
+        bpy.ops.curve.primitive_bezier_circle_add(radius=RADIUS)
+        obj = bpy.context.object
+    else:
+        bpy.ops.mesh.primitive_torus_add(major_radius=RADIUS, minor_radius=0.004)
+        obj = bpy.context.object
+    obj.location = place
+    obj.parent = bpy.data.objects["Head"]
+    bpy.context.view_layer.update()
+    return obj
+
+
+def tie(hair, *rings):
+    collection = bpy.data.collections.new("Ties")
+    bpy.context.scene.collection.children.link(collection)
+    for each in rings:
+        collection.objects.link(each)
+    hair.hairloom.tie_collection = collection
+    return collection
+
+
+def wavy():
+    """Strands that stand on the sphere, with slack between root and ring."""
+    random = np.random.default_rng(5)
+    outward = random.normal([0.0, 0.0, 1.0], 0.5, (60, 1, 3))
+    outward /= np.linalg.norm(outward, axis=2, keepdims=True)
+    along = np.linspace(0.0, 1.0, 16)[:, None]
+    across = np.cross(outward, [1.0, 0.0, 0.0]) * np.sin(along * 12.0) * 0.008
+    points = outward * (0.1 + 0.08 * along) + across * np.minimum(along * 4.0, 1.0)
+    count = np.arange(61) * 16
+    return StrandSet(points.reshape(-1, 3), count, np.full(960, 4e-5), np.zeros(60, np.int32))
+
+
+@pytest.fixture
+def swinging(new_hair, sphere, tmp_path):
+    """Hair on a head that is thrown about for some frames: (hair, head)."""
+    hair = new_hair(sphere)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    for frame, x in ((1, 0.0), (4, 0.1), (LAST, -0.05)):
+        sphere.location.x = x
+        sphere.keyframe_insert("location", frame=frame)
+    hair.hairloom.dynamics.collider_resolution = 8
+    hair.hairloom.dynamics.device = "numpy"
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    scene.frame_set(1)
+    return hair, sphere
+
+
+def escape(session):
+    """How far held strands are from where they are held, at most [m], where they reach it."""
+    rig, pose, strands = session.rig, session.solver.pose, session.strands
+    holds = rig.holds.where(pose.anchors)
+    first = holds.place.astype(int)
+    part = (holds.place - first)[:, None]
+    after = np.minimum(first + 1, strands.shape[1] - 1)
+
+    def at(grid):
+        return grid[holds.strand, first] * (1 - part) + grid[holds.strand, after] * part
+
+    rest = np.concatenate([at(rig.strands.grid), np.ones((len(first), 1))], axis=1)
+    target = np.einsum("nij,nj->ni", pose.anchors[holds.anchor], rest)[:, :3]
+    length = np.linalg.norm(np.diff(rig.strands.grid[holds.strand], axis=1), axis=2)
+    cv = np.arange(length.shape[1])
+    reach = np.where((cv >= 1) & (cv < first[:, None]), length, 0.0).sum(axis=1)
+    point = np.concatenate(
+        [rig.strands.grid[holds.strand, first], np.ones((len(first), 1))], axis=1
+    )
+    point = np.einsum("nij,nj->ni", pose.anchors[holds.anchor], point)[:, :3]
+    is_reached = np.linalg.norm(point - strands[holds.strand, 1], axis=1) < reach + 1e-5
+    gap = np.linalg.norm(at(strands) - target, axis=1)[is_reached]
+    assert len(gap) > 3 or not len(first)
+    return float(gap.max(initial=0.0))
+
+
+def played(hair, first=1, last=LAST):
+    shown = []
+    for frame in range(first, last + 1):
+        bpy.context.scene.frame_set(frame)
+        shown.append(previews.session_of(hair).strands)
+    return np.array(shown)
+
+
+@pytest.mark.parametrize("kind", ["circle", "ball", "curve", "torus"])
+def test_a_ring_of_any_kind_holds_what_passes_through_it(swinging, evaluated, kind):
+    """Those whose direction meets the disc at z = 0.12 within the ring, however it is made."""
+    hair, _ = swinging
+    tie(hair, ring(kind))
+    session = previews.start(hair, evaluated())
+    out = session.rig.strands.roots / 0.1
+    length = 0.12 / np.maximum(out[:, 2], 1e-6)
+    inside = length * np.hypot(out[:, 0], out[:, 1])
+    expected = (length <= 0.18) & (inside < RADIUS)
+    if kind == "ball":
+        near = out * np.clip(0.12 * out[:, 2:], 0.1, 0.18)
+        expected = np.linalg.norm(near - [0.0, 0.0, 0.12], axis=1) < RADIUS
+    close = np.abs(inside - RADIUS) < 0.002
+    held = np.zeros(len(out), bool)
+    held[session.rig.holds.strand] = True
+    assert (held == expected)[~close].all()
+    assert 3 < held.sum() < 40
+    played(hair)
+    assert escape(session) < 1e-3
+
+
+@pytest.mark.parametrize("device", ["numpy", "compute"])
+def test_held_strands_stay_with_a_ring_that_moves_by_itself(
+    new_hair, swinging, evaluated, gpu_context, device
+):
+    hair = new_hair(swinging[1], wavy())
+    hair.hairloom.dynamics.device = device
+    one = ring()
+    one.keyframe_insert("location", frame=1)
+    one.location.z += 0.002  # as far as these strands reach
+    one.keyframe_insert("location", frame=LAST)
+    bpy.context.scene.frame_set(1)
+    tie(hair, one)
+    session = previews.start(hair, evaluated())
+    for frame in range(2, LAST + 1):
+        bpy.context.scene.frame_set(frame)
+        assert escape(session) < 1e-3
+    assert session.solver.form == device
+
+
+def test_a_tie_that_is_deleted_in_mid_play_lets_go(swinging, evaluated):
+    hair, _ = swinging
+    one = ring()
+    tie(hair, one)
+    session = previews.start(hair, evaluated())
+    played(hair, 1, 4)
+    assert escape(session) < 1e-3
+    rig = session.rig
+    bpy.data.objects.remove(one)
+    shown = played(hair, 5, LAST)
+    assert np.isfinite(shown).all()
+    session = previews.session_of(hair)
+    assert session.rig is rig
+    assert len(rig.holds.where(session.solver.pose.anchors).strand) == 0
+    assert any("this tie is gone" in text for text in session.warnings)
+
+
+@pytest.mark.parametrize("how", ["disabled", "scaled to zero", "taken out", "head at zero"])
+def test_what_cannot_hold_is_said_and_holds_nothing(swinging, evaluated, how):
+    hair, head = swinging
+    one = ring()
+    collection = tie(hair, one)
+    session = previews.start(hair, evaluated())
+    played(hair, 1, 3)
+    if how == "disabled":
+        one.hide_viewport = True
+    elif how == "scaled to zero":
+        one.scale = (0.0, 0.0, 0.0)
+    elif how == "taken out":
+        collection.objects.unlink(one)
+    else:
+        head.scale = (0.0, 0.0, 0.0)
+    shown = played(hair, 4, LAST)
+    assert np.isfinite(shown).all()
+    pose = session.solver.pose
+    assert len(session.rig.holds.where(pose.anchors).strand) == 0
+    said = [text for text in session.warnings if "Ring" in text]
+    assert bool(said) == (how != "taken out")
+
+
+def test_a_ring_beside_the_hair_is_said(swinging, evaluated):
+    hair, _ = swinging
+    tie(hair, ring(place=(9.0, 0.0, 0.0)))
+    session = previews.start(hair, evaluated())
+    assert any("No hair passes through the tie Ring" in text for text in session.warnings)
+    assert np.isfinite(played(hair)).all()
+
+
+def test_what_cannot_be_a_tie_is_said(swinging, evaluated):
+    hair, _ = swinging
+    light = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    flat = bpy.data.objects.new("Dot", bpy.data.meshes.new("Dot"))
+    for obj in (light, flat):
+        bpy.context.collection.objects.link(obj)
+    tie(hair, light, flat)
+    session = previews.start(hair, evaluated())
+    text = " ".join(session.warnings)
+    assert "Lamp: it is a light object" in text
+    assert "Dot: its points do not form a ring" in text
+
+
+def test_tips_on_a_mesh_follow_its_deformation(swinging, evaluated):
+    hair, head = swinging
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.18, segments=24, ring_count=12)
+    bun = bpy.context.object
+    bun.name, bun.parent = "Bun", head
+    hair.hairloom.tip_surface = bun
+    hair.data.hairloom.guides.tip_distance = 0.1
+    session = previews.start(hair, evaluated())
+    assert len(session.rig.holds.strand) > 50
+    before = session.strands
+    swell = bun.modifiers.new("Swell", "DISPLACE")
+    swell.mid_level, swell.strength = 0.0, -0.01
+    bpy.context.view_layer.update()
+    after = session.strands
+    inwards = np.linalg.norm((after - before)[session.rig.holds.strand, -1], axis=1)
+    assert inwards == pytest.approx(np.full(len(inwards), 0.01), rel=0.2)
+    assert np.abs(after[:, 0] - before[:, 0]).max() < 1e-6
+
+
+def test_a_bake_keeps_what_ties_hold(swinging, evaluated):
+    hair, _ = swinging
+    one = ring()
+    tie(hair, one)
+    previews.start(hair, evaluated())
+    live = played(hair)
+    list(Bake.of([hair], bpy.context.scene).steps())
+    np.testing.assert_array_equal(played(hair), live)
+    cache = playback.cache_of(hair)
+    bpy.context.scene.frame_set(3)
+    assert changed_since(hair, cache, evaluated()) == ()
+    np.testing.assert_array_equal(playback.strands_in(cache, 3), live[2])
+    assert playback.pose_in(cache, 3, 0.5).anchors.shape == (1, 4, 4)
+    one.location.z += 0.01
+    bpy.context.view_layer.update()
+    assert changed_since(hair, cache, evaluated()) == ("ties",)
+    one.location.z -= 0.01
+    hair.hairloom.tie_collection = None
+    assert "ties" in changed_since(hair, cache, evaluated())
+
+
+def test_a_tie_that_is_added_while_previewing_is_taken_over(swinging, evaluated):
+    from hairloom.addon.blender.preview import scene_events
+
+    hair, _ = swinging
+    session = previews.start(hair, evaluated())
+    assert session.rig.holds is None
+    tie(hair, ring())
+    bpy.context.view_layer.update()
+    assert session.is_stale
+    scene_events.catch_up(evaluated())
+    assert len(previews.session_of(hair).rig.holds.strand) > 3
+    assert not session.is_stale
+
+
+def test_the_button_adds_the_selected_ring_or_a_new_one(swinging):
+    hair, head = swinging
+    one = ring()
+    for obj in (hair, one):
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = hair
+    assert bpy.ops.hairloom.add_hair_tie() == {"FINISHED"}
+    assert hair.hairloom.tie_collection.objects.values() == [one]
+    assert bpy.ops.hairloom.remove_hair_tie(tie="Ring") == {"FINISHED"}
+    assert len(hair.hairloom.tie_collection.objects) == 0
+    one.select_set(False)
+    bpy.context.scene.cursor.matrix = Matrix.Translation((0.0, 0.0, 0.14))
+    assert bpy.ops.hairloom.add_hair_tie() == {"FINISHED"}
+    made = hair.hairloom.tie_collection.objects[0]
+    assert (made.empty_display_type, made.parent) == ("CIRCLE", head)
+    assert made.matrix_world.translation.z == pytest.approx(0.14)
+
+
+def test_ties_survive_saving_and_opening(swinging, tmp_path, evaluated):
+    hair, _ = swinging
+    tie(hair, ring())
+    hair.hairloom.tip_surface = bpy.data.objects["Head"]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "tied.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "tied.blend"))
+    hair = bpy.data.objects["Hair"]
+    assert hair.hairloom.tie_collection.name == "Ties"
+    assert hair.hairloom.tip_surface.name == "Head"
+    session = previews.start(hair, evaluated())
+    assert len(session.rig.holds.strand) > 3
