@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import tempfile
 import time
@@ -22,15 +23,20 @@ _CURVE = (
 
 
 def usd_attacks(count: int, seed: int) -> dict[str, float]:
-    """Read this many; crashes are ends without a message of ours."""
-    found = {"usda_attacks": count, "usda_crashes": 0, "longest_seconds": 0.0}
+    """Read this many; crashes are ends without a message of ours.
+
+    longest_seconds: by the clock, where other work counts too. longest_processor_seconds: of this
+    process and the one that reads, for the same file.
+    """
+    found = {"usda_attacks": count, "usda_crashes": 0}
+    found |= {"longest_seconds": 0.0, "longest_processor_seconds": 0.0}
     with tempfile.TemporaryDirectory() as folder:
         for number in range(count):
             random = np.random.default_rng([seed, number])
             attack = _ATTACKS[number % len(_ATTACKS)]
             path = Path(folder) / f"attack.{('usda', 'usd')[number % 2]}"
             path.write_text("#usda 1.0\n" + _damaged(attack(random), random), encoding="utf-8")
-            begun = time.perf_counter()
+            begun, processed = time.perf_counter(), _processor_seconds()
             try:
                 read_usd(path)
             except HairloomError as error:
@@ -39,10 +45,18 @@ def usd_attacks(count: int, seed: int) -> dict[str, float]:
             except Exception as error:
                 print(f"attack {number}, {attack.__name__}: {error!r}", flush=True)
                 found["usda_crashes"] += 1
-            found["longest_seconds"] = max(found["longest_seconds"], time.perf_counter() - begun)
+            wall, processor = time.perf_counter() - begun, _processor_seconds() - processed
+            found["longest_seconds"] = max(found["longest_seconds"], wall)
+            found["longest_processor_seconds"] = max(found["longest_processor_seconds"], processor)
     # of the largest child [kB]
     found["memory_mb"] = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024.0
     return found
+
+
+def _processor_seconds() -> float:
+    """Of this process, and of all that it has started and that have ended."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 def _damaged(text: str, random: _Random) -> str:

@@ -53,7 +53,7 @@ MAX_POINTS = 1 << 28
 #: More than any scene that is sent for its hair, counted with all instances.
 MAX_PRIMS = 1_000_000
 #: Memory that a file may take beside its own size [bytes], and as a multiple of it.
-_BESIDE, _MAX_TIMES = 1 << 30, 30
+_BESIDE, _MAX_TIMES = 640 << 20, 30
 #: Time of the processor for any file, with the start [s], and bytes that take a second more.
 _SECONDS, _BYTES_A_SECOND = 7, 1_000_000
 
@@ -182,16 +182,20 @@ def summary(error: BaseException) -> str:
 
 def _limit(*paths: str) -> None:
     """Of memory and time for this process, by the size of these files; only Linux says how much
-    memory it has."""
+    memory it has.
+
+    Memory is what it may write to. Of the addresses that it has, libraries and stacks of threads
+    take a gigabyte and use little of it.
+    """
     if not sys.platform.startswith("linux"):
         return
     import resource
 
     size = sum(os.path.getsize(path) for path in paths if os.path.isfile(path))
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5])
     limits = {
         resource.RLIMIT_CPU: _SECONDS + size // _BYTES_A_SECOND,
-        resource.RLIMIT_AS: pages * resource.getpagesize() + _BESIDE + _MAX_TIMES * size,
+        resource.RLIMIT_DATA: pages * resource.getpagesize() + _BESIDE + _MAX_TIMES * size,
     }
     for limit, value in limits.items():
         _, most = resource.getrlimit(limit)
