@@ -7,8 +7,9 @@ See `_exchange_alembic`, `_exchange_usd`, `_exchange_files`, `_exchange_round_tr
 Beside each part stands what it takes, wall clock and processor: other work shows in the former
 alone.
 
-make bench NAME=exchange              some minutes, with few damaged files and kills
-python bench/exchange.py whole        the numbers of the proof: an hour or more
+make bench NAME=exchange                      some minutes, with few damaged files and kills
+tools/bench.py exchange whole                 the numbers of the proof: an hour or more
+tools/bench.py exchange whole kills "damaged files"    of these parts alone
 """
 
 from __future__ import annotations
@@ -31,9 +32,11 @@ from _exchange_usd import usd_figures
 #: damaged files of a format that we parse, and of one that a library parses in another process;
 #: kills of a format's writer; seconds of motion
 FEW, WHOLE = (1_000, 30, 5, 0.5), (10_000, 1_000, 100, 2.0)
+#: what there may be none of
+NONE = ("fuzz_failures", "kill_failures", "kill_mixed", "kill_leftovers")
 
 
-def main(*, is_whole: bool) -> None:
+def main(chosen: list[str], *, is_whole: bool) -> int:
     ours, libraries, kills, seconds = WHOLE if is_whole else FEW
     parts: dict[str, Callable[[], dict[str, float]]] = {
         "alembic": alembic_figures,
@@ -46,7 +49,8 @@ def main(*, is_whole: bool) -> None:
         "damaged files": lambda: fuzz_figures(ours, libraries),
     }
     found: dict[str, Any] = {}
-    for name, measure in parts.items():
+    for name in chosen or parts:
+        measure = parts[name]
         begun, processed = time.perf_counter(), processor_seconds()
         figures = measure()
         wall, processor = time.perf_counter() - begun, processor_seconds() - processed
@@ -54,7 +58,10 @@ def main(*, is_whole: bool) -> None:
         for figure, value in figures.items():
             print(f"{figure:40} {value:14.6g}", flush=True)
         found |= figures
-    print(json.dumps({**summary(found), **found, **machine()}))
+    print(json.dumps({**({} if chosen else summary(found)), **found, **machine()}))
+    missed = [name for name in NONE if found.get(name)]
+    print(f"missed: {', '.join(missed) or 'none'}")
+    return int(bool(missed))
 
 
 def summary(found: dict[str, float]) -> dict[str, float]:
@@ -84,4 +91,4 @@ def machine() -> dict[str, str]:
     }
 
 
-main(is_whole="whole" in sys.argv[1:])
+sys.exit(main([each for each in sys.argv[1:] if each != "whole"], is_whole="whole" in sys.argv))
