@@ -97,7 +97,7 @@ def test_a_file_that_cannot_be_opened_leaves_hair_to_be_seen(hair, evaluated, tm
         ("", "hair"),
         ("Zoë's hair ", "Zoë_s hair"),
         ("头发", "头发"),
-        ("x" * 500, "x" * 50),
+        ("x" * 500, "x" * 41 + "_c38c2bf3"),
     ],
 )
 def test_a_name_chooses_no_folder_but_its_own(name, folder, tmp_path):
@@ -110,6 +110,13 @@ def test_names_that_are_one_on_some_system_get_two_folders():
     taken = {as_compared(folder_name("Hair"))}
     assert folder_name("hair", taken) == "hair_2"
     assert folder_name("Cafe\u0301") == folder_name("Caf\u00e9")
+
+
+def test_versions_of_a_file_with_a_long_name_get_two_folders():
+    """Studios number at the end."""
+    stems = [f"show_episode_12_sequence_0400_shot_0130_lighting_final_v{n:03}" for n in range(3)]
+    folders = {folder_name(stem) for stem in stems}
+    assert len(folders) == 3 and max(map(len, folders)) <= 50
 
 
 def test_hair_with_a_path_for_a_name_is_baked_below_the_folder(hair, tmp_path):

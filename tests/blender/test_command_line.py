@@ -40,6 +40,8 @@ f 4/4 1/1 5/5
 #: as Blender runs verbs
 pytestmark = pytest.mark.usefixtures("extension")
 
+#: of what verbs write; others write a folder
+SUFFIXES = {"export": ".tfx", "cards": ".glb", "render": ".png"}
 SMALL = ["--set", "guides.guide_count=20", "--set", "guides.cv_count=8"]
 
 
@@ -100,7 +102,7 @@ def test_a_bad_groom_gets_a_message_and_leaves_nothing(
 ) -> None:
     bad = tmp_path / "bad.tfx"
     bad.write_bytes(BAD_GROOMS[kind])
-    output = tmp_path / "made" / f"result{'.tfx' if verb == 'export' else '.glb'}"
+    output = tmp_path / "made" / f"result{SUFFIXES.get(verb, '')}"
     arguments = [verb, "--groom", str(bad), "--head", str(head), "--output", str(output)]
     blocks = data_blocks()
 
@@ -141,7 +143,7 @@ def test_a_head_without_uvs_is_refused_when_strict(
     faces = [" ".join(word.split("/")[0] for word in line.split(" ")) for line in lines]
     bare.write_text("\n".join(faces))
     arguments = [verb, "--groom", str(groom), "--head", str(bare), "--strict", *SMALL]
-    output = tmp_path / f"result{'.tfx' if verb == 'export' else '.glb'}"
+    output = tmp_path / f"result{SUFFIXES.get(verb, '')}"
     assert command_line.run([*arguments, "--output", str(output)]) == 1
     message = capfd.readouterr().err
     assert str(bare) in message and "UV" in message and "--strict" in message

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -85,13 +86,15 @@ def strands_of(folder: Path, name: str, first: int) -> Callable[..., Any]:
 
 
 def made(folder: Path) -> dict[str, int]:
-    """File -> when it was written; reports are written by every run."""
+    """File -> when it was written; reports are written by every run. Frames of a bake lie in a
+    folder of their writer, whatever its name is."""
     files = (file for file in (folder / "out").rglob("*") if file.is_file())
-    return {
+    times = {
         file.relative_to(folder / "out").as_posix(): file.stat().st_mtime_ns
         for file in files
         if "verb" not in _content(file)
     }
+    return {re.sub("frames-hl-[^/]*", "frames", name): time for name, time in times.items()}
 
 
 def _content(file: Path) -> dict[str, Any]:

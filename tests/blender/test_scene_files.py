@@ -44,7 +44,7 @@ def test_a_disk_that_is_full_leaves_the_scene_before(
     limit = int(part * len(before))
     with full_disk(limit), pytest.raises(HairloomError, match="cannot be written") as raised:
         save_scene()
-    assert raised.value.place == str(path) and "space left" in raised.value.remedy
+    assert raised.value.place == str(path) and " disk" in raised.value.remedy
     assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
     with full_disk(limit), pytest.raises(HairloomError, match="cannot be written"):
         save_scene(tmp_path / "new.blend")

@@ -19,6 +19,7 @@ SAFETY = re.compile(
     r"Esc cancels|Esc ends the reading|half-written|whole or not|was killed|crash|file was in use"
     r"|that is in use|one before as it was|stays as it was|partial (files|result)|own process"
     r"|never mix their|[Cc]ancelling with|is saved in that case|automatically while|never fills"
+    r"|never write over|files of yours|that nothing can be written to|run no code|comes back into"
 )
 LONG_WORK = "window/session_long_work.py::from_a_dialog"
 CRASHES = "pure/exchange/test_subprocess_reader.py::test_every_bad_end_is_a_message"
@@ -42,6 +43,16 @@ PROMISES = {
     "::test_a_copy_of_the_cards_is_left_alone",
     "A file that is in use keeps its content": "pure/exchange/test_windows_rules.py"
     "::test_a_file_that_is_open_stays_and_the_new_ones_are_kept",
+    "Exports keep files of yours": "blender/test_card_files.py"
+    "::test_files_of_an_artist_are_kept_and_own_ones_replaced",
+    "Verbs never write over a file that they read": "blender/test_places.py"
+    "::test_what_would_be_lost_is_refused_before_any_work",
+    "named before the work begins": "blender/test_places.py"
+    "::test_what_would_be_lost_is_refused_before_any_work",
+    "Hair whose baked copy was deleted": "blender/test_bake_kept.py"
+    "::test_a_file_is_never_left_without_hair_in_renders",
+    "run no code of the current folder": "pure/exchange/test_subprocess_reader.py"
+    "::test_no_code_of_the_current_folder_or_the_environment_is_run",
     "Foreign USD files are never opened": "pure/test_promises.py::test_one_module_opens_usd_files",
     "on a full disk stays as it was": "blender/test_scene_files.py"
     "::test_a_disk_that_is_full_leaves_the_scene_before",

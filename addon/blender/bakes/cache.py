@@ -29,7 +29,7 @@ import numpy as np
 
 from ...errors import HairloomError
 from ...exchange.files.array_file import read_arrays
-from ...exchange.files.atomic import write_bytes_atomic
+from ...exchange.files.atomic import check_folder_place, remedy_for, write_bytes_atomic
 from ...exchange.files.moving import flush, flush_names
 from ...exchange.files.names import length_remark
 from ...exchange.files.stale_temp_files import MARK, is_stale, is_temporary, mark
@@ -168,6 +168,20 @@ class CacheWriter:
             flush(self._frames / name)
         except OSError as error:
             raise _unwritable(self.folder, error) from error
+
+
+def check_bake_folder(folder: Path) -> None:
+    """Refuse a folder that no bake can be written into before hours of work; writes nothing.
+
+    Raises:
+        HairloomError: nothing can be written there, or it holds files that are not of a bake.
+    """
+    check_folder_place(folder)
+    try:
+        if folder.exists():
+            _check_ours(folder)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
 
 
 class Cache:
@@ -403,7 +417,5 @@ def _unwritable(folder: Path, error: OSError) -> HairloomError:
     return HairloomError(
         f"the bake cannot be written ({why}{remark})",
         place=str(folder),
-        remedy="Choose a folder with a shorter path"
-        if remark
-        else "Choose a folder that you may write to, with space left",
+        remedy="Choose a folder with a shorter path" if remark else remedy_for(why),
     )

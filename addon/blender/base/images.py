@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...exchange.files.atomic import atomic_write, unwritable
+from ...exchange.files.atomic import DISK_FULL, atomic_write, unwritable
 from ...exchange.textures import texture_files
 from ...exchange.textures.srgb import srgb_decoded, srgb_encoded
 
@@ -157,6 +157,6 @@ def save_coded_png(path: Path, coded: Floats, *, has_alpha: bool = True) -> None
         with atomic_write(path) as temporary:
             image.save(filepath=str(temporary))
             if not texture_files.has_its_end(temporary):
-                raise unwritable(path, "the disk is full")
+                raise unwritable(path, DISK_FULL)
     finally:
         bpy.data.images.remove(image)

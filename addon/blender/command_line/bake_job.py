@@ -125,6 +125,7 @@ BAKE = Verb(
     bake,
     _add_options,
     output="folder for the bake, of several objects one below it each (default: their own)",
+    writes_folder=True,
     needs_output=False,
     takes_hair=False,
     operators=("bake", "bake_free"),

@@ -30,6 +30,7 @@ from .job_options import (
     parameters_of,
 )
 from .job_steps import Job, finish, motion_of, read_rig, tell_notes
+from .places import check_not_read
 from .verb import Verb
 
 
@@ -38,6 +39,7 @@ def cards(job: Job) -> None:
     options = job.options
     pictures = _own_pictures(job) | named_pictures(options.texture)
     path, _ = format_of(job.output, options.format)
+    check_not_read(path, options)
     settings = parameters_of(options, job.settings[CardExportSettings])
     check_no_input(path, [Path(argument.partition("=")[2]) for argument in options.texture])
     output = CardOutput(options.format, settings=settings)

@@ -27,6 +27,7 @@ from .import_job import IMPORT
 from .inputs import Sources
 from .job_options import check_numbers, chosen_settings
 from .job_steps import Job
+from .places import check_outputs, check_report
 from .render_job import RENDER
 from .run_job import RUN
 from .scene_files import check_saving, open_scene, save_scene
@@ -60,6 +61,11 @@ def run(arguments: list[str]) -> int:
         return int(stop.code or 0)
     (verb,) = (each for each in VERBS if each.name == options.verb)
     report = Report(verb.name, options.progress)
+    try:
+        check_report(options)
+    except HairloomError as error:
+        print(f"hairloom: {error}", file=sys.stderr)
+        return 1
     if not _reported(report, options.report):
         return 1
     try:
@@ -125,6 +131,7 @@ def _our_fault(fault: Exception) -> HairloomError:
 def _run(verb: Verb, options: argparse.Namespace, report: Report) -> None:
     """The job, unless it is done already."""
     check_numbers(options)
+    check_outputs(verb, options)
     stamp = Stamp(options) if getattr(options, "skip_existing", False) else None
     if stamp is not None:
         reason = stamp.why_not_done()

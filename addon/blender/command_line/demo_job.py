@@ -80,6 +80,7 @@ DEMO = Verb(
     demo,
     _add_options,
     output="folder to write into (default: out)",
+    writes_folder=True,
     default_output=Path("out"),
     needs_head=True,
 )

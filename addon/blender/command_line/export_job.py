@@ -35,6 +35,7 @@ from .job_options import (
 )
 from .job_steps import Job, motion_of, read_hair, read_rig, tell_notes
 from .object_settings import named_grooms, put_settings
+from .places import check_not_read
 from .verb import Verb
 
 
@@ -42,6 +43,8 @@ def export(job: Job) -> None:
     """Write the strands for an engine, at rest, at a frame of a bake, or over frames."""
     options, report = job.options, job.report
     path, kind = format_of(job.output, options.format)
+    if not options.preflight:
+        check_not_read(path, options)
     settings = parameters_of(options, job.settings[StrandExportSettings])
     frames = frames_of_option(options.frames, options.max_frames)
     if options.object or _is_of_scene(options):

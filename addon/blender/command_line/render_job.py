@@ -142,5 +142,6 @@ RENDER = Verb(
     render,
     _add_options,
     output="picture to write (.png)",
+    suffix=".png",
     operators=("show_slices", "show_skin_shadow"),
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import shutil
 import struct
@@ -14,7 +13,13 @@ import bpy
 import numpy as np
 
 from ...errors import HairloomError
-from ...exchange.files.atomic import atomic_write, unwritable
+from ...exchange.files.atomic import (
+    DISK_FULL,
+    as_system_says,
+    atomic_write,
+    check_place,
+    unwritable,
+)
 from ...exchange.files.stale_temp_files import temporary_beside
 from ..bakes.bake_settings import absolute, folder_of
 from ..base.suspension import suspended
@@ -35,10 +40,14 @@ def open_scene(path: Path) -> None:
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()))
     except RuntimeError as error:
+        why = str(error).strip().rpartition(": ")[2]
+        problem = f"Blender cannot open this file ({why})"
+        if "format is not supported" in why:
+            problem = "this is no Blender file"
         raise HairloomError(
-            f"Blender cannot open this file ({str(error).strip()})",
+            problem,
             place=str(path),
-            remedy="Give a .blend file of this Blender or an older one",
+            remedy="Give a .blend file that is whole, of this Blender or an older one",
         ) from error
 
 
@@ -65,6 +74,7 @@ def check_saving(output: Path | None, *, over: bool) -> None:
         raise HairloomError(
             "a scene's file name ends in .blend", place=str(output), remedy="Add .blend"
         )
+    check_place(Path(bpy.data.filepath) if output is None else output)
 
 
 def save_scene(path: Path | None = None) -> Path:
@@ -77,18 +87,25 @@ def save_scene(path: Path | None = None) -> Path:
         HairloomError: it has no file of its own, or it cannot be written.
     """
     check_saving(path, over=path is None)
-    target = Path(bpy.data.filepath) if path is None else path
+    own = Path(bpy.data.filepath) if bpy.data.filepath else None
+    target = own if path is None or _is_same(path, own) else path
+    assert target is not None, "check_saving refuses it"
     _keep_bakes(target.resolve().parent)
     with atomic_write(target) as temporary:
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(temporary), copy=True)
         except RuntimeError as error:
-            raise unwritable(target, str(error).removeprefix("Error:").strip()) from error
+            why = as_system_says(target, str(error).removeprefix("Error:").strip())
+            raise unwritable(target, why) from error
         if not is_whole(temporary):
-            raise unwritable(target, os.strerror(errno.ENOSPC))
-        if path is None:
+            raise unwritable(target, DISK_FULL)
+        if target is own:
             _keep_versions(target.resolve())
     return target
+
+
+def _is_same(path: Path, other: Path | None) -> bool:
+    return other is not None and os.path.realpath(path) == os.path.realpath(other)
 
 
 def is_whole(path: Path) -> bool:

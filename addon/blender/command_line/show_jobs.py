@@ -94,6 +94,7 @@ TURNTABLE = Verb(
     turntable,
     _add_turntable_options,
     output="folder for the pictures and the video",
+    writes_folder=True,
     operators=("turntable",),
 )
 SHEET = Verb(
@@ -101,5 +102,6 @@ SHEET = Verb(
     sheet,
     _add_sheet_options,
     output="picture to write (.png); --width and --height are of each picture in it",
+    suffix=".png",
     operators=("contact_sheet",),
 )

@@ -206,5 +206,6 @@ SIMULATE = Verb(
     simulate,
     add_motion_options,
     output="folder to write the bake into",
+    writes_folder=True,
     needs_head=True,
 )

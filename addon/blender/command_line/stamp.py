@@ -26,6 +26,7 @@ from ...exchange.files.atomic import write_text_atomic
 from ...params.preset import preset_as_dict
 from ..base.report import Report, hairloom_version
 from ..properties.presets import named_preset
+from .places import named_inputs
 
 SUFFIX = ".done.json"
 #: options that say nothing about the result
@@ -57,7 +58,7 @@ class Stamp:
         self._folder = Path(os.path.abspath(self.path.parent))
         self._asked = _asked(options, self._folder)
         self._begun = time.time_ns()
-        self._inputs = {path: digest(Path(path)) for path in _named_files(options)}
+        self._inputs = {path: digest(Path(path)) for path in _files_read(options)}
 
     def why_not_done(self) -> str:
         """Why the job has to run; empty where it need not."""
@@ -154,16 +155,12 @@ def _moved_with(folder: Path, value: Any) -> Any:
     return f"{name}{sign}{_seen_from(folder, path)}" if os.path.isabs(path) else value
 
 
-def _named_files(options: argparse.Namespace) -> set[str]:
-    """The files that options name, also as NAME=FILE; and the open scene's, where none is named."""
-    words = []
-    for name, value in vars(options).items():
-        if name not in _NOT_ASKED and name != "output":
-            words += [str(one) for one in (value if isinstance(value, list) else [value])]
-    words += [word.partition("=")[2] for word in words]
-    if not getattr(options, "scene", None):
-        words.append(bpy.data.filepath)
-    return {os.path.abspath(word) for word in words if word and Path(word).is_file()}
+def _files_read(options: argparse.Namespace) -> set[str]:
+    """The files that options name; and the open scene's, where none is named."""
+    named = named_inputs(options)
+    if not getattr(options, "scene", None) and bpy.data.filepath:
+        named.add(os.path.abspath(bpy.data.filepath))
+    return {path for path in named if os.path.isfile(path)}
 
 
 def _files_of_scene() -> list[str]:

@@ -31,6 +31,8 @@ class Verb:
     flow: does the work; the first line of its docstring is the help.
     add_options: adds what only this verb has.
     output: what --output is; "" for a verb without one.
+    suffix: of the file that --output is; "" where the flow says which there may be.
+    writes_folder: whether --output is a folder.
     default_output: where it writes without --output.
     needs_output: whether --output must be given.
     takes_hair: whether it works on hair that --groom, --head and --collider name.
@@ -46,6 +48,8 @@ class Verb:
     flow: Callable[[Job], None]
     add_options: Callable[[argparse.ArgumentParser], None] = no_options
     output: str = ""
+    suffix: str = ""
+    writes_folder: bool = False
     default_output: Path | None = None
     needs_output: bool = True
     takes_hair: bool = True

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
+from ...exchange.files.atomic import folder_unwritable
 from ...exchange.files.file_set import written_together
 from ...pipeline import Pose
 from ...render.camera import Camera, frame_camera
@@ -183,11 +184,7 @@ def _written_when_done(first: Path) -> Iterator[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise HairloomError(
-            f"nothing can be written into this folder ({error.strerror or error})",
-            place=str(folder),
-            remedy="Choose a folder that you may write to, with space left",
-        ) from error
+        raise folder_unwritable(folder, error.strerror or str(error)) from error
     try:
         with written_together(first) as beside:
             yield beside

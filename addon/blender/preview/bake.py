@@ -23,7 +23,7 @@ from ..bakes.bake_settings import (
     frames_of,
     is_own,
 )
-from ..bakes.cache import CacheWriter, Facts, delete
+from ..bakes.cache import CacheWriter, Facts, check_bake_folder, delete
 from ..bakes.groom_hashes import frame_rate
 from ..bakes.simulated import Simulated
 from ..base.objects import Handle
@@ -117,8 +117,8 @@ class Bake:
                 get one below it each.
 
         Raises:
-            HairloomError: nothing to bake, no frames, no place to write to, or no such weights as
-                children are to grow by.
+            HairloomError: nothing to bake, no frames, no place that can be written to, or no such
+                weights as children are to grow by.
         """
         if not objects:
             raise HairloomError(
@@ -134,6 +134,7 @@ class Bake:
             chosen = choose_folder(obj)
             if folder is None:
                 check_owner(obj, chosen)
+            check_bake_folder(chosen)
             parts.append(_Part(Handle.of(obj), own, chosen))
         return cls(parts)
 

@@ -21,7 +21,7 @@ from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import StrandSet
 from ...strands.resample import arc_length_positions
-from ..files.atomic import atomic_write, check_free_space, unwritable
+from ..files.atomic import as_system_says, atomic_write, check_free_space, unwritable
 from ..files.names import plain_name
 from ..groom import Groom, GroomMotion, points_of
 from ..groom_presets import MIN_WIDTH, UNREAL, GroomPreset, chosen_strands
@@ -65,9 +65,10 @@ def write_groom_alembic(
             traceback.clear_frames(error.__traceback__)
             if not isinstance(error, RuntimeError):
                 raise
-            raise unwritable(path, str(error).strip() or "no reason given") from error
+            why = as_system_says(path, str(error).strip() or "no reason given")
+            raise unwritable(path, why) from error
         if not is_finished(temporary):
-            raise unwritable(path, "the disk may be full")
+            raise unwritable(path, as_system_says(path, "the disk may be full"))
 
 
 def is_finished(path: Path) -> bool:

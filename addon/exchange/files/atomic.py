@@ -15,6 +15,29 @@ from .moving import committing, flush, flush_names, free_name, move
 from .names import check_name, length_remark
 from .stale_temp_files import remove_stale_files, temporary_beside
 
+#: reasons why nothing can be written
+IS_FOLDER = "a folder has this name"
+DISK_FULL = os.strerror(errno.ENOSPC)
+_NO_RIGHTS = os.strerror(errno.EACCES)
+_RIGHTS = "Choose a folder that you may write to"
+_SPACE = "Free some space there, or choose a folder on another disk"
+_REMEDIES = {
+    IS_FOLDER: "Choose another name",
+    DISK_FULL: _SPACE,
+    os.strerror(errno.EDQUOT): _SPACE,
+    os.strerror(errno.EFBIG): "Choose a folder on a disk that takes files of this size",
+    os.strerror(errno.EROFS): _RIGHTS,
+    # on Windows the same is said of a file that is open
+    _NO_RIGHTS: _RIGHTS if os.name == "posix" else f"{_RIGHTS}, and close what uses the file",
+    os.strerror(errno.EPERM): _RIGHTS,
+}
+_ANY_REMEDY = (
+    "Choose a folder that you may write to, with space left, and close other programs that use the "
+    "file"
+)
+#: A disk with fewer free bytes is full: a file system needs some of them itself.
+_FULL = 1 << 16
+
 
 @contextmanager
 def atomic_write(path: Path, *, keeps: bool = True) -> Iterator[Path]:
@@ -83,7 +106,7 @@ def _check_writable(target: Path) -> None:
     with suppress(FileNotFoundError):
         os.stat(target)  # a name that is too long, or below a file
     if target.is_dir():
-        raise IsADirectoryError(errno.EISDIR, "a folder has this name")
+        raise IsADirectoryError(errno.EISDIR, IS_FOLDER)
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_stale_files(target.parent)
     # under another name: nobody else shall know the right one before it is taken
@@ -109,26 +132,67 @@ def check_place(path: Path) -> None:
         HairloomError: a folder has this name, or no file can be made in its folder.
     """
     check_name(path)
-    if path.is_dir():
-        raise unwritable(path, "a folder has this name")
+    why = IS_FOLDER if path.is_dir() else _why_no_file(path)
+    if why:
+        raise unwritable(path, why)
+
+
+def check_folder_place(folder: Path) -> None:
+    """The same for a folder that files are to be written into; it need not be there yet.
+
+    Raises:
+        HairloomError: a file has this name, or no file can be made there.
+    """
+    check_name(folder)
+    if folder.exists() and not folder.is_dir():
+        raise HairloomError(
+            "a file has this name", place=str(folder), remedy="Choose a folder, or a new name"
+        )
+    why = _why_no_file(folder / "file")
+    if why:
+        raise folder_unwritable(folder, why)
+
+
+def folder_unwritable(folder: Path, why: str) -> HairloomError:
+    """The message for a folder that nothing can be written into."""
+    return HairloomError(
+        f"nothing can be written into this folder ({why})",
+        place=str(folder),
+        remedy=remedy_for(why),
+    )
+
+
+def _why_no_file(path: Path) -> str:
+    """Why no file can be made here, nor the folders that it needs; empty where one can."""
     folder = next(each for each in path.absolute().parents if each.exists())
     if not folder.is_dir():
-        raise unwritable(path, f"{folder.name} is no folder")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise unwritable(path, "permission denied")
+        return f"{folder.name} is no folder"
+    return "" if os.access(folder, os.W_OK | os.X_OK) else _NO_RIGHTS
 
 
 def unwritable(path: Path, why: str) -> HairloomError:
-    """The message for a place where nothing can be written."""
+    """The message for a place where nothing can be written.
+
+    why: as the system says it, or as one of the reasons above.
+    """
     remark = length_remark(temporary_beside(path), why)
     return HairloomError(
         f"this file cannot be written ({why}{remark})",
         place=str(path),
-        remedy="Choose a folder with a shorter path"
-        if remark
-        else "Choose a folder that you may write to, with space left, "
-        "and close other programs that use the file",
+        remedy="Choose a folder with a shorter path" if remark else remedy_for(why),
     )
+
+
+def remedy_for(why: str) -> str:
+    """What to do where nothing can be written for this reason."""
+    return _REMEDIES.get(why, _ANY_REMEDY)
+
+
+def as_system_says(path: Path, why: str) -> str:
+    """Why a library could not write beside this path: that the disk is full, where it is, which
+    few of them say; else what the library says."""
+    free = shutil.disk_usage(path.parent).free if path.parent.is_dir() else _FULL
+    return DISK_FULL if free < _FULL else why
 
 
 def check_free_space(path: Path, size: int) -> None:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ...errors import HairloomError
-from .atomic import unwritable
+from .atomic import IS_FOLDER, unwritable
 from .moving import committing, flush, flush_names, free_name, move
 from .names import check_name
 from .stale_temp_files import COMPLETE, remove_stale_files, temporary_beside
@@ -110,7 +110,7 @@ def _put_in_place(staging: Path, folder: Path) -> None:
 
 def _check_and_flush(file: Path, target: Path) -> None:
     if target.is_dir():
-        raise unwritable(target, "a folder has this name")
+        raise unwritable(target, IS_FOLDER)
     if target.exists():
         shutil.copymode(target, file)
     flush(file)

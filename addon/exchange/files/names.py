@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import re
 import unicodedata
@@ -64,8 +65,11 @@ def folder_name(name: str, taken: Container[str] = (), fallback: str = "hair") -
         taken: names that others have, in the form of `as_compared`.
     """
     composed = unicodedata.normalize("NFC", name)
-    plain = no_device(_UNSAFE.sub("_", composed)[:_MAX_LETTERS].strip(". ") or fallback)
-    return _free(plain, taken)
+    plain = _UNSAFE.sub("_", composed).strip(". ") or fallback
+    if len(plain) > _MAX_LETTERS:  # versions of a long name often differ at its end alone
+        digest = hashlib.sha256(plain.encode()).hexdigest()[:8]
+        plain = f"{plain[: _MAX_LETTERS - 9].strip('. ')}_{digest}"
+    return _free(no_device(plain), taken)
 
 
 def no_device(name: str) -> str:

@@ -46,19 +46,23 @@ def is_temporary(name: str) -> bool:
 
 
 def is_stale(path: str | Path, name: re.Match[str]) -> bool:
-    """Whether the writer of this file or folder is known to be gone.
+    """Whether the writer of this file or folder is gone.
+
+    Those of this machine since it was started can be asked for. Others, such as one that a power
+    cut has ended, are taken for gone after a day without a change.
 
     Args:
         name: of it, matched by a pattern with the groups of `mark`.
     """
-    return name["place"] == _here() and not _is_writing(int(name["process"]), path)
+    if name["place"] != _here() or os.name != "posix":
+        return _is_abandoned(path)
+    return not _is_writing(int(name["process"]))
 
 
 def remove_stale_files(folder: Path) -> None:
     """Remove files and folders with such names whose writers were killed.
 
-    Only writers of this machine are known to be gone. A process that has the number of a dead one
-    keeps what that left, for that time.
+    A process that has the number of a dead one keeps what that left, for that time.
 
     Raises:
         OSError: the folder cannot be read, or a complete set of files not be put in place.
@@ -88,12 +92,16 @@ def put_in_place(staging: Path, folder: Path) -> None:
             move(file, target)
 
 
-def _is_writing(process: int, path: str | Path) -> bool:
-    if os.name != "posix":  # there asking for a process by signal 0 would end it
-        try:
-            return time.time() - os.stat(path).st_mtime < _ABANDONED
-        except OSError:  # its writer has just removed it
-            return True
+def _is_abandoned(path: str | Path) -> bool:
+    """Whether nobody has changed it for a long time; a folder changes with each of its files."""
+    try:
+        return time.time() - os.stat(path).st_mtime >= _ABANDONED
+    except OSError:  # its writer has just removed it
+        return False
+
+
+def _is_writing(process: int) -> bool:
+    """Not for Windows, where asking for a process by signal 0 would end it."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ..files.atomic import atomic_write
+from ..files.atomic import as_system_says, atomic_write, unwritable
 from .srgb import srgb_decoded, srgb_encoded
 
 #: The largest side of a texture on every GPU that Blender supports [pixels].
@@ -135,11 +135,7 @@ def write_texture(
         done = target is not None and target.open(str(temporary), spec)
         done = done and target.write_image(np.ascontiguousarray(image))
         if not (done and target.close() and has_its_end(temporary)):
-            raise HairloomError(
-                f"this picture cannot be written ({_reason(target or library)})",
-                place=str(path),
-                remedy="Choose a folder with space left, or another format",
-            )
+            raise unwritable(path, as_system_says(path, _reason(target or library)))
 
 
 def has_its_end(path: Path) -> bool:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
-from ..files.atomic import atomic_write, unwritable
+from ..files.atomic import as_system_says, atomic_write, unwritable
 from ..files.axes import from_z_up
 from ..files.names import plain_name
 from ..groom import Groom, GroomMotion, points_of
@@ -98,7 +98,7 @@ def write_usd(
                 _write_motion(usd, stage, parts, motion, space, path)
             stage.GetRootLayer().Save()
         except usd.Tf.ErrorException as error:
-            raise unwritable(path, summary(error)) from error
+            raise unwritable(path, as_system_says(path, summary(error))) from error
 
 
 def _checked(up: str, scale: float, path: Path) -> UsdSpace:

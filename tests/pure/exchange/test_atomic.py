@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,8 +14,11 @@ import pytest
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files import moving
 from hairloom.addon.exchange.files.atomic import (
+    as_system_says,
     atomic_write,
+    check_folder_place,
     check_place,
+    remedy_for,
     write_bytes_atomic,
     write_text_atomic,
 )
@@ -72,7 +77,7 @@ def test_impossible_places_are_named_before_anything_is_written(tmp_path: Path) 
         with pytest.raises(HairloomError) as caught, atomic_write(target):
             pytest.fail("the block must not run")
         assert caught.value.place == str(target)
-        assert "Choose a folder" in caught.value.remedy
+        assert "Choose a" in caught.value.remedy
     assert names(tmp_path) == ["file", "folder"]
 
 
@@ -84,6 +89,38 @@ def test_a_place_is_refused_before_any_work(tmp_path: Path) -> None:
         assert caught.value.place == str(target)
     check_place(tmp_path / "new" / "folder" / "a.glb")
     assert names(tmp_path) == ["file"], "nothing is written"
+
+
+def test_a_folder_is_refused_before_any_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for target, said in ((tmp_path / "file", "a file has this name"), (Path("/proc/a"), "into")):
+        with (
+            pytest.MonkeyPatch.context() as patched,
+            pytest.raises(HairloomError, match=said) as caught,
+        ):
+            patched.setattr(os, "access", lambda *_: False)  # root may write anywhere
+            check_folder_place(target)
+        assert caught.value.place == str(target)
+    check_folder_place(tmp_path / "new" / "folder")
+    assert names(tmp_path) == ["file"], "nothing is written"
+
+
+def test_a_remedy_fits_the_reason() -> None:
+    assert "space" in remedy_for(os.strerror(errno.ENOSPC))
+    assert "space" not in remedy_for(os.strerror(errno.EACCES))
+    assert "may write to" in remedy_for(os.strerror(errno.EROFS))
+    assert "name" in remedy_for("a folder has this name")
+    assert "space" in (unknown := remedy_for("what a library says")) and "may write" in unknown
+
+
+def test_a_library_that_does_not_say_that_the_disk_is_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, said = tmp_path / "a.usdc", "Couldn't map file: bad arguments to mmap()"
+    assert as_system_says(path, said) == said
+    full = shutil.disk_usage(tmp_path)._replace(free=0)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
+    assert as_system_says(path, said) == os.strerror(errno.ENOSPC)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="file modes are POSIX")

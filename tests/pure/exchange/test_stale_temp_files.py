@@ -67,6 +67,27 @@ def test_what_others_write_or_own_stays(
     assert sorted(tmp_path.iterdir()) == sorted([path, *kept])
 
 
+def test_what_a_power_cut_or_another_machine_left_goes_after_a_day(
+    tmp_path: Path, ended: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A machine that was started again is another place."""
+    with monkeypatch.context() as patched:
+        patched.setattr(stale_temp_files, "_here", lambda: "0" * 8)
+        file, folder = (left_by(os.getpid(), tmp_path / "a.glb", patched, s) for s in (None, ""))
+    file.write_bytes(b"half")
+    folder.mkdir()
+    for name in ("a.glb", "a_base.png", ".complete"):
+        (folder / name).write_bytes(b"new")
+    remove_stale_files(tmp_path)
+    assert file.exists() and folder.exists()
+    for each in (file, folder):
+        then = each.stat().st_mtime - 86_500
+        os.utime(each, (then, then))
+    remove_stale_files(tmp_path)
+    left = {each.name: each.read_bytes() for each in tmp_path.iterdir()}
+    assert left == {"a.glb": b"new", "a_base.png": b"new"}, "a complete set is put in place"
+
+
 def test_where_no_process_can_be_asked_for_a_day_must_pass(
     tmp_path: Path, ended: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

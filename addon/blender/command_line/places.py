@@ -1,0 +1,106 @@
+"""Where a job writes, looked at before any work: no file that it reads, no two results in one, no
+place where nothing can be written, and no name of another kind of file."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+
+from ...errors import HairloomError
+from ...exchange.files.atomic import check_folder_place, check_place
+from .verb import Verb
+
+#: options that name a file to be written, and its suffix where that is not the verb's to say
+_ALSO = {
+    "save_as": ".blend",
+    "slices": ".png",
+    "skin_shadow": ".png",
+    "sheet": ".png",
+    "report": ".json",
+}
+_OUTPUTS = ("output", *_ALSO)
+
+
+def check_report(options: argparse.Namespace) -> None:
+    """The report is written before all else, over what was there.
+
+    Raises:
+        HairloomError: it would replace another kind of file, or one that the job reads.
+    """
+    if options.report is not None:
+        _check_file(Path(options.report), "report", _ALSO["report"], options)
+
+
+def check_outputs(verb: Verb, options: argparse.Namespace) -> None:
+    """Refuse what the job could not write, or should not.
+
+    Raises:
+        HairloomError: naming the option or the file, and what to do.
+    """
+    if getattr(options, "preflight", None):
+        return  # nothing is written
+    for name, suffix in _ALSO.items():
+        path = getattr(options, name, None)
+        if path is not None:
+            _check_file(Path(path), name, suffix, options)
+    output = getattr(options, "output", None)
+    if output is None:
+        return
+    if verb.writes_folder:
+        check_folder_place(output)
+        check_not_read(output, options)
+    else:
+        _check_file(output, "output", verb.suffix, options)
+
+
+def check_not_read(path: Path, options: argparse.Namespace) -> None:
+    """Refuse to write over what the job reads; a scene may be saved over itself.
+
+    Raises:
+        HairloomError: the job reads this file or folder.
+    """
+    is_scene = path.suffix == ".blend" and _is_same(path, getattr(options, "scene", None))
+    if not is_scene and any(_is_same(path, each) for each in named_inputs(options)):
+        raise HairloomError(
+            "the job reads this and would write over it",
+            place=str(path),
+            remedy="Give the result another name, or another folder",
+        )
+
+
+def named_inputs(options: argparse.Namespace) -> set[str]:
+    """The files and folders that are there and that options name, also as NAME=FILE, but for those
+    to be written."""
+    words = []
+    for name, value in vars(options).items():
+        if name not in _OUTPUTS:
+            words += [str(one) for one in (value if isinstance(value, list) else [value])]
+    words += [word.partition("=")[2] for word in words]
+    return {os.path.abspath(word) for word in words if word and os.path.exists(word)}
+
+
+def _check_file(path: Path, name: str, suffix: str, options: argparse.Namespace) -> None:
+    option = "--" + name.replace("_", "-")
+    if suffix and path.suffix.lower() != suffix:
+        raise HairloomError(
+            f"{option} writes a {suffix} file",
+            place=str(path),
+            remedy=f"Choose a name that ends in {suffix}",
+        )
+    check_place(path)
+    check_not_read(path, options)
+    others = [each for each in _OUTPUTS if each != name and getattr(options, each, None)]
+    if any(_is_same(path, getattr(options, each)) for each in others):
+        raise HairloomError(
+            "two results would go into this file", place=str(path), remedy=f"Change {option}"
+        )
+
+
+def _is_same(path: Path, other: str | Path | None) -> bool:
+    """Whether both name one file, also through a link or by another case."""
+    if other is None:
+        return False
+    if os.path.exists(path) and os.path.exists(other):
+        return os.path.samefile(path, other)
+    return os.path.realpath(path) == os.path.realpath(other)

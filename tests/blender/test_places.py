@@ -1,0 +1,108 @@
+"""A verb writes over nothing that it reads, and over no other kind of file; it says so before any
+work."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+from strand_files import hedgehog
+
+from hairloom.addon.blender.command_line import command_line, job_steps
+from hairloom.addon.exchange.groom import Groom
+from hairloom.addon.exchange.tressfx import write_tfx
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+RENDER = ["render", "--scene", "wig.blend", "--groom", "Hair"]
+EXPORT = ["export", "--groom", "hair.tfx"]
+PNG = "--output writes a .png file"
+#: arguments, and what is said of them
+REFUSED = [
+    ([*RENDER, "--output", "wig.blend"], PNG),
+    ([*RENDER, "--output", "kept"], PNG),
+    ([*RENDER, "--output", "a.png", "--slices", "hair.tfx"], "--slices writes a .png file"),
+    ([*RENDER, "--output", "a.png", "--sheet", "./a.png"], "two results would go into this file"),
+    ([*RENDER, "--output", "a.png", "--report", "wig.blend"], "--report writes a .json file"),
+    ([*RENDER, "--output", "hair.tfx/a.png"], "hair.tfx is no folder"),
+    ([*RENDER, "--output", "kept.png"], "a folder has this name"),
+    (["sheet", "--groom", "hair.tfx", "--output", "wig.blend"], PNG),
+    (["turntable", "--groom", "hair.tfx", "--output", "wig.blend"], "a file has this name"),
+    (["simulate", "--groom", "hair.tfx", "--output", "wig.blend"], "a file has this name"),
+    (["bake", "--scene", "wig.blend", "--output", "hair.tfx"], "a file has this name"),
+    (["bake", "--scene", "wig.blend", "--output", "kept"], "other files too, such as notes.txt. "),
+    ([*EXPORT, "--output", "hair.tfx"], "the job reads this"),
+    ([*EXPORT, "--output", "link.tfx"], "the job reads this"),
+    ([*EXPORT, "--output", "a.tfx", "--report", "look.json", "--preset", "look.json"], "reads"),
+]
+
+
+@pytest.fixture
+def folder(
+    sphere: Any, new_hair: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Path:
+    """A scene with hair on a head, a groom, and what else an artist has."""
+    new_hair(sphere)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "wig.blend"))
+    write_tfx(tmp_path / "hair.tfx", Groom(hedgehog()))
+    (tmp_path / "link.tfx").symlink_to("hair.tfx")
+    (tmp_path / "look.json").write_text("{}")
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept" / "notes.txt").write_text("mine")
+    (tmp_path / "kept.png").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(("arguments", "said"), REFUSED, ids=lambda each: " ".join(each)[-40:])
+def test_what_would_be_lost_is_refused_before_any_work(
+    arguments: list[str],
+    said: str,
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(job_steps, "read_inputs", lambda *_: pytest.fail("it has begun"))
+    before = contents(folder)
+    assert command_line.run(arguments) == 1
+    assert said in capsys.readouterr().err
+    assert contents(folder) == before
+
+
+def test_a_report_tells_that_the_output_is_refused(folder: Path) -> None:
+    assert command_line.run([*EXPORT, "--output", "hair.tfx", "--report", "r.json"]) == 1
+    error = json.loads((folder / "r.json").read_text())["error"]
+    assert error["place"] == "hair.tfx" and "another name" in error["remedy"]
+
+
+def test_a_check_of_an_export_needs_no_place(folder: Path) -> None:
+    assert command_line.run([*EXPORT, "--output", "hair.tfx", "--preflight"]) == 0
+
+
+def test_a_scene_that_is_saved_over_itself_is_kept_as_the_version_before(folder: Path) -> None:
+    before = (folder / "wig.blend").read_bytes()
+    bpy.context.preferences.filepaths.save_version = 1
+    grow = ["grow", "--scene", "wig.blend", "--head", "Head", "--set=grow.strand_count=20"]
+    assert command_line.run([*grow, "--output", "wig.blend"]) == 0
+    assert (folder / "wig.blend1").read_bytes() == before != (folder / "wig.blend").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"), [(b"hair", "this is no Blender file"), (None, "Blender cannot open this")]
+)
+def test_what_is_no_scene_is_said_in_a_few_words(
+    content: bytes | None, said: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cut = content or (folder / "wig.blend").read_bytes()[:-5000]
+    (folder / "cut.blend").write_bytes(cut)
+    assert command_line.run(["export", "--scene", "cut.blend", "--output", "a.tfx"]) == 1
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert line.startswith(f"hairloom: cut.blend: {said}") and line.count("cut.blend") == 1
