@@ -111,7 +111,7 @@ def planted() -> dict[str, int]:
 def autosave() -> dict[str, int]:
     """In a Blender with a window that plays hair for two minutes."""
     subprocess.run(["make", "test-ui", "SESSIONS=session_autosave"], cwd=REPOSITORY, check=False)
-    logs = (REPOSITORY / "out" / "window").glob("session_autosave*.log")
+    logs = (REPOSITORY / "out" / "window").glob("autosave-*.log")
     texts = (log.read_text(encoding="utf-8", errors="replace") for log in logs)
     saved = [n for text in texts for n in re.findall(r"autosaves while playing: (\d+)", text)]
     return {"autosaves_while_playing": min(map(int, saved), default=0)}
