@@ -11,6 +11,7 @@ from .arrays import Floats
 from .cards.atlas_settings import AtlasSettings
 from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps, strand_occluder
 from .cards.card_mesh import CardMesh
+from .cards.card_strands import card_strands
 from .cards.follow import CardBinding, bind_cards, card_lines, follow_guides
 from .cards.occlusion import CardOccluder
 from .cards.occlusion_settings import CardOcclusionSettings
@@ -42,18 +43,23 @@ def card_build_steps(
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
     """
-    occlusion = rest_occlusion(rig, settings[AmbientSettings])
     groom = card_groom(rig, settings[StrandSettings])
-    of_points = np.repeat(rig.strands.group, np.diff(rig.strands.offsets))
-    color = own_colors(rig.strands.color, of_points, settings[ShadingSettings])
-    groom = replace(groom, strands=replace(groom.strands, color=color), occlusion=occlusion)
+    strands = groom.strands
+    occlusion = rest_occlusion(rig, settings[AmbientSettings], strands.points)
+    of_points = np.repeat(strands.group, strands.point_counts)
+    color = own_colors(strands.color, of_points, settings[ShadingSettings])
+    groom = replace(
+        groom,
+        strands=replace(strands, color=color),
+        occlusion=occlusion.reshape(strands.strand_count, -1),
+    )
     sections = settings[CardSettings], settings[AtlasSettings], settings[CardOcclusionSettings]
     return card_steps(groom, *sections, alpha_of, others)
 
 
 def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
     """What cards are made from, without the occlusion of the strands."""
-    strands = rig.strands
+    strands = card_strands(rig.strands)
     radius = drawn_radius(strands.radius.reshape(strands.strand_count, -1), drawn)
     return CardGroom(strands, rig.guides, radius, root_normals(rig), rig.head)
 

@@ -401,11 +401,16 @@ def held_strands(rig: Rig, pose: Pose, strands: Floats) -> Floats:
     return strands
 
 
-def rest_occlusion(rig: Rig, settings: AmbientSettings) -> Floats:
-    """Ambient occlusion of every CV at rest, (strand_count, cv_count), 1 where nothing shades."""
+def rest_occlusion(rig: Rig, settings: AmbientSettings, points: Floats | None = None) -> Floats:
+    """Ambient occlusion of every point at rest, (point_count,), 1 where nothing shades.
+
+    Args:
+        points: (n, 3) [m] on the same strands; None is their own.
+    """
     strands, settings = rig.strands, _ambient(rig, settings)
-    occlusion = ambient_occlusion(strands, strands.points, rig.head, settings)
-    return occlusion.reshape(strands.strand_count, -1)
+    return ambient_occlusion(
+        strands, strands.points if points is None else points, rig.head, settings
+    )
 
 
 def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:

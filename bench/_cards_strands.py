@@ -22,6 +22,7 @@ from hairloom.addon.blender.cards.build import (
     card_maps,
     drawn_maps,
 )
+from hairloom.addon.blender.cards.show import without_strands
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.params import SettingsMap
@@ -30,6 +31,7 @@ from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.card_snapshot import CardSnapshot
 from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
+from hairloom.addon.render.strand_layout import StrandLayout
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
@@ -86,9 +88,9 @@ def _made(rig: Rig, width: float) -> MappedCards:
 
 def _cards(rig: Rig, made: MappedCards, look: str, width: float) -> CardSnapshot:
     """The cards in a look, which changes nothing but their maps."""
-    settings, build, grid = _settings(look, width), made.build, rig.strands.grid
+    settings, build = _settings(look, width), made.build
     maps, mesh = card_maps(CardInputs(rig, settings), build, drawn_maps), build.finest
-    area = StrandArea.of(grid, rig.strands.radius.reshape(grid.shape[:2]))
+    area = StrandArea.of(rig.strands)
     shadow = card_shadow_area(mesh.positions, mesh.triangles, mesh.uv, maps.textures.alpha)
     return CardSnapshot(
         mesh,
@@ -110,8 +112,9 @@ def _strands(rig: Rig, look: str, width: float, occlusion: np.ndarray) -> Snapsh
     strands = rig.strands
     assert rig.head is not None
     return Snapshot(
-        strands=strands.grid.astype(np.float32),
-        radius=strands.radius.reshape(strands.strand_count, -1).astype(np.float32),
+        points=strands.points,
+        radius=strands.radius,
+        layout=StrandLayout(strands.offsets),
         occlusion=occlusion,
         meshes=(replace(MeshSnapshot.of(rig.head), is_holdout=True),),
         lights=(Light.sun(SUN, (1.0, 1.0, 1.0), STRENGTH),),
@@ -122,8 +125,7 @@ def _strands(rig: Rig, look: str, width: float, occlusion: np.ndarray) -> Snapsh
 
 
 def _as_cards(hair: Snapshot, cards: CardSnapshot) -> Snapshot:
-    none = np.zeros((0, 2, 3), np.float32)
-    return replace(hair, strands=none, radius=none[..., 0], occlusion=None, color=None, cards=cards)
+    return replace(without_strands(hair), cards=cards)
 
 
 def _drawn(

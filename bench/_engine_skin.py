@@ -88,7 +88,7 @@ def camera(bounds: tuple[np.ndarray, np.ndarray]) -> Camera:
 def drawn(snapshot: Snapshot) -> tuple[np.ndarray, tuple[SkinShadow, ...]]:
     """The face, and the soft shadows that it was drawn with."""
     passes = MeshPass(), StrandPass()
-    low, high = snapshot.strands.min(axis=(0, 1)), snapshot.strands.max(axis=(0, 1))
+    low, high = snapshot.points.min(axis=0), snapshot.points.max(axis=0)
     picture = render_image(
         snapshot,
         camera((low, high)),

@@ -20,7 +20,7 @@ from typing import Any
 import gpu
 import numpy as np
 from _suzanne import suzanne
-from refinement_probes import adaptive_points, read_factors
+from refinement_probes import adaptive_points, point_textures, read_factors
 
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.groom.grow import grow, scalp_density
@@ -251,9 +251,7 @@ def coverage_eighth_difference(shown: Groom) -> float:
 def _factors(shown: Groom, camera: Camera) -> np.ndarray:
     """As the GPU finds them."""
     snapshot = shown.snapshot(BARE)
-    packed = np.concatenate([snapshot.strands, snapshot.radius[..., None]], axis=-1)
-    points = texture_from(packed, "RGBA32F")
-    order = DetailPass().order(snapshot, points, 1, camera, (WIDTH, HEIGHT))
+    order = DetailPass().order(snapshot, point_textures(snapshot), 1, camera, (WIDTH, HEIGHT))
     return read_factors(order, *shown.strands.shape[:2])
 
 

@@ -17,6 +17,7 @@ from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.render.camera import Camera
 from hairloom.addon.render.marschner_textures import MARSCHNER
 from hairloom.addon.render.snapshot import Snapshot
+from hairloom.addon.render.strand_layout import StrandLayout
 from hairloom.addon.render.strand_pass import StrandPass
 from hairloom.addon.shading.lights import three_point_lights
 from hairloom.addon.shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
@@ -67,7 +68,13 @@ def delay_ms(
     By the clock of the calling thread, which other programs do not hold up, and with few strands:
     the tables do not hang on how many there are.
     """
-    few = replace(snapshot, strands=snapshot.strands[:FEW], radius=snapshot.radius[:FEW])
+    cvs = snapshot.layout.cv_count
+    few = replace(
+        snapshot,
+        points=snapshot.points[: FEW * cvs],
+        radius=snapshot.radius[: FEW * cvs],
+        layout=StrandLayout.uniform(FEW, cvs),
+    )
     target, drawn = Target(FEW, FEW), StrandPass()
     MARSCHNER.release()
 

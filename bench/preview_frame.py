@@ -122,7 +122,7 @@ def main() -> None:
             ),
         )
         points = watch.measure("interpolate_ms", lambda m=motion: pipeline.strands_now(rig, m))
-        snapshot = Snapshot(strands=points, radius=radius, lights=lights)
+        snapshot = Snapshot(points=points, radius=radius, lights=lights)
         watch.measure(
             "draw_ms",
             lambda s=snapshot: drawn(lambda: ours.draw(s, camera, WIDTH, HEIGHT)),

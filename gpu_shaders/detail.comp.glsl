@@ -12,10 +12,11 @@ void main()
   if (strand >= strand_count) {
     return;
   }
-  int last = cv_count - 1;
-  vec3 root = texelFetch(cv_points, strand_texel(strand, 0, cv_count), 0).xyz;
+  StrandSpan span = strand_span(strand_spans, strand);
+  int last = span.count - 1;
+  vec3 root = texelFetch(cv_points, span.first, 0).xyz;
   vec3 from = root;
-  vec3 to = texelFetch(cv_points, strand_texel(strand, 1, cv_count), 0).xyz;
+  vec3 to = texelFetch(cv_points, span_texel(span, 1), 0).xyz;
   vec3 before = 2.0 * from - to;  // beyond its ends the strand goes on straight
   vec4 clip_before = seen.view_projection * vec4(before, 1.0);
   vec4 clip_from = seen.view_projection * vec4(from, 1.0);
@@ -27,7 +28,7 @@ void main()
   uint hiding = shades_over(from, (1u << uint(seen.center.w)) - 1u, seen);
 #endif
 
-  int texels = factor_texels(cv_count);
+  int texels = factor_texels(span.count);
   for (int texel = 0; texel < texels; texel++) {
     uvec4 words = uvec4(0x01010101u);
     for (int index = 0; index < FACTORS_IN_TEXEL; index++) {
@@ -37,7 +38,7 @@ void main()
       }
       vec3 after = 2.0 * to - from;
       if (segment + 2 <= last) {
-        after = texelFetch(cv_points, strand_texel(strand, segment + 2, cv_count), 0).xyz;
+        after = texelFetch(cv_points, span_texel(span, segment + 2), 0).xyz;
       }
 #if CULLING == {{culling_hidden}}
       hiding = shades_over(from + (to - before) / 6.0, hiding, seen);
@@ -72,7 +73,7 @@ void main()
       clip_to = clip_after;
       depth += segment + 2 <= last ? clip_after.z : 0.0;
     }
-    imageStore(factors, strand_texel(strand, texel, texels), uintBitsToFloat(words));
+    imageStore(factors, counted_texel(span.factors + texel), uintBitsToFloat(words));
   }
 #if CULLING == {{culling_hidden}}
   total = hiding != 0u ? 0 : total;
@@ -82,5 +83,5 @@ void main()
 #if MODE == {{mode_fixed}}
   depth = 0.0;  // where no strand is left out there is one draw, in which strands keep their order
 #endif
-  imageStore(totals, strand_texel(strand, 0, 1), vec4(float(total), depth / float(cv_count), 0.0, 0.0));
+  imageStore(totals, strand_texel(strand, 0, 1), vec4(float(total), depth / float(span.count), 0.0, 0.0));
 }

@@ -1,19 +1,19 @@
 // A strand's fragment as it waits in a pixel's list: x the next one's number, 0 at the end; y depth as
-// float bits; z the strand; w where along it, in 20 bits, and alpha, in 12.
+// float bits; z the strand; w where along its points, in 20 bits, and alpha, in 12.
 //
 // Holds no resources.
 
-const float LAYER_ALONG = 1048575.0, LAYER_ALPHA = 4095.0;
+const float LAYER_PLACE = 1048575.0, LAYER_ALPHA = 4095.0;
 
-uint packed_layer(float along, float alpha)
+uint packed_layer(float place, float alpha)
 {
-  uint place = uint(clamp(along, 0.0, 1.0) * LAYER_ALONG + 0.5);
-  return (place << 12u) | uint(clamp(alpha, 0.0, 1.0) * LAYER_ALPHA + 0.5);
+  uint steps = uint(clamp(place, 0.0, 1.0) * LAYER_PLACE + 0.5);
+  return (steps << 12u) | uint(clamp(alpha, 0.0, 1.0) * LAYER_ALPHA + 0.5);
 }
 
-float layer_along(uint word)
+float layer_place(uint word)
 {
-  return float(word >> 12u) / LAYER_ALONG;
+  return float(word >> 12u) / LAYER_PLACE;
 }
 
 float layer_alpha(uint word)

@@ -1,5 +1,6 @@
 // Opacity maps, vertex stage: strands as ribbons across the light's rays, straight between CVs and
-// at least a texel wide; what they cover less than that is their weight.
+// at least a texel wide; what they cover less than that is their weight. Stations beyond the tip fall
+// onto it. UNEVEN: points say how far along their strand they are; else they are evenly spaced.
 #include "lib_strand_texel.glsl"
 #include "lib_opacity.glsl"
 
@@ -14,22 +15,26 @@ vec4 map_position(vec3 point)
 
 void main()
 {
-  int station = gl_VertexID >> 1;
   float side = float(gl_VertexID & 1) * 2.0 - 1.0;
-  int strand = min(int((float(gl_InstanceID) + 0.5) * strand_step), strand_count - 1);
-  vec4 cv = texelFetch(cv_points, strand_texel(strand, station, cv_count), 0);
-  int next = min(station + 1, cv_count - 1), last = max(station - 1, 0);
-  vec3 ahead = texelFetch(cv_points, strand_texel(strand, next, cv_count), 0).xyz;
-  vec3 behind = texelFetch(cv_points, strand_texel(strand, last, cv_count), 0).xyz;
+  StrandSpan span = strand_span(strand_spans, first_instance + gl_InstanceID);
+  int last = span.count - 1, station = min(gl_VertexID >> 1, last);
+  vec4 cv = texelFetch(cv_points, span_texel(span, station), 0);
+  vec3 ahead = texelFetch(cv_points, span_texel(span, min(station + 1, last)), 0).xyz;
+  vec3 behind = texelFetch(cv_points, span_texel(span, max(station - 1, 0)), 0).xyz;
+#if UNEVEN
+  float along = texelFetch(cv_looks, span_texel(span, station), 0).y;
+#else
+  float along = float(station) / float(last);
+#endif
 
   vec4 clip = map_position(cv.xyz);
   vec4 from = map_position(behind), to = map_position(ahead);
-  vec2 along = (to.xy * from.w - from.xy * to.w);
-  float size = length(along);
-  vec2 across = size > 1.0e-20 ? vec2(-along.y, along.x) / size : vec2(1.0, 0.0);
+  vec2 course = to.xy * from.w - from.xy * to.w;
+  float size = length(course);
+  vec2 across = size > 1.0e-20 ? vec2(-course.y, course.x) / size : vec2(1.0, 0.0);
 
   float texels = float(opacity.resolution);
-  float taper = mix(1.0, strands.tip_width, float(station) / float(cv_count - 1));
+  float taper = mix(1.0, strands.tip_width, along);
   float half_width = cv.w * strands.fullness * taper *
                      strand_breadth(opacity, light_index, clip.xyw, across);
   float drawn = max(half_width, 0.5);

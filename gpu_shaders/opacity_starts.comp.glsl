@@ -33,12 +33,12 @@ void keep_first_and_last(vec3 place)
 void main()
 {
   ivec2 at = ivec2(gl_GlobalInvocationID.xy);
-  int strand = min(int((float(at.y) + 0.5) * strand_step), strand_count - 1);
-  if (at.x >= cv_count || at.y >= drawn_count) {
+  StrandSpan span = strand_span(strand_spans, first_instance + min(at.y, drawn_count - 1));
+  if (at.x >= span.count || at.y >= drawn_count) {
     return;
   }
-  vec3 root_side = texelFetch(cv_points, strand_texel(strand, max(at.x - 1, 0), cv_count), 0).xyz;
-  vec3 tip_side = texelFetch(cv_points, strand_texel(strand, at.x, cv_count), 0).xyz;
+  vec3 root_side = texelFetch(cv_points, span_texel(span, max(at.x - 1, 0)), 0).xyz;
+  vec3 tip_side = texelFetch(cv_points, span_texel(span, at.x), 0).xyz;
   if (!is_ahead(root_side) || !is_ahead(tip_side)) {
     return;  // it reaches behind the light
   }

@@ -23,10 +23,10 @@ vec3 debug_color()
 #  elif DEBUG != {{debug_detail}}
   return index_color(int(texelFetch(debug_numbers, strand_texel(strand_index, 0, 1), 0).x));
 #  elif ADAPTIVE
-  int segment = clamp(int(strand_along_and_occlusion.x * float(cv_count - 1)), 0, cv_count - 2);
+  StrandSpan span = strand_span(strand_spans, strand_index);
+  int segment = clamp(int(strand_place * float(span.count - 1)), 0, span.count - 2);
   int texel = segment / FACTORS_IN_TEXEL;
-  ivec2 at = strand_texel(strand_index, texel, factor_texels(cv_count));
-  uvec4 words = floatBitsToUint(texelFetch(factors, at, 0));
+  uvec4 words = floatBitsToUint(texelFetch(factors, counted_texel(span.factors + texel), 0));
   return detail_color(unpacked_factor(words, segment - texel * FACTORS_IN_TEXEL));
 #  else
   return detail_color(subdivisions);

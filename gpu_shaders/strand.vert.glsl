@@ -5,6 +5,7 @@
 //
 // COVERED: ribbons as wide as strands are, and as much wider as to reach all pixels that they cover a
 // fraction of. GATHERED: what it takes to find a fragment's looks later, in place of the looks.
+// UNEVEN: points say how far along their strand they are; else they are evenly spaced.
 #include "lib_strand_geometry.glsl"
 #include "lib_detail_packing.glsl"
 #if COVERED
@@ -15,64 +16,70 @@ void main()
 {
   int station = gl_VertexID >> 1;
   float side = float(gl_VertexID & 1) * 2.0 - 1.0;
-  int last = cv_count - 1;
 #if ADAPTIVE
   // x the strand, y its pieces, z factor of its width
   vec4 drawn = texelFetch(order, strand_texel(first_instance + gl_InstanceID, 0, 1), 0);
   int strand = int(drawn.x);
   float widening = drawn.z;
-  int texels = factor_texels(cv_count);
+  StrandSpan span = strand_span(strand_spans, strand);
+  int texels = factor_texels(span.count);
   StationSearch search = start_search(station, int(drawn.y));
   for (int texel = 0; texel < texels; texel++) {
-    search_factors(search, texelFetch(factors, strand_texel(strand, texel, texels), 0));
+    search_factors(search, texelFetch(factors, counted_texel(span.factors + texel), 0));
   }
   int segment = search.found;
   float u = found_u(search);
 #else
   int strand = gl_InstanceID;
   float widening = 1.0;
-  int segment = min(station / subdivisions, last - 1);
+  StrandSpan span = strand_span(strand_spans, strand);
+  int segment = min(station / subdivisions, span.count - 2);
   float u = float(station - segment * subdivisions) / float(subdivisions);
 #endif
 
+  int last = span.count - 1;
+  ivec2 root_side = span_texel(span, segment), tip_side = span_texel(span, segment + 1);
+
   // xyz position, w radius
-  vec4 from = texelFetch(cv_points, strand_texel(strand, segment, cv_count), 0);
-  vec4 to = texelFetch(cv_points, strand_texel(strand, segment + 1, cv_count), 0);
-  vec3 before = texelFetch(cv_points, strand_texel(strand, max(segment - 1, 0), cv_count), 0).xyz;
-  vec3 after = texelFetch(cv_points, strand_texel(strand, min(segment + 2, last), cv_count), 0).xyz;
+  vec4 from = texelFetch(cv_points, root_side, 0);
+  vec4 to = texelFetch(cv_points, tip_side, 0);
+  vec3 before = texelFetch(cv_points, span_texel(span, max(segment - 1, 0)), 0).xyz;
+  vec3 after = texelFetch(cv_points, span_texel(span, min(segment + 2, last)), 0).xyz;
   // beyond its ends the strand goes on straight
   before = segment == 0 ? 2.0 * from.xyz - to.xyz : before;
   after = segment == last - 1 ? 2.0 * to.xyz - from.xyz : after;
 
-#if !GATHERED
-  // x occlusion, y seed
-  vec2 from_look = texelFetch(cv_looks, strand_texel(strand, segment, cv_count), 0).xy;
-  vec2 to_look = texelFetch(cv_looks, strand_texel(strand, segment + 1, cv_count), 0).xy;
+#if UNEVEN || !GATHERED
+  // x occlusion, y fraction of the length
+  vec2 from_look = texelFetch(cv_looks, root_side, 0).xy;
+  vec2 to_look = texelFetch(cv_looks, tip_side, 0).xy;
 #endif
 
   vec3 point = catmull_rom_point(before, from.xyz, to.xyz, after, u);
   vec3 tangent = catmull_rom_tangent(before, from.xyz, to.xyz, after, u);
   float along = (float(segment) + u) / float(last);
+#if DEBUG || GATHERED
+  strand_place = along;
+#endif
+#if UNEVEN
+  along = mix(from_look.y, to_look.y, u);
+#endif
   float radius = mix(from.w, to.w, u) * strands.fullness;
   float taper = mix(1.0, strands.tip_width, along);
 
-#if GATHERED
-  strand_along = along;
-#else
+#if !GATHERED
   strand_point = point;
   strand_tangent = tangent;
   strand_along_and_occlusion = vec2(along, mix(from_look.x, to_look.x, u));
   strand_radius = radius * taper;
-  strand_seed = int(from_look.y);
+  strand_seed = int(texelFetch(strand_seeds, strand_texel(strand, 0, 1), 0).x);
 #  ifdef OTHER_TAU
-  strand_other_tau = mix(texelFetch(cv_other_tau, strand_texel(strand, segment, cv_count), 0),
-                       texelFetch(cv_other_tau, strand_texel(strand, segment + 1, cv_count), 0),
-                       u);
+  strand_other_tau =
+      mix(texelFetch(cv_other_tau, root_side, 0), texelFetch(cv_other_tau, tip_side, 0), u);
 #  endif
 #  ifdef OWN_COLOR
-  strand_own_color = mix(texelFetch(cv_colors, strand_texel(strand, segment, cv_count), 0),
-                         texelFetch(cv_colors, strand_texel(strand, segment + 1, cv_count), 0),
-                         u);
+  strand_own_color =
+      mix(texelFetch(cv_colors, root_side, 0), texelFetch(cv_colors, tip_side, 0), u);
 #  endif
 #endif
 #if DEBUG || GATHERED

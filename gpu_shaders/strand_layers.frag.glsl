@@ -43,7 +43,7 @@ void main()
         imageStore(layer_pixels, ivec2(at % width, at / width), uvec4(pixel.x | (pixel.y << 16u)));
       }
       uint depth = floatBitsToUint(gl_FragCoord.z);
-      uint word = packed_layer(strand_along, alpha);
+      uint word = packed_layer(strand_place, alpha);
       imageStore(layer_nodes, layer_texel(number), uvec4(next, depth, uint(strand_index), word));
     }
     else if (number > MAX_COUNTED) {

@@ -17,20 +17,22 @@ vec3 tangent_bend(vec3 before, vec3 from, vec3 to, vec3 after, float u, vec3 tan
   return turned * segments / ahead;
 }
 
-vec3 layer_radiance(int strand, float along)
+// `place` is 0 at the root's point and 1 at the tip's, and grows by as much from point to point.
+vec3 layer_radiance(int strand, float place)
 {
-  int last = cv_count - 1;
-  int segment = min(int(along * float(last)), last - 1);
-  float u = along * float(last) - float(segment);
-  vec4 root_side = texelFetch(cv_points, strand_texel(strand, segment, cv_count), 0);
-  vec4 tip_side = texelFetch(cv_points, strand_texel(strand, segment + 1, cv_count), 0);
-  vec3 from = root_side.xyz, to = tip_side.xyz;
-  vec3 before = texelFetch(cv_points, strand_texel(strand, max(segment - 1, 0), cv_count), 0).xyz;
-  vec3 after = texelFetch(cv_points, strand_texel(strand, min(segment + 2, last), cv_count), 0).xyz;
+  StrandSpan span = strand_span(strand_spans, strand);
+  int last = span.count - 1;
+  int segment = min(int(place * float(last)), last - 1);
+  float u = place * float(last) - float(segment);
+  ivec2 root_side = span_texel(span, segment), tip_side = span_texel(span, segment + 1);
+  vec4 from_cv = texelFetch(cv_points, root_side, 0), to_cv = texelFetch(cv_points, tip_side, 0);
+  vec3 from = from_cv.xyz, to = to_cv.xyz;
+  vec3 before = texelFetch(cv_points, span_texel(span, max(segment - 1, 0)), 0).xyz;
+  vec3 after = texelFetch(cv_points, span_texel(span, min(segment + 2, last)), 0).xyz;
   before = segment == 0 ? 2.0 * from - to : before;
   after = segment == last - 1 ? 2.0 * to - from : after;
-  vec2 from_look = texelFetch(cv_looks, strand_texel(strand, segment, cv_count), 0).xy;
-  vec2 to_look = texelFetch(cv_looks, strand_texel(strand, segment + 1, cv_count), 0).xy;
+  vec2 from_look = texelFetch(cv_looks, root_side, 0).xy;
+  vec2 to_look = texelFetch(cv_looks, tip_side, 0).xy;
   vec3 point = catmull_rom_point(before, from, to, after, u);
   vec3 tangent = catmull_rom_tangent(before, from, to, after, u);
   vec3 bend = vec3(0.0);
@@ -38,20 +40,20 @@ vec3 layer_radiance(int strand, float along)
   bend = tangent_bend(before, from, to, after, u, tangent);
 #endif
   float occlusion = mix(from_look.x, to_look.x, u);
-  float radius = mix(root_side.w, tip_side.w, u) * strands.fullness *
+  float along = place;
+#if UNEVEN
+  along = mix(from_look.y, to_look.y, u);
+#endif
+  float radius = mix(from_cv.w, to_cv.w, u) * strands.fullness *
                  mix(1.0, strands.tip_width, along);
   vec4 between = vec4(0.0), own = vec4(0.0);
 #ifdef OTHER_TAU
-  between = mix(texelFetch(cv_other_tau, strand_texel(strand, segment, cv_count), 0),
-                texelFetch(cv_other_tau, strand_texel(strand, segment + 1, cv_count), 0),
-                u);
+  between = mix(texelFetch(cv_other_tau, root_side, 0), texelFetch(cv_other_tau, tip_side, 0), u);
 #endif
 #ifdef OWN_COLOR
-  own = mix(texelFetch(cv_colors, strand_texel(strand, segment, cv_count), 0),
-            texelFetch(cv_colors, strand_texel(strand, segment + 1, cv_count), 0),
-            u);
+  own = mix(texelFetch(cv_colors, root_side, 0), texelFetch(cv_colors, tip_side, 0), u);
 #endif
-  uint seed = uint(from_look.y);
+  uint seed = uint(texelFetch(strand_seeds, strand_texel(strand, 0, 1), 0).x);
   return strand_radiance(point, tangent, bend, radius, along, occlusion, between, own, seed);
 }
 
@@ -63,6 +65,6 @@ void main()
   }
   ivec2 texel = layer_texel(imageLoad(layer_seen, place).x);
   uvec4 node = imageLoad(layer_nodes, texel);
-  vec3 light = uintBitsToFloat(node.y) * layer_radiance(int(node.z), layer_along(node.w));
+  vec3 light = uintBitsToFloat(node.y) * layer_radiance(int(node.z), layer_place(node.w));
   imageStore(layer_nodes, texel, uvec4(node.x, floatBitsToUint(light)));
 }

@@ -77,7 +77,7 @@ def main(folder: Path) -> None:
     studio, lights = of_addon("blender.pictures.studio"), of_addon("shading.lights")
     presets = of_addon("blender.properties.presets")
     hair = wig()
-    points = hair.strands.reshape(-1, 3)
+    points = hair.points
     box = points.min(axis=0), points.max(axis=0)
 
     def picture(

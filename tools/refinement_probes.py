@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,12 +37,22 @@ def adaptive_points(points: Floats, factors: Ints) -> tuple[Floats, Ints]:
 
 def read_factors(order: DetailOrder, strand_count: int, cv_count: int) -> Ints:
     """The factors of an uneven order, read back, (strand_count, cv_count - 1)."""
-    from hairloom.addon.render.detail_pass import factor_texels
-    from hairloom.addon.render.strand_layout import from_strand_rows
+    from hairloom.addon.render.strand_layout import FACTORS_IN_TEXEL
     from hairloom.addon.render.textures import texture_to_array
 
-    texels = from_strand_rows(
-        texture_to_array(order.factors), strand_count, factor_texels(cv_count)
-    )
-    factors = np.ascontiguousarray(texels).view(np.uint8).reshape(strand_count, -1)
+    texels = (cv_count - 2) // FACTORS_IN_TEXEL + 1
+    found = texture_to_array(order.factors).reshape(-1, 4)[: strand_count * texels]
+    factors = np.ascontiguousarray(found).view(np.uint8).reshape(strand_count, -1)
     return factors[:, : cv_count - 1].astype(np.int32)
+
+
+def point_textures(snapshot: Any) -> dict[str, Any]:
+    """The textures from which detail is found, as the draw of a snapshot makes them."""
+    from hairloom.addon.render.strand_curves import spans_texture
+    from hairloom.addon.render.textures import texture_from
+
+    packed = np.concatenate([snapshot.points, snapshot.radius[:, None]], axis=1)
+    return {
+        "cv_points": texture_from(snapshot.layout.pixels(packed), "RGBA32F"),
+        "strand_spans": spans_texture(snapshot.layout),
+    }

@@ -1,11 +1,12 @@
 """How finely each strand is drawn in one view, and which are: computed on the GPU.
 
-Two steps, with textures in the layout of strand_layout.strand_rows:
+Two steps, with a texel a strand as strand_layout.strand_rows has them, but for the factors:
 
     cv_points ----> detail ----> factors, totals             one invocation a strand
     totals -------> numpy -----> order, classes              read back, 8 bytes a strand
 
-    factors RGBA32F: the pieces of sixteen segments as bytes, see lib_detail_packing.glsl
+    factors RGBA32F: the pieces of sixteen segments as bytes, see lib_detail_packing.glsl; those of
+                     a strand begin where its span says
     totals  RG32F:   x pieces of the whole strand, 0 where it is not drawn; y its mean depth
     order   RGBA32F: x a strand that is drawn, y its pieces, z factor of its width; those of a class
                      lie side by side
@@ -13,6 +14,7 @@ Two steps, with textures in the layout of strand_layout.strand_rows:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,12 +27,13 @@ from ..refine.culling import shades_of
 from ..refine.detail import PictureView
 from ..refine.settings import DetailSettings
 from ..refine.thinning import Thinning, thinning, width_factor
+from ..strands.arc_length import steps
 from .camera import Camera
 from .detail_classes import DetailClass, detail_classes
 from .shader_program import ShaderRecipe, program
 from .shader_source import DETAIL_CHOICES, SHADE_CAPACITY
 from .snapshot import Snapshot
-from .strand_layout import FACTORS_IN_TEXEL, from_strand_rows, strand_rows, strand_rows_size
+from .strand_layout import StrandLayout, from_strand_rows, strand_rows, strand_rows_size
 from .textures import UniformBlock, texture_from, texture_to_array
 
 #: How far a strand that covers pixels in part is drawn beyond its edge [pixels].
@@ -46,9 +49,9 @@ def detail_recipe(mode: str, culling: str) -> ShaderRecipe:
         structs=("struct_detail.glsl",),
         settings=(DetailSettings,),
         blocks=_BLOCKS,
-        textures=(("FLOAT_2D", "cv_points"),),
+        textures=(("FLOAT_2D", "cv_points"), ("FLOAT_2D", "strand_spans")),
         images=(("RGBA32F", "factors"), ("RG32F", "totals")),
-        integers=("cv_count", "strand_count"),
+        integers=("strand_count",),
         group_size=(64, 1),
         defines=(
             ("MODE", DETAIL_CHOICES["mode"].index(mode)),
@@ -85,13 +88,18 @@ class DetailPass:
         self.release()
 
     def order(
-        self, snapshot: Snapshot, cv_points: Any, serial: int, camera: Camera, size: tuple[int, int]
+        self,
+        snapshot: Snapshot,
+        points: Mapping[str, Any],
+        serial: int,
+        camera: Camera,
+        size: tuple[int, int],
     ) -> DetailOrder:
         """What is to be drawn; computed only where something is new since the last time.
 
         Args:
-            cv_points: texture of the snapshot's CVs, see strand_pass.py.
-            serial: grows whenever that texture is another one or is written.
+            points: the textures cv_points and strand_spans of the snapshot, see strand_pass.py.
+            serial: grows whenever one of them is another one or is written.
             size: width and height of the final picture [pixels].
 
         Raises:
@@ -102,13 +110,14 @@ class DetailPass:
         shades = _shades(snapshot, view, thinned.widening)
         culling = "none" if snapshot.detail.culling == "hidden" else snapshot.detail.culling
         culling = "hidden" if len(shades) else culling
-        if snapshot.detail.mode == "fixed" and culling == "none" and thinned == Thinning():
+        is_even = snapshot.detail.mode == "fixed" and bool(snapshot.layout.cv_count)
+        if is_even and culling == "none" and thinned == Thinning():
             return _even_order(snapshot)
         seen = _view_values(view, camera, snapshot.root_center, shades)
         asked = (serial, seen.tobytes(), snapshot.detail, thinned, self._extent)
         if self._order is None or self._asked != asked:
             recipe = detail_recipe(snapshot.detail.mode, culling)
-            factors, totals = self._computed(recipe, snapshot, cv_points, seen)
+            factors, totals = self._computed(recipe, snapshot, points, seen)
             self._order = _ordered(factors, totals, _widths(snapshot, thinned))
             self._asked = asked
         return self._order
@@ -126,29 +135,29 @@ class DetailPass:
         return self._extent.thinning(snapshot, view)
 
     def _computed(
-        self, recipe: ShaderRecipe, snapshot: Snapshot, cv_points: Any, seen: Floats
+        self, recipe: ShaderRecipe, snapshot: Snapshot, points: Mapping[str, Any], seen: Floats
     ) -> tuple[Any, Floats]:
         """The texture of factors, and pieces and depth of each strand (strand_count, 2)."""
-        count, cv_count = snapshot.strand_count, snapshot.cv_count
-        factors, totals = self._targets(count, factor_texels(cv_count))
+        count = snapshot.strand_count
+        factors, totals = self._targets(snapshot.layout)
         shader = program(recipe)
         shader.bind(
             blocks={
                 "seen": self._blocks["seen"].holding(seen),
                 "detail": self._blocks["detail"].holding(struct_values(snapshot.detail)),
             },
-            textures={"cv_points": cv_points},
+            textures={name: points[name] for _, name in recipe.textures},
             images={"factors": factors, "totals": totals},
-            integers={"cv_count": cv_count, "strand_count": count},
+            integers={"strand_count": count},
         )
         across, _ = recipe.group_size
         gpu.compute.dispatch(shader.shader, -(-count // across), 1, 1)
         gpu.shader.unbind()
         return factors, from_strand_rows(texture_to_array(totals), count, 1).reshape(count, 2)
 
-    def _targets(self, strand_count: int, texels: int) -> tuple[Any, Any]:
+    def _targets(self, layout: StrandLayout) -> tuple[Any, Any]:
         """Textures that the shader writes, those of the last time if they fit."""
-        sizes = [strand_rows_size(strand_count, columns) for columns in (texels, 1)]
+        sizes = [layout.factor_size, strand_rows_size(layout.strand_count, 1)]
         if self._order is not None:
             kept = self._order.factors, self._totals
             if [(texture.width, texture.height) for texture in kept] == sizes:
@@ -176,10 +185,10 @@ class GroomExtent:
     @classmethod
     def of(cls, snapshot: Snapshot) -> GroomExtent:
         assert snapshot.rank is not None
-        points, roots = snapshot.strands, snapshot.strands[:, 0].mean(axis=0, dtype=np.float64)
-        length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(dtype=np.float64)
-        low, high = points.min(axis=(0, 1)) - roots, points.max(axis=(0, 1)) - roots
-        return cls(snapshot.rank, low, high, float(length), float(snapshot.radius.mean()))
+        points, roots = snapshot.points, snapshot.roots.mean(axis=0, dtype=np.float64)
+        length = float(steps(points, snapshot.layout.offsets).sum())
+        low, high = points.min(axis=0) - roots, points.max(axis=0) - roots
+        return cls(snapshot.rank, low, high, length, float(snapshot.radius.mean()))
 
     def thinning(self, snapshot: Snapshot, view: PictureView) -> Thinning:
         """How the groom is thinned out where it is now."""
@@ -194,15 +203,10 @@ class GroomExtent:
         )
 
 
-def factor_texels(cv_count: int) -> int:
-    """How many texels the factors of a strand take; as in lib_detail_packing.glsl."""
-    return (cv_count - 2) // FACTORS_IN_TEXEL + 1
-
-
 def _even_order(snapshot: Snapshot) -> DetailOrder:
     """All strands in the pieces of the fixed mode, which no pass has to find out."""
     subdivisions = min(snapshot.detail.subdivisions, snapshot.detail.max_subdivisions)
-    pieces = (snapshot.cv_count - 1) * subdivisions
+    pieces = (snapshot.layout.cv_count - 1) * subdivisions
     drawn = DetailClass(pieces, 0, snapshot.strand_count)
     return DetailOrder(None, None, (drawn,), pieces * snapshot.strand_count, subdivisions)
 

@@ -16,7 +16,8 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..groom.nearest import nearest_points
-from ..strands import Surface
+from ..strands import StrandSet, Surface
+from ..strands.resample import resample
 
 #: directions around the hair that are tried
 _AROUND = 16
@@ -45,6 +46,8 @@ _FACE_REACH = 1.35
 _LOWEST = 0.03
 #: points that stand for hair, roots and body, and cells across what is seen
 _HAIR, _ROOTS, _BODY, _CELLS = 20_000, 3_000, 16_000, 56
+#: and of each strand whose points are where its shape needs them
+_CVS = 16
 
 
 @dataclass(frozen=True)
@@ -64,12 +67,8 @@ class GoodSide:
         return np.array([turned[0], turned[1], height])
 
 
-def good_side(strands: Floats, body: Surface | None) -> GoodSide:
-    """Of hair at rest on its body.
-
-    Args:
-        strands: (strand_count, cv_count, 3) [m], world space, root first.
-    """
+def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
+    """Of hair at rest on its body, world space."""
     seen = _Seen.of(strands, body)
     angles = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
     level = np.stack([np.sin(angles), -np.cos(angles), np.zeros(_AROUND)], axis=1)
@@ -129,9 +128,10 @@ class _Seen:
     cell: float
 
     @classmethod
-    def of(cls, strands: Floats, body: Surface | None) -> _Seen:
+    def of(cls, strands: StrandSet, body: Surface | None) -> _Seen:
         # without roots, which are seen from both sides of a sheet
-        hair: Floats = _some(strands[:, 1:].reshape(-1, 3), _HAIR).astype(np.float64)
+        grid = _evenly_spaced(strands).grid
+        hair: Floats = _some(grid[:, 1:].reshape(-1, 3), _HAIR).astype(np.float64)
         middle = 0.5 * (hair.min(axis=0) + hair.max(axis=0))
         radius = max(float(np.linalg.norm(hair - middle, axis=1).max()), 1e-30)
         points: list[Floats] = [hair]
@@ -139,7 +139,7 @@ class _Seen:
         if body is not None and len(body.triangles):
             places = _places_on(body, middle, 2.0 * radius)
             points.append(places)
-            kind.append(np.where(_is_face(places, strands[:, 0].astype(np.float64)), 2, 0))
+            kind.append(np.where(_is_face(places, strands.roots.astype(np.float64)), 2, 0))
         return cls(np.concatenate(points) - middle, np.concatenate(kind), 2.0 * radius / _CELLS)
 
     def areas(self, direction: Floats) -> tuple[int, int]:
@@ -155,7 +155,15 @@ class _Seen:
         return int((nearest == 1).sum()), int((nearest == 2).sum())
 
 
-def _some(points: Floats, count: int) -> Floats:
+def _evenly_spaced(strands: StrandSet) -> StrandSet:
+    """The same hair in points that say how long it is; few strands will do."""
+    if strands.is_uniform:
+        return strands
+    few = strands.take(_some(np.arange(strands.strand_count), -(-_HAIR // _CVS)))
+    return resample(few, _CVS)
+
+
+def _some[Array: (Floats, Ints)](points: Array, count: int) -> Array:
     """Evenly many of the points, or all."""
     return points[:: -(-len(points) // count)]
 

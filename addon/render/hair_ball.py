@@ -8,7 +8,7 @@ from .snapshot import Snapshot
 
 
 class HairBall:
-    """Keeps what it has found for one array of strands, since that takes time."""
+    """Keeps what it has found for one array of points, since that takes time."""
 
     def __init__(self) -> None:
         self._extent: tuple[Floats | None, Ball | float] = (None, 0.0)
@@ -17,8 +17,8 @@ class HairBall:
         """Around all strands; of those on the GPU around all places that they can get to."""
         device = snapshot.device_points
         kept, found = self._extent
-        if kept is not snapshot.strands or isinstance(found, float) != (device is not None):
-            strands = snapshot.strands
-            found = ball_around(strands) if device is None else reach_of(strands)
-            self._extent = strands, found
+        if kept is not snapshot.points or isinstance(found, float) != (device is not None):
+            points, offsets = snapshot.points, snapshot.layout.offsets
+            found = ball_around(points) if device is None else reach_of(points, offsets)
+            self._extent = points, found
         return stepped_ball(snapshot.root_center, found) if isinstance(found, float) else found

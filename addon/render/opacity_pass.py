@@ -1,4 +1,8 @@
-"""Draws strands into opacity maps, see opacity_maps.py: ribbons of one piece a segment."""
+"""Draws strands into opacity maps, see opacity_maps.py: ribbons of one piece a segment.
+
+Strands of about as many points are one draw, see detail_classes.py. So programs take the spans of
+the strands that are drawn, in the order of these classes.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +11,23 @@ from dataclasses import dataclass
 from typing import Any
 
 import gpu
+import numpy as np
 
 from ..params.glsl import struct_values
 from ..shading.lights import Light
 from ..shading.settings import StrandSettings
 from ..shading.volume.light_frame import Ball
 from ..shading.volume.settings import VolumeSettings
+from .detail_classes import DetailClass, detail_classes
 from .feature_programs import UniformBlocks, bound
 from .opacity_maps import OpacityDrawing, OpacityMaps
+from .ribbons import Ribbons
 from .shader_feature import ShaderFeature
 from .shader_program import ShaderRecipe
 from .snapshot import Caster
+from .strand_curves import curves_feature
+from .strand_layout import StrandLayout, strand_rows
+from .textures import texture_from
 
 _LAYERS_RECIPE = ShaderRecipe(
     name="opacity",
@@ -25,44 +35,86 @@ _LAYERS_RECIPE = ShaderRecipe(
     fragment="opacity.frag.glsl",
     structs=("struct_opacity.glsl",),
     settings=(StrandSettings,),
+    integers=("first_instance",),
+    numbers=(("FLOAT", "strand_step"),),
     varyings=(("smooth", "FLOAT", "strand_depth"), ("flat", "FLOAT", "strand_weight")),
-    defines=(("DEEP", 0),),
+    defines=(("DEEP", 0), ("UNEVEN", 0)),
 )
 _STARTS_RECIPE = ShaderRecipe(
     name="opacity_starts",
     compute="opacity_starts.comp.glsl",
     structs=("struct_opacity.glsl",),
     images=(("R32UI", "starts", "READ_WRITE"),),
-    integers=("drawn_count", "map_index"),
+    integers=("drawn_count", "map_index", "first_instance"),
 )
 
 
 @dataclass(frozen=True, eq=False)
+class _Casting:
+    """Strands that throw the shadow of all.
+
+    layout: of all strands. count: how many of them.
+    spans: their texture strand_spans, in the order in which they are drawn. classes: the draws.
+    """
+
+    layout: StrandLayout
+    count: int
+    spans: Any
+    classes: tuple[DetailClass, ...]
+
+    @classmethod
+    def of(cls, layout: StrandLayout, count: int) -> _Casting:
+        evenly = (np.arange(count) + 0.5) * (layout.strand_count / count)
+        chosen = np.minimum(evenly.astype(np.int64), layout.strand_count - 1)
+        classes: tuple[DetailClass, ...] = (DetailClass(layout.cv_count - 1, 0, count),)
+        if not layout.cv_count:
+            order, classes = detail_classes(layout.counts[chosen] - 1, np.zeros(count))
+            chosen = chosen[order]
+        spans = texture_from(strand_rows(layout.spans[chosen][:, None]), "RGBA32F")
+        return cls(layout, count, spans, classes)
+
+
+@dataclass(frozen=True, eq=False)
 class _Strands:
-    """Strands on the GPU. drawn: how many of them throw the shadow of all. strip: one of them."""
+    """Strands on the GPU. curves: where they are. casting: those that are drawn."""
 
     state: Hashable
-    feature: ShaderFeature
+    curves: ShaderFeature
     settings: ShaderFeature
     blocks: UniformBlocks
-    cv_count: int
-    drawn: int
-    strip: Any
+    casting: _Casting
+    ribbons: Ribbons
 
     def draw_starts(self, maps: OpacityMaps, number: int, place: ShaderFeature) -> None:
+        integers = {"map_index": number, "drawn_count": 0, "first_instance": 0}
         shader = bound(
             _STARTS_RECIPE,
-            [place, self.feature],
+            [place, self.curves],
             self.blocks,
             images={"starts": maps.starts},
-            integers={"map_index": number, "drawn_count": self.drawn},
+            integers=integers,
         )
-        gpu.compute.dispatch(shader.shader, -(-self.cv_count // 8), -(-self.drawn // 8), 1)
+        for drawn in self.casting.classes:
+            shader.shader.uniform_int("drawn_count", drawn.count)
+            shader.shader.uniform_int("first_instance", drawn.first)
+            cvs = drawn.capacity + 1
+            gpu.compute.dispatch(shader.shader, -(-cvs // 8), -(-drawn.count // 8), 1)
         gpu.shader.unbind()
 
     def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
-        shader = bound(_LAYERS_RECIPE, [*features, self.feature, self.settings], self.blocks)
-        self.strip.draw_instanced(shader.shader, instance_start=0, instance_count=self.drawn)
+        casting = self.casting
+        shader = bound(
+            _LAYERS_RECIPE,
+            [*features, self.curves, self.settings],
+            self.blocks,
+            integers={"first_instance": 0},
+            numbers={"strand_step": casting.layout.strand_count / casting.count},
+        )
+        for drawn in casting.classes:
+            shader.shader.uniform_int("first_instance", drawn.first)
+            self.ribbons.of(drawn.capacity).draw_instanced(
+                shader.shader, instance_start=0, instance_count=drawn.count
+            )
 
 
 class OpacityPass:
@@ -74,7 +126,8 @@ class OpacityPass:
     def release(self) -> None:
         """Release everything on the GPU; the next draw makes it again."""
         self._drawing, self._blocks = OpacityDrawing(), UniformBlocks()
-        self._strip: tuple[int, Any] = (0, None)
+        self._ribbons = Ribbons()
+        self._casting: _Casting | None = None
 
     @property
     def note(self) -> str:
@@ -85,41 +138,31 @@ class OpacityPass:
         self,
         points: Any,
         serial: int,
-        shape: tuple[int, int],
+        layout: StrandLayout,
         ball: Ball,
         lights: Sequence[Light],
         settings: VolumeSettings,
         strands: StrandSettings,
         casters: tuple[Caster, ...] = (),
         spacing: float = 0.0,
+        looks: Any = None,
     ) -> OpacityMaps:
         """The maps of a frame.
 
         Args:
-            points: texture of CVs, xyz [m, world] and radius, in the layout of strand_rows.
+            points: texture of CVs, xyz [m, world] and radius, in this layout.
             serial: another number whenever the points are others.
-            shape: strand_count, cv_count.
+            looks: texture cv_looks where points are unevenly spaced, see strand_pass.py.
             ball, lights, casters, spacing: as in OpacityDrawing.maps.
         """
-        strand_count, cv_count = shape
-        drawn = max(round(strand_count * settings.strand_fraction), 1)
-        feature = ShaderFeature(
-            textures={"cv_points": ("FLOAT_2D", points)},
-            integers={"cv_count": cv_count, "strand_count": strand_count},
-            numbers={"strand_step": ("FLOAT", strand_count / drawn)},
-        )
+        count = max(round(layout.strand_count * settings.strand_fraction), 1)
+        casting = self._casting
+        if casting is None or casting.layout is not layout or casting.count != count:
+            casting = self._casting = _Casting.of(layout, count)
+        curves = curves_feature(points, casting.spans, looks)
         look = ShaderFeature(
             blocks={"strands": ("StrandSettings", struct_values(strands.as_drawn))}
         )
-        state, strip = (serial, shape, strands), self._ribbon(cv_count)
-        hair = _Strands(state, feature, look, self._blocks, cv_count, drawn, strip)
+        state = serial, layout, strands
+        hair = _Strands(state, curves, look, self._blocks, casting, self._ribbons)
         return self._drawing.maps(hair, ball, lights, settings, casters, spacing)
-
-    def _ribbon(self, cv_count: int) -> Any:
-        """A strip of vertices without attributes: two a CV."""
-        if self._strip[0] != cv_count:
-            layout = gpu.types.GPUVertFormat()
-            layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-            vertices = gpu.types.GPUVertBuf(layout, 2 * cv_count)
-            self._strip = cv_count, gpu.types.GPUBatch(type="TRI_STRIP", buf=vertices)
-        return self._strip[1]

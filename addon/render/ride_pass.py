@@ -37,7 +37,7 @@ from ..strands import StrandSet, Surface
 from .hold_pass import HoldPass
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .snapshot import DevicePoints
-from .strand_layout import from_strand_rows, strand_rows, strand_rows_size
+from .strand_layout import StrandLayout, from_strand_rows, strand_rows, strand_rows_size
 from .textures import texture_from, texture_to_array
 
 ROOTS_RECIPE = ShaderRecipe(
@@ -103,7 +103,7 @@ class RidePass:
         self._held = None if holds is None else HoldPass(holds, strands.grid)
         self._holds = None if head is None else RootHolds(strands, head)
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
-        self.points = DevicePoints((strands.strand_count, self._cv_count))
+        self.points = DevicePoints(StrandLayout(strands.offsets))
         self.release()
         released_with_shaders(self)
         released_with_shaders(self.points)  # a snapshot may outlive this pass

@@ -67,8 +67,8 @@ class SceneSnapshot:
 
     def unlit_by_hair(self) -> Snapshot:
         """Nothing but light, for meshes that no hair shades."""
-        none = np.zeros((0, 2, 3), np.float32)
-        return Snapshot(none, none[..., 0], lights=self.lights, ambient=self.ambient)
+        none = np.zeros((0, 3), np.float32)
+        return Snapshot(none, none[:, 0], lights=self.lights, ambient=self.ambient)
 
 
 def shaded_by(meshes: tuple[MeshSnapshot, ...], centers: Floats) -> list[int]:

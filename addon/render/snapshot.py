@@ -23,11 +23,14 @@ from ..shading.volume.settings import VolumeSettings
 from ..strands import Surface
 from .card_snapshot import CardSnapshot
 from .shader_source import DEBUG_VIEWS
+from .strand_layout import NO_STRANDS, StrandLayout
 
 type Color = tuple[float, float, float]
 
 #: how meshes that do not cover all are drawn
 TRANSPARENCIES = ("opaque", "hashed", "blended")
+#: what a snapshot has of each point, and its channels
+_OF_POINTS = {"points": (3,), "radius": (), "along": (), "occlusion": (), "color": (3,)}
 SKIN: Color = (0.55, 0.38, 0.31)
 #: an index of refraction of 1.4 gives ((1.4 - 1) / (1.4 + 1))^2
 SKIN_SPECULAR, SKIN_ROUGHNESS = 0.028, 0.45
@@ -127,14 +130,14 @@ class DevicePoints:
     Whoever computes them writes the next moment into the same texture, so a picture shows them as
     they are when it is drawn, and lets go of it when the GPU goes.
 
-    shape: (strand_count, cv_count).
-    texture: RGBA32F in the layout of strand_layout.strand_rows, xyz position [m, world] and w
-        radius [m]; None before the first moment and after the release.
+    layout: where they lie in the texture.
+    texture: RGBA32F, xyz position [m, world] and w radius [m]; None before the first moment and
+        after the release.
     center: (3,) [m], the middle of all roots.
     serial: grows whenever the texture is written, so that others know what is out of date.
     """
 
-    shape: tuple[int, int]
+    layout: StrandLayout
     texture: Any = None
     center: Floats = field(default_factory=lambda: np.zeros(3, np.float32))
     serial: int = 0
@@ -148,19 +151,25 @@ class DevicePoints:
 class Snapshot:
     """One moment of hair, the meshes around it, and the light.
 
-    strands: (strand_count, cv_count, 3) float32 [m], world space, root first.
-    radius: (strand_count, cv_count) float32 [m].
+    Strands have as many points as each needs. What belongs to points is taken as a grid as well,
+    (strand_count, cv_count, ...), of strands that have equally many; it is held point by point.
+
+    points: (point_count, 3) float32 [m], world space, strand after strand, root first.
+    radius: (point_count,) float32 [m].
+    layout: which points each strand has; of a grid it follows. Hand the same one on.
+    along: (point_count,) the fraction of its strand's length at which each point lies at rest, 0 at
+        the root and 1 at the tip; None where points are evenly spaced.
     extinction, spacing: factor on the light that a strand blocks, and how far apart [m] the strands
         are whose hairs fill the space between them, see `groom.widths.Widths`.
-    occlusion: (strand_count, cv_count) ambient light that arrives, 0 to 1; None is 1 everywhere.
-    color: (strand_count, cv_count, 3) scene-linear, the strands' own; None is the look's, and so is
-        NaN, all along a strand. Counts where the look wants it, see drawn_strands.drawn_color.
+    occlusion: (point_count,) ambient light that arrives, 0 to 1; None is 1 everywhere.
+    color: (point_count, 3) scene-linear, the strands' own; None is the look's, and so is NaN, all
+        along a strand. Counts where the look wants it, see drawn_strands.drawn_color.
     seed: (strand_count,) whole numbers below 2^24, which the noise of a strand depends on; None is
         each strand's index.
     ambient: the world's colour [W/(m^2 sr)].
     volume_center: (3,) [m], what strands look away from; None is the middle of all roots.
     device_points: the same strands where the GPU has moved them; they are drawn in place of
-        `strands` and `radius`, which then only say how many there are and how large.
+        `points` and `radius`, which then only say how large the hair is.
     guide, group: (strand_count,) whole numbers, what debug_view shows; None is 0 everywhere.
     rank: (strand_count,) in 0..1, below 1: when a groom gets small, strands of high rank go first
         (refine/thinning.py); None draws all of them always.
@@ -178,7 +187,7 @@ class Snapshot:
         ValueError: shapes that do not fit.
     """
 
-    strands: Floats
+    points: Floats
     radius: Floats
     occlusion: Floats | None = None
     seed: Ints | None = None
@@ -204,19 +213,23 @@ class Snapshot:
     extinction: float = 1.0
     spacing: float = 0.0
     color: Floats | None = None
+    layout: StrandLayout = NO_STRANDS
+    along: Floats | None = None
 
     def __post_init__(self) -> None:
-        if self.strands.ndim != 3 or self.strands.shape[1] < 2 or self.strands.shape[2] != 3:
-            raise ValueError(f"strands have shape {self.strands.shape}, not (S, C >= 2, 3)")
-        expected = {
-            "radius": self.strands.shape[:2],
-            "occlusion": self.strands.shape[:2],
-            "seed": self.strands.shape[:1],
+        self._hold_point_by_point()
+        points, strands = (self.layout.point_count,), (self.layout.strand_count,)
+        expected: dict[str, tuple[int, ...]] = {
+            "points": (*points, 3),
+            "radius": points,
+            "along": points,
+            "occlusion": points,
+            "color": (*points, 3),
+            "seed": strands,
+            "guide": strands,
+            "group": strands,
+            "rank": strands,
             "volume_center": (3,),
-            "guide": self.strands.shape[:1],
-            "group": self.strands.shape[:1],
-            "rank": self.strands.shape[:1],
-            "color": self.strands.shape,
         }
         if self.occluder_spheres is not None:
             expected["occluder_spheres"] = (len(self.occluder_spheres), 4)
@@ -224,12 +237,24 @@ class Snapshot:
             value = getattr(self, name)
             if value is not None and np.shape(value) != shape:
                 raise ValueError(f"{name} has shape {np.shape(value)}, not {shape}")
-        if self.device_points is not None and self.device_points.shape != expected["radius"]:
-            raise ValueError(
-                f"device_points has shape {self.device_points.shape}, not {expected['radius']}"
-            )
+        if self.device_points is not None and not self.device_points.layout.is_as(self.layout):
+            raise ValueError("device_points are of other strands")
         if self.debug_view not in DEBUG_VIEWS:
             raise ValueError(f"debug_view {self.debug_view!r} is none of {', '.join(DEBUG_VIEWS)}")
+
+    def _hold_point_by_point(self) -> None:
+        grid = np.shape(self.points)
+        if len(grid) != 3:
+            return
+        if grid[1] < 2:
+            raise ValueError(f"strands have shape {grid}, not (S, C >= 2, 3)")
+        layout = StrandLayout.uniform(grid[0], grid[1])
+        if not self.layout.is_as(layout):
+            object.__setattr__(self, "layout", layout)
+        for name, channels in _OF_POINTS.items():
+            values = getattr(self, name)
+            if np.shape(values) == (*grid[:2], *channels):
+                object.__setattr__(self, name, np.reshape(values, (-1, *channels)))
 
     @property
     def all_casters(self) -> tuple[Caster, ...]:
@@ -238,11 +263,7 @@ class Snapshot:
 
     @property
     def strand_count(self) -> int:
-        return int(self.strands.shape[0])
-
-    @property
-    def cv_count(self) -> int:
-        return int(self.strands.shape[1])
+        return self.layout.strand_count
 
     @property
     def center(self) -> Floats:
@@ -268,7 +289,12 @@ class Snapshot:
             return self.device_points.center
         if not self.strand_count:
             return np.zeros(3, np.float32)
-        return self.strands[:, 0].mean(axis=0, dtype=np.float64).astype(np.float32)
+        return self.roots.mean(axis=0, dtype=np.float64).astype(np.float32)
+
+    @property
+    def roots(self) -> Floats:
+        """First point of each strand, (strand_count, 3) [m]."""
+        return self.points[self.layout.offsets[:-1]]
 
 
 #: field of a snapshot -> the settings that it holds

@@ -20,7 +20,7 @@ _SETTINGS = (StrandSettings, ShadingSettings)
 #: of shading, for programs without the features that turn these on
 _PLAIN = (("MARSCHNER", 0), ("SHADOWS", 0), ("SCATTERING", 0))
 #: of strand.vert.glsl, likewise
-_WHOLE = (("ADAPTIVE", 0), ("DEBUG", 0))
+_WHOLE = (("ADAPTIVE", 0), ("DEBUG", 0), ("UNEVEN", 0))
 _VARYINGS = (
     ("smooth", "VEC3", "strand_point"),
     ("smooth", "VEC3", "strand_tangent"),
@@ -66,7 +66,7 @@ _GATHER_RECIPE = ShaderRecipe(
         ("RGBA32UI", "layer_nodes"),
     ),
     integers=("capacity",),
-    varyings=(("smooth", "FLOAT", "strand_along"), ("flat", "INT", "strand_index"), *_RIBBON),
+    varyings=(("smooth", "FLOAT", "strand_place"), ("flat", "INT", "strand_index"), *_RIBBON),
     outputs=(("VEC4", "color"),),
     defines=(*_WHOLE, ("COVERED", 1), ("GATHERED", 1), ("COUNTED", 0), ("PARTS", 0)),
 )
@@ -87,7 +87,7 @@ _SHADE_RECIPE = ShaderRecipe(
     images=(("R32UI", "layer_seen", "READ"), ("RGBA32UI", "layer_nodes", "READ_WRITE")),
     integers=("seen_count",),
     group_size=(64, 1),
-    defines=_PLAIN,
+    defines=(*_PLAIN, ("UNEVEN", 0)),
 )
 #: adds up each pixel's list
 _SHOWN_RECIPE = ShaderRecipe(

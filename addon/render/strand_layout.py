@@ -86,6 +86,10 @@ class StrandLayout:
         """Of strands that have equally many points."""
         return cls(np.arange(strand_count + 1, dtype=np.int32) * np.int32(cv_count))
 
+    def is_as(self, other: StrandLayout) -> bool:
+        """Whether both are of strands with the same point counts."""
+        return self is other or np.array_equal(self.offsets, other.offsets)
+
     @property
     def strand_count(self) -> int:
         return len(self.offsets) - 1
@@ -136,6 +140,12 @@ class StrandLayout:
         spans[:, 3] = self._factors[:-1]
         return spans
 
+    @property
+    def factor_size(self) -> tuple[int, int]:
+        """Width and height of the texture that holds all detail factors, texel by texel."""
+        texels = max(int(self._factors[-1]), 1)
+        return min(texels, STRAND_ROWS), -(-texels // STRAND_ROWS)
+
     def pixels(self, values: Floats) -> Floats:
         """Values (point_count, channels) as a texture's (height, width, channels), float32;
         texels of no point are 0.
@@ -180,3 +190,6 @@ class StrandLayout:
         """The first texel of each strand's detail factors, and how many there are in all."""
         texels = (self.counts - 2) // FACTORS_IN_TEXEL + 1
         return np.concatenate([[0], np.cumsum(texels, dtype=np.int64)])
+
+
+NO_STRANDS = StrandLayout(np.zeros(1, np.int32))

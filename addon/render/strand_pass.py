@@ -1,11 +1,15 @@
 """Draws strands as ribbons that face the eye, shaded per pixel, into whatever target is bound.
 
-Packed textures, one row a strand (column blocks beyond 16384 rows, see strand_layout.strand_rows):
+Packed textures, a texel a point, where strand_layout.StrandLayout says:
     cv_points RGBA32F: xyz position [m, world], w radius [m]     new with every new pose, unless
                                                                  it lies on the GPU already
-    cv_looks  RG32F:   x ambient occlusion, y seed as a number   constant
+    cv_looks  RG32F:   x ambient occlusion, y fraction of the    constant
+                       strand's length, where UNEVEN
     cv_colors RGBA16F: xyz own colour, w 0 where there is none   constant; of coloured hair alone
-    debug_numbers R32F: the guide or the group that a debug view shows
+And a texel a strand, as strand_layout.strand_rows has them:
+    strand_spans  RGBA32F: where its points lie, see lib_strand_texel.glsl
+    strand_seeds  R32F:    what its noise depends on
+    debug_numbers R32F:    the guide or the group that a debug view shows
 
 How many pieces each segment has comes from detail_pass.py, unless all have equally many.
 """
@@ -17,10 +21,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-import gpu
 import numpy as np
 
-from ..arrays import Floats
 from ..params.glsl import struct_values
 from ..shading.drawn_strands import drawn_color, natural_strands, own_colors
 from ..shading.lights import kept_lights
@@ -35,10 +37,12 @@ from .inter_groom_shadow import NOBODY, InterGroomShadow
 from .marschner_textures import marschner_feature, scattering_feature
 from .opacity_maps import OpacityMaps
 from .opacity_pass import OpacityPass
+from .ribbons import Ribbons
 from .shader_feature import ShaderFeature
 from .shader_program import released_with_shaders
 from .shader_source import DEBUG_VIEWS, ShaderError, output_index
 from .snapshot import Snapshot
+from .strand_curves import curves_feature, spans_texture
 from .strand_drawing import StrandDrawing
 from .strand_layers import LAYERS_OF_PIXELS, LayersDrawn
 from .strand_layout import strand_rows
@@ -127,16 +131,20 @@ class StrandPass:
         output_encoding = output_index(output)
         self._upload(snapshot)
         size = width // samples, height // samples
-        points, serial = self._textures["cv_points"], self._points_serial
-        order = self._detail.order(snapshot, points, serial, camera, size)
+        serial = self._points_serial
+        order = self._detail.order(snapshot, self._textures, serial, camera, size)
         if not order.classes:
             return
         is_debug = snapshot.debug_view != "none"
         drawing = StrandDrawing(
             order=order,
-            ribbon=self._ribbon,
+            ribbon=self._ribbons.of,
             blocks=self._blocks,
-            points=(view_feature(camera, width, height), self._points_feature(snapshot)),
+            points=(
+                view_feature(camera, width, height),
+                self._strands_feature(snapshot),
+                self._curves(snapshot),
+            ),
             shading=tuple(self._shading(snapshot, others)),
             shown=(
                 *(() if display is None else (display.feature,)),
@@ -174,13 +182,14 @@ class StrandPass:
         return self._opacity.maps(
             self._textures["cv_points"],
             self._points_serial,
-            (snapshot.strand_count, snapshot.cv_count),
+            snapshot.layout,
             self._ball.of(snapshot),
             kept_lights(snapshot.lights),
             snapshot.volume,
             snapshot.strand_settings,
             snapshot.all_casters,
             snapshot.spacing,
+            None if snapshot.along is None else self._textures["cv_looks"],
         )
 
     def ball(self, snapshot: Snapshot) -> Ball:
@@ -194,18 +203,19 @@ class StrandPass:
         self._ball, self._between = HairBall(), InterGroomShadow()
         self._textures: dict[str, Any] = {}
         self._uploaded: dict[str, tuple[Any, ...]] = {}
-        self._ribbons: dict[int, Any] = {}
+        self._ribbons = Ribbons()
         self._detail.release()
 
-    def _points_feature(self, snapshot: Snapshot) -> ShaderFeature:
+    def _strands_feature(self, snapshot: Snapshot) -> ShaderFeature:
+        """What all programs that know how wide strands are have."""
+        values = struct_values(snapshot.strand_settings.as_drawn)
+        return ShaderFeature(blocks={"strands": ("StrandSettings", values)})
+
+    def _curves(self, snapshot: Snapshot) -> ShaderFeature:
         """What all programs that know where strands are have."""
-        return ShaderFeature(
-            blocks={
-                "strands": ("StrandSettings", struct_values(snapshot.strand_settings.as_drawn))
-            },
-            textures={"cv_points": ("FLOAT_2D", self._textures["cv_points"])},
-            integers={"cv_count": snapshot.cv_count},
-        )
+        textures = self._textures
+        looks = None if snapshot.along is None else textures["cv_looks"]
+        return curves_feature(textures["cv_points"], textures["strand_spans"], looks)
 
     def _shading(
         self, snapshot: Snapshot, others: Sequence[OpacityMaps]
@@ -214,8 +224,9 @@ class StrandPass:
 
         A debug view has no model: it is the same with either.
         """
+        looks = ("strand_seeds", *(("cv_looks",) if snapshot.along is None else ()))
         yield ShaderFeature(
-            textures={"cv_looks": ("FLOAT_2D", self._textures["cv_looks"])},
+            textures={name: ("FLOAT_2D", self._textures[name]) for name in looks},
             blocks={"shading": ("ShadingSettings", struct_values(snapshot.shading))},
             numbers={"volume_center": ("VEC3", snapshot.center.tolist())},
         )
@@ -263,31 +274,34 @@ class StrandPass:
         return ShaderFeature(
             name=debug_view,
             textures=numbers if debug_view in NUMBERED_VIEWS else {},
-            varyings=(("flat", "INT", "strand_index"),),
+            varyings=(("flat", "INT", "strand_index"), ("smooth", "FLOAT", "strand_place")),
             defines={"DEBUG": DEBUG_VIEWS.index(debug_view)},
         )
 
     def _upload(self, snapshot: Snapshot) -> None:
-        points: tuple[Any, ...] = (snapshot.strands, snapshot.radius)
-        device = snapshot.device_points
+        layout, device = snapshot.layout, snapshot.device_points
+        points: tuple[Any, ...] = (snapshot.points, snapshot.radius)
         if device is not None:
             if device.texture is None:
                 raise ShaderError("strand: what the GPU has computed was released")
             points = (device, (device.serial,))
+        points = (*points, layout, snapshot.along)
         if self._take("cv_points", points, lambda: _points_texture(snapshot)):
             self._points_serial += 1
-        looks = (snapshot.occlusion, snapshot.seed, snapshot.strands.shape)
-        self._take("cv_looks", looks, lambda: texture_from(strand_rows(_looks(snapshot)), "RG32F"))
+        self._take("strand_spans", (layout,), lambda: spans_texture(layout))
+        looks = (snapshot.occlusion, snapshot.along, layout)
+        self._take("cv_looks", looks, lambda: _looks_texture(snapshot))
+        self._take("strand_seeds", (snapshot.seed, layout), lambda: _seeds_texture(snapshot))
         look = snapshot.shading
         if not _has_own_colors(snapshot):
             self._drop("cv_colors")
         else:
             chosen = (look.color_source, look.brow_source, look.brow_color)
-            sources = (snapshot.color, snapshot.group, chosen)
+            sources = (snapshot.color, snapshot.group, layout, chosen)
             self._take("cv_colors", sources, partial(_colors_texture, snapshot))
         if snapshot.debug_view in NUMBERED_VIEWS:
             numbers = getattr(snapshot, snapshot.debug_view)
-            shown = (numbers, snapshot.strands.shape[:1])
+            shown = (numbers, layout)
             self._take("debug_numbers", shown, lambda: _numbers_texture(snapshot))
 
     def _take(self, name: str, sources: tuple[Any, ...], make: Callable[[], Any]) -> bool:
@@ -307,21 +321,12 @@ class StrandPass:
         self._textures.pop(name, None)
         self._uploaded.pop(name, None)
 
-    def _ribbon(self, capacity: int) -> Any:
-        """A strip of vertices without attributes: two a station, see lib_strand_geometry.glsl."""
-        if capacity not in self._ribbons:
-            layout = gpu.types.GPUVertFormat()
-            layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-            vertices = gpu.types.GPUVertBuf(layout, 2 * (capacity + 1))
-            self._ribbons[capacity] = gpu.types.GPUBatch(type="TRI_STRIP", buf=vertices)
-        return self._ribbons[capacity]
-
 
 def _points_texture(snapshot: Snapshot) -> Any:
     if snapshot.device_points is not None:
         return snapshot.device_points.texture
-    packed = np.concatenate([snapshot.strands, snapshot.radius[..., None]], axis=-1)
-    return texture_from(strand_rows(packed), "RGBA32F")
+    packed = np.concatenate([snapshot.points, snapshot.radius[:, None]], axis=1)
+    return texture_from(snapshot.layout.pixels(packed), "RGBA32F")
 
 
 def _has_own_colors(snapshot: Snapshot) -> bool:
@@ -333,7 +338,7 @@ def _colors_texture(snapshot: Snapshot) -> Any:
     """See the head of this file; w is 1 where strands have colours, and 2 where
     tips have none of the look either."""
     look, group = snapshot.shading, snapshot.group
-    every_cv = None if group is None else np.repeat(group[:, None], snapshot.cv_count, axis=1)
+    every_cv = None if group is None else np.repeat(group, snapshot.layout.counts)
     color = own_colors(snapshot.color, every_cv, look)
     assert color is not None, "only coloured hair has such a texture"
     is_known = ~np.isnan(color[..., :1])
@@ -341,7 +346,7 @@ def _colors_texture(snapshot: Snapshot) -> Any:
     if every_cv is not None:
         known += natural_strands(every_cv, look)[..., None]
     packed = np.concatenate([np.where(is_known, color, 0.0), known], axis=-1)
-    return texture_from(strand_rows(np.minimum(packed, _BRIGHTEST)), "RGBA16F")
+    return texture_from(snapshot.layout.pixels(np.minimum(packed, _BRIGHTEST)), "RGBA16F")
 
 
 def _numbers_texture(snapshot: Snapshot) -> Any:
@@ -353,11 +358,16 @@ def _numbers_texture(snapshot: Snapshot) -> Any:
     return texture_from(strand_rows(shown), "R32F")
 
 
-def _looks(snapshot: Snapshot) -> Floats:
-    """Occlusion and seed per CV, (strand_count, cv_count, 2) float32."""
-    looks = np.ones((*snapshot.strands.shape[:2], 2), np.float32)
-    if snapshot.occlusion is not None:
-        looks[..., 0] = snapshot.occlusion
+def _looks_texture(snapshot: Snapshot) -> Any:
+    looks = np.ones((snapshot.layout.point_count, 2), np.float32)
+    for channel, values in enumerate((snapshot.occlusion, snapshot.along)):
+        if values is not None:
+            looks[:, channel] = values
+    return texture_from(snapshot.layout.pixels(looks), "RG32F")
+
+
+def _seeds_texture(snapshot: Snapshot) -> Any:
+    """What the noise of each strand depends on, exact below 2^24."""
     seed = np.arange(snapshot.strand_count) if snapshot.seed is None else snapshot.seed
-    looks[..., 1] = (np.asarray(seed) % SEED_LIMIT)[:, None]
-    return looks
+    seeds = np.asarray(seed % SEED_LIMIT, np.float32)
+    return texture_from(strand_rows(seeds[:, None, None]), "R32F")

@@ -20,8 +20,8 @@ _COLOR, _GREY = 2, 3
 #: What grey strands may be brighter than hair that is nearly black.
 _MAX = 4.0
 _DARKEST = 1e-4
-#: Strands whose colours stand for those of all, where a mean will do.
-_FEW = 1000
+#: Points whose colours stand for those of all, where a mean will do.
+_FEW = 16_000
 
 
 def drawn_radius(radius: Floats, settings: StrandSettings) -> Floats:
@@ -82,13 +82,15 @@ def mean_look(color: Floats | None, shading: ShadingSettings) -> ShadingSettings
     """The look in the mean of the strands' own colours, where they are drawn in them.
 
     Args:
-        color: (n, cv_count, 3) of strands, as in Snapshot.
+        color: (..., 3) of strands or of their points, as in Snapshot.
     """
     own = drawn_color(color, shading)
     if own is None or not len(own):
         return shading
-    few = own[:: max(len(own) // _FEW, 1)]
-    return in_color(_whole(few, shading).mean(axis=(0, 1)), shading)
+    few = own.reshape(-1, 3)
+    if len(few) > _FEW:  # at random, since every nth may be the same point of every strand
+        few = few[np.random.default_rng(0).integers(0, len(few), _FEW)]
+    return in_color(_whole(few, shading).mean(axis=0), shading)
 
 
 def brightest_look(color: Floats | None, shading: ShadingSettings) -> ShadingSettings:
@@ -98,7 +100,7 @@ def brightest_look(color: Floats | None, shading: ShadingSettings) -> ShadingSet
     own = drawn_color(color, shading)
     if own is None or not len(own):
         return shading
-    return in_color(_whole(own, shading).max(axis=(0, 1)), shading)
+    return in_color(_whole(own.reshape(-1, 3), shading).max(axis=0), shading)
 
 
 def strand_variation(

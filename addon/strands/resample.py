@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
+from .arc_length import steps
 from .strand_set import StrandSet
 
 
@@ -42,11 +43,8 @@ def arc_length_positions(strands: StrandSet, cv_count: int) -> tuple[Ints, Float
         left: (strand_count, cv_count) indices into points.
         weight: (strand_count, cv_count) in [0, 1].
     """
-    points = strands.points.astype(np.float64)
-    step = np.zeros(strands.point_count)
-    step[1:] = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    step[strands.offsets[:-1]] = 0.0
-    along = np.cumsum(step)  # ascending over all strands, so one search serves them all
+    # ascending over all strands, so one search serves them all
+    along = np.cumsum(steps(strands.points, strands.offsets))
     first, last = strands.offsets[:-1], strands.offsets[1:] - 1
 
     fraction = np.linspace(0.0, 1.0, cv_count)

@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .affine import mean_scale, moved
+from .arc_length import lengths
 
 #: Of hair whose width nobody knows, until it is found (`groom.widths`).
 DEFAULT_RADIUS = 4.0e-5  # [m], half of 0.08 mm, a typical human hair
@@ -130,11 +131,7 @@ class StrandSet:
 
     def lengths(self) -> Floats:
         """Arc length of each strand, (strand_count,) [m]."""
-        segments = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
-        segments[self.offsets[1:-1] - 1] = 0.0  # from one strand's tip to the next one's root
-        totals = np.concatenate([[0.0], np.cumsum(segments, dtype=np.float64)])
-        starts = self.offsets[:-1]
-        return (totals[self.offsets[1:] - 1] - totals[starts]).astype(np.float32)
+        return lengths(self.points, self.offsets).astype(np.float32)
 
     def take(self, strands: Ints) -> StrandSet:
         """The strands with these indices, in this order."""

@@ -76,7 +76,7 @@ def test_a_duplicate_of_hair_and_head_goes_with_its_own_head(linked, playing, ev
     assert swings(session) and swings(playing.session)
     assert np.abs(other[..., 0]).max() < 0.5, "the first stays where it is"
     found = engine_hair.read_groom(twin, evaluated())
-    assert found.strands.mean(axis=(0, 1))[0] > 1.0
+    assert found.points.mean(axis=0)[0] > 1.0
 
 
 def test_hair_that_shares_its_curves_is_combed_and_coloured_together(playing, evaluated):

@@ -159,13 +159,13 @@ def test_the_counts_are_what_was_drawn(preview, gpu_context):
     hair.data.hairloom.detail.culling = "none"
     hair.data.hairloom.detail.lod_height = 0.0
     shown, strand_pass = drawing(session).snapshot, StrandPass()
-    low, high = shown.strands.min(axis=(0, 1)), shown.strands.max(axis=(0, 1))
+    low, high = shown.points.min(axis=0), shown.points.max(axis=0)
     camera = frame_camera((low, high), (0.0, -1.0, 0.0), 0.5, 1.0)
     target = gpu_context.types.GPUOffScreen(64, 64)
     with target.bind():
         strand_pass.draw(shown, camera, 64, 64)
     target.free()
-    drawn, segments = strand_pass.statistics, shown.cv_count - 1
+    drawn, segments = strand_pass.statistics, shown.layout.cv_count - 1
     assert (drawn.strands, drawn.pieces) == (60, 60 * 3 * segments)
     assert drawn.vertices == 60 * 2 * (3 * segments + 1)
     line = counts_line("Hair", 60, shown.strand_count, drawn)

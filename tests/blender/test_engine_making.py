@@ -86,7 +86,7 @@ def test_the_first_picture_is_without_hair_until_it_is_made(hair: Any, gate: Gat
     (shown,) = view.arrive()
     assert shown.strand_count == COUNT and gate.makers == ["hair in Rendered mode"]
     waited = engine_hair.read_groom(hair, bpy.context.evaluated_depsgraph_get())
-    np.testing.assert_array_equal(shown.strands, waited.strands)
+    np.testing.assert_array_equal(shown.points, waited.points)
     np.testing.assert_array_equal(shown.occlusion, waited.occlusion)
     assert len(gate.makers) == 1, "it is made once"
 

@@ -43,7 +43,8 @@ def test_painting_the_curves_is_seen_in_the_preview(
     assert without_strands(shown).strand_count == 0, "where cards are shown"
     grid = two_colored().color_grid
     assert grid is not None
-    np.testing.assert_allclose(shown.color[:, [0, -1]], grid[:, [0, -1]], atol=1e-6)
+    color = shown.color.reshape(shown.strand_count, -1, 3)
+    np.testing.assert_allclose(color[:, [0, -1]], grid[:, [0, -1]], atol=1e-6)
     opaque = np.tile(np.float32([*BLUE, 1.0]), 480)
     hair.data.attributes["color"].data.foreach_set("color", opaque)
     hair.data.update_tag()

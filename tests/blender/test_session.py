@@ -90,7 +90,7 @@ def test_sliders_act_at_once(preview):
     snapshot = overlay.drawing_of(session.uid).snapshot
     assert snapshot.shading.base_color == (1.0, 0.5, 0.25)
     assert snapshot.strand_settings.fullness == 3.0
-    assert snapshot.strands is before.strands, "nothing else is made again"
+    assert snapshot.points is before.points, "nothing else is made again"
     assert snapshot.device_points is before.device_points
 
 

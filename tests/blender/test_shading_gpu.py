@@ -63,7 +63,7 @@ def test_strands_have_the_light_of_the_reference(frame: Any, melanin: float) -> 
     shading = replace(PLAIN, pigment="melanin", melanin=melanin)
     snapshot = snapshot_of(frame, shading)
     picture = drawn(frame, snapshot)
-    root, tip = snapshot.strands[:, 0].astype(np.float64), snapshot.strands[:, 1].astype(np.float64)
+    root, tip = snapshot.points[::2].astype(np.float64), snapshot.points[1::2].astype(np.float64)
     point = 0.5 * (root + tip)
     tangent = (tip - root) / np.linalg.norm(tip - root, axis=-1, keepdims=True)
     normal = strand_normal(point, tangent, snapshot.center.astype(np.float64))

@@ -84,7 +84,7 @@ def test_the_engine_draws_the_widths_of_the_preview(
     hair: bpy.types.Object, shown: np.ndarray, evaluated: Callable[[], Any]
 ) -> None:
     snapshot = read_groom(hair, evaluated())
-    np.testing.assert_array_equal(snapshot.radius, np.repeat(shown[:, None], 16, axis=1))
+    np.testing.assert_array_equal(snapshot.radius, np.repeat(shown, 16))
     inputs, _, _ = read_inputs(hair, evaluated())
     assert snapshot.extinction == inputs.rig.widths.extinction > 1.0
 

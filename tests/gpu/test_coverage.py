@@ -38,7 +38,7 @@ def stations(values: np.ndarray, pieces: int, ahead: float = 0.0) -> np.ndarray:
 def covered(snapshot, camera, width: int, height: int, samples: int = 1) -> np.ndarray:
     """Whether each pixel's centre lies in any ribbon, (height, width) bool; no meshes."""
     settings = snapshot.strand_settings
-    points = np.asarray(snapshot.strands, np.float64)
+    points = np.asarray(snapshot.points, np.float64).reshape(snapshot.strand_count, -1, 3)
     pieces = snapshot.detail.subdivisions
     pixels, depth = _to_pixels(stations(points, pieces), camera, width, height)
     onward, _ = _to_pixels(stations(points, pieces, 1e-4), camera, width, height)
@@ -48,7 +48,8 @@ def covered(snapshot, camera, width: int, height: int, samples: int = 1) -> np.n
 
     share = np.linspace(0.0, 1.0, pixels.shape[1])
     cv_share = np.linspace(0.0, 1.0, points.shape[1])
-    radius = np.stack([np.interp(share, cv_share, own) for own in snapshot.radius])
+    radii = snapshot.radius.reshape(snapshot.strand_count, -1)
+    radius = np.stack([np.interp(share, cv_share, own) for own in radii])
     taper = 1.0 + share * (settings.tip_width - 1.0)
     focal = camera.projection[1, 1] * height / 2.0
     minimum = settings.minimum_width * samples

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from refinement_probes import adaptive_points, read_factors
+from refinement_probes import adaptive_points, point_textures, read_factors
 from tiers import few_in_commits
 
 from hairloom.addon.refine.culling import faces_away, hidden, shades_of
@@ -72,13 +72,9 @@ def computed(
     """Factors (strand_count, cv_count - 1) as the GPU finds them, and the order."""
     from hairloom.addon.render import frame
     from hairloom.addon.render.detail_pass import DetailPass
-    from hairloom.addon.render.strand_layout import strand_rows
-    from hairloom.addon.render.textures import texture_from
 
     snapshot = snapshot_of(frame, strands, detail, **more)
-    packed = np.concatenate([strands, snapshot.radius[..., None]], axis=-1)
-    points = texture_from(strand_rows(packed), "RGBA32F")
-    order = DetailPass().order(snapshot, points, 1, camera, (WIDTH, HEIGHT))
+    order = DetailPass().order(snapshot, point_textures(snapshot), 1, camera, (WIDTH, HEIGHT))
     return read_factors(order, *strands.shape[:2]), order
 
 
@@ -253,7 +249,7 @@ def test_two_views_in_turn_and_nothing_computed_twice(frame: Any, monkeypatch: A
     assert shown(snapshot, other, samples=2)[1] == 0, "nor do samples"
     finer = dataclasses.replace(snapshot, detail=dataclasses.replace(BARE, error=0.1))
     assert shown(finer, other)[1] == 1
-    moved = dataclasses.replace(finer, strands=finer.strands + np.float32(0.01))
+    moved = dataclasses.replace(finer, points=finer.points + np.float32(0.01))
     assert shown(moved, other)[1] == 1
     detail = DetailSettings(lod_height=1e4)
     culled = dataclasses.replace(moved, detail=detail, occluder_spheres=OCCLUDER_SPHERES[:0])

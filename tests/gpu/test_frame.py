@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hairloom.addon.render.strand_layout import StrandLayout
 from hairloom.addon.shading.kajiya_kay import kajiya_kay, strand_base, strand_normal
 from hairloom.addon.shading.lights import Light, light_at, light_irradiance
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
@@ -205,7 +206,7 @@ def test_two_frames_are_identical_and_passes_may_be_kept(frame: Any) -> None:
     from hairloom.addon.render.strand_pass import StrandPass
 
     snapshot = hairy_sphere(frame, primary_strength=2.0)
-    moved = dataclasses.replace(snapshot, strands=snapshot.strands * np.float32(0.5))
+    moved = dataclasses.replace(snapshot, points=snapshot.points * np.float32(0.5))
     camera = frame.frame_camera(
         (np.full(3, -1.0), np.full(3, 1.0)), (0.2, -1, 0.3), np.radians(30), 1.0
     )
@@ -227,9 +228,9 @@ def test_points_on_the_gpu_look_like_uploaded_ones(frame: Any) -> None:
     from hairloom.addon.strands import StrandSet
 
     sphere = hairy_sphere(frame, primary_strength=2.0)
-    count, cv_count = sphere.strands.shape[:2]
+    count, cv_count = sphere.strand_count, sphere.layout.cv_count
     strands = StrandSet(
-        points=sphere.strands.reshape(-1, 3),
+        points=sphere.points,
         offsets=np.arange(count + 1) * cv_count,
         radius=sphere.radius.ravel(),
         group=np.zeros(count, np.int32),
@@ -244,9 +245,9 @@ def test_points_on_the_gpu_look_like_uploaded_ones(frame: Any) -> None:
     passes = frame.MeshPass(), StrandPass()
     for matrix, largest, share in ((np.eye(4), 0.0, 0.0), (turn, 1.0e-3, 1.0e-3)):
         ride.carry(None, matrix)
-        moved = (sphere.strands @ matrix[:3, :3].T).astype(np.float32)
+        moved = (sphere.points @ matrix[:3, :3].T).astype(np.float32)
         on_gpu = dataclasses.replace(sphere, device_points=ride.points)
-        uploaded = dataclasses.replace(sphere, strands=moved)
+        uploaded = dataclasses.replace(sphere, points=moved)
         pictures = [
             frame.render_image(shown, camera, 200, 200, 1, passes=passes)
             for shown in (uploaded, on_gpu, uploaded)
@@ -264,8 +265,8 @@ def test_points_on_the_gpu_that_do_not_fit_or_are_gone_are_refused(frame: Any, f
 
     strands, radius = uprights(np.array([0.5, 0.6]), 0.1)
     with pytest.raises(ValueError, match="device_points"):
-        frame.Snapshot(strands, radius, device_points=DevicePoints((3, 2)))
-    gone = frame.Snapshot(strands, radius, device_points=DevicePoints((2, 2)))
+        frame.Snapshot(strands, radius, device_points=DevicePoints(StrandLayout.uniform(3, 2)))
+    gone = frame.Snapshot(strands, radius, device_points=DevicePoints(StrandLayout.uniform(2, 2)))
     with pytest.raises(ShaderError, match="released"):
         frame.render_image(gone, front, 8, 8)
 

@@ -83,10 +83,10 @@ def test_the_soft_edge_of_a_meshs_shadow_has_no_colour_of_hair() -> None:
     """Hair stands on either side, a plate is in the way."""
     snapshot = snapshot_of(BLOND, scattering=True, is_skin=True)
     plate = Surface((0.2 * CORNERS + [-0.2, 0.0, 0.4]).astype(np.float32), TRIANGLES)
-    aside = snapshot.strands.copy()
-    aside[..., 0] += np.where(np.arange(len(aside)) % 2, 1.2, -1.2)[:, None]
+    aside = snapshot.points.copy()
+    aside[:, 0] += np.where(np.arange(len(aside)) // 6 % 2, 1.2, -1.2)
     skin = replace(snapshot.skin, softness=0.03)
-    found = left_on_the_floor(replace(snapshot, strands=aside, casters=(plate,), skin=skin))
+    found = left_on_the_floor(replace(snapshot, points=aside, casters=(plate,), skin=skin))
     assert ((found > 0.2) & (found < 0.8)).mean() > 0.02
     assert np.ptp(found, axis=1).max() < 5e-3
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hairloom.addon.render.strand_layout import StrandLayout
 from hairloom.addon.shading.lights import Light, kept_lights
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.shading.volume.light_frame import (
@@ -56,6 +57,10 @@ def points_of(strands: np.ndarray, radius: np.ndarray) -> Any:
     )
 
 
+def layout_of(strands: np.ndarray) -> StrandLayout:
+    return StrandLayout.uniform(*strands.shape[:2])
+
+
 def drawn(
     strands: np.ndarray,
     radius: np.ndarray,
@@ -68,7 +73,7 @@ def drawn(
     from hairloom.addon.render.opacity_pass import OpacityPass
 
     points, ball = points_of(strands, radius), ball or ball_around(strands)
-    return OpacityPass().maps(points, 1, strands.shape[:2], ball, (light,), settings, look), ball
+    return OpacityPass().maps(points, 1, layout_of(strands), ball, (light,), settings, look), ball
 
 
 def balls(strands: np.ndarray, count: int = 4) -> list[Ball]:
@@ -160,7 +165,7 @@ def test_strands_that_stand_for_many_are_blurred_and_meshes_are_not(
     maps = OpacityPass().maps(
         points_of(strands, radius),
         1,
-        strands.shape[:2],
+        layout_of(strands),
         ball,
         (light,),
         settings,
@@ -297,7 +302,7 @@ def test_depths_of_large_meshes_are_those_of_rays(gpu_context: Any, light: Light
         maps = OpacityPass().maps(
             points_of(strands, radius),
             1,
-            strands.shape[:2],
+            layout_of(strands),
             ball,
             (light,),
             settings,
@@ -343,9 +348,11 @@ def test_a_map_is_drawn_again_only_when_something_changed(gpu_context: Any) -> N
     strands, radius = dome(50)
     points, ball, opacity = points_of(strands, radius), ball_around(strands), OpacityPass()
 
+    layout = layout_of(strands)
+
     def maps(serial: int, light: Light, **settings: Any) -> Any:
         chosen = VolumeSettings(resolution=32, **settings)
-        return opacity.maps(points, serial, strands.shape[:2], ball, (light,), chosen, PLAIN)
+        return opacity.maps(points, serial, layout, ball, (light,), chosen, PLAIN)
 
     first = maps(1, LIGHTS["sun"])
     assert maps(1, LIGHTS["sun"]) is first
@@ -400,7 +407,7 @@ def test_hair_that_moves_keeps_its_textures(gpu_context: Any) -> None:
         settings = VolumeSettings(shadows="deep", resolution=resolution)
         moved = points_of(strands + np.float32(1e-4 * serial), radius)
         light = (LIGHTS["sun"],)
-        maps = opacity.maps(moved, serial, strands.shape[:2], ball, light, settings, PLAIN)
+        maps = opacity.maps(moved, serial, layout_of(strands), ball, light, settings, PLAIN)
         kept.append(maps)
         return {id(texture) for _, texture in maps.feature.textures.values()}
 
@@ -420,8 +427,8 @@ def test_textures_that_are_kept_hold_nothing_of_the_frame_before(gpu_context: An
 
     def held(drawn_by: OpacityPass, serial: int, scale: float, meshes: tuple[Any, ...]) -> Any:
         points = points_of(np.float32(scale) * strands, radius)
-        shape, light = strands.shape[:2], (LIGHTS["sun"],)
-        maps = drawn_by.maps(points, serial, shape, ball, light, settings, PLAIN, meshes)
+        layout, light = layout_of(strands), (LIGHTS["sun"],)
+        maps = drawn_by.maps(points, serial, layout, ball, light, settings, PLAIN, meshes)
         meshes_depth = np.asarray(maps.meshes.read())
         return layers_of(maps), np.asarray(maps.starts.read()), meshes_depth
 
@@ -447,7 +454,7 @@ def test_maps_too_large_for_memory_are_drawn_smaller_and_still_right(
         shadows=shadows, slices=64, layers=64, resolution=2048, max_lights=8, strand_fraction=1.0
     )
     points, ball, opacity = points_of(strands, radius), ball_around(strands), OpacityPass()
-    maps = opacity.maps(points, 1, strands.shape[:2], ball, lights, settings, PLAIN)
+    maps = opacity.maps(points, 1, layout_of(strands), ball, lights, settings, PLAIN)
     assert maps.size.bytes <= MEMORY_LIMIT and f"drawn with {maps.size.side}" in opacity.note
     frame = light_frame(lights[0], ball)
     assert frame is not None
@@ -468,7 +475,7 @@ def test_of_twenty_lights_the_strongest_throw_shadows(gpu_context: Any) -> None:
     given = [Light.sun((0.1 * n, 1.0, -1.0), (1, 1, 1), e) for n, e in enumerate(strength)]
     settings = VolumeSettings(shadows="slices", resolution=32, max_lights=3)
     kept = kept_lights(given)
-    maps = OpacityPass().maps(points, 1, strands.shape[:2], ball, kept, settings, PLAIN)
+    maps = OpacityPass().maps(points, 1, layout_of(strands), ball, kept, settings, PLAIN)
     map_of = maps.values[128:160].reshape(8, 4)[:, 0]
     casting = {kept[light].power[0] for light in np.flatnonzero(map_of >= 0.0)}
     assert maps.size.map_count == 3 and casting == {20.0, 19.0, 18.0}

@@ -34,14 +34,20 @@ def hair() -> np.ndarray:
 def tiles_of(settings: VolumeSettings, *lights: Light) -> tuple[Any, np.ndarray]:
     from hairloom.addon.render.opacity_pass import OpacityPass
     from hairloom.addon.render.opacity_tiles import opacity_tiles
-    from hairloom.addon.render.strand_layout import strand_rows
+    from hairloom.addon.render.strand_layout import StrandLayout, strand_rows
     from hairloom.addon.render.textures import texture_from
 
     strands = hair()
     radius = np.full((200, 4, 1), 5e-4, np.float32)
     points = texture_from(strand_rows(np.concatenate([strands, radius], axis=-1)), "RGBA32F")
     maps = OpacityPass().maps(
-        points, 1, (200, 4), ball_around(strands), lights, settings, StrandSettings()
+        points,
+        1,
+        StrandLayout.uniform(200, 4),
+        ball_around(strands),
+        lights,
+        settings,
+        StrandSettings(),
     )
     return maps, opacity_tiles(maps, len(layer_ends(settings)))
 

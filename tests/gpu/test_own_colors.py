@@ -34,7 +34,7 @@ def curtain(color: np.ndarray | None = None) -> dict[str, Any]:
         color = np.repeat(color[:, None], CVS, axis=1)
     radius = np.full((COUNT, CVS), 0.4 / COUNT, np.float32)
     return {
-        "strands": strands,
+        "points": strands,
         "radius": radius,
         "color": None if color is None else color.astype(np.float32),
         "seed": np.arange(COUNT),

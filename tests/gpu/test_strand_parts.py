@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.strand_layout import StrandLayout
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
@@ -128,11 +129,13 @@ def test_each_draw_is_whole_and_tries_first_what_the_last_one_needed(
     from hairloom.addon.render.textures import drawing_into
 
     shown = crossing(frame, 3)
+    cvs = shown.layout.cv_count
     few = replace(
         shown,
-        strands=shown.strands[:40],
-        radius=shown.radius[:40],
-        occlusion=np.ascontiguousarray(shown.occlusion[:40]),
+        points=shown.points[: 40 * cvs],
+        radius=shown.radius[: 40 * cvs],
+        occlusion=shown.occlusion[: 40 * cvs],
+        layout=StrandLayout.uniform(40, cvs),
     )
     color = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
     depth = gpu.types.GPUTexture((SIZE, SIZE), format="DEPTH_COMPONENT32F")

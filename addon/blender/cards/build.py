@@ -23,6 +23,7 @@ from ...cards.atlas_settings import AtlasSettings
 from ...cards.bake import sampled_maps
 from ...cards.bake_strands import FlatStrands, flat_strands
 from ...cards.build import CardBuild
+from ...cards.card_strands import card_strands
 from ...cards.drawing_settings import CardDrawingSettings
 from ...cards.follow import CardBinding
 from ...cards.occlusion_settings import CardOcclusionSettings
@@ -206,7 +207,7 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
     Shift and noise break up highlights from strand to strand and are made at random in any case.
     """
     settings, pictures = inputs.settings, inputs.pictures
-    texture, color = settings[TextureSettings], inputs.rig.strands.color_grid
+    texture, color = settings[TextureSettings], inputs.rig.strands.color
     look, strands = settings[ShadingSettings], settings[StrandSettings]
     colored = "base" not in pictures and drawn_color(color, look) is not None
     made = hair_textures(texture, build.finest.atlas.columns)
@@ -230,8 +231,13 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
         "tangent",
         gain,
         is_view_compensated="alpha" not in pictures,
-        base_color=brightest_look(color, look).base_color if colored else None,
+        base_color=brightest_look(_card_color(inputs.rig), look).base_color if colored else None,
     )
+
+
+def _card_color(rig: Rig) -> Floats | None:
+    """The colours that the atlas is baked from, (point_count, 3)."""
+    return card_strands(rig.strands).color
 
 
 def drawn_maps(flat: FlatStrands, size: int) -> AtlasMaps:
@@ -258,10 +264,10 @@ def baked_atlas(
     Args:
         drawn: how wide strands are drawn.
     """
-    grid = rig.strands.grid
+    strands = card_strands(rig.strands)
+    grid = strands.grid
     count, cv_count = grid.shape[:2]
-    radius = drawn_radius(rig.strands.radius.reshape(count, cv_count), drawn)
-    strands = rig.strands
+    radius = drawn_radius(strands.radius.reshape(count, cv_count), drawn)
     colors = strand_variation(
         np.arange(count), cv_count, shading, strands.color_grid, strands.group
     )
@@ -310,7 +316,7 @@ class BuiltCards:
                 is_view_compensated=maps.is_view_compensated,
                 base_color=maps.base_color,
             ),
-            StrandArea.of(strands.grid, strands.radius.reshape(strands.strand_count, -1)),
+            StrandArea.of(strands),
             card_shadow_area(mesh.positions, mesh.triangles, mesh.uv, textures.alpha),
             build.wrong_fraction,
             cards.notes,

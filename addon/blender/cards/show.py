@@ -20,6 +20,7 @@ from ...params import SettingsMap
 from ...pipeline import Pose, Rig
 from ...render.card_snapshot import CardSnapshot
 from ...render.snapshot import Snapshot
+from ...render.strand_layout import NO_STRANDS
 from ..base import latest_job
 from ..base.latest_job import LatestJob, Work
 from ..properties.groom_settings import GroomSettings
@@ -40,11 +41,12 @@ def as_shown(snapshot: Snapshot) -> Snapshot:
 
 def without_strands(snapshot: Snapshot) -> Snapshot:
     """The same with its cards at most."""
-    none = snapshot.strands[:0]
     return replace(
         snapshot,
-        strands=none,
-        radius=none[..., 0],
+        points=np.zeros((0, 3), np.float32),
+        radius=np.zeros(0, np.float32),
+        layout=NO_STRANDS,
+        along=None,
         volume_center=snapshot.center,
         device_points=None,
         occlusion=None,

@@ -160,14 +160,15 @@ def read_groom(
         strands = playback.strands_in(cache, scene.frame_current, scene.frame_subframe)
         made = _of_bake(owner, playback.rig_in(cache), settings, blocking=blocking)
         pose = playback.pose_in(cache, scene.frame_current, scene.frame_subframe)
+        guides = strands[made.rig.guides]
     else:
         made = _of_curves(owner, settings, depsgraph, blocking=blocking)
-        strands, pose = made.snapshot.strands, made.rig.rest_pose
-    snapshot = replace(made.snapshot, strands=strands)
+        strands, pose, guides = made.snapshot.points, made.rig.rest_pose, made.rig.guide_grid
+    snapshot = replace(made.snapshot, points=strands)
     if settings.shows_cards:
         others = read_occluders(settings[CardOcclusionSettings], owner, depsgraph, pose.matrix)
         built = made.cards(owner, settings, others)
-        cards = built.at(pose, strands[made.rig.guides], settings.sections)
+        cards = built.at(pose, guides, settings.sections)
         snapshot = as_shown(replace(snapshot, cards=cards))
     return with_all_strands(with_settings(snapshot, settings))
 
@@ -193,13 +194,13 @@ def uids_of(hair: bpy.types.Object) -> set[int]:
 
 def placed(snapshot: Snapshot, motion: Floats) -> Snapshot:
     """The same, moved by an affine (4, 4) matrix, as an instance is."""
-    strands = moved(snapshot.strands.reshape(-1, 3), motion).reshape(snapshot.strands.shape)
+    points = moved(snapshot.points, motion)
     cards, center = snapshot.cards, snapshot.volume_center
     if cards is not None:
         cards = replace(cards, mesh=moved_mesh(cards.mesh, motion))
     if center is not None:
         center = moved(center[None], motion)[0]
-    return replace(snapshot, strands=strands, cards=cards, volume_center=center)
+    return replace(snapshot, points=points, cards=cards, volume_center=center)
 
 
 def is_pending(uid: int) -> bool:

@@ -99,7 +99,7 @@ class Studio:
         camera, occluders = camera or self._camera(width / height), self._groom.occluders
         snapshot = replace(
             self._at_rest,
-            strands=points,
+            points=points,
             meshes=self._meshes(pose),
             lights=self.lights(camera) if lights is None else lights,
             ambient=self.stage.ambient,
@@ -152,13 +152,13 @@ class Studio:
 
     @cached_property
     def _ball(self) -> Ball:
-        low, high = self.bounds(self._rig.rest_pose, self._rig.strands.grid)
+        low, high = self.bounds(self._rig.rest_pose, self._rig.strands.points)
         return Ball(0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)))
 
     @cached_property
     def side(self) -> GoodSide:
         """From where the groom at rest is best seen."""
-        return good_side(self._rig.strands.grid, self._rig.head)
+        return good_side(self._rig.strands, self._rig.head)
 
     def _cards_at(self, pose: Pose, points: Floats) -> CardSnapshot | None:
         """The cards riding on the guides among these strands, where cards are shown."""
@@ -190,7 +190,7 @@ class Studio:
     def _in_its_light(self, pose: Pose, points: Floats) -> Snapshot:
         return replace(
             self._at_rest,
-            strands=points,
+            points=points,
             meshes=self._meshes(pose),
             lights=self.lights(self._camera(1.0)),
         )
@@ -205,10 +205,9 @@ class Studio:
     ) -> Floats:
         """These cards in place of the strands at rest; arguments as in `picture`."""
         camera = camera or self._camera(width / height)
-        cv_count = self._at_rest.cv_count
         snapshot = Snapshot(
-            strands=np.zeros((0, cv_count, 3), np.float32),
-            radius=np.zeros((0, cv_count), np.float32),
+            points=np.zeros((0, 3), np.float32),
+            radius=np.zeros(0, np.float32),
             meshes=self._meshes(self._rig.rest_pose),
             lights=self.lights(camera),
             ambient=self.stage.ambient,
@@ -258,13 +257,13 @@ class Studio:
 
     def _camera(self, aspect: float) -> Camera:
         """Holds the groom at rest and what of the head is near it, with room for the motion."""
-        held = self.held(self._rig.rest_pose, self._rig.strands.grid)
+        held = self.held(self._rig.rest_pose, self._rig.strands.points)
         return self.framed(held, self.side.three_quarter, aspect)
 
     def close_up(self, aspect: float) -> Camera:
         """Holds a part of the groom at rest: that around the roots that are nearest to the eye."""
         direction, roots = self.side.turned(*CLOSE_UP), self._rig.strands.roots
-        held = self.held(self._rig.rest_pose, self._rig.strands.grid)
+        held = self.held(self._rig.rest_pose, self._rig.strands.points)
         nearest = roots[(roots @ direction).argmax()]
         reach = CLOSE_REACH * float(np.ptp(held, axis=0).max())
         return self.framed(held[np.linalg.norm(held - nearest, axis=1) < reach], direction, aspect)

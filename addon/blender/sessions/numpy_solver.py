@@ -67,7 +67,7 @@ class NumpySolver:
         return self._strands
 
     def shown(self, snapshot: Snapshot) -> Snapshot:
-        return replace(snapshot, strands=self.strands(), device_points=None)
+        return replace(snapshot, points=self.strands(), device_points=None)
 
     def _take(self, motion: Motion) -> None:
         self._motion, self._is_baked, self._strands = motion, False, None

@@ -69,7 +69,7 @@ class PreparedGroom:
     """A groom made ready to be shown.
 
     ambient: what its occlusion was made by.
-    occlusion: (strand_count, cv_count) in [0, 1], at rest; None where it was left out.
+    occlusion: (point_count,) in [0, 1], at rest; None where it was left out.
     rank: (strand_count,), see `pipeline.strand_ranks`; None where it was left out.
     occluders: spheres in the head that hide hair; None where it has none, or they were left out.
     is_placeholder: whether these are a few of its strands only, which are not seen.

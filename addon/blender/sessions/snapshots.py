@@ -14,12 +14,14 @@ from ...pipeline import Pose, Rig
 from ...refine.settings import DetailSettings
 from ...render.hair_ball import HairBall
 from ...render.snapshot import SECTIONS, Snapshot
+from ...render.strand_layout import StrandLayout
 from ...shading.marschner.look import fibre_of
 from ...shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE, shape_of
 from ...shading.settings import ShadingSettings
 from ...shading.volume.settings import VolumeSettings
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
+from ...strands.arc_length import uneven_along
 from ..cards.show import ShownCards
 from ..properties.groom_settings import GroomSettings
 from ..scene.lights import (
@@ -37,15 +39,17 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
     """The groom at rest, with all that does not change while it moves."""
     strands = groom.rig.strands
     return Snapshot(
-        strands=strands.grid,
-        radius=strands.radius.reshape(strands.strand_count, -1),
+        points=strands.points,
+        radius=strands.radius,
+        layout=StrandLayout(strands.offsets),
+        along=uneven_along(strands.points, strands.offsets),
         occlusion=groom.occlusion,
         guide=np.ascontiguousarray(groom.rig.weights.guide[:, 0]),
         group=strands.group,
         rank=groom.rank,
         extinction=groom.rig.widths.extinction,
         spacing=groom.rig.widths.spacing,
-        color=strands.color_grid,
+        color=strands.color,
     )
 
 

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Floats, Ints
+from ...strands import StrandSet
+from ...strands.arc_length import along, steps
 from ..settings import StrandSettings
 
 #: a card lets at least as much light through as this leaves: four strands are as good as a wall
@@ -89,12 +91,13 @@ class StrandArea:
     weighted: float
 
     @classmethod
-    def of(cls, grid: Floats, radius: Floats) -> StrandArea:
-        """Of strands (strand_count, cv_count, 3) [m] with radii (strand_count, cv_count) [m]."""
-        length = np.linalg.norm(np.diff(grid, axis=1), axis=2)
-        area = (length * (radius[:, 1:] + radius[:, :-1])).sum(axis=0, dtype=np.float64)
-        along = (np.arange(len(area)) + 0.5) / max(len(area), 1)
-        return cls(float(area.sum()), float((area * along).sum()))
+    def of(cls, strands: StrandSet) -> StrandArea:
+        points, offsets, radius = strands.points, strands.offsets, strands.radius
+        # of the segment that ends at each point but the first
+        area = steps(points, offsets)[1:] * (radius[1:] + radius[:-1])
+        ends = along(points, offsets)
+        middle = 0.5 * (ends[1:] + ends[:-1])
+        return cls(float(area.sum()), float((area * middle).sum()))
 
     def shadow_area(self, strands: StrandSettings) -> float:
         """What they take of light from everywhere [m^2]: pi / 4 of their area, as cylinders."""

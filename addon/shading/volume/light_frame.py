@@ -19,7 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Bools, Floats
+from ...arrays import Bools, Floats, Ints
+from ...strands.arc_length import lengths
 from ..lights import Light
 
 #: the sphere is a little larger than the hair, so that nothing lies on a map's edge
@@ -119,15 +120,15 @@ def ball_around(points: Floats) -> Ball:
     return stepped_ball(middle, float(np.sqrt(np.max(np.sum((flat - middle) ** 2, axis=1)))))
 
 
-def reach_of(strands: Floats) -> float:
+def reach_of(points: Floats, offsets: Ints) -> float:
     """How far from the middle of all roots hair can get as long as it keeps its length, [m].
 
     Args:
-        strands: (strand_count, cv_count, 3) [m].
+        points, offsets: as in StrandSet [m].
     """
-    roots = strands[:, 0].astype(np.float64)
-    lengths = np.linalg.norm(np.diff(strands, axis=1), axis=2).sum(axis=1)
-    return float(np.max(np.linalg.norm(roots - roots.mean(axis=0), axis=1) + lengths))
+    roots = points[offsets[:-1]].astype(np.float64)
+    away = np.linalg.norm(roots - roots.mean(axis=0), axis=1)
+    return float(np.max(away + lengths(points, offsets)))
 
 
 def stepped_ball(center: Floats, radius: float) -> Ball:

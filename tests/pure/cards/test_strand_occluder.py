@@ -42,7 +42,7 @@ def test_they_take_what_the_strands_take() -> None:
     for count, radius in ((3000, 1.0e-4), (300, 3.0e-4)):
         rig = curtain(count, radius)
         strands = rig.strands
-        area = StrandArea.of(strands.grid, strands.radius.reshape(count, -1))
+        area = StrandArea.of(strands)
         drawn = StrandSettings(fullness=2.0, tip_width=1.0)
         found = taken(card_flow.occluder_of(rig, drawn))
         # cards are a little longer than the mean of their strands

@@ -87,7 +87,10 @@ def test_each_card_is_as_open_as_its_own_strands(settings: CardSettings) -> None
     """Against a loop over cards; the vertices of a card lie evenly along it."""
     rig = rig_of(900)
     dense = AmbientSettings(extinction=100.0)
-    groom = replace(card_flow.card_groom(rig), occlusion=pipeline.rest_occlusion(rig, dense))
+    shade = pipeline.rest_occlusion(rig, dense)
+    groom = replace(
+        card_flow.card_groom(rig), occlusion=shade.reshape(rig.strands.strand_count, -1)
+    )
     assert groom.occlusion is not None
     mesh = built(groom, settings).finest
     owner, cards = card_of_vertex(mesh), card_of_strand(groom, settings)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hairloom.addon.render.camera import frame_points
-from hairloom.addon.render.good_side import good_side
-from hairloom.addon.strands import Surface
+from hairloom.addon.render.good_side import GoodSide, good_side
+from hairloom.addon.strands import StrandSet, Surface
 
 TURNS = (0.0, 75.0, 180.0, 262.0)
 
@@ -79,6 +79,13 @@ def beast() -> tuple[np.ndarray, Surface]:
     return spikes(outward * squeeze, outward, 0.04), ball(1.0, squeeze)
 
 
+def side_of(grid: np.ndarray, body: Surface | None) -> GoodSide:
+    count, cv_count = grid.shape[:2]
+    points, offsets = grid.reshape(-1, 3), np.arange(count + 1) * cv_count
+    hair = StrandSet(points, offsets, np.ones(len(points)), np.zeros(count))
+    return good_side(hair, body)
+
+
 def turned(strands: np.ndarray, body: Surface, degrees: float) -> tuple[np.ndarray, Surface]:
     angle = np.radians(degrees)
     rotation = np.array(
@@ -97,7 +104,7 @@ def away(direction: np.ndarray, degrees: float) -> float:
 @pytest.mark.parametrize("shape", [head, cropped, sheet, beast])
 @pytest.mark.parametrize("degrees", TURNS)
 def test_the_front_is_found_wherever_it_is(shape, degrees: float) -> None:
-    side = good_side(*turned(*shape(), degrees))
+    side = side_of(*turned(*shape(), degrees))
     assert away(side.front, degrees) < 12.0
     assert 15.0 < away(side.three_quarter, degrees) < 45.0
 
@@ -106,15 +113,15 @@ def test_a_carpet_is_seen_from_above() -> None:
     strands, wall = sheet()
     flat = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # the wall's front turned up
     surface = Surface((wall.positions @ flat.T).astype(np.float32), wall.triangles)
-    side = good_side(spikes(strands[:, 0] @ flat.T, np.tile([0, 0, 1.0], (900, 1)), 0.02), surface)
-    assert side.three_quarter[2] > 0.5 > good_side(*head()).three_quarter[2]
+    side = side_of(spikes(strands[:, 0] @ flat.T, np.tile([0, 0, 1.0], (900, 1)), 0.02), surface)
+    assert side.three_quarter[2] > 0.5 > side_of(*head()).three_quarter[2]
 
 
 def test_a_sheet_without_a_body_is_not_seen_from_its_edge() -> None:
     strands, _ = sheet()
     for degrees in TURNS:
         rotated, _ = turned(strands, ball(1.0), degrees)
-        seen = away(good_side(rotated, None).three_quarter, degrees)
+        seen = away(side_of(rotated, None).three_quarter, degrees)
         assert min(seen, 180.0 - seen) < 50.0
 
 
@@ -123,12 +130,12 @@ def test_size_and_place_do_not_matter(scale: float) -> None:
     strands, body = head()
     place = scale * np.array([0.3, -0.2, 1.5])
     moved = Surface((body.positions * scale + place).astype(np.float32), body.triangles)
-    one, other = good_side(strands, body), good_side(strands * scale + place, moved)
+    one, other = side_of(strands, body), side_of(strands * scale + place, moved)
     np.testing.assert_allclose(one.three_quarter, other.three_quarter, atol=0.05)
 
 
 def test_views_turn_to_the_side_that_is_seen() -> None:
-    side = good_side(*head())
+    side = side_of(*head())
     np.testing.assert_allclose(side.turned(0.0, 0.0), side.front, atol=1e-12)
     np.testing.assert_allclose(side.turned(180.0, 0.0), -side.front, atol=1e-12)
     aside = side.turned(90.0, 0.0)

@@ -18,6 +18,7 @@ from hairloom.addon.shading.volume.card_opacity import (
 )
 from hairloom.addon.shading.volume.opacity import adds_to, layer_ends, layer_weights
 from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands import StrandSet
 
 
 def test_depth_of_a_card_is_that_of_strands_at_random() -> None:
@@ -52,12 +53,13 @@ def test_shade_of_strands_is_their_mean_shadow() -> None:
     random = np.random.default_rng(7)
     grid = np.cumsum(random.normal(0.0, 0.01, (20, 40, 3)), axis=1)
     radius = np.full((20, 40), 5.0e-5)
+    strands = StrandSet(grid.reshape(-1, 3), np.arange(21) * 40, radius.ravel(), np.zeros(20))
     settings = StrandSettings(fullness=2.0, tip_width=0.25, transparency="layers", opacity=0.5)
     steps = np.diff(grid, axis=1)
     across = np.linalg.norm(np.cross(steps[None], directions()[:, None, None]), axis=3).mean(axis=0)
     width = 2.0 * 5.0e-5 * 2.0 * np.linspace(1.0, 0.25, 40)
     expected = 0.5 * (across * 0.5 * (width[1:] + width[:-1])).sum()
-    shadow_area = StrandArea.of(grid, radius).shadow_area(settings)
+    shadow_area = StrandArea.of(strands).shadow_area(settings)
     assert shadow_area == pytest.approx(expected, rel=0.01)
 
 

@@ -1,0 +1,29 @@
+"""Strands as cards take them: equally many points, evenly spaced, one at each row of a card."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Ints
+from ..strands import StrandSet
+from ..strands.resample import resample
+
+#: Where strands have points as they need them, cards have at least as many rows,
+_FEWEST = 16
+#: and as many as this fraction of the strands needs points,
+_SERVED = 0.9
+#: unless all strands had more points than this together.
+_MOST_POINTS = 4_000_000
+
+
+def card_strands(strands: StrandSet) -> StrandSet:
+    """The same strands with one point count; those that have one already as they are."""
+    if strands.is_uniform:
+        return strands
+    return resample(strands, row_count(strands.point_counts))
+
+
+def row_count(point_counts: Ints) -> int:
+    """How many rows the cards of strands with these point counts have."""
+    served = int(np.quantile(point_counts, _SERVED, method="higher"))
+    return max(min(served, _MOST_POINTS // len(point_counts)), _FEWEST)
