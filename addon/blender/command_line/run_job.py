@@ -32,6 +32,8 @@ _OF_SCENES = (
     "look_from_material",
     "fin_add",
     "fin_remove",
+    "add_hair_tie",
+    "remove_hair_tie",
     "fit_spheres",
     "remove_spheres",
     "make_cards",
