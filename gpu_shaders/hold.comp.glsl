@@ -32,31 +32,46 @@ void put_beside(int strand, int cv, int other, float away)
   put(strand, cv, place + offset * (away / max(length(offset), TINY)));
 }
 
+// Where a point of a strand at rest is carried by an anchor.
+vec3 carried(int strand, int cv, int anchor)
+{
+  vec4 rest = vec4(texelFetch(rest_points, strand_texel(strand, cv, cv_count), 0).xyz, 1.0);
+  vec3 place;
+  for (int row = 0; row < 3; row++) {
+    place[row] = dot(texelFetch(anchors, strand_texel(anchor, row, 3), 0), rest);
+  }
+  return place;
+}
+
 // Bring a strand to one hold; `before` is the last CV that is held so far. Returns the next such.
 int bring(int strand, int number, int before, float whole_length)
 {
-  vec4 hold = texelFetch(holds, strand_texel(number, 0, 2), 0);  // x place, y anchor
-  vec4 rest = vec4(texelFetch(holds, strand_texel(number, 1, 2), 0).xyz, 1.0);
+  vec2 hold = texelFetch(holds, strand_texel(number, 0, 1), 0).xy;  // place, anchor
   int first = int(hold.x);
   int after = min(first + 1, cv_count - 1);
-  vec3 target;
-  for (int row = 0; row < 3; row++) {
-    target[row] = dot(texelFetch(anchors, strand_texel(int(hold.y), row, 3), 0), rest);
-  }
-  vec3 here = mix(point_at(strand, first), point_at(strand, after), hold.x - float(first));
-  vec3 error = target - here;
-  if (length(error) <= NEAR * whole_length) {
+  vec3 target = carried(strand, first, int(hold.y));
+  vec3 beyond = carried(strand, after, int(hold.y));
+  vec3 here = point_at(strand, first);
+  vec3 there = point_at(strand, after);
+  if (max(distance(target, here), distance(beyond, there)) <= NEAR * whole_length) {
     return after;
   }
   float reach = 0.0;
   for (int cv = before; cv < first; cv++) {
     reach += length_from(strand, cv);
   }
-  vec3 span = point_at(strand, first) + error - point_at(strand, before);
-  error += span * (min(reach / max(length(span), TINY), 1.0) - 1.0);
+  vec3 start = point_at(strand, before);
+  vec3 span = target - start;
+  span *= min(reach / max(length(span), TINY), 1.0);
+  vec3 direction = beyond - target;
+  if (after > first) {
+    direction *= length_from(strand, first) / max(length(direction), TINY);
+  }
+  vec3 shift = start + span - here;
+  vec3 shift_beyond = start + span + direction - there;
   for (int cv = before + 1; cv < cv_count; cv++) {
     float part = min(float(cv - before) / float(max(first - before, 1)), 1.0);
-    put(strand, cv, point_at(strand, cv) + error * part);
+    put(strand, cv, point_at(strand, cv) + (cv > first ? shift_beyond : shift * part));
   }
   for (int sweep = 0; sweep < SWEEPS; sweep++) {
     for (int cv = first - 1; cv > before; cv--) {

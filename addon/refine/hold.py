@@ -1,10 +1,10 @@
 """Strands that follow their guides are brought to where ties and surfaces hold them.
 
 A guide is held exactly; a strand between guides passes its tie a little beside its own place. So
-from root to tip each hold moves the strand there: evenly more on the way from the root, or from the
-hold before, and all beyond as a whole. On that way the segments get back their lengths, with both
-ends where they are (FABRIK; Aristidou and Lasenby 2011). What a tie would tear off goes as far as
-the strand is long.
+from root to tip each hold moves the two points beside it there, as the dynamics does: evenly more
+on the way from the root, or from the hold before, and all beyond as a whole. On that way the
+segments get back their lengths, with both ends where they are (FABRIK; Aristidou and Lasenby 2011).
+What a tie would tear off goes as far as the strand is long.
 """
 
 from __future__ import annotations
@@ -51,30 +51,37 @@ def hold(strands: Floats, rest: Floats, holds: Holds, anchors: Floats) -> None:
     before = np.full(len(strands), ROOT_POINTS - 1, np.int64)  # the last CV that is held so far
     for number in range(int(order.max(initial=-1)) + 1):
         one = np.flatnonzero(order == number)
-        strand, place = holds.strand[one], holds.place[one]
+        strand, first = holds.strand[one], holds.place[one].astype(np.int64)
         some, some_rest = strands[strand].astype(np.float64), rest[strand].astype(np.float64)
-        target = _moved(anchors[holds.anchor[one]], places_at(some_rest, place))
-        strands[strand] = _held(some, some_rest, before[strand], place, target)
-        before[strand] = np.minimum(place.astype(np.int64) + 1, strands.shape[1] - 1)
+        matrix = anchors[holds.anchor[one]]
+        strands[strand] = _held(some, some_rest, before[strand], first, matrix)
+        before[strand] = np.minimum(first + 1, strands.shape[1] - 1)
 
 
-def _held(some: Floats, rest: Floats, before: Ints, place: Floats, target: Floats) -> Floats:
-    cv, first = np.arange(some.shape[1]), place.astype(np.int64)
+def _held(some: Floats, rest: Floats, before: Ints, first: Ints, matrix: Floats) -> Floats:
+    """Strands (n, cv_count, 3) brought to one hold each: their points `first` and the next one."""
+    cv, after = np.arange(some.shape[1]), np.minimum(first + 1, some.shape[1] - 1)
     length = np.linalg.norm(np.diff(rest, axis=1), axis=2)
-    error = target - places_at(some, place)
-    is_off = np.linalg.norm(error, axis=1) > NEAR * length.sum(axis=1)
-    error = np.where(is_off[:, None], error, 0.0)
-    is_between = (cv[:-1] >= before[:, None]) & (cv[:-1] < first[:, None])
-    start, goal = _point(some, before), _point(some, first) + error
-    reach = np.where(is_between, length, 0.0).sum(axis=1)
-    away = np.linalg.norm(goal - start, axis=1)
-    error += (
-        (goal - start)
-        * (np.minimum(reach / np.maximum(away, _TINY), 1.0) - 1.0)[:, None]
-        * (is_off[:, None])
+    here, there = _point(some, first), _point(some, after)
+    target, beyond = (_moved(matrix, _point(rest, index)) for index in (first, after))
+    error = np.maximum(
+        np.linalg.norm(target - here, axis=1), np.linalg.norm(beyond - there, axis=1)
     )
-    part = (cv - before[:, None]) / np.maximum(first - before, 1)[:, None]
-    some = some + np.clip(part, 0.0, 1.0)[..., None] * error[:, None]
+    is_off = error > NEAR * length.sum(axis=1)
+
+    is_between = (cv[:-1] >= before[:, None]) & (cv[:-1] < first[:, None])
+    reach, start = np.where(is_between, length, 0.0).sum(axis=1), _point(some, before)
+    span = target - start
+    span *= np.minimum(reach / np.maximum(np.linalg.norm(span, axis=1), _TINY), 1.0)[:, None]
+    direction = beyond - target
+    size = np.linalg.norm(_point(rest, after) - _point(rest, first), axis=1)
+    direction *= (size / np.maximum(np.linalg.norm(direction, axis=1), _TINY))[:, None]
+
+    part = np.clip((cv - before[:, None]) / np.maximum(first - before, 1)[:, None], 0.0, 1.0)
+    shift = part[..., None] * (start + span - here)[:, None]
+    shift_beyond = (start + span + direction - there)[:, None]
+    shift = np.where((cv > first[:, None])[..., None], shift_beyond, shift)
+    some = some + np.where(is_off[:, None, None], shift, 0.0)
     for _ in range(SWEEPS):
         _sweep(some, length, before, first, is_off)
     return some
@@ -94,14 +101,6 @@ def _sweep(some: Floats, length: Floats, before: Ints, first: Ints, is_off: Bool
 
 def _point(grid: Floats, cv: Ints) -> Floats:
     return grid[np.arange(len(grid)), cv]
-
-
-def places_at(grid: Floats, place: Floats) -> Floats:
-    """Points of strands (n, cv_count, 3), each at one place in CVs, (n, 3)."""
-    first = place.astype(np.int64)
-    part = (place - first)[:, None]
-    after = np.minimum(first + 1, grid.shape[1] - 1)
-    return _point(grid, first) * (1.0 - part) + _point(grid, after) * part
 
 
 def _moved(matrix: Floats, points: Floats) -> Floats:

@@ -3,7 +3,7 @@ RidePass, over textures in the layout of `strand_layout.strand_rows`.
 
     rest_points   RGBA32F: xyz position at rest [m, world]
     held_strands  RGBA32F: x a strand that is held, y its first hold, z how many it has
-    holds         RGBA32F: first texel x place in CVs, y anchor; second xyz that place at rest
+    holds         RG32F: x place in CVs, y anchor
     anchors       RGBA32F: three texels each, rows of the matrix from world at rest to world now
     cv_points     RGBA32F: xyz position now [m, world], changed in place
 """
@@ -17,7 +17,6 @@ import numpy as np
 
 from ..arrays import Floats
 from ..groom.holds import Holds
-from ..refine.hold import places_at
 from .shader_program import ShaderRecipe, program
 from .strand_layout import strand_rows
 from .textures import texture_from
@@ -42,11 +41,11 @@ class HoldPass:
 
     Args:
         holds: of all strands.
-        rest: (strand_count, cv_count, 3) [m] world at rest.
+        cv_count: of each strand.
     """
 
-    def __init__(self, holds: Holds, rest: Floats) -> None:
-        self._all, self._rest = holds, rest
+    def __init__(self, holds: Holds, cv_count: int) -> None:
+        self._all, self._cv_count = holds, cv_count
         self.release()
 
     def release(self) -> None:
@@ -75,7 +74,7 @@ class HoldPass:
         shader.bind(
             textures=textures,
             images={"cv_points": cv_points},
-            integers={"cv_count": self._rest.shape[1], "held_count": count},
+            integers={"cv_count": self._cv_count, "held_count": count},
         )
         gpu.compute.dispatch(shader.shader, -(-count // HOLD_RECIPE.group_size[0]), 1, 1)
         gpu.shader.unbind()
@@ -84,11 +83,9 @@ class HoldPass:
         strand, first, count = np.unique(holds.strand, return_index=True, return_counts=True)
         held = np.zeros((len(strand), 1, 4), np.float32)
         held[:, 0, :3] = np.stack([strand, first, count], axis=1)
-        table = np.zeros((len(holds.strand), 2, 4), np.float32)
-        table[:, 0, 0], table[:, 0, 1] = holds.place, holds.anchor
-        table[:, 1, :3] = places_at(self._rest[holds.strand], holds.place)
+        table = np.stack([holds.place, holds.anchor], axis=1).astype(np.float32)[:, None]
         self._known, self._held_count = holds, len(strand)
         self._textures = {
             "held_strands": texture_from(strand_rows(held), "RGBA32F"),
-            "holds": texture_from(strand_rows(table), "RGBA32F"),
+            "holds": texture_from(strand_rows(table), "RG32F"),
         }

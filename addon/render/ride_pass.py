@@ -100,7 +100,7 @@ class RidePass:
         self._strands = strands
         self._guides, self._guide_grid = guides, guide_grid
         self._riders = Riders.of(strands.points, strands.offsets, guide_grid, weights)
-        self._held = None if holds is None else HoldPass(holds, strands.grid)
+        self._held = None if holds is None else HoldPass(holds, self._cv_count)
         self._holds = None if head is None else RootHolds(strands, head)
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
         self.points = DevicePoints(StrandLayout(strands.offsets))

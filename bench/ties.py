@@ -1,0 +1,135 @@
+"""Whether hair stays in a tie: a ponytail on the built-in head, shaken for two seconds.
+
+Of all strands as they are drawn: how far they leave their place in the ring (at most 1 mm), and how
+much longer or shorter they get; with a demo shake and one of 5 Hz, at 24 frames a second, so that
+half a substep is left at every other frame. The last line is one JSON object; the exit status is 1
+if a limit is missed.
+
+make bench NAME="ties --strands 8000 --pictures out"
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import bpy  # noqa: F401  it must come before gpu, which lives inside it
+import gpu
+import numpy as np
+from _ponytail import Ponytail, ponytail
+
+from hairloom.addon import pipeline
+from hairloom.addon.blender.colliders.fields import field_of
+from hairloom.addon.blender.command_line.simulate_job import shake_matrix
+from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
+from hairloom.addon.blender.sessions.numpy_solver import NumpySolver
+from hairloom.addon.dynamics.colliders import PosedCollider
+from hairloom.addon.dynamics.settings import DynamicsSettings
+
+FPS, SECONDS, LIMIT_MM = 24.0, 2.0, 1.0
+GRAVITY = np.array([0.0, 0.0, -9.81])
+
+
+def main() -> int:
+    options = argparse.ArgumentParser()
+    options.add_argument("--strands", type=int, default=8000)
+    options.add_argument("--pictures", type=Path, help="folder of pictures of the shaken ponytail")
+    options.add_argument("--compute", action="store_true", help="on the GPU instead of in numpy")
+    asked = options.parse_args()
+    gpu.init()
+    tail = ponytail(asked.strands)
+    assert tail.rig.holds is not None and tail.rig.guide_holds is not None
+    found: dict[str, object] = {
+        "strands": tail.rig.strands.strand_count,
+        "held_strands": len(tail.rig.holds.strand),
+        "guides": len(tail.rig.guides),
+        "held_guides": len(tail.rig.guide_holds.strand),
+        "form": "compute" if asked.compute else "numpy",
+    }
+    collider = field_of(tail.bust.surface, DynamicsSettings(), place="head")
+    shakes = {"shake": lambda time: shake_matrix(np.zeros(3), time), "shake_5hz": fast_shake}
+    worst = 0.0
+    for name, shake in shakes.items():
+        seen, shown = played(tail, shake, collider, compute=asked.compute)
+        found |= {f"{name}_{key}": value for key, value in seen.items()}
+        worst = max(worst, seen["tie_escape_mm"])
+        if asked.pictures is not None:
+            draw(tail, shown, asked.pictures / f"ties_{name}.png")
+    found["tie_escape_mm"] = worst
+    print(json.dumps(found))
+    return int(not worst <= LIMIT_MM)
+
+
+def fast_shake(time: float) -> np.ndarray:
+    """0.1 m to either side, five times a second, smoothly begun."""
+    matrix = np.eye(4)
+    matrix[0, 3] = 0.1 * np.sin(np.pi * min(time, 0.5)) ** 2 * np.sin(10.0 * np.pi * time)
+    return matrix
+
+
+def played(tail: Ponytail, shake, collider, *, compute: bool):
+    """What was seen of all strands, and some moments: (pose, strands)."""
+    rig, settings = tail.rig, DynamicsSettings()
+    solver = (ComputeSolver if compute else NumpySolver)(rig)
+    rest = lengths(rig.strands.grid)
+    escapes, changes, shown, before = [], [], [], np.eye(4)
+    for frame in range(1, round(SECONDS * FPS) + 1):
+        matrix = shake(frame / FPS)
+        posed = (PosedCollider(collider, before, matrix),)
+        solver.advance(tail.pose(matrix), posed, settings, GRAVITY, 1.0 / FPS)
+        before, strands = matrix, solver.strands()
+        assert np.isfinite(strands).all()
+        escapes.append(escape(tail, solver.pose, strands))
+        changes.append(np.abs(lengths(strands) / rest - 1.0))
+        if frame % 4 == 0:
+            shown.append((solver.pose, strands))
+    gap, change = np.array(escapes), np.array(changes)
+    return {
+        "tie_escape_mm": round(float(gap.max()) * 1e3, 4),
+        "tie_escape_p99_mm": round(float(np.quantile(gap, 0.99)) * 1e3, 4),
+        "length_worst_percent": round(float(change.max()) * 100.0, 3),
+        "length_p99_percent": round(float(np.quantile(change, 0.99)) * 100.0, 3),
+    }, shown
+
+
+def lengths(strands: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(np.diff(strands.astype(np.float64), axis=1), axis=2).sum(axis=1)
+
+
+def escape(tail: Ponytail, pose: pipeline.Pose, strands: np.ndarray) -> np.ndarray:
+    """How far each held strand is from its place in the ring [m]."""
+    holds = tail.rig.holds
+    first = holds.place.astype(int)
+    part = (holds.place - first)[:, None]
+
+    def at(grid: np.ndarray) -> np.ndarray:
+        return grid[holds.strand, first] * (1.0 - part) + grid[holds.strand, first + 1] * part
+
+    target = at(tail.rig.strands.grid) @ pose.matrix[:3, :3].T + pose.matrix[:3, 3]
+    return np.linalg.norm(at(strands) - target, axis=1)
+
+
+def draw(tail: Ponytail, shown: list, path: Path) -> None:
+    """Twelve moments, from behind and aside."""
+    from hairloom.addon.blender.base import images
+    from hairloom.addon.blender.pictures.studio import FIELD_OF_VIEW, Studio
+    from hairloom.addon.blender.properties.groom_settings import GroomSettings
+    from hairloom.addon.blender.sessions.prepared_groom import prepared
+    from hairloom.addon.refine.settings import DetailSettings
+    from hairloom.addon.render.frame import frame_camera
+    from hairloom.addon.shading.ambient_settings import AmbientSettings
+
+    settings = GroomSettings().with_settings(DetailSettings(lod_height=0.0))
+    groom = prepared(tail.rig, AmbientSettings())
+    studio = Studio(groom, settings, look=tail.bust.look("light"))
+    points = tail.rig.strands.points
+    box = points.min(axis=0) - 0.03, points.max(axis=0) + 0.03
+    camera = frame_camera(box, (-0.9, 0.9, 0.25), FIELD_OF_VIEW, 320 / 360)
+    pictures = [studio.picture(*moment, 320, 360, 2, camera) for moment in shown[:12]]
+    images.write_png(path, images.contact_sheet(pictures, 4))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
