@@ -6,7 +6,9 @@ import pytest
 from mathutils import Matrix
 
 from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.bakes.cache import Cache
 from hairloom.addon.blender.bakes.stale_bakes import changed_since
+from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.strands import StrandSet
@@ -291,3 +293,93 @@ def test_ties_survive_saving_and_opening(swinging, tmp_path, evaluated):
     assert hair.hairloom.tip_surface.name == "Head"
     session = previews.start(hair, evaluated())
     assert len(session.rig.holds.strand) > 3
+
+
+def bone_in(head):
+    """An armature whose one bone moves the head's vertices."""
+    bpy.ops.object.armature_add()
+    rig = bpy.context.object
+    rig.name = "Rig"
+    group = head.vertex_groups.new(name="Bone")
+    group.add(list(range(len(head.data.vertices))), 1.0, "REPLACE")
+    modifier = head.modifiers.new("Armature", "ARMATURE")
+    modifier.object = rig
+    return rig
+
+
+@pytest.mark.parametrize("how", ["child of the bone", "skinned"])
+def test_ties_move_with_bones(new_hair, sphere, evaluated, how):
+    rig = bone_in(sphere)
+    hair = new_hair(sphere)
+    hair.hairloom.dynamics.device = "numpy"
+    hair.hairloom.dynamics.collider_resolution = 8
+    if how == "skinned":
+        one = ring("torus")
+        one.parent = None
+        group = one.vertex_groups.new(name="Bone")
+        group.add(list(range(len(one.data.vertices))), 1.0, "REPLACE")
+        one.modifiers.new("Armature", "ARMATURE").object = rig
+    else:
+        one = ring()
+        matrix = one.matrix_world.copy()
+        one.parent, one.parent_type, one.parent_bone = rig, "BONE", "Bone"
+        one.matrix_world = matrix
+    bone = rig.pose.bones["Bone"]
+    bone.rotation_mode = "XYZ"
+    bone.keyframe_insert("rotation_euler", frame=1)
+    bone.rotation_euler = (0.6, 0.3, 0.0)
+    bone.keyframe_insert("rotation_euler", frame=LAST)
+    bpy.context.scene.frame_set(1)
+    tie(hair, one)
+    session = previews.start(hair, evaluated())
+    assert len(session.rig.holds.strand) > 3
+    begun = session.strands
+    for frame in range(2, LAST + 1):
+        bpy.context.scene.frame_set(frame)
+        assert escape(session) < 1e-3
+    turned = session.solver.pose.anchors[0, :3, :3]
+    assert np.degrees(np.arccos((np.trace(turned) - 1.0) / 2.0)) == pytest.approx(38.0, abs=4.0)
+    assert np.linalg.norm((session.strands - begun)[:, -1], axis=1).max() > 0.05
+    # the bone carries head and ring alike, so that the hair is as long between them as before
+    root = session.strands[session.rig.holds.strand, 0]
+    assert np.isfinite(root).all()
+
+
+def test_undo_brings_back_a_tie_that_was_deleted(swinging, evaluated):
+    hair, _ = swinging
+    tie(hair, ring())
+    previews.start(hair, evaluated())
+    bpy.ops.ed.undo_push(message="before")
+    bpy.data.objects.remove(bpy.data.objects["Ring"])
+    bpy.ops.ed.undo_push(message="deleted")
+    bpy.context.scene.frame_set(2)
+    bpy.ops.ed.undo()
+    hair = bpy.data.objects["Hair"]
+    assert hair.hairloom.tie_collection.objects[0].name == "Ring"
+    bpy.context.scene.frame_set(3)
+    session = previews.session_of(hair)
+    pose = session.solver.pose
+    assert np.isfinite(pose.anchors).all()
+    assert not [text for text in session.warnings if "Ring" in text]
+
+
+def test_the_verb_shakes_hair_with_its_ties(swinging, tmp_path):
+    hair, head = swinging
+    head.animation_data_clear()
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.18, segments=24, ring_count=12)
+    hair.hairloom.tip_surface = bpy.context.object
+    tie(hair, ring(), ring("torus", (0.0, 0.0, -0.12)))
+    objects, collections = len(bpy.data.objects), len(bpy.data.collections)
+    small = ["--set", "dynamics.collider_resolution=8", "--set", "guides.tip_distance=0.1"]
+    where = ["--seconds", "0.2", "--output", str(tmp_path / "shaken")]
+    arguments = ["simulate", "--groom", "Hair", "--head", "Head", *small, *where]
+    assert command_line.run(arguments) == 0
+    assert (len(bpy.data.objects), len(bpy.data.collections)) == (objects, collections)
+    cache = Cache(tmp_path / "shaken")
+    baked = playback.rig_in(cache)
+    assert baked.rig.holds.tie_count == 2
+    assert set(np.minimum(baked.rig.holds.anchor, 2)) == {0, 1, 2}
+    last = cache.frame(cache.facts.last)
+    expected = np.broadcast_to(last["matrix"], last["anchors"].shape)
+    np.testing.assert_allclose(last["anchors"], expected, atol=1e-5)
+    assert np.abs(last["matrix"] - np.eye(4)).max() > 0.001

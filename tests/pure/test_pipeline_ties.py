@@ -196,3 +196,31 @@ def test_a_tie_without_hair_is_said_and_does_no_harm() -> None:
     np.testing.assert_array_equal(rig.guides, plain.guides)
     np.testing.assert_array_equal(rig.weights.weight, plain.weights.weight)
     assert pipeline.held_cvs(rig, pose_at(rig, np.eye(4))) is None
+
+
+def test_strange_strands_in_a_tie_do_no_harm() -> None:
+    """Of two points, with two points at one place, without length at the tip, and a single dot."""
+    whole = ponytail(6).points.reshape(6, -1, 3)
+    ends = np.stack([whole[0, 0], RING + [0.0, 0.02, 0.0]])
+    doubled = np.concatenate([whole[1, :30], whole[1, 29:30], whole[1, 30:]])
+    stopped = np.concatenate([whole[2], whole[2, -1:], whole[2, -1:]])
+    lines = [ends, doubled, stopped, np.tile(RING, (5, 1)), *whole]
+    counts = [len(line) for line in lines]
+    strands = StrandSet(
+        np.concatenate(lines),
+        np.concatenate([[0], np.cumsum(counts)]),
+        np.full(sum(counts), 4e-5),
+        np.zeros(len(lines), np.int32),
+    )
+    settings = GuideSettings(cv_count=8, tip_distance=0.1)
+    holders = Holders((tie(),), TIPS)
+    rig = pipeline.prepare(strands, None, settings, place="hair", holders=holders)
+    assert rig.holds is not None and len(rig.holds.strand) > 6
+    poses = [pose_at(rig, shaking(frame / 24.0)) for frame in range(12)]
+    shrunk = np.diag([0.0, 0.0, 0.0, 1.0])
+    poses += [Pose(None, shrunk, pose_at(rig, shrunk).anchors)] * 3 + poses[:3]
+    for solver in ("direct", "relaxation"):
+        chosen = DynamicsSettings(length_solver=solver)
+        for motion in played(rig, poses, chosen, 24.0):
+            assert np.isfinite(motion.dynamics.position).all()
+            assert np.isfinite(pipeline.strands_now(rig, motion)).all()

@@ -23,13 +23,14 @@ from ...strands import Surface
 from ..bakes.guide_motion import BakedGuides
 from ..base.attributes import set_attribute
 from ..colliders.fields import field_of
+from ..colliders.ties import copy_holders
 from ..preview.bake import Bake
 from ..scene.curves import write_curves
 from .bake_job import write_bake
 from .inputs import Inputs
 from .job_options import add_motion_options
 from .job_steps import Job, finish, read_hair
-from .object_settings import put_map
+from .object_settings import is_groom, put_map
 from .verb import Verb
 
 #: the shake: how far the head turns and sways, and how often
@@ -84,6 +85,8 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
     if job.options.animated:
         yield _hair_of_open_scene(job, inputs)
         return
+    named = bpy.context.scene.objects.get(job.sources.groom or "")
+    depsgraph = bpy.context.evaluated_depsgraph_get()
     window = bpy.context.window_manager.windows[0]
     before, scene = window.scene, bpy.data.scenes.new("Hairloom Simulation")
     window.scene = scene
@@ -98,6 +101,8 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
         if inputs.density is not None:
             set_attribute(head.data, _DENSITY, "POINT", inputs.density)
             hair.hairloom.children_density = _DENSITY
+        if named is not None and is_groom(named):
+            copy_holders(named, hair, head, scene, depsgraph)
         low, high = inputs.head.bounds()
         rate = float(job.options.frame_rate)
         shake(head, (low + high) / 2.0, round(job.options.seconds * rate), rate)
