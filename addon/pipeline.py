@@ -397,7 +397,8 @@ def held_strands(rig: Rig, pose: Pose, strands: Floats) -> Floats:
     holds = None if rig.holds is None else rig.holds.where(pose.anchors)
     if holds is None or pose.anchors is None or not len(holds.strand):
         return strands
-    hold(strands, rig.strands.grid, holds, pose.anchors)
+    rest = rig.strands
+    hold(strands.reshape(-1, 3), rest.points, rest.offsets, holds, pose.anchors)
     return strands
 
 

@@ -6,36 +6,36 @@
 #define NEAR {{hold_near}}
 #define TINY 1.0e-12
 
-vec3 point_at(int strand, int cv)
+vec3 point_at(StrandSpan span, int cv)
 {
-  return imageLoad(cv_points, strand_texel(strand, cv, cv_count)).xyz;
+  return imageLoad(cv_points, span_texel(span, cv)).xyz;
 }
 
-void put(int strand, int cv, vec3 point)
+void put(StrandSpan span, int cv, vec3 point)
 {
-  ivec2 texel = strand_texel(strand, cv, cv_count);
+  ivec2 texel = span_texel(span, cv);
   imageStore(cv_points, texel, vec4(point, imageLoad(cv_points, texel).w));
 }
 
 // Of the segment from a CV to the next one, at rest.
-float length_from(int strand, int cv)
+float length_from(StrandSpan span, int cv)
 {
-  vec3 here = texelFetch(rest_points, strand_texel(strand, cv, cv_count), 0).xyz;
-  vec3 next = texelFetch(rest_points, strand_texel(strand, cv + 1, cv_count), 0).xyz;
+  vec3 here = texelFetch(rest_points, span_texel(span, cv), 0).xyz;
+  vec3 next = texelFetch(rest_points, span_texel(span, cv + 1), 0).xyz;
   return distance(here, next);
 }
 
-void put_beside(int strand, int cv, int other, float away)
+void put_beside(StrandSpan span, int cv, int other, float away)
 {
-  vec3 place = point_at(strand, other);
-  vec3 offset = point_at(strand, cv) - place;
-  put(strand, cv, place + offset * (away / max(length(offset), TINY)));
+  vec3 place = point_at(span, other);
+  vec3 offset = point_at(span, cv) - place;
+  put(span, cv, place + offset * (away / max(length(offset), TINY)));
 }
 
 // Where a point of a strand at rest is carried by an anchor.
-vec3 carried(int strand, int cv, int anchor)
+vec3 carried(StrandSpan span, int cv, int anchor)
 {
-  vec4 rest = vec4(texelFetch(rest_points, strand_texel(strand, cv, cv_count), 0).xyz, 1.0);
+  vec4 rest = vec4(texelFetch(rest_points, span_texel(span, cv), 0).xyz, 1.0);
   vec3 place;
   for (int row = 0; row < 3; row++) {
     place[row] = dot(texelFetch(anchors, strand_texel(anchor, row, 3), 0), rest);
@@ -44,41 +44,41 @@ vec3 carried(int strand, int cv, int anchor)
 }
 
 // Bring a strand to one hold; `before` is the last CV that is held so far. Returns the next such.
-int bring(int strand, int number, int before, float whole_length)
+int bring(StrandSpan span, int number, int before, float whole_length)
 {
   vec2 hold = texelFetch(holds, strand_texel(number, 0, 1), 0).xy;  // place, anchor
   int first = int(hold.x);
-  int after = min(first + 1, cv_count - 1);
-  vec3 target = carried(strand, first, int(hold.y));
-  vec3 beyond = carried(strand, after, int(hold.y));
-  vec3 here = point_at(strand, first);
-  vec3 there = point_at(strand, after);
+  int after = min(first + 1, span.count - 1);
+  vec3 target = carried(span, first, int(hold.y));
+  vec3 beyond = carried(span, after, int(hold.y));
+  vec3 here = point_at(span, first);
+  vec3 there = point_at(span, after);
   if (max(distance(target, here), distance(beyond, there)) <= NEAR * whole_length) {
     return after;
   }
   float reach = 0.0;
   for (int cv = before; cv < first; cv++) {
-    reach += length_from(strand, cv);
+    reach += length_from(span, cv);
   }
-  vec3 start = point_at(strand, before);
-  vec3 span = target - start;
-  span *= min(reach / max(length(span), TINY), 1.0);
+  vec3 start = point_at(span, before);
+  vec3 way = target - start;
+  way *= min(reach / max(length(way), TINY), 1.0);
   vec3 direction = beyond - target;
   if (after > first) {
-    direction *= length_from(strand, first) / max(length(direction), TINY);
+    direction *= length_from(span, first) / max(length(direction), TINY);
   }
-  vec3 shift = start + span - here;
-  vec3 shift_beyond = start + span + direction - there;
-  for (int cv = before + 1; cv < cv_count; cv++) {
+  vec3 shift = start + way - here;
+  vec3 shift_beyond = start + way + direction - there;
+  for (int cv = before + 1; cv < span.count; cv++) {
     float part = min(float(cv - before) / float(max(first - before, 1)), 1.0);
-    put(strand, cv, point_at(strand, cv) + (cv > first ? shift_beyond : shift * part));
+    put(span, cv, point_at(span, cv) + (cv > first ? shift_beyond : shift * part));
   }
   for (int sweep = 0; sweep < SWEEPS; sweep++) {
     for (int cv = first - 1; cv > before; cv--) {
-      put_beside(strand, cv, cv + 1, length_from(strand, cv));
+      put_beside(span, cv, cv + 1, length_from(span, cv));
     }
     for (int cv = before + 1; cv < first; cv++) {
-      put_beside(strand, cv, cv - 1, length_from(strand, cv - 1));
+      put_beside(span, cv, cv - 1, length_from(span, cv - 1));
     }
   }
   return after;
@@ -92,12 +92,13 @@ void main()
   }
   // x the strand, y its first hold, z how many it has
   ivec3 own = ivec3(texelFetch(held_strands, strand_texel(held, 0, 1), 0).xyz);
+  StrandSpan span = strand_span(strand_spans, own.x);
   float whole_length = 0.0;
-  for (int cv = 0; cv < cv_count - 1; cv++) {
-    whole_length += length_from(own.x, cv);
+  for (int cv = 0; cv < span.count - 1; cv++) {
+    whole_length += length_from(span, cv);
   }
   int before = {{pinned}} - 1;
   for (int number = 0; number < own.z; number++) {
-    before = bring(own.x, own.y + number, before, whole_length);
+    before = bring(span, own.y + number, before, whole_length);
   }
 }

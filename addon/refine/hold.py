@@ -36,26 +36,31 @@ class Holds(Protocol):
     def anchor(self) -> Ints: ...
 
 
-def hold(strands: Floats, rest: Floats, holds: Holds, anchors: Floats) -> None:
-    """Bring strands (strand_count, cv_count, 3) world [m] to where they are held, in place.
+def hold(points: Floats, rest: Floats, offsets: Ints, holds: Holds, anchors: Floats) -> None:
+    """Bring strands (point_count, 3) world [m] to where they are held, in place.
 
     Args:
         rest: the same at rest, with the lengths to keep.
+        offsets: (strand_count + 1,), strand s is points offsets[s]:offsets[s + 1].
         holds: those of one strand are one after the other, from root to tip.
         anchors: (anchor_count, 4, 4), from world at rest to world now, all finite.
     """
+    counts = np.diff(offsets)
     begins = np.flatnonzero(np.diff(holds.strand, prepend=-1))
     order = np.arange(len(holds.strand)) - np.repeat(
         begins, np.diff(begins, append=len(holds.strand))
     )
-    before = np.full(len(strands), ROOT_POINTS - 1, np.int64)  # the last CV that is held so far
+    before = np.full(len(counts), ROOT_POINTS - 1, np.int64)  # the last point that is held so far
     for number in range(int(order.max(initial=-1)) + 1):
-        one = np.flatnonzero(order == number)
-        strand, first = holds.strand[one], holds.place[one].astype(np.int64)
-        some, some_rest = strands[strand].astype(np.float64), rest[strand].astype(np.float64)
-        matrix = anchors[holds.anchor[one]]
-        strands[strand] = _held(some, some_rest, before[strand], first, matrix)
-        before[strand] = np.minimum(first + 1, strands.shape[1] - 1)
+        of_order = np.flatnonzero(order == number)
+        for count in np.unique(counts[holds.strand[of_order]]).tolist():
+            one = of_order[counts[holds.strand[of_order]] == count]
+            strand, first = holds.strand[one], holds.place[one].astype(np.int64)
+            index = offsets[strand, None] + np.arange(count)
+            some, some_rest = points[index].astype(np.float64), rest[index].astype(np.float64)
+            matrix = anchors[holds.anchor[one]]
+            points[index] = _held(some, some_rest, before[strand], first, matrix)
+            before[strand] = np.minimum(first + 1, count - 1)
 
 
 def _held(some: Floats, rest: Floats, before: Ints, first: Ints, matrix: Floats) -> Floats:

@@ -1,7 +1,8 @@
 """Strands brought to where ties and surfaces hold them, on the GPU: `refine.hold.hold` behind
-RidePass, over textures in the layout of `strand_layout.strand_rows`.
+RidePass, over textures in the layouts of `strand_layout`.
 
     rest_points   RGBA32F: xyz position at rest [m, world]
+    strand_spans  RGBA32F: where the points of each strand lie, see strand_layout.StrandLayout
     held_strands  RGBA32F: x a strand that is held, y its first hold, z how many it has
     holds         RG32F: x place in CVs, y anchor
     anchors       RGBA32F: three texels each, rows of the matrix from world at rest to world now
@@ -18,7 +19,7 @@ import numpy as np
 from ..arrays import Floats
 from ..groom.holds import Holds
 from .shader_program import ShaderRecipe, program
-from .strand_layout import strand_rows
+from .strand_layout import StrandLayout, strand_rows
 from .textures import texture_from
 
 HOLD_RECIPE = ShaderRecipe(
@@ -26,12 +27,13 @@ HOLD_RECIPE = ShaderRecipe(
     compute="hold.comp.glsl",
     textures=(
         ("FLOAT_2D", "rest_points"),
+        ("FLOAT_2D", "strand_spans"),
         ("FLOAT_2D", "held_strands"),
         ("FLOAT_2D", "holds"),
         ("FLOAT_2D", "anchors"),
     ),
     images=(("RGBA32F", "cv_points", "READ_WRITE"),),
-    integers=("cv_count", "held_count"),
+    integers=("held_count",),
     group_size=(64, 1),
 )
 
@@ -41,11 +43,11 @@ class HoldPass:
 
     Args:
         holds: of all strands.
-        cv_count: of each strand.
+        layout: of rest_points and cv_points.
     """
 
-    def __init__(self, holds: Holds, cv_count: int) -> None:
-        self._all, self._cv_count = holds, cv_count
+    def __init__(self, holds: Holds, layout: StrandLayout) -> None:
+        self._all, self._layout = holds, layout
         self.release()
 
     def release(self) -> None:
@@ -74,7 +76,7 @@ class HoldPass:
         shader.bind(
             textures=textures,
             images={"cv_points": cv_points},
-            integers={"cv_count": self._cv_count, "held_count": count},
+            integers={"held_count": count},
         )
         gpu.compute.dispatch(shader.shader, -(-count // HOLD_RECIPE.group_size[0]), 1, 1)
         gpu.shader.unbind()
@@ -85,7 +87,9 @@ class HoldPass:
         held[:, 0, :3] = np.stack([strand, first, count], axis=1)
         table = np.stack([holds.place, holds.anchor], axis=1).astype(np.float32)[:, None]
         self._known, self._held_count = holds, len(strand)
+        spans = strand_rows(self._layout.spans[:, None])
         self._textures = {
+            "strand_spans": texture_from(spans, "RGBA32F"),
             "held_strands": texture_from(strand_rows(held), "RGBA32F"),
             "holds": texture_from(strand_rows(table), "RG32F"),
         }

@@ -100,10 +100,10 @@ class RidePass:
         self._strands = strands
         self._guides, self._guide_grid = guides, guide_grid
         self._riders = Riders.of(strands.points, strands.offsets, guide_grid, weights)
-        self._held = None if holds is None else HoldPass(holds, self._cv_count)
         self._holds = None if head is None else RootHolds(strands, head)
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
         self.points = DevicePoints(StrandLayout(strands.offsets))
+        self._held = None if holds is None else HoldPass(holds, self.points.layout)
         self.release()
         released_with_shaders(self)
         released_with_shaders(self.points)  # a snapshot may outlive this pass

@@ -76,3 +76,38 @@ def test_equals_numpy(rig: Rig) -> None:
     ride.release()
     ride.ride(pose.head_positions, pose.matrix, guides, pose.anchors)
     np.testing.assert_allclose(ride.read(), expected, atol=2e-6)
+
+
+def test_strands_of_any_point_counts(rig: Rig) -> None:
+    """The pass alone, on strands of 4 to 40 points that lie in rows one after the other."""
+    from hairloom.addon.groom.ties import find_holds
+    from hairloom.addon.refine.hold import hold
+    from hairloom.addon.render.hold_pass import HoldPass
+    from hairloom.addon.render.strand_layout import StrandLayout
+    from hairloom.addon.render.textures import texture_from, texture_to_array
+
+    random = np.random.default_rng(8)
+    counts = random.integers(4, 41, 90)
+    lines = [random.normal([0, 0, 0.5], 0.3, (count, 3)).cumsum(axis=0) for count in counts]
+    points = np.concatenate([0.2 * line / len(line) for line in lines]).astype(np.float32)
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    radius = np.full(len(points), 1e-4)
+    strands = StrandSet(points, offsets, radius, np.zeros(90, np.int32))
+    shapes = np.diag([0.03, 0.03, 0.03, 1.0])[None].repeat(2, axis=0)
+    shapes[:, 2, 3] = 0.03, 0.08
+    ties = tuple(Tie(str(number), shape, True) for number, shape in enumerate(shapes))
+    holds = find_holds(strands, Holders(ties))
+    assert holds is not None and len(holds.strand) > 40
+    matrices = np.stack([np.eye(4)] * 2)
+    matrices[:, :3, 3] = random.normal(0.0, 0.01, (2, 3))
+    anchors = anchors_of(holds, matrices, None)
+    expected = points.copy()
+    hold(expected, points, strands.offsets, holds, anchors)
+    layout = StrandLayout(strands.offsets)
+    texels = layout.pixels(np.column_stack([points, radius]))
+    rest, now = (texture_from(texels, "RGBA32F") for _ in range(2))
+    HoldPass(holds, layout).hold(now, rest, anchors)
+    found = layout.values(texture_to_array(now))
+    assert np.abs(expected - points).max() > 0.005
+    np.testing.assert_allclose(found[:, :3], expected, atol=2e-6)
+    np.testing.assert_array_equal(found[:, 3], radius.astype(np.float32))
