@@ -47,6 +47,8 @@ def main() -> int:
         "guides": len(tail.rig.guides),
         "held_guides": len(tail.rig.guide_holds.strand),
         "form": "compute" if asked.compute else "numpy",
+        "renderer": gpu.platform.renderer_get(),
+        "numpy": np.__version__,
     }
     collider = field_of(tail.bust.surface, DynamicsSettings(), place="head")
     shakes = {"shake": lambda time: shake_matrix(np.zeros(3), time), "shake_5hz": fast_shake}

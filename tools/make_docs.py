@@ -64,7 +64,8 @@ def texts_to_translate() -> str:
 
 
 def make_pictures() -> None:
-    """Run the demo on the built-in head, in air and under water, and keep its pictures."""
+    """Run the demo on the built-in head, in air and under water, shake a ponytail, and keep their
+    pictures."""
     IMAGES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         headless = [sys.executable, str(REPOSITORY / "tools" / "headless.py")]
@@ -74,6 +75,9 @@ def make_pictures() -> None:
         preset = ["--preset", "dynamics/under_water"]
         subprocess.run([*headless, "demo", *preset, "--output", folder], check=True)
         write_small(Path(folder) / "motion.png", IMAGES / "under_water.jpg")
+        ties = [sys.executable, str(REPOSITORY / "tools" / "bench.py"), "ties"]
+        subprocess.run([*ties, "--strands", "3000", "--pictures", folder], check=True)
+        write_small(Path(folder) / "ties_shake.png", IMAGES / "ponytail.jpg")
     tools = ("refinement", "preset", "shading", "volume", "engine", "quick_start")
     for name in (*(f"{each}_pictures" for each in tools), "preset_thumbnails"):
         tool = [sys.executable, str(REPOSITORY / "tools" / f"{name}.py")]

@@ -78,6 +78,7 @@ def tell_rig(report: Report, rig: Rig, name: str) -> None:
         groom=Path(name).name,
         strands=rig.strands.strand_count,
         guides=len(rig.guides),
+        held_strands=0 if rig.holds is None else len(np.unique(rig.holds.strand)),
         children=rig.child_count,
         children_line=rig.children_line,
         widths=rig.widths.line,
