@@ -61,14 +61,14 @@ int bring(StrandSpan span, int number, int before, float whole_length)
     reach += length_from(span, cv);
   }
   vec3 start = point_at(span, before);
-  vec3 way = target - start;
-  way *= min(reach / max(length(way), TINY), 1.0);
+  vec3 offset = target - start;
+  offset *= min(reach / max(length(offset), TINY), 1.0);
   vec3 direction = beyond - target;
   if (after > first) {
     direction *= length_from(span, first) / max(length(direction), TINY);
   }
-  vec3 shift = start + way - here;
-  vec3 shift_beyond = start + way + direction - there;
+  vec3 shift = start + offset - here;
+  vec3 shift_beyond = start + offset + direction - there;
   for (int cv = before + 1; cv < span.count; cv++) {
     float part = min(float(cv - before) / float(max(first - before, 1)), 1.0);
     put(span, cv, point_at(span, cv) + (cv > first ? shift_beyond : shift * part));
