@@ -22,8 +22,11 @@ from ..files.file_space import FileSpace
 from ..groom import Groom
 from ..read_groom import ReadGroom
 from .usd_curves import Curves, UnusableCurvesError, curves_of
-from .usd_library import prims_of, usd_arrays
-from .usd_reader import Arrays
+from .usd_library import usd_arrays
+from .usd_reader import Arrays, unpacked
+
+#: prims of which each is named in notes
+_FEW = 3
 
 
 def read_usd(
@@ -81,16 +84,20 @@ class _Reading:
 
     def pieces(self) -> Iterator[Curves]:
         """The curves of each prim that has usable ones."""
-        for prim in prims_of(self._arrays):
+        notes, problems = dict[str, list[str]](), dict[str, list[str]]()
+        for prim in unpacked(self._arrays):
             local = prim["matrix"].T  # USD has row vectors
+            path = str(prim["path"])
             try:
                 piece = curves_of(prim, self._to_blender @ local)
             except UnusableCurvesError as error:
-                self._problems.append(f"{prim['path']} was left out: {error}")
+                problems.setdefault(str(error), []).append(path)
                 continue
-            self.notes += [f"{prim['path']}: {note}" for note in piece.notes]
+            for note in piece.notes:
+                notes.setdefault(note, []).append(path)
             yield piece
-        self.notes += self._problems
+        self._problems = _of_prims(problems, " was left out", ", were left out")
+        self.notes += _of_prims(notes) + self._problems
         others = zip(self._arrays["others"], self._arrays["other_counts"], strict=True)
         counts = ", ".join(f"{count:,} {kind}" for kind, count in others)
         if counts:
@@ -120,6 +127,20 @@ class _Reading:
 
     def _error(self, problem: str, remedy: str) -> HairloomError:
         return HairloomError(problem, place=str(self._path), remedy=remedy)
+
+
+def _of_prims(notes: dict[str, list[str]], one: str = "", many: str = "") -> list[str]:
+    """Sentences on prims, given the paths that each is on; of many prims one for all.
+
+    one, many: what a sentence begins with, after the path or the paths.
+    """
+    found = []
+    for note, paths in notes.items():
+        if len(paths) > _FEW:
+            found.append(f"{len(paths):,} prims, such as {paths[0]}{many}: {note}")
+        else:
+            found += [f"{path}{one}: {note}" for path in paths]
+    return found
 
 
 def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Groom:

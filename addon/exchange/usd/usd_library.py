@@ -7,7 +7,7 @@ their place, in one process with Blender's own. Some Linux distributions build B
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -79,16 +79,6 @@ def usd_arrays(path: Path, python: Sequence[str] | None = None) -> Arrays:
         run_reader(script, path, [result], library="USD", python=python, settings=one_thread)
         with np.load(result, allow_pickle=False) as arrays:
             return dict(arrays)
-
-
-def prims_of(arrays: Arrays) -> Iterator[Arrays]:
-    """The arrays of each prim of curves, by their names without its number."""
-    prims: dict[str, Arrays] = {}
-    for name, array in arrays.items():
-        number, slash, own_name = name.partition("/")
-        if slash:
-            prims.setdefault(number, {})[own_name] = array
-    yield from prims.values()
 
 
 def _unusable(path: Path, problem: str, remedy: str) -> HairloomError:

@@ -6,17 +6,18 @@ A damaged file makes OpenUSD crash, and a text of a few kilobytes can describe m
 machine holds. So only this process opens files, and it has limits of time, memory and prims. It
 imports no other module of ours. It ends with REPORTED, and a line on stderr, after an error.
 
-The result has, for the BasisCurves number N in the file's order, "N/name", "N/path", "N/matrix"
-(4, 4) that takes row vectors to the stage, "N/points", "N/counts", "N/widths", "N/samples" of
-points over time, "N/traits" (wrap, type, basis, interpolation of widths) and, for each primvar of
-PRIMVARS that it has, "N/primvar/NAME" without indices and "N/interpolation/NAME"; and of the stage
-"up", "unit", "has_unit", "prim_names" (name and label of the topmost one), "version" (major and
-minor; -1 where it names none), "others" (types of other geometry) and "other_counts".
+The result has, for each BasisCurves in the file's order, "name", "path", "matrix" (4, 4) that takes
+row vectors to the stage, "points", "counts", "widths", "samples" of points over time, "traits"
+(wrap, type, basis, interpolation of widths) and, for each primvar of PRIMVARS that it has,
+"primvar/NAME" without indices and "interpolation/NAME", all of them `packed`. And it has of the
+stage "up", "unit", "has_unit", "prim_names" (name and label of the topmost one), "version" (major
+and minor; -1 where it names none), "others" (types of other geometry) and "other_counts".
 """
 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import sys
 from collections import Counter
@@ -55,7 +56,7 @@ MAX_PRIMS = 1_000_000
 #: Memory that a file may take beside its own size [bytes], and as a multiple of it.
 _BESIDE, _MAX_TIMES = 640 << 20, 30
 #: Time of the processor for any file, with the start [s], and bytes that take a second more.
-_SECONDS, _BYTES_A_SECOND = 7, 1_000_000
+_SECONDS, _BYTES_A_SECOND = 6, 1_000_000
 
 
 class _TooMuchError(Exception):
@@ -71,7 +72,8 @@ def read_curves(path: str) -> Arrays:
     found = _of_stage(stage)
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
     others: Counter[str] = Counter()
-    number = points = 0
+    curves_prims: list[Arrays] = []
+    points = 0
     walk = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
     for prims, prim in enumerate(walk):
         if prims > MAX_PRIMS:
@@ -82,9 +84,7 @@ def read_curves(path: str) -> Arrays:
             if points > MAX_POINTS:
                 raise _TooMuchError(f"it has more than {MAX_POINTS:,} points")
             matrix = np.array(cache.GetLocalToWorldTransform(prim), np.float64)
-            found |= {f"{number}/{name}": array for name, array in curves.items()}
-            found[f"{number}/matrix"] = matrix
-            number += 1
+            curves_prims.append(curves | {"matrix": matrix})
         elif prim.IsA(UsdGeom.PointInstancer):
             others["PointInstancer"] += 1
             walk.PruneChildren()
@@ -92,7 +92,50 @@ def read_curves(path: str) -> Arrays:
             others[str(prim.GetTypeName())] += 1
     found["others"] = np.array(sorted(others), np.str_)
     found["other_counts"] = np.array([others[kind] for kind in sorted(others)], np.int64)
+    return found | packed(curves_prims)
+
+
+def packed(prims: list[Arrays]) -> Arrays:
+    """The arrays of many prims as a few, since an array in a file takes longer than a prim: those
+    of one name, type and shape follow each other, texts are one document. Empties the prims.
+
+    "texts": JSON as bytes, for each prim {name: text or texts}. "layouts": JSON as bytes, the name
+    and the dimensions of each K; "K/values": the rows of all prims that have it, "K/prims": which
+    these are, "K/rows": how many rows each has.
+    """
+    texts: list[dict[str, Any]] = []
+    numbers: dict[tuple[str, str, int, tuple[int, ...]], list[int]] = {}
+    for number, prim in enumerate(prims):
+        texts.append({name: a.tolist() for name, a in prim.items() if a.dtype.kind == "U"})
+        for name, array in prim.items():
+            if array.dtype.kind != "U":
+                layout = name, array.dtype.str, array.ndim, array.shape[1:]
+                numbers.setdefault(layout, []).append(number)
+    found = {"texts": _as_json(texts), "layouts": _as_json([(n, d) for n, _, d, _ in numbers])}
+    for key, ((name, *_), having) in enumerate(numbers.items()):
+        rows = [np.atleast_1d(prims[number].pop(name)) for number in having]
+        found[f"{key}/values"] = np.concatenate(rows)
+        found[f"{key}/prims"] = np.array(having, np.int64)
+        found[f"{key}/rows"] = np.array([len(each) for each in rows], np.int64)
     return found
+
+
+def unpacked(arrays: Arrays) -> list[Arrays]:
+    """The arrays of each prim again, by their names."""
+    prims = [
+        {name: np.array(text, np.str_) for name, text in each.items()}
+        for each in json.loads(arrays["texts"].tobytes())
+    ]
+    for key, (name, dimensions) in enumerate(json.loads(arrays["layouts"].tobytes())):
+        values, ends = arrays[f"{key}/values"], np.cumsum(arrays[f"{key}/rows"]).tolist()
+        starts = [0, *ends[:-1]]
+        for number, start, end in zip(arrays[f"{key}/prims"].tolist(), starts, ends, strict=True):
+            prims[number][name] = values[start:end] if dimensions else values[start]
+    return prims
+
+
+def _as_json(content: object) -> NDArray[Any]:
+    return np.frombuffer(json.dumps(content).encode(), np.uint8)
 
 
 def _of_stage(stage: Any) -> Arrays:
