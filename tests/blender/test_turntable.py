@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from full_disk import full_disk
 from tiers import few_in_commits
 
 pytest.importorskip("bpy", reason="turntables are drawn inside Blender")
@@ -18,7 +19,7 @@ pytest.importorskip("bpy", reason="turntables are drawn inside Blender")
 import bpy
 import gpu
 
-from hairloom.addon.blender.base.images import read_texture
+from hairloom.addon.blender.base.images import read_texture, write_png
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.pictures import turntable as turntable_module
 from hairloom.addon.blender.pictures import video
@@ -181,6 +182,25 @@ def test_what_fails_leaves_nothing(table: Turntable, monkeypatch: pytest.MonkeyP
     with pytest.raises(HairloomError, match="it broke"):
         list(table.steps())
     assert not table.folder.exists()
+
+
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.9])
+def test_a_video_on_a_full_disk_is_none(tmp_path: Path, part: float) -> None:
+    """Blender itself calls half a video finished."""
+    pictures = np.random.default_rng(0).random((6, 64, 64, 4)).astype(np.float32)
+    frames = [tmp_path / f"f_{number:04}.png" for number in range(len(pictures))]
+    for frame, picture in zip(frames, pictures, strict=True):
+        write_png(frame, picture)
+    whole, cut = tmp_path / "whole.mp4", tmp_path / "cut.mp4"
+    video.write_video(whole, frames, (64, 64), 24.0)
+    assert video.is_whole(whole)
+    limit = int(part * whole.stat().st_size)
+    with full_disk(limit), pytest.raises(HairloomError, match="no video was written"):
+        video.write_video(cut, frames, (64, 64), 24.0)
+    assert not cut.exists()
+    for length in (0, 7, 100, limit, whole.stat().st_size - 1):
+        cut.write_bytes(whole.read_bytes()[:length])
+        assert not video.is_whole(cut)
 
 
 def test_without_a_writer_of_videos_the_pictures_stay(

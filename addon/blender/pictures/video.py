@@ -12,10 +12,12 @@ from pathlib import Path
 import bpy
 
 from ...errors import HairloomError
-from ...exchange.files.atomic import atomic_write
+from ...exchange.files.atomic import as_system_says, atomic_write
 
 #: codecs that Blender may have been built with, the most widely supported first
 _CODECS = ("H264", "MPEG4")
+_OTHER_BUILD = "make a video of them with an official build of Blender"
+_FREE_SPACE = "free some space there and try again, or make a video of them elsewhere"
 
 
 def can_write_video() -> bool:
@@ -48,8 +50,33 @@ def write_video(
             except RuntimeError as error:
                 why = str(error).strip()
             if temporary.is_file() and temporary.stat().st_size:
+                if not is_whole(temporary):
+                    raise _failed(path, as_system_says(path, "it was cut short"), _FREE_SPACE)
                 return
         raise _failed(path, why)
+
+
+def is_whole(path: Path) -> bool:
+    """Whether an .mp4 has been written to its end; Blender is silent about a full disk.
+
+    It is a row of boxes, each with its size and its kind, among them the index of all frames (ISO
+    base media file format).
+    """
+    end, at, kinds = path.stat().st_size, 0, set[bytes]()
+    with path.open("rb") as file:
+        while at < end:
+            file.seek(at)
+            head = file.read(16)
+            if len(head) < 8:
+                return False
+            size, kind = int.from_bytes(head[:4]), head[4:8]
+            if size == 1:
+                size = int.from_bytes(head[8:])
+            if size < 8:
+                return False
+            kinds.add(kind)
+            at += size
+    return at == end and b"moov" in kinds
 
 
 @contextmanager
@@ -83,9 +110,9 @@ def _sequence_of(
         bpy.data.scenes.remove(scene)
 
 
-def _failed(path: Path, why: str) -> HairloomError:
+def _failed(path: Path, why: str, remedy: str = _OTHER_BUILD) -> HairloomError:
     return HairloomError(
         f"no video was written ({why})",
         place=str(path),
-        remedy="The pictures are complete: make a video of them with an official build of Blender",
+        remedy=f"The pictures are complete: {remedy}",
     )
