@@ -47,7 +47,7 @@ class Shots:
 
     def strands(self) -> Any:
         rig = self.rig
-        return self._studio.picture(rig.rest_pose, rig.strands.grid, WIDTH, HEIGHT, SAMPLES)
+        return self._studio.picture(rig.rest_pose, rig.strands.points, WIDTH, HEIGHT, SAMPLES)
 
     def built(self, way: str, levels: int = 1) -> tuple[Any, Any]:
         """Cards in this way, and how they are drawn."""

@@ -59,7 +59,7 @@ def picture(rig: Any, look: dict[str, Any], camera: Any = None, samples: int = S
     groom_settings = of_addon("blender.properties.groom_settings")
     chosen = groom_settings.GroomSettings(sections, debug_view=view)
     made = studio.Studio(of_addon("blender.sessions.prepared_groom").prepared(rig, ambient), chosen)
-    return made.picture(rig.rest_pose, rig.strands.grid, WIDTH, HEIGHT, samples, camera)
+    return made.picture(rig.rest_pose, rig.strands.points, WIDTH, HEIGHT, samples, camera)
 
 
 def close_camera(rig: Any, reach: float) -> Any:

@@ -107,7 +107,7 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
         )
         name = file_name(chosen_hair(context)[0].name)
         folder = Path(bpy.path.abspath(self.directory))
-        return Turntable(shown.studio, shown.pose, shown.points, chosen, folder, name)
+        return Turntable(shown.studio, shown.pose, shown.points, chosen, folder, name, shown.guides)
 
 
 class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
@@ -153,6 +153,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
                 (self.size, self.size),
                 self.samples,
                 by_looks=self.shows == "looks",
+                guides=shown.guides,
             )
             manager.progress_begin(0, sheet.count)
             try:

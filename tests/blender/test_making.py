@@ -263,7 +263,7 @@ def test_a_failure_of_what_nobody_wants_any_more_is_no_matter(
 
 def test_pictures_are_of_whole_hair(hair, evaluated, in_window):
     previews.start(hair, evaluated())
-    assert len(shown_groom(hair, evaluated()).points) == COUNT
+    assert len(shown_groom(hair, evaluated()).points.reshape(COUNT, -1, 3)) == COUNT
 
 
 def test_orders_tell_whether_they_give_the_same_rig(hair, evaluated, extension):

@@ -66,7 +66,7 @@ def studio_of(strands: StrandSet, head: Surface) -> Studio:
 
 def still(studio: Studio, **options: bool) -> np.ndarray:
     rig = studio._rig
-    return studio.picture(rig.rest_pose, rig.strands.grid, SIZE, SIZE, 2, **options)
+    return studio.picture(rig.rest_pose, rig.strands.points, SIZE, SIZE, 2, **options)
 
 
 @pytest.fixture

@@ -105,7 +105,7 @@ def test_the_groom_stays_whole_in_view_and_does_not_drift(
     table: Turntable, size: tuple[int, int]
 ) -> None:
     """Also one that is long to one side of its head, and high up."""
-    points = table.points.copy() + [0.5, -0.2, 3.0]
+    points = table.points.reshape(-1, 16, 3) + [0.5, -0.2, 3.0]
     points[::7] += np.linspace(0.0, 0.4, points.shape[1])[:, None] * np.array([1.0, 0.2, 0.0])
     table.points = points
     table.pose = replace(table.pose, head_positions=None)

@@ -107,18 +107,17 @@ def _fill(
 ) -> None:
     """The bake's strands at rest, with the look of the hair."""
     strands = rig.rig.strands
-    grid = strands.grid
     if len(curves.curves):
         curves.remove_curves()
-    curves.add_curves([grid.shape[1]] * len(grid))
-    curves.position_data.foreach_set("vector", grid.ravel())
+    curves.add_curves(strands.point_counts.tolist())
+    curves.position_data.foreach_set("vector", strands.points.ravel())
     if not _are_poly(hair.data):
         curves.set_types(type="CATMULL_ROM")
     else:
         curves.set_types(type="POLY")
     set_attribute(curves, "radius", "POINT", strands.radius)
     shown = hair.evaluated_get(depsgraph).data
-    if len(shown.curves) == len(grid):  # else it is not known which strand is which
+    if len(shown.curves) == strands.strand_count:  # else it is not known which strand is which
         _take_attributes(curves, shown)
     set_colors(curves, strands)
     curves.materials.clear()

@@ -72,7 +72,8 @@ def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
     """All that `rig_of` needs."""
     strands = rig.strands
     arrays: Arrays = {
-        "strands": strands.grid,
+        "strands": strands.points,
+        "offsets": strands.offsets,
         "radius": strands.radius,
         "group": strands.group,
         "guides": rig.guides,
@@ -122,7 +123,7 @@ def _hold_arrays(holds: Holds) -> Arrays:
     return arrays
 
 
-def _holds_of(arrays: Arrays, strand_count: int, cv_count: int) -> Holds | None:
+def _holds_of(arrays: Arrays, strands: StrandSet) -> Holds | None:
     if "hold_strand" not in arrays:
         return None
     surface = None
@@ -138,11 +139,13 @@ def _holds_of(arrays: Arrays, strand_count: int, cv_count: int) -> Holds | None:
         arrays.get("tip_triangle"),
         arrays.get("tip_barycentric"),
     )
-    _check_indices(holds.strand, strand_count)
-    _check_indices(holds.place.astype(np.int64), cv_count)
+    _check_indices(holds.strand, strands.strand_count)
     _check_indices(holds.anchor, holds.anchor_count)
     if not len(holds.strand) == len(holds.place) == len(holds.anchor):
         raise ValueError("holds do not fit together")
+    last = strands.point_counts[holds.strand] - 1
+    if not ((holds.place >= 0.0) & (holds.place <= last)).all():
+        raise ValueError("a hold is at no point of its strand")
     return holds
 
 
@@ -161,8 +164,6 @@ def rig_of(arrays: Arrays, place: str) -> BakedRig:
 
 
 def _rig_of(arrays: Arrays) -> BakedRig:
-    grid = arrays["strands"]
-    count, cv_count, _ = grid.shape
     head, frames = None, None
     if "head_positions" in arrays:
         head = Surface(arrays["head_positions"], arrays["head_triangles"])
@@ -171,8 +172,8 @@ def _rig_of(arrays: Arrays) -> BakedRig:
             head.positions, head.triangles, arrays["root_triangle"], arrays["root_barycentric"]
         )
     strands = StrandSet(
-        points=grid.reshape(-1, 3),
-        offsets=np.arange(count + 1, dtype=np.int32) * cv_count,
+        points=arrays["strands"],
+        offsets=arrays["offsets"],
         radius=arrays["radius"],
         group=arrays["group"],
         root_uv=arrays.get("root_uv"),
@@ -180,7 +181,7 @@ def _rig_of(arrays: Arrays) -> BakedRig:
         root_barycentric=arrays.get("root_barycentric"),
         color=arrays.get("color"),
     )
-    _check_indices(arrays["guides"], count)
+    _check_indices(arrays["guides"], strands.strand_count)
     _check_indices(arrays["weight_guide"], len(arrays["guides"]))
     weights = GuideWeights(arrays["weight_guide"], arrays["weight"])
     notes = tuple(str(note) for note in arrays.get("notes", ()))
@@ -195,7 +196,7 @@ def _rig_of(arrays: Arrays) -> BakedRig:
         int(arrays["own_count"]),
         Widths.of(arrays["widths"], str(arrays["widths_reason"])),
         str(arrays["children_line"]),
-        _holds_of(arrays, count, cv_count),
+        _holds_of(arrays, strands),
     )
     ties = arrays.get("tie_rests", np.zeros((0, 4, 4)))
     rests = RestMatrices(arrays["hair_rest"], arrays.get("head_rest"), ties)

@@ -20,6 +20,7 @@ from ..scene.fin_modifier import clear, fin_modifier, has_fins, show
 from .bake_settings import absolute, folder_of
 from .baked_rig import BakedRig, rig_of
 from .cache import FACTS, Cache
+from .simulated import Arrays
 
 
 class _Known:
@@ -85,7 +86,7 @@ def rig_in(cache: Cache) -> BakedRig:
 
 
 def strands_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
-    """All strands of a groom, (strand_count, cv_count, 3) world [m].
+    """All strands of a groom, in the shape of `pipeline.strands_at`, world [m].
 
     Before the first frame and after the last one they stay as they are in these. Between two
     frames, where motion blur looks, they go straight.
@@ -93,11 +94,26 @@ def strands_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
     Raises:
         HairloomError: the bake is damaged.
     """
-    facts, rig = cache.facts, rig_in(cache)
-    here = rig.strands(cache.frame(min(max(frame, facts.first), facts.last)))
+    return _between(cache, frame, subframe, rig_in(cache).strands)
+
+
+def guides_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
+    """The guides of a groom, (guide_count, cv_count, 3) world [m]; in time as `strands_in`.
+
+    Raises:
+        HairloomError: the bake is damaged.
+    """
+    return _between(cache, frame, subframe, lambda arrays: arrays["guides"])
+
+
+def _between(
+    cache: Cache, frame: int, subframe: float, points_of: Callable[[Arrays], Floats]
+) -> Floats:
+    facts = cache.facts
+    here = points_of(cache.frame(min(max(frame, facts.first), facts.last)))
     if not subframe or not facts.first <= frame < facts.last:
         return here
-    there = rig.strands(cache.frame(frame + 1))
+    there = points_of(cache.frame(frame + 1))
     between: Floats = here + (there - here) * np.float32(subframe)
     return between
 
@@ -166,7 +182,7 @@ def _write(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> No
         raise HairloomError("there is no bake here", place=str(folder), remedy="Bake again")
     points = strands_in(cache, scene.frame_current, scene.frame_subframe)
     is_same = curves.hairloom.baked_rig in ("", cache.facts.rig_hash)
-    if len(curves.position_data) != points.shape[0] * points.shape[1] or not is_same:
+    if 3 * len(curves.position_data) != points.size or not is_same:
         raise HairloomError(
             "these curves are not those of the bake", place=curves.name, remedy="Bake again"
         )

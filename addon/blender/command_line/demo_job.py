@@ -50,7 +50,12 @@ def _write_close_up(job: Job, path: Path, studio: Studio, rig: Rig) -> None:
     camera = studio.close_up(options.width / options.height)
     with job.report.stage("draw close-up"):
         picture = studio.picture(
-            rig.rest_pose, rig.strands.grid, options.width, options.height, options.samples, camera
+            rig.rest_pose,
+            rig.strands.points,
+            options.width,
+            options.height,
+            options.samples,
+            camera,
         )
     studio.write(path, picture)
     job.report.add_output(path)

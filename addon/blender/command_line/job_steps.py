@@ -82,7 +82,8 @@ def tell_rig(report: Report, rig: Rig, name: str) -> None:
         children=rig.child_count,
         children_line=rig.children_line,
         widths=rig.widths.line,
-        cv_count=rig.strands.grid.shape[1],
+        cv_count=rig.guide_grid.shape[1],
+        points=rig.strands.point_count,
         bounds_m=[low.round(5).tolist(), high.round(5).tolist()],
     )
 
@@ -110,19 +111,21 @@ def tell_notes(notes: list[str], report: Report) -> None:
 
 @dataclass(frozen=True)
 class PosedHair:
-    """Hair in one frame: all strands (strand_count, cv_count, 3) [m, world], and the pose."""
+    """Hair in one frame: the pose, the points of all strands, and the guides, world space [m]."""
 
     rig: Rig
     pose: Pose
     points: Floats
+    guides: Floats
 
     @classmethod
     def of_rest(cls, rig: Rig) -> Self:
-        return cls(rig, rig.rest_pose, rig.strands.grid)
+        return cls(rig, rig.rest_pose, rig.strands.points, rig.guide_grid)
 
     @classmethod
     def of_motion(cls, motion: BakedGuides, rig: Rig, frame: int) -> Self:
-        return cls(rig, *motion.strands(frame))
+        pose, guides = motion.at(frame)
+        return cls(rig, pose, pipeline.strands_at(rig, pose, guides), guides)
 
 
 def motion_of(job: Job, frames: range | None = None) -> BakedGuides:

@@ -46,7 +46,12 @@ def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> Floats
     options, report = job.options, job.report
     with report.stage("draw still"):
         picture = studio.picture(
-            hair.pose, hair.points, options.width, options.height, options.samples
+            hair.pose,
+            hair.points,
+            options.width,
+            options.height,
+            options.samples,
+            guides=hair.guides,
         )
     drawn = studio.statistics
     report.facts["drawn"] = {
@@ -67,9 +72,12 @@ def write_sheet(job: Job, path: Path, studio: Studio, motion: BakedGuides) -> No
     progress, pictures = job.report.progress("drawing the contact sheet", count), []
     for place in np.linspace(0, len(motion.frames) - 1, count).round().astype(int):
         with job.report.stage("interpolate strands"):
-            pose, points = motion.strands(motion.frames[place])
+            hair = PosedHair.of_motion(motion, motion.rig, motion.frames[place])
         with job.report.stage("draw frame"):
-            pictures.append(studio.picture(pose, points, 480, 360, samples=2))
+            picture = studio.picture(
+                hair.pose, hair.points, 480, 360, samples=2, guides=hair.guides
+            )
+        pictures.append(picture)
         progress.show(len(pictures))
     studio.write(path, contact_sheet(pictures, SHEET_COLUMNS))
     job.report.add_output(path)

@@ -26,7 +26,7 @@ def turntable(job: Job) -> None:
     )
     hair = posed_hair(job)
     studio = open_studio(job, hair.rig)
-    turn = Turntable(studio, hair.pose, hair.points, chosen, job.output)
+    turn = Turntable(studio, hair.pose, hair.points, chosen, job.output, guides=hair.guides)
     progress = report.progress("drawing the turntable", chosen.frames)
     with report.stage("draw turntable"):
         for done in turn.steps():
@@ -43,7 +43,15 @@ def sheet(job: Job) -> None:
     hair = posed_hair(job)
     studio = open_studio(job, hair.rig)
     size, samples = (options.width, options.height), options.samples
-    drawn = Sheet(studio, hair.pose, hair.points, size, samples, by_looks=options.looks)
+    drawn = Sheet(
+        studio,
+        hair.pose,
+        hair.points,
+        size,
+        samples,
+        by_looks=options.looks,
+        guides=hair.guides,
+    )
     progress = report.progress("drawing the contact sheet", drawn.count)
     with report.stage("draw contact sheet"):
         for done in drawn.steps():

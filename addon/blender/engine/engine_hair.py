@@ -160,7 +160,7 @@ def read_groom(
         strands = playback.strands_in(cache, scene.frame_current, scene.frame_subframe)
         made = _of_bake(owner, playback.rig_in(cache), settings, blocking=blocking)
         pose = playback.pose_in(cache, scene.frame_current, scene.frame_subframe)
-        guides = strands[made.rig.guides]
+        guides = playback.guides_in(cache, scene.frame_current, scene.frame_subframe)
     else:
         made = _of_curves(owner, settings, depsgraph, blocking=blocking)
         strands, pose, guides = made.snapshot.points, made.rig.rest_pose, made.rig.guide_grid

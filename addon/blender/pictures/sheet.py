@@ -37,7 +37,7 @@ class Sheet:
     """A contact sheet, drawn one picture at a time.
 
     Args:
-        pose, points: see Studio.picture.
+        pose, points, guides: see Studio.picture.
         size: width and height of each picture [pixels].
         by_looks: one view in all looks that come with Hairloom, instead of all views.
     """
@@ -51,8 +51,10 @@ class Sheet:
         samples: int,
         *,
         by_looks: bool = False,
+        guides: Floats | None = None,
     ) -> None:
         self._studio, self._pose, self._points = studio, pose, points
+        self._guides = guides
         self._size, self._samples, self._by_looks = size, samples, by_looks
         self._held = studio.held(pose, points)
         self._pictures: list[Floats] = []
@@ -92,14 +94,15 @@ class Sheet:
             self._studio.settings = worn
 
     def _seen(self, camera: Camera) -> Floats:
-        return self._studio.picture(self._pose, self._points, *self._size, self._samples, camera)
+        hair = self._pose, self._points
+        return self._studio.picture(*hair, *self._size, self._samples, camera, guides=self._guides)
 
     def _camera(self, direction: Floats, held: Floats) -> Camera:
         return self._studio.framed(held, direction, self._size[0] / self._size[1])
 
     def _near_the_eye(self) -> Floats:
         """Points around the nearest hair in the three-quarter view."""
-        middles = self._points[:, self._points.shape[1] // 2]
+        middles = self._studio.middles(self._points)
         towards = middles @ self._studio.side.three_quarter
         count = max(round(_NEAREST_FRACTION * len(middles)), 1)
         middle = middles[np.argsort(towards)[-count:]].mean(axis=0)

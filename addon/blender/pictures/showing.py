@@ -26,13 +26,14 @@ from .studio import Studio
 class ShownGroom:
     """A groom as it is now.
 
-    points: (strand_count, cv_count, 3) [m], world space.
+    points, guides: see Studio.picture.
     notes: what the artist should know.
     """
 
     studio: Studio
     pose: Pose
     points: Floats
+    guides: Floats
     notes: tuple[str, ...]
 
 
@@ -48,12 +49,14 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
         session = previews.session_of(hair)
     if isinstance(session, Session):
         studio = _studio(hair, session.groom, session.settings)
-        return ShownGroom(studio, session.solver.pose, session.strands, studio.warnings)
+        solver = session.solver
+        guides = solver.guides()
+        return ShownGroom(studio, solver.pose, session.strands, guides, studio.warnings)
     request = GroomSource(hair, depsgraph).request
     rig, settings = rig_of(request), request.settings
     studio = _studio(hair, prepared(rig, settings[AmbientSettings]), settings)
     notes = (*request.source.warnings, *rig.notes, *studio.warnings)
-    return ShownGroom(studio, rig.rest_pose, rig.strands.grid, notes)
+    return ShownGroom(studio, rig.rest_pose, rig.strands.points, rig.guide_grid, notes)
 
 
 def file_name(name: str) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...arrays import Floats
-from ...pipeline import Pose
+from ...pipeline import Pose, style_of_guides
 from ...render.camera import Camera, frame_points
 from ...render.card_pass import CardPass
 from ...render.card_snapshot import CardSnapshot
@@ -85,15 +85,17 @@ class Studio:
         camera: Camera | None = None,
         *,
         lights: tuple[Light, ...] | None = None,
+        guides: Floats | None = None,
         is_transparent: bool = False,
     ) -> Floats:
         """Hair at these points on the head in this pose, (height, width, 4) scene-linear.
 
         Args:
-            points: (strand_count, cv_count, 3) [m], world space.
+            points: of all strands [m], world space, in the shape of `pipeline.strands_at`.
             samples: sub-pixels along each side of a pixel.
             camera: in place of the studio's own.
             lights: in place of the stage's, which are attached to the camera.
+            guides: (guide_count, cv_count, 3) [m], what cards ride on; None is in their style.
             is_transparent: without the backdrop.
         """
         camera, occluders = camera or self._camera(width / height), self._groom.occluders
@@ -104,7 +106,7 @@ class Studio:
             lights=self.lights(camera) if lights is None else lights,
             ambient=self.stage.ambient,
             occluder_spheres=None if occluders is None else occluders.at(pose),
-            cards=self._cards_at(pose, points),
+            cards=self._cards_at(pose, guides),
         )
         picture = self._drawn(as_shown(snapshot), camera, width, height, samples)
         return picture if is_transparent else over(picture, backdrop(self.stage, width, height))
@@ -160,15 +162,17 @@ class Studio:
         """From where the groom at rest is best seen."""
         return good_side(self._rig.strands, self._rig.head)
 
-    def _cards_at(self, pose: Pose, points: Floats) -> CardSnapshot | None:
-        """The cards riding on the guides among these strands, where cards are shown."""
+    def _cards_at(self, pose: Pose, guides: Floats | None) -> CardSnapshot | None:
+        """The cards riding on these guides, where cards are shown."""
         if not self.settings.shows_cards:
             return None
         key, sections = cards_key(self.settings), self.settings.sections
         if self._cards is None or self._cards[0] != key:
             inputs = CardInputs(self._rig, sections, self._card_pictures)
             self._cards = key, BuiltCards.now(inputs)
-        return self._cards[1].at(pose, points[self._rig.guides], sections)
+        if guides is None:
+            guides = style_of_guides(self._rig, pose)
+        return self._cards[1].at(pose, guides, sections)
 
     def slices(self, pose: Pose, points: Floats) -> Floats:
         """The layers of the shadow maps in the studio's light, see opacity_tiles.
@@ -267,6 +271,11 @@ class Studio:
         nearest = roots[(roots @ direction).argmax()]
         reach = CLOSE_REACH * float(np.ptp(held, axis=0).max())
         return self.framed(held[np.linalg.norm(held - nearest, axis=1) < reach], direction, aspect)
+
+    def middles(self, points: Floats) -> Floats:
+        """The middle point of each strand, (strand_count, 3) [m]; points as of `picture`."""
+        offsets = self._rig.strands.offsets
+        return points.reshape(-1, 3)[(offsets[:-1] + offsets[1:]) // 2]
 
     def _meshes(self, pose: Pose) -> tuple[MeshSnapshot, ...]:
         if self._rig.head is None or pose.head_positions is None:

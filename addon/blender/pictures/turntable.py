@@ -86,7 +86,7 @@ class TurntableSettings:
 class Turntable:
     """A groom on a turntable.
 
-    pose, points: see Studio.picture; the groom does not move while the camera circles it.
+    pose, points, guides: see Studio.picture; the groom does not move while the camera circles it.
     folder, name: pictures become folder/name_0001.png and so on, the video folder/name.mp4.
     notes: warnings, complete after the last step.
     """
@@ -97,6 +97,7 @@ class Turntable:
     settings: TurntableSettings
     folder: Path
     name: str = "turntable"
+    guides: Floats | None = None
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -121,6 +122,7 @@ class Turntable:
             chosen.samples,
             self.camera(frame),
             lights=self._lights(frame),
+            guides=self.guides,
             is_transparent=chosen.transparent,
         )
 

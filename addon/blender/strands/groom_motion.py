@@ -101,7 +101,7 @@ class ChildrenMotion:
         read = usable_curves(_found(self.hair), depsgraph).strands
         if read.strand_count != self.count:
             raise _other_curves(self.hair, frame)
-        now = resample(read.take(self.guides), self.rig.strands.grid.shape[1]).grid
+        now = resample(read.take(self.guides), self.rig.guide_grid.shape[1]).grid
         positions = None
         if self.rig.head is not None:
             name = self.body.handle.name
