@@ -7,6 +7,7 @@
 
 #define CONTACT_WEIGHT {{contact_weight}}
 #define HELD {{held_weight}}
+#define HELD_SWEEPS {{held_sweeps}}
 
 vec3 touched_normal[FREE_SIZE];  // at each free CV that touches a collider, else zero
 
@@ -132,8 +133,16 @@ vec3 brought_near(vec3 point, vec3 other, float farthest)
   return other + offset * min(farthest / max(length(offset), TINY), 1.0);
 }
 
+void shorten_from_root()
+{
+  for (int i = 0; i < FREE; i++) {
+    position[i + 2] = brought_near(position[i + 2], position[i + 1], segment_length[i]);
+  }
+}
+
 // No CV farther from the root than its length along the strand, neither in a straight line nor along
-// the strand; a guide with held CVs is shortened from these to the root first.
+// the strand; a guide with held CVs is shortened to and fro, from these to the
+// root first.
 void hold_within_reach()
 {
   float reach = 0.0;
@@ -143,14 +152,23 @@ void hold_within_reach()
     position[i + 2] = position[1] + offset * min(reach / max(length(offset), TINY), 1.0);
   }
 #ifdef HAS_HELD
-  bool is_beyond = false;
-  for (int i = FREE - 2; i >= 0; i--) {
-    is_beyond = is_beyond || held[i + 1];
-    vec3 near = brought_near(position[i + 2], position[i + 3], segment_length[i + 1]);
-    position[i + 2] = is_beyond && !held[i] ? near : position[i + 2];
-  }
-#endif
+  vec3 place[FREE_SIZE];
   for (int i = 0; i < FREE; i++) {
-    position[i + 2] = brought_near(position[i + 2], position[i + 1], segment_length[i]);
+    place[i] = position[i + 2];
   }
+  for (int sweep = 0; sweep < HELD_SWEEPS; sweep++) {
+    bool is_beyond = false;
+    for (int i = FREE - 1; i >= 0; i--) {
+      position[i + 2] = held[i] ? place[i] : position[i + 2];
+    }
+    for (int i = FREE - 2; i >= 0; i--) {
+      is_beyond = is_beyond || held[i + 1];
+      vec3 near = brought_near(position[i + 2], position[i + 3], segment_length[i + 1]);
+      position[i + 2] = is_beyond && !held[i] ? near : position[i + 2];
+    }
+    shorten_from_root();
+  }
+#else
+  shorten_from_root();
+#endif
 }

@@ -35,6 +35,8 @@ CONTACT_WEIGHT = np.float32(0.9)
 #: Mass that a held CV seems to have more than others, as a fraction: all but 1, as the lengths of
 #: a straight guide between two ends that cannot move have no solution. It is put back at once.
 HELD = np.float32(0.99)
+#: How often guides with held CVs are shortened to and fro.
+HELD_SWEEPS = 4
 #: Lengths below this count as zero [m].
 TINY = np.float32(1.0e-12)
 _TINY_SQUARED = TINY * TINY
@@ -147,16 +149,18 @@ def shorten(position: Floats, length: Floats, held: Floats | None) -> None:
     """No segment longer than it should be: from root to tip each CV comes near enough to the one
     before it. That shortens zigzags, which long-range attachments let pass.
 
-    Guides with held CVs are shortened from these to the root first; where both cannot be had, the
-    length counts and not the held CV's place.
+    Guides with held CVs are shortened to and fro, from these to the root first; where both cannot
+    be had, the length counts and not the held CV's place.
     """
-    last = position.shape[1] - 1
-    if held is not None:
-        for cv, is_moved in _towards_root(held):
-            near = _brought_near(position[:, cv], position[:, cv + 1], length[cv])
-            np.copyto(position[:, cv], near, where=is_moved)
-    for cv in range(PINNED, last + 1):
-        position[:, cv] = _brought_near(position[:, cv], position[:, cv - 1], length[cv - 1])
+    before = None if held is None else position.copy()
+    for _ in range(1 if held is None else HELD_SWEEPS):
+        if held is not None and before is not None:
+            np.copyto(position, before, where=held > 0.0)
+            for cv, is_moved in _towards_root(held):
+                near = _brought_near(position[:, cv], position[:, cv + 1], length[cv])
+                np.copyto(position[:, cv], near, where=is_moved)
+        for cv in range(PINNED, position.shape[1]):
+            position[:, cv] = _brought_near(position[:, cv], position[:, cv - 1], length[cv - 1])
 
 
 def _brought_near(point: Floats, other: Floats, farthest: Floats) -> Floats:

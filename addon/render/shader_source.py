@@ -16,7 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ..cards.bake import SAMPLES, SPARSE_RANGE, SPARSE_STEPS
-from ..dynamics.constraints import CONTACT_WEIGHT, HELD, PINNED
+from ..dynamics.constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED
 from ..dynamics.contacts import REACH, SKIN
 from ..dynamics.wind import MODES
 from ..refine import detail, ride
@@ -89,6 +89,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "pinned": str(PINNED),
         "contact_weight": repr(float(CONTACT_WEIGHT)),
         "held_weight": repr(float(HELD)),
+        "held_sweeps": str(HELD_SWEEPS),
         "hold_sweeps": str(SWEEPS),
         "hold_near": repr(NEAR),
         "skin_of_reach": repr(SKIN / REACH),

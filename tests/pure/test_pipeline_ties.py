@@ -198,6 +198,37 @@ def test_a_tie_without_hair_is_said_and_does_no_harm() -> None:
     assert pipeline.held_cvs(rig, pose_at(rig, np.eye(4))) is None
 
 
+def test_the_end_of_a_braid_stays_together() -> None:
+    """Three bundles around each other, held by a ball at their ends, which swings by itself."""
+    random = np.random.default_rng(3)
+    along = np.linspace(0.0, 1.0, 60)
+    turn = 12.0 * along + (2.0 * np.pi / 3.0) * (np.arange(90) % 3)[:, None]
+    wide = 0.012 * np.minimum(1.0, 6.0 * (1.0 - along)) + 0.0005
+    points = np.stack([wide * np.cos(turn), wide * np.sin(turn), 0.0 * turn - 0.3 * along], axis=-1)
+    points += random.normal(0.0, 0.0008, (90, 1, 3))
+    count = points.shape[1]
+    strands = StrandSet(
+        points.reshape(-1, 3), np.arange(91) * count, np.full(90 * count, 4e-5), np.zeros(90)
+    )
+    shape = np.diag([0.006, 0.006, 0.006, 1.0])
+    shape[2, 3] = -0.297
+    settings = GuideSettings(guide_count=20, cv_count=24)
+    ball = Holders((Tie("Band", shape, True),))
+    rig = pipeline.prepare(strands, None, settings, place="braid", holders=ball)
+    assert rig.holds is not None and len(rig.holds.strand) == 90
+    poses = []
+    for frame in range(30):
+        swung = np.eye(4)
+        swung[:3, 3] = np.array([0.04, 0.0, 0.015]) * np.sin(0.2 * frame) ** 2
+        poses.append(pose_at(rig, np.eye(4), swung))
+    rest = lengths(rig.strands.grid)
+    for motion in played(rig, poses, DynamicsSettings(), 24.0):
+        now = pipeline.strands_now(rig, motion)
+        assert escape(rig, motion.pose, now).max() < 1e-4
+        assert np.abs(lengths(now) / rest - 1.0).max() < 0.002
+        assert np.linalg.norm(now[:, -1] - now[:, -1].mean(axis=0), axis=1).max() < 0.008
+
+
 def test_strange_strands_in_a_tie_do_no_harm() -> None:
     """Of two points, with two points at one place, without length at the tip, and a single dot."""
     whole = ponytail(6).points.reshape(6, -1, 3)

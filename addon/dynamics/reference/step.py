@@ -14,7 +14,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...params.curve import along as curve_along
-from ..constraints import CONTACT_WEIGHT, HELD, PINNED, ROUNDING
+from ..constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED, ROUNDING
 from ..settings import DynamicsSettings
 from ..state import DynamicsState
 from ..step import Drive
@@ -226,11 +226,14 @@ class _Guide:
             reach += self.length[cv - 1]
             displacement = self.x[cv] - root
             self.x[cv] = root + displacement * min(reach / float(np.linalg.norm(displacement)), 1.0)
-        last = len(self.x) - 1
-        for cv in self._towards_root():
-            self._bring_near(cv, cv + 1, self.length[cv])
-        for cv in range(PINNED, last + 1):
-            self._bring_near(cv, cv - 1, self.length[cv - 1])
+        held = self._held_cvs()
+        before = self.x[held].copy()
+        for _ in range(HELD_SWEEPS if held else 1):
+            self.x[held] = before
+            for cv in self._towards_root():
+                self._bring_near(cv, cv + 1, self.length[cv])
+            for cv in range(PINNED, len(self.x)):
+                self._bring_near(cv, cv - 1, self.length[cv - 1])
 
     def _bring_near(self, cv: int, other: int, farthest: float) -> None:
         offset = self.x[cv] - self.x[other]

@@ -262,7 +262,9 @@ def catenary(start_point, end_point, length, share):
 
 @pytest.mark.parametrize("solver", few_in_commits(["direct", "relaxation"]))
 @pytest.mark.parametrize("rise", [0.0, 0.06])
-def test_a_strand_held_at_both_ends_hangs_as_a_catenary(kit, solver, rise):
+@pytest.mark.parametrize("by", ["tip", "tie"])
+def test_a_strand_held_at_both_ends_hangs_as_a_catenary(kit, solver, rise, by):
+    """A tie holds two CVs in a row, beyond which a tail hangs."""
     cv_count, length, span = 32, 0.3, 0.18
     segment = length / (cv_count - 1)
     # any shape of that length between the ends: here an arch of two straight halves, upwards
@@ -279,8 +281,18 @@ def test_a_strand_held_at_both_ends_hangs_as_a_catenary(kit, solver, rise):
     settings = DynamicsSettings(
         **kit.LIMP | {"damping": 4.0, "length_solver": solver, "relaxations": 32}
     )
-    scene = kit.Scene(grid, settings, held=kit.tips([True], cv_count))
-    hanging = scene.play(5.0)[-1].grid[0, 1:, [0, 2]].T
+    held = kit.tips([True], cv_count)
+    if by == "tie":
+        tail = grid[:, -1:] + np.arange(1, 6)[:, None] * np.float32([segment, 0.0, 0.0])
+        grid = np.concatenate([grid, tail], axis=1)
+        held = kit.tied([True], cv_count + 5, cv_count - 1)
+    scene = kit.Scene(grid, settings, held=held)
+    state = scene.play(5.0)[-1]
+    hanging = state.grid[0, 1:cv_count, [0, 2]].T
+    if by == "tie":
+        near = 1e-6 if solver == "direct" else 5e-4
+        np.testing.assert_allclose(state.grid[0][held[0]], grid[0][held[0]], atol=near)
+        assert (state.grid[0, -1, 0] - tip[0]) < 1.5 * segment  # the tail hangs down
     expected = catenary((0.0, 0.0), tip, reach, share[:, 0])
     assert expected[:, 1].min() < -0.07
     np.testing.assert_allclose(hanging, expected, atol=0.02 * length)
