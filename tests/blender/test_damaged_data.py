@@ -52,6 +52,17 @@ def test_facts_that_cannot_be_are_told(bake, change):
         Cache(bake)
 
 
+@pytest.mark.parametrize(
+    ("change", "said"), [(1, "a newer Hairloom.*Update"), (-1, "an older Hairloom.*Bake again")]
+)
+def test_a_bake_of_another_version_is_not_called_damaged(bake, change, said):
+    facts = json.loads((bake / "cache.json").read_text())
+    (bake / "cache.json").write_text(json.dumps(facts | {"version": facts["version"] + change}))
+    with pytest.raises(HairloomError, match=said) as raised:
+        Cache(bake)
+    assert "damaged" not in str(raised.value)
+
+
 def test_facts_in_which_lists_never_end_are_told(bake):
     (bake / "cache.json").write_text('{"version": ' + "[" * 200_000)
     with pytest.raises(HairloomError, match=r"damaged .*Bake again"):

@@ -35,7 +35,8 @@ from ...exchange.files.names import length_remark
 from ...exchange.files.stale_temp_files import MARK, is_stale, is_temporary, mark
 from .simulated import Arrays
 
-VERSION = 1
+#: Of what a bake holds, other than what `layout` says. 2: strands may have points of their own.
+VERSION = 2
 FACTS, CONSTANTS = "cache.json", "constants.npz"
 _OURS = re.compile(r"cache\.json|constants\.npz|frame_-?\d{5,7}\.npz")
 _FRAMES = re.compile(rf"frames-{MARK}")
@@ -358,7 +359,13 @@ def _read_facts(path: Path) -> dict[str, Any]:
             raise ValueError(f"it has more than {_LARGEST_FACTS:,} bytes")
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        raise HairloomError("there is no bake", place=str(path.parent), remedy="Bake") from error
+        raise HairloomError(
+            "there is no bake here",
+            place=str(path.parent),
+            remedy="Bake first, or choose the folder of a bake",
+        ) from error
+    except UnicodeDecodeError as error:
+        raise _damaged(path, "it is no text") from error
     except (OSError, ValueError, RecursionError) as error:
         raise _damaged(path, str(error)) from error
     version = content.get("version") if isinstance(content, dict) else None
@@ -369,6 +376,12 @@ def _read_facts(path: Path) -> dict[str, Any]:
             f"this bake was made by a newer Hairloom (version {version} of the format)",
             place=str(path),
             remedy="Update Hairloom, or bake again",
+        )
+    if version < VERSION:
+        raise HairloomError(
+            f"this bake was made by an older Hairloom (version {version} of the format)",
+            place=str(path),
+            remedy="Bake again",
         )
     return content
 

@@ -254,8 +254,9 @@ def check_frames(name: str, frames: range, cache: Cache) -> None:
     first, last = cache.facts.first, cache.facts.last
     missing = [frame for frame in (frames[0], frames[-1]) if not cache.holds(frame)]
     if missing:
+        wanted = f"all of {frames[0]} to {frames[-1]}" if len(frames) > 1 else str(frames[0])
         raise HairloomError(
-            f"its bake holds frames {first} to {last}, not all of {frames[0]} to {frames[-1]}",
+            f"its bake holds frames {first} to {last}, not {wanted}",
             place=name,
-            remedy=f"Bake these frames, or write {first} to {last}",
+            remedy=f"Bake that too, or choose from {first} to {last}",
         )
