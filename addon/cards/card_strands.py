@@ -13,7 +13,7 @@ _FEWEST = 16
 #: and as many as this fraction of the strands needs points,
 _SERVED = 0.9
 #: unless all strands had more points than this together.
-_MOST_POINTS = 4_000_000
+_MAX_POINTS = 4_000_000
 
 
 def card_strands(strands: StrandSet) -> StrandSet:
@@ -26,4 +26,4 @@ def card_strands(strands: StrandSet) -> StrandSet:
 def row_count(point_counts: Ints) -> int:
     """How many rows the cards of strands with these point counts have."""
     served = int(np.quantile(point_counts, _SERVED, method="higher"))
-    return max(min(served, _MOST_POINTS // len(point_counts)), _FEWEST)
+    return max(min(served, _MAX_POINTS // len(point_counts)), _FEWEST)
