@@ -46,6 +46,11 @@ def cover(pair, name: str, factor: float = 1.0) -> float:
     return covered / max(inside, 1)
 
 
+def coverage(rig: Rig, camera: Camera, size: int, samples: int) -> np.ndarray:
+    """What hair in front of the body covers of each pixel, (size, size)."""
+    return render_image(_unlit(rig), camera, size, size, samples)[..., 3]
+
+
 def _unlit(rig: Rig) -> Snapshot:
     groom = PreparedGroom(rig, AmbientSettings())
     shadows = VolumeSettings(shadows="none")

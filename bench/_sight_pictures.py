@@ -1,7 +1,8 @@
 """Pictures of the studio with every setting as it ships: of any scale, of any number of strands,
 and beside Cycles.
 
-FLIP is Andersson et al.'s (2020) at its own 67 pixels a degree, over the pixels that hair changes.
+FLIP is Andersson et al.'s (2020) at its own 67 pixels a degree, over pixels of which hair covers
+most.
 
 The same groom by fewer strands is other strands, pixel by pixel, in any renderer. So `count_flip`
 is that of hair seen from where a pixel is as wide as the fewest strands are apart: pictures are
@@ -18,6 +19,7 @@ from dataclasses import replace
 import flip_evaluator
 import numpy as np
 from _shading_room import CyclesRoom
+from _sight_cover import coverage
 from _sight_grooms import Pair, rig_of, scaled
 
 from hairloom.addon import pipeline
@@ -56,8 +58,10 @@ SHOWN = 0.5
 COUNTS = (5_000, 20_000, 100_000)
 #: Cycles' room is black
 _UNLIT = ("ambient", "backdrop_center", "backdrop_edge")
-#: a pixel that differs by more than this from the bald head's has hair
-_HAS_HAIR = 1e-3
+#: of a pixel of hair, what hair covers at least
+_IS_HAIR = 0.5
+#: what a look has of its own beside what Principled Hair knows
+_UNKNOWN = ("color_variation", "shift_noise", "sparkle")
 
 
 def scale_flip(pair: Pair, name: str) -> float:
@@ -108,7 +112,7 @@ def _count_figures(children: str) -> dict[str, float]:
 
 
 def cycles_figures() -> dict[str, float]:
-    """The built-in groom under one sun, path traced with the same curves and widths."""
+    """The built-in groom under one sun, path traced with the same curves, widths and fibres."""
     head = built_in_head()
     grown = grow_with_face(head.surface, GrowSettings(), head.weights)
     rig = rig_of((grown, head.surface), "built-in")
@@ -121,7 +125,8 @@ def cycles_figures() -> dict[str, float]:
     found = {}
     for name, absorption in COLORS.items():
         node = PrincipledHair(parametrization="ABSORPTION", absorption_coefficient=absorption)
-        shading, _ = settings_from(node, ShadingSettings())
+        plain = replace(ShadingSettings(), **dict.fromkeys(_UNKNOWN, 0.0))
+        shading, _ = settings_from(node, plain)
         dark = replace(StageSettings(), **dict.fromkeys(_UNLIT, (0.0, 0.0, 0.0)))
         settings = GroomSettings().with_settings(shading, dark)
         sun = (Light.sun(-SUN, (1.0, 1.0, 1.0), STRENGTH),)
@@ -147,11 +152,10 @@ def _picture(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The studio's, (SIZE, SIZE, 4), and where hair is in it."""
     studio = _studio(rig, settings)
-    drawn = [
-        studio.picture(rig.rest_pose, points, SIZE, SIZE, SAMPLES, camera, lights=lights)
-        for points in (rig.strands.grid, rig.strands.grid + 1e6 * _size(rig))
-    ]
-    return drawn[0], np.abs(drawn[0] - drawn[1]).max(axis=-1) > _HAS_HAIR
+    camera = camera or studio._camera(1.0)
+    points = rig.strands.grid
+    drawn = studio.picture(rig.rest_pose, points, SIZE, SIZE, SAMPLES, camera, lights=lights)
+    return drawn, coverage(rig, camera, SIZE, SAMPLES) > _IS_HAIR
 
 
 def _studio(rig: Rig, settings: GroomSettings | None = None) -> Studio:
@@ -172,11 +176,6 @@ def _reduced(picture: np.ndarray, size: int) -> np.ndarray:
     squares = picture[: rows * size, : columns * size].astype(np.float64)
     found: np.ndarray = squares.reshape(rows, size, columns, size, -1).mean(axis=(1, 3))
     return found
-
-
-def _size(rig: Rig) -> np.float32:
-    low, high = rig.strands.bounds()
-    return np.float32((high - low).max())
 
 
 def _flip(truth: np.ndarray, picture: np.ndarray, where: np.ndarray) -> float:

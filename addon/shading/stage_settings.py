@@ -61,13 +61,13 @@ class StageSettings(Settings):
     title = "Stage"
     owner = "job"
 
-    key: float = _strength(4.2, "Key", "Main light")
+    key: float = _strength(3.8, "Key", "Main light")
     key_side: float = _side(42.0, "Key Side", "main light")
     key_height: float = _height(40.0, "Key Height", "main light")
-    fill: float = _strength(1.6, "Fill", "Light into the shadows of the main light")
+    fill: float = _strength(1.2, "Fill", "Light into the shadows of the main light")
     fill_side: float = _side(-60.0, "Fill Side", "fill light")
     fill_height: float = _height(5.0, "Fill Height", "fill light")
-    rim: float = _strength(2.8, "Rim", "Light from behind, which shines through the hair")
+    rim: float = _strength(1.9, "Rim", "Light from behind, which shines through the hair")
     rim_side: float = _side(-148.0, "Rim Side", "light from behind")
     rim_height: float = _height(35.0, "Rim Height", "light from behind")
     distance: float = number(
@@ -86,7 +86,7 @@ class StageSettings(Settings):
         hard=(-1.0, 1.0),
     )
     ambient: tuple[float, float, float] = color(
-        (0.11, 0.125, 0.15),
+        (0.45, 0.475, 0.52),
         label="Ambient",
         description="Light from all sides",
         maximum=100.0,
