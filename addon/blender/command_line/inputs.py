@@ -99,8 +99,8 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     if head is not None and head.corner_uv is None:
         notes = (
             *notes,
-            f"{head_name}: it has no UVs, so strands have no root UVs, and shadows on it have hard "
-            "edges. Unwrap it (Edit Mode, UV > Unwrap).",
+            f"{head_name}: it has no UVs, so strands have no root UVs. Unwrap it (Edit Mode, UV >"
+            " Unwrap).",
         )
     children = _weights(sources.children_density, head_name)
     found = head_object and head_object.name
