@@ -44,8 +44,8 @@ _WHORL, _SWIRL_REACH, _SWIRL = (0.12, 0.55, 0.85), 0.45, np.radians(75.0)
 _CLUMPS_STRAY, _STRANDS_STRAY, _LIFT_VARIES = np.radians(9.0), np.radians(11.0), 0.14
 #: Hair is piled up no higher than this fraction of its length, and kept as far from the skin.
 _MAX_PILE, _MAX_CLEARANCE = 0.12, 0.06
-#: It is as high as it will be at 1 / _RISEN of its length: where it rose within some centimetres, hair
-#: beside the parting stood in loops before the light.
+#: It is as high as it will be at 1 / _RISEN of its length. Where it rose within some centimetres,
+#: hair beside the parting stood in loops before the light.
 _RISEN = 1.2
 #: Hair shorter than this turns within its own length, but is stiffer, as a shorter beam is [m].
 _STIFF = 0.05
