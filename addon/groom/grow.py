@@ -46,7 +46,7 @@ _CLUMPS_STRAY, _STRANDS_STRAY, _LIFT_VARIES = np.radians(9.0), np.radians(11.0),
 _MAX_PILE, _MAX_CLEARANCE = 0.12, 0.06
 #: It is as high as it will be at 1 / _RISEN of its length. Where it rose within some centimetres,
 #: hair beside the parting stood in loops before the light.
-_RISEN = 1.2
+_RISEN = 1.6
 #: Hair shorter than this turns within its own length, but is stiffer, as a shorter beam is [m].
 _STIFF = 0.05
 #: The sharpest turn from one segment to the next that a clump or a wave may make [rad].
