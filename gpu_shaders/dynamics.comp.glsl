@@ -2,7 +2,7 @@
 //
 // Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION;
 // HAS_HELD; HAS_AIR; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
-// kinds of colliders.
+// kinds of colliders; HAS_SHARP, where segments collide too.
 //
 // Loops of an unknown number of turns ask at their end: drivers on CPUs go once more through the
 // body of one that asks at its begin, with nothing to do.
@@ -153,6 +153,11 @@ void keep_outside()
 #else
   int steps = passes + frame.length_iterations;
 #endif
+#if CONTACT_SLOTS > 0
+  int round_number = 0;
+  bool is_again = true;
+  do {  // once more in turn where lengths have drawn the guide into a collider
+#endif
   int number = 0;
   if (is_off) {
     do {
@@ -174,6 +179,14 @@ void keep_outside()
   if (is_off) {
     lay_out();
   }
+#endif
+#if CONTACT_SLOTS > 0
+    is_again = round_number < {{more_rounds}} && is_deep();
+    round_number++;
+    steps += 1 - passes;
+    passes = 1;
+    is_off = true;
+  } while (is_again);
 #endif
 }
 

@@ -79,3 +79,32 @@ Found distance_in(Field field, vec3 point)
   return Found(y.x + f.x * gradient.x + outside, gradient * (1.0 / field.cell));
 }
 #endif
+
+// From a point of the collider's own space to it.
+//
+// Of a field: own its nodes along x, y, z and its row, low_cell where it begins and its cell. Of round
+// solids: own the first of them, how many, 0, -1.
+Found distance_to(vec4 own, vec4 low_cell, vec3 local)
+{
+  Found found = Found(1.0e30, vec3(0.0));
+#ifdef HAS_FIELDS
+  if (own.w >= 0.0) {
+    found = distance_in(Field(low_cell.xyz, low_cell.w, ivec3(own.xyz), int(own.w)), local);
+  }
+#endif
+#ifdef HAS_ROUNDS
+  if (own.w < 0.0) {
+    vec4 nearest = vec4(0.0);  // xyz from the axis, w radius
+    int end = int(own.x + own.y);
+    for (int k = int(own.x); k < end; k++) {
+      Round solid = round_at(k);
+      vec3 outward = outward_of(solid, local);
+      float away = length(outward) - solid.radius;
+      nearest = away < found.distance ? vec4(outward, solid.radius) : nearest;
+      found.distance = min(away, found.distance);
+    }
+    found = distance_from(nearest.xyz, nearest.w);
+  }
+#endif
+  return found;
+}

@@ -1,12 +1,15 @@
 // Contacts: found once in a substep, solved as planes each time lengths and contacts alternate.
 //
 // Twin of addon/dynamics/contacts.py, over the globals of lib_guide.glsl; see there. Defines:
-// CONTACT_SLOTS, how many contacts a CV may have at once. Needs the block `frame`, and `moments`.
+// CONTACT_SLOTS, how many contacts a CV may have at once; HAS_SHARP, where segments collide too. Needs
+// the block `frame`, and `moments`.
 #include "lib_lengths.glsl"
 #include "lib_collider.glsl"
 
 #define SKIN (frame.reach * {{skin_of_reach}})
 #define NO_PLANE -1.0e30
+#define BETWEEN_RADIUS {{between_radius}}
+#define TRACE_STEPS {{trace_steps}}
 
 // xyz normal outwards, w offset [m]: keep normal . x >= offset
 vec4 plane[CONTACT_SLOTS][FREE_SIZE];
@@ -14,12 +17,23 @@ vec4 plane[CONTACT_SLOTS][FREE_SIZE];
 // counts as touching [m], NO_PLANE for never
 vec4 origin[CONTACT_SLOTS][FREE_SIZE];
 float pushed[CONTACT_SLOTS][FREE_SIZE];  // [m] in this substep
+#ifdef HAS_SHARP
+// the same of a point of each segment, the one that ends at the free CV
+vec4 between_plane[CONTACT_SLOTS][FREE_SIZE];
+vec4 between_origin[CONTACT_SLOTS][FREE_SIZE];
+float between_pushed[CONTACT_SLOTS][FREE_SIZE];
+float between_along[CONTACT_SLOTS][FREE_SIZE];  // its fraction of the segment
+vec3 between_normal[FREE_SIZE];  // at each free CV whose segments touch, else zero
+#endif
 
 struct Posed {
   vec4 inverse[3];  // rows of world to object at the substep's end
   vec4 change[3];   // rows of what the substep changes in object to world
   vec4 low_cell;    // of a field
-  ivec4 own;        // of a field xyz nodes, w row; of round solids x the first, y how many, w -1
+  vec4 own;         // of a field xyz nodes, w row; of round solids x the first, y how many, w -1
+  vec4 inverse_before[3];  // rows of world to object at the substep's begin
+  vec4 sweep;  // x [m^2] ways up to this squared length need not be followed; y above 0: segments
+              // collide; z the smallest scale; w [m] its swelling
 };
 
 vec4 moment_texel(int substep, int collider, int texel)
@@ -34,17 +48,75 @@ Posed posed_at(int substep, int collider)
   for (int row = 0; row < 3; row++) {
     posed.inverse[row] = moment_texel(substep, collider, row);
     posed.change[row] = moment_texel(substep, collider, 3 + row);
+    posed.inverse_before[row] = moment_texel(substep, collider, 9 + row);
   }
-  posed.own = ivec4(moment_texel(substep, collider, 6));
-#ifdef HAS_FIELDS
+  posed.own = moment_texel(substep, collider, 6);
   posed.low_cell = moment_texel(substep, collider, 7);
-#endif
+  posed.sweep = moment_texel(substep, collider, 12);
   return posed;
 }
 
 vec3 moved(vec4 rows[3], vec4 point)
 {
   return vec3(dot(rows[0], point), dot(rows[1], point), dot(rows[2], point));
+}
+
+// xyz the normal in the world of a gradient in object space; w what distances are multiplied by. The
+// gradient transforms by the inverse transposed, and its length says how much the distance is scaled
+// along it.
+vec4 world_normal(Posed posed, vec3 gradient)
+{
+  vec3 normal = posed.inverse[0].xyz * gradient.x + posed.inverse[1].xyz * gradient.y +
+                posed.inverse[2].xyz * gradient.z;
+  float unscaled = 1.0 / max(length(normal), TINY);
+  return vec4(normal * unscaled, unscaled);
+}
+
+struct Met {
+  vec3 normal;    // of the surface where the way meets it, or where the way ends
+  float surface;  // [m] normal . x of the surface there
+  float was;      // [m] from the surface where the way begins
+};
+
+// The way of a point in the substep, as seen from the collider, until it meets `reach` [m].
+Met followed(Posed posed, vec3 here, vec3 before, float reach)
+{
+  vec3 begin = moved(posed.inverse_before, vec4(before, 1.0));
+  vec3 local = moved(posed.inverse, vec4(here, 1.0));
+  Found found = distance_to(posed.own, posed.low_cell, begin);
+  float was = found.distance * world_normal(posed, found.gradient).w;
+  vec3 path = local - begin;
+  float span = length(path) * posed.sweep.z;
+  float target = min(reach, was);
+  float least = span * (1.0 / float(TRACE_STEPS));
+  float place = was > 0.0 ? 1.0 : 0.0;  // along the way; what starts inside met it there
+  if (was > 0.0 && span > TINY) {
+    float gone = 0.0;
+    float away = was;
+    bool goes_on = true;
+    int number = 0;
+    do {
+      float room = away - target;
+      float stride = max(room, least);
+      float ahead = gone + stride;
+      goes_on = ahead < span;
+      if (goes_on) {
+        float next = distance_to(posed.own, posed.low_cell, begin + path * (ahead / span)).distance * posed.sweep.z;
+        if (next < target) {
+          place = (ahead - stride + stride * room / max(room - (next - target), TINY)) / span;
+          goes_on = false;
+        }
+        gone = ahead;
+        away = next;
+      }
+      number++;
+    } while (goes_on && number < TRACE_STEPS);
+  }
+  vec3 point = begin + path * place;
+  found = distance_to(posed.own, posed.low_cell, point);
+  vec4 normal = world_normal(posed, found.gradient);
+  float ahead = (dot(found.gradient, point - local) - found.distance) * normal.w;
+  return Met(normal.xyz, dot(normal.xyz, here) + ahead, was);
 }
 
 // The next collider, from this one on, that is near the guide's bounding sphere; else their number.
@@ -57,6 +129,12 @@ int next_near(int collider, int substep, float guide_radius)
     }
   }
   return collider;
+}
+
+// How far a point that keeps a distance, both [m], may be from its plane when the substep ends.
+float slack_of(float kept)
+{
+  return max(kept * {{may_miss}}, 2.0 * SKIN);
 }
 
 // Put a contact of free CV i where there is room; else in place of the less pressing one of the
@@ -98,9 +176,9 @@ void find_contacts_with(Posed posed)
   for (int i = 0; i < FREE; i++) {
     least[i] = 1.0e30;
   }
-  int count = posed.own.w < 0 ? posed.own.y : 0;
+  int count = posed.own.w < 0.0 ? int(posed.own.y) : 0;
   for (int k = 0; k < count; k++) {
-    Round solid = round_at(posed.own.x + k);
+    Round solid = round_at(int(posed.own.x) + k);
     for (int i = 0; i < FREE; i++) {
       vec3 outward = outward_of(solid, local[i].xyz);
       float away = length(outward) - solid.radius;
@@ -113,34 +191,151 @@ void find_contacts_with(Posed posed)
   }
 #endif
 #ifdef HAS_FIELDS
-  Field field = Field(posed.low_cell.xyz, posed.low_cell.w, posed.own.xyz, posed.own.w);
+  Field field = Field(posed.low_cell.xyz, posed.low_cell.w, ivec3(posed.own.xyz), int(posed.own.w));
   for (int i = 0; i < FREE; i++) {
     Found in_field = distance_in(field, local[i].xyz);
 #ifdef HAS_ROUNDS
-    found[i].distance = posed.own.w >= 0 ? in_field.distance : found[i].distance;
-    found[i].gradient = posed.own.w >= 0 ? in_field.gradient : found[i].gradient;
+    found[i].distance = posed.own.w >= 0.0 ? in_field.distance : found[i].distance;
+    found[i].gradient = posed.own.w >= 0.0 ? in_field.gradient : found[i].gradient;
 #else
     found[i] = in_field;
 #endif
   }
 #endif
   for (int i = 0; i < FREE; i++) {
-    // distance and normal in the world: the gradient transforms by the inverse transposed, and its
-    // length says how much the distance is scaled along it
-    vec3 gradient = found[i].gradient;
-    vec3 normal = posed.inverse[0].xyz * gradient.x + posed.inverse[1].xyz * gradient.y +
-                  posed.inverse[2].xyz * gradient.z;
-    float unscaled = 1.0 / max(length(normal), TINY);
-    normal *= unscaled;
-    float away = found[i].distance * unscaled;
+    vec4 unscaled = world_normal(posed, found[i].gradient);
+    vec3 normal = unscaled.xyz;
+    float away = found[i].distance * unscaled.w;
     vec3 from = previous[i + 2] + moved(posed.change, local[i]);
+    vec3 path = position[i + 2] - from;
     float height = dot(normal, position[i + 2]);
-    float reached = away - dot(normal, position[i + 2] - from) + frame.led_out;
-    float offset = height - away + min(radius[i], reached);
-    if (away < radius[i] + frame.reach) {
-      add_contact(i, vec4(normal, offset), vec4(from, reached >= radius[i] ? SKIN : NO_PLANE));
+    float surface = height - away;
+    float was = away - dot(normal, path);
+    float beyond = frame.reach;
+#ifdef HAS_SHARP
+    beyond += posed.sweep.y > 0.0 ? length(path) : 0.0;
+#endif
+    if (away < radius[i] + beyond) {
+      if (dot(path, path) > posed.sweep.x) {
+        Met met = followed(posed, position[i + 2], previous[i + 2], radius[i]);
+        normal = met.normal;
+        surface = met.surface;
+        was = met.was;
+        height = dot(normal, position[i + 2]);
+      }
+      float reached = was + frame.led_out + posed.sweep.w;
+      float offset = surface + min(radius[i], reached);
+      if (posed.sweep.y <= 0.0 || offset - height > -frame.reach) {
+        add_contact(i, vec4(normal, offset), vec4(from, reached >= radius[i] ? SKIN : NO_PLANE));
+      }
     }
   }
+}
+
+#ifdef HAS_SHARP
+bool held_at(int i)
+{
+#ifdef HAS_HELD
+  return held[i];
+#else
+  return false;
+#endif
+}
+
+vec3 between(vec3 lower, vec3 upper, float along)
+{
+  return lower + (upper - lower) * along;
+}
+
+// x, y: what the lower and the upper CV of segment i go, of the way of a point of it.
+vec2 weights_of(int i, float along)
+{
+  float lower = i > 0 && !held_at(max(i - 1, 0)) ? 1.0 - along : 0.0;
+  float scale = lower * lower + along * along;
+  return vec2(lower / scale, min(along / scale, {{max_weight}}));
+}
+
+// As add_contact, for segment i.
+void add_between(int i, vec4 new_plane, vec4 new_origin, float along)
+{
+  int slot = 0;
+#if CONTACT_SLOTS > 1
+  if (between_plane[0][i].w != NO_PLANE) {
+    float gaps[2];
+    for (int k = 0; k < 2; k++) {
+      vec3 point = between(position[i + 1], position[i + 2], between_along[k][i]);
+      gaps[k] = dot(between_plane[k][i], vec4(-point, 1.0));
+    }
+    vec3 new_point = between(position[i + 1], position[i + 2], along);
+    if (dot(new_plane, vec4(-new_point, 1.0)) <= min(gaps[0], gaps[1])) {
+      return;
+    }
+    if (gaps[0] < gaps[1]) {
+      between_plane[0][i] = between_plane[1][i];
+      between_origin[0][i] = between_origin[1][i];
+      between_along[0][i] = between_along[1][i];
+    }
+    slot = 1;
+  }
+#endif
+  between_plane[slot][i] = new_plane;
+  between_origin[slot][i] = new_origin;
+  between_along[slot][i] = along;
+}
+
+// Of some points of each segment the one that is deepest below its plane.
+void find_between_with(Posed posed)
+{
+  for (int i = 0; i < FREE; i++) {
+    if (held_at(i)) {
+      continue;
+    }
+    vec3 lower = position[i + 1];
+    vec3 upper = position[i + 2];
+    vec3 middle = 0.5 * (lower + upper);
+    vec3 local = moved(posed.inverse, vec4(middle, 1.0));
+    vec3 path = middle - 0.5 * (previous[i + 1] + previous[i + 2]) - moved(posed.change, vec4(local, 1.0));
+    Found found = distance_to(posed.own, posed.low_cell, local);
+    float away = found.distance * world_normal(posed, found.gradient).w;
+    if (away >= radius[i] + frame.reach + 0.5 * length(upper - lower) + length(path)) {
+      continue;
+    }
+    float kept = radius[i] * BETWEEN_RADIUS;
+    float deepest = -frame.reach;
+    vec4 plane_there = vec4(0.0);
+    vec4 origin_there = vec4(0.0);
+    float along_there = 0.0;
+    for (int k = 0; k < {{between_count}}; k++) {
+      float along = float(k + 1) / float({{between_count}} + 1);
+      vec3 here = between(lower, upper, along);
+      vec3 before = between(previous[i + 1], previous[i + 2], along);
+      Met met = followed(posed, here, before, radius[i]);
+      float reached = met.was + frame.led_out + posed.sweep.w;
+      float offset = met.surface + min(kept, reached);
+      float gap = offset - dot(met.normal, here);
+      if (gap > deepest) {
+        vec3 from = before + moved(posed.change, vec4(moved(posed.inverse, vec4(here, 1.0)), 1.0));
+        deepest = gap;
+        plane_there = vec4(met.normal, offset);
+        origin_there = vec4(from, reached >= kept ? SKIN : NO_PLANE);
+        along_there = along;
+      }
+    }
+    if (along_there > 0.0) {
+      add_between(i, plane_there, origin_there, along_there);
+    }
+  }
+}
+#endif
+
+void find_with(Posed posed)
+{
+  find_contacts_with(posed);
+#ifdef HAS_SHARP
+  if (posed.sweep.y > 0.0) {
+    find_between_with(posed);
+  }
+#endif
 }
 
 void find_contacts(int substep)
@@ -150,27 +345,76 @@ void find_contacts(int substep)
       plane[slot][i] = vec4(0.0, 0.0, 0.0, NO_PLANE);
       origin[slot][i] = vec4(0.0, 0.0, 0.0, NO_PLANE);
       pushed[slot][i] = 0.0;
+#ifdef HAS_SHARP
+      between_plane[slot][i] = vec4(0.0, 0.0, 0.0, NO_PLANE);
+      between_origin[slot][i] = vec4(0.0, 0.0, 0.0, NO_PLANE);
+      between_pushed[slot][i] = 0.0;
+      between_along[slot][i] = 1.0;
+#endif
     }
   }
 #if CONTACT_SLOTS == 1
-  find_contacts_with(posed_at(substep, 0));  // there is but one collider
+  find_with(posed_at(substep, 0));  // there is but one collider
 #else
   float squared = 0.0;
   for (int i = 0; i < FREE; i++) {
     vec3 span = position[i + 2] - position[1];
     squared = max(squared, dot(span, span));
+#ifdef HAS_SHARP
+    span = previous[i + 2] - position[1];
+    squared = max(squared, dot(span, span));
+#endif
   }
   float guide_radius = sqrt(squared);
   int collider = next_near(0, substep, guide_radius);
   // drivers on CPUs run a loop once even if nothing is left to do, so it is asked at the end
   if (collider < frame.collider_count) {
     do {
-      find_contacts_with(posed_at(substep, collider));
+      find_with(posed_at(substep, collider));
       collider = next_near(collider + 1, substep, guide_radius);
     } while (collider < frame.collider_count);
   }
 #endif
 }
+
+#ifdef HAS_SHARP
+// Bring points of segments back to their planes, all of one collider at once; CVs whose segments
+// touch, but that do not touch themselves, get the normal.
+void push_between(float friction)
+{
+  for (int i = 0; i < FREE; i++) {
+    between_normal[i] = vec3(0.0);
+  }
+  for (int slot = 0; slot < CONTACT_SLOTS; slot++) {
+    vec3 lower = position[1];
+    for (int i = 0; i < FREE; i++) {
+      vec3 upper = position[i + 2];
+      vec3 here = between(lower, upper, between_along[slot][i]);
+      vec3 normal = between_plane[slot][i].xyz;
+      float gap = between_plane[slot][i].w - dot(normal, here);
+      float push = max(gap, 0.0);
+      between_pushed[slot][i] += push;
+      vec3 there = here + normal * push;
+      vec3 slip = there - between_origin[slot][i].xyz;
+      slip -= normal * dot(normal, slip);
+      there -= slip * min(push * friction / max(length(slip), TINY), 1.0);
+      vec2 weights = weights_of(i, between_along[slot][i]);
+      position[i + 1] += (there - here) * weights.x;
+      position[i + 2] += (there - here) * weights.y;
+      bool touches = gap > -between_origin[slot][i].w && between_pushed[slot][i] > 0.0;
+      between_normal[i] = touches ? normal : between_normal[i];
+      if (touches && weights.x > 0.0) {
+        between_normal[max(i - 1, 0)] = normal;
+      }
+      lower = upper;
+    }
+  }
+  for (int i = 0; i < FREE; i++) {
+    bool touches = dot(touched_normal[i], touched_normal[i]) > 0.0;
+    touched_normal[i] = touches ? touched_normal[i] : between_normal[i];
+  }
+}
+#endif
 
 // Bring CVs back to their planes, and say which ones touch.
 void push_out(float friction)
@@ -191,6 +435,27 @@ void push_out(float friction)
       touched_normal[i] = gap > -origin[slot][i].w ? normal : touched_normal[i];
     }
   }
+#ifdef HAS_SHARP
+  push_between(friction);
+#endif
+}
+
+// Whether any CV or segment is farther below its plane than it may be.
+bool is_deep()
+{
+  bool found = false;
+  for (int slot = 0; slot < CONTACT_SLOTS; slot++) {
+    for (int i = 0; i < FREE; i++) {
+      float gap = dot(plane[slot][i], vec4(-position[i + 2], 1.0));
+      found = found || (origin[slot][i].w != NO_PLANE && gap > slack_of(radius[i]));
+#ifdef HAS_SHARP
+      vec3 here = between(position[i + 1], position[i + 2], between_along[slot][i]);
+      gap = dot(between_plane[slot][i], vec4(-here, 1.0));
+      found = found || (between_origin[slot][i].w != NO_PLANE && gap > slack_of(radius[i] * BETWEEN_RADIUS));
+#endif
+    }
+  }
+  return found;
 }
 
 // Take away the speed that pushing out has made: contacts do not bounce.
@@ -201,6 +466,15 @@ void absorb()
       vec3 normal = plane[slot][i].xyz;
       float away = max(dot(normal, position[i + 2] - origin[slot][i].xyz), 0.0);
       previous[i + 2] += normal * (pushed[slot][i] > 0.0 ? away : 0.0);
+#ifdef HAS_SHARP
+      normal = between_plane[slot][i].xyz;
+      vec3 here = between(position[i + 1], position[i + 2], between_along[slot][i]);
+      away = max(dot(normal, here - between_origin[slot][i].xyz), 0.0);
+      vec2 weights = weights_of(i, between_along[slot][i]);
+      normal *= between_pushed[slot][i] > 0.0 ? away : 0.0;
+      previous[i + 1] += normal * weights.x;
+      previous[i + 2] += normal * weights.y;
+#endif
     }
   }
 }

@@ -58,10 +58,17 @@ class Touched:
 
     def part(self, guides: Ints, guide_count: int) -> Touched:
         """Those of some guides (n,), rising, of all; their index is among these guides alone."""
-        cv, guide = np.divmod(self.index, guide_count)
-        place = np.searchsorted(guides, guide)
-        kept = np.flatnonzero(guides.take(place, mode="clip") == guide)
-        return Touched(cv[kept] * len(guides) + place[kept], self.normal[:, kept])
+        index, kept = part_of(self.index, guides, guide_count)
+        return Touched(index, self.normal[:, kept])
+
+
+def part_of(index: Ints, guides: Ints, guide_count: int) -> tuple[Ints, Ints]:
+    """Of indices (m,) into (cv_count, guide_count) in C order those of some guides (n,), rising: as
+    they are among these guides alone, and which these are."""
+    cv, guide = np.divmod(index, guide_count)
+    place = np.searchsorted(guides, guide)
+    kept = np.flatnonzero(guides.take(place, mode="clip") == guide)
+    return cv[kept] * len(guides) + place[kept], kept
 
 
 def pin(position: Floats, carried: Floats, length: Floats, held: Floats | None) -> None:

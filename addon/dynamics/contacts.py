@@ -1,21 +1,31 @@
 """Contacts: found once in a substep, solved as planes each time lengths and contacts alternate.
 
 A CV near a collider gets the plane of its nearest surface, moved out by the CV's own radius, which
-grows from root to tip (the "pearl" configuration of Nguyen and Donnelly 2005), so that no collider
-slips between two CVs. What a plane asks for is limited: a CV goes no deeper than it was, as seen
-from the moving collider, and is led out by no more than `depenetration_speed`. So hair that starts
-inside comes out at a walk instead of exploding.
+grows from root to tip (the "pearl" configuration of Nguyen and Donnelly 2005). What a plane asks
+for is limited: a CV goes no deeper than it was, as seen from the moving collider, and is led out by
+no more than `depenetration_speed`. So hair that starts inside comes out at a walk instead of
+exploding.
+
+Two things are looked at more closely where a collider's curves are tight for them, by the same
+measure: a straight way of length c, between two points outside of a ball of radius R, enters it by
+no more than c^2 / 8 R.
+
+    a segment   gets a plane too, at the deepest of some points between its CVs; what it asks for is
+                shared out to both of them
+    a CV's way  in a substep, as seen from the moving collider, is followed until it meets the
+                surface (sphere tracing, Hart 1996); the plane is the one there. So nothing passes
+                through what is thin, however fast either of them is
 
 Friction is Coulomb's, on positions (Macklin et al. 2014, "Unified Particle Physics", section 6.1):
 the slip against the collider's own motion is reduced by up to mu times the push.
 
-Limitations: one plane a CV and collider and substep; between colliders that touch each other the
-last one wins.
+Limitations: one plane a CV, a segment and collider and substep; between colliders that touch each
+other the last one wins.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -24,12 +34,26 @@ from ..arrays import Bools, Floats, Ints
 from ..strands.vectors import dot_rows
 from .colliders import Pose, transform_points
 from .colliders.posed import near_points, world_distance
-from .constraints import PINNED, TINY, Touched, chosen
+from .constraints import PINNED, TINY, Touched, chosen, part_of
 from .settings import DynamicsSettings
 
 #: How far a CV may be brought by the length solve after contacts were found, in sizes: these are
 #: the median length of hair, `state.Rest.size`, and `cloth.state.Fabric.size`.
 REACH = 0.008
+#: What is allowed to enter a collider unseen, in sizes: less than the radius that a CV keeps.
+UNSEEN = 0.003
+#: Where segments are looked at, as fractions from one CV to the next.
+BETWEEN = (0.25, 0.5, 0.75)
+#: Of the radius that CVs keep, what points of segments keep: hair that lies on a round surface goes
+#: by its CVs alone.
+BETWEEN_RADIUS = np.float32(0.5)
+#: Steps along a way at most; the shortest is this part of the way.
+TRACE_STEPS = 12
+#: How much of its distance may be missing, as a fraction of it, before contacts and lengths are
+#: solved in turn once more, and how often that is.
+MAY_MISS, MORE_ROUNDS = np.float32(0.5), 10
+#: How often one CV is pushed by what a point near the other, which is pinned, asks for.
+MAX_WEIGHT = np.float32(2.0)
 #: Closer than this to its plane a CV counts as touching, so that lengths do not push it in; in
 #: sizes.
 SKIN = 4.0e-4
@@ -37,7 +61,7 @@ SKIN = 4.0e-4
 
 @dataclass(frozen=True)
 class Contacts:
-    """Planes of one collider, n of them.
+    """Planes of one collider, m of them.
 
     index: (m,) into the points that contacts were looked for.
     normal: (3, m) outwards, world. offset: (m,) [m], the point shall keep normal . x >= offset.
@@ -45,6 +69,7 @@ class Contacts:
     is_out: (m,) whether the offset leads all the way out.
     skin: [m], closer than this it touches.
     push: (m,) [m], how far it was pushed so far in this substep.
+    slack: (m,) [m], how far it may be from its plane when the substep ends.
     """
 
     index: Ints
@@ -54,39 +79,136 @@ class Contacts:
     is_out: Bools
     skin: np.float32
     push: Floats
+    slack: Floats
 
     def push_out(self, position: Floats, friction: float) -> Bools:
         """Bring points (3, n) back to their planes, in place; returns which ones touch, (m,)."""
-        here = chosen(position, self.index)
+        here = self._here(position)
         gap = dot_rows(self.normal, here)
         np.subtract(self.offset, gap, out=gap)
         push = np.maximum(gap, np.float32(0.0))
         self.push[:] += push
-        here += self.normal * push
-        if friction:
-            here -= self._friction(here, push, friction)
-        for row, value in zip(position, here, strict=True):
-            row[self.index] = value
+        self._move(position, here, self._pushed(here, push, friction))
         return (gap > -self.skin) & self.is_out
-
-    def _friction(self, here: Floats, push: Floats, friction: float) -> Floats:
-        slip = here - self.origin
-        slip -= self.normal * dot_rows(self.normal, slip)
-        length = np.maximum(np.sqrt(dot_rows(slip, slip)), TINY)
-        slip *= np.minimum(push * np.float32(friction) / length, np.float32(1.0))
-        return slip
 
     def absorb(self, position: Floats, previous: Floats) -> None:
         """Take away the speed that pushing out has made: contacts do not bounce.
 
         Changes `previous` (3, n), so that no pushed point moves away from the collider.
         """
-        moved = chosen(position, self.index)
+        moved = self._here(position)
         moved -= self.origin
         away = np.maximum(dot_rows(self.normal, moved), np.float32(0.0))
         away *= self.push > 0.0
-        for row, value in zip(previous, self.normal * away, strict=True):
+        self._add(previous, self.normal * away)
+
+    def missing(self, position: Floats) -> Bools:
+        """Which of them (m,) are farther below their planes than they may be."""
+        gap = self.offset - dot_rows(self.normal, self._here(position))
+        result: Bools = gap > self.slack
+        return result
+
+    def part(self, guides: Ints, guide_count: int) -> Contacts:
+        """Those of some guides (n,), rising, of all; their index is among these guides alone."""
+        index, kept = part_of(self.index, guides, guide_count)
+        return replace(
+            self,
+            index=index,
+            normal=self.normal[:, kept],
+            offset=self.offset[kept],
+            origin=self.origin[:, kept],
+            is_out=self.is_out[kept],
+            push=self.push[kept],
+            slack=self.slack[kept],
+        )
+
+    def note(self, part: Contacts, guides: Ints, guide_count: int) -> None:
+        """Take over how far those of `part` were pushed."""
+        _, kept = part_of(self.index, guides, guide_count)
+        self.push[kept] = part.push
+
+    def touched(self, is_touching: Bools) -> Touched | None:
+        """The free CVs that touch."""
+        which = is_touching.nonzero()[0]  # sooner than by np.flatnonzero
+        if not which.size:
+            return None
+        return Touched(self.index.take(which), chosen(self.normal, which))
+
+    def _pushed(self, here: Floats, push: Floats, friction: float) -> Floats:
+        """Where points (3, m) come to."""
+        there: Floats = here + self.normal * push
+        if friction:
+            slip = there - self.origin
+            slip -= self.normal * dot_rows(self.normal, slip)
+            length = np.maximum(np.sqrt(dot_rows(slip, slip)), TINY)
+            slip *= np.minimum(push * np.float32(friction) / length, np.float32(1.0))
+            there -= slip
+        return there
+
+    def _here(self, position: Floats) -> Floats:
+        return chosen(position, self.index)
+
+    def _move(self, position: Floats, here: Floats, there: Floats) -> None:
+        del here
+        for row, value in zip(position, there, strict=True):
+            row[self.index] = value
+
+    def _add(self, previous: Floats, displacement: Floats) -> None:
+        for row, value in zip(previous, displacement, strict=True):
             row[self.index] += value
+
+
+@dataclass(frozen=True)
+class SegmentContacts(Contacts):
+    """The same of points on segments; `index` is of the CV where the segment ends.
+
+    stride: from a CV to the next of its guide. along: (m,) fraction of the segment.
+    weight_lower, weight_upper: (m,) of the point's way, what its two CVs go.
+    """
+
+    stride: int
+    along: Floats
+    weight_lower: Floats
+    weight_upper: Floats
+
+    def part(self, guides: Ints, guide_count: int) -> SegmentContacts:
+        _, kept = part_of(self.index, guides, guide_count)
+        own = super().part(guides, guide_count)
+        assert isinstance(own, SegmentContacts)
+        return replace(
+            own,
+            stride=len(guides),
+            along=self.along[kept],
+            weight_lower=self.weight_lower[kept],
+            weight_upper=self.weight_upper[kept],
+        )
+
+    def touched(self, is_touching: Bools) -> Touched | None:
+        """Both CVs of each segment that touches, of two of these the upper one's normal."""
+        which = (is_touching & (self.push > 0.0)).nonzero()[0]
+        if not which.size:
+            return None
+        upper, normal = self.index.take(which), chosen(self.normal, which)
+        free = (self.weight_lower.take(which) > 0.0).nonzero()[0]
+        lower = Touched(upper.take(free) - self.stride, chosen(normal, free))
+        return last_of([Touched(upper, normal), lower])
+
+    def _here(self, position: Floats) -> Floats:
+        lower = chosen(position, self.index - self.stride)
+        here = chosen(position, self.index)
+        here -= lower
+        here *= self.along
+        here += lower
+        return here
+
+    def _move(self, position: Floats, here: Floats, there: Floats) -> None:
+        self._add(position, there - here)
+
+    def _add(self, previous: Floats, displacement: Floats) -> None:
+        lower = self.index - self.stride
+        for row, value in zip(previous, displacement, strict=True):
+            row[lower] += value * self.weight_lower
+            row[self.index] += value * self.weight_upper
 
 
 def find_contacts(
@@ -96,6 +218,7 @@ def find_contacts(
     poses: list[Pose],
     led_out: float,
     size: float,
+    spacing: float = 0.0,
 ) -> list[Contacts]:
     """Planes for all points near a collider.
 
@@ -105,9 +228,52 @@ def find_contacts(
         poses: of the colliders at the substep's end.
         led_out: how far [m] a point that is inside may be led out in this substep.
         size: of the hair or cloth [m].
+        spacing: [m] of CVs along a guide; 0 of points that no segments join.
     """
-    found = (_contacts_with(pose, position, previous, radius, led_out, size) for pose in poses)
+    found = (
+        _contacts_with(pose, position, previous, radius, led_out, size, spacing) for pose in poses
+    )
     return [contacts for contacts in found if len(contacts.index)]
+
+
+def find_between(
+    position: Floats,
+    previous: Floats,
+    radius: Floats,
+    poses: list[Pose],
+    led_out: float,
+    size: float,
+    guide_count: int,
+) -> list[SegmentContacts]:
+    """Planes for the segments of guides near what is sharp for them.
+
+    Args:
+        position, previous, radius, poses, led_out, size: as in `find_contacts`, of all CVs in the
+            order (cv_count, guide_count).
+    """
+    cv_count = position.shape[1] // guide_count
+    spacing = spacing_of(size, cv_count)
+    found = (
+        _between_with(pose, position, previous, radius, led_out, size, guide_count)
+        for pose in poses
+        if cv_count > PINNED and is_sharp(pose, spacing, size)
+    )
+    return [contacts for contacts in found if len(contacts.index)]
+
+
+def spacing_of(size: float, cv_count: int) -> float:
+    """[m] from one CV to the next of hair of this size."""
+    return size / (cv_count - 1)
+
+
+def is_sharp(pose: Pose, spacing: float, size: float) -> bool:
+    """Whether a segment of this length [m] could enter the collider between its CVs."""
+    return spacing * spacing > short_squared(pose.collider.curve_radius * pose.scale, size)
+
+
+def short_squared(curve_radius: float, size: float) -> float:
+    """The squared length [m^2] of ways that need not be followed at curves of a radius [m]."""
+    return 8.0 * curve_radius * UNSEEN * size
 
 
 def cv_radius(settings: DynamicsSettings, cv_count: int, size: float) -> Floats:
@@ -129,13 +295,19 @@ def radius_of_all(
 
 
 def touched_by(contacts: list[Contacts], touching: list[Bools]) -> Touched | None:
-    """Free CVs that touch, each with the normal of the last collider that it touches; None where
-    none does."""
-    found = []
-    for one, is_touching in zip(contacts, touching, strict=True):
-        which = is_touching.nonzero()[0]  # sooner than by np.flatnonzero
-        if which.size:
-            found.append(Touched(one.index.take(which), chosen(one.normal, which)))
+    """Free CVs that touch, each with the normal of the last collider that it touches, or else that
+    its segments touch; None where none does."""
+    own: list[Touched] = []
+    between: list[Touched] = []
+    for one, which in zip(contacts, touching, strict=True):
+        found = one.touched(which)
+        if found is not None:
+            (between if isinstance(one, SegmentContacts) else own).append(found)
+    return last_of(between + own)
+
+
+def last_of(found: list[Touched]) -> Touched | None:
+    """All of them; of those that name a CV again the last."""
     if len(found) < 2:
         return found[0] if found else None
     index = np.concatenate([one.index for one in found])[::-1]
@@ -145,21 +317,176 @@ def touched_by(contacts: list[Contacts], touching: list[Bools]) -> Touched | Non
 
 
 def _contacts_with(
-    pose: Pose, position: Floats, previous: Floats, radius: Floats, led_out: float, size: float
+    pose: Pose,
+    position: Floats,
+    previous: Floats,
+    radius: Floats,
+    led_out: float,
+    size: float,
+    spacing: float,
 ) -> Contacts:
-    index, local, reach = near_points(pose, position, radius, REACH * size)
+    sharp = is_sharp(pose, spacing, size)
+    beyond: Floats | float = REACH * size
+    if sharp:  # what is beyond it now may have passed through
+        beyond = _travel(pose, position, previous) + beyond
+    index, local, reach = near_points(pose, position, radius, beyond)
     distance, normal = world_distance(pose, local)
+
     close = (distance < reach).nonzero()[0]
     index, distance = index.take(close), distance.take(close)
     local, normal = chosen(local, close), chosen(normal, close)
-    here, origin = chosen(position, index), chosen(previous, index)
-    origin += transform_points(pose.displacement, local)
-    reached = distance - dot_rows(normal, here - origin)
-    reached += np.float32(led_out)
+    here, before = chosen(position, index), chosen(previous, index)
+    origin = transform_points(pose.displacement, local)
+    origin += before
+    path = here - origin
+    reached = distance - dot_rows(normal, path)
+    height = dot_rows(normal, here)
+    height -= distance
+    limit = np.float32(short_squared(pose.collider.curve_radius * pose.scale, size))
+    long = (dot_rows(path, path) > limit).nonzero()[0]
     own_radius = radius.take(index)
-    offset = dot_rows(normal, here)
-    offset -= distance
-    offset += np.minimum(own_radius, reached)
+    if long.size:
+        some = _followed(pose, chosen(before, long), chosen(local, long), own_radius.take(long))
+        normal[:, long], height[long], reached[long] = some
+    reached += np.float32(led_out + pose.swelling)
+    offset = np.minimum(own_radius, reached)
+    offset += height
+    if sharp:
+        kept = (offset - dot_rows(normal, here) > -np.float32(REACH * size)).nonzero()[0]
+        index, normal, offset = index.take(kept), chosen(normal, kept), offset.take(kept)
+        origin, reached, own_radius = (
+            chosen(origin, kept),
+            reached.take(kept),
+            own_radius.take(kept),
+        )
     is_out = reached >= own_radius
-    skin = np.float32(SKIN * size)
-    return Contacts(index, normal, offset, origin, is_out, skin, np.zeros_like(offset))
+    skin, slack = np.float32(SKIN * size), _slack(own_radius, is_out, size)
+    return Contacts(index, normal, offset, origin, is_out, skin, np.zeros_like(offset), slack)
+
+
+def _slack(radius: Floats, is_out: Bools, size: float) -> Floats:
+    slack = np.maximum(radius * MAY_MISS, np.float32(2.0 * SKIN * size))
+    slack[~is_out] = np.inf
+    return slack
+
+
+def _between_with(
+    pose: Pose,
+    position: Floats,
+    previous: Floats,
+    radius: Floats,
+    led_out: float,
+    size: float,
+    guide_count: int,
+) -> SegmentContacts:
+    first = PINNED * guide_count
+    middle, middle_before = (
+        (rows[:, first:] + rows[:, first - guide_count : -guide_count]) * np.float32(0.5)
+        for rows in (position, previous)
+    )
+    segment = position[:, first:] - position[:, first - guide_count : -guide_count]
+    reach = _travel(pose, middle, middle_before)
+    reach += radius[first:] + np.float32(REACH * size)
+    reach += np.sqrt(dot_rows(segment, segment)) * np.float32(0.5)
+    upper, _, _ = near_points(pose, middle, reach)
+    upper += first
+    lower = upper - guide_count
+    count, along = len(upper), np.repeat(np.array(BETWEEN, np.float32), len(upper))
+    here, before = (
+        _mixed(chosen(rows, lower), chosen(rows, upper)) for rows in (position, previous)
+    )
+    own_radius = np.tile(radius.take(upper), len(BETWEEN))
+    local = transform_points(pose.inverse, here)
+    origin = transform_points(pose.displacement, local)
+    origin += before
+    normal, height, reached = _followed(pose, before, local, own_radius)
+    reached += np.float32(led_out + pose.swelling)
+    wanted = own_radius * BETWEEN_RADIUS
+    offset = np.minimum(wanted, reached)
+    offset += height
+    # of each segment the point that is deepest below its plane
+    missing = offset - dot_rows(normal, here)
+    which = missing.reshape(len(BETWEEN), count).argmax(axis=0) * count + np.arange(count)
+    which = which[missing.take(which) > -REACH * size]
+    along, offset, reached = along.take(which), offset.take(which), reached.take(which)
+    upper = upper.take(which % max(count, 1))
+    weight_lower = (np.float32(1.0) - along) * (radius.take(upper - guide_count) > -np.inf)
+    scale = weight_lower * weight_lower + along * along
+    is_out = reached >= wanted.take(which)
+    return SegmentContacts(
+        upper,
+        chosen(normal, which),
+        offset,
+        chosen(origin, which),
+        is_out,
+        np.float32(SKIN * size),
+        np.zeros_like(offset),
+        _slack(wanted.take(which), is_out, size),
+        guide_count,
+        along,
+        weight_lower / scale,
+        np.minimum(along / scale, MAX_WEIGHT),
+    )
+
+
+def _mixed(lower: Floats, upper: Floats) -> Floats:
+    """Points (3, k n) between points (3, n) at the fractions BETWEEN."""
+    path = upper - lower
+    return np.concatenate([lower + path * np.float32(along) for along in BETWEEN], axis=1)
+
+
+def _travel(pose: Pose, position: Floats, previous: Floats) -> Floats:
+    """How far [m] points (3, n) have gone in the substep as seen from the collider, (n,)."""
+    origin = transform_points(pose.displacement, transform_points(pose.inverse, position))
+    origin += previous
+    origin -= position
+    result: Floats = np.sqrt(dot_rows(origin, origin))
+    return result
+
+
+def _followed(
+    pose: Pose, before: Floats, local: Floats, radius: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Where the ways of points meet their radius (n,) [m], or end.
+
+    Args:
+        before: (3, n) world [m] where they were. local: (3, n) object space, where they are.
+
+    Returns:
+        normal (3, n) there; normal . x (n,) [m] of the surface there; and how far from the surface
+        they were, (n,) [m]: all in the world, as it is at the substep's end.
+    """
+    begin = transform_points(pose.inverse_before, before)
+    first, _ = world_distance(pose, begin)
+    scale = np.float32(pose.scale)  # a step that is too short harms nothing
+    path = local - begin
+    length = np.sqrt(dot_rows(path, path))
+    length *= scale
+    least = length * np.float32(1.0 / TRACE_STEPS)
+    target = np.minimum(radius, first)
+    place = (first > 0.0).astype(np.float32)  # along the way; what starts inside met it there
+    going = ((first > 0.0) & (length > TINY)).nonzero()[0]
+    gone, distance = np.zeros_like(length), first.copy()
+    for _ in range(TRACE_STEPS):
+        if not going.size:
+            break
+        room = distance.take(going) - target.take(going)
+        step = np.maximum(room, least.take(going))
+        ahead = gone.take(going) + step
+        there = ahead < length.take(going)
+        going, ahead, step, room = going[there], ahead[there], step[there], room[there]
+        points = chosen(begin, going) + chosen(path, going) * (ahead / length.take(going))
+        found = pose.collider.distance(points)[0] * scale
+        met = found < target.take(going)
+        # between the last two steps, as if the distance fell evenly
+        back = np.minimum((room - (found - target.take(going))), np.inf)
+        exact = ahead - step + step * room / np.maximum(back, TINY)
+        hit = met.nonzero()[0]
+        place[going[hit]] = exact[hit] / length.take(going[hit])
+        gone[going], distance[going] = ahead, found
+        going = going[~met]
+    points = begin + path * place
+    distance, normal = world_distance(pose, points)
+    surface = dot_rows(normal, transform_points(pose.matrix, points))
+    surface -= distance
+    return normal, surface, first

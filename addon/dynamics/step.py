@@ -22,12 +22,12 @@ depend on the frame rate; `grid_at_frame_end` bridges it for drawing.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from .colliders import Pose, poses_through
 from .constraints import (
     Touched,
@@ -37,7 +37,14 @@ from .constraints import (
     pin,
     relax_lengths,
 )
-from .contacts import find_contacts, touched_by
+from .contacts import (
+    MORE_ROUNDS,
+    Contacts,
+    find_between,
+    find_contacts,
+    spacing_of,
+    touched_by,
+)
 from .forces import air_fraction, brake, predict, speed_kept
 from .frame import Block, Drive, Frame, check_drive, style_rows
 from .schedule import due_substeps
@@ -92,6 +99,7 @@ def _advance_block(
     settings, dt, rest = frame.settings, frame.dt, block.rest
     position, previous, spare = block.position, block.previous, np.empty_like(block.position)
     kept, blown = speed_kept(settings, dt), air_fraction(settings, dt)
+    chain = _Chain(rest.length, block.held, rest.size, settings)
     for number, span in enumerate(spans):
         style = block.style_at(span[1])
         impulse = block.impulse_at(span)
@@ -105,8 +113,8 @@ def _advance_block(
         pin(position, style, rest.length, block.held)
         restore_style(position, style, rest.shape, frame.matrix)
         pin(position, style, rest.length, block.held)
-        _keep_lengths(position, block, None, settings)
-        _keep_outside(position, previous, block, frame, poses[number])
+        chain.keep_lengths(position, None)
+        _keep_outside(position, previous, block, chain, frame, poses[number])
     return position, previous
 
 
@@ -142,41 +150,83 @@ def displacement_beside_root(time_left: float, drive: Drive, duration: float) ->
     return displacement
 
 
-def _keep_lengths(
-    position: Floats, block: Block, touched: Touched | None, settings: DynamicsSettings
-) -> None:
-    length, held = block.rest.length, block.held
-    if settings.length_solver == "direct":
-        keep_lengths(position, length, touched, held)
-        return
-    relax_lengths(position, length, held, settings.relaxations)
-    if settings.long_range:
-        hold_within_reach(position, length, held)
+@dataclass(frozen=True)
+class _Chain:
+    """What keeps guides in one piece; length, held: see `Block`. size: of the hair [m]."""
+
+    length: Floats
+    held: Floats | None
+    size: float
+    settings: DynamicsSettings
+
+    def part(self, guides: Ints) -> _Chain:
+        held = None if self.held is None else self.held[:, guides]
+        return replace(self, length=self.length[:, guides], held=held)
+
+    def keep_lengths(self, position: Floats, touched: Touched | None) -> None:
+        if self.settings.length_solver == "direct":
+            keep_lengths(position, self.length, touched, self.held)
+            return
+        relax_lengths(position, self.length, self.held, self.settings.relaxations)
+        if self.settings.long_range:
+            hold_within_reach(position, self.length, self.held)
 
 
 def _keep_outside(
-    position: Floats, previous: Floats, block: Block, frame: Frame, poses: list[Pose]
+    position: Floats, previous: Floats, block: Block, chain: _Chain, frame: Frame, poses: list[Pose]
 ) -> None:
     """Contacts and lengths in turn; lengths come last, and slide along what touches.
 
     Guides that touch nothing take part, so that none depends on what others do.
     """
-    settings, rest, touched = frame.settings, block.rest, None
+    settings, size = frame.settings, block.rest.size
     here, was = (rows.reshape(3, -1) for rows in (position, previous))
-    contacts = find_contacts(
-        here,
-        was,
-        block.radius,
-        poses,
-        settings.depenetration_speed * rest.size * frame.dt,
-        rest.size,
-    )
-    for _ in range(settings.contact_passes if frame.drive.colliders else 0):
-        touching = [one.push_out(here, settings.friction) for one in contacts]
-        touched = touched_by(contacts, touching)
-        _keep_lengths(position, block, touched, settings)
-    if settings.length_solver == "direct":
-        tolerance, iterations = settings.length_tolerance, settings.length_iterations
-        finish_lengths(position, rest.length, touched, block.held, tolerance, iterations, rest.size)
+    led_out = settings.depenetration_speed * size * frame.dt
+    spacing = spacing_of(size, position.shape[1])
+    contacts = find_contacts(here, was, block.radius, poses, led_out, size, spacing)
+    guide_count = position.shape[2]
+    contacts += find_between(here, was, block.radius, poses, led_out, size, guide_count)
+    passes = settings.contact_passes if frame.drive.colliders else 0
+    _solve_in_turn(position, chain, contacts, passes)
+    _solve_again(position, chain, contacts)
     for one in contacts:
         one.absorb(here, was)
+
+
+def _solve_in_turn(position: Floats, chain: _Chain, contacts: list[Contacts], passes: int) -> None:
+    """Contacts and lengths, and lengths at last."""
+    touched, settings = None, chain.settings
+    here = position.reshape(3, -1)
+    for _ in range(passes):
+        touching = [one.push_out(here, settings.friction) for one in contacts]
+        touched = touched_by(contacts, touching)
+        chain.keep_lengths(position, touched)
+    if settings.length_solver == "direct":
+        tolerance, iterations = settings.length_tolerance, settings.length_iterations
+        length, held, size = chain.length, chain.held, chain.size
+        finish_lengths(position, length, touched, held, tolerance, iterations, size)
+
+
+def _solve_again(position: Floats, chain: _Chain, contacts: list[Contacts]) -> None:
+    """Once more in turn, for guides that their lengths have drawn into a collider."""
+    guide_count = position.shape[2]
+    guides = _missing(position, contacts)
+    for _ in range(MORE_ROUNDS):
+        if not guides.size:
+            return
+        some, own = (
+            position.take(guides, axis=2),
+            [one.part(guides, guide_count) for one in contacts],
+        )
+        _solve_in_turn(some, chain.part(guides), own, 1)
+        position[:, :, guides] = some
+        for one, part in zip(contacts, own, strict=True):
+            one.note(part, guides, guide_count)
+        guides = guides[_missing(some, own)]
+
+
+def _missing(position: Floats, contacts: list[Contacts]) -> Ints:
+    """Guides, rising, of which a CV or segment is farther below its plane than it may be."""
+    here, guide_count = position.reshape(3, -1), position.shape[2]
+    found = [one.index[one.missing(here)] % guide_count for one in contacts]
+    return np.unique(np.concatenate(found)) if found else np.zeros(0, np.int64)

@@ -22,6 +22,8 @@ from ..dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
+from ..dynamics.colliders.posed import FLAT
+from ..dynamics.contacts import short_squared, spacing_of
 from ..errors import HairloomError
 from .shader_source import COLLIDER_TEXELS, FIELD_ROW, ROUNDS_ACROSS, STRAND_ROWS
 from .textures import texture_from
@@ -80,18 +82,29 @@ class ColliderTextures:
 
         It is RGBA32F, COLLIDER_TEXELS texels a collider in one row, as `moments` has them.
         """
-        return texture_from(self.moments(posed, np.array([[0.0, 1.0]]), 0.0), "RGBA32F")
+        return texture_from(self.moments(posed, np.array([[0.0, 1.0]]), 0.0, 0.0, 2), "RGBA32F")
 
-    def moments(self, posed: tuple[PosedCollider, ...], spans: Floats, reach: float) -> Floats:
+    def moments(
+        self,
+        posed: tuple[PosedCollider, ...],
+        spans: Floats,
+        reach: float,
+        size: float,
+        cv_count: int,
+    ) -> Floats:
         """Rows of the table of moments, (substep_count, collider_count * COLLIDER_TEXELS, 4).
 
         A collider's texels: three rows of its inverse matrix at the substep's end; three of how
-        much the substep changes its matrix; those of `own`; a sphere around it that holds all
-        points within reach.
+        much the substep changes its matrix; those of `own`; a sphere around it, on its way in the
+        substep, that holds all points within reach; three rows of its inverse matrix at the
+        substep's begin; x the squared length of ways that need not be followed (see
+        `contacts.short_squared`), y 1 where segments collide, z its smallest scale,
+        w its swelling.
 
         Args:
             spans: (substep_count, 2) begin and end of each substep as fractions of the frame.
             reach: [m] from a collider in which contacts may be.
+            size: [m] of the hair. cv_count: of a guide.
         """
         table = np.zeros((len(spans), len(posed), COLLIDER_TEXELS, 4), np.float32)
         table[:, :, 6:8] = self.own
@@ -104,7 +117,21 @@ class ColliderTextures:
             stretch = np.sqrt(np.einsum("nij,nij->n", turned, turned))  # no less than the largest
             center, radius = self.bounds[place]
             table[:, place, 8, :3] = turned @ center + now[:, :3, 3]
-            table[:, place, 8, 3] = radius * stretch + reach
+            change = now - before
+            travel = np.linalg.norm(change[:, :3, :3] @ center + change[:, :3, 3], axis=1)
+            travel += radius * np.sqrt(
+                np.einsum("nij,nij->n", change[:, :3, :3], change[:, :3, :3])
+            )
+            table[:, place, 8, 3] = radius * stretch + reach + travel
+            scales = np.linalg.svd(now[:, :3, :3], compute_uv=False)
+            is_flat = np.linalg.cond(before[:, :3, :3]) >= 1.0 / FLAT
+            before[is_flat] = now[is_flat]
+            table[:, place, 9:12] = np.linalg.inv(before)[:, :3]
+            seen = scales[:, -1] * short_squared(one.collider.curve_radius, size)
+            table[:, place, 12, 0] = seen
+            table[:, place, 12, 1] = spacing_of(size, cv_count) ** 2 > seen
+            table[:, place, 12, 2] = scales[:, -1]
+            table[:, place, 12, 3] = one.swelling
         return table.reshape(len(spans), -1, 4)
 
 

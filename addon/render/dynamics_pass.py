@@ -77,6 +77,7 @@ def dynamics_recipe(
     collider_count: int = 0,
     rounds: bool = False,
     fields: bool = False,
+    sharp: bool = False,
 ) -> ShaderRecipe:
     """The program for guides of this many CVs, without what the scene does not need."""
     flags = {
@@ -85,6 +86,7 @@ def dynamics_recipe(
         "HAS_AIR": air,
         "HAS_ROUNDS": rounds,
         "HAS_FIELDS": fields,
+        "HAS_SHARP": sharp and cv_count > PINNED,
     }
     textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
     textures += ["moments"] + ["held_cvs"] * held
@@ -204,11 +206,13 @@ class DynamicsPass:
         colliders, settings, state = self._colliders, frame.settings, self._state
         assert colliders is not None
         posed = frame.drive.colliders
-        spans = spans_of(frame, first, count)
+        spans, is_sharp = spans_of(frame, first, count), False
         table = moments_of(frame, first, spans)
         if posed:
             reach = (REACH + max(settings.radius_root, settings.radius_tip)) * frame.size
-            table = np.concatenate([table, colliders.moments(posed, spans, reach)], axis=1)
+            poses = colliders.moments(posed, spans, reach, frame.size, state.cv_count)
+            is_sharp = bool(poses.reshape(len(spans), len(posed), -1, 4)[:, :, 12, 1].any())
+            table = np.concatenate([table, poses], axis=1)
         textures = {**self._textures, "moments": texture_from(table, "RGBA32F")}
         textures |= {"rounds": colliders.rounds, "fields": colliders.fields}
         recipe = dynamics_recipe(
@@ -219,6 +223,7 @@ class DynamicsPass:
             collider_count=len(posed),
             rounds=colliders.rounds is not None,
             fields=colliders.fields is not None,
+            sharp=is_sharp,
         )
         block = block_of(frame, state.guide_count, state.cv_count, count, speed_ratio)
         shader = program(recipe)

@@ -17,7 +17,16 @@ from types import MappingProxyType
 
 from ..cards.bake import SAMPLES, SPARSE_RANGE, SPARSE_STEPS
 from ..dynamics.constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED
-from ..dynamics.contacts import REACH, SKIN
+from ..dynamics.contacts import (
+    BETWEEN,
+    BETWEEN_RADIUS,
+    MAX_WEIGHT,
+    MAY_MISS,
+    MORE_ROUNDS,
+    REACH,
+    SKIN,
+    TRACE_STEPS,
+)
 from ..dynamics.wind import MODES
 from ..refine import detail, ride
 from ..refine.hold import NEAR, SWEEPS
@@ -49,7 +58,7 @@ SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
 #: A texture side may be 16384 texels on every GPU that Blender supports.
 STRAND_ROWS = 16384
 #: Texels of the dynamics' table of moments: of the substep itself, and of each collider.
-MOMENT_TEXELS, COLLIDER_TEXELS = 1 + -(-MODES // 4), 9
+MOMENT_TEXELS, COLLIDER_TEXELS = 1 + -(-MODES // 4), 13
 #: Round solids, and nodes of distance fields, in one row of their textures.
 ROUNDS_ACROSS, FIELD_ROW = 512, 4096
 #: Regions behind the head that culling looks into, at most; a strand's are bits of one number.
@@ -95,6 +104,12 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "skin_of_reach": repr(SKIN / REACH),
         "shortest_segment": repr(ride.SHORTEST),
         "reversed_turn": repr(ride.REVERSED),
+        "between_count": str(len(BETWEEN)),
+        "between_radius": repr(float(BETWEEN_RADIUS)),
+        "trace_steps": str(TRACE_STEPS),
+        "may_miss": repr(float(MAY_MISS)),
+        "more_rounds": str(MORE_ROUNDS),
+        "max_weight": repr(float(MAX_WEIGHT)),
         "wind_modes": str(MODES),
         "moment_texels": str(MOMENT_TEXELS),
         "collider_texels": str(COLLIDER_TEXELS),

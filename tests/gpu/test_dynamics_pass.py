@@ -73,6 +73,18 @@ def ball_field(radius: float) -> DistanceField:
     return DistanceField(np.maximum(round_part, nodes[..., 2] - 0.06), nodes[0, 0, 0], cell)
 
 
+def plate_field() -> DistanceField:
+    """A sampled plate of 8 mm that stands in the hair."""
+    cell = 0.005
+    axes = [np.arange(-half - 3 * cell, half + 3 * cell, cell) for half in (0.1, 0.004, 0.05)]
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    outside = np.abs(nodes) - np.array([0.1, 0.004, 0.05])
+    values = np.linalg.norm(np.maximum(outside, 0.0), axis=-1) + np.minimum(
+        outside.max(axis=-1), 0.0
+    )
+    return DistanceField(values, nodes[0, 0, 0] + [0.0, -0.06, 0.22], cell)
+
+
 @dataclass(eq=False)
 class Scene:
     """Guides on a shaking head; `on_head` go with it, `standing` stand still."""
@@ -86,6 +98,7 @@ class Scene:
     is_held: bool = False
     fps: float = 60.0
     is_bent: bool = True
+    is_fast: bool = False  # colliders swing ten times as far
 
     @property
     def settings(self) -> DynamicsSettings:
@@ -111,6 +124,10 @@ class Scene:
 
     def colliders(self, frame: int) -> tuple[PosedCollider, ...]:
         earlier, before, now = (shaking((frame + k) / self.fps) for k in (-1, 0, 1))
+        if self.is_fast:
+            for matrix in (earlier, before, now):
+                matrix[0, 3] *= 10.0
+                matrix[1, 3] = matrix[0, 3] * 0.5
         bent = curvature(earlier, before, now, 1.0) if self.is_bent and frame else None
         still = np.eye(4)
         return (
@@ -133,6 +150,9 @@ BALL = SphereCollider(np.array([0.0, 0.0, 0.0]), 0.095)
 IN_THE_WAY = SphereCollider(np.array([0.05, 0.05, 0.2]), 0.05)
 AT_TIPS = SphereCollider(np.array([0.0, 0.05, 0.28]), 0.1)
 ROD = CapsuleCollider(np.array([-0.2, 0.05, 0.12]), np.array([0.2, 0.1, 0.16]), 0.03)
+#: So thin that segments collide with it, and so far out that it goes several times its own width in
+#: a substep.
+FINGER = CapsuleCollider(np.array([-0.2, 0.1, 0.2]), np.array([0.2, 0.12, 0.24]), 0.006)
 CLUSTER = SphereSetCollider(
     np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.02], [-0.04, 0.02, 0.0], [0.0, -0.03, 0.04]]),
     np.array([0.09, 0.07, 0.06, 0.06]),
@@ -175,6 +195,8 @@ AT_COLLIDERS = {
     "ball without friction": Scene({"friction": 0.0, **LIMP}, on_head=(BALL,)),
     "standing ball": Scene(standing=(IN_THE_WAY,)),
     "capsule": Scene(LIMP, on_head=(ROD,)),
+    "finger": Scene(guide_count=20, on_head=(FINGER,), is_fast=True),
+    "plate and finger": Scene(guide_count=12, on_head=(plate_field(), FINGER)),
     "set of balls": Scene(LIMP, on_head=(CLUSTER,)),
     "mesh field": Scene(LIMP, on_head=(ball_field(0.095),)),
     "head and ball": Scene(on_head=(ball_field(0.095),), standing=(IN_THE_WAY,)),

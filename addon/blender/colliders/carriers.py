@@ -1,8 +1,9 @@
 """Following an object that collides: by its matrix, and by how an armature deforms its mesh.
 
-Most heads in Blender do not move as objects: an armature moves their vertices. A collider is rigid,
-so it takes the rotation, scale and translation that fit the vertices best. If there is hair, the
-vertices near its roots count, because the rest of a body bends independently of the head.
+Most heads in Blender do not move as objects: an armature moves their vertices. A collider moves by
+the rotation, scale and translation that fit the vertices best; a mesh is bent by the rest. If there
+is hair, the vertices near its roots count, because the rest of a body moves independently of the
+head.
 """
 
 from __future__ import annotations
@@ -24,8 +25,6 @@ from ..scene.surfaces import read_positions
 _ENOUGH = 2000
 #: Rings of triangles around the roots that count as near them.
 _RINGS = 2
-#: Bending by more than this fraction of the tracked part's size is reported to the artist.
-_BENT = 0.02
 #: Modifiers that do not move a mesh.
 _STILL = frozenset(
     ("SUBSURF", "MULTIRES", "TRIANGULATE", "MIRROR", "EDGE_SPLIT", "WEIGHTED_NORMAL", "BEVEL")
@@ -39,14 +38,14 @@ class Carrier:
 
     rest: (n, 3) [m] world, these vertices at rest; none for an object without a mesh.
     vertex_count: of the whole evaluated mesh.
-    bend: [m], root mean square of how its vertices differed from a rigid motion when last seen.
+    shape: (vertex_count, 3) [m] world, all vertices when last seen, if its shape may change.
     """
 
     body: Body
     index: Ints
     rest: Floats
     vertex_count: int
-    bend: float = 0.0
+    shape: Floats | None = None
 
     @classmethod
     def of_object(cls, body: Body) -> Carrier:
@@ -79,22 +78,16 @@ class Carrier:
         if not is_deforming(obj):
             evaluated = obj.evaluated_get(depsgraph)
             self._check(len(evaluated.data.vertices) if obj.type == "MESH" else 0)
-            self.bend = 0.0
+            self.shape = None
             return matrix
         positions = read_positions(obj, depsgraph, place=obj.name)
         self._check(len(positions))
+        self.shape = positions
         fit = fit_similarity(moved(self.rest, matrix), positions[self.index])
         if fit is None:
-            self.bend = 0.0
             return matrix
-        self.bend = fit.error
         result: Floats = fit.matrix @ matrix
         return result
-
-    @property
-    def bends(self) -> bool:
-        """Whether it bends more than a rigid collider can follow."""
-        return self.bend > _BENT * float(np.ptp(self.rest, axis=0).max())
 
     def _check(self, vertex_count: int) -> None:
         if vertex_count != self.vertex_count:

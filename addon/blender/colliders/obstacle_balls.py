@@ -44,6 +44,7 @@ class BallsPart:
     rest: Floats
     track: Track = field(default_factory=Track)
     warnings: dict[str, str] = field(default_factory=dict)
+    swelling: float = 0.0
     _set: SphereSetCollider | None = None
     _members: tuple[int, ...] = ()
 

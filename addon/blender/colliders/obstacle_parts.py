@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import bpy
@@ -16,15 +17,18 @@ from ...dynamics.colliders import (
     PosedCollider,
     SphereCollider,
 )
+from ...dynamics.colliders.bent_field import BentField
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.trajectory import curvature
 from ...strands import Surface
-from ...strands.affine import moved
+from ...strands.affine import mean_scale, moved
 from .carriers import Carrier, scales_of
 from .fields import field_of
 
 #: A mesh that returns to its rest within this part of its extent is the same mesh.
 _SAME_SHAPE = 1.0e-5
+#: What counts as near the tracked vertices, in the radius of a ball around these.
+NEAR = 3.0
 #: Axes whose lengths differ by less than this fraction count as equal.
 _EVEN = 0.01
 
@@ -35,11 +39,13 @@ class Part(Protocol):
     name: of the object that it is made of, or of one of them.
     uid: the object's session number, or None where it is made of several.
     track: where it was in the last two frames.
+    swelling: how far its shape has changed since it was last seen, see `PosedCollider`.
     warnings: object -> what the artist should know since it was last seen.
     """
 
     track: Track
     warnings: dict[str, str]
+    swelling: float
 
     @property
     def name(self) -> str: ...
@@ -69,7 +75,9 @@ class Track:
     def rest(self, matrix: Floats) -> None:
         self.before, self.earlier, self.duration = matrix, None, 0.0
 
-    def go(self, collider: Collider, matrix: Floats, duration: float) -> PosedCollider:
+    def go(
+        self, collider: Collider, matrix: Floats, duration: float, swelling: float = 0.0
+    ) -> PosedCollider:
         """The trajectory since the previous frame, by the same formula as the roots'."""
         if self.before is None:
             self.rest(matrix)
@@ -77,7 +85,7 @@ class Track:
         bent = None
         if self.earlier is not None and duration:
             bent = curvature(self.earlier, self.before, matrix, self.duration / duration)
-        posed = PosedCollider(collider, self.before, matrix, bent)
+        posed = PosedCollider(collider, self.before, matrix, bent, swelling)
         self.earlier, self.before, self.duration = self.before, matrix, duration
         return posed
 
@@ -86,7 +94,9 @@ class Track:
 class FieldPart:
     """A mesh, as its signed distance in world space with the mesh at rest.
 
-    surface: world space at rest; its field takes a second to build.
+    surface: world space at rest; its field takes a second to build. Where the mesh has another
+    shape, the field is made again around what has moved, which takes some hundredths of a second.
+    swelling: see `PosedCollider`.
     """
 
     carrier: Carrier
@@ -95,6 +105,10 @@ class FieldPart:
     resolution: int
     track: Track = field(default_factory=Track)
     warnings: dict[str, str] = field(default_factory=dict)
+    swelling: float = 0.0
+    _shape: Floats | None = None
+    _bent: BentField | None = None
+    _at: tuple[Floats, DistanceField] | None = None
 
     @classmethod
     def new(
@@ -113,14 +127,33 @@ class FieldPart:
         return self.carrier.body.handle.uid
 
     def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
-        matrix = self.carrier.moved(depsgraph)
-        self.warnings.clear()
-        if self.carrier.bends:
-            self.warnings[self.name] = (
-                f"{self.name}: it bends by {self.carrier.bend * 1000.0:.0f} mm, which its rigid "
-                "collider does not follow. Fit spheres to it."
-            )
-        return self.distance, matrix
+        matrix, shape = self.carrier.moved(depsgraph), self.carrier.shape
+        if shape is None:
+            self.swelling, self._shape = 0.0, None
+            return self.distance, matrix
+        local = moved(shape, np.linalg.inv(matrix)).astype(np.float32)
+        before = self.surface.positions if self._shape is None else self._shape
+        path = (local - before)[self._near]
+        self.swelling = float(np.sqrt(np.einsum("ij,ij->i", path, path).max(initial=0.0)))
+        self.swelling *= mean_scale(matrix)
+        self._shape = local
+        if self._bent is None:
+            self._bent = BentField(self.distance, self.surface)
+        if self._at is None or not np.array_equal(self._at[0], local):
+            self._at = local, self._bent.at(local)
+        return self._at[1], matrix
+
+    @cached_property
+    def _near(self) -> Bools:
+        """(vertex_count,) what is near the vertices that it is tracked by: how far hands move in a
+        frame says nothing about hair on a head."""
+        tracked = self.carrier.rest
+        if not len(tracked):
+            return np.ones(len(self.surface.positions), bool)
+        middle = tracked.mean(axis=0)
+        reach = NEAR * float(np.linalg.norm(tracked - middle, axis=1).max())
+        result: Bools = np.linalg.norm(self.surface.positions - middle, axis=1) <= reach
+        return result
 
     def is_of(self, surface: Surface, matrix: Floats, settings: DynamicsSettings) -> bool:
         """Whether it was made from this mesh, before `matrix` (4, 4) moved it from its rest."""
@@ -145,6 +178,7 @@ class ShapePart:
     base: Floats
     track: Track = field(default_factory=Track)
     warnings: dict[str, str] = field(default_factory=dict)
+    swelling: float = 0.0
 
     @property
     def name(self) -> str:

@@ -104,7 +104,8 @@ class Obstacles:
         posed = []
         for part in self._there(depsgraph):
             try:
-                posed.append(part.track.go(*part.now(depsgraph), duration))
+                collider, matrix = part.now(depsgraph)
+                posed.append(part.track.go(collider, matrix, duration, part.swelling))
             except HairloomError as error:
                 self._fail(part, error)
         return tuple(posed)

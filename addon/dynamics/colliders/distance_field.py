@@ -7,6 +7,9 @@ holes, doubled faces and slivers do not upset. It is evaluated only at nodes nea
 than one cell; between two neighbours of which one is farther than a cell there is no surface, so
 all other signs follow along the rows.
 
+No part of the surface lies outside of what is looked up by more than a twentieth of a cell, see
+`covering`: hair that stays out of the one stays out of the other.
+
 Error of the look-up: zero where the distance is linear; near edges and corners, and where the cell
 is crossed by the medial axis, below one cell's half diagonal, in practice a tenth of a cell.
 """
@@ -30,6 +33,10 @@ MARGIN = 2
 EXACT = 6.0
 #: Farther away one node in this many is exact, and the others are interpolated.
 STRIDE = 3
+#: How far a part of the surface may lie outside of what is looked up, in cells.
+UNCOVERED = 0.05
+#: Cells between the nodes that tell how sharp the surface is.
+STEP = 2
 
 
 class DistanceField:
@@ -82,7 +89,8 @@ class DistanceField:
                 "it encloses no volume at this resolution",
                 "Close its holes, or raise the collider resolution",
             )
-        return cls(np.where(inside, -distance, distance), low, cell)
+        values = np.where(inside, -distance, distance)
+        return cls(covering(values, low, cell, points_on(surface, cell / 2.0)), low, cell)
 
     @cached_property
     def bounds(self) -> tuple[Floats, float]:
@@ -95,6 +103,18 @@ class DistanceField:
         inside -= center
         farthest = float(np.sqrt((inside * inside).sum(axis=1).max()))
         return self.low + center * np.float32(self.cell), (farthest + 3.0**0.5) * self.cell
+
+    @cached_property
+    def curve_radius(self) -> float:
+        """By how far the surface bulges between two nodes that are 2 STEP cells apart."""
+        values, most = self.values, 0.0
+        for axis in range(3):
+            along = np.moveaxis(values, axis, 0)
+            middle = along[STEP:-STEP]
+            bulge = (along[2 * STEP :] + along[: -2 * STEP]) / 2.0 - middle
+            at_surface = np.abs(middle) < 0.6 * self.cell
+            most = max(most, float(bulge[at_surface].max(initial=0.0)))
+        return (STEP * self.cell) ** 2 / (2.0 * max(most, 1.0e-3 * self.cell))
 
     def near(self, points: Floats, reach: Floats | float) -> Ints:
         """Points whose nearest node is no farther away than `reach` plus the distance to that node:
@@ -172,6 +192,47 @@ def _distances(nodes: Floats, surface: Surface, cell: float) -> Floats:
     # for each axis; without that no distance is too long, which `near` relies on.
     distance -= 3.0 * (STRIDE * cell) ** 2 / (8.0 * np.maximum(distance, least))
     return np.where(exact <= least, exact, np.maximum(distance, least))
+
+
+def covering(values: Floats, low: Floats, cell: float, points: Floats) -> Floats:
+    """Values (nx, ny, nz), lowered where the surface would lie outside of what is looked up.
+
+    A look-up cuts edges and corners off, and a sheet thinner than a cell vanishes. Each point of
+    the surface that would be outside by e, beyond what is allowed, lowers the nodes of its cell by
+    the least sum of squares that takes e from it: w e / sum of w^2, with its weights w.
+
+    Args:
+        points: (n, 3) of the surface; those outside of the grid do not count.
+    """
+    place = (points - low) / cell
+    place = place[((place >= 0.0) & (place <= np.array(values.shape) - 1)).all(axis=1)]
+    node = np.minimum(place.astype(np.int64), np.array(values.shape) - 2)
+    fraction = place - node
+    weight = np.ones((8, len(place)))
+    index = np.empty((8, len(place)), np.int64)
+    for corner, offset in enumerate(np.ndindex(2, 2, 2)):
+        for axis, side in enumerate(offset):
+            weight[corner] *= fraction[:, axis] if side else 1.0 - fraction[:, axis]
+        index[corner] = np.ravel_multi_index((node + offset).T, values.shape)
+    flat = values.ravel()
+    outside = np.maximum((weight * flat[index]).sum(axis=0) - UNCOVERED * cell, 0.0)
+    lowered = np.zeros_like(flat)
+    np.maximum.at(lowered, index, weight * (outside / (weight * weight).sum(axis=0)))
+    return (flat - lowered).reshape(values.shape)
+
+
+def points_on(surface: Surface, spacing: float) -> Floats:
+    """Points (n, 3) all over the triangles, at most `spacing` [m] apart along edges."""
+    corners = surface.corners.astype(np.float64)
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    parts = np.ceil(edges / spacing).astype(int)
+    found = []
+    for count in np.unique(parts[parts > 0]):
+        steps = np.array([(i, j) for i in range(count + 1) for j in range(count + 1 - i)]) / count
+        a, b, c = np.moveaxis(corners[parts == count], 1, 0)
+        u, v = steps[:, :1, None], steps[:, 1:, None]
+        found.append((a + u * (b - a) + v * (c - a)).reshape(-1, 3))
+    return np.concatenate(found) if found else np.zeros((0, 3))
 
 
 def _filled_in(values: Floats, chosen: Ints, axis: int) -> Floats:

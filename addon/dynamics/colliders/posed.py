@@ -26,6 +26,11 @@ class Collider(Protocol):
     def bounds(self) -> tuple[Floats, float]:
         """Center (3,) and radius [m] of a sphere around it."""
 
+    @property
+    def curve_radius(self) -> float:
+        """[m] about the smallest radius of its convex parts: a straight way of length c between two
+        points outside of it enters it by no more than about c^2 / (8 curve_radius)."""
+
     def near(self, points: Floats, reach: Floats | float) -> Ints:
         """Indices of the points (3, n) that may be closer than `reach` [m], one or (n,) float32,
         quickly."""
@@ -41,6 +46,8 @@ class PosedCollider:
     matrix_before, matrix_now: (4, 4) affine, object to world, at the frame's begin and end.
     matrix_curvature: (4, 4), how the path between them is bent, see `trajectory.curvature`; None:
         straight.
+    swelling: how far [m] its surface has moved in the frame by its change of shape, at most: what
+        that has swallowed is led out at once.
 
     Raises:
         HairloomError: a matrix that is not finite or flattens the collider.
@@ -50,6 +57,7 @@ class PosedCollider:
     matrix_before: Floats
     matrix_now: Floats
     matrix_curvature: Floats | None = None
+    swelling: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("matrix_before", "matrix_now", "matrix_curvature"):
@@ -76,17 +84,28 @@ class PosedCollider:
         moments: Any = np.array(spans).T[..., None, None]  # in matrix_at an array does for a number
         before, now = self.matrix_at(moments)
         center, radius = self.collider.bounds
+        flat_before = np.linalg.cond(before[:, :3, :3]) >= 1.0 / FLAT
         centers = (now[:, :3, :3] @ center + now[:, :3, 3]).astype(np.float32)
         scales = np.linalg.svd(now[:, :3, :3], compute_uv=False)
         is_flat = scales[:, -1] <= FLAT * scales[:, 0]
         displacements = (now - before).astype(np.float32)
         now[is_flat] = np.eye(4)
-        inverses = np.linalg.inv(now).astype(np.float32)
+        before[flat_before] = now[flat_before]
+        inverses, inverses_before = (np.linalg.inv(one).astype(np.float32) for one in (now, before))
+        matrices = now.astype(np.float32)
         return [
             None
             if is_flat[i]
             else Pose(
-                self.collider, inverses[i], displacements[i], centers[i], radius * largest, smallest
+                self.collider,
+                inverses[i],
+                displacements[i],
+                centers[i],
+                radius * largest,
+                smallest,
+                matrices[i],
+                inverses_before[i],
+                self.swelling,
             )
             for i, (largest, _, smallest) in enumerate(scales.tolist())
         ]
@@ -96,10 +115,13 @@ class PosedCollider:
 class Pose:
     """A collider at the end of a substep.
 
-    inverse: (4, 4) float32, world to object. way: (4, 4) float32, what the substep has added to
-        the matrix from object to world.
+    inverse: (4, 4) float32, world to object. displacement: (4, 4) float32, what the substep has
+        added to the matrix from object to world.
     center: (3,) float32 world [m]. radius: [m], of a sphere around it.
     scale: the smallest of the matrix along any axis.
+    matrix: (4, 4) float32, object to world.
+    inverse_before: (4, 4) float32, world to object at the substep's begin.
+    swelling: see `PosedCollider`.
     """
 
     collider: Collider
@@ -108,6 +130,9 @@ class Pose:
     center: Floats
     radius: float
     scale: float
+    matrix: Floats
+    inverse_before: Floats
+    swelling: float = 0.0
 
 
 def poses_through(
@@ -122,18 +147,18 @@ def poses_through(
 
 
 def near_points(
-    pose: Pose, position: Floats, reach: Floats, beyond: float = 0.0
+    pose: Pose, position: Floats, reach: Floats, beyond: Floats | float = 0.0
 ) -> tuple[Ints, Floats, Floats]:
-    """Points (3, n) world that may be within their reach, (n,) [m] and `beyond` [m]: their indices,
-    where they are in object space (3, m), and their reach [m] (m,).
+    """Points (3, n) world that may be within their reach, (n,) [m], and `beyond` [m], one or (n,):
+    their indices, where they are in object space (3, m), and their reach [m] (m,).
 
     A bounding sphere first, then the collider's own quick answer.
     """
     offset = position - pose.center[:, None]
-    farthest = pose.radius + float(reach.max()) + beyond
+    farthest = pose.radius + float(reach.max()) + float(np.max(beyond))
     index = (dot_rows(offset, offset) < np.float32(farthest * farthest)).nonzero()[0]
     reach = reach.take(index)
-    reach += np.float32(beyond)
+    reach += np.float32(beyond) if np.ndim(beyond) == 0 else np.take(beyond, index)
     local = transform_points(pose.inverse, position.take(index, axis=1, mode="clip"))
     kept = pose.collider.near(local, reach / np.float32(pose.scale))
     return index.take(kept), local.take(kept, axis=1, mode="clip"), reach.take(kept)

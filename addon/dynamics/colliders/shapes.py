@@ -40,6 +40,10 @@ class SphereCollider:
     def bounds(self) -> tuple[Floats, float]:
         return self.center, float(self.radius)
 
+    @property
+    def curve_radius(self) -> float:
+        return float(self.radius)
+
     def near(self, points: Floats, reach: Floats | float) -> Ints:
         return np.arange(points.shape[1])
 
@@ -76,6 +80,10 @@ class CapsuleCollider:
     def bounds(self) -> tuple[Floats, float]:
         half = (self.end - self.start) / np.float32(2.0)
         return self.start + half, float(np.linalg.norm(half)) + float(self.radius)
+
+    @property
+    def curve_radius(self) -> float:
+        return float(self.radius)
 
     def near(self, points: Floats, reach: Floats | float) -> Ints:
         return np.arange(points.shape[1])

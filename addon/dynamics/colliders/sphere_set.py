@@ -54,6 +54,10 @@ class SphereSetCollider:
         displacement = np.sqrt(((self.centers - middle) ** 2).sum(axis=1))
         return middle, float((displacement + self.radii).max())
 
+    @property
+    def curve_radius(self) -> float:
+        return float(self.radii.min())
+
     def near(self, points: Floats, reach: Floats | float) -> Ints:
         """By the cell of each point, or the cell nearest to it: all balls lie within the grid's
         box, so that no point is nearer to one than the box's own nearest point is."""

@@ -10,7 +10,16 @@ from ...arrays import Floats
 from ..colliders import PosedCollider
 from ..colliders.posed import FLAT
 from ..constraints import PINNED
-from ..contacts import REACH, SKIN
+from ..contacts import (
+    BETWEEN,
+    BETWEEN_RADIUS,
+    MAX_WEIGHT,
+    MAY_MISS,
+    REACH,
+    SKIN,
+    TRACE_STEPS,
+    short_squared,
+)
 from ..settings import DynamicsSettings
 
 
@@ -26,7 +35,12 @@ class Moment:
 
 @dataclass
 class Plane:
-    """One contact: CV `cv` shall keep normal . x >= offset; see `contacts.Contacts`."""
+    """One contact: CV `cv`, or a point of the segment that ends there, shall keep
+    normal . x >= offset; see `contacts.Contacts`.
+
+    along: fraction of the segment; 1 is the CV itself. weights: of the point's way, what the CV
+        before and the CV go.
+    """
 
     cv: int
     normal: Floats
@@ -34,59 +48,224 @@ class Plane:
     origin: Floats
     is_out: bool
     skin: float  # [m]
+    slack: float  # [m]
+    along: float = 1.0
+    weights: tuple[float, float] = (0.0, 1.0)
     push: float = 0.0
 
-    def push_out(self, x: Floats, friction: float) -> bool:
-        """Bring the CV back to its plane, in place; returns whether it touches."""
-        missing = self.offset - float(self.normal @ x[self.cv])
+    def point(self, x: Floats) -> Floats:
+        result: Floats = x[self.cv - 1] + (x[self.cv] - x[self.cv - 1]) * self.along
+        return result
+
+    def gap(self, x: Floats) -> float:
+        return self.offset - float(self.normal @ self.point(x))
+
+    def push_of(self, x: Floats, friction: float) -> tuple[Floats, bool]:
+        """How far its point has to go [m]; and whether it touches."""
+        here, missing = self.point(x), self.gap(x)
         push = max(missing, 0.0)
         self.push += push
-        x[self.cv] += self.normal * push
-        slip = x[self.cv] - self.origin
+        there = here + self.normal * push
+        slip = there - self.origin
         slip = slip - self.normal * (self.normal @ slip)
         length = max(float(np.linalg.norm(slip)), 1.0e-9)
-        x[self.cv] -= slip * min(friction * push / length, 1.0)
-        return bool(missing > -self.skin) and self.is_out
+        there = there - slip * min(friction * push / length, 1.0)
+        return there - here, bool(missing > -self.skin) and self.is_out
+
+    def move(self, x: Floats, push: Floats) -> None:
+        x[self.cv - 1] += push * self.weights[0]
+        x[self.cv] += push * self.weights[1]
 
     def absorb(self, x: Floats, previous: Floats) -> None:
         """Take away the speed that pushing out has made."""
         if self.push > 0.0:
-            away = float(self.normal @ (x[self.cv] - self.origin))
-            previous[self.cv] += self.normal * max(away, 0.0)
+            away = float(self.normal @ (self.point(x) - self.origin))
+            self.move(previous, self.normal * max(away, 0.0))
 
 
-def push_out(planes: list[Plane], x: Floats, friction: float) -> dict[int, Floats]:
-    """Bring all CVs back, one after the other; the normals of those that touch."""
-    return {plane.cv: plane.normal for plane in planes if plane.push_out(x, friction)}
+def push_out(planes: list[list[Plane]], x: Floats, friction: float) -> dict[int, Floats]:
+    """Bring all CVs back to their planes; the normals of those that touch.
+
+    Args:
+        planes: those of each collider's CVs, then those of each collider's segments. What is in one
+            list starts from the same x.
+    """
+    of_cvs: dict[int, Floats] = {}
+    of_segments: dict[int, Floats] = {}
+    for group in planes:
+        found = [(plane, *plane.push_of(x, friction)) for plane in group]
+        uppers: dict[int, Floats] = {}
+        lowers: dict[int, Floats] = {}
+        for plane, push, touches in found:
+            plane.move(x, push)
+            if plane.along == 1.0:
+                if touches:
+                    of_cvs[plane.cv] = plane.normal
+            elif touches and plane.push > 0.0:
+                uppers[plane.cv] = plane.normal
+                if plane.weights[0] > 0.0:
+                    lowers[plane.cv - 1] = plane.normal
+        of_segments |= uppers | lowers
+    return of_segments | of_cvs
+
+
+def is_deep(planes: list[list[Plane]], x: Floats) -> bool:
+    """Whether any is farther below its plane than it may be."""
+    return any(plane.gap(x) > plane.slack for group in planes for plane in group)
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A collider in one substep."""
+
+    posed: PosedCollider
+    before: Floats
+    now: Floats
+    inverse: Floats
+    inverse_before: Floats
+    seen: float  # [m^2], squared length of ways that need not be followed
+
+    @classmethod
+    def of(cls, posed: PosedCollider, moment: Moment, size: float) -> Solid | None:
+        """None: it is flat."""
+        before, now = posed.matrix_at(moment.begin), posed.matrix_at(moment.end)
+        if np.linalg.cond(now[:3, :3]) >= 1.0 / FLAT:
+            return None
+        begin = now if np.linalg.cond(before[:3, :3]) >= 1.0 / FLAT else before
+        scale = float(np.linalg.svd(now[:3, :3], compute_uv=False)[-1])
+        seen = short_squared(posed.collider.curve_radius * scale, size)
+        return cls(posed, before, now, np.linalg.inv(now), np.linalg.inv(begin), seen)
+
+    def local(self, x: Floats) -> Floats:
+        result: Floats = (self.inverse @ np.append(x, 1.0))[:3]
+        return result
+
+    def origin(self, x: Floats, previous: Floats) -> Floats:
+        """Where it would be had it stayed with the collider."""
+        result: Floats = previous + ((self.now - self.before) @ np.append(self.local(x), 1.0))[:3]
+        return result
+
+    def at(self, local: Floats) -> tuple[float, Floats]:
+        """Distance and normal in the world."""
+        found, gradient = self.posed.collider.distance(local[:, None])
+        outward = self.inverse[:3, :3].T @ gradient[:, 0]
+        steepness = float(np.linalg.norm(outward))
+        return float(found[0]) / steepness, outward / steepness
+
+    def followed(self, x: Floats, previous: Floats, radius: float) -> tuple[Floats, float, float]:
+        """Normal and normal . x of the surface that its way meets, and its distance before."""
+        begin = (self.inverse_before @ np.append(previous, 1.0))[:3]
+        path = self.local(x) - begin
+        first, _ = self.at(begin)
+        place = self._met(begin, path, first, min(radius, first)) if first > 0.0 else 0.0
+        local = begin + path * place
+        distance, normal = self.at(local)
+        there = (self.now @ np.append(local, 1.0))[:3]
+        return normal, float(normal @ there) - distance, first
+
+    def _met(self, begin: Floats, path: Floats, first: float, target: float) -> float:
+        """Fraction of the way where it is no farther than the target; 1: nowhere."""
+        scale = float(np.linalg.svd(self.now[:3, :3], compute_uv=False)[-1])
+        length = float(np.linalg.norm(path)) * scale
+        gone, distance = 0.0, first
+        for _ in range(TRACE_STEPS):
+            step = max(distance - target, length / TRACE_STEPS)
+            if gone + step >= length:
+                return 1.0
+            local = begin + path * ((gone + step) / length)
+            found = float(self.posed.collider.distance(local[:, None])[0][0]) * scale
+            if found < target:
+                return (gone + step * (distance - target) / (distance - found)) / length
+            gone, distance = gone + step, found
+        return 1.0
 
 
 def planes_of(
     posed: PosedCollider,
     x: Floats,
     previous: Floats,
+    held: list[bool],
     settings: DynamicsSettings,
     moment: Moment,
     size: float,
-) -> list[Plane]:
-    """Planes for all CVs of x (cv_count, 3) near a collider; `size` [m] is the hair's."""
-    planes: list[Plane] = []
-    before, now = posed.matrix_at(moment.begin), posed.matrix_at(moment.end)
-    if np.linalg.cond(now[:3, :3]) >= 1.0 / FLAT:
-        return planes
-    inverse = np.linalg.inv(now)
-    for cv in range(PINNED, len(x)):
+) -> tuple[list[Plane], list[Plane]]:
+    """Planes for the CVs of x (cv_count, 3) near a collider, and for segments; `size` [m] is the
+    hair's."""
+    solid = Solid.of(posed, moment, size)
+    if solid is None:
+        return [], []
+    free = [cv for cv in range(PINNED, len(x)) if not held[cv]]
+    led_out = settings.depenetration_speed * size * moment.dt + posed.swelling
+    is_sharp = (size / (len(x) - 1)) ** 2 > solid.seen
+    of_cvs, of_segments = [], []
+    for cv in free:
         along = cv / (len(x) - 1)
         radius = size * (settings.radius_root * (1.0 - along) + settings.radius_tip * along)
-        local = inverse @ np.append(x[cv], 1.0)
-        found, gradient = posed.collider.distance(local[:3, None])
-        outward = inverse[:3, :3].T @ gradient[:, 0]
-        steepness = float(np.linalg.norm(outward))
-        normal, distance = outward / steepness, float(found[0]) / steepness
-        if distance >= radius + REACH * size:
-            continue
-        origin = previous[cv] + ((now - before) @ local)[:3]
-        was = distance - normal @ (x[cv] - origin)
-        reached = was + settings.depenetration_speed * size * moment.dt
-        offset = float(normal @ x[cv]) - distance + min(radius, reached)
-        planes.append(Plane(cv, normal, offset, origin, reached >= radius, SKIN * size))
-    return planes
+        plane = _plane_of_cv(solid, cv, x, previous, radius, led_out, size, is_sharp)
+        if plane is not None:
+            of_cvs.append(plane)
+        if is_sharp:
+            is_loose = cv > PINNED and not held[cv - 1]
+            plane = _plane_between(solid, cv, x, previous, radius, led_out, size, is_loose)
+            if plane is not None:
+                of_segments.append(plane)
+    return of_cvs, of_segments
+
+
+def _plane_of_cv(
+    solid: Solid,
+    cv: int,
+    x: Floats,
+    previous: Floats,
+    radius: float,
+    led_out: float,
+    size: float,
+    is_sharp: bool,
+) -> Plane | None:
+    distance, normal = solid.at(solid.local(x[cv]))
+    origin = solid.origin(x[cv], previous[cv])
+    path = x[cv] - origin
+    beyond = float(np.linalg.norm(path)) if is_sharp else 0.0
+    if distance >= radius + REACH * size + beyond:
+        return None
+    surface, was = float(normal @ x[cv]) - distance, distance - float(normal @ path)
+    if path @ path > solid.seen:
+        normal, surface, was = solid.followed(x[cv], previous[cv], radius)
+    reached = was + led_out
+    offset = surface + min(radius, reached)
+    if is_sharp and offset - normal @ x[cv] <= -REACH * size:
+        return None
+    slack = max(radius * float(MAY_MISS), 2.0 * SKIN * size) if reached >= radius else np.inf
+    return Plane(cv, normal, offset, origin, reached >= radius, SKIN * size, slack)
+
+
+def _plane_between(
+    solid: Solid,
+    cv: int,
+    x: Floats,
+    previous: Floats,
+    radius: float,
+    led_out: float,
+    size: float,
+    is_loose: bool,
+) -> Plane | None:
+    """Of the points of the segment that ends at a CV the deepest one's.
+
+    is_loose: whether the CV before is free too.
+    """
+    deepest: Plane | None = None
+    wanted = radius * float(BETWEEN_RADIUS)
+    for along in BETWEEN:
+        here, before = (rows[cv - 1] + (rows[cv] - rows[cv - 1]) * along for rows in (x, previous))
+        normal, surface, was = solid.followed(here, before, radius)
+        offset = surface + min(wanted, was + led_out)
+        lower = (1.0 - along) * is_loose
+        scale = lower * lower + along * along
+        weights = lower / scale, min(along / scale, float(MAX_WEIGHT))
+        is_out = was + led_out >= wanted
+        slack = max(wanted * float(MAY_MISS), 2.0 * SKIN * size) if is_out else np.inf
+        origin = solid.origin(here, before)
+        plane = Plane(cv, normal, offset, origin, is_out, SKIN * size, slack, along, weights)
+        if deepest is None or plane.gap(x) > deepest.gap(x):
+            deepest = plane
+    return deepest if deepest is not None and deepest.gap(x) > -REACH * size else None

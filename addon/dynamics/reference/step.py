@@ -15,12 +15,13 @@ import numpy as np
 from ...arrays import Floats
 from ...params.curve import along as curve_along
 from ..constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED, ROUNDING
+from ..contacts import MORE_ROUNDS
 from ..settings import DynamicsSettings
 from ..state import DynamicsState
 from ..step import Drive
 from ..turn import best_rotation
 from ..wind import air_of
-from .contacts import Moment, planes_of, push_out
+from .contacts import Moment, Plane, is_deep, planes_of, push_out
 from .shape import frames, hold, jacobian_of
 
 
@@ -88,19 +89,29 @@ class _Guide:
         self._restore_style(style, settings, moment.dt)
         self._pin(style)
         self._keep_lengths({}, settings)
-        planes = [
-            plane
+        found = [
+            planes_of(posed, self.x, self.previous, self.held, settings, moment, self.size)
             for posed in drive.colliders
-            for plane in planes_of(posed, self.x, self.previous, settings, moment, self.size)
         ]
+        planes = [of_cvs for of_cvs, _ in found] + [of_segments for _, of_segments in found]
+        self._solve_in_turn(planes, settings, settings.contact_passes if drive.colliders else 0)
+        for _ in range(MORE_ROUNDS):
+            if not is_deep(planes, self.x):
+                break
+            self._solve_in_turn(planes, settings, 1)
+        for group in planes:
+            for plane in group:
+                plane.absorb(self.x, self.previous)
+
+    def _solve_in_turn(
+        self, planes: list[list[Plane]], settings: DynamicsSettings, passes: int
+    ) -> None:
         normals: dict[int, Floats] = {}
-        for _ in range(settings.contact_passes if drive.colliders else 0):
+        for _ in range(passes):
             normals = push_out(planes, self.x, settings.friction)
             self._keep_lengths(normals, settings)
         if settings.length_solver == "direct":
             self._finish_lengths(normals, settings)
-        for plane in planes:
-            plane.absorb(self.x, self.previous)
 
     def _style_at(self, fraction: float) -> Floats:
         return (

@@ -87,6 +87,42 @@ def test_a_moving_ball_sweeps_hair_along(kit):
     assert farthest > 0.1
 
 
+@pytest.mark.parametrize("kind", ["finger", "plate"])
+def test_nothing_thin_passes_between_two_points(kit, kind):
+    """It goes through hanging hair at 2 m/s, a width of its own in each substep.
+
+    A sharp edge over which hair is drawn enters a segment by up to 2 mm.
+    """
+    settings = DynamicsSettings()
+    finger = CapsuleCollider((-0.1, 0.0, 0.0), (0.1, 0.0, 0.0), 0.008)
+    box = kit.box((0.2, 0.01, 0.12))
+    thin = finger if kind == "finger" else DistanceField.from_surface(box, settings)
+    height = 0.0 if kind == "finger" else 0.05
+    grid = kit.straight(5, 16, 0.25) - np.float32([0.02, 0.0, 0.0])
+    state, behind = start(grid), 0
+    for step in range(22):
+        ways = [kit.translation(0.0, -0.1 + k * 2.0 / 180.0, -0.13) for k in (step, step + 1)]
+        posed = (PosedCollider(thin, *ways),)
+        state = advance(state, Drive(grid, grid, posed, kit.EARTH), settings, 1.0 / 180.0)
+        points = kit.moved(np.linalg.inv(ways[1]), between(state.grid))
+        if kind == "finger":
+            depth = 0.008 - np.linalg.norm(points[..., 1:], axis=-1)
+        else:
+            depth = (np.array([0.1, 0.005, 0.06]) - np.abs(points)).min(axis=-1)
+        assert depth.max() < (5e-4 if kind == "finger" else 2.5e-3)
+        level = np.abs(points[..., 2]) <= height + 0.004
+        behind = max(behind, int((level & (points[..., 1] < -0.004)).sum()))
+    assert state.grid[:, 8, 1].min() > 0.05, "it was swept along"
+    assert not behind
+
+
+def between(grid):
+    """Points of all free segments, (guides, n, 3)."""
+    share = np.linspace(0.0, 1.0, 6)[:, None]
+    points = grid[:, 1:-1, None] * (1.0 - share) + grid[:, 2:, None] * share
+    return points.reshape(len(grid), -1, 3)
+
+
 def test_hair_that_starts_inside_is_led_out(kit):
     """It comes out within a second and never gets faster than a fall."""
     settings = DynamicsSettings()
@@ -248,7 +284,9 @@ def test_of_two_colliders_that_touch_a_cv_the_last_one_counts():
         count = len(index)
         normal = np.repeat(np.float32(way)[:, None], count, axis=1)
         rows, zero = np.zeros((3, count), np.float32), np.zeros(count, np.float32)
-        return Contacts(np.array(index), normal, zero, rows, zero == 0.0, np.float32(0.0), zero)
+        return Contacts(
+            np.array(index), normal, zero, rows, zero == 0.0, np.float32(0.0), zero, zero
+        )
 
     both = [contacts([2, 5, 7], (1, 0, 0)), contacts([1, 5, 7, 9], (0, 1, 0))]
     found = touched_by(both, [np.array([1, 1, 0], bool), np.array([0, 1, 1, 1], bool)])

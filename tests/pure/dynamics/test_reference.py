@@ -1,5 +1,7 @@
 """The fast step against the slow one: two solvers that share next to nothing must agree."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tiers import few_in_commits
@@ -13,6 +15,7 @@ from hairloom.addon.dynamics.colliders import (
 from hairloom.addon.dynamics.measure import deepest_penetration
 from hairloom.addon.dynamics.reference.step import advance_slowly
 from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import advance
 
 #: [m] in 0.4 s of float32 against float64: limp strands enlarge what rounding starts about
@@ -153,6 +156,35 @@ def test_with_a_sphere_set_and_a_capsule(kit, shake, collider, bowed):
     assert np.abs(fast[-1].position - alone[-1].position).max() > 5e-3
     for one, other in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one.position, other.position, atol=TOUCHING)
+
+
+@pytest.mark.parametrize("is_mesh", few_in_commits([True, False]))
+def test_segments_at_what_is_thin_and_fast(kit, is_mesh):
+    """It goes twice its own thickness in a substep; all find the same places on the segments."""
+    settings = DynamicsSettings(**kit.LIMP | TIGHT | {"damping": 1.0, "collider_resolution": 24})
+    thin = CapsuleCollider((-0.1, 0.0, 0.0), (0.1, 0.0, 0.0), 0.006)
+    if is_mesh:
+        thin = DistanceField.from_surface(kit.box((0.2, 0.012, 0.06)), settings)
+    grid = kit.straight(4, 9, 0.25)
+
+    def motion(time):
+        return kit.translation(0.02, -0.05 + 2.2 * time, -0.14) @ kit.rotation(0, 3.0 * time)
+
+    moving = [
+        kit.Scene(grid, settings, motion, on_head=(thin,), advance=how)
+        for how in (advance, advance_slowly)
+    ]
+    states = [start(grid) for _ in moving]
+    still = kit.Scene(grid, settings)
+    for frame in range(4):
+        times = frame / 60.0, (frame + 1) / 60.0
+        drive = replace(still.drive(*times), colliders=moving[0].colliders(*times))
+        states = [
+            scene.advance(state, drive, settings, 1.0 / 60.0)
+            for scene, state in zip(moving, states, strict=True)
+        ]
+        np.testing.assert_allclose(states[0].position, states[1].position, atol=TOUCHING)
+    assert np.abs(states[0].position - start(grid).position).max() > 0.02
 
 
 def test_no_guides(kit, shake):
