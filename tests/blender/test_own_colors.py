@@ -62,6 +62,27 @@ def test_a_bake_keeps_the_colours(hair: Any, evaluated: Callable[[], Any]) -> No
     np.testing.assert_array_equal(found.strands.color, rig.strands.color)
 
 
+def test_a_bake_keeps_points_by_need(hair: Any, evaluated: Callable[[], Any]) -> None:
+    rig = previews.start(hair, evaluated()).rig
+    strands = rig.strands
+    kept = np.arange(strands.point_count) % 16 % 5 == 0
+    kept[: strands.point_count // 2] = True
+    offsets = np.concatenate([[0], np.cumsum(kept)])[strands.offsets]
+    color = None if strands.color is None else strands.color[kept]
+    uneven = replace(
+        strands,
+        points=strands.points[kept],
+        offsets=offsets,
+        radius=strands.radius[kept],
+        color=color,
+    )
+    assert not uneven.is_uniform
+    arrays = rig_arrays(replace(rig, strands=uneven), RestMatrices(np.eye(4), np.eye(4)))
+    found = rig_of(arrays, "here").rig.strands
+    for name in ("points", "offsets", "radius", "color"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(uneven, name))
+
+
 @pytest.mark.draws
 @pytest.mark.slow
 def test_cards_have_the_colours_of_their_strands(hair: Any, evaluated: Callable[[], Any]) -> None:

@@ -155,3 +155,15 @@ def test_points_touch_the_frame_and_stay_within(aspect: float) -> None:
     assert max(high) == pytest.approx(1.0) and min(low) == pytest.approx(-1.0)
     fills = int(np.argmax(high - low))
     assert low[fills] == pytest.approx(-1.0) and high[fills] == pytest.approx(1.0)
+
+
+def test_strands_of_few_points_say_as_much_as_of_many() -> None:
+    strands, body = head()
+    count, cv_count = strands.shape[:2]
+    counts = np.where(np.arange(count) % 2, 2, cv_count)
+    pairs = zip(strands, counts, strict=True)
+    kept = np.concatenate([grid[[0, -1]] if few == 2 else grid for grid, few in pairs])
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    hair = StrandSet(kept, offsets, np.ones(len(kept)), np.zeros(count))
+    expected = side_of(strands, body)
+    assert np.abs(good_side(hair, body).three_quarter - expected.three_quarter).max() < 0.1
