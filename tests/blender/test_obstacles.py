@@ -262,7 +262,9 @@ def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
         now = read_surface(body, depsgraph(), need_uv=False, place="Body").positions
         now = now[np.abs(now[:, 2]) > 0.2]  # the middle folds
         distance, _ = signed_distance(now, [posed])
-        assert np.abs(distance).max() < 0.5 * posed.collider.cell
+        cell = posed.collider.cell
+        assert np.median(np.abs(distance)) < 0.05 * cell
+        assert np.abs(distance).max() < 0.75 * cell  # at the rims of its ends
         return posed
 
     by_roots = place(roots)

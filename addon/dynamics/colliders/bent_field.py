@@ -28,6 +28,8 @@ BAND = 1.5
 MOVED = 0.05
 #: How much larger than at rest the grid may become to either side, in its longest sides.
 LARGEST = 1
+#: A triangle is a sliver when its height is less than this fraction of its longest edge.
+SLIVER = 1.0e-3
 #: Pairs of triangles and nodes measured at once.
 _PAIRS = 1 << 18
 #: Of two triangles as near, the one counts that a node faces more: what an angle costs, as a
@@ -164,12 +166,14 @@ class _Triangles:
         rows = np.ascontiguousarray(corners.transpose(1, 2, 0), np.float32)
         self._corner = rows
         self._edge = np.roll(rows, -1, axis=0) - rows
-        normal = cross_rows(self._edge[0], self._edge[1])
-        normal /= np.maximum(np.sqrt(dot_rows(normal, normal)), np.float32(1.0e-20))
-        self._normal = normal
-        self._has_area = dot_rows(normal, normal) > 0.5
-        self._across = np.stack([cross_rows(normal, edge) for edge in self._edge])  # inwards
         lengths = np.stack([dot_rows(edge, edge) for edge in self._edge])
+        normal = cross_rows(self._edge[0], self._edge[1])
+        area = np.sqrt(dot_rows(normal, normal))
+        # rounding alone says which way a sliver faces: its neighbours decide
+        self._has_area = area > np.float32(SLIVER) * lengths.max(axis=0)
+        normal *= self._has_area / np.maximum(area, np.float32(1.0e-20))
+        self._normal = normal
+        self._across = np.stack([cross_rows(normal, edge) for edge in self._edge])  # inwards
         self._over_length = np.float32(1.0) / np.maximum(lengths, np.float32(1.0e-20))
 
     def heights(self, points: Floats, triangle: Ints) -> Floats:
