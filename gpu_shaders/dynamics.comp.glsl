@@ -2,7 +2,7 @@
 //
 // Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION;
 // HAS_HELD; HAS_AIR; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
-// kinds of colliders; HAS_SHARP, where segments collide too.
+// kinds of colliders; HAS_SHARP and HAS_FOLLOWED, see lib_contacts.glsl.
 //
 // Loops of an unknown number of turns ask at their end: drivers on CPUs go once more through the
 // body of one that asks at its begin, with nothing to do.

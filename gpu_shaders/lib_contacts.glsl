@@ -1,8 +1,8 @@
 // Contacts: found once in a substep, solved as planes each time lengths and contacts alternate.
 //
 // Twin of addon/dynamics/contacts.py, over the globals of lib_guide.glsl; see there. Defines:
-// CONTACT_SLOTS, how many contacts a CV may have at once; HAS_SHARP, where segments collide too. Needs
-// the block `frame`, and `moments`.
+// CONTACT_SLOTS, how many contacts a CV may have at once; HAS_SHARP, where segments collide too;
+// HAS_FOLLOWED, there and where colliders are fast. Needs the block `frame`, and `moments`.
 #include "lib_lengths.glsl"
 #include "lib_collider.glsl"
 
@@ -48,7 +48,9 @@ Posed posed_at(int substep, int collider)
   for (int row = 0; row < 3; row++) {
     posed.inverse[row] = moment_texel(substep, collider, row);
     posed.change[row] = moment_texel(substep, collider, 3 + row);
+#ifdef HAS_FOLLOWED
     posed.inverse_before[row] = moment_texel(substep, collider, 9 + row);
+#endif
   }
   posed.own = moment_texel(substep, collider, 6);
   posed.low_cell = moment_texel(substep, collider, 7);
@@ -72,6 +74,7 @@ vec4 world_normal(Posed posed, vec3 gradient)
   return vec4(normal * unscaled, unscaled);
 }
 
+#ifdef HAS_FOLLOWED
 struct Met {
   vec3 normal;    // of the surface where the way meets it, or where the way ends
   float surface;  // [m] normal . x of the surface there
@@ -118,6 +121,7 @@ Met followed(Posed posed, vec3 here, vec3 before, float reach)
   float ahead = (dot(found.gradient, point - local) - found.distance) * normal.w;
   return Met(normal.xyz, dot(normal.xyz, here) + ahead, was);
 }
+#endif
 
 // The next collider, from this one on, that is near the guide's bounding sphere; else their number.
 int next_near(int collider, int substep, float guide_radius)
@@ -216,6 +220,7 @@ void find_contacts_with(Posed posed)
     beyond += posed.sweep.y > 0.0 ? length(path) : 0.0;
 #endif
     if (away < radius[i] + beyond) {
+#ifdef HAS_FOLLOWED
       if (dot(path, path) > posed.sweep.x) {
         Met met = followed(posed, position[i + 2], previous[i + 2], radius[i]);
         normal = met.normal;
@@ -223,6 +228,7 @@ void find_contacts_with(Posed posed)
         was = met.was;
         height = dot(normal, position[i + 2]);
       }
+#endif
       float reached = was + frame.led_out + posed.sweep.w;
       float offset = surface + min(radius[i], reached);
       if (posed.sweep.y <= 0.0 || offset - height > -frame.reach) {

@@ -271,6 +271,12 @@ def is_sharp(pose: Pose, spacing: float, size: float) -> bool:
     return spacing * spacing > short_squared(pose.collider.curve_radius * pose.scale, size)
 
 
+def is_followed(travel: float, limit: float, sharp: bool) -> bool:
+    """Whether paths of points are followed: where segments collide, and where the collider itself
+    goes farther in the substep, `travel` [m], than a path that need not be (limit [m^2])."""
+    return sharp or travel * travel > limit
+
+
 def short_squared(curve_radius: float, size: float) -> float:
     """The squared length [m^2] of ways that need not be followed at curves of a radius [m]."""
     return 8.0 * curve_radius * UNSEEN * size
@@ -342,10 +348,10 @@ def _contacts_with(
     reached = distance - dot_rows(normal, path)
     height = dot_rows(normal, here)
     height -= distance
-    limit = np.float32(short_squared(pose.collider.curve_radius * pose.scale, size))
-    long = (dot_rows(path, path) > limit).nonzero()[0]
     own_radius = radius.take(index)
-    if long.size:
+    limit = short_squared(pose.collider.curve_radius * pose.scale, size)
+    if is_followed(pose.travel, limit, sharp):
+        long = (dot_rows(path, path) > np.float32(limit)).nonzero()[0]
         some = _followed(pose, chosen(before, long), chosen(local, long), own_radius.take(long))
         normal[:, long], height[long], reached[long] = some
     reached += np.float32(led_out + pose.swelling)

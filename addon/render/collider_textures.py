@@ -22,11 +22,14 @@ from ..dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
-from ..dynamics.colliders.posed import FLAT
+from ..dynamics.colliders.posed import inverse_or, travels
 from ..dynamics.contacts import short_squared, spacing_of
 from ..errors import HairloomError
 from .shader_source import COLLIDER_TEXELS, FIELD_ROW, ROUNDS_ACROSS, STRAND_ROWS
 from .textures import texture_from
+
+#: The squared length of paths that need not be followed where none need be.
+NOT_FOLLOWED = 1.0e30
 
 
 @dataclass(frozen=True)
@@ -117,19 +120,18 @@ class ColliderTextures:
             stretch = np.sqrt(np.einsum("nij,nij->n", turned, turned))  # no less than the largest
             center, radius = self.bounds[place]
             table[:, place, 8, :3] = turned @ center + now[:, :3, 3]
-            change = now - before
-            travel = np.linalg.norm(change[:, :3, :3] @ center + change[:, :3, 3], axis=1)
-            travel += radius * np.sqrt(
-                np.einsum("nij,nij->n", change[:, :3, :3], change[:, :3, :3])
-            )
+            travel = travels(now - before, center, radius)
             table[:, place, 8, 3] = radius * stretch + reach + travel
             scales = np.linalg.svd(now[:, :3, :3], compute_uv=False)
-            is_flat = np.linalg.cond(before[:, :3, :3]) >= 1.0 / FLAT
-            before[is_flat] = now[is_flat]
-            table[:, place, 9:12] = np.linalg.inv(before)[:, :3]
-            seen = scales[:, -1] * short_squared(one.collider.curve_radius, size)
-            table[:, place, 12, 0] = seen
-            table[:, place, 12, 1] = spacing_of(size, cv_count) ** 2 > seen
+            table[:, place, 9:12] = [
+                inverse_or(*pair)[:3] for pair in zip(before, now, strict=True)
+            ]
+            limit = scales[:, -1] * short_squared(one.collider.curve_radius, size)
+            sharp = spacing_of(size, cv_count) ** 2 > limit
+            table[:, place, 12, 0] = np.where(
+                sharp | (travel * travel > limit), limit, NOT_FOLLOWED
+            )
+            table[:, place, 12, 1] = sharp
             table[:, place, 12, 2] = scales[:, -1]
             table[:, place, 12, 3] = one.swelling
         return table.reshape(len(spans), -1, 4)

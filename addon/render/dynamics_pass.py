@@ -38,7 +38,7 @@ from ..dynamics.schedule import due_substeps
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.state import DynamicsState, Rest, as_rows
 from ..dynamics.step import displacement_beside_root
-from .collider_textures import ColliderTextures
+from .collider_textures import NOT_FOLLOWED, ColliderTextures
 from .dynamics_block import block_of, moments_of, spans_of
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .strand_layout import from_strand_rows, strand_rows
@@ -77,6 +77,7 @@ def dynamics_recipe(
     collider_count: int = 0,
     rounds: bool = False,
     fields: bool = False,
+    followed: bool = False,
     sharp: bool = False,
 ) -> ShaderRecipe:
     """The program for guides of this many CVs, without what the scene does not need."""
@@ -86,6 +87,7 @@ def dynamics_recipe(
         "HAS_AIR": air,
         "HAS_ROUNDS": rounds,
         "HAS_FIELDS": fields,
+        "HAS_FOLLOWED": followed and cv_count > PINNED,
         "HAS_SHARP": sharp and cv_count > PINNED,
     }
     textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
@@ -206,12 +208,13 @@ class DynamicsPass:
         colliders, settings, state = self._colliders, frame.settings, self._state
         assert colliders is not None
         posed = frame.drive.colliders
-        spans, is_sharp = spans_of(frame, first, count), False
+        spans, is_followed, is_sharp = spans_of(frame, first, count), False, False
         table = moments_of(frame, first, spans)
         if posed:
             reach = (REACH + max(settings.radius_root, settings.radius_tip)) * frame.size
             poses = colliders.moments(posed, spans, reach, frame.size, state.cv_count)
-            is_sharp = bool(poses.reshape(len(spans), len(posed), -1, 4)[:, :, 12, 1].any())
+            limit, sharp = poses.reshape(len(spans), len(posed), -1, 4)[:, :, 12, :2].T
+            is_followed, is_sharp = bool((limit < NOT_FOLLOWED).any()), bool(sharp.any())
             table = np.concatenate([table, poses], axis=1)
         textures = {**self._textures, "moments": texture_from(table, "RGBA32F")}
         textures |= {"rounds": colliders.rounds, "fields": colliders.fields}
@@ -223,6 +226,7 @@ class DynamicsPass:
             collider_count=len(posed),
             rounds=colliders.rounds is not None,
             fields=colliders.fields is not None,
+            followed=is_followed,
             sharp=is_sharp,
         )
         block = block_of(frame, state.guide_count, state.cv_count, count, speed_ratio)

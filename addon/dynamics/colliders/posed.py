@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -84,15 +85,13 @@ class PosedCollider:
         moments: Any = np.array(spans).T[..., None, None]  # in matrix_at an array does for a number
         before, now = self.matrix_at(moments)
         center, radius = self.collider.bounds
-        flat_before = np.linalg.cond(before[:, :3, :3]) >= 1.0 / FLAT
         centers = (now[:, :3, :3] @ center + now[:, :3, 3]).astype(np.float32)
         scales = np.linalg.svd(now[:, :3, :3], compute_uv=False)
         is_flat = scales[:, -1] <= FLAT * scales[:, 0]
         displacements = (now - before).astype(np.float32)
         now[is_flat] = np.eye(4)
-        before[flat_before] = now[flat_before]
-        inverses, inverses_before = (np.linalg.inv(one).astype(np.float32) for one in (now, before))
-        matrices = now.astype(np.float32)
+        inverses = np.linalg.inv(now).astype(np.float32)
+        travel = travels(now - before, center, radius)
         return [
             None
             if is_flat[i]
@@ -103,8 +102,9 @@ class PosedCollider:
                 centers[i],
                 radius * largest,
                 smallest,
-                matrices[i],
-                inverses_before[i],
+                float(travel[i]),
+                now[i],
+                before[i],
                 self.swelling,
             )
             for i, (largest, _, smallest) in enumerate(scales.tolist())
@@ -119,8 +119,8 @@ class Pose:
         added to the matrix from object to world.
     center: (3,) float32 world [m]. radius: [m], of a sphere around it.
     scale: the smallest of the matrix along any axis.
-    matrix: (4, 4) float32, object to world.
-    inverse_before: (4, 4) float32, world to object at the substep's begin.
+    travel: [m], no point of it goes farther in the substep.
+    matrix, matrix_before: (4, 4) float64, object to world at the substep's end and begin.
     swelling: see `PosedCollider`.
     """
 
@@ -130,9 +130,31 @@ class Pose:
     center: Floats
     radius: float
     scale: float
+    travel: float
     matrix: Floats
-    inverse_before: Floats
+    matrix_before: Floats
     swelling: float = 0.0
+
+    @cached_property
+    def inverse_before(self) -> Floats:
+        """(4, 4) float32, world to object at the substep's begin, or at its end if it was flat."""
+        return inverse_or(self.matrix_before, self.matrix).astype(np.float32)
+
+
+def travels(displacement: Floats, center: Floats, radius: float) -> Floats:
+    """How far [m] any point of a ball goes at most, by changes of a matrix (n, 4, 4)."""
+    linear = displacement[:, :3, :3]
+    shift = linear @ center + displacement[:, :3, 3]
+    turn = np.sqrt(np.einsum("nij,nij->n", linear, linear))
+    result: Floats = np.sqrt(np.einsum("ni,ni->n", shift, shift)) + radius * turn
+    return result
+
+
+def inverse_or(matrix: Floats, other: Floats) -> Floats:
+    """The inverse of a matrix (4, 4), or of the other one where it is flat."""
+    scales = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    result: Floats = np.linalg.inv(other if scales[-1] <= FLAT * scales[0] else matrix)
+    return result
 
 
 def poses_through(

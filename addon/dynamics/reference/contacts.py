@@ -123,7 +123,8 @@ class Solid:
     now: Floats
     inverse: Floats
     inverse_before: Floats
-    seen: float  # [m^2], squared length of ways that need not be followed
+    seen: float  # [m^2], squared length of paths that need not be followed
+    travel: float  # [m], no point of it goes farther
 
     @classmethod
     def of(cls, posed: PosedCollider, moment: Moment, size: float) -> Solid | None:
@@ -134,7 +135,10 @@ class Solid:
         begin = now if np.linalg.cond(before[:3, :3]) >= 1.0 / FLAT else before
         scale = float(np.linalg.svd(now[:3, :3], compute_uv=False)[-1])
         seen = short_squared(posed.collider.curve_radius * scale, size)
-        return cls(posed, before, now, np.linalg.inv(now), np.linalg.inv(begin), seen)
+        change, (center, reach) = now - before, posed.collider.bounds
+        travel = float(np.linalg.norm(change[:3, :3] @ center + change[:3, 3]))
+        travel += reach * float(np.linalg.norm(change[:3, :3]))
+        return cls(posed, before, now, np.linalg.inv(now), np.linalg.inv(begin), seen, travel)
 
     def local(self, x: Floats) -> Floats:
         result: Floats = (self.inverse @ np.append(x, 1.0))[:3]
@@ -229,7 +233,7 @@ def _plane_of_cv(
     if distance >= radius + REACH * size + beyond:
         return None
     surface, was = float(normal @ x[cv]) - distance, distance - float(normal @ path)
-    if path @ path > solid.seen:
+    if (is_sharp or solid.travel**2 > solid.seen) and path @ path > solid.seen:
         normal, surface, was = solid.followed(x[cv], previous[cv], radius)
     reached = was + led_out
     offset = surface + min(radius, reached)
