@@ -35,11 +35,15 @@ from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
 from .strands import StrandSet, Surface
+from .strands.center_lines import center_lines
 from .strands.face import is_face_hair
 from .strands.join import joined
+from .strands.needed_points import with_needed_points
 from .strands.resample import resample
 
 NO_WIND = np.zeros(3)
+#: Points that children are mixed from, of all of them together, and of each one at least.
+CHILD_POINTS, FEWEST_CHILD_POINTS = 12_000_000, 16
 
 
 @dataclass(frozen=True)
@@ -58,11 +62,11 @@ class Pose:
 
 @dataclass(frozen=True)
 class Rig:
-    """A groom made ready to move: all strands at one CV count, their guides and weights.
+    """A groom made ready to move: all strands, their guides and weights.
 
-    strands: uniform, world space at rest; bound when there is a head.
+    strands: as many points as each needs, world space at rest; bound when there is a head.
     guides: (guide_count,) indices of the strands that are simulated.
-    guide_grid: (guide_count, cv_count, 3) [m], the lines that are simulated in their place.
+    guide_grid: (guide_count, cv_count, 3) [m], their centre lines, which are simulated.
     rest_frames: of all strands, or None without a head.
     notes: what the artist should know, each with its remedy.
     own_count: how many strands, the first ones, are the artist's own; children follow in the order
@@ -86,8 +90,11 @@ class Rig:
 
     @cached_property
     def guide_holds(self) -> Holds | None:
-        """The same of the guides alone, numbered as these."""
-        return None if self.holds is None else self.holds.of(self.guides)
+        """The same of the guides alone, numbered as these, along their centre lines."""
+        if self.holds is None:
+            return None
+        own, cv_count = self.holds.of(self.guides), self.guide_grid.shape[1]
+        return own.on_lines(self.strands.take(self.guides), cv_count)
 
     @property
     def child_count(self) -> int:
@@ -96,7 +103,7 @@ class Rig:
 
     @cached_property
     def riders(self) -> Riders:
-        return Riders.of(self.strands.points, self.strands.offsets, self.guide_grid, self.weights)
+        return Riders.of(self.strands, self.guide_grid, self.weights)
 
     @property
     def rest_pose(self) -> Pose:
@@ -167,14 +174,15 @@ def prepare(
             "it has no strands that can be used", place=place, remedy="Choose hair that has strands"
         )
     bound = strands if head is None else bind_roots(strands, head, place=place).strands
-    uniform = resample(bound, settings.cv_count)
-    reach = settings.tip_distance * _hair_length(uniform) if holders else 0.0
-    holds = find_holds(uniform, holders, reach)
-    kind = None if holds is None else holds.kinds(uniform.strand_count)
-    guides = choose_guides(uniform, settings, kind)
-    weights = _weights(uniform, uniform.take(guides), kind, None if kind is None else kind[guides])
-    grid = uniform.grid[guides]
-    rig = Rig(uniform, head, guides, grid, weights, _frames(uniform, head))
+    own = with_needed_points(bound, settings.cv_count)
+    lines = center_lines(bound, settings.cv_count)
+    reach = settings.tip_distance * _hair_length(own) if holders else 0.0
+    holds = find_holds(own, holders, reach)
+    kind = None if holds is None else holds.kinds(own.strand_count)
+    guides = choose_guides(lines, settings, kind)
+    guide_lines = lines.take(guides)
+    weights = _weights(lines, guide_lines, kind, None if kind is None else kind[guides])
+    rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head))
     if children is not None and children.method == "auto":
         rig = _automatic(rig, children, density, widths, place)
     else:
@@ -255,12 +263,14 @@ def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None,
             "set Children to None."
         )
         return replace(rig, notes=(*rig.notes, note))
-    parents = _parents(own)
-    made = make_children(own.take(parents), head, settings, density, place=place)
-    strands = joined(own, made.strands)
+    parents, cv_count = _parents(own), rig.guide_grid.shape[1]
+    shapes, notes = _parent_shapes(own.take(parents), settings.strand_count)
+    made = make_children(shapes, head, settings, density, place=place)
+    strands = joined(own, with_needed_points(made.strands, cv_count))
     if len(rig.guides) < own.strand_count:
         # shaped by their neighbours among all strands, they move as guides do
-        weights = _weights(made.strands, own.take(rig.guides))
+        lines = center_lines(own.take(rig.guides), cv_count)
+        weights = _weights(center_lines(made.strands, cv_count), lines)
     else:
         weights = replace(made.weights, guide=parents[made.weights.guide])
     return Rig(
@@ -273,9 +283,26 @@ def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None,
             np.concatenate([rig.weights.weight, weights.weight]),
         ),
         _frames(strands, head),
-        (*rig.notes, *made.notes),
+        (*rig.notes, *made.notes, *notes),
         own_count=own.strand_count,
     )
+
+
+def _parent_shapes(parents: StrandSet, child_count: int) -> tuple[StrandSet, tuple[str, ...]]:
+    """What children are mixed from, which takes equally many points: as many as the parent has
+    that has most, as long as all children have room for them.
+    """
+    needed = int(parents.point_counts.max(initial=2))
+    count = min(needed, max(CHILD_POINTS // max(child_count, 1), FEWEST_CHILD_POINTS))
+    if count >= needed:
+        return resample(parents, needed), ()
+    shapes = resample(parents, count)
+    kept = shapes.lengths().sum(dtype=np.float64) / parents.lengths().sum(dtype=np.float64)
+    note = (
+        f"{child_count:,} children of {needed} points do not fit into memory, so they have {count},"
+        f" and {100.0 * (1.0 - kept):.1f} % of the length of curls is lost. Use fewer children."
+    )
+    return shapes, (note,)
 
 
 def _parents(own: StrandSet) -> Ints:
@@ -294,25 +321,28 @@ def _frames(strands: StrandSet, head: Surface | None) -> RootFrames | None:
 
 
 def carried(rig: Rig, pose: Pose) -> Floats:
-    """Rest shapes of all strands, each carried rigidly by its own root, (n, cv_count, 3)."""
-    return _carried(rig, rig.strands.grid, slice(None), pose)
+    """Rest shapes of all strands, each carried rigidly by its own root, (point_count, 3)."""
+    strands = rig.strands
+    return _carried(rig, strands.points, strands.point_counts, slice(None), pose)
 
 
 def carried_guides(rig: Rig, pose: Pose) -> Floats:
     """The same of the guides, (guide_count, cv_count, 3)."""
-    return _carried(rig, rig.guide_grid, rig.guides, pose)
+    grid = rig.guide_grid
+    counts = np.full(len(grid), grid.shape[1])
+    return _carried(rig, grid.reshape(-1, 3), counts, rig.guides, pose).reshape(grid.shape)
 
 
-def _carried(rig: Rig, grid: Floats, chosen: Ints | slice, pose: Pose) -> Floats:
+def _carried(rig: Rig, points: Floats, counts: Ints, chosen: Ints | slice, pose: Pose) -> Floats:
     if rig.head is None or pose.head_positions is None or rig.rest_frames is None:
-        return (grid @ pose.matrix[:3, :3].T + pose.matrix[:3, 3]).astype(np.float32)
+        return (points @ pose.matrix[:3, :3].T + pose.matrix[:3, 3]).astype(np.float32)
     triangle, barycentric = rig.strands.root_triangle, rig.strands.root_barycentric
     assert triangle is not None and barycentric is not None
     now = root_frames(
         pose.head_positions, rig.head.triangles, triangle[chosen], barycentric[chosen]
     )
     rest = RootFrames(rig.rest_frames.origin[chosen], rig.rest_frames.rotation[chosen])
-    return follow(grid, rest, now)
+    return follow(points, counts, rest, now)
 
 
 def style_of_guides(rig: Rig, pose: Pose) -> Floats:
@@ -370,19 +400,18 @@ def advance(
 
 
 def strands_now(rig: Rig, motion: Motion) -> Floats:
-    """All strands at this moment of a running motion, (strand_count, cv_count, 3) [m]."""
+    """All strands at this moment of a running motion, (point_count, 3) [m]."""
     return strands_at(rig, motion.pose, motion.guides)
 
 
 def strands_at(rig: Rig, pose: Pose, guides_now: Floats) -> Floats:
-    """All strands riding on guides, (strand_count, cv_count, 3) [m], world space.
+    """All strands riding on guides, (point_count, 3) [m], world space.
 
     Args:
         guides_now: (guide_count, cv_count, 3) [m], simulated or baked, world space.
     """
-    strands = carried(rig, pose)
-    moved = ride(strands.reshape(-1, 3), rig.riders, carried_guides(rig, pose), guides_now)
-    return held_strands(rig, pose, moved.reshape(strands.shape))
+    moved = ride(carried(rig, pose), rig.riders, carried_guides(rig, pose), guides_now)
+    return held_strands(rig, pose, moved)
 
 
 def strands_at_rest(rig: Rig, pose: Pose) -> Floats:
@@ -392,14 +421,13 @@ def strands_at_rest(rig: Rig, pose: Pose) -> Floats:
     return strands_at(rig, pose, style_of_guides(rig, pose))
 
 
-def held_strands(rig: Rig, pose: Pose, strands: Floats) -> Floats:
-    """Strands that follow their guides, brought to where they are held; in place."""
+def held_strands(rig: Rig, pose: Pose, points: Floats) -> Floats:
+    """Strands (point_count, 3) that ride, brought to where they are held; in place."""
     holds = None if rig.holds is None else rig.holds.where(pose.anchors)
     if holds is None or pose.anchors is None or not len(holds.strand):
-        return strands
-    rest = rig.strands
-    hold(strands.reshape(-1, 3), rest.points, rest.offsets, holds, pose.anchors)
-    return strands
+        return points
+    hold(points, rig.strands.points, rig.strands.offsets, holds, pose.anchors)
+    return points
 
 
 def rest_occlusion(rig: Rig, settings: AmbientSettings, points: Floats | None = None) -> Floats:

@@ -33,21 +33,21 @@ void main()
   vec3 weight = texelFetch(guide_weights, strand_texel(strand, 1, 3), 0).xyz;
   vec3 per_meter = texelFetch(guide_weights, strand_texel(strand, 2, 3), 0).xyz;
 
-  // xyz position, w radius
-  vec4 rest = texelFetch(rest_points, strand_texel(strand, 0, cv_count), 0);
+  StrandSpan span = strand_span(strand_spans, strand);
+  vec4 rest = texelFetch(rest_points, span.first, 0);  // xyz position, w radius
   vec3 displacement = vec3(0.0);
   for (int k = 0; k < 3; k++) {
     ivec2 shift = strand_texel(guide[k], segment_count, segment_count + 1);
     displacement += weight[k] * texelFetch(guide_turns, shift, 0).xyz;
   }
   float reached = 0.0;
-  for (int cv = 0; cv < cv_count; cv++) {
-    imageStore(cv_points, strand_texel(strand, cv, cv_count),
+  for (int point = 0; point < span.count; point++) {
+    imageStore(cv_points, span_texel(span, point),
                vec4(follow(rest.xyz, motion) + displacement, rest.w));
-    if (cv + 1 == cv_count) {
+    if (point + 1 == span.count) {
       break;
     }
-    vec4 next = texelFetch(rest_points, strand_texel(strand, cv + 1, cv_count), 0);
+    vec4 next = texelFetch(rest_points, span_texel(span, point + 1), 0);
     vec3 edge = next.xyz - rest.xyz;
     float size = length(edge);
     vec3 place = (reached + 0.5 * size) * per_meter;

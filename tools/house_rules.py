@@ -290,7 +290,6 @@ def unused_names(repository: Path = REPOSITORY) -> list[str]:
 WANTED = {
     "detail_factors": "what the pieces drawn by shaders are tested against",
     "points_at": "what the points drawn by shaders are tested against",
-    "simplify": "grooms are prepared by it as soon as they ride on guides in points of their own",
 }
 
 

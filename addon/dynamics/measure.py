@@ -1,11 +1,14 @@
-"""What a simulation must hold: lengths, and hair outside of colliders."""
+"""What a simulation must hold: lengths, and hair outside of colliders; guides, and all hair."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..arrays import Bools, Floats, Ints
+from ..strands.arc_length import lengths
 from ..strands.vectors import dot_rows
 from .colliders import PosedCollider, transform_points
+from .colliders.signed_distance import signed_distance
 from .constraints import PINNED, TINY, directions
 from .state import DynamicsState
 
@@ -38,3 +41,34 @@ def deepest_penetration(state: DynamicsState, colliders: tuple[PosedCollider, ..
         scale = np.maximum(np.sqrt(dot_rows(outward, outward)), TINY)
         deepest = max(deepest, float(-(distance / scale).min()))
     return deepest
+
+
+def length_changes(points: Floats, rest: Floats, offsets: Ints) -> Floats:
+    """By which fraction of its length at rest each strand is longer or shorter, (strand_count,).
+
+    Args:
+        points, rest: (point_count, 3) [m], strand after strand.
+        offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
+    """
+    before = lengths(rest, offsets)
+    return np.abs(lengths(points, offsets) - before) / np.maximum(before, TINY)
+
+
+def are_outside(points: Floats, colliders: tuple[PosedCollider, ...]) -> Bools:
+    """Which points (n, 3) world [m] are in no collider, as these stand at the frame's end."""
+    distance, _ = signed_distance(points, colliders, 0.0)
+    return np.asarray(distance >= 0.0)
+
+
+def strand_depths(
+    points: Floats, offsets: Ints, colliders: tuple[PosedCollider, ...], were_outside: Bools
+) -> Floats:
+    """How deep [m] each strand is in a collider with what was outside at rest, (strand_count,).
+
+    Args:
+        points, offsets: as of `length_changes`.
+        were_outside: (point_count,), see `are_outside`.
+    """
+    distance, _ = signed_distance(points, colliders, 0.0)
+    depth = np.where(were_outside, -distance, 0.0)
+    return np.maximum.reduceat(depth, offsets[:-1]) if len(depth) else np.zeros(0, np.float32)

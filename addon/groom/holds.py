@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..strands import Surface
+from ..strands import StrandSet, Surface
+from ..strands.arc_length import along
 from ..strands.strand_set import ROOT_POINTS
 from .roots import root_frames
 
@@ -46,6 +47,17 @@ class Holds:
         place = np.searchsorted(chosen, self.strand)
         kept = np.flatnonzero(np.take(chosen, place, mode="clip") == self.strand)
         return self._some(kept, place[kept])
+
+    def on_lines(self, strands: StrandSet, cv_count: int) -> Holds:
+        """The same places on centre lines of `cv_count` CVs, see `strands.center_lines`."""
+        if (strands.point_counts == cv_count).all():
+            return self
+        fraction, first = along(strands.points, strands.offsets), self.place.astype(np.int64)
+        before = strands.offsets[self.strand] + first
+        after = np.minimum(before + 1, strands.offsets[self.strand + 1] - 1)
+        here = fraction[before] + (self.place - first) * (fraction[after] - fraction[before])
+        place = np.maximum(here * (cv_count - 1), ROOT_POINTS).astype(np.float32)
+        return replace(self, place=place)
 
     def where(self, anchors: Floats | None) -> Holds:
         """Those whose anchors are there: an object that is gone holds nothing.

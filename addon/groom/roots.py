@@ -14,6 +14,8 @@ from .root_fit import IMPLAUSIBLE_DISTANCE, fitting_factor
 
 #: Sine of a triangle's first angle below which rounding in float64 decides about its normal.
 _FLAT = 1.0e-9
+#: Strands carried at once, so that they stay in the processor's cache.
+_CHUNK = 512
 
 
 @dataclass(frozen=True)
@@ -92,24 +94,36 @@ def root_frames(
     return RootFrames(origin, rotation)
 
 
-def follow(grid: Floats, rest: RootFrames, now: RootFrames) -> Floats:
-    """Each strand carried rigidly with its root, (strand_count, cv_count, 3) float32 [m].
+def follow(points: Floats, counts: Ints, rest: RootFrames, now: RootFrames) -> Floats:
+    """Each strand carried rigidly with its root, (point_count, 3) float32 [m].
 
     Adds only the change, so that a root that did not move returns its strand bit for bit.
 
     Args:
-        grid: (strand_count, cv_count, 3) [m], the strands at rest.
+        points: (point_count, 3) [m], the strands at rest, one after the other.
+        counts: (strand_count,) how many points each has.
         rest, now: frames of the same roots at rest and now.
     """
     turn = (now.rotation - rest.rotation) @ rest.rotation.transpose(0, 2, 1)
-    local = grid - rest.origin[:, None].astype(np.float32)
     # the rounding of the origin to float32 must not show: it is turned here instead
     rounding = rest.origin - rest.origin.astype(np.float32)
     shift = now.origin - rest.origin - np.einsum("sij,sj->si", turn, rounding)
-    moved = local @ turn.astype(np.float32).transpose(0, 2, 1)
-    moved += shift.astype(np.float32)[:, None]
-    moved += grid
-    return np.asarray(moved, np.float32)
+    # of a strand the turn, in three columns of three, the shift, and the origin
+    motions = np.column_stack([turn.transpose(0, 2, 1).reshape(-1, 9), shift, rest.origin]).astype(
+        np.float32
+    )
+    moved = np.array(points, np.float32)
+    ends = np.cumsum(counts)
+    for first in range(0, len(counts), _CHUNK):
+        last = min(first + _CHUNK, len(counts))
+        part = moved[ends[first] - counts[first] : ends[last - 1]]
+        motion = np.ascontiguousarray(np.repeat(motions[first:last], counts[first:last], axis=0).T)
+        local = part.T - motion[12:]
+        change = motion[9:12]
+        for column in range(3):
+            change += motion[3 * column : 3 * column + 3] * local[column]
+        part += change.T
+    return moved
 
 
 def _check_scale(

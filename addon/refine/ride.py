@@ -20,6 +20,9 @@ from typing import Protocol
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..strands import StrandSet
+from ..strands.arc_length import steps
+from ..strands.center_lines import center_lines
 from ..strands.vectors import cross_rows, dot_rows
 
 #: Points moved at once, so that they stay in the processor's cache.
@@ -48,37 +51,43 @@ class Riders:
     weights: of all strands.
     stations: (point_count,) float32 [m], how far along its guides the middle of the segment that
         begins at a point takes its rotation from.
+    reach: (strand_count,) float32, the length of each centre line as a fraction of its strand's.
     segments_per_meter: (guide_count,) float32 [1/m], of each guide.
     """
 
     offsets: Ints
     weights: Weights
     stations: Floats
+    reach: Floats
     segments_per_meter: Floats
 
     @classmethod
-    def of(cls, points: Floats, offsets: Ints, guides: Floats, weights: Weights) -> Riders:
+    def of(cls, strands: StrandSet, guides: Floats, weights: Weights) -> Riders:
         """Bind strands to guides.
 
         Args:
-            points: (point_count, 3) [m] at rest.
-            guides: (guide_count, cv_count, 3) [m] at rest, CVs evenly along each.
+            strands: at rest.
+            guides: (guide_count, cv_count, 3) [m] at rest, CVs evenly along each; centre lines.
         """
         lengths = np.linalg.norm(np.diff(guides, axis=1), axis=2).sum(axis=1, dtype=np.float64)
         per_meter = (guides.shape[1] - 1) / np.maximum(lengths, SHORTEST)
-        return cls(offsets, weights, stations(points, offsets), per_meter.astype(np.float32))
+        # a curl is as far along its guide as its own centre line has come
+        reach = center_lines(strands, guides.shape[1]).lengths()
+        reach /= np.maximum(strands.lengths(), np.float32(SHORTEST))
+        stations = _middles(strands.points, strands.offsets)
+        stations *= np.repeat(reach, strands.point_counts)
+        return cls(strands.offsets, weights, stations, reach, per_meter.astype(np.float32))
 
 
-def stations(points: Floats, offsets: Ints) -> Floats:
+def _middles(points: Floats, offsets: Ints) -> Floats:
     """Distance along its strand [m] of the middle of the segment that begins at each point,
     (point_count,) float32; that of the tip means nothing.
     """
-    step = np.zeros(len(points))
-    step[:-1] = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    step[offsets[1:] - 1] = 0.0
-    reached = np.concatenate([[0.0], np.cumsum(step)])[:-1]
-    start = np.repeat(reached[offsets[:-1]], np.diff(offsets))
-    return (reached - start + 0.5 * step).astype(np.float32)
+    ends = steps(points, offsets)
+    reached = np.cumsum(ends)
+    reached -= np.repeat(reached[offsets[:-1]], np.diff(offsets))
+    begins = np.append(ends[1:], 0.0)[: len(ends)]
+    return (reached + 0.5 * begins).astype(np.float32)
 
 
 def ride(points: Floats, riders: Riders, guide_rest: Floats, guide_now: Floats) -> Floats:

@@ -18,6 +18,7 @@ New with every frame are the head's vertices that hold a root, or a matrix, and 
                            last xyz how far the guide has left its root [m]
     rest_turns    RGBA32F: the same of guides at rest
     guide_weights RGBA32F: xyz of three texels the guides, their weights, their segments a metre
+    strand_spans  RGBA32F: where the points of each strand lie, see strand_layout.StrandLayout
     cv_points     RGBA32F: xyz position now [m, world], w radius [m]
 
 Whole numbers lie in them as floats, exact below 2^24.
@@ -32,12 +33,12 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..groom.holds import Holds
-from ..refine.ride import Riders, Weights
+from ..refine.ride import Riders
 from ..strands import StrandSet, Surface
 from .hold_pass import HoldPass
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .snapshot import DevicePoints
-from .strand_layout import StrandLayout, from_strand_rows, strand_rows, strand_rows_size
+from .strand_layout import StrandLayout, strand_rows, strand_rows_size
 from .textures import texture_from, texture_to_array
 
 ROOTS_RECIPE = ShaderRecipe(
@@ -68,10 +69,11 @@ RIDE_RECIPE = ShaderRecipe(
         ("FLOAT_2D", "root_motions"),
         ("FLOAT_2D", "guide_weights"),
         ("FLOAT_2D", "rest_points"),
+        ("FLOAT_2D", "strand_spans"),
         ("FLOAT_2D", "guide_turns"),
     ),
     images=(("RGBA32F", "cv_points"),),
-    integers=("cv_count", "segment_count", "strand_count", "mover_count"),
+    integers=("segment_count", "strand_count", "mover_count"),
     group_size=(64, 1),
 )
 
@@ -80,11 +82,11 @@ class RidePass:
     """The strands of one groom on the GPU. Making one touches no GPU; `carry` and `ride` do.
 
     Args:
-        strands: uniform, world space at rest; bound when there is a head.
+        strands: world space at rest; bound when there is a head.
         head: world space at rest, or None for hair that one matrix carries.
         guides: (guide_count,) indices of the strands that are simulated.
         guide_grid: (guide_count, cv_count, 3) [m], the lines that are simulated, at rest.
-        weights: of all strands.
+        riders: how the strands ride on them.
         holds: where strands are held by ties or by a surface; None: nowhere.
     """
 
@@ -94,12 +96,12 @@ class RidePass:
         head: Surface | None,
         guides: Ints,
         guide_grid: Floats,
-        weights: Weights,
+        riders: Riders,
         holds: Holds | None = None,
     ) -> None:
         self._strands = strands
         self._guides, self._guide_grid = guides, guide_grid
-        self._riders = Riders.of(strands.points, strands.offsets, guide_grid, weights)
+        self._riders = riders
         self._holds = None if head is None else RootHolds(strands, head)
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
         self.points = DevicePoints(StrandLayout(strands.offsets))
@@ -153,10 +155,10 @@ class RidePass:
         self._run_ride("guide_turns", anchors)
 
     def read(self) -> Floats:
-        """The strands as they are shown, (strand_count, cv_count, 3) float32 [m], world space."""
+        """The strands as they are shown, (point_count, 3) float32 [m], world space."""
         assert self.points.texture is not None, "nothing is shown yet"
         pixels = texture_to_array(self.points.texture)
-        return from_strand_rows(pixels, self._strands.strand_count, self._cv_count)[..., :3]
+        return np.ascontiguousarray(self.points.layout.values(pixels)[:, :3])
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next frame uploads it again."""
@@ -164,10 +166,6 @@ class RidePass:
         self.points.release()
         if self._held is not None:
             self._held.release()
-
-    @property
-    def _cv_count(self) -> int:
-        return int(self._strands.grid.shape[1])
 
     @property
     def _segment_count(self) -> int:
@@ -194,22 +192,24 @@ class RidePass:
     def _upload(self) -> None:
         """Everything that is constant, and the textures that the shaders write."""
         strands, textures = self._strands, self._textures
-        grid, count = strands.grid, strands.strand_count
-        points = np.concatenate([grid, strands.radius.reshape(count, -1, 1)], axis=-1)
-        textures["rest_points"] = texture_from(strand_rows(points), "RGBA32F")
+        layout, count = self.points.layout, strands.strand_count
+        points = np.column_stack([strands.points, strands.radius])
+        textures["rest_points"] = texture_from(layout.pixels(points), "RGBA32F")
+        spans = strand_rows(layout.spans[:, None])
+        textures["strand_spans"] = texture_from(spans, "RGBA32F")
         guide_strands = self._guides[:, None, None].astype(np.float32)
         textures["guide_strands"] = texture_from(strand_rows(guide_strands), "R32F")
         points = strand_rows(_padded(self._guide_grid))
         textures["guide_points"] = texture_from(points, "RGBA32F")
         weights = self._riders.weights
-        per_meter = self._riders.segments_per_meter[weights.guide]
+        per_meter = self._riders.segments_per_meter[weights.guide] * self._riders.reach[:, None]
         riding = np.stack([weights.guide, weights.weight, per_meter], axis=1)
         textures["guide_weights"] = texture_from(strand_rows(_padded(riding)), "RGBA32F")
         textures["guide_turns"] = _empty(*self._guide_grid.shape[:2])
         at_rest = np.zeros((*self._guide_grid.shape[:2], 4))
         at_rest[:, :-1, 3] = 1.0
         textures["rest_turns"] = texture_from(strand_rows(at_rest), "RGBA32F")
-        self.points.texture = _empty(count, self._cv_count)
+        self.points.texture = _cleared(layout.size)
         if self._holds is not None:
             holds = strand_rows(self._holds.texels)
             textures["root_holds"] = texture_from(holds, "RGBA32F")
@@ -253,12 +253,11 @@ class RidePass:
     def _run_ride(self, turns: str, anchors: Floats | None) -> None:
         textures, count = self._textures, self._strands.strand_count
         shader = program(RIDE_RECIPE)
-        taken = "root_motions", "guide_weights", "rest_points"
+        taken = "root_motions", "guide_weights", "rest_points", "strand_spans"
         shader.bind(
             textures=_named(textures, *taken) | {"guide_turns": textures[turns]},
             images={"cv_points": self.points.texture},
             integers={
-                "cv_count": self._cv_count,
                 "segment_count": self._segment_count,
                 "strand_count": count,
                 "mover_count": self._mover_count,
@@ -279,7 +278,10 @@ def _padded(values: Floats) -> Floats:
 
 def _empty(strand_count: int, column_count: int) -> Any:
     """A texture RGBA32F of the size that strand_rows gives, zero everywhere."""
-    size = strand_rows_size(strand_count, column_count)
+    return _cleared(strand_rows_size(strand_count, column_count))
+
+
+def _cleared(size: tuple[int, int]) -> Any:
     texture = gpu.types.GPUTexture(size, format="RGBA32F")
     texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
     return texture

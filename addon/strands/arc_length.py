@@ -36,9 +36,9 @@ def along(points: Floats, offsets: Ints) -> Floats:
     """
     counts = np.diff(offsets)
     total = np.cumsum(steps(points, offsets))
-    way = total - np.repeat(total[offsets[:-1]], counts)
+    reached = total - np.repeat(total[offsets[:-1]], counts)
     length = np.repeat(total[offsets[1:] - 1] - total[offsets[:-1]], counts)
-    fraction = np.divide(way, length, out=even(offsets), where=length > 0.0)
+    fraction = np.divide(reached, length, out=even(offsets), where=length > 0.0)
     fraction[offsets[1:] - 1] = 1.0
     return np.minimum(fraction, 1.0)
 

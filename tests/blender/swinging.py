@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from grids import grid_of
 
 FRAME = 1.0 / 24.0  # [s]
 #: the push of a head in each of some frames [m]
@@ -17,9 +18,9 @@ def swings(session: Any) -> bool:
     from hairloom.addon.blender.preview import previews
 
     previews.rest(bpy.context.evaluated_depsgraph_get(), keep_playing=True)
-    head, before = session.head.found(), session.strands
+    head, before = session.head.found(), grid_of(session)
     for _ in range(FRAMES):
         head.location.x += STEP
         previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
-    offset = session.strands - before - [FRAMES * STEP, 0.0, 0.0]
+    offset = grid_of(session) - before - [FRAMES * STEP, 0.0, 0.0]
     return bool(offset[:, -1, 0].mean() < -0.005 and np.abs(offset[:, 0]).max() < 1e-5)

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 from bake_files import contents, frames_in
+from grids import baked_grid, grid_of
 from windows_rules import windows_rules
 
 from hairloom.addon.blender.bakes import groom_hashes, playback
@@ -47,7 +48,7 @@ def bake(*objects, **options):
 
 
 def drawn(hair):
-    return previews.session_of(hair).strands
+    return grid_of(previews.session_of(hair))
 
 
 def played(hair, first=1, last=LAST):
@@ -72,7 +73,7 @@ def test_a_bake_equals_playback_bit_for_bit(swinging, evaluated):
     np.testing.assert_array_equal(played(hair), live_strands)
     cache = playback.cache_of(hair)
     for frame in range(1, LAST + 1):
-        np.testing.assert_array_equal(playback.strands_in(cache, frame), live_strands[frame - 1])
+        np.testing.assert_array_equal(baked_grid(cache, frame), live_strands[frame - 1])
 
 
 @pytest.mark.usefixtures("gpu_context")
@@ -93,7 +94,7 @@ def test_a_bake_on_the_gpu_equals_playback_on_the_gpu_bit_for_bit(swinging, eval
         np.testing.assert_array_equal(cache.frame(frame)["guides"], guides[frame - 1])
         bpy.context.scene.frame_set(frame)
         np.testing.assert_array_equal(drawn(hair), strands[frame - 1])
-        ridden = playback.strands_in(cache, frame)
+        ridden = baked_grid(cache, frame)
         np.testing.assert_allclose(ridden, strands[frame - 1], rtol=0, atol=2e-6)
 
 
@@ -121,10 +122,10 @@ def test_a_preview_begun_elsewhere_shows_the_very_same_strands(swinging, evaluat
     cache = playback.cache_of(hair)
     bpy.context.scene.frame_set(5)
     previews.start(hair, evaluated())
-    np.testing.assert_array_equal(drawn(hair), playback.strands_in(cache, 5))
+    np.testing.assert_array_equal(drawn(hair), baked_grid(cache, 5))
     assert previews.previews[hair.session_uid].bake.changed == ()
     bpy.context.scene.frame_set(2)
-    np.testing.assert_array_equal(drawn(hair), playback.strands_in(cache, 2))
+    np.testing.assert_array_equal(drawn(hair), baked_grid(cache, 2))
 
 
 def test_a_deformed_head_carries_baked_hair(swinging, evaluated):
@@ -539,7 +540,7 @@ def test_a_damaged_bake_is_told_and_the_hair_simulated(damage, swinging, evaluat
     session = previews.start(hair, evaluated())
     if damage == "no constants":  # only renders need them
         with pytest.raises(HairloomError, match="Bake again"):
-            playback.strands_in(playback.cache_of(hair), 3)
+            baked_grid(playback.cache_of(hair), 3)
         return
     played(hair, last=3)
     assert previews.sessions() == (session,)

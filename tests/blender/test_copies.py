@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from grids import baked_grid, grid_of
 from swinging import swings
 
 from hairloom.addon.blender.bakes import playback
@@ -70,9 +71,9 @@ def test_a_duplicate_of_hair_and_head_goes_with_its_own_head(linked, playing, ev
     bpy.context.view_layer.update()
     session = previews.start(twin, evaluated())
     assert session.warnings == ()
-    assert session.strands.mean(axis=(0, 1))[0] == pytest.approx(1.0, abs=0.02)
+    assert grid_of(session).mean(axis=(0, 1))[0] == pytest.approx(1.0, abs=0.02)
     previews.play(evaluated())
-    other = playing.session.strands
+    other = grid_of(playing.session)
     assert swings(session) and swings(playing.session)
     assert np.abs(other[..., 0]).max() < 0.5, "the first stays where it is"
     found = engine_hair.read_groom(twin, evaluated())
@@ -89,7 +90,7 @@ def test_hair_that_shares_its_curves_is_combed_and_coloured_together(playing, ev
     bpy.context.view_layer.update()
     scene_events.catch_up(evaluated())
     for session in sessions:
-        assert session.strands[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
+        assert grid_of(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
         assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 0.5
 
 
@@ -194,7 +195,7 @@ def test_renders_show_a_duplicate_by_its_own_bake(linked, baked, playing):
         assert engine_hair.owner_of(shown) == hair and hair.hide_render and not shown.hide_render
         points = np.empty((len(shown.data.position_data), 3), np.float32)
         shown.data.position_data.foreach_get("vector", points.ravel())
-        strands = playback.strands_in(playback.cache_of(hair), 2)
+        strands = baked_grid(playback.cache_of(hair), 2)
         assert np.array_equal(points, strands.reshape(-1, 3))
         assert points[:, 0].mean() == pytest.approx(x, abs=0.02)
     bake(baked)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from grids import baked_grid
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -184,7 +185,7 @@ def test_hair_is_rendered_as_it_was_baked(
     for frame, subframe in ((2, 0.0), (2, 0.25)):
         stage.frame_set(frame, subframe=subframe)
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        expected = playback.strands_in(playback.cache_of(hair), frame, subframe)
+        expected = baked_grid(playback.cache_of(hair), frame, subframe)
         for obj in (copy, hair):
             found = engine_hair.read_groom(obj, depsgraph)
             np.testing.assert_array_equal(found.points, expected.reshape(-1, 3))

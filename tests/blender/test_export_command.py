@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from grids import baked_grid
 from strand_files import needs_usd
 
 from hairloom.addon.blender.bakes import playback
@@ -166,7 +167,7 @@ def test_hair_of_the_scene_leaves_with_its_bake(
     cache = playback.cache_of(hair)
     assert cache is not None
     for frame in range(1, 5):
-        baked = playback.strands_in(cache, frame).reshape(-1, 3)
+        baked = baked_grid(cache, frame).reshape(-1, 3)
         np.testing.assert_array_equal(np.array(curves.GetPointsAttr().Get(frame)), baked)
     assert report["preflight"]["frames"] == [1, 4, 24.0]
     run("--object", "Hair", "--frames", "3", "6", output="none.usdc", code=1)

@@ -6,6 +6,7 @@ import weakref
 import bpy
 import numpy as np
 import pytest
+from grids import grid_of
 from waiting import until
 
 from hairloom.addon.blender.colliders import fields
@@ -119,7 +120,7 @@ def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(
 ):
     hair = new_hair(sphere)
     session = previews.start(hair, evaluated())
-    at_rest = session.strands
+    at_rest = grid_of(session)
     assert previews.play(evaluated(), blocking=False) == []
     assert (
         previews.is_playing()
@@ -131,7 +132,7 @@ def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(
     previews.advance(evaluated(), FRAME)
     previews.rest(evaluated(), keep_playing=True)
     assert previews.previews[session.uid].phase is Phase.WAITING
-    assert session.strands == pytest.approx(at_rest + [0.05, 0.0, 0.0], abs=2e-6)
+    assert grid_of(session) == pytest.approx(at_rest + [0.05, 0.0, 0.0], abs=2e-6)
     gate.set()
     until_made()
     previews.advance(evaluated(), FRAME)
@@ -140,7 +141,7 @@ def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(
     evaluated()
     previews.advance(evaluated(), FRAME)
     carried = at_rest + [0.08, 0.0, 0.0]
-    assert np.abs(session.strands - carried)[:, -1].max() > 1e-3, "tips stay behind"
+    assert np.abs(grid_of(session) - carried)[:, -1].max() > 1e-3, "tips stay behind"
 
 
 def test_stop_while_hair_waits_ends_the_waiting(new_hair, sphere, evaluated, gate):

@@ -5,6 +5,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from grids import baked_grid, grid_of
 from swinging import FRAME, swings
 from tiers import few_in_commits
 
@@ -71,7 +72,7 @@ def test_a_linked_groom_is_shown_as_it_is_there(library):
     session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
     assert previews.play(bpy.context.evaluated_depsgraph_get()) == []
     previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
-    assert np.isfinite(session.strands).all() and previews.notice() == ""
+    assert np.isfinite(grid_of(session)).all() and previews.notice() == ""
 
 
 def test_an_override_has_settings_of_its_own_which_last(override, tmp_path):
@@ -233,7 +234,7 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
     hair.hairloom.dynamics.collider_resolution = 16
     session = previews.start(hair, evaluated())
     frames(scene, 6)
-    still = session.strands
+    still = grid_of(session)
     path = "hairloom.dynamics.wind_speed"
     if way == "keyframe":
         keyed(hair, path, {1: 0.0, 3: 40.0})
@@ -245,10 +246,10 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
             source.keyframe_insert("location", frame=frame)
         driven(hair, path, source)
     frames(scene, 6)
-    blown = session.strands
+    blown = grid_of(session)
     assert (blown - still)[:, -1, 0].mean() > 0.005
     list(Bake.of([hair], scene).steps())
-    baked = playback.strands_in(playback.cache_of(hair), 6)
+    baked = baked_grid(playback.cache_of(hair), 6)
     np.testing.assert_array_equal(baked, blown)
 
 

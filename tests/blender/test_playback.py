@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from grids import baked_grid, grid_of
 from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
@@ -120,7 +121,7 @@ def test_a_render_shows_the_baked_hair_of_its_frame(engine, scene, tmp_path):
         scene.frame_current = frame  # F12 shows the frame that is set, without a frame change
         scene.render.filepath = str(tmp_path / f"{engine}{frame}.png")
         bpy.ops.render.render(write_still=True)
-        strands[frame] = playback.strands_in(cache, frame)
+        strands[frame] = baked_grid(cache, frame)
         np.testing.assert_array_equal(written(copy.data), strands[frame].reshape(-1, 3))
     pictures = {frame: coverage(tmp_path / f"{engine}{frame}.png") for frame in strands}
     for frame, other in ((2, 5), (5, 2)):
@@ -134,7 +135,7 @@ def test_a_fresh_process_renders_the_bake_of_a_saved_file(scene, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     bpy.ops.hairloom.bake()
     cache = playback.cache_of(bpy.data.objects["Hair"])
-    strands = [playback.strands_in(cache, frame) for frame in range(1, LAST + 1)]
+    strands = [baked_grid(cache, frame) for frame in range(1, LAST + 1)]
     bpy.ops.wm.save_mainfile()
     tools = str(Path(__file__).parents[2] / "tools")
     script = RENDER.format(tools=tools, file=str(file), last=LAST)
@@ -150,9 +151,9 @@ def test_a_render_changes_nothing_of_what_the_viewport_shows(scene, evaluated):
     hair = bpy.data.objects["Hair"]
     session = previews.start(hair, evaluated())
     scene.frame_set(4)
-    before = session.strands
+    before = grid_of(session)
     bpy.ops.render.render()
-    np.testing.assert_array_equal(session.strands, before)
+    np.testing.assert_array_equal(grid_of(session), before)
     assert previews.sessions() == (session,) and scene.frame_current == 4
     assert not playback._known.is_rendering
 
@@ -172,7 +173,7 @@ def test_motion_blur_smears_the_hair_between_two_frames(scene, tmp_path):
         bpy.ops.render.render(write_still=True)
         pictures.append(coverage(tmp_path / f"blur{is_blurred}.png"))
     sharp, blurred = pictures
-    ends = [expected(playback.strands_in(cache, frame)) > 0.0 for frame in (3, 4)]
+    ends = [expected(baked_grid(cache, frame)) > 0.0 for frame in (3, 4)]
     only_later = ends[1] & ~ends[0]
     assert blurred[only_later].mean() > 2.0 * sharp[only_later].mean() + 0.05
     assert blurred.max() < 0.99 * sharp.max() or blurred[ends[0]].mean() < sharp[ends[0]].mean()
@@ -182,7 +183,7 @@ def test_between_two_frames_strands_go_straight_for_motion_blur(scene):
     bpy.ops.hairloom.bake()
     hair = bpy.data.objects["Hair"]
     cache = playback.cache_of(hair)
-    here, there = (playback.strands_in(cache, frame) for frame in (3, 4))
+    here, there = (baked_grid(cache, frame) for frame in (3, 4))
     scene.frame_set(3, subframe=0.25)
     between = written(hair.hairloom.bake.copy.data).reshape(here.shape)
     assert between == pytest.approx(0.75 * here + 0.25 * there, abs=1e-6)
@@ -194,7 +195,7 @@ def test_beyond_its_frames_a_copy_shows_the_nearest(scene):
     cache, curves = playback.cache_of(hair), hair.hairloom.bake.copy.data
     for beyond, nearest in ((-3, 1), (LAST + 9, LAST)):
         scene.frame_set(beyond)
-        strands = playback.strands_in(cache, nearest)
+        strands = baked_grid(cache, nearest)
         np.testing.assert_array_equal(written(curves), strands.reshape(-1, 3))
 
 

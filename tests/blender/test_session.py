@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from grids import grid_of
 from mathutils import Matrix
 
 from hairloom.addon.blender.base.objects import layer_key
@@ -27,7 +28,7 @@ def preview(new_hair, sphere, evaluated):
 
 def drawn(session):
     """The strands as they are drawn, whether they lie on the GPU or in an array."""
-    return session.strands
+    return grid_of(session)
 
 
 def play(evaluated, frames, each=lambda frame: None):

@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 import pytest
+from grids import grid_of
 
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.viewport import overlay
@@ -18,7 +19,7 @@ def preview(new_hair, sphere, evaluated):
 
 def drawn(session):
     """The strands as they are drawn, whether they lie on the GPU or in an array."""
-    return session.strands
+    return grid_of(session)
 
 
 def update():

@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from grids import baked_grid
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.guide_motion import BakedGuides
@@ -131,7 +132,7 @@ def test_motion_of_strands_and_of_cards_says_so(
     assert not any("out of date" in note for note in still.notes), "a still has no motion"
 
     capfd.readouterr()
-    before = playback.strands_in(playback.cache_of(hair), LAST)
+    before = baked_grid(playback.cache_of(hair), LAST)
     bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "hair.abc"), frames="scene")
     assert "out of date (settings)" in "".join(capfd.readouterr())
-    np.testing.assert_array_equal(playback.strands_in(playback.cache_of(hair), LAST), before)
+    np.testing.assert_array_equal(baked_grid(playback.cache_of(hair), LAST), before)

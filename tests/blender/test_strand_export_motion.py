@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 import pytest
 from bake_files import frames_in
+from grids import baked_grid
 from strand_files import curves_of, hedgehog, needs_usd, push_up, stage_of, straight, to_unreal
 
 from hairloom.addon.blender.bakes import playback
@@ -71,10 +72,10 @@ def test_each_frame_is_that_of_the_bake(swinging: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(curves["times"], np.arange(1, LAST + 1) / rate)
     moved = 0.0
     for frame in range(1, LAST + 1):
-        baked = playback.strands_in(cache, frame).reshape(-1, 3)
+        baked = baked_grid(cache, frame).reshape(-1, 3)
         np.testing.assert_allclose(curves["points"][frame - 1], to_unreal(baked), rtol=1e-6)
         np.testing.assert_array_equal(prim.GetPointsAttr().Get(frame), baked)
-        moved = max(moved, np.abs(baked - playback.strands_in(cache, 1).reshape(-1, 3)).max())
+        moved = max(moved, np.abs(baked - baked_grid(cache, 1).reshape(-1, 3)).max())
     assert moved > 0.05
     assert curves["groom_root_uv"].shape == (60, 2)
 
@@ -91,7 +92,7 @@ def test_guides_of_a_bake_move_as_their_strands_do(swinging: Any, tmp_path: Path
     assert cache is not None and curves["groom_guide"].sum() == 9
     rig = playback.rig_in(cache).rig
     for place, frame in enumerate((2, 3, 4)):
-        strands = playback.strands_in(cache, frame)
+        strands = baked_grid(cache, frame)
         expected = np.concatenate([strands, strands[rig.guides]]).reshape(-1, 3)
         np.testing.assert_allclose(curves["points"][place], to_unreal(expected), rtol=1e-6)
 

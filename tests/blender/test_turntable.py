@@ -105,13 +105,14 @@ def test_the_groom_stays_whole_in_view_and_does_not_drift(
     table: Turntable, size: tuple[int, int]
 ) -> None:
     """Also one that is long to one side of its head, and high up."""
-    points = table.points.reshape(-1, 16, 3) + [0.5, -0.2, 3.0]
-    points[::7] += np.linspace(0.0, 0.4, points.shape[1])[:, None] * np.array([1.0, 0.2, 0.0])
+    points = table.points.copy() + [0.5, -0.2, 3.0]
+    along = np.tile(np.linspace(0.0, 0.4, 16), len(points) // 16)
+    points[::7] += along[::7, None] * np.array([1.0, 0.2, 0.0])
     table.points = points
     table.pose = replace(table.pose, head_positions=None)
     table.settings = replace(SMALL, frames=36, width=size[0], height=size[1])
     homogeneous = np.append(points.reshape(-1, 3), np.ones((points.size // 3, 1)), axis=1)
-    middle = np.append((points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2.0, 1.0)
+    middle = np.append((points.min(axis=0) + points.max(axis=0)) / 2.0, 1.0)
     largest, places = 0.0, []
     for frame in range(36):
         camera = table.camera(frame)

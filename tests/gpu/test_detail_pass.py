@@ -265,6 +265,7 @@ def test_two_views_in_turn_and_nothing_computed_twice(frame: Any, monkeypatch: A
 def test_points_that_the_gpu_moves_get_new_detail(frame: Any) -> None:
     """A groom that comes nearer within one texture is divided more finely."""
     from hairloom.addon.groom.weights import GuideWeights
+    from hairloom.addon.refine.ride import Riders
     from hairloom.addon.render.ride_pass import RidePass
     from hairloom.addon.strands import StrandSet
 
@@ -276,7 +277,8 @@ def test_points_that_the_gpu_moves_get_new_detail(frame: Any) -> None:
         group=np.zeros(200, np.int32),
     )
     no_guide = GuideWeights(np.zeros((200, 3), np.int32), np.zeros((200, 3), np.float32))
-    ride = RidePass(strands, None, np.zeros(1, np.int32), strands.grid[:1], no_guide)
+    riders = Riders.of(strands, strands.grid[:1], no_guide)
+    ride = RidePass(strands, None, np.zeros(1, np.int32), strands.grid[:1], riders)
     snapshot = snapshot_of(frame, grid, BARE, device_points=ride.points)
     passes, counts = (frame.MeshPass(), frame.StrandPass()), []
     for distance in (3.0, 0.0, 0.0, 3.0):

@@ -223,6 +223,7 @@ def test_two_frames_are_identical_and_passes_may_be_kept(frame: Any) -> None:
 def test_points_on_the_gpu_look_like_uploaded_ones(frame: Any) -> None:
     """Bit for bit at rest; turned, when rounding moves edges by 1e-7 m, in nearly all pixels."""
     from hairloom.addon.groom.weights import GuideWeights
+    from hairloom.addon.refine.ride import Riders
     from hairloom.addon.render.ride_pass import RidePass
     from hairloom.addon.render.strand_pass import StrandPass
     from hairloom.addon.strands import StrandSet
@@ -236,7 +237,8 @@ def test_points_on_the_gpu_look_like_uploaded_ones(frame: Any) -> None:
         group=np.zeros(count, np.int32),
     )
     no_guide = GuideWeights(np.zeros((count, 3), np.int32), np.zeros((count, 3), np.float32))
-    ride = RidePass(strands, None, np.zeros(1, np.int32), strands.grid[:1], no_guide)
+    riders = Riders.of(strands, strands.grid[:1], no_guide)
+    ride = RidePass(strands, None, np.zeros(1, np.int32), strands.grid[:1], riders)
     turn = np.eye(4)
     turn[:3, :3] = [[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]
     camera = frame.frame_camera(

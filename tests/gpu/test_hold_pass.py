@@ -58,7 +58,7 @@ def pose_of(rig: Rig, seed: int) -> Pose:
 def test_equals_numpy(rig: Rig) -> None:
     from hairloom.addon.render.ride_pass import RidePass
 
-    ride = RidePass(rig.strands, rig.head, rig.guides, rig.guide_grid, rig.weights, rig.holds)
+    ride = RidePass(rig.strands, rig.head, rig.guides, rig.guide_grid, rig.riders, rig.holds)
     for seed in range(3):
         pose = pose_of(rig, seed)
         if seed == 2:  # a tie that is gone holds nothing
@@ -72,7 +72,7 @@ def test_equals_numpy(rig: Rig) -> None:
         ride.ride(pose.head_positions, pose.matrix, guides, pose.anchors)
         np.testing.assert_allclose(ride.read(), expected, atol=2e-6)
     ride.carry(None, np.eye(4), anchors_of(rig.holds, np.stack([np.eye(4)] * 2), None))
-    np.testing.assert_array_equal(ride.read(), rig.strands.grid)
+    np.testing.assert_array_equal(ride.read(), rig.strands.points)
     ride.release()
     ride.ride(pose.head_positions, pose.matrix, guides, pose.anchors)
     np.testing.assert_allclose(ride.read(), expected, atol=2e-6)

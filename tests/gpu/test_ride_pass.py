@@ -104,7 +104,7 @@ def simulated(rig: Rig, pose: Pose, seed: int = 2) -> np.ndarray:
 def pass_of(rig: Rig) -> Any:
     from hairloom.addon.render.ride_pass import RidePass
 
-    return RidePass(rig.strands, rig.head, rig.guides, rig.guide_grid, rig.weights)
+    return RidePass(rig.strands, rig.head, rig.guides, rig.guide_grid, rig.riders)
 
 
 def shown(ride: Any, pose: Pose, guides: Any) -> np.ndarray:
@@ -120,7 +120,7 @@ def test_strands_ride_as_in_numpy_on_a_deformed_head() -> None:
         expected = pipeline.strands_at(rig, pose, guides)
         found = shown(ride, pose, guides)
         assert np.abs(found - expected).max() < TOLERANCE
-    assert np.abs(found - rig.strands.grid).max() > 0.1, "it has gone a long way"
+    assert np.abs(found - rig.strands.points).max() > 0.1, "it has gone a long way"
     ride.carry(pose.head_positions, pose.matrix)
     assert np.abs(ride.read() - pipeline.carried(rig, pose)).max() < TOLERANCE
 
@@ -145,7 +145,7 @@ def test_hair_without_a_head_goes_with_a_matrix() -> None:
     expected = pipeline.strands_at(rig, pose, guides)
     # the matrix is rounded to float32, and strands are three metres from the origin
     assert np.abs(shown(ride, pose, guides) - expected).max() < 4.0 * TOLERANCE
-    carried = pipeline.carried(rig, pose)[:, 0].mean(axis=0)
+    carried = pipeline.carried(rig, pose)[rig.strands.offsets[:-1]].mean(axis=0)
     assert ride.points.center == pytest.approx(carried, abs=2.0e-6)
 
 
@@ -176,11 +176,11 @@ def test_strands_at_rest_stay_bit_for_bit() -> None:
     for rig in (rig_on(ball(), 400), rig_on(None, 400)):
         ride, pose = pass_of(rig), rig.rest_pose
         ride.carry(pose.head_positions, pose.matrix)
-        assert np.array_equal(ride.read(), rig.strands.grid)
+        assert np.array_equal(ride.read(), rig.strands.points)
         radius = rig.strands.radius.reshape(400, -1)
         pixels = np.array(ride.points.texture.read()).reshape(400, -1, 4)
         assert np.array_equal(pixels[..., 3], radius), "the fourth channel is the radius"
-        assert np.array_equal(shown(ride, pose, rig.strands.grid[rig.guides]), rig.strands.grid)
+        assert np.array_equal(shown(ride, pose, rig.guide_grid), rig.strands.points)
         assert ride.points.center == pytest.approx(rig.strands.roots.mean(axis=0), abs=5.0e-7)
 
 
@@ -208,7 +208,7 @@ def test_the_middle_of_all_roots_follows_the_head(
     pose = deformed(rig.head)
     ride = pass_of(rig)
     ride.carry(pose.head_positions, pose.matrix)
-    expected = pipeline.carried(rig, pose)[:, 0].mean(axis=0)
+    expected = pipeline.carried(rig, pose)[rig.strands.offsets[:-1]].mean(axis=0)
     assert ride.points.center == pytest.approx(expected, abs=tolerance)
 
 

@@ -12,9 +12,11 @@ from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.groom.ties import Holders, Tie, TipSurface
 from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
+from hairloom.addon.strands.resample import resample
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 RING = np.array([0.0, 0.1, 0.05])
+CV_COUNT = 24
 
 
 def ponytail(count: int = 200, seed: int = 4) -> StrandSet:
@@ -29,12 +31,13 @@ def ponytail(count: int = 200, seed: int = 4) -> StrandSet:
     points = np.concatenate([to_ring, tail[:, 1:]], axis=1)
     points[::20, :, 1] -= 0.15 * np.linspace(0.0, 1.0, points.shape[1])  # these pass by
     number = points.shape[1]
-    return StrandSet(
+    strands = StrandSet(
         points.reshape(-1, 3),
         np.arange(count + 1) * number,
         np.full(count * number, 4e-5),
         np.zeros(count, np.int32),
     )
+    return resample(strands, CV_COUNT)  # as many as guides have
 
 
 def tie() -> Tie:
@@ -46,7 +49,9 @@ def tie() -> Tie:
 
 
 def rig_of(holders: Holders, **settings: int) -> Rig:
-    chosen = GuideSettings(**{"guide_count": 40, "cv_count": 24, "tip_distance": 0.03, **settings})
+    chosen = GuideSettings(
+        **{"guide_count": 40, "cv_count": CV_COUNT, "tip_distance": 0.03, **settings}
+    )
     return pipeline.prepare(ponytail(), None, chosen, place="hair", holders=holders)
 
 
@@ -95,6 +100,10 @@ def played(rig: Rig, poses: list[Pose], settings: DynamicsSettings, fps: float):
         yield motion
 
 
+def grid(rig: Rig, points: np.ndarray) -> np.ndarray:
+    return points.reshape(rig.strands.grid.shape)
+
+
 TIPS = TipSurface(
     "Bun",
     Surface(np.array([[-1.0, -1, -0.155], [1, -1, -0.155], [0, 1, -0.155]]), np.array([[0, 1, 2]])),
@@ -115,9 +124,9 @@ def test_all_strands_stay_in_a_ring_that_turns_with_the_head(holders: Holders) -
     poses = [pose_at(rig, shaking(frame / 24.0)) for frame in range(30)]
     rest, swung = lengths(rig.strands.grid), 0.0
     for motion in played(rig, poses, DynamicsSettings(), 24.0):
-        strands = pipeline.strands_now(rig, motion)
+        strands = grid(rig, pipeline.strands_now(rig, motion))
         assert escape(rig, motion.pose, strands).max() < 1e-4
-        away = np.abs(strands - pipeline.strands_at_rest(rig, motion.pose))
+        away = np.abs(strands - grid(rig, pipeline.strands_at_rest(rig, motion.pose)))
         swung = max(swung, float(away.max()))
         assert np.isfinite(strands).all()
         assert np.abs(lengths(strands) / rest - 1.0).max() < 0.002
@@ -142,10 +151,10 @@ def test_hair_beyond_a_tie_follows_the_tie_and_not_the_head() -> None:
 def test_hair_at_rest_stays_as_it_is_to_the_last_bit() -> None:
     rig = rig_of(Holders((tie(),), TIPS))
     pose = pose_at(rig, np.eye(4))
-    np.testing.assert_array_equal(pipeline.strands_at_rest(rig, pose), rig.strands.grid)
+    np.testing.assert_array_equal(pipeline.strands_at_rest(rig, pose), rig.strands.points)
     guides = pipeline.style_of_guides(rig, pose)
     np.testing.assert_array_equal(guides, rig.strands.grid[rig.guides])
-    np.testing.assert_array_equal(pipeline.strands_at(rig, pose, guides), rig.strands.grid)
+    np.testing.assert_array_equal(pipeline.strands_at(rig, pose, guides), rig.strands.points)
 
 
 def test_a_tie_that_goes_away_in_mid_motion_lets_go() -> None:
@@ -153,7 +162,7 @@ def test_a_tie_that_goes_away_in_mid_motion_lets_go() -> None:
     poses = [pose_at(rig, shaking(frame / 24.0)) for frame in range(24)]
     gone = [replace(pose, anchors=np.full_like(pose.anchors, np.nan)) for pose in poses[12:]]
     motions = list(played(rig, poses[:12] + gone, DynamicsSettings(), 24.0))
-    ends = [pipeline.strands_now(rig, motion) for motion in motions]
+    ends = [grid(rig, pipeline.strands_now(rig, motion)) for motion in motions]
     assert all(np.isfinite(end).all() for end in ends)
     assert escape(rig, poses[11], ends[10]).max() < 1e-4
     assert escape(rig, poses[-1], ends[-1]).max() > 1e-3
@@ -169,7 +178,7 @@ def test_a_tie_that_is_torn_off_leaves_every_length() -> None:
         poses.append(pose_at(rig, np.eye(4), away))
     rest = lengths(rig.strands.grid[rig.guides])
     for motion in played(rig, poses, DynamicsSettings(), 24.0):
-        strands = pipeline.strands_now(rig, motion)
+        strands = grid(rig, pipeline.strands_now(rig, motion))
         assert np.isfinite(strands).all()
         assert np.abs(lengths(motion.dynamics.grid) / rest - 1.0).max() < 0.005
 

@@ -54,7 +54,7 @@ class BakedRig:
         return (found, held) == (head, anchors) and frame["guides"].shape == guides
 
     def strands(self, frame: Arrays) -> Floats:
-        """All strands in a frame, (strand_count, cv_count, 3) float32 world [m]."""
+        """All strands in a frame, (point_count, 3) float32 world [m]."""
         return pipeline.strands_at(self.rig, self.pose(frame), frame["guides"])
 
 
@@ -140,6 +140,8 @@ def _holds_of(arrays: Arrays, strands: StrandSet) -> Holds | None:
         arrays.get("tip_barycentric"),
     )
     _check_indices(holds.strand, strands.strand_count)
+    if (holds.place < 0.0).any() or (holds.place >= strands.point_counts[holds.strand]).any():
+        raise ValueError("a strand is held beyond its tip")
     _check_indices(holds.anchor, holds.anchor_count)
     if not len(holds.strand) == len(holds.place) == len(holds.anchor):
         raise ValueError("holds do not fit together")

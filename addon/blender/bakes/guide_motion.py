@@ -91,6 +91,6 @@ class BakedGuides:
         return playback.rig_in(self.cache).pose(arrays), arrays["guides"]
 
     def strands(self, frame: int) -> tuple[Pose, Floats]:
-        """The pose, and all strands (strand_count, cv_count, 3) [m, world]."""
+        """The pose, and all strands (point_count, 3) [m, world]."""
         pose, guides = self.at(frame)
         return pose, pipeline.strands_at(self.rig, pose, guides)

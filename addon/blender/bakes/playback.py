@@ -86,7 +86,7 @@ def rig_in(cache: Cache) -> BakedRig:
 
 
 def strands_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
-    """All strands of a groom, in the shape of `pipeline.strands_at`, world [m].
+    """All strands of a groom, (point_count, 3) world [m].
 
     Before the first frame and after the last one they stay as they are in these. Between two
     frames, where motion blur looks, they go straight.
@@ -182,7 +182,7 @@ def _write(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> No
         raise HairloomError("there is no bake here", place=str(folder), remedy="Bake again")
     points = strands_in(cache, scene.frame_current, scene.frame_subframe)
     is_same = curves.hairloom.baked_rig in ("", cache.facts.rig_hash)
-    if 3 * len(curves.position_data) != points.size or not is_same:
+    if len(curves.position_data) != len(points) or not is_same:
         raise HairloomError(
             "these curves are not those of the bake", place=curves.name, remedy="Bake again"
         )

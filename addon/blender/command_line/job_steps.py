@@ -84,6 +84,7 @@ def tell_rig(report: Report, rig: Rig, name: str) -> None:
         widths=rig.widths.line,
         cv_count=rig.guide_grid.shape[1],
         points=rig.strands.point_count,
+        points_of_a_strand_max=int(rig.strands.point_counts.max()),
         bounds_m=[low.round(5).tolist(), high.round(5).tolist()],
     )
 

@@ -91,7 +91,7 @@ class Studio:
         """Hair at these points on the head in this pose, (height, width, 4) scene-linear.
 
         Args:
-            points: of all strands [m], world space, in the shape of `pipeline.strands_at`.
+            points: (point_count, 3) [m], world space.
             samples: sub-pixels along each side of a pixel.
             camera: in place of the studio's own.
             lights: in place of the stage's, which are attached to the camera.

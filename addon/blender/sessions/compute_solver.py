@@ -36,7 +36,7 @@ class ComputeSolver:
         self._is_drawn = False
         self._dynamics: DynamicsPass | None = None
         self._ride = RidePass(
-            rig.strands, rig.head, rig.guides, rig.guide_grid, rig.weights, rig.holds
+            rig.strands, rig.head, rig.guides, rig.guide_grid, rig.riders, rig.holds
         )
 
     @property

@@ -13,7 +13,7 @@ from ... import pipeline
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...pipeline import Pose, Rig
-from ...strands.resample import resample
+from ...strands.center_lines import center_lines
 from ..bakes import playback
 from ..bakes.cache import Cache
 from ..bakes.groom_hashes import frame_rate
@@ -60,7 +60,7 @@ class BakedMotion:
         return self.cache.facts.frame_rate
 
     def at(self, frame: int, _depsgraph: bpy.types.Depsgraph) -> Floats:
-        return playback.strands_in(self.cache, frame).reshape(-1, 3)
+        return playback.strands_in(self.cache, frame)
 
 
 @dataclass(frozen=True)
@@ -101,13 +101,13 @@ class ChildrenMotion:
         read = usable_curves(_found(self.hair), depsgraph).strands
         if read.strand_count != self.count:
             raise _other_curves(self.hair, frame)
-        now = resample(read.take(self.guides), self.rig.guide_grid.shape[1]).grid
+        now = center_lines(read.take(self.guides), self.rig.guide_grid.shape[1]).grid
         positions = None
         if self.rig.head is not None:
             name = self.body.handle.name
             positions = read_positions(self.body.found(), depsgraph, place=name)
         pose = Pose(positions, self.body.moved(depsgraph))
-        return pipeline.strands_at(self.rig, pose, now).reshape(-1, 3)
+        return pipeline.strands_at(self.rig, pose, now)
 
 
 def moving_hair(

@@ -18,6 +18,7 @@ from ...pipeline import Rig
 from ...shading.drawn_strands import look_color, own_colors
 from ...shading.settings import ShadingSettings
 from ...strands import StrandSet
+from ...strands.needed_points import with_needed_points
 from ...strands.resample import resample
 from ..bakes import playback
 from ..bakes.cache import Cache
@@ -164,7 +165,8 @@ def _with_notes(
 
 def _as_wide_as_drawn(hair: bpy.types.Object, strands: StrandSet) -> StrandSet:
     settings = hair.data.hairloom
-    drawn, widths = with_widths(resample(strands, settings.guides.cv_count), settings.widths.method)
+    drawn = with_needed_points(strands, settings.guides.cv_count)
+    drawn, widths = with_widths(drawn, settings.widths.method)
     return as_wide(strands, drawn) if widths.is_found else strands
 
 

@@ -17,7 +17,7 @@ from hairloom.addon.params import SettingsMap
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.strands import StrandSet
-from hairloom.addon.strands.simplify import simplify
+from hairloom.addon.strands.needed_points import with_needed_points
 
 SETTINGS = SettingsMap(
     CardSettings(source="clusters", card_count=12),
@@ -45,7 +45,7 @@ def waving(count: int = 200, cv_count: int = 64) -> StrandSet:
 def test_cards_of_points_by_need_are_those_of_many_points() -> None:
     dense = waving()
     rig = pipeline.prepare(dense, None, GuideSettings(cv_count=64), place="test")
-    uneven = simplify(rig.strands, 2e-4).strands
+    uneven = with_needed_points(rig.strands, 16)
     assert not uneven.is_uniform and uneven.point_count < 0.9 * dense.point_count
     expected, found = (
         result_of(card_flow.card_build_steps(replace(rig, strands=strands), SETTINGS)).finest
@@ -63,4 +63,4 @@ def test_rows_are_what_most_strands_need() -> None:
     assert row_count(np.full(100_000, 200)) == 40, "not more than memory holds"
     even = waving(10)
     assert card_strands(even) is even
-    assert card_strands(simplify(even, 2e-4).strands).grid.shape[1] >= 16
+    assert card_strands(with_needed_points(even, 16)).grid.shape[1] >= 16

@@ -70,10 +70,24 @@ def test_missing_root_uvs_come_from_the_surface_and_own_ones_stay(egg: Surface) 
     assert bind_roots(strands, bare, place="test").strands.root_uv is None
 
 
+def followed(strands: StrandSet, rest: RootFrames, now: RootFrames) -> Floats:
+    return follow(strands.points, strands.point_counts, rest, now).reshape(strands.grid.shape)
+
+
+def test_strands_of_any_point_counts_go_each_with_its_own_root(egg: Surface) -> None:
+    even = bind_roots(hair_on(egg, 1300, offset=0.003), egg, place="test").strands
+    rest, now = frames_of(even, egg.positions, egg), frames_of(even, 1.5 * egg.positions, egg)
+    whole, counts = followed(even, rest, now), np.random.default_rng(1).integers(2, 9, 1300)
+    parts = [points[:count] for points, count in zip(even.grid, counts, strict=True)]
+    expected = [points[:count] for points, count in zip(whole, counts, strict=True)]
+    found = follow(np.concatenate(parts), counts, rest, now)
+    assert np.array_equal(found, np.concatenate(expected))
+
+
 def test_at_rest_every_bit_stays(egg: Surface) -> None:
     strands = bind_roots(hair_on(egg, 300, offset=0.003), egg, place="test").strands
     frames = frames_of(strands, egg.positions, egg)
-    assert (follow(strands.grid, frames, frames) == strands.grid).all()
+    assert (followed(strands, frames, frames) == strands.grid).all()
 
 
 def test_rigid_motion_passes_through(egg: Surface) -> None:
@@ -83,7 +97,7 @@ def test_rigid_motion_passes_through(egg: Surface) -> None:
     # in float64, so that only what `follow` does is seen
     now = frames_of(strands, egg.positions.astype(np.float64) @ turn.T + shift, egg)
     expected = strands.grid.astype(np.float64) @ turn.T + shift
-    assert np.abs(follow(strands.grid, rest, now) - expected).max() < 1e-7
+    assert np.abs(followed(strands, rest, now) - expected).max() < 1e-7
 
 
 def test_each_strand_goes_rigidly_when_the_surface_bends(egg: Surface) -> None:
@@ -91,7 +105,7 @@ def test_each_strand_goes_rigidly_when_the_surface_bends(egg: Surface) -> None:
     bent = egg.positions.astype(np.float64)
     bent = bent * (1.0 + 0.3 * np.sin(20.0 * bent[:, [2, 0, 1]]))
     rest, now = frames_of(strands, egg.positions, egg), frames_of(strands, bent, egg)
-    moved = follow(strands.grid, rest, now)
+    moved = followed(strands, rest, now)
 
     def distances(grid: Floats) -> Floats:
         return np.linalg.norm(grid[:, :, None] - grid[:, None], axis=3)
@@ -146,7 +160,7 @@ def test_no_strands_bind_and_no_faces_are_told(egg: Surface) -> None:
     none = bind_roots(strands.take(np.zeros(0, np.int64)), egg, place="test").strands
     assert none.is_bound
     frames = frames_of(none, egg.positions, egg)
-    assert follow(none.grid, frames, frames).shape[0] == 0
+    assert followed(none, frames, frames).shape[0] == 0
     with pytest.raises(HairloomError, match="no faces"):
         bind_roots(strands, Surface(egg.positions, np.zeros((0, 3))), place="test")
 

@@ -11,6 +11,8 @@ import pytest
 from hairloom.addon.arrays import Floats, Ints
 from hairloom.addon.groom.weights import GuideWeights
 from hairloom.addon.refine.ride import Riders, guide_turns, ride
+from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands.center_lines import center_lines
 
 SPACING = 0.015  # [m], between CVs
 
@@ -37,10 +39,14 @@ def on_one_guide(guide: Ints) -> GuideWeights:
     return GuideWeights(np.repeat(guide[:, None], 3, axis=1), weight)
 
 
+def set_of(points: Floats, offsets: Ints) -> StrandSet:
+    return StrandSet(points, offsets, np.zeros(len(points)), np.zeros(len(offsets) - 1))
+
+
 def rode(rest: Floats, weights: GuideWeights, guides: Floats, now: Floats) -> Floats:
     """Strands of one CV count, (strand_count, cv_count, 3)."""
     offsets = np.arange(len(rest) + 1) * rest.shape[1]
-    riders = Riders.of(rest.reshape(-1, 3), offsets, guides, weights)
+    riders = Riders.of(set_of(rest.reshape(-1, 3), offsets), guides, weights)
     return ride(rest.reshape(-1, 3), riders, guides, now).reshape(rest.shape)
 
 
@@ -87,6 +93,8 @@ def one_by_one(rest: Floats, weights: GuideWeights, guides: Floats, now: Floats)
     found = rest.copy()
     for strand, guide_of, weight_of in zip(found, weights.guide, weights.weight, strict=True):
         edges = np.diff(strand, axis=0)
+        line = center_lines(set_of(strand, np.array([0, len(strand)])), guides.shape[1])
+        reach = line.lengths()[0] / np.linalg.norm(edges, axis=1).sum()
         strand[0] += weight_of @ (now - guides)[guide_of, 0]
         reached = 0.0
         for segment, edge in enumerate(edges):
@@ -95,7 +103,7 @@ def one_by_one(rest: Floats, weights: GuideWeights, guides: Floats, now: Floats)
             for guide, weight in zip(guide_of, weight_of, strict=True):
                 count = turns.shape[1]
                 length = np.linalg.norm(np.diff(guides[guide], axis=0), axis=1).sum()
-                place = np.clip(middle / length * count - 0.5, 0.0, count - 1)
+                place = np.clip(middle * reach / length * count - 0.5, 0.0, count - 1)
                 before = min(int(place), count - 2)
                 near, far = (quaternion(turns[guide, before + side]) for side in (0, 1))
                 blend += weight * (near + (place - before) * (far - near))
@@ -169,18 +177,17 @@ def coil(turns: int, cv_count: int, length: float = 0.2, radius: float = 0.008) 
 
 def test_a_coil_stays_this_coil_on_a_guide_that_bends_to_an_arc() -> None:
     """Its windings lie around the arc as they lay around the straight guide."""
-    strand, angle = coil(20, 400), np.linspace(0.0, np.pi / 2, 65)
-    bend = 0.2 / (np.pi / 2)
-    straight = np.stack([0 * angle, 0 * angle, -bend * angle], axis=1)[None]
-    arc = bend * np.stack([1.0 - np.cos(angle), 0 * angle, -np.sin(angle)], axis=1)[None]
-    length = float(lengths(strand[None]).sum())
-    riders = Riders.of(strand, np.array([0, 400]), straight * (length / 0.2), on_one_guide([0]))
-    found = ride(strand, riders, straight, arc)
-    assert lengths(found[None]).sum() == pytest.approx(length, rel=1e-6)
+    strand, bend = coil(20, 400), 0.2 / (np.pi / 2)
+    coils = set_of(strand, np.array([0, 400]))
+    line = center_lines(coils, 16).grid
+    angle, away = -line[..., 2] / bend, bend - line[..., 0]
+    places = [bend - away * np.cos(angle), line[..., 1], -away * np.sin(angle)]
+    found = ride(strand, Riders.of(coils, line, on_one_guide([0])), line, np.stack(places, axis=-1))
+    assert lengths(found[None]).sum() == pytest.approx(lengths(strand[None]).sum(), rel=1e-6)
     # from the middle of the arc's circle, the windings reach as far in as out
-    away = np.hypot(found[:, 0] - bend, found[:, 2]) - bend
-    sides = np.hypot(away, found[:, 1])
-    assert sides == pytest.approx(0.008, rel=0.02)
+    radius = np.hypot(np.hypot(found[:, 0] - bend, found[:, 2]) - bend, found[:, 1])
+    assert radius == pytest.approx(0.008, rel=0.06)
+    assert found[-1, 2] == pytest.approx(-bend, abs=0.01)
 
 
 def test_guides_that_fold_back_turn_nothing_further_than_themselves() -> None:
@@ -240,7 +247,7 @@ def test_strands_of_any_number_of_points(strand_count: int) -> None:
     offsets = np.concatenate([[0], np.cumsum(counts)])
     strands = [walk[:count] for walk, count in zip(walks(strand_count, 30, 4), counts, strict=True)]
     points = np.concatenate([np.zeros((0, 3), np.float32), *strands])
-    found = ride(points, Riders.of(points, offsets, guides, weights), guides, now)
+    found = ride(points, Riders.of(set_of(points, offsets), guides, weights), guides, now)
     assert found.shape == points.shape
     for strand in range(0, strand_count, 37):
         own = GuideWeights(weights.guide[strand : strand + 1], weights.weight[strand : strand + 1])
@@ -254,7 +261,7 @@ def test_riding_takes_little_more_memory_than_its_result() -> None:
     for strand_count in (20_000, 60_000):
         rest = walks(strand_count, 7, 3).reshape(-1, 3)
         offsets = np.arange(strand_count + 1) * 7
-        riders = Riders.of(rest, offsets, guides, random_weights(strand_count, 20))
+        riders = Riders.of(set_of(rest, offsets), guides, random_weights(strand_count, 20))
         tracemalloc.start()
         size = ride(rest, riders, guides, guides).nbytes
         _, peak = tracemalloc.get_traced_memory()

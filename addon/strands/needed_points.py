@@ -1,0 +1,140 @@
+"""As many points as each strand needs, so that its shape stays what it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from .join import joined
+from .resample import resample
+from .strand_set import StrandSet
+
+#: Points that a strand may have, at most.
+MAX_POINTS = 256
+#: Of its length a strand may lose this.
+LOST = 0.005
+#: A strand may stray by this part of the hair's median length: 0.2 mm of 25 cm.
+STRAY = 8.0e-4
+#: Each count that is tried is larger than the one before by about this factor.
+_STEP = 1.25
+#: Points looked at at once.
+_CHUNK = 1_000_000
+
+
+def with_needed_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -> StrandSet:
+    """The same strands with fewer points where these do, and more where there are few.
+
+    A strand of more than `least` points is resampled evenly, if it then loses at most LOST of its
+    length and strays by at most STRAY of the median length of all. Else it keeps its points. One of
+    fewer than `least` gets more between its own.
+    """
+    own = strands.point_counts
+    needed = needed_points(strands, least, most)
+    if np.array_equal(needed, own):
+        return strands
+    parts, order = [], []
+    for count in np.unique(needed).tolist():
+        for is_refined in (False, True):
+            chosen = np.flatnonzero((needed == count) & ((own < count) == is_refined))
+            if len(chosen):
+                some = strands.take(chosen)
+                parts.append(_refined(some, count) if is_refined else resample(some, count))
+                order.append(chosen)
+    whole = parts[0]
+    for part in parts[1:]:
+        whole = joined(whole, part)
+    return whole.take(np.argsort(np.concatenate(order)))
+
+
+def needed_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -> Ints:
+    """How many points `with_needed_points` gives each strand, (strand_count,)."""
+    own = strands.point_counts
+    needed = np.clip(own, least, most)
+    if not strands.strand_count:
+        return needed
+    stray = STRAY * float(np.median(strands.lengths()))
+    left = np.flatnonzero(own > least)
+    for count in _counts(least, most):
+        left = left[own[left] > count]
+        if not len(left):
+            break
+        suffices = np.zeros(len(left), bool)
+        size = max(_CHUNK // int(own[left].max()), 1)
+        for start in range(0, len(left), size):
+            part = strands.take(left[start : start + size])
+            suffices[start : start + size] = _suffices(part, count, stray)
+        needed[left[suffices]] = count
+        left = left[~suffices]
+    return needed
+
+
+def _counts(least: int, most: int) -> list[int]:
+    counts, count = [], float(least)
+    while count < most:
+        counts.append(round(count))
+        count *= _STEP
+    return counts
+
+
+def _suffices(strands: StrandSet, count: int, stray: float) -> Bools:
+    """Whether each strand is the same by `count` even points."""
+    even = resample(strands, count)
+    kept = even.lengths() >= (1.0 - LOST) * strands.lengths()
+    # each point against the place as far along the even ones: no nearer than the nearest
+    counts, first = strands.point_counts, strands.offsets[:-1]
+    step = np.zeros(strands.point_count)
+    step[1:] = np.linalg.norm(np.diff(strands.points, axis=0), axis=1)
+    step[first] = 0.0
+    along = np.cumsum(step)
+    along -= np.repeat(along[first], counts)
+    whole = np.repeat(np.maximum(along[strands.offsets[1:] - 1], 1.0e-30), counts)
+    place = np.clip(along / whole, 0.0, 1.0) * (count - 1)
+    before = np.minimum(place.astype(np.int64), count - 2)
+    part = (place - before)[:, None]
+    before += np.repeat(np.arange(strands.strand_count) * count, counts)
+    on_even = even.points[before] * (1.0 - part) + even.points[before + 1] * part
+    away = np.linalg.norm(strands.points - on_even, axis=1)
+    return np.asarray(kept & (np.maximum.reduceat(away, first) <= stray))
+
+
+def _refined(strands: StrandSet, count: int) -> StrandSet:
+    """With `count` points, their own among them: the others lie between these, most of them where
+    they are far apart."""
+    left = np.empty((strands.strand_count, count), np.int64)
+    weight = np.empty((strands.strand_count, count))
+    own = strands.point_counts
+    for number in np.unique(own).tolist():
+        some = np.flatnonzero(own == number)
+        points = strands.take(some).grid.astype(np.float64)
+        pieces = _pieces(np.linalg.norm(np.diff(points, axis=1), axis=2), count - 1)
+        begin = np.cumsum(pieces, axis=1) - pieces
+        segment = (np.arange(count)[:, None] >= begin[:, None]).sum(axis=2) - 1
+        inside = np.arange(count) - np.take_along_axis(begin, segment, axis=1)
+        weight[some] = inside / np.take_along_axis(pieces, segment, axis=1)
+        left[some] = strands.offsets[some, None] + segment
+    part = weight[..., None].astype(np.float32)
+
+    def between(values: Floats) -> Floats:
+        near, far = values[left], values[left + 1]
+        mixed: Floats = np.where(part == 1.0, far, near + (far - near) * part)
+        return mixed.reshape(-1, values.shape[1])
+
+    return replace(
+        strands,
+        points=between(strands.points),
+        offsets=np.arange(strands.strand_count + 1) * count,
+        radius=between(strands.radius[:, None])[:, 0],
+        color=None if strands.color is None else between(strands.color),
+    )
+
+
+def _pieces(length: Floats, count: int) -> Ints:
+    """How many pieces each segment gets, (n, segments): at least one each, and by length."""
+    segments = length.shape[1]
+    wanted = length / np.maximum(length.sum(axis=1, keepdims=True), 1.0e-30) * (count - segments)
+    pieces = wanted.astype(np.int64)
+    spare = count - segments - pieces.sum(axis=1)
+    rank = np.argsort(np.argsort(pieces - wanted, axis=1, kind="stable"), axis=1, kind="stable")
+    return pieces + 1 + (rank < spare[:, None]) + 0 * segments
