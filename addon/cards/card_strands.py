@@ -6,7 +6,8 @@ import numpy as np
 
 from ..arrays import Ints
 from ..strands import StrandSet
-from ..strands.resample import resample
+from ..strands.arc_length import uneven_along
+from ..strands.resample import evenly_spaced, resample
 
 #: Where strands have points as they need them, cards have at least as many rows,
 _FEWEST = 16
@@ -17,10 +18,12 @@ _MAX_POINTS = 4_000_000
 
 
 def card_strands(strands: StrandSet) -> StrandSet:
-    """The same strands with one point count; those that have one already as they are."""
-    if strands.is_uniform:
+    """The same strands with one point count, evenly; those that are so already as they are."""
+    if not strands.is_uniform:
+        return resample(strands, row_count(strands.point_counts))
+    if uneven_along(strands.points, strands.offsets) is None:
         return strands
-    return resample(strands, row_count(strands.point_counts))
+    return evenly_spaced(strands, int(strands.point_counts[0]))
 
 
 def row_count(point_counts: Ints) -> int:

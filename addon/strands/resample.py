@@ -17,6 +17,11 @@ def resample(strands: StrandSet, cv_count: int) -> StrandSet:
     """
     if strands.strand_count == 0 or (strands.point_counts == cv_count).all():
         return strands
+    return evenly_spaced(strands, cv_count)
+
+
+def evenly_spaced(strands: StrandSet, cv_count: int) -> StrandSet:
+    """`resample`, also of strands that have this count already."""
     left, weight = arc_length_positions(strands, cv_count)
     points = _mix(strands.points, left, weight[..., None])
     radius = _mix(strands.radius, left, weight)
