@@ -26,21 +26,23 @@ _CHUNK = 1_000_000
 def with_needed_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -> StrandSet:
     """The same strands with fewer points where these do, and more where there are few.
 
-    A strand of more than `least` points is resampled evenly, if it then loses at most LOST of its
-    length and strays by at most STRAY of the median length of all. Else it keeps its points. One of
-    fewer than `least` gets more between its own.
+    A strand is resampled evenly to as few points as it takes to lose at most LOST of its length and
+    to stray by at most STRAY of the median length of all. Where that is no fewer than its own, it
+    keeps its own, and one of fewer than `least` gets more between them.
     """
     own = strands.point_counts
-    needed = needed_points(strands, least, most)
-    if np.array_equal(needed, own):
+    if not strands.strand_count or (own == least).all():
+        return strands
+    needed, is_even = _needed(strands, least, most)
+    if np.array_equal(needed, own) and not is_even.any():
         return strands
     parts, order = [], []
     for count in np.unique(needed).tolist():
-        for is_refined in (False, True):
-            chosen = np.flatnonzero((needed == count) & ((own < count) == is_refined))
+        for are_even in (False, True):
+            chosen = np.flatnonzero((needed == count) & (is_even == are_even))
             if len(chosen):
                 some = strands.take(chosen)
-                parts.append(_refined(some, count) if is_refined else resample(some, count))
+                parts.append(resample(some, count) if are_even else _refined(some, count))
                 order.append(chosen)
     whole = parts[0]
     for part in parts[1:]:
@@ -48,26 +50,24 @@ def with_needed_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -
     return whole.take(np.argsort(np.concatenate(order)))
 
 
-def needed_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -> Ints:
-    """How many points `with_needed_points` gives each strand, (strand_count,)."""
+def _needed(strands: StrandSet, least: int, most: int) -> tuple[Ints, Bools]:
+    """How many points each strand gets, and whether evenly, (strand_count,) each."""
     own = strands.point_counts
-    needed = np.clip(own, least, most)
-    if not strands.strand_count:
-        return needed
+    needed, is_even = np.clip(own, least, most), own > most
     stray = STRAY * float(np.median(strands.lengths()))
-    left = np.flatnonzero(own > least)
+    left = np.flatnonzero(own != least)
     for count in _counts(least, most):
-        left = left[own[left] > count]
+        left = left[(own[left] > count) | (count == least)]
         if not len(left):
             break
         suffices = np.zeros(len(left), bool)
-        size = max(_CHUNK // int(own[left].max()), 1)
+        size = max(_CHUNK // max(int(own[left].max()), count), 1)
         for start in range(0, len(left), size):
             part = strands.take(left[start : start + size])
             suffices[start : start + size] = _suffices(part, count, stray)
-        needed[left[suffices]] = count
+        needed[left[suffices]], is_even[left[suffices]] = count, True
         left = left[~suffices]
-    return needed
+    return needed, is_even
 
 
 def _counts(least: int, most: int) -> list[int]:
@@ -102,6 +102,8 @@ def _suffices(strands: StrandSet, count: int, stray: float) -> Bools:
 def _refined(strands: StrandSet, count: int) -> StrandSet:
     """With `count` points, their own among them: the others lie between these, most of them where
     they are far apart."""
+    if (strands.point_counts == count).all():
+        return strands
     left = np.empty((strands.strand_count, count), np.int64)
     weight = np.empty((strands.strand_count, count))
     own = strands.point_counts
