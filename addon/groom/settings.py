@@ -226,7 +226,7 @@ class GuideSettings(Settings):
     cv_count: int = integer(
         16,
         label="Points",
-        description="Number of points that a guide is simulated with; strands have as many as they need",
+        description="Points that a guide is simulated with; strands have as many as they need",
         soft=(8, 32),
         hard=(4, 64),
         source=_NALU,
