@@ -160,6 +160,7 @@ def shorten(position: Floats, length: Floats, held: Floats | None) -> None:
     be had, the length counts and not the held CV's place.
     """
     before = None if held is None else position.copy()
+    is_swept = np.ones(position.shape[2], bool)
     for _ in range(1 if held is None else HELD_SWEEPS):
         if held is not None and before is not None:
             np.copyto(position, before, where=held > 0.0)
@@ -167,7 +168,9 @@ def shorten(position: Floats, length: Floats, held: Floats | None) -> None:
                 near = _brought_near(position[:, cv], position[:, cv + 1], length[cv])
                 np.copyto(position[:, cv], near, where=is_moved)
         for cv in range(PINNED, position.shape[1]):
-            position[:, cv] = _brought_near(position[:, cv], position[:, cv - 1], length[cv - 1])
+            near = _brought_near(position[:, cv], position[:, cv - 1], length[cv - 1])
+            np.copyto(position[:, cv], near, where=is_swept)
+        is_swept = np.zeros(0, bool) if held is None else held.any(axis=0)
 
 
 def _brought_near(point: Floats, other: Floats, farthest: Floats) -> Floats:
