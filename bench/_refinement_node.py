@@ -5,7 +5,8 @@ the same guides of 30 points, and three of them for a strand; a frame of it is a
 depsgraph after the guides were tagged. It finds roots and weights again in each, which cannot be
 turned off. Ours is `ride`, which a frame of the preview without compute shaders goes through: it
 has the weights since the groom was built, those of the roots that the node chose, and the strands'
-rest shapes. The forms of plain numpy do the same sum.
+rest shapes. The forms of plain numpy only add up displacements, as strands that neither turn nor
+keep their lengths would take.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from _shaken_head import RADIUS, guides_on, surface_of
 
 from hairloom.addon.blender.scene.curves import read_curves, write_curves
 from hairloom.addon.groom.weights import GuideWeights, guide_weights
-from hairloom.addon.refine.ride import ride
+from hairloom.addon.refine.ride import Riders, ride
 from hairloom.addon.refine.smooth import points_at
 from hairloom.addon.strands import StrandSet
 
@@ -124,7 +125,9 @@ def node_figures() -> dict[str, float]:
         node_ms *= count / made.strand_count
         weights = _weights(made.grid[:, 0], guides, count)
         rest = summed_in_chunks(np.zeros((count, POINTS, 3), np.float32), guide_rest, weights)
-        carry = partial(ride, rest, guide_rest, guide_now, weights)
+        strands = _strand_set(rest)
+        riders = Riders.of(strands, guide_rest, weights)
+        carry = partial(ride, strands.points, riders, guide_rest, guide_now)
         ours, plain = _least([carry, *(partial(mix, rest, motion, weights) for mix in PLAIN)])
         figures |= {
             f"node_ms_{count}": round(node_ms, 2),
@@ -181,14 +184,14 @@ def _weights(roots: np.ndarray, guides: StrandSet, count: int) -> GuideWeights:
     return guide_weights(roots, np.zeros(count, np.int32), guides.grid[:, 0], group)
 
 
-def _strand_set(grid: np.ndarray, like: StrandSet) -> StrandSet:
+def _strand_set(grid: np.ndarray, like: StrandSet | None = None) -> StrandSet:
     count, points, _ = grid.shape
     return StrandSet(
         points=grid.reshape(-1, 3),
         offsets=np.arange(count + 1) * points,
         radius=np.full(count * points, 4.0e-5),
         group=np.zeros(count),
-        root_uv=like.root_uv,
+        root_uv=None if like is None else like.root_uv,
     )
 
 

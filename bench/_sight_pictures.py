@@ -153,7 +153,7 @@ def _picture(
     """The studio's, (SIZE, SIZE, 4), and where hair is in it."""
     studio = _studio(rig, settings)
     camera = camera or studio._camera(1.0)
-    points = rig.strands.grid
+    points = rig.strands.points
     drawn = studio.picture(rig.rest_pose, points, SIZE, SIZE, SAMPLES, camera, lights=lights)
     return drawn, coverage(rig, camera, SIZE, SAMPLES) > _IS_HAIR
 

@@ -97,7 +97,8 @@ def main() -> None:
     camera = frame_camera(rig.strands.bounds(), (-0.5, -1.0, 0.2), 0.5, WIDTH / HEIGHT)
     lights, ours, riding = three_point_lights(camera.view), StrandPass(), StrandPass()
     solver = ComputeSolver(rig)
-    lines = Lines(STRANDS, rig.strands.grid.shape[1])
+    shape = rig.strands.grid.shape  # grown hair has one point count
+    lines = Lines(STRANDS, shape[1])
     color = gpu.types.GPUTexture((WIDTH, HEIGHT), format="RGBA16F")
     depth = gpu.types.GPUTexture((WIDTH, HEIGHT), format="DEPTH_COMPONENT32F")
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
@@ -122,6 +123,7 @@ def main() -> None:
             ),
         )
         points = watch.measure("interpolate_ms", lambda m=motion: pipeline.strands_now(rig, m))
+        points = points.reshape(shape)
         snapshot = Snapshot(points=points, radius=radius, lights=lights)
         watch.measure(
             "draw_ms",

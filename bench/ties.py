@@ -27,6 +27,7 @@ from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
 from hairloom.addon.blender.sessions.numpy_solver import NumpySolver
 from hairloom.addon.dynamics.colliders import PosedCollider
 from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.strands.arc_length import lengths
 
 FPS, SECONDS, LIMIT_MM = 24.0, 2.0, 1.0
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -75,7 +76,8 @@ def played(tail: Ponytail, shake, collider, *, compute: bool):
     """What was seen of all strands, and some moments: (pose, strands)."""
     rig, settings = tail.rig, DynamicsSettings()
     solver = (ComputeSolver if compute else NumpySolver)(rig)
-    rest = lengths(rig.strands.grid)
+    offsets = rig.strands.offsets
+    rest = lengths(rig.strands.points, offsets)
     escapes, changes, shown, before = [], [], [], np.eye(4)
     for frame in range(1, round(SECONDS * FPS) + 1):
         matrix = shake(frame / FPS)
@@ -84,7 +86,7 @@ def played(tail: Ponytail, shake, collider, *, compute: bool):
         before, strands = matrix, solver.strands()
         assert np.isfinite(strands).all()
         escapes.append(escape(tail, solver.pose, strands))
-        changes.append(np.abs(lengths(strands) / rest - 1.0))
+        changes.append(np.abs(lengths(strands, offsets) / rest - 1.0))
         if frame % 4 == 0:
             shown.append((solver.pose, strands))
     gap, change = np.array(escapes), np.array(changes)
@@ -96,20 +98,17 @@ def played(tail: Ponytail, shake, collider, *, compute: bool):
     }, shown
 
 
-def lengths(strands: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(np.diff(strands.astype(np.float64), axis=1), axis=2).sum(axis=1)
-
-
 def escape(tail: Ponytail, pose: pipeline.Pose, strands: np.ndarray) -> np.ndarray:
     """How far each held strand is from its place in the ring [m]."""
     holds = tail.rig.holds
     first = holds.place.astype(int)
     part = (holds.place - first)[:, None]
+    first += tail.rig.strands.offsets[holds.strand]
 
-    def at(grid: np.ndarray) -> np.ndarray:
-        return grid[holds.strand, first] * (1.0 - part) + grid[holds.strand, first + 1] * part
+    def at(points: np.ndarray) -> np.ndarray:
+        return points[first] * (1.0 - part) + points[first + 1] * part
 
-    target = at(tail.rig.strands.grid) @ pose.matrix[:3, :3].T + pose.matrix[:3, 3]
+    target = at(tail.rig.strands.points) @ pose.matrix[:3, :3].T + pose.matrix[:3, 3]
     return np.linalg.norm(at(strands) - target, axis=1)
 
 

@@ -79,7 +79,7 @@ def main(folder: Path) -> None:
     )
 
     def look_and_motion(preset: Any) -> tuple[Any, tuple[Any, Any]]:
-        at_rest = rig.rest_pose, rig.strands.grid
+        at_rest = rig.rest_pose, rig.strands.points
         chosen = {one.section: one for one in preset.all}
         if "dynamics" in chosen:
             return plain, moved(rig, chosen["dynamics"])
