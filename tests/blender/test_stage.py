@@ -21,6 +21,7 @@ from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.blender.sessions.prepared_groom import prepared
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.face_hair import grow_with_face
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.params import SettingsMap
@@ -58,8 +59,12 @@ def scaled(strands: StrandSet, head: Surface, scale: float) -> tuple[StrandSet, 
     )
 
 
-def studio_of(strands: StrandSet, head: Surface) -> Studio:
-    rig = pipeline.prepare(strands, head, GuideSettings(), place="the test's hair")
+def studio_of(
+    strands: StrandSet, head: Surface, children: ChildrenSettings | None = None
+) -> Studio:
+    rig = pipeline.prepare(
+        strands, head, GuideSettings(), place="the test's hair", children=children
+    )
     settings = SettingsMap(VolumeSettings(shadows="deep"), StrandSettings())
     return Studio(prepared(rig, AmbientSettings()), GroomSettings(settings))
 
@@ -89,6 +94,16 @@ def test_a_picture_is_the_same_at_any_size(head: Surface) -> None:
     for scale in (1e-3, 1e3):
         away = np.abs(pictures[scale] - pictures[1.0])[is_seen]
         assert away.mean() < 0.005, f"at {scale:g}: {away.mean():.4f}"
+
+
+def test_children_do_not_turn_the_camera(head: Surface) -> None:
+    strands = half_a_head(head)
+    own = studio_of(strands, head).side
+    for seed in (1, 2):
+        more = ChildrenSettings(method="multi", strand_count=3000, seed=seed)
+        side = studio_of(strands, head, more).side
+        assert np.array_equal(side.front, own.front)
+        assert np.array_equal(side.three_quarter, own.three_quarter)
 
 
 def test_the_stages_that_ship_are_four_and_the_studio_is_the_default() -> None:

@@ -159,8 +159,11 @@ class Studio:
 
     @cached_property
     def side(self) -> GoodSide:
-        """From where the groom at rest is best seen."""
-        return good_side(self._rig.strands, self._rig.head)
+        """From where the groom at rest is best seen, by its own strands: children grow anew, by
+        chance, in a scene of another size.
+        """
+        own = np.arange(self._rig.strands.strand_count - self._rig.child_count)
+        return good_side(self._rig.strands.take(own), self._rig.head)
 
     def _cards_at(self, pose: Pose, guides: Floats | None) -> CardSnapshot | None:
         """The cards riding on these guides, where cards are shown."""
