@@ -30,7 +30,7 @@ from hairloom.addon.blender.sessions.prepared_groom import prepared
 from hairloom.addon.exchange.textures.srgb import srgb_encoded
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.face_hair import grow_with_face
-from hairloom.addon.groom.settings import GrowSettings
+from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.camera import Camera
 from hairloom.addon.render.snapshot import SKIN
@@ -40,6 +40,7 @@ from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.principled import PrincipledHair, settings_from
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.stage_settings import StageSettings
+from hairloom.addon.strands.resample import resample
 
 SIZE, SAMPLES = 320, 3
 #: Cycles' pictures of one colour, each with a seed of its own and denoised; paths a pixel; bounces
@@ -117,8 +118,9 @@ def cycles_figures() -> dict[str, float]:
     grown = grow_with_face(head.surface, GrowSettings(), head.weights)
     rig = rig_of((grown, head.surface), "built-in")
     room, camera = CyclesRoom(), _studio(rig)._camera(1.0)
-    drawn = drawn_radius(rig.strands.radius.reshape(rig.strands.strand_count, -1), StrandSettings())
-    room.strands(rig.strands.grid, drawn)
+    strands = resample(rig.strands, GuideSettings().cv_count)
+    drawn = drawn_radius(strands.radius.reshape(strands.strand_count, -1), StrandSettings())
+    room.strands(strands.grid, drawn)
     room.body(head.surface.positions, head.surface.triangles, SKIN, casts_shadow=True)
     room.look(camera)
     room.sun(SUN, STRENGTH)
