@@ -159,7 +159,7 @@ class Studio:
 
     @cached_property
     def side(self) -> GoodSide:
-        """From where the groom at rest is best seen, by its own strands: children grow anew, by
+        """From where the groom at rest is best seen, by its own strands: children grow again, by
         chance, in a scene of another size.
         """
         own = np.arange(self._rig.strands.strand_count - self._rig.child_count)
