@@ -163,7 +163,9 @@ def play_and_stop():
 
     def lag():
         carried = at_rest + np.array([head.location.x, 0.0, 0.0])
-        lags.append(float((carried - live().sessions()[0].strands)[:, -1, 0].mean()))
+        session = live().sessions()[0]
+        tips = session.rig.strands.offsets[1:] - 1
+        lags.append(float((carried - session.strands)[tips, 0].mean()))
         return lags[-1]
 
     head.location.x = 0.06

@@ -126,7 +126,8 @@ def played_in_both(head):
 def lag(session):
     """How far the tips are from where the style would have them [m]."""
     style = of_hairloom("pipeline").carried(session.rig, session.solver.pose)
-    return float(np.abs(session.strands[:, -1] - style[:, -1]).max())
+    tips = session.rig.strands.offsets[1:] - 1
+    return float(np.abs(session.strands[tips] - style[tips]).max())
 
 
 driver.play(steps())
