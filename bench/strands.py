@@ -31,6 +31,7 @@ from hairloom.addon.dynamics.colliders import Collider, PosedCollider
 from hairloom.addon.dynamics.colliders.signed_distance import signed_distance
 from hairloom.addon.dynamics.measure import length_changes
 from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.trajectory import curvature
 from hairloom.addon.pipeline import Motion, Pose, Rig
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.arc_length import lengths, steps
@@ -92,14 +93,16 @@ def played(rig: Rig, collider: Collider, shake: Any, fps: float) -> Iterator[tup
     """The motion in each frame, and the head's matrix."""
     assert rig.head is not None
     centre = rig.head.positions.mean(axis=0).astype(np.float64)
-    motion, before = pipeline.begin(rig, rig.rest_pose), np.eye(4)
+    motion = pipeline.begin(rig, rig.rest_pose)
+    earlier, before = None, np.eye(4)
     for frame in range(1, round(SECONDS * fps) + 1):
         matrix = shake(frame / fps, centre)
-        posed = (PosedCollider(collider, before, matrix),)
+        bent = None if earlier is None else curvature(earlier, before, matrix, 1.0)
+        posed = (PosedCollider(collider, before, matrix, bent),)
         motion = pipeline.advance(
             rig, motion, pose_of(rig, matrix), posed, DynamicsSettings(), GRAVITY, 1.0 / fps
         )
-        before = matrix
+        earlier, before = before, matrix
         yield motion, matrix
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from .arc_length import along
 from .join import joined
 from .resample import resample
 from .strand_set import StrandSet
@@ -19,7 +20,7 @@ LOST = 0.005
 STRAY = 8.0e-4
 #: Each count that is tried is larger than the one before by about this factor.
 _STEP = 1.25
-#: Points looked at at once.
+#: Points tried at once.
 _CHUNK = 1_000_000
 
 
@@ -83,20 +84,13 @@ def _suffices(strands: StrandSet, count: int, stray: float) -> Bools:
     even = resample(strands, count)
     kept = even.lengths() >= (1.0 - LOST) * strands.lengths()
     # each point against the place as far along the even ones: no nearer than the nearest
-    counts, first = strands.point_counts, strands.offsets[:-1]
-    step = np.zeros(strands.point_count)
-    step[1:] = np.linalg.norm(np.diff(strands.points, axis=0), axis=1)
-    step[first] = 0.0
-    along = np.cumsum(step)
-    along -= np.repeat(along[first], counts)
-    whole = np.repeat(np.maximum(along[strands.offsets[1:] - 1], 1.0e-30), counts)
-    place = np.clip(along / whole, 0.0, 1.0) * (count - 1)
+    place = along(strands.points, strands.offsets) * (count - 1)
     before = np.minimum(place.astype(np.int64), count - 2)
     part = (place - before)[:, None]
-    before += np.repeat(np.arange(strands.strand_count) * count, counts)
+    before += np.repeat(np.arange(strands.strand_count) * count, strands.point_counts)
     on_even = even.points[before] * (1.0 - part) + even.points[before + 1] * part
     away = np.linalg.norm(strands.points - on_even, axis=1)
-    return np.asarray(kept & (np.maximum.reduceat(away, first) <= stray))
+    return np.asarray(kept & (np.maximum.reduceat(away, strands.offsets[:-1]) <= stray))
 
 
 def _refined(strands: StrandSet, count: int) -> StrandSet:
@@ -139,4 +133,4 @@ def _pieces(length: Floats, count: int) -> Ints:
     pieces = wanted.astype(np.int64)
     spare = count - segments - pieces.sum(axis=1)
     rank = np.argsort(np.argsort(pieces - wanted, axis=1, kind="stable"), axis=1, kind="stable")
-    return pieces + 1 + (rank < spare[:, None]) + 0 * segments
+    return pieces + 1 + (rank < spare[:, None])

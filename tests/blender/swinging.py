@@ -1,7 +1,8 @@
-"""Whether previewed hair swings, as tests ask that let something happen to it meanwhile."""
+"""Hair on a head that is thrown about, and whether previewed hair swings."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -11,6 +12,20 @@ from grids import grid_of
 FRAME = 1.0 / 24.0  # [s]
 #: the push of a head in each of some frames [m]
 STEP, FRAMES = 0.03, 4
+
+
+def thrown(hair: Any, head: Any, last: int, bake: Path, peak: int = 4) -> tuple[Any, Any]:
+    """Hair and its head, which is keyed from frame 1 to `last`; quickly solved, on the CPU."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, last
+    for frame, x in ((1, 0.0), (peak, 0.1), (last, -0.05)):
+        head.location.x = x
+        head.keyframe_insert("location", frame=frame)
+    hair.hairloom.dynamics.collider_resolution = 8
+    hair.hairloom.dynamics.device = "numpy"
+    hair.hairloom.bake.folder = str(bake)
+    scene.frame_set(1)
+    return hair, head
 
 
 def swings(session: Any) -> bool:

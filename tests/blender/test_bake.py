@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from bake_files import contents, frames_in
 from grids import baked_grid, grid_of
+from swinging import thrown
 from windows_rules import windows_rules
 
 from hairloom.addon.blender.bakes import groom_hashes, playback
@@ -29,17 +30,7 @@ LAST = 8
 @pytest.fixture
 def swinging(new_hair, sphere, tmp_path):
     """Hair on a head that is thrown about for some frames: (hair, head)."""
-    hair = new_hair(sphere)
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, LAST
-    for frame, x in ((1, 0.0), (4, 0.1), (LAST, -0.05)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
-    hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.dynamics.device = "numpy"
-    hair.hairloom.bake.folder = str(tmp_path / "bake")
-    scene.frame_set(1)
-    return hair, sphere
+    return thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
 
 
 def bake(*objects, **options):

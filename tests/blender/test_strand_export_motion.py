@@ -14,6 +14,7 @@ import pytest
 from bake_files import frames_in
 from grids import baked_grid
 from strand_files import curves_of, hedgehog, needs_usd, push_up, stage_of, straight, to_unreal
+from swinging import thrown
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.preview.bake import Bake
@@ -37,17 +38,7 @@ def told(capfd: pytest.CaptureFixture[str]) -> Callable[[], str]:
 @pytest.fixture
 def swinging(new_hair: Any, sphere: Any, tmp_path: Path) -> tuple[Any, Any]:
     """Hair on a head that is thrown about for some frames: (hair, head)."""
-    hair = new_hair(sphere)
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, LAST
-    for frame, x in ((1, 0.0), (3, 0.1), (LAST, -0.05)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
-    hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.dynamics.device = "numpy"
-    hair.hairloom.bake.folder = str(tmp_path / "bake")
-    scene.frame_set(1)
-    return hair, sphere
+    return thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake", peak=3)
 
 
 def bake(*objects: Any, **options: Any) -> None:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from grids import baked_grid, grid_of
 from mathutils import Matrix
+from swinging import thrown
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.cache import Cache
@@ -62,17 +63,7 @@ def wavy():
 @pytest.fixture
 def swinging(new_hair, sphere, tmp_path):
     """Hair on a head that is thrown about for some frames: (hair, head)."""
-    hair = new_hair(sphere)
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, LAST
-    for frame, x in ((1, 0.0), (4, 0.1), (LAST, -0.05)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
-    hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.dynamics.device = "numpy"
-    hair.hairloom.bake.folder = str(tmp_path / "bake")
-    scene.frame_set(1)
-    return hair, sphere
+    return thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
 
 
 def escape(session):

@@ -172,6 +172,7 @@ def prepared(
     if occluders is None and rig.head is not None and with_occluders:
         occluders = OccluderSpheres(rig.head, rig.strands.roots)
     rank = pipeline.strand_ranks(rig)
+    _ = rig.riders  # found in the thread that builds, as the window's first frame would wait for it
     return PreparedGroom(rig, ambient, occlusion, rank, occluders)
 
 
