@@ -38,7 +38,7 @@ from .strands import StrandSet, Surface
 from .strands.center_lines import center_lines
 from .strands.face import is_face_hair
 from .strands.join import joined
-from .strands.needed_points import with_needed_points
+from .strands.needed_points import LOST, MAX_POINTS, with_needed_points
 from .strands.resample import resample
 
 NO_WIND = np.zeros(3)
@@ -182,7 +182,8 @@ def prepare(
     guides = choose_guides(lines, settings, kind)
     guide_lines = lines.take(guides)
     weights = _weights(lines, guide_lines, kind, None if kind is None else kind[guides])
-    rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head))
+    notes = _lost_length(bound, own)
+    rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head), notes)
     if children is not None and children.method == "auto":
         rig = _automatic(rig, children, density, widths, place)
     else:
@@ -196,6 +197,19 @@ def prepare(
         holds = find_holds(rig.strands, holders, reach)
     assert holds is not None
     return replace(rig, holds=holds, notes=(*rig.notes, *idle(holds, holders)))
+
+
+def _lost_length(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
+    """What is said where strands have not as many points as they need."""
+    kept = own.lengths() / np.maximum(strands.lengths(), np.float32(1.0e-30))
+    lost = 1.0 - kept[kept < 1.0 - LOST]
+    if not len(lost):
+        return ()
+    note = (
+        f"{len(lost):,} strands need more than {MAX_POINTS} points. They have {MAX_POINTS}, and lose"
+        f" up to {100.0 * float(lost.max()):.1f} % of their length. Use fewer turns."
+    )
+    return (note,)
 
 
 def _hair_length(strands: StrandSet) -> float:

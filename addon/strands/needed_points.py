@@ -12,8 +12,8 @@ from .join import joined
 from .resample import resample
 from .strand_set import StrandSet
 
-#: Points that a strand may have, at most.
-MAX_POINTS = 256
+#: Points that a strand may have, at most: 20 turns of a coil lose LOST by 410.
+MAX_POINTS = 512
 #: Of its length a strand may lose this.
 LOST = 0.005
 #: A strand may stray by this part of the hair's median length: 0.2 mm of 25 cm.
@@ -52,23 +52,36 @@ def with_needed_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -
 
 
 def _needed(strands: StrandSet, least: int, most: int) -> tuple[Ints, Bools]:
-    """How many points each strand gets, and whether evenly, (strand_count,) each."""
+    """How many points each strand gets, and whether evenly, (strand_count,) each.
+
+    The least of all strands is tried first, as it suffices for most, then what lies halfway between
+    what was too few and what was enough.
+    """
     own = strands.point_counts
-    needed, is_even = np.clip(own, least, most), own > most
+    counts = np.array(_counts(least, most))
+    # of each strand the counts that are left to try, from and up to; the last is its own
+    low = np.zeros(len(own), np.int64)
+    last = np.where(own == least, 0, np.maximum(counts.searchsorted(own), 1))
+    high = last.copy()
     stray = STRAY * float(np.median(strands.lengths()))
-    left = np.flatnonzero(own != least)
-    for count in _counts(least, most):
-        left = left[(own[left] > count) | (count == least)]
-        if not len(left):
-            break
-        suffices = np.zeros(len(left), bool)
-        size = max(_CHUNK // max(int(own[left].max()), count), 1)
-        for start in range(0, len(left), size):
-            part = strands.take(left[start : start + size])
-            suffices[start : start + size] = _suffices(part, count, stray)
-        needed[left[suffices]], is_even[left[suffices]] = count, True
-        left = left[~suffices]
-    return needed, is_even
+    tried = np.zeros(len(own), np.int64)
+    while (left := np.flatnonzero(low < high)).size:
+        for number in np.unique(tried[left]).tolist():
+            some = left[tried[left] == number]
+            suffices = _suffice(strands, some, int(counts[number]), stray)
+            high[some[suffices]] = number
+            low[some[~suffices]] = number + 1
+        tried = (low + high) // 2
+    is_even = low < last
+    needed = np.where(is_even, counts[np.minimum(low, len(counts) - 1)], np.clip(own, least, most))
+    return needed, is_even | (own > most)
+
+
+def _suffice(strands: StrandSet, some: Ints, count: int, stray: float) -> Bools:
+    """Whether some of the strands are the same by `count` even points, (n,)."""
+    size = max(_CHUNK // max(int(strands.point_counts[some].max()), count), 1)
+    parts = [some[start : start + size] for start in range(0, len(some), size)]
+    return np.concatenate([_suffices(strands.take(part), count, stray) for part in parts])
 
 
 def _counts(least: int, most: int) -> list[int]:

@@ -87,6 +87,14 @@ def test_kinks_that_even_points_would_miss_keep_their_points() -> None:
     assert np.array_equal(found.points, strands.points)
 
 
+def test_a_coil_of_twenty_turns_keeps_its_length() -> None:
+    """Whatever points it comes with: few would be put inside of the curve, on its chords."""
+    for count in (400, 1000, 5000):
+        strands = ragged(coil(20, count))
+        kept = with_needed_points(strands, 16).lengths() / strands.lengths()
+        assert kept.min() >= 1.0 - LOST
+
+
 def test_no_strand_has_more_than_the_most() -> None:
     found = with_needed_points(ragged(coil(60, 5000), coil(0, 30)), 16)
     assert found.point_counts.tolist() == [MAX_POINTS, 16]
