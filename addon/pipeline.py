@@ -206,7 +206,7 @@ def _lost_length(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
     if not len(lost):
         return ()
     note = (
-        f"{len(lost):,} strands need more than {MAX_POINTS} points. They have {MAX_POINTS}, and lose"
+        f"{len(lost):,} strands need more than {MAX_POINTS} points. They have that many, and lose"
         f" up to {100.0 * float(lost.max()):.1f} % of their length. Use fewer turns."
     )
     return (note,)
