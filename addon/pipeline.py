@@ -105,6 +105,11 @@ class Rig:
     def riders(self) -> Riders:
         return Riders.of(self.strands, self.guide_grid, self.weights)
 
+    @cached_property
+    def rest_lengths(self) -> Floats:
+        """Of all strands, (strand_count,) [m]."""
+        return self.strands.lengths()
+
     @property
     def rest_pose(self) -> Pose:
         return Pose(None if self.head is None else self.head.positions, np.eye(4))

@@ -119,17 +119,17 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
     search = ClosestPointSearch(rig.head)
     offsets, rest = rig.strands.offsets, rig.strands.points
     were_outside = _distance(rest, np.eye(4), collider) >= 0.0
-    segments = steps(rest, offsets)
+    segments, rest_lengths = steps(rest, offsets), lengths(rest, offsets)
     change, depth, worst = (np.zeros(rig.strands.strand_count) for _ in range(3))
     for motion, matrix in played(rig, collider, shake, fps):
         points = pipeline.strands_now(rig, motion)
         assert np.isfinite(points).all()
-        np.maximum(change, length_changes(points, rest, offsets), out=change)
+        np.maximum(change, length_changes(points, offsets, rest_lengths), out=change)
         off = np.abs(steps(points, offsets) - segments) / np.maximum(segments, 1.0e-5)
         np.maximum(worst, np.maximum.reduceat(off, offsets[:-1]), out=worst)
         deep = _depths(points, matrix, collider, search, were_outside)
         np.maximum(depth, np.maximum.reduceat(deep, offsets[:-1]), out=depth)
-    depth *= MEDIAN_LENGTH / np.median(lengths(rest, offsets))
+    depth *= MEDIAN_LENGTH / np.median(rest_lengths)
     return {
         "length_p99_percent": float(np.quantile(change, 0.99)) * 100.0,
         "length_worst_percent": float(change.max()) * 100.0,

@@ -43,15 +43,16 @@ def deepest_penetration(state: DynamicsState, colliders: tuple[PosedCollider, ..
     return deepest
 
 
-def length_changes(points: Floats, rest: Floats, offsets: Ints) -> Floats:
+def length_changes(points: Floats, offsets: Ints, rest_lengths: Floats) -> Floats:
     """By which fraction of its length at rest each strand is longer or shorter, (strand_count,).
 
     Args:
-        points, rest: (point_count, 3) [m], strand after strand.
+        points: (point_count, 3) [m], strand after strand.
         offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
+        rest_lengths: (strand_count,) [m].
     """
-    before = lengths(rest, offsets)
-    return np.abs(lengths(points, offsets) - before) / np.maximum(before, TINY)
+    change = np.abs(lengths(points, offsets) - rest_lengths)
+    return np.asarray(change / np.maximum(rest_lengths, TINY))
 
 
 def are_outside(points: Floats, colliders: tuple[PosedCollider, ...]) -> Bools:

@@ -19,15 +19,16 @@ def steps(points: Floats, offsets: Ints) -> Floats:
     """
     length = np.zeros(len(points))
     if len(points):
-        length[1:] = np.linalg.norm(np.diff(points.astype(np.float64), axis=0), axis=1)
+        step = np.diff(points.astype(np.float64), axis=0)
+        np.sqrt(np.einsum("ij,ij->i", step, step), out=length[1:])
         length[offsets[:-1]] = 0.0
     return length
 
 
 def lengths(points: Floats, offsets: Ints) -> Floats:
-    """Arc length of each strand, (strand_count,) float64 [m]; arguments as of `steps`."""
+    """Arc length of each strand, (strand_count,) float32 [m]; arguments as of `steps`."""
     totals = np.concatenate([[0.0], np.cumsum(steps(points, offsets))])
-    return totals[offsets[1:]] - totals[offsets[:-1]]
+    return (totals[offsets[1:]] - totals[offsets[:-1]]).astype(np.float32)
 
 
 def along(points: Floats, offsets: Ints) -> Floats:

@@ -131,7 +131,7 @@ class StrandSet:
 
     def lengths(self) -> Floats:
         """Arc length of each strand, (strand_count,) [m]."""
-        return lengths(self.points, self.offsets).astype(np.float32)
+        return lengths(self.points, self.offsets)
 
     def take(self, strands: Ints) -> StrandSet:
         """The strands with these indices, in this order."""

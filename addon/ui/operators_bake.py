@@ -14,6 +14,7 @@ from ..blender.scene.fin_modifier import fin_modifier
 from ..errors import HairloomError
 from . import long_work
 from .long_work import LongWork, Steps, counted, draw_progress
+from .operators_measure import draw_figures
 from .reports import reporting
 from .selection import chosen_hair
 
@@ -119,6 +120,8 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         text=f"Frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps, {computed}",
         icon="CHECKMARK",
     )
+    if facts.figures is not None:
+        draw_figures(layout.column(align=True), facts.figures.lines)
     if known is not None and known.changed:
         layout.label(text="Out of date: " + ", ".join(known.changed), icon="ERROR")
 

@@ -15,6 +15,7 @@ from .drawing import Draw, draw_section
 from .messages import draw_lines
 from .operators_bake import draw_bake
 from .operators_colliders import draw_colliders
+from .operators_measure import draw_measure
 from .operators_show import draw_show
 from .operators_ties import draw_ties
 from .preset_chooser import draw_preset_row
@@ -112,6 +113,7 @@ def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_preset_row(layout, hair, "dynamics")
     draw_section(layout, hair.hairloom, "dynamics")
+    draw_measure(layout, hair)
 
 
 def draw_collisions(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

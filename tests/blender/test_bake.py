@@ -575,3 +575,34 @@ def test_the_buttons_bake_and_delete(swinging, tmp_path):
     assert list(tmp_path.iterdir()) == []
     assert hair.hide_render and hair.hairloom.bake.copy is None
     assert [curves.name for curves in bpy.data.hair_curves] == ["Hair"]
+
+
+def test_a_bake_knows_how_far_its_strands_stretch_and_how_deep_they_are(swinging):
+    """Found again from its frames, and the sphere that the head is."""
+    hair, head = swinging
+    head.hairloom.collider_shape = "sphere"
+    bake(hair)
+    cache, change, depth = playback.cache_of(hair), [0.0], [0.0]
+    for frame in range(2, LAST + 1):
+        grid, matrix = baked_grid(cache, frame), playback.pose_in(cache, frame).matrix
+        length = np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1)
+        change.append(np.abs(length / 0.08 - 1.0).max())
+        depth.append(0.1 - np.linalg.norm(grid[:, 1:] - matrix[:3, 3], axis=2).min())
+    found = cache.facts.figures
+    assert found.strands_stretch_max_percent == pytest.approx(100.0 * max(change), abs=1e-3)
+    # the ball is around the mesh's box, a little larger than its faces
+    assert found.strands_penetration_max_mm == pytest.approx(1000.0 * max(depth), abs=0.2)
+
+
+def test_figures_that_are_none_make_a_bake_damaged(swinging):
+    hair, _ = swinging
+    bake(hair)
+    facts = Path(hair.hairloom.bake.folder) / "cache.json"
+    content = json.loads(facts.read_text())
+    for bad in ("many", {}, content["figures"] | {"penetration_max_mm": None}):
+        facts.write_text(json.dumps(content | {"figures": bad}))
+        with pytest.raises(HairloomError, match="damaged"):
+            Cache(facts.parent)
+    del content["figures"]  # by an earlier version
+    facts.write_text(json.dumps(content))
+    assert Cache(facts.parent).facts.figures is None

@@ -41,6 +41,7 @@ def test_a_scene_is_baked_and_saved(file, tmp_path):
     folder = tmp_path / "hairloom_cache" / "wig" / "Hair"
     assert Cache(folder).facts.last == LAST
     (baked,) = json.loads(report.read_text())["baked"]
+    assert 0.0 <= baked.pop("figures")["strands_stretch_max_percent"] < 0.01
     assert baked == {
         "object": "Hair",
         "folder": str(folder),

@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 import pytest
+from grids import grid_of
 
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.sessions import measures
@@ -40,3 +42,36 @@ def test_a_session_measures_itself(new_hair, sphere, evaluated):
     session.advance(evaluated(), 1.0 / 24.0)
     assert session.times.milliseconds("simulation") > 0.0
     assert measures.array_bytes(session.rig) >= session.rig.strands.points.nbytes
+
+
+def test_figures_are_those_of_the_frame_that_is_shown(new_hair, sphere, evaluated):
+    """Found by hand from the strands that are drawn and a head that is a ball."""
+    hair = new_hair(sphere)
+    sphere.hairloom.collider_shape = "sphere"
+    session = previews.start(hair, evaluated())
+    previews.begin(session, evaluated(), blocking=True)
+    sphere.location.x += 0.05
+    previews.advance(evaluated(), 1.0 / 24.0)
+    assert session.figures is None
+    session.measure()
+    found, points = session.figures, grid_of(session)
+    assert session.are_figures_current
+    length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    assert found.strands_stretch_max_percent == pytest.approx(
+        100.0 * np.abs(length / 0.08 - 1.0).max(), abs=1e-3
+    )
+    # points at rest on the sphere itself may count as outside or not; its ball is around all of it
+    depth = 0.1 - np.linalg.norm(points[:, 1:] - [0.05, 0.0, 0.0], axis=2).min()
+    assert found.strands_penetration_max_mm == pytest.approx(max(0.0, 1000.0 * depth), abs=0.1)
+    previews.advance(evaluated(), 1.0 / 24.0)
+    assert session.figures is found and not session.are_figures_current, "of another moment"
+    previews.rest(evaluated(), keep_playing=True)
+    assert session.figures is None
+
+
+def test_measuring_needs_hair_that_is_simulated(new_hair, sphere, evaluated):
+    session = previews.start(new_hair(sphere), evaluated())
+    assert not bpy.ops.hairloom.measure.poll()
+    session.play(evaluated())
+    assert bpy.ops.hairloom.measure() == {"FINISHED"}
+    assert session.figures.strands_stretch_max_percent < 1e-3

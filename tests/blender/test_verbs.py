@@ -25,6 +25,7 @@ WINDOW_ONLY = {
     "pause",
     "reset",
     "stop",
+    "measure",
     "fin_preview",
     "fin_reset",
     "choose_preset",

@@ -236,7 +236,24 @@ def of_hair():
     column()[0].spaces.active.context = "DATA"
     yield
     for name in ("data", "look", "shadows", "strands", "dynamics", "cards", "show"):
+        if name == "dynamics":
+            tied_and_baked()
         yield from picture(name, column)
+
+
+def tied_and_baked():
+    """Some hair goes through a ring, and a turn of the head is baked beside the file."""
+    hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
+    bpy.context.scene.cursor.location = (0.0, 0.0, 0.16)
+    choose(hair)
+    assert bpy.ops.hairloom.add_hair_tie() == {"FINISHED"}
+    choose(hair)
+    bpy.ops.wm.save_as_mainfile(filepath=str(Path(bpy.app.tempdir) / "shot.blend"))
+    for frame, angle in ((1, 0.0), (6, 0.8), (12, -0.4)):
+        head.rotation_euler.z = angle
+        head.keyframe_insert("rotation_euler", frame=frame)
+    bpy.context.scene.frame_end = 12
+    assert bpy.ops.hairloom.bake() == {"FINISHED"}
 
 
 def of_a_mesh():

@@ -27,6 +27,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ...dynamics.figures import Figures
 from ...errors import HairloomError
 from ...exchange.files.array_file import read_arrays
 from ...exchange.files.atomic import check_folder_place, remedy_for, write_bytes_atomic
@@ -54,6 +55,7 @@ class Facts:
     first, last: scene frames. frame_rate: [1/s].
     form: what computed it. rig_hash, frame_hashes (one for each frame): see `simulated.hashes`.
     hairloom: the version that wrote it.
+    figures: of the motion of hair; None of cloth, and where the version did not measure.
     """
 
     owner: str
@@ -65,6 +67,7 @@ class Facts:
     hairloom: str
     file: str = ""
     frame_hashes: tuple[str, ...] = ()
+    figures: Figures | None = None
 
     @property
     def frame_count(self) -> int:
@@ -198,10 +201,11 @@ class Cache:
         try:
             self._frame_folder = folder / _checked_name(content["frames"])
             self._layout = {str(n): (str(d), tuple(s)) for n, (d, s) in content["layout"].items()}
-            names = [name for name in Facts.__dataclass_fields__ if name != "frame_hashes"]
+            names = Facts.__dataclass_fields__.keys() - {"frame_hashes", "figures"}
             self.facts = Facts(
                 **{name: content[name] for name in names},
                 frame_hashes=tuple(content["frame_hashes"]),
+                figures=Figures.of(content.get("figures")),
             )
             _check(self.facts)
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:

@@ -110,19 +110,21 @@ class Obstacles:
                 self._fail(part, error)
         return tuple(posed)
 
-    def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Jump to the present pose, at rest.
+    def rest(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
+        """Jump to the present pose, at rest; returns where they stand.
 
         Raises:
             HairloomError: as `move`.
         """
+        posed = []
         for part in self._there(depsgraph):
             try:
                 collider, matrix = part.now(depsgraph)
-                PosedCollider(collider, matrix, matrix)
+                posed.append(PosedCollider(collider, matrix, matrix))
                 part.track.rest(matrix)
             except HairloomError as error:
                 self._fail(part, error)
+        return tuple(posed)
 
     def _there(self, depsgraph: bpy.types.Depsgraph) -> Iterator[Part]:
         """The parts that Blender evaluates; others start at rest when they return."""

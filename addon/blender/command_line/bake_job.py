@@ -92,6 +92,7 @@ def _tell(objects: list[bpy.types.Object], report: Report) -> None:
                 "last": facts.last,
                 "frame_rate": facts.frame_rate,
                 "form": facts.form,
+                "figures": None if facts.figures is None else facts.figures.as_dict(),
             }
         )
         report.add_output(folder)

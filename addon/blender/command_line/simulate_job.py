@@ -7,28 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from ... import pipeline
 from ...arrays import Floats
-from ...dynamics.colliders import PosedCollider
-from ...dynamics.measure import (
-    are_outside,
-    deepest_penetration,
-    length_changes,
-    max_stretch,
-    strand_depths,
-)
-from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...strands import Surface
 from ..bakes.guide_motion import BakedGuides
 from ..base.attributes import set_attribute
-from ..colliders.fields import field_of
 from ..colliders.ties import copy_holders
 from ..preview.bake import Bake
 from ..scene.curves import write_curves
@@ -69,7 +57,11 @@ def simulated(job: Job, inputs: Inputs, folder: Path) -> BakedGuides:
             place = inputs.groom_name if error.place == hair.name else error.place
             raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     motion = BakedGuides.in_folder(folder.resolve())
-    _tell_worst(job, inputs, motion)
+    facts = motion.cache.facts
+    assert facts.figures is not None, "it was measured while it was baked"
+    job.report.facts.update(
+        frames=facts.frame_count, frame_rate=facts.frame_rate, **facts.figures.as_dict()
+    )
     return motion
 
 
@@ -187,58 +179,6 @@ def shake_matrix(centre: Floats, seconds: float) -> Floats:
     matrix[:3, 3] = centre - matrix[:3, :3] @ centre
     matrix[0, 3] += ease * SHAKE_SWAY * np.sin(phase)
     return matrix
-
-
-def _tell_worst(job: Job, inputs: Inputs, motion: BakedGuides) -> None:
-    """Stretch and penetration in all frames, of the guides and of all strands as drawn."""
-    assert inputs.collider is not None, "simulate and demo refuse hair without a head"
-    name = job.sources.collider or job.sources.head or "built-in head"
-    rig, offsets = motion.rig, motion.rig.strands.offsets
-    with job.report.stage("measure"):
-        settings = job.settings[DynamicsSettings]
-        collider = field_of(inputs.collider, settings, place=name)
-        pose, _ = motion.at(motion.frames[0])
-        state = pipeline.begin(rig, pose).dynamics
-        at_rest = (PosedCollider(collider, np.eye(4), np.eye(4)),)
-        were_outside = are_outside(rig.strands.points, at_rest)
-        stretch, penetration = 0.0, 0.0
-        change, depth = (np.zeros(rig.strands.strand_count) for _ in range(2))
-        for frame in motion.frames[1:]:
-            pose, guides = motion.at(frame)
-            now = replace(state, position=np.ascontiguousarray(guides.transpose(2, 1, 0)))
-            posed = (PosedCollider(collider, pose.matrix, pose.matrix),)
-            stretch = max(stretch, max_stretch(now))
-            penetration = max(penetration, deepest_penetration(now, posed))
-            points = pipeline.strands_at(rig, pose, guides)
-            changes = length_changes(points, pipeline.carried(rig, pose), offsets)
-            np.maximum(change, changes, out=change)
-            np.maximum(depth, strand_depths(points, offsets, posed, were_outside), out=depth)
-    job.report.facts.update(
-        frames=len(motion.frames),
-        frame_rate=motion.frame_rate,
-        stretch_max_percent=round(stretch * 100.0, 4),
-        penetration_max_mm=round(penetration * 1000.0, 4),
-        **worst_of_strands(change, depth),
-    )
-
-
-def worst_of_strands(change: Floats, depth: Floats) -> dict[str, float]:
-    """Figures of all strands, each by its worst frame: the worst, the 99th percentile, and how many
-    are over 1 % and over 1 mm.
-
-    Args:
-        change: (strand_count,) of their length, a fraction. depth: (strand_count,) [m].
-    """
-    percent, depth_mm = change * 100.0, depth * 1000.0
-    figures = {
-        "strands_stretch_max_percent": percent.max(initial=0.0),
-        "strands_stretch_p99_percent": np.quantile(percent, 0.99) if len(percent) else 0.0,
-        "strands_stretched_percent": 100.0 * (percent > 1.0).mean() if len(percent) else 0.0,
-        "strands_penetration_max_mm": depth_mm.max(initial=0.0),
-        "strands_penetration_p99_mm": np.quantile(depth_mm, 0.99) if len(depth_mm) else 0.0,
-        "strands_inside_percent": 100.0 * (depth_mm > 1.0).mean() if len(depth_mm) else 0.0,
-    }
-    return {name: round(float(value), 4) for name, value in figures.items()}
 
 
 SIMULATE = Verb(

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import bpy
 
+from ...dynamics.figures import Measure
 from ...errors import HairloomError
 from ..bakes import baked_copy, playback
 from ..bakes.bake_settings import (
@@ -47,6 +48,7 @@ class _Part:
     writer: CacheWriter | None = None
     rig_hash: str = ""
     notes: tuple[str, ...] = ()
+    measure: Measure | None = None
 
     def go(self, frame: int, depsgraph: bpy.types.Depsgraph) -> None:
         """Simulate and write this frame, if it is one of its own."""
@@ -56,7 +58,8 @@ class _Part:
             session = self.session = simulated_for(self.found(), depsgraph)
             session.play(depsgraph)
             self.rig_hash = session.rig_hash(depsgraph)
-            self.notes = session.rig.notes if isinstance(session, Session) else ()
+            if isinstance(session, Session):
+                self.notes, self.measure = session.rig.notes, session.new_measure()
             self.writer = CacheWriter(self.folder)
             self.writer.add_constants(session.constants())
         else:
@@ -64,6 +67,8 @@ class _Part:
             if isinstance(session, Session):
                 session.take_settings()  # those that are animated
             session.advance(depsgraph, 1.0 / frame_rate(depsgraph.scene))
+            if isinstance(session, Session) and self.measure is not None:
+                session.measure_into(self.measure)
         self.writer.add(frame, session.recorded(), session.frame_hash(depsgraph))
 
     def finish(self, rate: float) -> None:
@@ -79,6 +84,7 @@ class _Part:
                 rig_hash=self.rig_hash,
                 hairloom=environment()["hairloom"],
                 file=file_name(self.found()),
+                figures=None if self.measure is None else self.measure.figures,
             )
         )
 

@@ -9,11 +9,16 @@ from functools import partial
 import bpy
 import numpy as np
 
+from ... import pipeline
 from ...arrays import Floats
+from ...dynamics.colliders import PosedCollider
+from ...dynamics.figures import Figures, Measure
 from ...dynamics.settings import DynamicsSettings
+from ...dynamics.state import start
 from ...errors import HairloomError
 from ...pipeline import Pose, Rig
 from ...render.snapshot import Snapshot
+from ...strands.arc_length import lengths
 from ..bakes.baked_rig import BakedRig, frame_arrays, rig_arrays
 from ..bakes.simulated import Arrays
 from ..base.latest_job import LatestJob
@@ -35,6 +40,8 @@ class Session:
 
     uid, hair, head: of its objects.
     groom: what it was made into; a placeholder until the first hair is made in a thread.
+    figures: as measured last since the hair was at rest. are_figures_current: whether it has not
+        moved since.
 
     Args:
         hair: a hair curves object.
@@ -73,6 +80,10 @@ class Session:
         self.obstacles: Obstacles | None = None
         self.is_playing = False
         self.is_stale = False
+        self._begun: tuple[Pose, tuple[PosedCollider, ...]] | None = None
+        self._posed: tuple[PosedCollider, ...] = ()
+        self.figures: Figures | None = None
+        self.are_figures_current = False
         self.picture = GroomPicture(
             self.hair.found, is_drawn=is_drawn, arrived=partial(arrived, self)
         )
@@ -182,7 +193,7 @@ class Session:
 
     @property
     def strands(self) -> Floats:
-        """All strands as they are shown, (strand_count, cv_count, 3) [m]; reads back from a GPU."""
+        """All strands as they are shown, (point_count, 3) [m]; reads back from a GPU."""
         return self.solver.strands()
 
     def _take(
@@ -302,8 +313,10 @@ class Session:
             HairloomError: the hair or its head is gone, or the head's mesh is another one.
         """
         self.solver.rest(self._pose(depsgraph))
+        self._begun, self.figures = None, None
         if self.is_playing and self.obstacles is not None:
-            self.obstacles.rest(depsgraph)
+            self._posed = self.obstacles.rest(depsgraph)
+            self._begun = self.solver.pose, self._posed
         self._show()
 
     def has_moved(self, depsgraph: bpy.types.Depsgraph) -> bool:
@@ -373,15 +386,42 @@ class Session:
         """
         with self.times.measured("simulation"):
             pose = self._pose(depsgraph)
+            self._posed = () if self.obstacles is None else self.obstacles.move(depsgraph, duration)
             self.solver.advance(
                 pose,
-                () if self.obstacles is None else self.obstacles.move(depsgraph, duration),
+                self._posed,
                 self.settings[DynamicsSettings],
                 gravity_of(depsgraph.scene),
                 duration,
                 scene_wind(depsgraph),
             )
             self._show()
+
+    def measure(self) -> None:
+        """Find the figures of this moment, while it is simulated."""
+        measure = self.new_measure()
+        self.measure_into(measure)
+        self.figures, self.are_figures_current = measure.figures, True
+
+    def new_measure(self) -> Measure:
+        """For the frames from rest on; while it is simulated."""
+        assert self._begun is not None, "it is simulated"
+        pose, posed = self._begun
+        rig = self.rig
+        guides = start(pipeline.carried_guides(rig, pose))
+        return Measure(guides, pipeline.carried(rig, pose), rig.strands.offsets, posed)
+
+    def measure_into(self, measure: Measure) -> None:
+        """Take the present frame into account; reads strands back from a GPU."""
+        guides = self.solver.guides()
+        measure.add(self.solver.strands(), self._rest_lengths(), guides, self._posed)
+
+    def _rest_lengths(self) -> Floats:
+        """Of all strands; those of hair without a head grow with its object."""
+        rig = self.rig
+        if rig.head is not None:
+            return rig.rest_lengths
+        return lengths(pipeline.carried(rig, self.solver.pose), rig.strands.offsets)
 
     def recorded(self) -> Arrays:
         """See `baked_rig.frame_arrays`."""
@@ -404,6 +444,7 @@ class Session:
         self._show()
 
     def _show(self) -> None:
+        self.are_figures_current = False
         self.picture.show(self.rig, self.solver, self.settings)
 
 

@@ -1,0 +1,140 @@
+"""Figures of a motion: how far guides and strands stretch, and how deep in colliders they are."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Self
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .colliders import PosedCollider
+from .measure import (
+    are_outside,
+    deepest_penetration,
+    length_changes,
+    max_stretch,
+    strand_depths,
+)
+from .state import DynamicsState
+
+type Colliders = tuple[PosedCollider, ...]
+
+#: What counts as stretched, a fraction, and as inside [m].
+STRETCHED, INSIDE = 0.01, 0.001
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Of some frames, each guide and each strand by its worst one. Reports have the same names.
+
+    stretch_max_percent: of a guide's segment. penetration_max_mm: of a guide's point.
+    strands_stretch_*: change of length of all strands as drawn; the worst, and the 99th percentile.
+    strands_stretched_percent: how many change by more than 1 %.
+    strands_penetration_*: how deep all strands as drawn are where they were outside at rest.
+    strands_inside_percent: how many are deeper than 1 mm.
+    """
+
+    stretch_max_percent: float = 0.0
+    penetration_max_mm: float = 0.0
+    strands_stretch_max_percent: float = 0.0
+    strands_stretch_p99_percent: float = 0.0
+    strands_stretched_percent: float = 0.0
+    strands_penetration_max_mm: float = 0.0
+    strands_penetration_p99_mm: float = 0.0
+    strands_inside_percent: float = 0.0
+
+    @classmethod
+    def of(cls, values: object) -> Self | None:
+        """As `as_dict` gives them, from a file; None where it has none.
+
+        Raises:
+            ValueError: they are something else.
+        """
+        if values is None:
+            return None
+        names = {field.name for field in fields(cls)}
+        if not isinstance(values, dict) or set(values) != names:
+            raise ValueError("its figures are others")
+        if not all(isinstance(value, int | float) for value in values.values()):
+            raise ValueError("its figures are no numbers")
+        if not all(math.isfinite(value) for value in values.values()):
+            raise ValueError("its figures are not finite")
+        return cls(**values)
+
+    def as_dict(self) -> dict[str, float]:
+        return asdict(self)
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """For a panel, of all strands first."""
+        return (
+            f"Strands: stretch {_percent(self.strands_stretch_max_percent)} at most, "
+            f"{_percent(self.strands_stretch_p99_percent)} at the 99th percentile; "
+            f"{_percent(self.strands_stretched_percent)} of them over 1 %",
+            f"Penetration {self.strands_penetration_max_mm:,.1f} mm at most, "
+            f"{self.strands_penetration_p99_mm:,.1f} mm at the 99th percentile; "
+            f"{_percent(self.strands_inside_percent)} of them over 1 mm",
+            f"Guides: stretch {_percent(self.stretch_max_percent)}, "
+            f"penetration {self.penetration_max_mm:,.1f} mm at most",
+        )
+
+
+def _percent(value: float) -> str:
+    """Such as "0.03 %": two digits, but 0 only where it is nothing."""
+    return "0 %" if not value else f"{value:.1f} %" if value >= 1.0 else f"{max(value, 0.01):.2f} %"
+
+
+class Measure:
+    """What is found frame after frame.
+
+    Args:
+        rest: the guides at rest.
+        points: (point_count, 3) [m, world], all strands at rest.
+        offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
+        colliders: as they stand then.
+    """
+
+    def __init__(
+        self, rest: DynamicsState, points: Floats, offsets: Ints, colliders: Colliders
+    ) -> None:
+        self._rest, self._offsets = rest, offsets
+        self._were_outside = are_outside(points, colliders)
+        self._stretch = self._penetration = 0.0
+        self._change, self._depth = (np.zeros(len(offsets) - 1) for _ in range(2))
+
+    def add(
+        self, points: Floats, rest_lengths: Floats, guides: Floats, colliders: Colliders
+    ) -> None:
+        """Take another frame into account.
+
+        Args:
+            points: all strands, (point_count, 3) [m, world].
+            rest_lengths: (strand_count,) [m], which they should have.
+            guides: (guide_count, cv_count, 3) [m, world].
+        """
+        position = np.ascontiguousarray(guides.transpose(2, 1, 0))
+        now = replace(self._rest, position=position)
+        self._stretch = max(self._stretch, max_stretch(now))
+        self._penetration = max(self._penetration, deepest_penetration(now, colliders))
+        changes = length_changes(points, self._offsets, rest_lengths)
+        depths = strand_depths(points, self._offsets, colliders, self._were_outside)
+        np.maximum(self._change, changes, out=self._change)
+        np.maximum(self._depth, depths, out=self._depth)
+
+    @property
+    def figures(self) -> Figures:
+        """Of all frames so far."""
+        change, depth = self._change, self._depth
+        found = (
+            100.0 * self._stretch,
+            1000.0 * self._penetration,
+            100.0 * change.max(initial=0.0),
+            100.0 * np.quantile(change, 0.99) if len(change) else 0.0,
+            100.0 * (change > STRETCHED).mean() if len(change) else 0.0,
+            1000.0 * depth.max(initial=0.0),
+            1000.0 * np.quantile(depth, 0.99) if len(depth) else 0.0,
+            100.0 * (depth > INSIDE).mean() if len(depth) else 0.0,
+        )
+        return Figures(*(round(float(value), 4) + 0.0 for value in found))  # without -0.0

@@ -1,0 +1,62 @@
+"""Measure: stretch and penetration of the strands, in the panels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+
+from ..blender.base.redraw import redraw_panels
+from ..blender.preview import previews
+from ..blender.sessions.session import Session
+from .messages import draw_lines
+from .reports import reporting
+from .selection import chosen_hair, needs_hair
+
+
+class HAIRLOOM_OT_measure(bpy.types.Operator):
+    """Measure how far the strands stretch and how deep they are in colliders, as they are now. A
+    bake measures all of its frames by itself"""
+
+    bl_idname = "hairloom.measure"
+    bl_label = "Measure"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not needs_hair(cls, context):
+            return False
+        if any(_simulated(chosen_hair(context))):
+            return True
+        cls.poll_message_set("The selected hair is not simulated: press Play first")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for session in _simulated(chosen_hair(context)):
+            session.measure()
+        redraw_panels()
+        return {"FINISHED"}
+
+
+def _simulated(hair: Iterable[bpy.types.Object]) -> Iterable[Session]:
+    sessions = (previews.session_of(each) for each in hair)
+    return (each for each in sessions if each is not None and each.is_playing)
+
+
+def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Draw the button, and what was measured last; greyed out once the hair has moved on."""
+    layout.operator("hairloom.measure", icon="DRIVER_DISTANCE")
+    session = previews.session_of(hair)
+    if session is not None and session.figures is not None:
+        lines = layout.column(align=True)
+        lines.active = session.are_figures_current
+        draw_figures(lines, session.figures.lines)
+
+
+def draw_figures(column: bpy.types.UILayout, lines: Iterable[str]) -> None:
+    """Draw what was measured, wrapped to fit the panel."""
+    for line in lines:
+        draw_lines(column, bpy.context, line)
+
+
+CLASSES = (HAIRLOOM_OT_measure,)
