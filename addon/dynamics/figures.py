@@ -67,23 +67,37 @@ class Figures:
         return asdict(self)
 
     @property
-    def lines(self) -> tuple[str, ...]:
-        """For a panel, of all strands first."""
+    def table(self) -> tuple[tuple[str, str, str, str], ...]:
+        """For a panel: of all strands the worst, the 99th percentile, and how many are over 1 % or
+        1 mm; of guides the worst."""
         return (
-            f"Strands: stretch {_percent(self.strands_stretch_max_percent)} at most, "
-            f"{_percent(self.strands_stretch_p99_percent)} at the 99th percentile; "
-            f"{_percent(self.strands_stretched_percent)} of them over 1 %",
-            f"Penetration {self.strands_penetration_max_mm:,.1f} mm at most, "
-            f"{self.strands_penetration_p99_mm:,.1f} mm at the 99th percentile; "
-            f"{_percent(self.strands_inside_percent)} of them over 1 mm",
-            f"Guides: stretch {_percent(self.stretch_max_percent)}, "
-            f"penetration {self.penetration_max_mm:,.1f} mm at most",
+            ("All Strands", "Worst", "99 %", "Over 1"),
+            (
+                "Stretch",
+                _percent(self.strands_stretch_max_percent),
+                _percent(self.strands_stretch_p99_percent),
+                _percent(self.strands_stretched_percent),
+            ),
+            (
+                "Penetration",
+                _length(self.strands_penetration_max_mm),
+                _length(self.strands_penetration_p99_mm),
+                _percent(self.strands_inside_percent),
+            ),
+            ("Guides", "Worst", "", ""),
+            ("Stretch", _percent(self.stretch_max_percent), "", ""),
+            ("Penetration", _length(self.penetration_max_mm), "", ""),
         )
 
 
 def _percent(value: float) -> str:
     """Such as "0.03 %": two digits, but 0 only where it is nothing."""
     return "0 %" if not value else f"{value:.1f} %" if value >= 1.0 else f"{max(value, 0.01):.2f} %"
+
+
+def _length(value: float) -> str:
+    """Such as "9.5 mm"."""
+    return f"{value:,.1f} mm" if value < 1000.0 else f"{value / 1000.0:,.2f} m"
 
 
 class Measure:

@@ -121,7 +121,7 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         icon="CHECKMARK",
     )
     if facts.figures is not None:
-        draw_figures(layout.column(align=True), facts.figures.lines)
+        draw_figures(layout.column(align=True), facts.figures.table)
     if known is not None and known.changed:
         layout.label(text="Out of date: " + ", ".join(known.changed), icon="ERROR")
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import bpy
 
 from ..blender.base.redraw import redraw_panels
 from ..blender.preview import previews
 from ..blender.sessions.session import Session
-from .messages import draw_lines
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
+
+#: Fraction of a table's width that names have.
+_NAMES = 0.34
 
 
 class HAIRLOOM_OT_measure(bpy.types.Operator):
@@ -50,13 +52,17 @@ def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     if session is not None and session.figures is not None:
         lines = layout.column(align=True)
         lines.active = session.are_figures_current
-        draw_figures(lines, session.figures.lines)
+        draw_figures(lines, session.figures.table)
 
 
-def draw_figures(column: bpy.types.UILayout, lines: Iterable[str]) -> None:
-    """Draw what was measured, wrapped to fit the panel."""
-    for line in lines:
-        draw_lines(column, bpy.context, line)
+def draw_figures(column: bpy.types.UILayout, table: Iterable[Sequence[str]]) -> None:
+    """Draw what was measured, see `Figures.table`."""
+    for name, *values in table:
+        row = column.split(factor=_NAMES)
+        row.label(text=name)
+        columns = row.row()
+        for value in values:
+            columns.label(text=value)
 
 
 CLASSES = (HAIRLOOM_OT_measure,)

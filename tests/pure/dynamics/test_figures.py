@@ -82,7 +82,8 @@ def test_figures_survive_a_file_and_garbage_does_not():
             Figures.of(bad)
 
 
-def test_lines_say_nothing_is_nothing_and_little_is_not():
-    lines = Figures(strands_stretch_max_percent=0.0004, strands_penetration_max_mm=12.34).lines
-    assert "stretch 0.01 % at most, 0 % at" in lines[0]
-    assert "12.3 mm at most" in lines[1]
+def test_the_table_says_nothing_is_nothing_and_little_is_not():
+    found = Figures(strands_stretch_max_percent=0.0004, strands_penetration_max_mm=12.34)
+    table = found.table
+    assert table[1] == ("Stretch", "0.01 %", "0 %", "0 %")
+    assert table[2] == ("Penetration", "12.3 mm", "0.0 mm", "0 %")
