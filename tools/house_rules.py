@@ -54,7 +54,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "dynamics": {"params", "strands"},
     "refine": {"params", "strands"},
     "shading": {"params", "strands"},
-    "cards": {"params", "strands"},
+    "cards": {"params", "strands", "refine"},
     "exchange": {
         "params",
         "strands",

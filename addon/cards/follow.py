@@ -1,14 +1,13 @@
 """Cards that ride on guides: bound at rest, carried as whole strips.
 
-A card has a bone: the mixture of its guides, moved to its root, with a frame that does not twist
-from root to tip (Bishop 1975). A row of the card (its vertices at one place along it) keeps its
-place in that frame. So strips bend and do not shear, a row stays as wide as it was, and nothing
-twists but what the root turns.
+A card has a bone: the mixture of its guides at rest, moved to its root. It rides as strands do, so
+it keeps its length. It has a frame that does not twist from root to tip (Bishop 1975). A row of the
+card (its vertices at one place along it) keeps its place in that frame. So strips bend and do not
+shear, a row stays as wide as it was, and nothing twists but what the root turns.
 
 Vectors lie as planes here, (3, ...): that is several times as fast.
 
-Limitations: guides that wind around each other do not twist the card between them. Where they go
-apart the bone, their mean, gets shorter, as strands that ride on them do.
+Limitation: guides that wind around each other do not twist the card between them.
 """
 
 from __future__ import annotations
@@ -18,6 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..refine.ride import Riders, ride
+from ..strands import StrandSet
 from ..strands.affine import moved
 from ..strands.vectors import cross_rows, dot_rows, unit_rows
 from .card_mesh import CardMesh
@@ -37,8 +38,10 @@ class CardBinding:
 
     mesh: at rest.
     guide, weight: (n, k) for each of n cards: indices of its guides, and weights of sum 1.
+    guides: (guide_count, cv_count, 3) [m] at rest.
     root: (3, n) from the mixture of the guides' roots to the card's root [m].
-    way, side: (3, n) unit vectors of the bone's first frame at rest.
+    bone: (3, cv_count, n) from its root [m] at rest. riders: all bones on the guides.
+    heading, side: (3, n) unit vectors of the bone's first frame at rest.
     row: (vertex_count,) which row each vertex lies in.
     row_card, row_cv: (row_count,) the card of each row, and the CV before it; row_share: how far
         it lies towards the next one.
@@ -49,7 +52,10 @@ class CardBinding:
     mesh: CardMesh
     guide: Ints
     weight: Floats
+    guides: Floats
     root: Floats
+    bone: Floats
+    riders: Riders
     heading: Floats
     side: Floats
     row: Ints
@@ -108,7 +114,10 @@ def bind_cards(mesh: CardMesh, guides: Floats, guide: Ints, weight: Floats) -> C
         mesh,
         guide,
         np.asarray(weight, np.float32),
+        np.asarray(guides, np.float32),
         root,
+        bone - bone[:, :1],
+        _riders(bone, guides, guide, weight),
         headings[:, 0],
         side,
         row.reshape(-1),
@@ -133,10 +142,10 @@ def follow_guides(binding: CardBinding, guides: Floats, turn: Floats) -> CardMes
     """
     if not len(binding.guide):
         return binding.mesh
-    first = np.asarray(turn, np.float32)[binding.guide[:, 0]]
+    turns = np.asarray(turn, np.float32)
+    first = turns[binding.guide[:, 0]]
     volume = np.linalg.det(first)
-    bone = _mixed(guides, binding.guide, binding.weight)
-    bone += np.einsum("nij,jn->in", first, binding.root)[:, None]
+    bone = _ridden(binding, np.asarray(guides, np.float32), turns)
     headings = _headings(bone)
     was = unit_rows(np.einsum("nij,jn->in", first, binding.heading))
     side = np.einsum("nij,jn->in", first, binding.side)
@@ -169,6 +178,35 @@ def moved_mesh(mesh: CardMesh, matrix: Floats) -> CardMesh:
     )
 
 
+@dataclass(frozen=True)
+class _Weights:
+    """See `refine.ride.Weights`."""
+
+    guide: Ints
+    weight: Floats
+
+
+def _riders(bone: Floats, guides: Floats, guide: Ints, weight: Floats) -> Riders:
+    """Bones (3, cv_count, n) on their guides."""
+    _, cv_count, count = bone.shape
+    points = bone.transpose(2, 1, 0).reshape(-1, 3)
+    offsets = np.arange(count + 1) * cv_count
+    strands = StrandSet(points, offsets, np.zeros(len(points)), np.zeros(count, int))
+    return Riders.of(strands, guides, _Weights(guide, np.asarray(weight, np.float32)))
+
+
+def _ridden(binding: CardBinding, guides: Floats, turns: Floats) -> Floats:
+    """The bones now, (3, cv_count, n)."""
+    first = turns[binding.guide[:, 0]]
+    root = _mixed(guides[:, :1], binding.guide, binding.weight)[:, 0]
+    root += np.einsum("nij,jn->in", first, binding.root)
+    carried = np.einsum("nij,jcn->nci", first, binding.bone) + root.T[:, None]
+    rest = binding.guides
+    by_root = guides[:, :1] + np.einsum("gij,gcj->gci", turns, rest - rest[:, :1])
+    ridden = ride(carried.reshape(-1, 3), binding.riders, by_root, guides)
+    return np.ascontiguousarray(ridden.reshape(carried.shape).transpose(2, 1, 0))
+
+
 def _placed(frame: Floats, local: Floats) -> Floats:
     """Vectors in frames (3, 3, n) as they are in the world, (n, 3)."""
     vectors = np.empty((local.shape[1], 3), np.float32)
@@ -186,7 +224,8 @@ def _rows(
     """Places of all rows (3, row_count), and their frames: way, side and up, (3, 3, row_count).
 
     Args:
-        bone, ways: (3, cv_count, n). side: (3, n) at the root. hand: (n,) -1 for mirrored cards.
+        bone, headings: (3, cv_count, n). side: (3, n) at the root.
+        hand: (n,) -1 for mirrored cards.
     """
     heading = unit_rows(_on_rows(headings, binding))
     across = _perpendicular(_on_rows(_transported(headings, side), binding), heading)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -82,13 +83,20 @@ class JointRig:
 
 @dataclass(frozen=True)
 class FitError:
-    """Distances of skinned vertices from simulated ones [m], over all levels and frames:
+    """Distances of vertices as they are played from simulated ones [m], over all levels and frames:
     root mean square, 99 % of them are below, and the worst.
     """
 
     mean_square_root: float
     most: float
     worst: float
+
+    @classmethod
+    def of(cls, distances: Sequence[Floats]) -> Self:
+        """Of distances (n,) [m], part after part."""
+        every = np.concatenate(distances)
+        rms = float(np.sqrt(np.mean(np.square(every, dtype=np.float64))))
+        return cls(rms, float(np.quantile(every, 0.99)), float(every.max(initial=0.0)))
 
 
 def joint_steps(
@@ -130,9 +138,7 @@ def keyed_error(tracks: CardTracks, rig: JointRig, turn: Floats, place: Floats) 
             own = Skin(skin.joint[part], skin.weight[part])
             miss = skinned(points, own, *moves) - moved[part]
             distances.append(np.sqrt((miss * miss).sum(axis=-1)).astype(np.float32).ravel())
-    every = np.concatenate(distances)
-    rms = float(np.sqrt(np.mean(np.square(every, dtype=np.float64))))
-    return FitError(rms, float(np.quantile(every, 0.99)), float(every.max()))
+    return FitError.of(distances)
 
 
 def joint_moves(rest: Floats, turn: Floats, place: Floats) -> tuple[Floats, Floats]:

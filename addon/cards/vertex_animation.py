@@ -66,6 +66,16 @@ def vertex_texels(layout: MotionLayout) -> Floats:
     return np.stack([(column + 0.5) / layout.width, (row + 0.5) / layout.height], axis=1)
 
 
+def rounding(values: Floats, depth: str) -> Floats:
+    """What storing values of any shape adds to them.
+
+    Args:
+        depth: "half" or "float".
+    """
+    stored = values.astype(np.float16 if depth == "half" else np.float32)
+    return stored.astype(np.float32) - values
+
+
 def motion_texture(values: Floats, layout: MotionLayout) -> Floats:
     """The texture, (height, width, 3) with row 0 at the bottom; 0 where no vertex is.
 

@@ -222,6 +222,10 @@ def test_a_motion_texture_holds_the_simulated_cards(
                 np.testing.assert_allclose(pictures[name][row, column], expected, atol=6e-4)
     # a half holds 11 bits of how far a vertex goes, here less than 12.5 cm
     assert worst < (0.125 * 2.0**-11 + 1e-6 if depth == "half" else 1e-6)
+    error = told["error"]
+    assert error["root_mean_square"] <= error["percentile_99"] <= error["worst"]
+    # some of the frames, along one axis, and all frames in space
+    assert worst - 1e-6 <= error["worst"] <= 2.0 * worst if depth == "half" else not error["worst"]
 
 
 @pytest.mark.parametrize("file_format", [FBX, USD])

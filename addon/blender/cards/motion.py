@@ -17,7 +17,13 @@ from ...cards.joint_keys import between_keys, chain_keys, keys_of
 from ...cards.joint_solve import rigid_fits
 from ...cards.joints import CardTracks, FitError, joint_steps, keyed_error
 from ...cards.steps import result_of
-from ...cards.vertex_animation import MotionLayout, motion_layout, motion_texture, vertex_texels
+from ...cards.vertex_animation import (
+    MotionLayout,
+    motion_layout,
+    motion_texture,
+    rounding,
+    vertex_texels,
+)
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import GLB, OBJ, CardFormat
 from ...exchange.cards.glb_skin import Skeleton, with_skeleton
@@ -131,7 +137,8 @@ class JointMotion:
         if self.relative_error <= wanted:
             return ()
         return (
-            f"Joints are off by {self.relative_error:.1%} of the hair's length, more than the "
+            f"Joints are off by {self.relative_error:.1%} of the hair's length (root mean square; "
+            f"the worst by {self.error.worst / self.tracks.hair_length:.1%}), more than the "
             f"{wanted:.1%} that are asked for. Allow more chains, or joints in each.",
         )
 
@@ -193,10 +200,8 @@ class TextureMotion:
 
     def write(self, path: Path) -> dict[str, str]:
         """Write the textures beside the mesh; position, normal and tangent -> file."""
-        tracks, moved = self.moved.tracks, self.moved
-        rests = [mesh.positions[:, None] for mesh in tracks.levels]
-        offsets = [now - rest for now, rest in zip(tracks.moved, rests, strict=True)]
-        every = {"position": offsets, "normal": moved.normals, "tangent": moved.tangents}
+        moved = self.moved
+        every = {"position": self._offsets, "normal": moved.normals, "tangent": moved.tangents}
         files = {}
         for name, parts in every.items():
             values = self.file_format.placed(np.concatenate(parts))
@@ -211,6 +216,20 @@ class TextureMotion:
             )
         return files
 
+    @property
+    def _offsets(self) -> list[Floats]:
+        """Of each level, (vertex_count, frame_count, 3) [m] from rest."""
+        tracks = self.moved.tracks
+        rests = [mesh.positions[:, None] for mesh in tracks.levels]
+        return [now - rest for now, rest in zip(tracks.moved, rests, strict=True)]
+
+    @property
+    def error(self) -> FitError:
+        """How far vertices are off by the rounding of what is stored."""
+        scale, depth = np.float32(self.file_format.units_per_metre), self.settings.motion_depth
+        misses = [rounding(each * scale, depth) / scale for each in self._offsets]
+        return FitError.of([np.linalg.norm(miss, axis=-1).ravel() for miss in misses])
+
     def facts(self, files: dict[str, str]) -> dict[str, Any]:
         tracks = self.moved.tracks
         low: Floats = np.stack([each.min(axis=(0, 1)) for each in tracks.moved]).min(axis=0)
@@ -222,5 +241,6 @@ class TextureMotion:
             files,
             self.settings.motion_depth,
             (low, high),
+            self.error,
             self.settings.motion_space,
         )

@@ -52,12 +52,7 @@ def joint_motion(
         "joints": rig.chains * rig.joints + 1,
         "keys": sum(len(keys.frame) for keys in skeleton.keys) * rig.joints,
         "influences": rig.skins[0].joint.shape[1],
-        "error": {
-            "root_mean_square": error.mean_square_root * scale,
-            "percentile_99": error.most * scale,
-            "worst": error.worst * scale,
-            "hair_length": tracks.hair_length * scale,
-        },
+        "error": _error(error, tracks, scale),
         "how": _HOW_TO_PLAY,
     }
 
@@ -69,6 +64,7 @@ def texture_motion(
     files: Mapping[str, str],
     depth: str,
     bounds: tuple[Floats, Floats],
+    error: FitError,
     space: str,
 ) -> dict[str, Any]:
     """Of a vertex animation texture.
@@ -95,7 +91,18 @@ def texture_motion(
             "minimum": corners.min(axis=0).tolist(),
             "maximum": corners.max(axis=0).tolist(),
         },
+        "error": _error(error, tracks, file_format.units_per_metre),
         "how": _HOW_TO_READ,
+    }
+
+
+def _error(error: FitError, tracks: CardTracks, scale: float) -> dict[str, float]:
+    """In a file of this many units in a metre."""
+    return {
+        "root_mean_square": error.mean_square_root * scale,
+        "percentile_99": error.most * scale,
+        "worst": error.worst * scale,
+        "hair_length": tracks.hair_length * scale,
     }
 
 

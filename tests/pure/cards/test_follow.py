@@ -219,3 +219,15 @@ def test_cards_of_a_rig_ride_as_its_strands_do() -> None:
     assert step[mesh.group[owner] == 3].max() < 1e-6
     tips = (mesh.group[owner] == 7) & (mesh.along > 0.95)
     assert step[tips] == pytest.approx(0.05, abs=0.01)
+
+
+def test_a_card_between_guides_that_go_apart_keeps_its_length() -> None:
+    """Two guides swing by 60 degrees to either side: their mean would be half as long."""
+    mesh, guides = flat_card(), straight(2)
+    binding = bind_cards(mesh, guides, np.array([[0, 1]]), np.float32([[0.5, 0.5]]))
+    now = guides.copy()
+    for guide, angle in enumerate((np.pi / 3, -np.pi / 3)):
+        now[guide] = (guides[guide] - guides[guide, 0]) @ turn_about("y", angle).T
+        now[guide] += guides[guide, 0]
+    moved = follow_guides(binding, now, np.tile(np.eye(3), (2, 1, 1)))
+    np.testing.assert_allclose(moved.positions, mesh.positions, atol=1e-6)
