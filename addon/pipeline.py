@@ -35,7 +35,7 @@ from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
 from .strands import StrandSet, Surface
-from .strands.center_lines import center_lines
+from .strands.center_lines import center_lines, curl_room
 from .strands.face import is_face_hair
 from .strands.join import joined
 from .strands.needed_points import LOST, MAX_POINTS, with_needed_points
@@ -96,6 +96,11 @@ class Rig:
         own, cv_count = self.holds.of(self.guides), self.guide_grid.shape[1]
         return own.on_lines(self.strands.take(self.guides), cv_count)
 
+    @cached_property
+    def curl_room(self) -> Floats | None:
+        """How much the curls of guides have to give, see `center_lines.curl_room`."""
+        return curl_room(self.strands.take(self.guides).lengths(), self.guide_grid)
+
     @property
     def child_count(self) -> int:
         own = self.own_count
@@ -103,7 +108,7 @@ class Rig:
 
     @cached_property
     def riders(self) -> Riders:
-        return Riders.of(self.strands, self.guide_grid, self.weights)
+        return Riders.of(self.strands, self.guide_grid, self.weights, self.curl_room)
 
     @cached_property
     def rest_lengths(self) -> Floats:
@@ -391,7 +396,7 @@ def held_cvs(rig: Rig, pose: Pose) -> Held | None:
 def begin(rig: Rig, pose: Pose) -> Motion:
     """Hair at rest in this pose."""
     guides = style_of_guides(rig, pose)
-    return Motion(start(guides), guides, guides, pose)
+    return Motion(start(guides, rig.curl_room), guides, guides, pose)
 
 
 def advance(

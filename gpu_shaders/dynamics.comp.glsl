@@ -1,7 +1,7 @@
 // One frame of dynamics: one invocation a guide, which goes through all substeps.
 //
 // Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION;
-// HAS_HELD; HAS_AIR; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
+// HAS_HELD; HAS_SPRINGS; HAS_AIR; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
 // kinds of colliders; HAS_SHARP and HAS_FOLLOWED, see lib_contacts.glsl.
 //
 // Loops of an unknown number of turns ask at their end: drivers on CPUs go once more through the
@@ -14,6 +14,9 @@
 #endif
 #include "lib_style.glsl"
 #include "lib_lengths.glsl"
+#ifdef HAS_SPRINGS
+#include "lib_springs.glsl"
+#endif
 #if CONTACT_SLOTS > 0
 #include "lib_contacts.glsl"
 #endif
@@ -26,6 +29,9 @@ vec3 style_curvature[CV_COUNT];
 vec3 twist_before;
 vec3 twist_displacement;
 vec3 twist_curvature;
+#ifdef HAS_SPRINGS
+bool is_curled = false;
+#endif
 vec3 fall[FREE_SIZE];  // [m] that gravity adds to each free CV in a substep
 
 // How the path of a point is bent, times r (r + 1); twin of curvature in addon/dynamics/trajectory.py.
@@ -52,6 +58,12 @@ void load_guide(int guide)
     ivec2 texel = strand_texel(guide, i + 1, CV_COUNT);
     shape[i] = texelFetch(rest_shapes, texel, 0);
     segment_length[i] = texelFetch(rest_lengths, texel, 0).x;
+#ifdef HAS_SPRINGS
+    rest_length[i] = segment_length[i];
+    most[i] = texelFetch(curl_rooms, texel, 0).x * rest_length[i] * frame.springs.x;
+    compliance[i] = 0.0;
+    is_curled = is_curled || most[i] > 0.0;
+#endif
     band[i] = frame.band[i + 2];
     bend[i] = frame.own[i + 1].x;
     radius[i] = frame.own[i + 2].y;
@@ -77,6 +89,9 @@ void find_fall()
   weight_on_style(frame.combed.xyz, root, middle, fall);
   for (int i = 0; i < FREE; i++) {
     fall[i] = frame.fall.xyz - fall[i];
+#ifdef HAS_SPRINGS
+    load[i] *= frame.springs.y;
+#endif
   }
 }
 
@@ -103,7 +118,7 @@ void pin_held()
   vec3 start = style[1];
   float reach = 0.0;
   for (int i = 0; i < FREE; i++) {
-    reach += segment_length[i];
+    reach += LENGTH_AT_REST[i];
     vec3 displacement = style[i + 2] - start;
     float ratio = reach / max(length(displacement), TINY);
     ratio = i == 0 || held[i - 1] ? ratio : min(ratio, 1.0);
@@ -208,6 +223,11 @@ void do_substep(int number)
   style_twist = twist_before + twist_displacement * moment.x + twist_curvature * moment.y;
   predict(moment, air_displacement);
   pin();
+#ifdef HAS_SPRINGS
+  if (is_curled) {
+    give(frame.springs.y);
+  }
+#endif
   restore_style();
   pin_held();
   keep_lengths(false);

@@ -13,7 +13,7 @@ vec3 braked(vec3 here, vec3 before, float drag, vec3 air_displacement)
 }
 
 // The part of gravity that the tension of the carried segments cannot hold, for each free CV.
-// `carried` is where the free CVs are carried, `root` where the last pinned one is.
+// Where curls give, `load` gets the tension. `carried` is where the free CVs are carried, `root` where the last pinned one is.
 void weight_on_style(vec3 gravity, vec3 root, vec3 carried[FREE_SIZE], out vec3 weight[FREE_SIZE])
 {
   vec3 segment[FREE_SIZE];
@@ -40,6 +40,9 @@ void weight_on_style(vec3 gravity, vec3 root, vec3 carried[FREE_SIZE], out vec3 
   for (int i = FREE - 1; i >= 0; i--) {
     float own = tension[i] - taken;
     taken = ratio[i] * own;
+#ifdef HAS_SPRINGS
+    load[i] = own * length_of(segment[i]);
+#endif
     vec3 pull = segment[i] * own;
     weight[i] = gravity - (pull - above);
     above = pull;

@@ -2,7 +2,7 @@
 // segment, all loops have constant bounds, so that compilers keep arrays in registers.
 //
 // Twin of addon/dynamics/state.py. Defines: CV_COUNT, at least 2; HAS_HELD, where CVs are held by
-// ties. Holds no resources.
+// ties; HAS_SPRINGS, where curls give. Holds no resources.
 
 #define PINNED {{pinned}}
 #define FREE (CV_COUNT - PINNED)
@@ -21,6 +21,16 @@ float bend[FREE_SIZE];         // of CV i + 1
 float radius[FREE_SIZE];       // of free CV i [m], in collisions
 #ifdef HAS_HELD
 bool held[FREE_SIZE];  // of free CV i; twin of addon/dynamics/held.py
+#endif
+
+#ifdef HAS_SPRINGS
+float rest_length[FREE_SIZE];  // [m] as segment_length, which is that of this substep
+float most[FREE_SIZE];         // [m] by how much longer segment i may be, 0 where it does not give
+float load[FREE_SIZE];         // [m] by which the weight in the style would draw it out
+float compliance[FREE_SIZE];   // of segment i in the next Newton step
+#define LENGTH_AT_REST rest_length
+#else
+#define LENGTH_AT_REST segment_length
 #endif
 
 // Never zero; what is added is lost to rounding above 1e-8 m.

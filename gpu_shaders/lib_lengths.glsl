@@ -32,6 +32,9 @@ void newton_step(bool has_normals)
     diagonal -= held[i] ? square * HELD : 0.0;
     beside *= light_before;
 #endif
+#ifdef HAS_SPRINGS
+    diagonal += compliance[i] * square;
+#endif
     if (has_normals) {
       float lower = dot(normal_before, segment[i]);
       float upper = dot(touched_normal[i], segment[i]);

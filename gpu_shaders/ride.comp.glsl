@@ -1,9 +1,12 @@
 // Strands that ride on guides: carried by their own roots, they turn with their guides.
 // Twin of ride in addon/refine/ride.py, behind follow in addon/groom/roots.py. One
-// invocation a strand.
+// invocation a strand. Define: HAS_CURLS, where curls may be drawn out.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"
 #include "lib_turn.glsl"
+#ifdef HAS_CURLS
+#include "lib_curls.glsl"
+#endif
 
 // How a guide has turned at a place along it [segments].
 vec4 turn_at(int guide, float place)
@@ -16,6 +19,20 @@ vec4 turn_at(int guide, float place)
   vec4 far = texelFetch(guide_turns, strand_texel(guide, after, segment_count + 1), 0);
   return near + (held - float(before)) * (far - near);
 }
+
+#ifdef HAS_CURLS
+// Where a guide points there at rest, and by how much it is longer.
+vec4 axis_at(int guide, float place)
+{
+  float last = float(segment_count - 1);
+  float held = clamp(place - 0.5, 0.0, last);
+  int before = int(held);
+  vec4 near = texelFetch(guide_axes, strand_texel(guide, before, segment_count + 1), 0);
+  int after = min(before + 1, segment_count - 1);
+  vec4 far = texelFetch(guide_axes, strand_texel(guide, after, segment_count + 1), 0);
+  return near + (held - float(before)) * (far - near);
+}
+#endif
 
 void main()
 {
@@ -58,7 +75,17 @@ void main()
       blend += (dot(turn, blend) < 0.0 ? -weight[k] : weight[k]) * turn;
     }
     blend.w += dot(blend, blend) < {{reversed_turn}} ? 1.0 : 0.0;
-    displacement += turn_change(blend, edge + motion.turn * edge);
+    vec3 carried = edge + motion.turn * edge;
+#ifdef HAS_CURLS
+    vec4 axis = vec4(0.0);
+    for (int k = 0; k < 3; k++) {
+      axis += weight[k] * axis_at(guide[k], place[k]);
+    }
+    vec3 drawn = drawn_out(carried, axis);
+    displacement += drawn;
+    carried += drawn;
+#endif
+    displacement += turn_change(blend, carried);
     reached += size;
     rest = next;
   }

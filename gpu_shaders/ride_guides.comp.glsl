@@ -1,9 +1,14 @@
 // How each segment of the guides has turned from the shape in which its root carries it, and behind
 // these how far the guide has left its root; one invocation a guide. Twin of guide_turns in
-// addon/refine/ride.py.
+// addon/refine/ride.py. Define: HAS_CURLS, where curls may be drawn out; then guide_axes gets where
+// each segment points at rest, and by which fraction it is longer, see guide_axes in
+// addon/refine/curls.py.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"
 #include "lib_turn.glsl"
+#ifdef HAS_CURLS
+#include "lib_curls.glsl"
+#endif
 
 void main()
 {
@@ -17,18 +22,27 @@ void main()
                                       texelFetch(root_motions, strand_texel(mover, 1, 4), 0),
                                       texelFetch(root_motions, strand_texel(mover, 2, 4), 0),
                                       texelFetch(root_motions, strand_texel(mover, 3, 4), 0));
-  vec3 was = follow(texelFetch(guide_points, strand_texel(guide, 0, segment_count + 1), 0).xyz, motion);
+  vec4 rest = texelFetch(guide_points, strand_texel(guide, 0, segment_count + 1), 0);
+  vec3 was = follow(rest.xyz, motion);
   vec3 is = texelFetch(guides_now, strand_texel(guide, 0, segment_count + 1), 0).xyz;
   imageStore(guide_turns, strand_texel(guide, segment_count, segment_count + 1), vec4(is - was, 0.0));
   vec4 turn = vec4(0.0, 0.0, 0.0, 1.0);
   for (int segment = 0; segment < segment_count; segment++) {
     ivec2 texel = strand_texel(guide, segment + 1, segment_count + 1);
-    vec3 was_next = follow(texelFetch(guide_points, texel, 0).xyz, motion);
+    vec4 rest_next = texelFetch(guide_points, texel, 0);
+    vec3 was_next = follow(rest_next.xyz, motion);
     vec3 is_next = texelFetch(guides_now, texel, 0).xyz;
     vec3 before = direction_of(was_next - was);
     vec3 here = before + turn_change(turn, before);
     turn = turn_product(minimal_rotation(here, direction_of(is_next - is)), turn);
     imageStore(guide_turns, strand_texel(guide, segment, segment_count + 1), turn);
+#ifdef HAS_CURLS
+    float size = length(was_next - was);  // w of a CV: whether the segment from it on gives
+    float extension = rest.w > 0.0 && size > 0.0 ? length(is_next - is) / size - 1.0 : 0.0;
+    vec4 axis = vec4(before, seen_extension(extension));
+    imageStore(guide_axes, strand_texel(guide, segment, segment_count + 1), axis);
+#endif
+    rest = rest_next;
     was = was_next;
     is = is_next;
   }

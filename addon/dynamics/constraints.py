@@ -118,6 +118,17 @@ def keep_lengths(
         _newton_step(position, length[1:], touched, held)
 
 
+def spring_step(position: Floats, target: Floats, compliance: Floats, held: Floats | None) -> None:
+    """One implicit step of springs along the segments, in place.
+
+    Args:
+        position: (3, cv_count, guide_count) world [m], in C order.
+        target: (cv_count - PINNED, guide_count) [m], to which each segment would go without any.
+        compliance: in the shape of `target`, over dt^2, for CVs of mass 1; 0 is rigid.
+    """
+    _newton_step(position, target, None, held, compliance)
+
+
 def relax_lengths(position: Floats, length: Floats, held: Floats | None, sweeps: int) -> None:
     """Bring segments towards their length one after the other, from root to tip, again and again
     (Jakobsen 2001): each gives half of its error to both of its ends, all of it to a free one."""
@@ -257,7 +268,11 @@ def _off_length(position: Floats, length: Floats, tolerance: float, size: float)
 
 
 def _newton_step(
-    position: Floats, length: Floats, touched: Touched | None, held: Floats | None
+    position: Floats,
+    length: Floats,
+    touched: Touched | None,
+    held: Floats | None,
+    compliance: Floats | None = None,
 ) -> None:
     segment, squared = segments(position[:, 1:])
     diagonal, beside = chain_matrix(segment, squared)
@@ -269,6 +284,8 @@ def _newton_step(
         diagonal -= heavy * squared
         diagonal[1:] -= heavy[:-1] * squared[1:]
         beside *= np.float32(1.0) - heavy[:-1]
+    if compliance is not None:
+        diagonal += compliance * squared
     if touched is None:
         solve_tridiagonal(diagonal, beside, right)
     else:

@@ -81,11 +81,11 @@ def felt_gravity(
         turn: (3, 3) how the groom has turned since, see `turn.best_rotation`.
         carried: (3, cv_count, guide_count) world [m], the style.
     """
-    pull = np.asarray(gravity, np.float32) * np.float32(settings.gravity)
+    pull = _pull(gravity, settings)
     left = pull * np.float32(1.0 - settings.buoyancy)
     if not settings.sag_compensation or not carried.shape[1] > PINNED or not carried.shape[2]:
         return left[:, None, None]
-    combed = (turn @ pull.astype(np.float64)).astype(np.float32)
+    combed = _turned(pull, turn)
     felt = np.empty_like(carried)
     felt[:] = left[:, None, None]
     held = weight_on_style(combed, carried)
@@ -94,15 +94,37 @@ def felt_gravity(
     return felt
 
 
+def combed_gravity(gravity: Floats, settings: DynamicsSettings, turn: Floats) -> Floats:
+    """The gravity (3,) [m/s^2] that the style carries, turned with it; arguments as above."""
+    return _turned(_pull(gravity, settings), turn) * np.float32(settings.sag_compensation)
+
+
+def _pull(gravity: Floats, settings: DynamicsSettings) -> Floats:
+    pull: Floats = np.asarray(gravity, np.float32) * np.float32(settings.gravity)
+    return pull
+
+
+def _turned(pull: Floats, turn: Floats) -> Floats:
+    return (turn @ pull.astype(np.float64)).astype(np.float32)
+
+
 def weight_on_style(gravity: Floats, carried: Floats) -> Floats:
     """The part of gravity (3,) that the segments' tension cannot hold, (3, n, guide_count).
 
     g - J^T (J J^T)^-1 J g with the length constraints J of the free CVs.
+    """
+    segment, tension = tension_on_style(gravity, carried)
+    segment *= tension
+    return gravity[:, None, None] - less_next(segment)
+
+
+def tension_on_style(gravity: Floats, carried: Floats) -> tuple[Floats, Floats]:
+    """Segments (3, n, guide_count) [m] beyond the pinned ones, and the tension in each by which
+    they hold gravity (3,), over the segment's length, (n, guide_count) [1/s^2].
     """
     segment, squared = segments(carried[:, PINNED - 1 :])
     diagonal, beside = chain_matrix(segment, squared)
     tension = np.zeros_like(diagonal)  # J g: only the segment at the pinned CV feels a difference
     tension[0] = dot_rows(segment[:, 0], gravity[:, None])
     solve_tridiagonal(diagonal, beside, tension)
-    segment *= tension
-    return gravity[:, None, None] - less_next(segment)
+    return segment, tension

@@ -11,9 +11,10 @@ from ..arrays import Floats
 from ..errors import HairloomError
 from .colliders import PosedCollider
 from .contacts import radius_of_all
-from .forces import carried_fraction, felt_gravity
+from .forces import carried_fraction, combed_gravity, felt_gravity
 from .held import Held
 from .settings import DynamicsSettings
+from .springs import Springs
 from .state import DynamicsState, Rest, StyleRows, as_rows, checked_grid
 from .style import StyleBand, style_band
 from .trajectory import at, curvature
@@ -165,6 +166,7 @@ class Block:
         that changes while the way of the style bends.
     radius: (cv_count * n,) [m], the distance that each CV keeps from colliders; not to be written.
     held: (cv_count, n), see `held.Held.rows`; None where none of these guides is held.
+    springs: of the guides that are curled; None where none of these gives.
     """
 
     position: Floats
@@ -177,6 +179,7 @@ class Block:
     impulse_curvature: Floats | None
     radius: Floats
     held: Floats | None
+    springs: Springs | None
 
     @classmethod
     def of(
@@ -201,10 +204,13 @@ class Block:
             radius = np.where(held.ravel() > 0.0, np.float32(-np.inf), radius)
         else:
             held = None
+        rest = state.rest.part(guides)
+        combed = combed_gravity(drive.gravity, settings, frame.turn)
+        springs = Springs.of(rest.room, rest.length, middle, combed, held, settings, dt)
         return cls(
             position,
             previous.copy(),
-            state.rest.part(guides),
+            rest,
             before,
             displacement,
             bent,
@@ -212,6 +218,7 @@ class Block:
             None if bent is None else bent * np.float32(frame.carried_fraction),
             radius,
             held,
+            springs,
         )
 
     def style_at(self, moment: float) -> Floats:

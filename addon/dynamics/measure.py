@@ -16,13 +16,17 @@ from .state import DynamicsState
 def max_stretch(state: DynamicsState) -> float:
     """Largest change of a simulated segment's length, as a fraction of its rest length.
 
-    Segments between pinned CVs belong to the style, and those without length cannot stretch.
+    Segments between pinned CVs belong to the style, those without length cannot stretch, and those
+    of curls may.
     """
     rest = state.rest.length[PINNED - 1 :]
     if not rest.size:
         return 0.0
     _, length = directions(state.position[:, PINNED - 1 :])
-    change = np.divide(np.abs(length - rest), rest, out=np.zeros_like(rest), where=rest > TINY)
+    is_fixed = rest > TINY
+    if state.rest.room is not None:
+        is_fixed &= state.rest.room[PINNED - 1 :] == 0.0
+    change = np.divide(np.abs(length - rest), rest, out=np.zeros_like(rest), where=is_fixed)
     return float(change.max())
 
 

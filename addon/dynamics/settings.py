@@ -118,6 +118,28 @@ class DynamicsSettings(MotionSettings):
         hard=(0.0, 1.0),
         panel="Style",
     )
+    curl_stretch: float = number(
+        0.25,
+        label="Curl Stretch",
+        description="How far curls and coils may be drawn out or pushed together when the hair "
+        "swings, as a fraction of what there is until they are straight; 0 keeps them stiff, "
+        "straight hair never stretches",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        panel="Style",
+    )
+    curl_bounce: float = number(
+        2.0,
+        label="Curl Bounce",
+        description="Stiffness of curls along themselves, in swings per second of a strand that "
+        "bobs from its root; more is stiffer",
+        soft=(1.0, 8.0),
+        hard=(0.1, 50.0),
+        unit="rate",
+        source="Springs with a compliance, Macklin, Mueller and Chentanez 2016",
+        panel="Style",
+    )
     length_solver: str = choice(
         "direct",
         (

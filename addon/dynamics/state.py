@@ -27,12 +27,15 @@ class Rest:
     length: (cv_count - 1, guide_count) float32 [m] of each segment.
     shape: what is kept of it wherever the guides swing.
     size: the median length of all guides [m], in which distances are given in the settings.
+    room: (cv_count - 1, guide_count) float32, by which fraction of its length each segment could be
+        drawn out until its curls are straight; None where no guide is curled.
     """
 
     position: Floats
     length: Floats
     shape: LocalShape
     size: float = 0.0
+    room: Floats | None = None
 
     @cached_property
     def sample(self) -> Floats:
@@ -48,6 +51,7 @@ class Rest:
             self.length[:, guides],
             self.shape.part(guides),
             self.size,
+            None if self.room is None else self.room[:, guides],
         )
 
 
@@ -98,11 +102,13 @@ class DynamicsState:
         return np.ascontiguousarray(self.position.transpose(2, 1, 0))
 
 
-def start(guide_grid: Floats) -> DynamicsState:
+def start(guide_grid: Floats, room: Floats | None = None) -> DynamicsState:
     """Guides at rest in their style.
 
     Args:
         guide_grid: (guide_count, cv_count, 3) world [m], cv_count at least 2.
+        room: (guide_count, cv_count - 1), see `strands.center_lines.curl_room`; None: none is
+            curled.
 
     Raises:
         HairloomError: another shape, or a CV that is not finite.
@@ -119,6 +125,7 @@ def start(guide_grid: Floats) -> DynamicsState:
         length=length,
         shape=local_shape(position),
         size=float(np.median(length.sum(axis=0))) if length.size else 0.0,
+        room=None if room is None else np.ascontiguousarray(room.T, np.float32),
     )
     for array in (rest.length, rest.shape.curvature, rest.shape.hold, rest.shape.twist_cv):
         array.flags.writeable = False

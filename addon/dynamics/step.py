@@ -4,6 +4,7 @@
         brake        drag by the square of the speed through the air
         predict      Verlet: inertia, damping, gravity, wind
         pin          the head carries the first two CVs, ties carry what they hold
+        springs      curls give along themselves; the lengths that they leave are kept from there on
         style        global and local shape, one direct solve
         lengths      one direct solve, or relaxation
         contacts     found once, then in turn:  push out  |  keep lengths
@@ -111,6 +112,8 @@ def _advance_block(
         predict(position, previous, impulse, kept, out=spare)
         previous, position, spare = position, spare, previous
         pin(position, style, rest.length, block.held)
+        if block.springs is not None:
+            chain = replace(chain, length=block.springs.step(position, previous, rest.length))
         restore_style(position, style, rest.shape, frame.matrix)
         pin(position, style, rest.length, block.held)
         chain.keep_lengths(position, None)

@@ -6,7 +6,7 @@ does not bend, nothing turns. A segment of a strand takes on the rotations of it
 far from the root as it is itself, blended as quaternions. Its own segments, turned so and put
 together from the root on, are the strand; where guides leave their roots, so does its root. So
 lengths are kept whatever the guides do, strands of guides that turn rigidly turn rigidly, and a
-coil stays this coil on a guide that bends.
+coil stays this coil on a guide that bends. Where a curled guide is drawn out, see `curls`.
 
 Vectors lie as planes here, (3, n), and quaternions as (4, n), xyz and w last: that is several times
 as fast.
@@ -19,11 +19,12 @@ from typing import Protocol
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet
 from ..strands.arc_length import steps
 from ..strands.center_lines import center_lines
 from ..strands.vectors import cross_rows, dot_rows
+from .curls import drawn_out, guide_axes
 
 #: Points moved at once, so that they stay in the processor's cache.
 _CHUNK = 8192
@@ -53,6 +54,8 @@ class Riders:
         begins at a point takes its rotation from.
     reach: (strand_count,) float32, the length of each centre line as a fraction of its strand's.
     segments_per_meter: (guide_count,) float32 [1/m], of each guide.
+    gives: (guide_count, cv_count - 1), which segments of guides are curls, which may be drawn out;
+        None: none.
     """
 
     offsets: Ints
@@ -60,14 +63,18 @@ class Riders:
     stations: Floats
     reach: Floats
     segments_per_meter: Floats
+    gives: Bools | None = None
 
     @classmethod
-    def of(cls, strands: StrandSet, guides: Floats, weights: Weights) -> Riders:
+    def of(
+        cls, strands: StrandSet, guides: Floats, weights: Weights, room: Floats | None = None
+    ) -> Riders:
         """Bind strands to guides.
 
         Args:
             strands: at rest.
             guides: (guide_count, cv_count, 3) [m] at rest, CVs evenly along each; centre lines.
+            room: (guide_count, cv_count - 1), see `center_lines.curl_room`; None: no curls.
         """
         lengths = np.linalg.norm(np.diff(guides, axis=1), axis=2).sum(axis=1, dtype=np.float64)
         per_meter = (guides.shape[1] - 1) / np.maximum(lengths, SHORTEST)
@@ -76,7 +83,9 @@ class Riders:
         reach /= np.maximum(strands.lengths(), np.float32(SHORTEST))
         stations = _middles(strands.points, strands.offsets)
         stations *= np.repeat(reach, strands.point_counts)
-        return cls(strands.offsets, weights, stations, reach, per_meter.astype(np.float32))
+        gives = None if room is None else room > 0.0
+        per_meter = per_meter.astype(np.float32)
+        return cls(strands.offsets, weights, stations, reach, per_meter, gives)
 
 
 def _middles(points: Floats, offsets: Ints) -> Floats:
@@ -103,7 +112,9 @@ def ride(points: Floats, riders: Riders, guide_rest: Floats, guide_now: Floats) 
     moved = np.array(points, np.float32)
     if not len(moved):
         return moved
-    table = _turn_table(guide_turns(guide_rest, guide_now))
+    table = _with_steps(guide_turns(guide_rest, guide_now).transpose(2, 1, 0))
+    axes = None if riders.gives is None else guide_axes(guide_rest, guide_now, riders.gives)
+    axes = None if axes is None else _with_steps(axes)
     shifts = np.asarray(guide_now[:, 0] - guide_rest[:, 0], np.float32)
     counts = np.diff(riders.offsets)
     # whole strands a chunk, about as many points each
@@ -112,7 +123,7 @@ def ride(points: Floats, riders: Riders, guide_rest: Floats, guide_now: Floats) 
     for last in np.unique(np.minimum(ends, len(counts))).tolist():
         chunk = slice(int(riders.offsets[first]), int(riders.offsets[last]))
         strands = slice(first, last)
-        turned = _turned(moved[chunk], strands, counts[strands], riders, table)
+        turned = _turned(moved[chunk], strands, counts[strands], riders, table, axes)
         turned += np.repeat(_mean_shift(shifts, riders.weights, strands), counts[strands], axis=0)
         moved[chunk] += turned
         first = last
@@ -195,11 +206,11 @@ def _product(left: Floats, right: Floats) -> Floats:
     return product
 
 
-def _turn_table(turns: Floats) -> Floats:
-    """Turns, and below them what takes each to that of the next segment,
-    (guide_count, segment_count, 8)."""
-    table = np.zeros((*turns.shape[:0:-1], 8), np.float32)
-    table[..., :4] = turns.transpose(2, 1, 0)
+def _with_steps(values: Floats) -> Floats:
+    """Values of segments (guide_count, segment_count, 4), and behind them what takes each to that
+    of the next segment, (guide_count, segment_count, 8)."""
+    table = np.zeros((*values.shape[:2], 8), np.float32)
+    table[..., :4] = values
     table[:, :-1, 4:] = table[:, 1:, :4] - table[:, :-1, :4]
     return table
 
@@ -212,8 +223,15 @@ def _mean_shift(shifts: Floats, weights: Weights, strands: slice) -> Floats:
     return np.einsum("nk,nkc->nc", weight, shifts[guide]).astype(np.float32)
 
 
-def _turned(points: Floats, strands: slice, counts: Ints, riders: Riders, table: Floats) -> Floats:
-    """What turning adds to the points of some strands, (n, 3)."""
+def _turned(
+    points: Floats,
+    strands: slice,
+    counts: Ints,
+    riders: Riders,
+    table: Floats,
+    axes: Floats | None,
+) -> Floats:
+    """What turning and drawing out add to the points of some strands, (n, 3)."""
     segment = np.zeros((3, len(points)), np.float32)
     segment[:, :-1] = (points[1:] - points[:-1]).T
     tips = np.cumsum(counts) - 1
@@ -223,6 +241,7 @@ def _turned(points: Floats, strands: slice, counts: Ints, riders: Riders, table:
     last = table.shape[1] - 1
     flat = table.reshape(-1, 8)
     blend: Floats | None = None
+    axis = None if axes is None else np.zeros((4, len(points)), np.float32)
     for guide, weight in zip(
         riders.weights.guide[strands].T, riders.weights.weight[strands].T, strict=True
     ):
@@ -236,6 +255,9 @@ def _turned(points: Floats, strands: slice, counts: Ints, riders: Riders, table:
         turn = near[4:] * place
         turn += near[:4]
         fraction = np.repeat(weight, counts)
+        if axes is not None and axis is not None:
+            near = axes.reshape(-1, 8).take(before, axis=0, mode="clip").T
+            axis += (near[4:] * place + near[:4]) * fraction
         if blend is None:
             blend = turn * fraction
         else:  # of two quaternions of one rotation the nearer
@@ -244,7 +266,14 @@ def _turned(points: Floats, strands: slice, counts: Ints, riders: Riders, table:
     assert blend is not None
     size = _dot(blend, blend)
     blend[3] += size < REVERSED  # opposite turns that leave nothing
+    drawn: Floats | None = None
+    if axis is not None and (is_drawn := axis[3].nonzero()[0]).size:
+        drawn = np.zeros_like(segment)
+        drawn[:, is_drawn] = drawn_out(segment[:, is_drawn], axis[:, is_drawn])
+        segment += drawn
     change = turn_change(blend, segment)
+    if drawn is not None:
+        change += drawn
     total = np.cumsum(change, axis=1, dtype=np.float64)
     total -= change  # of the segments before each point
     starts = tips + 1 - counts

@@ -21,13 +21,14 @@ from ..dynamics.contacts import REACH, cv_radius
 from ..dynamics.forces import air_fraction, carried_fraction, speed_kept
 from ..dynamics.frame import Frame
 from ..dynamics.settings import DynamicsSettings
+from ..dynamics.springs import give, stiffness
 from ..dynamics.style import style_band
 from ..dynamics.trajectory import clamped_ratio
 from ..dynamics.wind import MODES
 from .shader_source import MOMENT_TEXELS
 
 #: Numbers before the vectors, and vectors before those of the CVs, of the uniform block.
-_NUMBERS, _VECTORS = 16, 3 + 2 * MODES
+_NUMBERS, _VECTORS = 16, 4 + 2 * MODES
 
 
 def spans_of(frame: Frame, first: int, count: int) -> Floats:
@@ -83,7 +84,9 @@ def block_of(
         speed_ratio,
         REACH * frame.size,
     )
-    _fill_forces(values[_NUMBERS:].reshape(-1, 4), frame)
+    vectors = values[_NUMBERS:].reshape(-1, 4)
+    _fill_forces(vectors, frame)
+    vectors[3, :2] = give(settings), 1.0 / (stiffness(settings, cv_count) * dt * dt)
     values[_NUMBERS + 4 * _VECTORS :] = _cv_values(settings, cv_count, dt, frame.size)
     return values
 
@@ -98,8 +101,8 @@ def _fill_forces(vectors: Floats, frame: Frame) -> None:
     vectors[1, :3] = combed * (np.float32(settings.sag_compensation) * square)
     if air is not None:
         vectors[2, :3] = air.velocity
-        vectors[3 : 3 + len(air.swing), :3] = air.swing
-        vectors[3 + MODES : 3 + MODES + len(air.wave), :3] = air.wave
+        vectors[4 : 4 + len(air.swing), :3] = air.swing
+        vectors[4 + MODES : 4 + MODES + len(air.wave), :3] = air.wave
 
 
 @lru_cache(maxsize=8)

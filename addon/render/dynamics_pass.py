@@ -11,6 +11,7 @@ strand_layout.strand_rows:
     rest_shapes    RGBA32F: of CV i xyz curvature [m] and w hold (style.LocalShape); of CV 0 x its
                    twist CV
     rest_lengths   R32F: [m] to the next CV
+    curl_rooms     R32F: of the segment to the next CV, see Rest.room; only where curls give
     held_cvs       R32F: 1 where a CV is held (held.Held), else 0
     beside_root    RGBA32F: xyz [m], see step.displacement_beside_root; both only where CVs are held
 
@@ -73,6 +74,7 @@ def dynamics_recipe(
     *,
     relaxation: bool = False,
     held: bool = False,
+    springs: bool = False,
     air: bool = False,
     collider_count: int = 0,
     rounds: bool = False,
@@ -84,6 +86,7 @@ def dynamics_recipe(
     flags = {
         "RELAXATION": relaxation,
         "HAS_HELD": held,
+        "HAS_SPRINGS": springs,
         "HAS_AIR": air,
         "HAS_ROUNDS": rounds,
         "HAS_FIELDS": fields,
@@ -91,7 +94,7 @@ def dynamics_recipe(
         "HAS_SHARP": sharp and cv_count > PINNED,
     }
     textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
-    textures += ["moments"] + ["held_cvs"] * held
+    textures += ["moments"] + ["held_cvs"] * held + ["curl_rooms"] * springs
     textures += ["rounds"] * rounds + ["fields"] * fields
     return ShaderRecipe(
         name="dynamics",
@@ -182,7 +185,11 @@ class DynamicsPass:
             textures["previous_positions"] = texture_from(strand_rows(previous[..., :2]), "RG32F")
             textures["bridged"] = points_texture(here)
             textures["rest_shapes"] = texture_from(strand_rows(rest_shapes(state.rest)), "RGBA32F")
-            textures["rest_lengths"] = texture_from(strand_rows(rest_lengths(state.rest)), "R32F")
+            lengths = of_segments(state.rest.length)
+            textures["rest_lengths"] = texture_from(strand_rows(lengths), "R32F")
+            if state.rest.room is not None:
+                rooms = of_segments(state.rest.room)
+                textures["curl_rooms"] = texture_from(strand_rows(rooms), "R32F")
         self._styles = [(style, self._style_texture(style)) for style in drive.targets]
         now, before, *earlier = (texture for _, texture in self._styles)
         textures |= {"styles_now": now, "styles_before": before}
@@ -222,6 +229,7 @@ class DynamicsPass:
             state.cv_count,
             relaxation=settings.length_solver == "relaxation",
             held=frame.drive.held is not None,
+            springs=state.rest.room is not None and settings.curl_stretch > 0.0,
             air=frame.air is not None,
             collider_count=len(posed),
             rounds=colliders.rounds is not None,
@@ -285,8 +293,9 @@ def rest_shapes(rest: Rest) -> Floats:
     return shapes
 
 
-def rest_lengths(rest: Rest) -> Floats:
-    """`rest_lengths`, (guide_count, cv_count, 1)."""
-    lengths = np.zeros((*rest.position.shape[:0:-1], 1), np.float32)
-    lengths[:, :-1, 0] = rest.length.T
-    return lengths
+def of_segments(values: Floats) -> Floats:
+    """Values of segments (cv_count - 1, guide_count), each at its first CV,
+    (guide_count, cv_count, 1)."""
+    at_cvs = np.zeros((values.shape[1], values.shape[0] + 1, 1), np.float32)
+    at_cvs[:, :-1, 0] = values.T
+    return at_cvs

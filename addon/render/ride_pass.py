@@ -12,11 +12,14 @@ New with every frame are the head's vertices that hold a root, or a matrix, and 
     root_holds    RGBA32F: first texel xyz the triangle's vertices, second xy weights of b and c
     rest_frames   RGBA32F: xyz of four texels origin, tangent, bitangent, normal at rest
     rest_points   RGBA32F: xyz position at rest [m, world], w radius [m]
-    guide_points  RGBA32F: xyz CVs of the guides at rest [m, world]
+    guide_points  RGBA32F: xyz CVs of the guides at rest [m, world], w whether the segment from
+                           there on may be drawn out
     guide_strands R32F:    the strand that each guide is
     guide_turns   RGBA32F: the rotation of each segment of the guides since rest, a quaternion, and
                            last xyz how far the guide has left its root [m]
     rest_turns    RGBA32F: the same of guides at rest
+    guide_axes    RGBA32F: of each segment of the guides, where curls may be drawn out: xyz where
+                           it points as its root carries it, w by which fraction it is longer
     guide_weights RGBA32F: xyz of three texels the guides, their weights, their segments a metre
     strand_spans  RGBA32F: where the points of each strand lie, see strand_layout.StrandLayout
     cv_points     RGBA32F: xyz position now [m, world], w radius [m]
@@ -49,33 +52,46 @@ ROOTS_RECIPE = ShaderRecipe(
     integers=("strand_count",),
     group_size=(64, 1),
 )
-GUIDES_RECIPE = ShaderRecipe(
-    name="ride_guides",
-    compute="ride_guides.comp.glsl",
-    textures=(
-        ("FLOAT_2D", "guides_now"),
-        ("FLOAT_2D", "guide_strands"),
-        ("FLOAT_2D", "root_motions"),
-        ("FLOAT_2D", "guide_points"),
-    ),
-    images=(("RGBA32F", "guide_turns"),),
-    integers=("segment_count", "guide_count", "mover_count"),
-    group_size=(64, 1),
-)
-RIDE_RECIPE = ShaderRecipe(
-    name="ride",
-    compute="ride.comp.glsl",
-    textures=(
-        ("FLOAT_2D", "root_motions"),
-        ("FLOAT_2D", "guide_weights"),
-        ("FLOAT_2D", "rest_points"),
-        ("FLOAT_2D", "strand_spans"),
-        ("FLOAT_2D", "guide_turns"),
-    ),
-    images=(("RGBA32F", "cv_points"),),
-    integers=("segment_count", "strand_count", "mover_count"),
-    group_size=(64, 1),
-)
+
+
+def _guides_recipe(*, curls: bool) -> ShaderRecipe:
+    return ShaderRecipe(
+        name="ride_guides",
+        compute="ride_guides.comp.glsl",
+        textures=(
+            ("FLOAT_2D", "guides_now"),
+            ("FLOAT_2D", "guide_strands"),
+            ("FLOAT_2D", "root_motions"),
+            ("FLOAT_2D", "guide_points"),
+        ),
+        images=(("RGBA32F", "guide_turns"), *[("RGBA32F", "guide_axes")] * curls),
+        integers=("segment_count", "guide_count", "mover_count"),
+        group_size=(64, 1),
+        defines=(("HAS_CURLS", 1),) if curls else (),
+    )
+
+
+def _ride_recipe(*, curls: bool) -> ShaderRecipe:
+    return ShaderRecipe(
+        name="ride",
+        compute="ride.comp.glsl",
+        textures=(
+            ("FLOAT_2D", "root_motions"),
+            ("FLOAT_2D", "guide_weights"),
+            ("FLOAT_2D", "rest_points"),
+            ("FLOAT_2D", "strand_spans"),
+            ("FLOAT_2D", "guide_turns"),
+            *[("FLOAT_2D", "guide_axes")] * curls,
+        ),
+        images=(("RGBA32F", "cv_points"),),
+        integers=("segment_count", "strand_count", "mover_count"),
+        group_size=(64, 1),
+        defines=(("HAS_CURLS", 1),) if curls else (),
+    )
+
+
+GUIDES_RECIPE, CURLED_GUIDES_RECIPE = _guides_recipe(curls=False), _guides_recipe(curls=True)
+RIDE_RECIPE, CURLED_RIDE_RECIPE = _ride_recipe(curls=False), _ride_recipe(curls=True)
 
 
 class RidePass:
@@ -199,8 +215,11 @@ class RidePass:
         textures["strand_spans"] = texture_from(spans, "RGBA32F")
         guide_strands = self._guides[:, None, None].astype(np.float32)
         textures["guide_strands"] = texture_from(strand_rows(guide_strands), "R32F")
-        points = strand_rows(_padded(self._guide_grid))
-        textures["guide_points"] = texture_from(points, "RGBA32F")
+        points = _padded(self._guide_grid)
+        if self._riders.gives is not None:
+            points[:, :-1, 3] = self._riders.gives
+            textures["guide_axes"] = _empty(*self._guide_grid.shape[:2])
+        textures["guide_points"] = texture_from(strand_rows(points), "RGBA32F")
         weights = self._riders.weights
         per_meter = self._riders.segments_per_meter[weights.guide] * self._riders.reach[:, None]
         riding = np.stack([weights.guide, weights.weight, per_meter], axis=1)
@@ -235,13 +254,14 @@ class RidePass:
 
     def _run_guides(self, guides_now: Any) -> None:
         textures, count = self._textures, len(self._guides)
-        shader = program(GUIDES_RECIPE)
+        recipe = GUIDES_RECIPE if self._riders.gives is None else CURLED_GUIDES_RECIPE
+        shader = program(recipe)
         shader.bind(
             textures={
                 "guides_now": guides_now,
                 **_named(textures, "guide_strands", "root_motions", "guide_points"),
             },
-            images=_named(textures, "guide_turns"),
+            images={name: textures[name] for _, name, *_ in recipe.images},
             integers={
                 "segment_count": self._segment_count,
                 "guide_count": count,
@@ -252,8 +272,10 @@ class RidePass:
 
     def _run_ride(self, turns: str, anchors: Floats | None) -> None:
         textures, count = self._textures, self._strands.strand_count
-        shader = program(RIDE_RECIPE)
-        taken = "root_motions", "guide_weights", "rest_points", "strand_spans"
+        is_curled = self._riders.gives is not None and turns == "guide_turns"
+        shader = program(CURLED_RIDE_RECIPE if is_curled else RIDE_RECIPE)
+        taken = ["root_motions", "guide_weights", "rest_points", "strand_spans"]
+        taken += ["guide_axes"] * is_curled
         shader.bind(
             textures=_named(textures, *taken) | {"guide_turns": textures[turns]},
             images={"cv_points": self.points.texture},

@@ -16,6 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ..cards.bake import SAMPLES, SPARSE_RANGE, SPARSE_STEPS
+from ..dynamics import springs
 from ..dynamics.constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED
 from ..dynamics.contacts import (
     BETWEEN,
@@ -28,7 +29,7 @@ from ..dynamics.contacts import (
     TRACE_STEPS,
 )
 from ..dynamics.wind import MODES
-from ..refine import detail, ride
+from ..refine import curls, detail, ride
 from ..refine.hold import NEAR, SWEEPS
 from ..refine.settings import DetailSettings
 from ..shading.card_look import DARKEST, MEAN_FACING
@@ -98,11 +99,16 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "pinned": str(PINNED),
         "contact_weight": repr(float(CONTACT_WEIGHT)),
         "held_weight": repr(float(HELD)),
+        "steepest_spring": repr(float(springs.STEEPEST)),
         "held_sweeps": str(HELD_SWEEPS),
         "hold_sweeps": str(SWEEPS),
         "hold_near": repr(NEAR),
         "skin_of_reach": repr(SKIN / REACH),
         "shortest_segment": repr(ride.SHORTEST),
+        "curl_slack": repr(curls.SLACK),
+        "curl_catching_up": repr(curls.CATCHING_UP),
+        "curl_widest": repr(curls.WIDEST),
+        "curl_shortest": repr(curls.SHORTEST),
         "reversed_turn": repr(ride.REVERSED),
         "between_count": str(len(BETWEEN)),
         "between_radius": repr(float(BETWEEN_RADIUS)),

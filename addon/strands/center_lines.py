@@ -19,6 +19,8 @@ from .strand_set import StrandSet
 _FAITHFUL = 0.02
 #: Samples of a strand between two CVs, of which the mean is taken.
 _SAMPLES = 16
+#: No segment gets room for more than this: one whose curls cancel out would have it for anything.
+_WIDEST = 20.0
 #: Strands averaged at once.
 _CHUNK = 2048
 
@@ -40,6 +42,22 @@ def center_lines(strands: StrandSet, cv_count: int) -> StrandSet:
         dense = resample(strands.take(some), (cv_count - 1) * _SAMPLES + 1).grid
         points[some, 1:-1] = _means(dense)
     return replace(lines, points=points.reshape(-1, 3))
+
+
+def curl_room(length: Floats, lines: Floats) -> Floats | None:
+    """By which fraction of its length each segment of centre lines could be drawn out until its
+    curls are straight, (n, cv_count - 1) float32; None where no strand is curled.
+
+    Args:
+        length: (n,) [m] of the strands, evenly along which the CVs lie.
+        lines: (n, cv_count, 3) [m].
+    """
+    segment = np.linalg.norm(np.diff(lines, axis=1), axis=2)
+    room = length[:, None] / segment.shape[1] / np.maximum(segment, 1.0e-12) - 1.0
+    is_curled = length - segment.sum(axis=1) > _FAITHFUL * length
+    if not is_curled.any():
+        return None
+    return np.where(is_curled[:, None], np.clip(room, 0.0, _WIDEST), 0.0).astype(np.float32)
 
 
 def _means(dense: Floats) -> Floats:

@@ -96,6 +96,7 @@ class Scene:
     standing: tuple[Collider, ...] = ()
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
     is_held: bool = False
+    is_curled: bool = False
     fps: float = 60.0
     is_bent: bool = True
     is_fast: bool = False  # colliders swing ten times as far
@@ -110,7 +111,17 @@ class Scene:
         return (grid @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
 
     def start(self) -> DynamicsState:
-        return start(self.carried(0.0))
+        return start(self.carried(0.0), self.room)
+
+    @property
+    def room(self) -> np.ndarray | None:
+        """Of two guides in three, most of their segments."""
+        if not self.is_curled:
+            return None
+        random = np.random.default_rng(8)
+        room = random.uniform(-0.5, 1.5, (self.guide_count, self.cv_count - 1)).clip(0.0, None)
+        room[::3] = 0.0
+        return room
 
     @cached_property
     def held(self) -> Held | None:
@@ -158,6 +169,9 @@ CLUSTER = SphereSetCollider(
     np.array([0.09, 0.07, 0.06, 0.06]),
 )
 
+#: numpy lets rounding of the world's coordinates pass as well, which adds up where curls give.
+LOOSE = {"length_tolerance": 0.02}
+
 IN_AIR = {
     "default": Scene(),
     "straight way": Scene(is_bent=False),
@@ -175,6 +189,9 @@ IN_AIR = {
     ),
     "held": Scene(is_held=True),
     "held at 24 frames a second": Scene({"substep_rate": 100.0}, fps=24.0, is_held=True),
+    "curls": Scene({"curl_stretch": 0.6, "sag_compensation": 0.6, **LOOSE}, is_curled=True),
+    "held curls": Scene({"curl_bounce": 5.0, **LOOSE}, is_held=True, is_curled=True),
+    "curls with relaxation": Scene({"length_solver": "relaxation"}, is_curled=True),
     "relaxation": Scene({"length_solver": "relaxation"}),
     "relaxation without reach": Scene(
         {"length_solver": "relaxation", "relaxations": 3, "long_range": False}, is_held=True
@@ -201,6 +218,7 @@ AT_COLLIDERS = {
     "mesh field": Scene(LIMP, on_head=(ball_field(0.095),)),
     "head and ball": Scene(on_head=(ball_field(0.095),), standing=(IN_THE_WAY,)),
     "three of all kinds": Scene(on_head=(CLUSTER, ball_field(0.08)), standing=(ROD,)),
+    "curls": Scene(LIMP | LOOSE, on_head=(BALL,), is_curled=True),
     "one pass": Scene({"contact_passes": 1, **LIMP}, on_head=(BALL,)),
     "relaxation": Scene({"length_solver": "relaxation"}, on_head=(BALL,)),
     "held": Scene(LIMP, on_head=(BALL,), standing=(IN_THE_WAY,), is_held=True),

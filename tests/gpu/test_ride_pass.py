@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from hairloom.addon import pipeline
 from hairloom.addon.groom.roots import root_frames
+from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.groom.weights import GuideWeights
 from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
@@ -233,3 +235,38 @@ def test_guides_of_another_shape_are_refused() -> None:
     pose = rig.rest_pose
     with pytest.raises(ValueError, match="guides have shape"):
         shown(pass_of(rig), pose, np.zeros((3, 6, 3), np.float32))
+
+
+def coiled(count: int = 200) -> Rig:
+    """Coils and straight strands that lean, with few guides."""
+    random = np.random.default_rng(5)
+    along = np.linspace(0.0, 1.0, 160)
+    angle = 2.0 * np.pi * 8.0 * along
+    radius = 0.006 * (np.arange(count)[:, None] % 3 > 0) * np.minimum(1.0, 20.0 * along)
+    grid = np.stack([radius * np.cos(angle), radius * np.sin(angle), -0.2 * along + 0 * radius], -1)
+    grid += (
+        random.normal(size=(count, 1, 3)) * 0.05
+        + 0.1 * random.normal(size=(count, 1, 3)) * along[:, None]
+    )
+    offsets, width = np.arange(count + 1) * 160, np.full(count * 160, 4e-5)
+    strands = StrandSet(grid.reshape(-1, 3), offsets, width, np.zeros(count))
+    return pipeline.prepare(strands, None, GuideSettings(guide_count=30), place="coils")
+
+
+def test_curls_are_drawn_out_as_in_numpy() -> None:
+    rig = coiled()
+    assert rig.curl_room is not None and 0 < rig.curl_room.any(axis=1).sum() < 30
+    ride, matrix = pass_of(rig), turned(0.7, (0.1, 0.0, 0.0))
+    pose = Pose(None, matrix)
+    guides = pipeline.carried_guides(rig, pose).astype(np.float64)
+    way = np.diff(guides, axis=1) * np.random.default_rng(6).uniform(0.7, 1.9, (30, 1, 1))
+    way += np.random.default_rng(7).normal(scale=0.002, size=way.shape)
+    now = np.concatenate([guides[:, :1], guides[:, :1] + way.cumsum(axis=1)], axis=1)
+    expected = pipeline.strands_at(rig, pose, now.astype(np.float32))
+    found = shown(ride, pose, now.astype(np.float32))
+    assert np.abs(found - expected).max() < 2.0 * TOLERANCE
+    plain = replace(rig.riders, gives=None)
+    other = type(ride)(rig.strands, None, rig.guides, rig.guide_grid, plain)
+    assert np.abs(shown(other, pose, now.astype(np.float32)) - found).max() > 0.02
+    ride.carry(None, matrix)
+    assert np.abs(ride.read() - pipeline.carried(rig, pose)).max() < TOLERANCE

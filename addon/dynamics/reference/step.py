@@ -17,6 +17,7 @@ from ...params.curve import along as curve_along
 from ..constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED, ROUNDING
 from ..contacts import MORE_ROUNDS
 from ..settings import DynamicsSettings
+from ..springs import STEEPEST, give, stiffness
 from ..state import DynamicsState
 from ..step import Drive
 from ..turn import best_rotation
@@ -62,7 +63,10 @@ class _Guide:
         self.x, self.previous = points(state.position), points(state.previous)
         self.rest = points(state.rest.position)
         self.twist_cv = int(state.rest.shape.twist_cv[guide])
-        self.length = [float(np.linalg.norm(b - a)) for a, b in pairwise(self.rest)]
+        self.rest_length = [float(np.linalg.norm(b - a)) for a, b in pairwise(self.rest)]
+        self.length = self.rest_length  # those that this substep keeps
+        room = state.rest.room
+        self.room = np.zeros(len(self.length)) if room is None else room[:, guide].astype(float)
         self.size = state.rest.size
         self.held = [False] * len(self.x)
         if drive.held is not None:
@@ -76,8 +80,10 @@ class _Guide:
             else curvature[guide].astype(np.float64)
         )
         middle = (drive.target_before + drive.target_now).transpose(2, 1, 0) / 2.0
-        self.gravity = self._felt_gravity(
-            drive, settings, best_rotation(state.rest.position, middle)
+        turn = best_rotation(state.rest.position, middle)
+        self.gravity = self._felt_gravity(drive, settings, turn)
+        self.load = settings.sag_compensation * self._tension_on_style(
+            turn @ (np.asarray(drive.gravity, np.float64) * settings.gravity)
         )
 
     def substep(self, drive: Drive, settings: DynamicsSettings, moment: Moment) -> None:
@@ -86,6 +92,7 @@ class _Guide:
         self._predict(settings, air, moment)
         style = self._style_at(moment.end)
         self._pin(style)
+        self._give(settings, moment.dt)
         self._restore_style(style, settings, moment.dt)
         self._pin(style)
         self._keep_lengths({}, settings)
@@ -150,7 +157,7 @@ class _Guide:
         before = PINNED - 1
         for cv in self._held_cvs():
             displacement = style[cv] - self.x[before]
-            ratio = sum(self.length[before:cv]) / float(np.linalg.norm(displacement))
+            ratio = sum(self.rest_length[before:cv]) / float(np.linalg.norm(displacement))
             is_beside = cv == before + 1
             self.x[cv] = self.x[before] + displacement * (ratio if is_beside else min(ratio, 1.0))
             before = cv
@@ -172,11 +179,47 @@ class _Guide:
         # the part of the combed weight across all length constraints, by projection
         combed = np.tile(turn @ pull, free)
         jacobian = jacobian_of(self.before + self.displacement / 2.0)
-        tension = np.linalg.solve(jacobian @ jacobian.T, jacobian @ combed)
+        tension = self._tension_on_style(turn @ pull)
         felt[PINNED:] -= settings.sag_compensation * (combed - jacobian.T @ tension).reshape(
             free, 3
         )
         return felt
+
+    def _tension_on_style(self, combed: Floats) -> Floats:
+        """By which each segment beyond the pinned ones holds the gravity of the style [m/s^2]."""
+        free = len(self.x) - PINNED
+        if free < 1:
+            return np.zeros(0)
+        jacobian = jacobian_of(self.before + self.displacement / 2.0)
+        tension: Floats = np.linalg.solve(jacobian @ jacobian.T, jacobian @ np.tile(combed, free))
+        return tension
+
+    def _give(self, settings: DynamicsSettings, dt: float) -> None:
+        """One step of the springs along a curl, in tensions; its lengths are those it leaves."""
+        room = self.room[PINNED - 1 :] * give(settings)
+        if not room.any():
+            return
+        free, kappa = len(self.x) - PINNED, stiffness(settings, len(self.x))
+        rest = np.array(self.rest_length[PINNED - 1 :])
+        previous = np.linalg.norm(np.diff(self.previous[PINNED - 1 :], axis=0), axis=1)
+        right = self._lengths() - rest
+        compliance = np.zeros(free)
+        for one in np.flatnonzero(room):
+            most = room[one] * rest[one]
+            ratio = np.clip((previous[one] - rest[one]) / most, -STEEPEST, STEEPEST)
+            slope = kappa * (1.0 + ratio**2) / (1.0 - ratio**2) ** 2
+            tension = kappa * most * ratio / (1.0 - ratio**2) + self.load[one]
+            compliance[one] = 1.0 / (slope * dt * dt)
+            right[one] += tension / slope - most * ratio
+        jacobian, mobility = jacobian_of(self.x), self._mobility({})
+        before = self.x.copy()
+        tension = np.linalg.solve(jacobian @ mobility @ jacobian.T + np.diag(compliance), right)
+        self.x[PINNED:] -= (mobility @ jacobian.T @ tension).reshape(free, 3)
+        held = self._held_cvs()
+        self.x[held] = before[held]
+        longest = rest * (1.0 + room)
+        left = np.clip(self._lengths(), rest**2 / longest, longest)
+        self.length = [*self.rest_length[: PINNED - 1], *left]
 
     def _restore_style(self, style: Floats, settings: DynamicsSettings, dt: float) -> None:
         count = len(self.x)
@@ -196,7 +239,7 @@ class _Guide:
         for i in range(1, count - 1):
             rest_second = self.rest[i + 1] - 2.0 * self.rest[i] + self.rest[i - 1]
             style_second = style[i + 1] - 2.0 * style[i] + style[i - 1]
-            held = hold(rest_second, (self.length[i] + self.length[i - 1]) / 2.0)
+            held = hold(rest_second, (self.rest_length[i] + self.rest_length[i - 1]) / 2.0)
             wanted = held * (turns[i - 1] @ rest_turns[i - 1].T @ rest_second)
             wanted = wanted + (1.0 - held) * style_second
             weights = {i - 1: 1.0, i: -2.0, i + 1: 1.0}
@@ -256,20 +299,23 @@ class _Guide:
         free = len(self.x) - PINNED
         if free < 1:
             return
-        jacobian = jacobian_of(self.x)
-        mobility = np.eye(3 * free)
-        for cv, normal in normals.items():
-            at = slice(3 * (cv - PINNED), 3 * (cv - PINNED) + 3)
-            mobility[at, at] -= float(CONTACT_WEIGHT) * np.outer(normal, normal)
-        held = self._held_cvs()
-        for cv in held:
-            at = slice(3 * (cv - PINNED), 3 * (cv - PINNED) + 3)
-            mobility[at, at] = (1.0 - float(HELD)) * np.eye(3)
+        jacobian, mobility, held = jacobian_of(self.x), self._mobility(normals), self._held_cvs()
         before = self.x[held].copy()
         error = self._lengths() - self.length[PINNED - 1 :]
         tension = np.linalg.solve(jacobian @ mobility @ jacobian.T, error)
         self.x[PINNED:] -= (mobility @ jacobian.T @ tension).reshape(free, 3)
         self.x[held] = before
+
+    def _mobility(self, normals: dict[int, Floats]) -> Floats:
+        free = len(self.x) - PINNED
+        mobility = np.eye(3 * free)
+        for cv, normal in normals.items():
+            at = slice(3 * (cv - PINNED), 3 * (cv - PINNED) + 3)
+            mobility[at, at] -= float(CONTACT_WEIGHT) * np.outer(normal, normal)
+        for cv in self._held_cvs():
+            at = slice(3 * (cv - PINNED), 3 * (cv - PINNED) + 3)
+            mobility[at, at] = (1.0 - float(HELD)) * np.eye(3)
+        return mobility
 
     def _finish_lengths(self, normals: dict[int, Floats], settings: DynamicsSettings) -> None:
         for _ in range(settings.length_iterations):

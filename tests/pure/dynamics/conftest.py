@@ -152,6 +152,7 @@ class Scene:
     """Guides on a head that moves by matrices, with colliders that go with it or stand still.
 
     held: (guide_count, cv_count) the CVs that go with the head too, or None.
+    room: (guide_count, cv_count - 1) how much curls have to give, or None.
     bowed: whether the ways within a frame are smooth, as the pipeline makes them.
     """
 
@@ -165,9 +166,10 @@ class Scene:
     held: Any = None
     bowed: bool = False
     wind: Any = (0.0, 0.0, 0.0)
+    room: Any = None
 
     def start(self) -> DynamicsState:
-        return start(moved(self.motion(0.0), self.grid))
+        return start(moved(self.motion(0.0), self.grid), self.room)
 
     def colliders(self, before: float, now: float) -> tuple[PosedCollider, ...]:
         matrices = self.motion(before), self.motion(now)

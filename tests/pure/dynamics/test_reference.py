@@ -94,6 +94,28 @@ def test_held_cvs(kit, shake, solver):
         np.testing.assert_allclose(one.position, other.position, atol=FREE)
 
 
+@pytest.mark.parametrize("held", few_in_commits([True, False]))
+@pytest.mark.parametrize("solver", ["direct", "relaxation"])
+def test_curls_that_give(kit, shake, solver, held):
+    """Some guides, some segments of these, with ties and a ball, the weight carried in part."""
+    room = np.random.default_rng(4).uniform(-0.5, 1.5, (6, 9)).clip(0.0, None)
+    room[::3] = 0.0
+    values = {"length_solver": solver, "curl_stretch": 0.5, "sag_compensation": 0.6}
+    scene = kit.Scene(
+        kit.curly(6, 10),
+        DynamicsSettings(**TIGHT | values),
+        shake,
+        on_head=(SphereCollider((0.0, 0.0, 0.0), 0.13),),
+        held=kit.tied(np.arange(6) % 2 == 0, 10, 5) if held else None,
+        room=room,
+    )
+    fast, slow = both(kit, scene, 0.3)
+    plain = kit.Scene(**scene.__dict__ | {"room": None}).play(0.3, 50.0)
+    assert np.abs(fast[-1].position - plain[-1].position).max() > 2e-3
+    for one, other in zip(fast, slow, strict=True):
+        np.testing.assert_allclose(one.position, other.position, atol=TOUCHING)
+
+
 @pytest.mark.parametrize("iterations", [1, 8])
 def test_held_cvs_that_tear(kit, iterations):
     """Heads that turn by a right angle in a frame: both forms lay the same guides out again."""

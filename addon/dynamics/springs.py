@@ -1,0 +1,134 @@
+"""Curls give: the centre line of a curled guide is a chain of springs along itself.
+
+Each segment j of it may be drawn out or pushed together by an extension e = |s_j| - l_j, against
+a tension, for CVs of mass 1, of
+
+    T(e) = kappa e / (1 - (e / E)^2) + T_0     E the most that it gives, T_0 that at rest
+
+which is an ideal spring at first and stiffens as the curl is drawn straight. kappa is such that a
+guide curled along its whole length bobs at the frequency of the settings, so that motion depends
+neither on the substep, nor on the CV count, nor on the size. T_0 is the tension of the weight that
+the style carries: a groom at rest is as long as it was combed.
+
+A step is backward Euler, linearised at the extension before it: the Newton step of `constraints`,
+with a compliance on the diagonal (XPBD, Macklin, Mueller and Chentanez 2016). The lengths that it
+leaves are those that the rest of the substep keeps. So what does not give stays as stiff as it was,
+and style, contacts and reach need to know of no springs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..strands.vectors import dot_rows
+from .constraints import PINNED, TINY, segments, spring_step
+from .forces import tension_on_style
+from .settings import DynamicsSettings
+
+#: Of what a curl could be drawn out until it is straight, it gives this at Curl Stretch 1.
+GIVEN = 0.8
+#: A spring is linearised no nearer to its end than this.
+STEEPEST = np.float32(0.9)
+
+
+def stiffness(settings: DynamicsSettings, cv_count: int) -> float:
+    """kappa [1/s^2] of each segment of a guide with `cv_count` CVs.
+
+    The first mode of n equal masses on n springs, one end held: omega = 2 sqrt(kappa)
+    sin(pi / (4 n + 2)).
+    """
+    free = max(cv_count - PINNED, 1)
+    return (math.pi * settings.curl_bounce / math.sin(math.pi / (4 * free + 2))) ** 2
+
+
+def give(settings: DynamicsSettings) -> float:
+    """Fraction of a curl's room that it gives."""
+    return GIVEN * settings.curl_stretch
+
+
+@dataclass(frozen=True)
+class Springs:
+    """The curled guides of a block in a frame; rows (cv_count - 2, n), a segment beyond the pinned
+    ones each.
+
+    guides: (n,) which of the block they are, rising.
+    length: [m] at rest.
+    most: E [m], 0 where a segment does not give.
+    load: T_0 / kappa [m].
+    softness: 1 / (kappa dt^2).
+    held: see `held.Held.rows`, of these guides; None where none is held.
+    """
+
+    guides: Ints
+    length: Floats
+    most: Floats
+    load: Floats
+    softness: float
+    held: Floats | None
+
+    @classmethod
+    def of(
+        cls,
+        room: Floats | None,
+        length: Floats,
+        style: Floats,
+        combed: Floats,
+        held: Floats | None,
+        settings: DynamicsSettings,
+        dt: float,
+    ) -> Springs | None:
+        """Those of a block; None where no guide gives.
+
+        Args:
+            room, length: (cv_count - 1, guide_count), see `state.Rest`.
+            style: (3, cv_count, guide_count) world [m].
+            combed: (3,) [m/s^2], the gravity that the style carries.
+            held: (cv_count, guide_count), see `held.Held.rows`; None where no CV is held.
+        """
+        if room is None or not settings.curl_stretch or style.shape[1] <= PINNED:
+            return None
+        guides = room[PINNED - 1 :].any(axis=0).nonzero()[0]
+        if not guides.size:
+            return None
+        kappa = stiffness(settings, style.shape[1])
+        at_rest = length[PINNED - 1 :, guides]
+        most = room[PINNED - 1 :, guides] * at_rest * np.float32(give(settings))
+        segment, tension = tension_on_style(combed, style[:, :, guides])
+        load = tension * np.sqrt(dot_rows(segment, segment)) / np.float32(kappa)
+        own = None if held is None else held[:, guides]
+        return cls(guides, at_rest, most, load, 1.0 / (kappa * dt * dt), own)
+
+    def step(self, position: Floats, previous: Floats, length: Floats) -> Floats:
+        """Move curled guides by what their springs pull in a substep; the lengths (cv_count - 1,
+        guide_count) [m] of all segments from then on.
+
+        Args:
+            position, previous: (3, cv_count, guide_count) world [m], now and a substep earlier.
+            length: of all segments at rest.
+        """
+        some = position.take(self.guides, axis=2)
+        _, squared = segments(previous[:, PINNED - 1 :].take(self.guides, axis=2))
+        steepest = STEEPEST * self.most
+        extended = np.clip(np.sqrt(squared) - self.length, -steepest, steepest)
+        used = extended / np.maximum(self.most, TINY)
+        used *= used
+        softer = np.square(1.0 - used) / (1.0 + used)
+        softer *= self.most > 0.0
+        target = self.length + extended - softer * (extended / (1.0 - used) + self.load)
+        spring_step(some, target, softer * np.float32(self.softness), self.held)
+        position[:, :, self.guides] = some
+        _, squared = segments(some[:, PINNED - 1 :])
+        lengths = length.copy()
+        longest, shortest = limits(self.length, self.most)
+        lengths[PINNED - 1 :, self.guides] = np.clip(np.sqrt(squared), shortest, longest)
+        return lengths
+
+
+def limits(length: Floats, most: Floats) -> tuple[Floats, Floats]:
+    """How long and how short segments may get [m]: by the same factor."""
+    longest = length + most
+    return longest, length * (length / np.maximum(longest, TINY))
