@@ -1,9 +1,10 @@
 """Cards that ride on guides: bound at rest, carried as whole strips.
 
 A card has a bone: the mixture of its guides at rest, moved to its root. It rides as strands do, so
-it keeps its length. It has a frame that does not twist from root to tip (Bishop 1975). A row of the
-card (its vertices at one place along it) keeps its place in that frame. So strips bend and do not
-shear, a row stays as wide as it was, and nothing twists but what the root turns.
+it keeps its length, unless the curls that the card shows are drawn out. It has a frame that does
+not twist from root to tip (Bishop 1975). A row of the card (its vertices at one place along it)
+keeps its place in that frame. So strips bend and do not shear, a row stays as wide as it was, and
+nothing twists but what the root turns.
 
 Vectors lie as planes here, (3, ...): that is several times as fast.
 
@@ -87,13 +88,16 @@ def card_lines(mesh: CardMesh) -> tuple[Ints, Floats]:
     return used.astype(np.int32), lines
 
 
-def bind_cards(mesh: CardMesh, guides: Floats, guide: Ints, weight: Floats) -> CardBinding:
+def bind_cards(
+    mesh: CardMesh, guides: Floats, guide: Ints, weight: Floats, room: Floats | None = None
+) -> CardBinding:
     """Tie cards to the guides that they ride on.
 
     Args:
         mesh: at rest, world space.
         guides: (guide_count, cv_count, 3) [m] at rest, CVs evenly along each.
         guide, weight: (n, k) for the cards of `card_lines`, in its order.
+        room: (guide_count, cv_count - 1), see `center_lines.curl_room`; None: no curls.
     """
     used, lines = card_lines(mesh)
     mixed = _mixed(guides, guide, weight)
@@ -117,7 +121,7 @@ def bind_cards(mesh: CardMesh, guides: Floats, guide: Ints, weight: Floats) -> C
         np.asarray(guides, np.float32),
         root,
         bone - bone[:, :1],
-        _riders(bone, guides, guide, weight),
+        _riders(bone, guides, _Weights(guide, np.asarray(weight, np.float32)), room),
         headings[:, 0],
         side,
         row.reshape(-1),
@@ -186,13 +190,13 @@ class _Weights:
     weight: Floats
 
 
-def _riders(bone: Floats, guides: Floats, guide: Ints, weight: Floats) -> Riders:
+def _riders(bone: Floats, guides: Floats, weights: _Weights, room: Floats | None) -> Riders:
     """Bones (3, cv_count, n) on their guides."""
     _, cv_count, count = bone.shape
     points = bone.transpose(2, 1, 0).reshape(-1, 3)
     offsets = np.arange(count + 1) * cv_count
     strands = StrandSet(points, offsets, np.zeros(len(points)), np.zeros(count, int))
-    return Riders.of(strands, guides, _Weights(guide, np.asarray(weight, np.float32)))
+    return replace(Riders.of(strands, guides, weights, room), are_lines=True)
 
 
 def _ridden(binding: CardBinding, guides: Floats, turns: Floats) -> Floats:

@@ -56,6 +56,8 @@ class Riders:
     segments_per_meter: (guide_count,) float32 [1/m], of each guide.
     gives: (guide_count, cv_count - 1), which segments of guides are curls, which may be drawn out;
         None: none.
+    are_lines: whether these strands are centre lines themselves, which get as much longer as their
+        guides do.
     """
 
     offsets: Ints
@@ -64,6 +66,7 @@ class Riders:
     reach: Floats
     segments_per_meter: Floats
     gives: Bools | None = None
+    are_lines: bool = False
 
     @classmethod
     def of(
@@ -269,7 +272,8 @@ def _turned(
     drawn: Floats | None = None
     if axis is not None and (is_drawn := axis[3].nonzero()[0]).size:
         drawn = np.zeros_like(segment)
-        drawn[:, is_drawn] = drawn_out(segment[:, is_drawn], axis[:, is_drawn])
+        some, along = segment[:, is_drawn], axis[:, is_drawn]
+        drawn[:, is_drawn] = some * along[3] if riders.are_lines else drawn_out(some, along)
         segment += drawn
     change = turn_change(blend, segment)
     if drawn is not None:

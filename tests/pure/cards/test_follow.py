@@ -231,3 +231,16 @@ def test_a_card_between_guides_that_go_apart_keeps_its_length() -> None:
         now[guide] += guides[guide, 0]
     moved = follow_guides(binding, now, np.tile(np.eye(3), (2, 1, 1)))
     np.testing.assert_allclose(moved.positions, mesh.positions, atol=1e-6)
+
+
+def test_a_card_of_curls_gets_longer_with_its_guide_and_stays_as_wide() -> None:
+    mesh, guides = flat_card(), straight()
+    room = np.full((1, guides.shape[1] - 1), 2.0, np.float32)
+    one = np.zeros((1, 1), int), np.ones((1, 1), np.float32)
+    longer = guides[:, :1] + (guides - guides[:, :1]) * np.float32(1.3)
+    turns = np.eye(3)[None]
+    stiff = follow_guides(bind_cards(mesh, guides, *one), longer, turns).positions
+    curled = follow_guides(bind_cards(mesh, guides, *one, room), longer, turns).positions
+    np.testing.assert_allclose(np.ptp(stiff, axis=0), np.ptp(mesh.positions, axis=0), atol=1e-6)
+    expected = np.sort(np.ptp(mesh.positions, axis=0)) * [1.0, 1.0, 1.3]
+    np.testing.assert_allclose(np.sort(np.ptp(curled, axis=0)), expected, atol=1e-6)
