@@ -67,9 +67,9 @@ def drawn_out(segment: Floats, axis: Floats) -> Floats:
     left = thick - along * along * axis[3] * (np.float32(2.0) + axis[3])
     left = np.clip(left, 0.0, np.minimum(np.float32(WIDEST * WIDEST) * thick, squared))
     wanted = np.copysign(np.sqrt(squared - left), along)
-    is_thick = (size > SHORTEST) & (thick > 0.0)
-    factor = np.sqrt(np.divide(left, thick, out=np.ones_like(left), where=is_thick))
+    is_changed = (size > SHORTEST) & (thick > 0.0) & (axis[3] != 0.0)
+    factor = np.sqrt(np.divide(left, thick, out=np.ones_like(left), where=is_changed))
     change = direction * (wanted - along)
     change += across * (factor - np.float32(1.0))
-    change[:, ~is_thick] = 0.0
+    change[:, ~is_changed] = 0.0
     return change

@@ -259,8 +259,11 @@ def _turned(
         turn += near[:4]
         fraction = np.repeat(weight, counts)
         if axes is not None and axis is not None:
-            near = axes.reshape(-1, 8).take(before, axis=0, mode="clip").T
-            axis += (near[4:] * place + near[:4]) * fraction
+            near = np.ascontiguousarray(axes.reshape(-1, 8).take(before, axis=0, mode="clip").T)
+            here = near[4:] * place
+            here += near[:4]
+            here *= fraction
+            axis += here
         if blend is None:
             blend = turn * fraction
         else:  # of two quaternions of one rotation the nearer
@@ -270,10 +273,8 @@ def _turned(
     size = _dot(blend, blend)
     blend[3] += size < REVERSED  # opposite turns that leave nothing
     drawn: Floats | None = None
-    if axis is not None and (is_drawn := axis[3].nonzero()[0]).size:
-        drawn = np.zeros_like(segment)
-        some, along = segment[:, is_drawn], axis[:, is_drawn]
-        drawn[:, is_drawn] = some * along[3] if riders.are_lines else drawn_out(some, along)
+    if axis is not None and axis[3].any():
+        drawn = segment * axis[3] if riders.are_lines else drawn_out(segment, axis)
         segment += drawn
     change = turn_change(blend, segment)
     if drawn is not None:
