@@ -22,6 +22,7 @@ from .errors import HairloomError
 from .groom.automatic_children import are_few, automatic
 from .groom.children import make_children
 from .groom.children_settings import ChildrenSettings
+from .groom.counter_random import named, uniform
 from .groom.guides import choose_guides, grouped
 from .groom.holds import Holds
 from .groom.roots import RootFrames, bind_roots, follow, root_frames
@@ -34,6 +35,7 @@ from .refine.ride import Riders, ride
 from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
+from .shading.strand_noise import SEED_LIMIT
 from .strands import StrandSet, Surface
 from .strands.center_lines import center_lines, curl_room
 from .strands.face import is_face_hair
@@ -491,6 +493,23 @@ def strand_ranks(rig: Rig) -> Floats:
     ranks = np.arange(count, dtype=np.float32) / np.float32(max(count, 1))
     ranks[:own] = even_ranks(rig.strands.roots[:own]) * np.float32(own / max(count, 1))
     return ranks
+
+
+def strand_seeds(rig: Rig) -> Ints:
+    """What the noise of each strand depends on, (strand_count,) whole numbers below 2^24.
+
+    A child's is named by the place of its root, so that it keeps its own colour when another one
+    comes or goes.
+    """
+    strands = rig.strands
+    seeds = np.arange(strands.strand_count)
+    own = strands.strand_count - rig.child_count
+    if rig.child_count:
+        assert strands.root_triangle is not None and strands.root_barycentric is not None
+        place = strands.root_barycentric[own:].view(np.uint32)
+        key = named(strands.root_triangle[own:], place[:, 0], place[:, 1])
+        seeds[own:] = uniform(key, 0) * SEED_LIMIT
+    return seeds % SEED_LIMIT
 
 
 def root_turns(rig: Rig, pose: Pose) -> Floats:

@@ -6,6 +6,10 @@ level to level, so that the roots fill up evenly at any count (McCool and Fiume 
 Poisson disk sampling distributions). Where hair is to grow half as densely the radius is longer by
 the root of two. Darts, levels and batches never depend on how many roots are asked for.
 
+Each triangle gets darts of its own, by its own random numbers. So a triangle that is split, comes
+or goes changes the roots around it, and rounding, which differs where a scene has another size,
+changes hardly any: hair thrown anew all over would be another groom.
+
 Limitations: distances are straight ones, not along the surface, so two sheets nearer to each other
 than their roots share the room.
 """
@@ -18,9 +22,9 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
-from ..strands import Surface
+from .counter_random import named, uniform
 from .dart_throwing import SampleCells, Samples, first_come
-from .grown import checked_weights
+from .triangle_subdivision import Pieces
 
 #: Roots of the first level; each level is to have more by the next factor.
 _FIRST_COUNT, _GROWTH = 8.0, 2.0**0.5
@@ -38,21 +42,18 @@ _THINNEST = 2.0**-12
 _PLAIN = 65_536
 
 
-def spread_roots(
-    surface: Surface, count: int, density: Floats | None, seed: int
-) -> tuple[Ints, Floats]:
-    """Roots spread by area x density: triangle (count,) and barycentric (count, 3).
+def spread_roots(pieces: Pieces, count: int, seed: int, whole: Pieces | None = None) -> Samples:
+    """Roots spread by area x density over pieces of a surface, `count` of them.
 
     The roots of a smaller count are exactly the first ones of a larger count, for the same seed.
 
     Args:
-        density: (vertex_count,), not negative, linear within a triangle; None: 1 everywhere.
+        whole: the surface of which `pieces` are the part where roots are wanted; None: all of it.
 
     Raises:
-        HairloomError: the surface has no area on which hair may grow, or a density that does not
-            fit it or is not finite.
+        HairloomError: there is no area on which hair may grow.
     """
-    target = _Target.of(surface, checked_weights(density, surface, "density"))
+    target = _Target.of(pieces, pieces if whole is None else whole)
     roots, level = Samples.none(), 0
     is_full = False
     while len(roots) < count and not is_full:
@@ -60,9 +61,9 @@ def spread_roots(
         level += 1
     batch = 0
     while len(roots) < count:
-        roots = roots.and_also(target.samples(_PLAIN, [seed, 1, batch]))
+        roots = roots.and_also(target.samples(_PLAIN / target.part, named(seed, 1, 0, batch)))
         batch += 1
-    return roots.triangle[:count], roots.barycentric[:count]
+    return roots.take(np.arange(count))
 
 
 def require_area(mass: Floats) -> None:
@@ -77,51 +78,60 @@ def require_area(mass: Floats) -> None:
 
 @dataclass(frozen=True)
 class _Target:
-    """corners: (triangle_count, 3, 3) float64 [m], from the middle of the surface.
-    density: (triangle_count, 3) at the corners, 1 at the most.
-    reached: (3 x triangle_count,) mass of each corner's share, added up [m^2].
+    """corners: (piece_count, 3, 3) float64 [m], from the middle of the pieces.
+    density: (piece_count, 3) at the corners, 1 at the most on the whole surface.
+    mass: (piece_count,) area x density [m^2].
+    part: how much of the whole surface's mass the pieces have.
+    key: (piece_count,) what their random numbers depend on.
     """
 
     corners: Floats
     density: Floats
-    reached: Floats
+    mass: Floats
+    part: float
+    key: Ints
 
     @classmethod
-    def of(cls, surface: Surface, density: Floats | None) -> _Target:
-        corners = surface.corners.astype(np.float64)
-        weights = np.ones(len(surface.positions)) if density is None else density
-        on_corner = weights[surface.triangles] / max(float(weights.max(initial=0.0)), 1e-300)
-        edge = corners[:, 1:] - corners[:, :1]
-        area = 0.5 * np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
-        mass = area[:, None] / 3.0 * on_corner
+    def of(cls, pieces: Pieces, whole: Pieces) -> _Target:
+        peak = max(float(whole.density.max(initial=0.0)), 1e-300)
+        mass = pieces.mass / peak
         require_area(mass)
-        used = corners[mass.sum(axis=1) > 0.0]
+        used = pieces.point[mass > 0.0]
         middle = (used.min(axis=(0, 1)) + used.max(axis=(0, 1))) / 2.0
-        return cls(corners - middle, on_corner, np.cumsum(mass))
+        part = float(mass.sum() / (whole.mass.sum() / peak))
+        return cls(pieces.point - middle, pieces.density / peak, mass, min(part, 1.0), pieces.key)
 
     @property
-    def mass(self) -> float:
-        return float(self.reached[-1])
+    def whole_mass(self) -> float:
+        """Of the whole surface [m^2]: hardly changed by which pieces are asked for."""
+        return float(self.mass.sum()) / self.part
 
-    def samples(self, count: int, stream: list[int]) -> Samples:
-        """Random points by area x density.
+    def samples(self, count: float, stream: Ints) -> Samples:
+        """Random points by area x density, in random order: so many on the whole surface.
 
         A density linear between corners is the sum of three that fall from 1 at a corner to 0;
         points of such a one are spacings of three random cuts, two of them joined
         (Devroye 1986, chapter V.2: Dirichlet with 2, 1, 1).
         """
-        random = np.random.default_rng(stream)
-        last = np.searchsorted(self.reached, self.mass)  # the last share that is not empty
-        fraction = np.searchsorted(self.reached, random.random(count) * self.mass, side="right")
-        triangle, corner = np.divmod(np.minimum(fraction, last), 3)
-        _, middle, last_cut = np.sort(random.random((count, 3)), axis=1).T
-        rows, barycentric = np.arange(count), np.empty((count, 3))
+        piece_key = named(self.key, stream)
+        wanted = self.mass * (count / self.whole_mass)
+        counts = np.floor(wanted + uniform(piece_key, 0)).astype(np.int64)
+        piece = np.repeat(np.arange(len(counts)), counts)
+        number = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
+        key = named(piece_key[piece], 1 + number)
+        order = np.argsort(uniform(key, 4))
+        piece, key = piece[order], key[order]
+        density = self.density[piece]
+        share = np.cumsum(density, axis=1)
+        corner = (uniform(key, 0)[:, None] * share[:, 2:] >= share[:, :2]).sum(axis=1)
+        _, middle, last_cut = np.sort([uniform(key, cut) for cut in (1, 2, 3)], axis=0)
+        rows, barycentric = np.arange(len(piece)), np.empty((len(piece), 3))
         barycentric[rows, corner] = middle
         barycentric[rows, (corner + 1) % 3] = last_cut - middle
         barycentric[rows, (corner + 2) % 3] = 1.0 - last_cut
-        point = np.einsum("nk,nkj->nj", barycentric, self.corners[triangle])
-        density = np.einsum("nk,nk->n", barycentric, self.density[triangle])
-        return Samples(triangle, barycentric, point, np.maximum(density, _THINNEST) ** -0.5)
+        point = np.einsum("nk,nkj->nj", barycentric, self.corners[piece])
+        reach = np.maximum(np.einsum("nk,nk->n", barycentric, density), _THINNEST) ** -0.5
+        return Samples(piece, barycentric, point, reach, key)
 
 
 def _filled(
@@ -129,16 +139,17 @@ def _filled(
 ) -> tuple[Samples, bool]:
     """The roots and those of one more level, until there are `count`; and whether it is full."""
     wanted = _FIRST_COUNT * _GROWTH**level
-    radius = float(np.sqrt(_PACKING * target.mass / wanted))
-    dart_count = int(np.ceil(_SAMPLES * wanted / _BATCHES))
+    radius = float(np.sqrt(_PACKING * target.whole_mass / wanted))
     before = len(roots)
     old = SampleCells(roots, radius)
     for batch in range(_BATCHES):
         if len(roots) >= count:
             return roots, False
-        samples = target.samples(dart_count, [seed, 0, level, batch])
+        darts = _SAMPLES * wanted / _BATCHES
+        samples = target.samples(darts, named(seed, 0, level, batch))
         samples = samples.take(~old.covers(samples))
         new = SampleCells(roots.take(np.arange(before, len(roots))), radius)
         samples = samples.take(~new.covers(samples))
         roots = roots.and_also(samples.take(first_come(samples, radius)))
-    return roots, wanted >= _FIRST_SURE and len(roots) - before < _FULL * wanted
+    here = wanted * target.part
+    return roots, here >= _FIRST_SURE and len(roots) - before < _FULL * here

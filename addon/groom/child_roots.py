@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
 from .blue_noise import require_area, spread_roots
+from .dart_throwing import Samples
 from .grown import checked_weights
 from .nearest import nearest_points
 from .triangle_subdivision import Pieces
@@ -43,12 +44,14 @@ _BARE = 0.95
 @dataclass(frozen=True)
 class ChildRoots:
     """triangle: (n,). barycentric: (n, 3) float32. point: (n, 3) float32 [m], on the surface.
+    key: (n,) uint64, what is random about each child depends on.
     notes: what the artist should know.
     """
 
     triangle: Ints
     barycentric: Floats
     point: Floats
+    key: Ints
     notes: tuple[str, ...]
 
 
@@ -72,10 +75,10 @@ def child_roots(
     is_near = guided.holds(pieces.point.mean(axis=1), pieces.normal)
     mass_near, mass = float(pieces.mass[is_near].sum()), float(pieces.mass.sum())
     tried = int(1.05 * count * min(_TRIES, mass / max(mass_near, 1e-300))) + 64
-    triangle, barycentric = _spread(pieces, guided, count, tried, seed)
+    roots = _spread(pieces, everywhere, guided, count, tried, seed)
     is_bare = density is not None and mass_near < _BARE * float(everywhere.mass.sum())
-    notes = _notes(count, len(triangle), is_bare, len(guided.place) == 1)
-    return _on_surface(surface, triangle, barycentric, notes)
+    notes = _notes(count, len(roots), is_bare, len(guided.place) == 1)
+    return _on_surface(surface, roots, notes)
 
 
 @dataclass(frozen=True)
@@ -151,36 +154,35 @@ def _near_guides(pieces: Pieces, guided: _Guided) -> Pieces:
 
 
 def _spread(
-    pieces: Pieces, guided: _Guided, count: int, tried: int, seed: int
-) -> tuple[Ints, Floats]:
-    """Roots near guides, at most `count`: triangle of the surface (n,), barycentric (n, 3).
+    pieces: Pieces, everywhere: Pieces, guided: _Guided, count: int, tried: int, seed: int
+) -> Samples:
+    """Roots near guides, at most `count`, on triangles of the surface.
 
     Args:
         tried: how many roots may be enough to find them; more are tried where not.
     """
     if not len(pieces):
-        return np.zeros(0, np.int64), np.zeros((0, 3))
-    surface, density, normal = pieces.surface, pieces.density.ravel(), pieces.normal
+        return Samples.none()
     most = _TRIES * max(count, 1000)
     while True:
-        piece, inside = spread_roots(surface, tried, density, seed)
-        point = np.einsum("nk,nkj->nj", inside, pieces.point[piece])
-        found = np.flatnonzero(guided.holds(point, normal[piece]))[:count]
+        roots = spread_roots(pieces, tried, seed, everywhere)
+        point = np.einsum("nk,nkj->nj", roots.barycentric, pieces.point[roots.triangle])
+        found = np.flatnonzero(guided.holds(point, pieces.normal[roots.triangle]))[:count]
         if len(found) == count or tried >= most:
             break
         tried = min(most, 2 * tried)
-    piece, inside = piece[found], inside[found]
-    return pieces.parent[piece], np.einsum("nk,nkj->nj", inside, pieces.corner[piece])
+    roots = roots.take(found)
+    piece = roots.triangle
+    inside = np.einsum("nk,nkj->nj", roots.barycentric, pieces.corner[piece])
+    return replace(roots, triangle=pieces.parent[piece], barycentric=inside)
 
 
-def _on_surface(
-    surface: Surface, triangle: Ints, barycentric: Floats, notes: tuple[str, ...]
-) -> ChildRoots:
+def _on_surface(surface: Surface, roots: Samples, notes: tuple[str, ...]) -> ChildRoots:
     """The roots exactly where `roots.root_frames` will find them."""
-    kept = barycentric.astype(np.float32)
-    a, b, c = np.moveaxis(surface.corners[triangle].astype(np.float64), 1, 0)
+    kept = roots.barycentric.astype(np.float32)
+    a, b, c = np.moveaxis(surface.corners[roots.triangle].astype(np.float64), 1, 0)
     point = a + kept[:, 1:2] * (b - a) + kept[:, 2:3] * (c - a)
-    return ChildRoots(triangle, kept, point.astype(np.float32), notes)
+    return ChildRoots(roots.triangle, kept, point.astype(np.float32), roots.key, notes)
 
 
 def _notes(wanted: int, found: int, is_bare: bool, is_tuft: bool) -> tuple[str, ...]:

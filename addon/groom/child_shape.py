@@ -7,6 +7,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..params.curve import along
 from .children_settings import ChildrenSettings
+from .counter_random import named, uniform
 from .weights import GuideWeights
 
 _TURN = 2.0 * np.pi
@@ -14,6 +15,8 @@ _TURN = 2.0 * np.pi
 _CHUNK = 2048
 #: Segments of a strand in one wave of frizz, at least: shorter ones it could not show.
 _SEGMENTS_PER_WAVE = 3.0
+#: Random numbers of a child's own, beside that of its place (`children`).
+_LENGTH, _WAVES = 2, 3
 
 
 def mixed(root: Floats, guide_grid: Floats, weights: GuideWeights) -> Floats:
@@ -37,16 +40,16 @@ def mixed(root: Floats, guide_grid: Floats, weights: GuideWeights) -> Floats:
     return grid.reshape(len(grid), cv_count, 3)
 
 
-def shorten(grid: Floats, settings: ChildrenSettings) -> None:
+def shorten(grid: Floats, key: Ints, settings: ChildrenSettings) -> None:
     """Cut each strand to a random length along its curve, in place, and space its CVs as before.
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
+        key: (child_count,) what is random about each depends on.
     """
     if not settings.length_variation:
         return
-    random = np.random.default_rng([settings.seed, 2])
-    kept = 1.0 - settings.length_variation * random.random(len(grid))
+    kept = 1.0 - settings.length_variation * uniform(key, _LENGTH)
     for start in range(0, len(grid), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         grid[chunk] = _cut(grid[chunk], kept[chunk])
@@ -82,7 +85,7 @@ def _on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
     return p1 + t * (m1 + t * (3.0 * chord - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * chord)))
 
 
-def frizz(grid: Floats, settings: ChildrenSettings, size: float) -> None:
+def frizz(grid: Floats, key: Ints, settings: ChildrenSettings, size: float) -> None:
     """Let each strand stray from its path in waves, in place; roots stay.
 
     Two waves across each other, with each child's own direction, phase and pitch, and together no
@@ -90,12 +93,12 @@ def frizz(grid: Floats, settings: ChildrenSettings, size: float) -> None:
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
+        key: (child_count,) what is random about each depends on.
         size: the median length of the guides [m], in which frizz is given.
     """
     if not settings.frizz:
         return
-    random = np.random.default_rng([settings.seed, 3])
-    own = random.random((len(grid), 2, 4))
+    own = uniform(named(key[:, None], np.arange(8)), _WAVES).reshape(-1, 2, 4)
     strayed = settings.frizz * along(settings.frizz_along, np.linspace(0.0, 1.0, grid.shape[1]))
     strayed *= size
     strayed[0] = 0.0

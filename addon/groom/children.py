@@ -4,8 +4,8 @@ Tariq (2008, Real-time hair rendering on the GPU) has two patterns: multi strand
 guides (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23), and single strand, around one guide.
 
 Children are progressive: those of a smaller number are exactly the first of a larger number. So
-roots come in their own order (`blue_noise`), what is random about a child depends on its
-place in that order, and nothing is measured over all children.
+roots come in their own order (`blue_noise`), what is random about a child depends on the name of
+its root, and nothing is measured over all children.
 """
 
 from __future__ import annotations
@@ -21,11 +21,14 @@ from .child_clumps import clump
 from .child_roots import ChildRoots, child_roots
 from .child_shape import frizz, mixed, shorten
 from .children_settings import ChildrenSettings
+from .counter_random import named, normal
 from .nearest import nearest_points
 from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights
 
 #: Guides are as far apart as this neighbour is, in the middle.
 _NEIGHBOUR = 3
+#: Random numbers of where a child takes its shape from; those of its shape are in `child_shape`.
+_PLACE = 0
 
 
 @dataclass(frozen=True)
@@ -69,8 +72,8 @@ def make_children(
     group = guides.group[weights.guide[:, 0]]
     grid = mixed(roots.point, guides.grid, weights)
     clump(grid, group, settings)
-    shorten(grid, settings)
-    frizz(grid, settings, float(np.median(guides.lengths())))
+    shorten(grid, roots.key, settings)
+    frizz(grid, roots.key, settings, float(np.median(guides.lengths())))
     cv_count = grid.shape[1]
     strands = StrandSet(
         points=grid.reshape(-1, 3),
@@ -88,7 +91,7 @@ def make_children(
 
 def _weights(roots: ChildRoots, guides: StrandSet, settings: ChildrenSettings) -> GuideWeights:
     if settings.method != "single":
-        place = _scattered(roots.point, guides.roots, settings)
+        place = _scattered(roots, guides.roots, settings)
         return child_weights(place, guides.roots, guides.group, guides.grid, settings.parting)
     nearest, _ = nearest_points(roots.point, guides.roots, 1)
     weight = np.zeros((len(nearest), GUIDES_PER_STRAND), np.float32)
@@ -96,14 +99,13 @@ def _weights(roots: ChildRoots, guides: StrandSet, settings: ChildrenSettings) -
     return GuideWeights(np.repeat(nearest, GUIDES_PER_STRAND, axis=1).astype(np.int32), weight)
 
 
-def _scattered(place: Floats, guide_root: Floats, settings: ChildrenSettings) -> Floats:
+def _scattered(roots: ChildRoots, guide_root: Floats, settings: ChildrenSettings) -> Floats:
     """Where children take their shapes from, (child_count, 3) [m]: from near them, at random."""
     if not settings.scatter or len(guide_root) < 2:
-        return place
+        return roots.point
     _, gap = nearest_points(guide_root, guide_root, min(_NEIGHBOUR + 1, len(guide_root)))
-    random = np.random.default_rng([settings.seed, 4])
     reach = settings.scatter * float(np.median(gap[:, -1]))
-    return place + np.float32(reach) * random.standard_normal(place.shape, np.float32)
+    return roots.point + np.float32(reach) * normal(named(roots.key[:, None], np.arange(3)), _PLACE)
 
 
 def _radius(guides: StrandSet, weights: GuideWeights, settings: ChildrenSettings) -> Floats:

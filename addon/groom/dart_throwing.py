@@ -13,23 +13,30 @@ from ..arrays import Bools, Floats, Ints
 class Samples:
     """triangle: (n,). barycentric: (n, 3). point: (n, 3) [m], from the middle of the surface.
     reach: (n,) the distance to keep, as a factor of the level's radius, 1 where hair is densest.
+    key: (n,) uint64, its name: what is random about whatever grows there depends on it.
     """
 
     triangle: Ints
     barycentric: Floats
     point: Floats
     reach: Floats
+    key: Ints
 
     @classmethod
     def none(cls) -> Samples:
-        return cls(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+        no_key = np.zeros(0, np.uint64)
+        return cls(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), no_key)
 
     def __len__(self) -> int:
         return len(self.triangle)
 
     def take(self, chosen: Bools | Ints) -> Samples:
         return Samples(
-            self.triangle[chosen], self.barycentric[chosen], self.point[chosen], self.reach[chosen]
+            self.triangle[chosen],
+            self.barycentric[chosen],
+            self.point[chosen],
+            self.reach[chosen],
+            self.key[chosen],
         )
 
     def and_also(self, other: Samples) -> Samples:
@@ -38,6 +45,7 @@ class Samples:
             np.concatenate([self.barycentric, other.barycentric]),
             np.concatenate([self.point, other.point]),
             np.concatenate([self.reach, other.reach]),
+            np.concatenate([self.key, other.key]),
         )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
 from ..strands.vectors import unit
+from .counter_random import named
 
 #: The four quarters of a triangle: for each the barycentric coordinates of its corners.
 _QUARTERS = np.array(
@@ -29,12 +30,14 @@ class Pieces:
     corner: (n, 3, 3) barycentric coordinates in it, of each corner.
     point: (n, 3, 3) [m], the corners.
     density: (n, 3) at the corners.
+    key: (n,) uint64, what is random about each depends on; the same whatever others there are.
     """
 
     parent: Ints
     corner: Floats
     point: Floats
     density: Floats
+    key: Ints
 
     @classmethod
     def of(cls, surface: Surface, density: Floats | None) -> Pieces:
@@ -50,12 +53,8 @@ class Pieces:
             np.broadcast_to(np.eye(3), (count, 3, 3)),
             surface.corners.astype(np.float64),
             weights[surface.triangles],
+            np.arange(count, dtype=np.uint64),
         )
-
-    @property
-    def surface(self) -> Surface:
-        """The pieces as a mesh of their own, three vertices each."""
-        return Surface(self.point.reshape(-1, 3), np.arange(3 * len(self)).reshape(-1, 3))
 
     def __len__(self) -> int:
         return len(self.parent)
@@ -77,7 +76,11 @@ class Pieces:
 
     def take(self, chosen: Bools) -> Pieces:
         return Pieces(
-            self.parent[chosen], self.corner[chosen], self.point[chosen], self.density[chosen]
+            self.parent[chosen],
+            self.corner[chosen],
+            self.point[chosen],
+            self.density[chosen],
+            self.key[chosen],
         )
 
     def and_also(self, other: Pieces) -> Pieces:
@@ -86,6 +89,7 @@ class Pieces:
             np.concatenate([self.corner, other.corner]),
             np.concatenate([self.point, other.point]),
             np.concatenate([self.density, other.density]),
+            np.concatenate([self.key, other.key]),
         )
 
     def split(self) -> Pieces:
@@ -94,4 +98,5 @@ class Pieces:
             np.einsum("qck,nk...->nqc...", _QUARTERS, part).reshape(-1, 3, *part.shape[2:])
             for part in (self.corner, self.point, self.density)
         )
-        return Pieces(np.repeat(self.parent, 4), corner, point, density)
+        key = named(self.key[:, None], 1 + np.arange(4)).ravel()
+        return Pieces(np.repeat(self.parent, 4), corner, point, density, key)

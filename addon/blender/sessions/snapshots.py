@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...pipeline import Pose, Rig
+from ...pipeline import Pose, Rig, strand_seeds
 from ...refine.settings import DetailSettings
 from ...render.hair_ball import HairBall
 from ...render.snapshot import SECTIONS, Snapshot
@@ -47,6 +47,7 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
         guide=np.ascontiguousarray(groom.rig.weights.guide[:, 0]),
         group=strands.group,
         rank=groom.rank,
+        seed=strand_seeds(groom.rig),
         extinction=groom.rig.widths.extinction,
         spacing=groom.rig.widths.spacing,
         color=strands.color,

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from hairloom.addon.arrays import Floats, Ints
+from hairloom.addon.arrays import Floats
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom import blue_noise
 from hairloom.addon.groom.blue_noise import spread_roots
+from hairloom.addon.groom.dart_throwing import Samples
+from hairloom.addon.groom.triangle_subdivision import Pieces
 from hairloom.addon.strands import Surface
 
 
@@ -22,9 +26,13 @@ def sheet(cells: int = 12, size: float = 1.0) -> Surface:
     return Surface(positions, np.concatenate([np.stack([a, c, d], 1), np.stack([a, d, b], 1)]))
 
 
-def points(surface: Surface, roots: tuple[Ints, Floats]) -> Floats:
-    triangle, barycentric = roots
-    return np.einsum("nk,nkj->nj", barycentric, surface.corners[triangle].astype(np.float64))
+def spread(surface: Surface, count: int, density: Floats | None, seed: int) -> Samples:
+    return spread_roots(Pieces.of(surface, density), count, seed)
+
+
+def points(surface: Surface, roots: Samples) -> Floats:
+    corners = surface.corners[roots.triangle].astype(np.float64)
+    return np.einsum("nk,nkj->nj", roots.barycentric, corners)
 
 
 def nearest(of: Floats) -> Floats:
@@ -42,27 +50,67 @@ def test_a_smaller_count_is_the_beginning_of_a_larger_one(
     egg: Surface, is_dense_everywhere: bool
 ) -> None:
     density = None if is_dense_everywhere else np.maximum(egg.positions[:, 2], 0.0)
-    triangle, barycentric = spread_roots(egg, 5000, density, 1)
-    assert triangle.shape == (5000,)
-    assert barycentric.shape == (5000, 3)
+    roots = spread(egg, 5000, density, 1)
+    assert roots.triangle.shape == (5000,)
+    assert roots.barycentric.shape == (5000, 3)
     for count in (0, 1, 2, 17, 400, 1024, 4999):
-        fewer = spread_roots(egg, count, density, 1)
-        assert (fewer[0] == triangle[:count]).all()
-        assert (fewer[1] == barycentric[:count]).all()
+        fewer = spread(egg, count, density, 1)
+        assert (fewer.triangle == roots.triangle[:count]).all()
+        assert (fewer.barycentric == roots.barycentric[:count]).all()
+        assert (fewer.key == roots.key[:count]).all()
 
 
 def test_the_seed_decides_and_nothing_else_does(egg: Surface) -> None:
-    one, again, other = (spread_roots(egg, 300, None, seed) for seed in (1, 1, 2))
-    assert (one[0] == again[0]).all()
-    assert (one[1] == again[1]).all()
-    assert (one[1] != other[1]).any()
+    one, again, other = (spread(egg, 300, None, seed) for seed in (1, 1, 2))
+    assert (one.triangle == again.triangle).all()
+    assert (one.barycentric == again.barycentric).all()
+    assert (one.barycentric != other.barycentric).any()
+
+
+def test_roots_have_names_of_their_own(egg: Surface) -> None:
+    assert len(np.unique(spread(egg, 5000, None, 1).key)) == 5000
+    assert not np.isin(spread(egg, 5000, None, 2).key, spread(egg, 5000, None, 1).key).any()
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0 / 1024.0, 1.7, 1e3, 1024.0])
+def test_another_size_hardly_changes_the_roots(egg: Surface, factor: float) -> None:
+    """Rounding differs there, and none at all between sizes whose ratio is a power of two."""
+    sized = replace(egg, positions=egg.positions * np.float32(factor))
+    one, other = spread(egg, 5000, None, 1), spread(sized, 5000, None, 1)
+    places = dict(zip(one.key.tolist(), one.barycentric, strict=True))
+    same = [key for key in other.key.tolist() if key in places]
+    is_exact = float(np.log2(factor)).is_integer()
+    assert len(same) == 5000 if is_exact else len(same) > 0.97 * 5000
+    theirs = dict(zip(other.key.tolist(), other.barycentric, strict=True))
+    assert all((places[key] == theirs[key]).all() for key in same)
+
+
+def test_an_edit_changes_the_roots_beside_it_alone() -> None:
+    """A triangle that is moved away, of 288: nearly all roots of the others stay."""
+    surface = sheet()
+    moved = surface.triangles.copy()
+    moved[100] = 0
+    edited = replace(surface, triangles=moved)
+    one, other = (spread(each, 3000, None, 1) for each in (surface, edited))
+    elsewhere = one.triangle != 100
+    assert np.isin(one.key[elsewhere], other.key).mean() > 0.9
+
+
+def test_a_part_of_a_surface_has_the_roots_of_the_whole_there() -> None:
+    """As far as no dart was kept out by one beyond the border, and as one kept out by that."""
+    pieces = Pieces.of(sheet(), None)
+    left = pieces.take(pieces.point[..., 0].max(axis=1) < 0.51)
+    whole = spread_roots(pieces, 1000, 1)
+    part = spread_roots(left, 1000, 1, pieces)
+    inside = whole.key[whole.point[:, 0] < -0.25]
+    assert np.isin(inside, part.key).mean() > 0.5
 
 
 # --- how they lie --------------------------------------------------------------------------------
 
 
 def test_roots_lie_inside_their_triangles(egg: Surface) -> None:
-    _, barycentric = spread_roots(egg, 3000, None, 3)
+    barycentric = spread(egg, 3000, None, 3).barycentric
     assert barycentric.min() >= 0.0
     assert barycentric.sum(axis=1) == pytest.approx(np.ones(3000))
 
@@ -74,7 +122,7 @@ def test_every_beginning_is_spread_like_blue_noise() -> None:
     fit, have a least distance of 0.77.
     """
     surface = sheet()
-    roots = points(surface, spread_roots(surface, 3000, None, 1))
+    roots = points(surface, spread(surface, 3000, None, 1))
     white = np.random.default_rng(1).random((2000, 3)) * [1.0, 1.0, 0.0]
     for count in (150, 500, 1000, 1300, 1700, 2200, 3000):
         hexagonal = np.sqrt(2.0 / np.sqrt(3.0) / count)
@@ -90,7 +138,7 @@ def test_distances_follow_the_density() -> None:
     """Sixteen times as dense is four times as near, and neither half lies closer than its own."""
     surface = sheet()
     density = np.where(surface.positions[:, 0] < 0.5, 1.0, 16.0)
-    roots = points(surface, spread_roots(surface, 3000, density, 2))
+    roots = points(surface, spread(surface, 3000, density, 2))
     distance = nearest(roots)
     thin, dense = roots[:, 0] < 0.4, roots[:, 0] > 0.6
     for part, area in ((thin, 0.4), (dense, 0.4)):
@@ -106,7 +154,7 @@ def test_counts_follow_area_and_density(egg: Surface) -> None:
     """
     density = 1.2 + np.sin(20.0 * egg.positions[:, 2]).astype(np.float64)
     count = 20_000
-    height = points(egg, spread_roots(egg, count, density, 4))[:, 2]
+    height = points(egg, spread(egg, count, density, 4))[:, 2]
 
     corners = egg.corners.astype(np.float64)
     cuts = np.random.default_rng(5).dirichlet([1.0, 1.0, 1.0], 300)
@@ -124,15 +172,16 @@ def test_counts_follow_area_and_density(egg: Surface) -> None:
 def test_density_is_linear_within_a_triangle() -> None:
     """One triangle, dense at one corner: b has the density b, whose mean is 1 / 2."""
     surface = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    _, barycentric = spread_roots(surface, 4000, np.array([1.0, 0.0, 0.0]), 6)
+    barycentric = spread(surface, 4000, np.array([1.0, 0.0, 0.0]), 6).barycentric
     assert barycentric.mean(axis=0) == pytest.approx([0.5, 0.25, 0.25], abs=0.005)
     assert (barycentric[:, 0] < 0.5).mean() == pytest.approx(0.5, abs=0.01)  # 3 b^2 - 2 b^3
 
 
 def test_no_roots_where_the_density_is_zero(egg: Surface) -> None:
     density = (egg.positions[:, 2] > 0.03).astype(np.float64)
-    triangle, barycentric = spread_roots(egg, 2000, density, 7)
-    assert np.einsum("nk,nk->n", barycentric, density[egg.triangles[triangle]]).min() > 0.0
+    roots = spread(egg, 2000, density, 7)
+    at_corners = density[egg.triangles[roots.triangle]]
+    assert np.einsum("nk,nk->n", roots.barycentric, at_corners).min() > 0.0
 
 
 # --- bad input -----------------------------------------------------------------------------------
@@ -143,14 +192,12 @@ def test_nowhere_to_grow_is_told(egg: Surface) -> None:
     no_faces = Surface(np.zeros((3, 3)), np.zeros((0, 3)))
     for surface in (flat, no_faces):
         with pytest.raises(HairloomError, match="no area"):
-            spread_roots(surface, 10, None, 1)
+            spread(surface, 10, None, 1)
     lone = Surface(np.concatenate([egg.positions, [[9, 9, 9]]]), egg.triangles)
     on_no_face = np.append(np.zeros(len(egg.positions)), 1.0)
     for surface, density in ((egg, np.zeros(len(egg.positions))), (lone, on_no_face)):
         with pytest.raises(HairloomError, match="no area"):
-            spread_roots(surface, 10, density, 1)
-    with pytest.raises(HairloomError, match="not a finite number"):
-        spread_roots(egg, 10, np.full(len(egg.positions), np.nan), 1)
+            spread(surface, 10, density, 1)
 
 
 def stacked_sheets() -> Surface:
@@ -172,11 +219,11 @@ def needle_and_dust() -> Surface:
     ids=["stacked", "needle", "huge", "tiny"],
 )
 def test_odd_surfaces_get_their_roots_in_order(surface: Surface) -> None:
-    triangle, barycentric = spread_roots(surface, 6000, None, 9)
-    assert len(triangle) == 6000
+    barycentric = spread(surface, 6000, None, 9).barycentric
+    assert len(barycentric) == 6000
     assert np.isfinite(barycentric).all()
-    fewer = spread_roots(surface, 1500, None, 9)
-    assert (fewer[1] == barycentric[:1500]).all()
+    fewer = spread(surface, 1500, None, 9)
+    assert (fewer.barycentric == barycentric[:1500]).all()
 
 
 def test_a_full_surface_goes_on_with_plain_roots(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -184,8 +231,8 @@ def test_a_full_surface_goes_on_with_plain_roots(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(blue_noise, "_FULL", 2.0)
     monkeypatch.setattr(blue_noise, "_FIRST_SURE", 0.0)
     surface = sheet()
-    _, barycentric = spread_roots(surface, 70_000, None, 1)
-    fewer = spread_roots(surface, 500, None, 1)
-    assert (fewer[1] == barycentric[:500]).all()
+    barycentric = spread(surface, 70_000, None, 1).barycentric
+    fewer = spread(surface, 500, None, 1)
+    assert (fewer.barycentric == barycentric[:500]).all()
     found = nearest(points(surface, fewer)) / np.sqrt(2.0 / np.sqrt(3.0) / 500)
     assert found.mean() < 0.6  # as white noise
