@@ -485,13 +485,14 @@ def strand_ranks(rig: Rig) -> Floats:
     """Where each strand stands in an even order, (strand_count,) in 0 to 1: the strands of low
     rank alone are the same hair, only sparser.
 
-    Children come in the order in which they were grown, which is such an order, after the
-    artist's own strands.
+    The artist's own strands and children each keep their share. Children come in the order in
+    which they were grown, which is such an order: one more of them changes no other's rank by much.
     """
     count = rig.strands.strand_count
     own = count - rig.child_count
-    ranks = np.arange(count, dtype=np.float32) / np.float32(max(count, 1))
-    ranks[:own] = even_ranks(rig.strands.roots[:own]) * np.float32(own / max(count, 1))
+    ranks = np.empty(count, np.float32)
+    ranks[:own] = even_ranks(rig.strands.roots[:own])
+    ranks[own:] = np.arange(rig.child_count) / max(rig.child_count, 1)
     return ranks
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import gpu
 import numpy as np
 
+from ..arrays import Floats
 from ..params.glsl import struct_values
 from ..shading.lights import Light
 from ..shading.settings import StrandSettings
@@ -51,27 +52,35 @@ _STARTS_RECIPE = ShaderRecipe(
 
 @dataclass(frozen=True, eq=False)
 class _Casting:
-    """Strands that throw the shadow of all.
+    """Strands that throw the shadow of all: those of the lowest ranks, which stay the same ones
+    when a strand comes or goes; every nth would be others from there on.
 
-    layout: of all strands. count: how many of them.
+    layout: of all strands. rank: see Snapshot. count: how many of them.
     spans: their texture strand_spans, in the order in which they are drawn. classes: the draws.
     """
 
     layout: StrandLayout
+    rank: Floats | None
     count: int
     spans: Any
     classes: tuple[DetailClass, ...]
 
     @classmethod
-    def of(cls, layout: StrandLayout, count: int) -> _Casting:
-        evenly = (np.arange(count) + 0.5) * (layout.strand_count / count)
-        chosen = np.minimum(evenly.astype(np.int64), layout.strand_count - 1)
+    def of(cls, layout: StrandLayout, rank: Floats | None, count: int) -> _Casting:
+        if rank is None:
+            evenly = (np.arange(count) + 0.5) * (layout.strand_count / count)
+            chosen = np.minimum(evenly.astype(np.int64), layout.strand_count - 1)
+        else:
+            chosen = np.sort(np.argsort(rank, kind="stable")[:count])
         classes: tuple[DetailClass, ...] = (DetailClass(layout.cv_count - 1, 0, count),)
         if not layout.cv_count:
             order, classes = detail_classes(layout.counts[chosen] - 1, np.zeros(count))
             chosen = chosen[order]
         spans = texture_from(strand_rows(layout.spans[chosen][:, None]), "RGBA32F")
-        return cls(layout, count, spans, classes)
+        return cls(layout, rank, count, spans, classes)
+
+    def is_of(self, layout: StrandLayout, rank: Floats | None, count: int) -> bool:
+        return self.layout is layout and self.rank is rank and self.count == count
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,23 +155,25 @@ class OpacityPass:
         casters: tuple[Caster, ...] = (),
         spacing: float = 0.0,
         looks: Any = None,
+        rank: Floats | None = None,
     ) -> OpacityMaps:
         """The maps of a frame.
 
         Args:
             points: texture of CVs, xyz [m, world] and radius, in this layout.
             serial: another number whenever the points are others.
+            rank: see Snapshot.
             looks: texture cv_looks where points are unevenly spaced, see strand_pass.py.
             ball, lights, casters, spacing: as in OpacityDrawing.maps.
         """
         count = max(round(layout.strand_count * settings.strand_fraction), 1)
         casting = self._casting
-        if casting is None or casting.layout is not layout or casting.count != count:
-            casting = self._casting = _Casting.of(layout, count)
+        if casting is None or not casting.is_of(layout, rank, count):
+            casting = self._casting = _Casting.of(layout, rank, count)
         curves = curves_feature(points, casting.spans, looks)
         look = ShaderFeature(
             blocks={"strands": ("StrandSettings", struct_values(strands.as_drawn))}
         )
-        state = serial, layout, strands
+        state = serial, casting, strands
         hair = _Strands(state, curves, look, self._blocks, casting, self._ribbons)
         return self._drawing.maps(hair, ball, lights, settings, casters, spacing)

@@ -190,6 +190,7 @@ class StrandPass:
             snapshot.all_casters,
             snapshot.spacing,
             None if snapshot.along is None else self._textures["cv_looks"],
+            snapshot.rank,
         )
 
     def ball(self, snapshot: Snapshot) -> Ball:

@@ -111,12 +111,12 @@ def test_low_ranks_are_an_even_sparser_groom() -> None:
             curves(300 if children else 1000), sheet(), GUIDES, place="a wig", children=children
         )
         rank = pipeline.strand_ranks(rig)
-        assert sorted(rank) == pytest.approx(np.arange(1000) / 1000, abs=1e-6)
+        assert sorted(rank) == pytest.approx(np.arange(1000) / 1000, abs=4e-3)
         few = rig.strands.roots[rank < 0.25]
         quarter = (few[:, 0] > 0.0) * 2 + (few[:, 1] > 0.0)
         assert np.bincount(quarter, minlength=4).min() > 45
-    own_first = rank[:300]
-    assert own_first.max() < 0.3 and not (np.diff(own_first) > 0.0).all()
+        own = rank[:300]
+        assert (own < 0.25).sum() == pytest.approx(75, abs=10) and not (np.diff(own) > 0.0).all()
 
 
 def test_children_keep_their_noise_when_others_come_or_go() -> None:
