@@ -479,3 +479,28 @@ def test_of_twenty_lights_the_strongest_throw_shadows(gpu_context: Any) -> None:
     map_of = maps.values[128:160].reshape(8, 4)[:, 0]
     casting = {kept[light].power[0] for light in np.flatnonzero(map_of >= 0.0)}
     assert maps.size.map_count == 3 and casting == {20.0, 19.0, 18.0}
+
+
+def test_strands_of_the_lowest_ranks_throw_the_shadow_of_all(gpu_context: Any) -> None:
+    """Half of the strands: where the others are makes no difference, nor does their order."""
+    from hairloom.addon.render.opacity_pass import OpacityPass
+
+    strands, radius = dome()
+    ball, light = ball_around(strands), LIGHTS["sun"]
+    settings = VolumeSettings(shadows="deep", layers=8, resolution=64, strand_fraction=0.5)
+    rank = np.random.default_rng(3).permutation(len(strands)) / np.float32(len(strands))
+
+    def layers(grid: np.ndarray, of: np.ndarray) -> np.ndarray:
+        points, layout = points_of(grid, radius), layout_of(grid)
+        maps = OpacityPass().maps(
+            points, 1, layout, ball, (light,), settings, PLAIN, rank=of.astype(np.float32)
+        )
+        return np.asarray(maps.layers.read(), np.float64)
+
+    moved = np.where((rank < 0.5)[:, None, None], strands, ball.center.astype(np.float32))
+    truth = layers(strands, rank)
+    assert truth.max() > 0.0
+    assert np.abs(layers(moved, rank) - truth).max() <= 1e-6 * truth.max()
+    assert np.abs(layers(moved, 1.0 - rank) - truth).max() > 0.1 * truth.max()
+    mixed = np.random.default_rng(4).permutation(len(strands))
+    assert np.abs(layers(strands[mixed], rank[mixed]) - truth).max() <= 1e-5 * truth.max()
