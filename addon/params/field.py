@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache
 from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 
@@ -34,6 +35,8 @@ Owner = Literal["groom", "character", "scene", "job"]
 Condition = Callable[[Any], bool]
 
 _METADATA_KEY = "parameter"
+#: A name that is as much like one that was mistyped, from 0 to 1, may be the one that was meant.
+_NEAR = 0.5
 
 
 @dataclass(frozen=True)
@@ -174,10 +177,12 @@ class Settings:
         declared = {parameter.name: parameter for parameter in cls.parameters()}
         unknown = sorted(set(values) - set(declared))
         if unknown:
+            near = get_close_matches(unknown[0], declared, 3, _NEAR)
+            meant = f"Did you mean {' or '.join(near)}? " if near else ""
             raise HairloomError(
                 f"unknown {cls.section} parameter '{unknown[0]}'",
                 place=place,
-                remedy="Use one of " + ", ".join(declared),
+                remedy=f"{meant}docs/parameters.md lists all of them",
             )
         return cls(**{name: declared[name].checked(v, place) for name, v in values.items()})
 

@@ -328,3 +328,38 @@ def test_hair_of_a_scene_is_taken_with_its_own_settings(scene: Path, tmp_path: P
     assert exported() == pytest.approx(300, rel=0.3)
     fewer = exported("--groom", "Hair", "--set", "children.method=none")
     assert fewer == exported("--object", "Hair", "--set", "children.method=none") < exported()
+
+
+def test_settings_that_no_object_has_are_refused(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The head is a mesh: its hair has the settings of cards, and only cloth has dynamics."""
+    for setting in ("cards.card_count=50", "dynamics.damping=2"):
+        whole = ["run", "make_cards", "--scene", str(scene), "--object", "Head", "--set", setting]
+        assert command_line.run([*whole, "--output", str(scene.with_name("out.blend"))]) == 1
+        said = capsys.readouterr().err
+        assert f"Head: it has no settings of '{setting.partition('.')[0]}'" in said
+        assert "Name the hair curves with --object" in said
+    assert not scene.with_name("out.blend").exists()
+
+
+def test_a_render_of_a_scene_draws_its_hair(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As an export writes it; of several it has to be said which."""
+    report = scene.with_name("report.json")
+    simulated = ["simulate", "--scene", str(scene), "--report", str(report), "--seconds", "0.05"]
+    small = ["--set", "dynamics.device=numpy", "--set", "dynamics.collider_resolution=8"]
+    output = ["--output", str(scene.with_name("baked"))]
+    assert command_line.run([*simulated, *small, *output]) == 0
+    told = json.loads(report.read_text())
+    assert told["outputs"] == ["baked"] and "strands_inside_percent" in told
+    assert "reading Hair" in capsys.readouterr().out
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    other = bpy.data.objects["Hair"].copy()
+    other.name = "Fringe"
+    bpy.context.collection.objects.link(other)
+    bpy.ops.wm.save_mainfile()
+    assert command_line.run([*simulated, *small, *output]) == 1
+    said = capsys.readouterr().err
+    assert "several objects: Fringe, Hair" in said and "--groom" in said

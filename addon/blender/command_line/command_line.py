@@ -17,6 +17,7 @@ from ...errors import HairloomError
 from ...params import SettingsMap
 from ..base.gpu_context import gpu_refusals
 from ..base.interruption import Interrupted, interruptible
+from ..base.objects import objects_in
 from ..base.report import Report
 from .bake_job import BAKE
 from .cards_job import CARDS
@@ -27,6 +28,7 @@ from .import_job import IMPORT
 from .inputs import Sources
 from .job_options import check_numbers, chosen_settings
 from .job_steps import Job
+from .object_settings import is_groom
 from .places import check_outputs, check_report
 from .render_job import RENDER
 from .run_job import RUN
@@ -156,6 +158,8 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
     if verb.opens_scene and options.scene:
         with report.stage("open scene"):
             open_scene(Path(options.scene))
+        if verb.takes_hair and not hasattr(options, "object"):
+            options.groom = options.groom or _only_groom(options)
     output = getattr(options, "output", None)
     if verb.saves_scene:
         check_saving(output, over=options.save)
@@ -183,6 +187,24 @@ def _sources(verb: Verb, options: argparse.Namespace) -> Sources:
         children_density=options.children_density or _own_density(options.groom),
         skin=options.skin,
     )
+
+
+def _only_groom(options: argparse.Namespace) -> str | None:
+    """The hair of the scene that was named, where nothing else is named that hair could come from.
+
+    Raises:
+        HairloomError: there are several.
+    """
+    if options.head or getattr(options, "bake", None):
+        return None
+    grooms = [obj.name for obj in objects_in(bpy.context.view_layer) if is_groom(obj)]
+    if len(grooms) > 1:
+        raise HairloomError(
+            f"this scene has hair in several objects: {', '.join(sorted(grooms))}",
+            place="--scene",
+            remedy="Name one of them with --groom",
+        )
+    return grooms[0] if grooms else None
 
 
 def _own_density(groom: str | None) -> str:

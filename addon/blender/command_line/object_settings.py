@@ -13,6 +13,7 @@ from ...params import Settings, SettingsMap
 from ..base.objects import objects_in
 from ..properties.presets import named_preset
 from ..properties.properties import settings_of
+from ..scene.fin_modifier import fin_modifier
 from .overrides import overrides
 
 
@@ -96,6 +97,28 @@ def put_settings(obj: bpy.types.Object, presets: list[str], assignments: list[st
         own = settings_of(group, ALL_SETTINGS[section]) if settings is None else settings
         changed = type(own).from_dict(own.as_dict() | values, "--set")
         _write(group, changed)
+
+
+def check_sections(objects: list[bpy.types.Object], assignments: list[str]) -> None:
+    """Refuse settings that would act on none of these objects.
+
+    Raises:
+        HairloomError: naming the first of them.
+    """
+    for section in ALL_SETTINGS:
+        has_it = any(_group(obj, section) is not None for obj in objects if _is_simulated(obj))
+        if overrides(assignments, section) and not has_it:
+            names = ", ".join(obj.name for obj in objects)
+            raise HairloomError(
+                f"it has no settings of '{section}', which are those of hair"
+                + (" or cloth" if ALL_SETTINGS[section].owner == "character" else ""),
+                place=names,
+                remedy="Name the hair curves with --object",
+            )
+
+
+def _is_simulated(obj: bpy.types.Object) -> bool:
+    return obj.type == "CURVES" or fin_modifier(obj) is not None
 
 
 def put_map(obj: bpy.types.Object, chosen: SettingsMap) -> None:

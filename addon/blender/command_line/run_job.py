@@ -13,7 +13,7 @@ from ...errors import HairloomError
 from ..base.outcome import Reports, collected_reports
 from .job_options import add_object_option, add_save_option
 from .job_steps import Job, tell_notes
-from .object_settings import check_editable, named_objects, put_settings
+from .object_settings import check_editable, check_sections, named_objects, put_settings
 from .overrides import plain_value
 from .scene_files import check_saving, save_scene
 from .verb import SCENE_OUTPUT, Verb
@@ -215,6 +215,8 @@ def _change_settings(job: Job, assignments: list[str]) -> None:
             place="--object",
             remedy="Name hair curves or a mesh of the scene",
         )
+    if job.options.operator != "fin_add":  # which makes a mesh cloth, with these settings
+        check_sections(chosen, assignments)
     for obj in chosen:
         check_editable(obj)
         put_settings(obj, job.options.preset, assignments)

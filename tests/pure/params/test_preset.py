@@ -43,7 +43,7 @@ def test_a_preset_comes_back_as_saved(tmp_path: Path) -> None:
     [
         ({"values": {"length": -1.0}}, "'length' is -1.0, but it must lie from", "Use a value"),
         ({"values": {"length": "long"}}, "'length' is 'long'", "Use a value"),
-        ({"values": {"lenght": 0.1}}, "unknown grow parameter 'lenght'", "Use one of"),
+        ({"values": {"lenght": 0.1}}, "unknown grow parameter 'lenght'", "Did you mean length"),
         ({"values": [1, 2]}, "not a Hairloom preset", "Choose a preset"),
         ({"section": "guides"}, "a preset of no known kind ('guides')", "Choose a preset of grow"),
         ({"hairloom": PRESET_VERSION + 1}, f"{PRESET_VERSION + 1}", ""),
