@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from grids import grid_of
 from mathutils import Matrix
+from swinging import thrown
 from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
@@ -17,18 +18,11 @@ LAST = 10
 
 
 @pytest.fixture
-def swinging(new_hair, sphere, evaluated):
+def swinging(new_hair, sphere, evaluated, tmp_path):
     """Previewed hair on a head that is thrown about: (hair, head, session)."""
-    hair = new_hair(sphere)
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 1, LAST
-    for frame, x in ((1, 0.0), (4, 0.1), (LAST, -0.05)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
-    hair.hairloom.dynamics.collider_resolution = 8
-    hair.hairloom.dynamics.device = "numpy"
-    scene.frame_set(5)
-    return hair, sphere, previews.start(hair, evaluated())
+    hair, head = thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
+    bpy.context.scene.frame_set(5)
+    return hair, head, previews.start(hair, evaluated())
 
 
 def go(*frames):
