@@ -8,7 +8,7 @@ so that the tests can use it too.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -24,15 +24,16 @@ from hairloom.addon.dynamics.colliders import (
 )
 from hairloom.addon.dynamics.held import Held
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.dynamics.state import DynamicsState
+from hairloom.addon.dynamics.springs import give
+from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive
 from hairloom.addon.dynamics.trajectory import curvature
 from hairloom.addon.params import Parameter
 
 CV_COUNTS = (2, 3, 4, 8, 16, 24)
 FRAME_RATES = (12.0, 24.0, 30.0, 60.0, 120.0)
-#: Left out: what no step reads.
-_NOT_DRAWN = {"device", "collider_resolution"}
+#: Left out: what no step reads, and what is drawn by itself, so that the runs stay what they were.
+_NOT_DRAWN = {"device", "collider_resolution", "curl_stretch", "curl_bounce"}
 #: Sweeps over a segment in a second of simulation; with more of them a run takes minutes.
 _SWEEPS = 60_000
 #: Shorter than this a strand has no length to be compared with [m].
@@ -70,7 +71,8 @@ class Way:
 
 @dataclass(frozen=True)
 class RandomRun:
-    """Guides (guide_count, cv_count, 3) at rest on a head, and all that happens to them."""
+    """Guides (guide_count, cv_count, 3) at rest on a head, how much their curls have to give, and
+    all that happens to them."""
 
     grid: np.ndarray
     settings: DynamicsSettings
@@ -81,10 +83,11 @@ class RandomRun:
     fps: float
     is_bent: bool
     held: Held | None
+    room: np.ndarray | None = None
 
-    def begin(self) -> np.ndarray:
+    def begin(self) -> DynamicsState:
         """The guides where the head is at first."""
-        return _moved(self.head.matrix(0.0), self.grid)
+        return start(_moved(self.head.matrix(0.0), self.grid), self.room)
 
     def drives(self, seconds: float) -> Iterator[Drive]:
         """One a frame."""
@@ -107,7 +110,8 @@ class RandomRun:
 
 @dataclass(frozen=True)
 class Reach:
-    """The farthest that a CV is from its root, as a share of its rest length along the strand.
+    """The farthest that a CV is from its root, as a share of its length along the strand, which is
+    that at rest, but for what curls give.
 
     straight: in a straight line. along: along the strand as it is. is_finite: no NaN anywhere.
     """
@@ -117,12 +121,15 @@ class Reach:
     is_finite: bool
 
 
-def reach_of(state: DynamicsState) -> Reach:
-    """The worst of all CVs of a state."""
+def reach_of(state: DynamicsState, settings: DynamicsSettings | None = None) -> Reach:
+    """The worst of all CVs of a state; without settings nothing gives."""
     position = state.position.astype(np.float64)
     if not np.isfinite(position).all() or not np.isfinite(state.previous).all():
         return Reach(np.inf, np.inf, False)
-    rest = np.cumsum(state.rest.length.astype(np.float64), axis=0)
+    longest = state.rest.length.astype(np.float64)
+    if state.rest.room is not None and settings is not None:
+        longest *= 1.0 + give(settings) * state.rest.room
+    rest = np.cumsum(longest, axis=0)
     straight = np.linalg.norm(position[:, 1:] - position[:, :1], axis=0)
     along = np.cumsum(np.linalg.norm(np.diff(position, axis=1), axis=0), axis=0)
     allowed = np.maximum(rest, _NO_LENGTH)
@@ -153,6 +160,14 @@ def random_run(seed: int, guide_count: int = 12) -> RandomRun:
         for step in (0, 1):
             is_held[is_tied, first[is_tied] + step] = True
         held = Held(is_held)
+    curls = np.random.default_rng((seed, 1))
+    room = None
+    if curls.random() < 0.5:
+        room = curls.uniform(-1.0, curls.choice([2.0, 20.0]), (guide_count, cv_count - 1))
+        room = np.maximum(room, 0.0)
+        stretch = float(curls.choice([0.01, 0.25, 1.0]))
+        bounce = float(curls.choice([0.1, 2.0, 50.0]))
+        settings = replace(settings, curl_stretch=stretch, curl_bounce=bounce)
     return RandomRun(
         grid=_guides(random, guide_count, cv_count),
         settings=settings,
@@ -163,6 +178,7 @@ def random_run(seed: int, guide_count: int = 12) -> RandomRun:
         fps=float(random.choice(FRAME_RATES)),
         is_bent=bool(random.random() < 0.7),
         held=held,
+        room=room,
     )
 
 

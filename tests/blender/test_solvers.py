@@ -18,12 +18,14 @@ from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.sessions import solvers
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
 from hairloom.addon.blender.sessions.numpy_solver import NumpySolver
+from hairloom.addon.dynamics.measure import length_changes
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.render.snapshot import Snapshot
+from hairloom.addon.strands import StrandSet
 
 pytestmark = pytest.mark.draws
 
@@ -94,6 +96,37 @@ def test_both_agree_on_a_shaken_head(
         solver.rest(poses[10])
     assert np.abs(compute.strands() - numpy.strands()).max() < 1.0e-6
     assert np.abs(compute.guides() - numpy.guides()).max() < 1.0e-6
+
+
+@pytest.mark.usefixtures("gpu_context")
+def test_coils_bounce_alike_and_keep_their_lengths() -> None:
+    """A row of them hangs from what is thrown up and down, and then held still."""
+    along, roots = np.linspace(0.0, 1.0, 200), np.arange(24)[:, None] * [0.02, 0.0, 0.0]
+    angle = 2.0 * np.pi * 12.0 * along
+    around = 0.006 * np.minimum(1.0, 20.0 * along)
+    coil = np.stack([around * np.cos(angle), around * np.sin(angle), -0.2 * along], axis=1)
+    points, offsets = (roots[:, None] + coil).reshape(-1, 3), np.arange(25) * 200
+    strands = StrandSet(points, offsets, np.full(len(points), 5e-5), np.zeros(24))
+    coils = pipeline.prepare(strands, None, GuideSettings(guide_count=8), place="coils")
+    offsets, length = coils.strands.offsets, coils.strands.lengths()
+
+    def pose(frame: int) -> Pose:
+        matrix = np.eye(4)
+        matrix[2, 3] = 0.05 * np.sin(4.0 * np.pi * min(frame, 30) / RATE)
+        return Pose(None, matrix)
+
+    both = numpy, compute = NumpySolver(coils), ComputeSolver(coils)
+    heights = []
+    for frame in range(1, 90):
+        for solver in both:
+            solver.advance(pose(frame), (), DynamicsSettings(), GRAVITY, 1.0 / RATE)
+        found = numpy.strands()
+        heights.append(float(np.ptp(found[: offsets[1], 2])))
+        if frame % 10 == 0:
+            assert np.abs(compute.strands() - found).max() < 5.0e-4
+            assert length_changes(found, offsets, length).max() < 1.0e-5
+    assert max(heights) > 1.1 * 0.2 and min(heights) < 0.95 * 0.2
+    assert heights[-1] == pytest.approx(0.2, rel=0.02)
 
 
 @pytest.mark.usefixtures("gpu_context")

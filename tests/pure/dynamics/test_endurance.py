@@ -23,17 +23,17 @@ SEEDS = (10, 15, 4, 1, 5, 7, 9, 12, 14, 17, 20, 32, 36)
 @pytest.mark.parametrize("seed", few_in_commits(SEEDS, 3))
 def test_no_settings_and_colliders_break_the_hair(seed: int) -> None:
     run = random_run(seed)
-    state = start(run.begin())
+    state = run.begin()
     for drive in run.drives(0.5):
         state = advance(state, drive, run.settings, 1.0 / run.fps)
-        reach = reach_of(state)
+        reach = reach_of(state, run.settings)
         assert reach.is_finite
         assert reach.along <= 1.02 or not promises_length(run.settings)
 
 
 def test_a_shaken_head_leaves_the_hair_its_length() -> None:
     run = shaken(guide_count=30)
-    state = start(run.begin())
+    state = run.begin()
     for drive in run.drives(1.0):
         state = advance(state, drive, run.settings, 1.0 / run.fps)
         assert reach_of(state).along < 1.005
@@ -47,6 +47,7 @@ def test_the_runs_are_what_they_say() -> None:
     kinds = {type(solid).__name__ for run in runs for solid, _ in run.colliders}
     assert len(kinds) == 4
     assert any(run.held is not None for run in runs)
+    assert 15 < sum(run.room is not None for run in runs) < 45
     assert {one.length_solver for one in settings} == {"direct", "relaxation"}
     assert max(one.wind_speed for one in settings) == 200.0
     assert min(one.gravity for one in settings) == -10.0
