@@ -8,7 +8,7 @@ the root of two. Darts, levels and batches never depend on how many roots are as
 
 Each triangle gets darts of its own, by its own random numbers. So a triangle that is split, comes
 or goes changes the roots around it, and rounding, which differs where a scene has another size,
-changes hardly any: hair thrown anew all over would be another groom.
+changes hardly any: hair thrown again all over would be another groom.
 
 Limitations: distances are straight ones, not along the surface, so two sheets nearer to each other
 than their roots share the room.
@@ -107,7 +107,7 @@ class _Target:
         return float(self.mass.sum()) / self.part
 
     def samples(self, count: float, stream: Ints) -> Samples:
-        """Random points by area x density, in random order: so many on the whole surface.
+        """Random points by area x density, in random order: `count` on the whole surface.
 
         A density linear between corners is the sum of three that fall from 1 at a corner to 0;
         points of such a one are spacings of three random cuts, two of them joined
@@ -122,8 +122,8 @@ class _Target:
         order = np.argsort(uniform(key, 4))
         piece, key = piece[order], key[order]
         density = self.density[piece]
-        share = np.cumsum(density, axis=1)
-        corner = (uniform(key, 0)[:, None] * share[:, 2:] >= share[:, :2]).sum(axis=1)
+        reached = np.cumsum(density, axis=1)
+        corner = (uniform(key, 0)[:, None] * reached[:, 2:] >= reached[:, :2]).sum(axis=1)
         _, middle, last_cut = np.sort([uniform(key, cut) for cut in (1, 2, 3)], axis=0)
         rows, barycentric = np.arange(len(piece)), np.empty((len(piece), 3))
         barycentric[rows, corner] = middle
@@ -145,8 +145,8 @@ def _filled(
     for batch in range(_BATCHES):
         if len(roots) >= count:
             return roots, False
-        darts = _SAMPLES * wanted / _BATCHES
-        samples = target.samples(darts, named(seed, 0, level, batch))
+        dart_count = _SAMPLES * wanted / _BATCHES
+        samples = target.samples(dart_count, named(seed, 0, level, batch))
         samples = samples.take(~old.covers(samples))
         new = SampleCells(roots.take(np.arange(before, len(roots))), radius)
         samples = samples.take(~new.covers(samples))
