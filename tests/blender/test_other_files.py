@@ -262,3 +262,62 @@ def test_an_override_is_baked_and_shown_in_renders(override, tmp_path):
     show_in_renders([override], bpy.context.evaluated_depsgraph_get())
     copy = override.hairloom.bake.copy
     assert override.hide_render and copy.users_scene == (bpy.context.scene,)
+
+
+def a_ring():
+    """Around z, above the head."""
+    ring = bpy.data.objects.new("Ring", None)
+    ring.empty_display_type, ring.empty_display_size = "CIRCLE", 0.09
+    ring.rotation_euler.x, ring.location.z = np.pi / 2.0, 0.12  # Blender draws circles around y
+    return ring
+
+
+def held_strands(hair, head):
+    """How many strands are held while the head is pushed; all of them go with what holds them."""
+    session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
+    assert previews.play(bpy.context.evaluated_depsgraph_get()) == []
+    rig = session.rig
+    at = (rig.holds.strand, np.round(rig.holds.place).astype(int))
+    before = grid_of(session)[at]
+    for _ in range(4):
+        head.location.x += 0.02
+        previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
+    np.testing.assert_allclose(
+        grid_of(session)[at] - before, [[0.08, 0, 0]] * len(before), atol=4e-3
+    )
+    assert session.warnings == ()
+    count = len(rig.holds.strand)
+    previews.stop_all()
+    return count
+
+
+def test_hair_of_an_override_is_tied_by_the_button_and_stays_tied(override, tmp_path):
+    ring, head = a_ring(), override.parent
+    bpy.context.scene.collection.objects.link(ring)
+    ring.parent = head
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    ring.select_set(True)
+    override.select_set(True)
+    bpy.context.view_layer.objects.active = override
+    assert bpy.ops.hairloom.add_hair_tie() == {"FINISHED"}
+    count = held_strands(override, head)
+    assert count > 3
+    hair = saved_and_loaded(tmp_path)
+    assert hair.hairloom.tie_collection.objects[:] == [bpy.data.objects["Ring"]]
+    assert held_strands(hair, hair.parent) == count
+
+
+def test_ties_of_a_library_hold_hair_of_its_override(library):
+    bpy.ops.wm.open_mainfile(filepath=library)
+    ties = bpy.data.collections.new("Ties")
+    bpy.data.collections["Groom"].children.link(ties)
+    ties.objects.link(a_ring())
+    bpy.data.objects["Ring"].parent = bpy.data.objects["Head"]
+    bpy.data.objects["Hair"].hairloom.tie_collection = ties
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    brought(library, link=True).override_hierarchy_create(scene, layer)
+    hair = next(obj for obj in scene.objects if obj.type == "CURVES")
+    assert held_strands(hair, hair.parent) > 3
