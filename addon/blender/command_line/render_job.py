@@ -21,6 +21,8 @@ from .job_steps import Job, PosedHair, finish, motion_of, open_studio, posed_hai
 from .verb import Verb
 
 SHEET_COLUMNS, SHEET_ROWS = 4, 3
+#: of each of its pictures [pixels]
+SHEET_SIZE = 360, 270
 
 
 def render(job: Job) -> None:
@@ -75,7 +77,7 @@ def write_sheet(job: Job, path: Path, studio: Studio, motion: BakedGuides) -> No
             hair = PosedHair.of_motion(motion, motion.rig, motion.frames[place])
         with job.report.stage("draw frame"):
             picture = studio.picture(
-                hair.pose, hair.points, 480, 360, samples=2, guides=hair.guides
+                hair.pose, hair.points, *SHEET_SIZE, samples=2, guides=hair.guides
             )
         pictures.append(picture)
         progress.show(len(pictures))

@@ -67,6 +67,7 @@ class Studio:
         self._groom, self._rig, self._snapshot = groom, groom.rig, snapshot_of(groom)
         self._passes, self._card_pass = (MeshPass(), StrandPass()), CardPass()
         self._notes: dict[str, None] = {}
+        self._cameras: dict[float, Camera] = {}
         self._cards: tuple[Hashable, BuiltCards] | None = None
         self._card_pictures, self._look = card_pictures or {}, look
         self.settings = settings
@@ -264,8 +265,10 @@ class Studio:
 
     def _camera(self, aspect: float) -> Camera:
         """Holds the groom at rest and what of the head is near it, with room for the motion."""
-        held = self.held(self._rig.rest_pose, self._rig.strands.points)
-        return self.framed(held, self.side.three_quarter, aspect)
+        if aspect not in self._cameras:  # each frame of a motion asks, of a million points
+            held = self.held(self._rig.rest_pose, self._rig.strands.points)
+            self._cameras[aspect] = self.framed(held, self.side.three_quarter, aspect)
+        return self._cameras[aspect]
 
     def close_up(self, aspect: float) -> Camera:
         """Holds a part of the groom at rest: that around the roots that are nearest to the eye."""
