@@ -33,7 +33,12 @@ def max_stretch(state: DynamicsState) -> float:
 def deepest_penetration(state: DynamicsState, colliders: tuple[PosedCollider, ...]) -> float:
     """How deep [m] the center of any free CV lies in a collider at the frame's end; 0 if none."""
     points = state.position[:, PINNED:].reshape(3, -1)
-    deepest = 0.0
+    return float(_depths(points, colliders).max(initial=0.0))
+
+
+def _depths(points: Floats, colliders: tuple[PosedCollider, ...]) -> Floats:
+    """How deep [m] each of the points (3, n) lies in a collider at the frame's end, (n,)."""
+    deepest = np.zeros(points.shape[1], np.float32)
     for posed in colliders if points.size else ():
         inverse = np.linalg.inv(posed.matrix_now)
         distance, gradient = posed.collider.distance(transform_points(inverse, points))
@@ -43,7 +48,7 @@ def deepest_penetration(state: DynamicsState, colliders: tuple[PosedCollider, ..
         steepness = inverse[:3, :3].T.astype(np.float32)
         outward = sum(steepness[:, axis, None] * gradient[axis] for axis in range(3))
         scale = np.maximum(np.sqrt(dot_rows(outward, outward)), TINY)
-        deepest = max(deepest, float(-(distance / scale).min()))
+        np.maximum(deepest, -(distance / scale), out=deepest)
     return deepest
 
 
@@ -75,5 +80,7 @@ def strand_depths(
         were_outside: (point_count,), see `are_outside`.
     """
     distance, _ = signed_distance(points, colliders, 0.0)
-    depth = np.where(were_outside, -distance, 0.0)
+    inside = np.flatnonzero(were_outside & (distance < 0.0))
+    depth = np.zeros(len(points), np.float32)
+    depth[inside] = _depths(np.ascontiguousarray(points[inside].T, np.float32), colliders)
     return np.maximum.reduceat(depth, offsets[:-1]) if len(depth) else np.zeros(0, np.float32)

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
+from hairloom.addon.dynamics.colliders import DistanceField, PosedCollider, SphereCollider
 from hairloom.addon.dynamics.figures import Figures, Measure
+from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
+from hairloom.addon.strands import Surface
 
 COUNT, POINTS = 200, 8
 LENGTHS = np.full(COUNT, 0.2)
@@ -87,3 +89,17 @@ def test_the_table_says_nothing_is_nothing_and_little_is_not():
     table = found.table
     assert table[1] == ("Stretch", "0.01 %", "0 %", "0 %")
     assert table[2] == ("Penetration", "12.3 mm", "0.0 mm", "0 %")
+
+
+def test_nothing_is_deeper_in_a_thin_mesh_than_that_is_thick(kit):
+    """In its middle, where both sides are as near, sampled distances do not change."""
+    ball = kit.icosphere(0.1, 4)
+    disc = Surface(ball.positions * [0.05, 1.0, 1.0], ball.triangles)
+    field = DistanceField.from_surface(disc, DynamicsSettings())
+    grid = upright()
+    measure = measure_of(grid, ())
+    matrix = np.eye(4)
+    matrix[:3, 3] = 0.1, 0.0, 0.1
+    add(measure, grid, (PosedCollider(field, matrix, matrix),))
+    found = measure.figures.strands_penetration_max_mm
+    assert 3.0 < found < 5.5, "half of its thickness is 5 mm"
