@@ -31,6 +31,7 @@ from .groom.ties import NO_HOLDERS, Holders, find_holds, idle
 from .groom.weights import GuideWeights, guide_weights
 from .groom.widths import Widths, with_widths
 from .refine.hold import hold
+from .refine.lead_out import NOT_LED, Clearance, LedOut, clearance_at, lead_out
 from .refine.ride import Riders, ride
 from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
@@ -130,6 +131,8 @@ class Motion:
     carried_guides: the same without dynamics: their rest shape carried by the roots.
     carried_earlier: the same one frame earlier; None at the start.
     duration: of the last frame [s]; 0 at the start.
+    colliders: as they stand at its end.
+    clearance: how far strands stay from these; None before there are any.
     """
 
     dynamics: DynamicsState
@@ -138,6 +141,8 @@ class Motion:
     pose: Pose
     carried_earlier: Floats | None = None
     duration: float = 0.0
+    colliders: tuple[PosedCollider, ...] = ()
+    clearance: Clearance | None = None
 
     def drive(
         self,
@@ -422,22 +427,52 @@ def advance(
     drive = motion.drive(target, colliders, gravity, duration, scene_wind, held_cvs(rig, pose))
     state = advance_dynamics(motion.dynamics, drive, settings, duration)
     guides, before = grid_at_frame_end(state, drive, duration), motion.carried_guides
-    return Motion(state, guides, target, pose, before, duration)
+    clearance = clearance_of(rig, motion, colliders, settings)
+    return Motion(state, guides, target, pose, before, duration, colliders, clearance)
+
+
+def clearance_of(
+    rig: Rig, motion: Motion, colliders: tuple[PosedCollider, ...], settings: DynamicsSettings
+) -> Clearance | None:
+    """How far strands stay from colliders, from the first frame on that has any: as far as guides
+    do at their roots, but no farther than they were at its begin."""
+    kept = settings.radius_root * motion.dynamics.rest.size
+    known = motion.clearance
+    if not colliders or (known is not None and known.kept == kept):
+        return known
+    before = tuple(posed.at_begin() for posed in colliders)
+    return clearance_at(strands_now(rig, motion), rig.strands.offsets, before, kept)
 
 
 def strands_now(rig: Rig, motion: Motion) -> Floats:
     """All strands at this moment of a running motion, (point_count, 3) [m]."""
-    return strands_at(rig, motion.pose, motion.guides)
+    return strands_and_led(rig, motion)[0]
 
 
-def strands_at(rig: Rig, pose: Pose, guides_now: Floats) -> Floats:
+def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:
+    """The same, and those that were led out of colliders."""
+    points, offsets = _riding(rig, motion.pose, motion.guides), rig.strands.offsets
+    if motion.clearance is None:
+        return held_strands(rig, motion.pose, points), NOT_LED
+    led = lead_out(points, offsets, motion.colliders, motion.clearance)
+    points = held_strands(rig, motion.pose, points)
+    return points, LedOut.of(led, points, offsets)
+
+
+def strands_at(rig: Rig, pose: Pose, guides_now: Floats, led: LedOut = NOT_LED) -> Floats:
     """All strands riding on guides, (point_count, 3) [m], world space.
 
     Args:
         guides_now: (guide_count, cv_count, 3) [m], simulated or baked, world space.
+        led: strands that were led out of colliders.
     """
-    moved = ride(carried(rig, pose), rig.riders, carried_guides(rig, pose), guides_now)
-    return held_strands(rig, pose, moved)
+    points = held_strands(rig, pose, _riding(rig, pose, guides_now))
+    led.put(points, rig.strands.offsets)
+    return points
+
+
+def _riding(rig: Rig, pose: Pose, guides_now: Floats) -> Floats:
+    return ride(carried(rig, pose), rig.riders, carried_guides(rig, pose), guides_now)
 
 
 def strands_at_rest(rig: Rig, pose: Pose) -> Floats:

@@ -29,9 +29,12 @@ vec4 signed_distance(vec3 point, float reach)
     Found found = distance_to(solid_texel(solid, 6), solid_texel(solid, 7), local);
     vec3 normal = rows[0].xyz * found.gradient.x + rows[1].xyz * found.gradient.y +
                   rows[2].xyz * found.gradient.z;
-    float unscaled = 1.0 / max(length(normal), 1.0e-12);
-    if (found.distance * unscaled < result.w) {
-      result = vec4(normal * unscaled, found.distance * unscaled);
+    float size = max(length(normal), 1.0e-12);
+    // two sides of the collider may be as near; then a sampled gradient is short
+    float stretch = max({{flattest}} / max(length(found.gradient), 1.0e-12), 1.0);
+    float away = found.distance / (size * stretch);
+    if (away < result.w) {
+      result = vec4(normal / size, away);
     }
   }
   return result;

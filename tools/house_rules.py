@@ -52,7 +52,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "strands": {"params"},
     "groom": {"params", "strands"},
     "dynamics": {"params", "strands"},
-    "refine": {"params", "strands"},
+    "refine": {"params", "strands", "dynamics"},
     "shading": {"params", "strands"},
     "cards": {"params", "strands", "refine"},
     "exchange": {

@@ -137,6 +137,27 @@ class ColliderTextures:
         return table.reshape(len(spans), -1, 4)
 
 
+class UploadedColliders:
+    """The textures of the colliders that were asked for last; passes of one groom share them."""
+
+    def __init__(self) -> None:
+        self._textures: ColliderTextures | None = None
+
+    def of(self, posed: tuple[PosedCollider, ...]) -> ColliderTextures:
+        """Those of these colliders, uploaded if they are others than before.
+
+        Raises:
+            HairloomError: more of them than a texture holds.
+        """
+        if self._textures is None or not self._textures.are_of(posed):
+            self._textures = ColliderTextures.of(tuple(one.collider for one in posed))
+        return self._textures
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU."""
+        self._textures = None
+
+
 def round_texels(collider: Collider) -> Floats:
     """Two texels for each round solid, (n, 2, 4)."""
     if isinstance(collider, SphereSetCollider):

@@ -39,7 +39,7 @@ from ..dynamics.schedule import due_substeps
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.state import DynamicsState, Rest, as_rows
 from ..dynamics.step import displacement_beside_root
-from .collider_textures import NOT_FOLLOWED, ColliderTextures
+from .collider_textures import NOT_FOLLOWED, UploadedColliders
 from .dynamics_block import block_of, moments_of, spans_of
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .strand_layout import from_strand_rows, strand_rows
@@ -120,10 +120,12 @@ class DynamicsPass:
 
     Args:
         state: where the motion begins, or goes on.
+        colliders: where they are uploaded to; None: to a place of its own.
     """
 
-    def __init__(self, state: DynamicsState) -> None:
+    def __init__(self, state: DynamicsState, colliders: UploadedColliders | None = None) -> None:
         self._state = state  # positions as they were given or read last, the clock as it is now
+        self._colliders = colliders or UploadedColliders()
         self.release()
         released_with_shaders(self)
 
@@ -173,7 +175,7 @@ class DynamicsPass:
         self._textures: dict[str, Any] = {}
         self._is_bridged = False
         self._block = UniformBlock()
-        self._colliders: ColliderTextures | None = None
+        self._colliders.release()
         self._styles: list[tuple[Floats, Any]] = []  # those of the last frame, and their textures
         self._held: Held | None = None
 
@@ -194,8 +196,7 @@ class DynamicsPass:
         now, before, *earlier = (texture for _, texture in self._styles)
         textures |= {"styles_now": now, "styles_before": before}
         textures["styles_earlier"] = earlier[0] if earlier else before  # which then counts nothing
-        if self._colliders is None or not self._colliders.are_of(drive.colliders):
-            self._colliders = ColliderTextures.of(tuple(one.collider for one in drive.colliders))
+        self._colliders.of(drive.colliders)
         if drive.held is not None and drive.held is not self._held:
             held = drive.held.rows.T[..., None]
             textures["held_cvs"] = texture_from(strand_rows(held), "R32F")
@@ -212,9 +213,8 @@ class DynamicsPass:
             self._dispatch(frame, first, part, 1.0 if first else speed_ratio)
 
     def _dispatch(self, frame: Frame, first: int, count: int, speed_ratio: float) -> None:
-        colliders, settings, state = self._colliders, frame.settings, self._state
-        assert colliders is not None
-        posed = frame.drive.colliders
+        settings, state, posed = frame.settings, self._state, frame.drive.colliders
+        colliders = self._colliders.of(posed)
         spans, is_followed, is_sharp = spans_of(frame, first, count), False, False
         table = moments_of(frame, first, spans)
         if posed:

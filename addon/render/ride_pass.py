@@ -1,11 +1,12 @@
 """Strands that ride on guides, computed on the GPU: what StrandPass draws without an upload.
 
-The same as pipeline.strands_at, in three dispatches over textures in the layout of
+The same as pipeline.strands_and_led, in dispatches over textures in the layout of
 strand_layout.strand_rows:
 
     vertices ------> ride_roots ------> root_motions                    one invocation a strand
     guides_now ----> ride_guides -----> guide_turns                     one a guide
                      ride ------------> cv_points                       one a strand
+                     lead_out, hold, changed in place
 
 New with every frame are the head's vertices that hold a root, or a matrix, and the guides.
 
@@ -35,10 +36,14 @@ import gpu
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..dynamics.colliders import PosedCollider
 from ..groom.holds import Holds
+from ..refine.lead_out import NOT_LED, LedOut
 from ..refine.ride import Riders
 from ..strands import StrandSet, Surface
+from .collider_textures import UploadedColliders
 from .hold_pass import HoldPass
+from .lead_out_pass import LeadOutPass
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .snapshot import DevicePoints
 from .strand_layout import StrandLayout, strand_rows, strand_rows_size
@@ -104,6 +109,9 @@ class RidePass:
         guide_grid: (guide_count, cv_count, 3) [m], the lines that are simulated, at rest.
         riders: how the strands ride on them.
         holds: where strands are held by ties or by a surface; None: nowhere.
+        colliders: where these are uploaded to; None: to a place of its own.
+
+    leading: what leads strands out of colliders.
     """
 
     def __init__(
@@ -114,6 +122,7 @@ class RidePass:
         guide_grid: Floats,
         riders: Riders,
         holds: Holds | None = None,
+        colliders: UploadedColliders | None = None,
     ) -> None:
         self._strands = strands
         self._guides, self._guide_grid = guides, guide_grid
@@ -122,6 +131,7 @@ class RidePass:
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
         self.points = DevicePoints(StrandLayout(strands.offsets))
         self._held = None if holds is None else HoldPass(holds, self.points.layout)
+        self.leading = LeadOutPass(self.points.layout, colliders or UploadedColliders())
         self.release()
         released_with_shaders(self)
         released_with_shaders(self.points)  # a snapshot may outlive this pass
@@ -149,6 +159,8 @@ class RidePass:
         matrix: Floats,
         guides_now: Any,
         anchors: Floats | None = None,
+        colliders: tuple[PosedCollider, ...] = (),
+        led: LedOut = NOT_LED,
     ) -> None:
         """Show every strand carried by its root and moved with its guides.
 
@@ -156,8 +168,11 @@ class RidePass:
             head_positions, matrix, anchors: as in `carry`.
             guides_now: (guide_count, cv_count, 3) [m], world space, or a texture RGBA32F that
                 holds them in the layout of strand_layout.strand_rows.
+            colliders: what strands are led out of, once a clearance has begun.
+            led: strands that were led out of colliders earlier.
 
         Raises:
+            HairloomError: a collider that the GPU cannot have.
             ShaderError: a shader does not compile here.
             ValueError: guides of another shape.
         """
@@ -168,7 +183,15 @@ class RidePass:
                 raise ValueError(f"guides have shape {guides_now.shape}, not {wanted}")
             guides_now = texture_from(strand_rows(_padded(guides_now)), "RGBA32F")
         self._run_guides(guides_now)
-        self._run_ride("guide_turns", anchors)
+        self._run_ride("guide_turns", anchors, colliders, led)
+
+    def begin_clearance(self, colliders: tuple[PosedCollider, ...], kept: float) -> None:
+        """From now on strands stay out of colliders; where they are shown, a motion begins.
+
+        Args:
+            colliders: as they stand now, at their frame's end. kept: see `Clearance`.
+        """
+        self.leading.begin(self.points.texture, colliders, kept)
 
     def read(self) -> Floats:
         """The strands as they are shown, (point_count, 3) float32 [m], world space."""
@@ -176,10 +199,18 @@ class RidePass:
         pixels = texture_to_array(self.points.texture)
         return np.ascontiguousarray(self.points.layout.values(pixels)[:, :3])
 
+    def read_led(self) -> LedOut:
+        """Those that were led out of colliders."""
+        led = self.leading.led()
+        if not len(led):
+            return NOT_LED
+        return LedOut.of(led, self.read(), self._strands.offsets)
+
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next frame uploads it again."""
         self._textures: dict[str, Any] = {}
         self.points.release()
+        self.leading.release()
         if self._held is not None:
             self._held.release()
 
@@ -270,7 +301,13 @@ class RidePass:
         )
         _dispatch(shader, count, 1)
 
-    def _run_ride(self, turns: str, anchors: Floats | None) -> None:
+    def _run_ride(
+        self,
+        turns: str,
+        anchors: Floats | None,
+        colliders: tuple[PosedCollider, ...] = (),
+        led: LedOut = NOT_LED,
+    ) -> None:
         textures, count = self._textures, self._strands.strand_count
         is_curled = self._riders.gives is not None and turns == "guide_turns"
         shader = program(CURLED_RIDE_RECIPE if is_curled else RIDE_RECIPE)
@@ -286,8 +323,10 @@ class RidePass:
             },
         )
         _dispatch(shader, count, 1)
+        self.leading.lead(self.points.texture, colliders)
         if self._held is not None:
             self._held.hold(self.points.texture, textures["rest_points"], anchors)
+        self.leading.put(self.points.texture, led)
         self.points.serial += 1
 
 

@@ -17,6 +17,7 @@ from types import MappingProxyType
 
 from ..cards.bake import SAMPLES, SPARSE_RANGE, SPARSE_STEPS
 from ..dynamics import springs
+from ..dynamics.colliders.signed_distance import FLATTEST
 from ..dynamics.constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED
 from ..dynamics.contacts import (
     BETWEEN,
@@ -29,7 +30,7 @@ from ..dynamics.contacts import (
     TRACE_STEPS,
 )
 from ..dynamics.wind import MODES
-from ..refine import curls, detail, ride
+from ..refine import curls, detail, lead_out, ride
 from ..refine.hold import NEAR, SWEEPS
 from ..refine.settings import DetailSettings
 from ..shading.card_look import DARKEST, MEAN_FACING
@@ -44,7 +45,6 @@ from ..shading.volume.map_size import START_TEXELS
 from ..shading.volume.mesh_frames import MESH_FRAME_CAPACITY
 from ..shading.volume.mesh_light import (
     EDGE_ON,
-    GOLDEN_ANGLE,
     MESH_BIAS,
     MESH_BLUR,
     MESH_TAPS,
@@ -52,6 +52,7 @@ from ..shading.volume.mesh_light import (
 )
 from ..shading.volume.opacity import MAP_BORDER, MIN_THICKNESS
 from ..shading.volume.transparency import UNSEEN_FRACTION
+from ..strands.vectors import GOLDEN_ANGLE
 from .pixel_parts import DEPTH_END
 
 SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
@@ -103,6 +104,13 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "held_sweeps": str(HELD_SWEEPS),
         "hold_sweeps": str(SWEEPS),
         "hold_near": repr(NEAR),
+        "flattest": repr(FLATTEST),
+        "lead_sweeps": str(lead_out.SWEEPS),
+        "lead_slack": repr(lead_out.SLACK),
+        "lead_tries": str(lead_out.TRIES),
+        "lead_halvings": str(lead_out.HALVINGS),
+        "lead_margin": repr(lead_out.MARGIN),
+        "lead_attempts": str(lead_out.ATTEMPTS),
         "skin_of_reach": repr(SKIN / REACH),
         "shortest_segment": repr(ride.SHORTEST),
         "curl_slack": repr(curls.SLACK),

@@ -10,6 +10,9 @@ import numpy as np
 
 from ..arrays import Floats
 
+#: From one point of an even spiral to the next [rad].
+GOLDEN_ANGLE = float(np.pi * (3.0 - np.sqrt(5.0)))
+
 
 def unit(vectors: Floats) -> Floats:
     """Vectors (..., 3) of length 1; zero stays zero."""

@@ -53,9 +53,11 @@ def played(hair, first=1, last=LAST):
 
 def test_a_bake_equals_playback_bit_for_bit(swinging, evaluated):
     hair, _ = swinging
+    hair.hairloom.dynamics.radius_root = 0.5  # all that swings comes too near
     previews.start(hair, evaluated())
     live_strands = played(hair)
     assert np.ptp(live_strands[:, :, -1] - live_strands[:, :, 0], axis=0).max() > 0.01
+    assert len(previews.session_of(hair).solver.led().strands), "the head pushes some strands"
     bpy.context.scene.frame_set(3)
     assert bake(hair) == list(range(1, LAST + 1))
     assert bpy.context.scene.frame_current == 3
@@ -72,15 +74,19 @@ def test_a_bake_on_the_gpu_equals_playback_on_the_gpu_bit_for_bit(swinging, eval
     """Guides and what is drawn of them; the copy for renders is ridden on the CPU."""
     hair, _ = swinging
     hair.hairloom.dynamics.device = "compute"
+    hair.hairloom.dynamics.radius_root = 0.5  # all that swings comes too near
     session = previews.start(hair, evaluated())
     guides, strands = [], []
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
         guides.append(session.solver.guides())
+        led = session.solver.led()
         strands.append(drawn(hair))
     assert session.solver.form == "compute" and np.ptp(np.array(guides), axis=0).max() > 0.01
+    assert len(led.strands), "the head pushes some strands"
     bake(hair)
     cache = playback.cache_of(hair)
+    np.testing.assert_array_equal(cache.frame(LAST)["led_strands"], led.strands)
     for frame in range(1, LAST + 1):
         np.testing.assert_array_equal(cache.frame(frame)["guides"], guides[frame - 1])
         bpy.context.scene.frame_set(frame)
@@ -606,3 +612,18 @@ def test_figures_that_are_none_make_a_bake_damaged(swinging):
     del content["figures"]  # by an earlier version
     facts.write_text(json.dumps(content))
     assert Cache(facts.parent).facts.figures is None
+
+
+@pytest.mark.parametrize(("strands", "count"), [([10**6], 16), ([-1], 16), ([0], 15), ([0, 1], 16)])
+def test_led_strands_that_are_not_of_the_groom_are_refused(strands, count, swinging, tmp_path):
+    hair, _ = swinging
+    bake(hair)
+    path = frames_in(tmp_path / "bake") / "frame_000002.npz"
+    with np.load(path) as file:
+        arrays = dict(file)
+    arrays["led_strands"] = np.array(strands, np.int32)
+    arrays["led_points"] = np.zeros((count, 3), np.float32)
+    np.savez(path, **arrays)
+    playback.forget()
+    with pytest.raises(HairloomError, match="Bake again"):
+        playback.strands_in(playback.cache_of(hair), 2)

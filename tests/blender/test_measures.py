@@ -24,6 +24,15 @@ def test_the_median_of_the_last_frames_is_told(monkeypatch):
     assert times.line == "", "what was long ago is no news"
 
 
+def test_a_frame_of_many_seconds_has_both_its_parts(monkeypatch):
+    now, times = [0.0], measures.FrameTimes()
+    monkeypatch.setattr(measures.time, "perf_counter", lambda: now[0])
+    for part, spent in (("simulation", 1.0), ("drawing", 12.0)):
+        with times.measured(part):
+            now[0] += spent
+    assert times.line == "simulation 1000.0 ms   drawing 12000.0 ms"
+
+
 def test_an_array_counts_once_and_a_view_is_its_array():
     @dataclass
     class Held:

@@ -17,6 +17,7 @@ from ...groom.roots import root_frames
 from ...groom.weights import GuideWeights
 from ...groom.widths import Widths
 from ...pipeline import Pose, Rig
+from ...refine.lead_out import LedOut
 from ...strands import StrandSet, Surface
 from .simulated import Arrays
 
@@ -45,27 +46,49 @@ class BakedRig:
         return Pose(frame.get("head"), frame["matrix"], frame.get("anchors"))
 
     def fits(self, frame: Arrays) -> bool:
-        """Whether a frame is of this rig: as many guides, vertices of the head, and anchors."""
+        """Whether a frame is of this rig: as many guides, vertices of the head, and anchors, and
+        strands that it has."""
         head = None if self.rig.head is None else self.rig.head.positions.shape
         found = frame["head"].shape if "head" in frame else None
         anchors = None if self.rig.holds is None else (self.rig.holds.anchor_count, 4, 4)
         held = frame["anchors"].shape if "anchors" in frame else None
         guides = self.rig.guide_grid.shape
-        return (found, held) == (head, anchors) and frame["guides"].shape == guides
+        if (found, held) != (head, anchors) or frame["guides"].shape != guides:
+            return False
+        return led_in(frame).fits(self.rig.strands.offsets)
 
     def strands(self, frame: Arrays) -> Floats:
-        """All strands in a frame, (point_count, 3) float32 world [m]."""
-        return pipeline.strands_at(self.rig, self.pose(frame), frame["guides"])
+        """All strands in a frame, (point_count, 3) float32 world [m].
+
+        Raises:
+            HairloomError: the frame is of another rig.
+        """
+        if not self.fits(frame):
+            raise HairloomError(
+                "a frame is of another groom than the bake", place="bake", remedy="Bake again"
+            )
+        return pipeline.strands_at(self.rig, self.pose(frame), frame["guides"], led_in(frame))
 
 
-def frame_arrays(pose: Pose, guides: Floats) -> Arrays:
-    """One frame: guides (guide_count, cv_count, 3) world [m], and what carries them."""
-    arrays: Arrays = {"guides": guides, "matrix": np.asarray(pose.matrix, np.float64)}
+def frame_arrays(pose: Pose, guides: Floats, led: LedOut) -> Arrays:
+    """One frame: guides (guide_count, cv_count, 3) world [m], what carries them, and the strands
+    that were led out of colliders: what shows a frame has no colliders."""
+    arrays: Arrays = {
+        "guides": guides,
+        "matrix": np.asarray(pose.matrix, np.float64),
+        "led_strands": led.strands,
+        "led_points": led.points,
+    }
     if pose.head_positions is not None:
         arrays["head"] = pose.head_positions
     if pose.anchors is not None:
         arrays["anchors"] = pose.anchors
     return arrays
+
+
+def led_in(frame: Arrays) -> LedOut:
+    """The strands of a frame that were led out of colliders."""
+    return LedOut(frame["led_strands"], frame["led_points"])
 
 
 def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:

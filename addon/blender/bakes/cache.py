@@ -37,7 +37,10 @@ from ...exchange.files.stale_temp_files import MARK, is_stale, is_temporary, mar
 from .simulated import Arrays
 
 #: Of what a bake holds, other than what `layout` says. 2: strands may have points of their own.
-VERSION = 2
+#: 3: frames hold the strands that were led out of colliders.
+VERSION = 3
+#: Arrays that may have another length in each frame.
+_LISTS = frozenset({"led_strands", "led_points"})
 FACTS, CONSTANTS = "cache.json", "constants.npz"
 _OURS = re.compile(r"cache\.json|constants\.npz|frame_-?\d{5,7}\.npz")
 _FRAMES = re.compile(rf"frames-{MARK}")
@@ -104,8 +107,9 @@ class CacheWriter:
         self._save(CONSTANTS, arrays)
 
     def add(self, frame: int, arrays: Arrays, frame_hash: str) -> None:
-        """Frames come in order; all hold arrays of the same names, types and shapes."""
-        layout = {name: [str(a.dtype), list(a.shape)] for name, a in arrays.items()}
+        """Frames come in order; all hold arrays of the same names, types and shapes, but for the
+        lengths of lists."""
+        layout = {name: [kind, list(shape)] for name, (kind, shape) in _layout_of(arrays).items()}
         assert not self._frame_hashes or layout == self._layout, "the frames of a bake are alike"
         self._layout = layout
         self._frame_hashes.append(frame_hash)
@@ -242,8 +246,7 @@ class Cache:
     def _read(self, name: str) -> Arrays:
         path = self._frame_folder / name
         arrays = _read_arrays(path)
-        found = {name: (str(a.dtype), tuple(a.shape)) for name, a in arrays.items()}
-        if found != self._layout:
+        if _layout_of(arrays) != self._layout:
             raise _damaged(path, "its arrays are not those of the other frames")
         return arrays
 
@@ -251,6 +254,14 @@ class Cache:
     def found(cls, folder: Path) -> Self | None:
         """The bake in this folder; None where there is none."""
         return cls(folder) if (folder / FACTS).is_file() else None
+
+
+def _layout_of(arrays: Arrays) -> dict[str, tuple[str, tuple[int, ...]]]:
+    """Type and shape of each array; lists count as if they were empty."""
+    return {
+        name: (str(a.dtype), (0, *a.shape[1:]) if name in _LISTS else tuple(a.shape))
+        for name, a in arrays.items()
+    }
 
 
 def owner_of(folder: Path) -> tuple[str, str]:

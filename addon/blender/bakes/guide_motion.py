@@ -8,7 +8,6 @@ from typing import Protocol, Self
 
 import bpy
 
-from ... import pipeline
 from ...arrays import Floats
 from ...errors import HairloomError
 from ...pipeline import Pose, Rig
@@ -92,5 +91,4 @@ class BakedGuides:
 
     def strands(self, frame: int) -> tuple[Pose, Floats]:
         """The pose, and all strands (point_count, 3) [m, world]."""
-        pose, guides = self.at(frame)
-        return pose, pipeline.strands_at(self.rig, pose, guides)
+        return self.at(frame)[0], playback.strands_in(self.cache, frame)

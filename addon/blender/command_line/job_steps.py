@@ -125,8 +125,8 @@ class PosedHair:
 
     @classmethod
     def of_motion(cls, motion: BakedGuides, rig: Rig, frame: int) -> Self:
-        pose, guides = motion.at(frame)
-        return cls(rig, pose, pipeline.strands_at(rig, pose, guides), guides)
+        pose, points = motion.strands(frame)
+        return cls(rig, pose, points, motion.at(frame)[1])
 
 
 def motion_of(job: Job, frames: range | None = None) -> BakedGuides:

@@ -12,12 +12,14 @@ from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.settings import DynamicsSettings
 from ...pipeline import Motion, Pose, Rig
+from ...refine.lead_out import NOT_LED, LedOut
+from ...render.collider_textures import UploadedColliders
 from ...render.dynamics_pass import DynamicsPass
 from ...render.ride_pass import RidePass
 from ...render.snapshot import Snapshot
 from ...render.strand_layout import from_strand_rows
 from ...render.textures import texture_to_array
-from .numpy_solver import checked_guides, let_go
+from .numpy_solver import carried_motion, let_go
 
 
 class ComputeSolver:
@@ -35,9 +37,18 @@ class ComputeSolver:
         self._is_resting = motion is None
         self._is_drawn = False
         self._dynamics: DynamicsPass | None = None
+        self._led = NOT_LED
+        self._colliders = UploadedColliders()
         self._ride = RidePass(
-            rig.strands, rig.head, rig.guides, rig.guide_grid, rig.riders, rig.holds
+            rig.strands,
+            rig.head,
+            rig.guides,
+            rig.guide_grid,
+            rig.riders,
+            rig.holds,
+            self._colliders,
         )
+        self._ride.leading.take(self._motion.clearance)
 
     @property
     def pose(self) -> Pose:
@@ -49,7 +60,12 @@ class ComputeSolver:
             return let_go(self._rig, self._motion)
         if self._dynamics is None:
             return self._motion
-        return replace(self._motion, dynamics=self._dynamics.read(), guides=self.guides())
+        return replace(
+            self._motion,
+            dynamics=self._dynamics.read(),
+            guides=self.guides(),
+            clearance=self._ride.leading.read(),
+        )
 
     def rest(self, pose: Pose) -> None:
         self._take(pipeline.begin(self._rig, pose))
@@ -68,7 +84,8 @@ class ComputeSolver:
             self._take(self.motion)
         motion = self._motion
         if self._dynamics is None:
-            self._dynamics = DynamicsPass(motion.dynamics)
+            self._dynamics = DynamicsPass(motion.dynamics, self._colliders)
+        self._begin_clearance(colliders, settings)
         rig = self._rig
         target, held = pipeline.style_of_guides(rig, pose), pipeline.held_cvs(rig, pose)
         drive = motion.drive(target, colliders, gravity, duration, scene_wind, held)
@@ -79,12 +96,13 @@ class ComputeSolver:
             pose=pose,
             carried_earlier=motion.carried_guides,
             duration=duration,
+            colliders=colliders,
         )
         self._is_resting = self._is_drawn = False
 
-    def carry(self, pose: Pose, guides: Floats) -> None:
-        self._take(replace(self._motion, pose=pose, guides=checked_guides(self._rig, guides)))
-        self._is_baked = True
+    def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
+        self._take(carried_motion(self._rig, self._motion, pose, guides))
+        self._led, self._is_baked = led, True
 
     def guides(self) -> Floats:
         texture = self._guides_texture
@@ -98,16 +116,21 @@ class ComputeSolver:
         self._draw()
         return self._ride.read()
 
+    def led(self) -> LedOut:
+        self._draw()
+        return self._led if self._is_baked else self._ride.read_led()
+
     def shown(self, snapshot: Snapshot) -> Snapshot:
         self._draw()
         return replace(snapshot, device_points=self._ride.points)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next frame goes on from what was read back."""
-        is_resting, is_baked = self._is_resting, self._is_baked
-        self._take(self._motion if is_baked else self.motion)
-        self._is_resting, self._is_baked = is_resting, is_baked
+        is_resting, is_baked, led = self._is_resting, self._is_baked, self._led
+        motion = self._motion if is_baked else self.motion
         self._ride.release()
+        self._take(motion)
+        self._is_resting, self._is_baked, self._led = is_resting, is_baked, led
 
     @property
     def _guides_texture(self) -> Any:
@@ -119,8 +142,18 @@ class ComputeSolver:
         if self._dynamics is not None:
             self._dynamics.release()
             self._dynamics = None
-        self._motion = motion
+        self._motion, self._led = motion, NOT_LED
+        self._ride.leading.take(motion.clearance)
         self._is_baked = self._is_resting = self._is_drawn = False
+
+    def _begin_clearance(
+        self, colliders: tuple[PosedCollider, ...], settings: DynamicsSettings
+    ) -> None:
+        """As pipeline.clearance_of, from what is shown."""
+        kept = settings.radius_root * self._motion.dynamics.rest.size
+        if colliders and self._ride.leading.kept != kept:
+            self._draw()
+            self._ride.begin_clearance(tuple(posed.at_begin() for posed in colliders), kept)
 
     def _draw(self) -> None:
         """Bring the strands on the GPU to this moment, once."""
@@ -132,5 +165,6 @@ class ComputeSolver:
             self._ride.carry(head, matrix, anchors)
         else:
             guides = self._motion.guides if texture is None else texture
-            self._ride.ride(head, matrix, guides, anchors)
+            colliders = self._motion.colliders
+            self._ride.ride(head, matrix, guides, anchors, colliders, self._led)
         self._is_drawn = True

@@ -36,8 +36,10 @@ class FrameTimes:
 
     def milliseconds(self, part: str) -> float | None:
         """The median of the last frames; None where there were none lately."""
-        now = time.perf_counter()
-        recent = [spent for when, spent in self._times[part] if now - when < _LATEST]
+        # a frame that takes long does not make its own parts old
+        frame = sum(times[-1][1] for times in self._times.values() if times)
+        oldest = time.perf_counter() - _LATEST - frame
+        recent = [spent for when, spent in self._times[part] if when > oldest]
         return 1000.0 * median(recent) if recent else None
 
     @property

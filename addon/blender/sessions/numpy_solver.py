@@ -13,6 +13,7 @@ from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import rows_of
 from ...errors import HairloomError
 from ...pipeline import Motion, Pose, Rig
+from ...refine.lead_out import NOT_LED, LedOut
 from ...render.snapshot import Snapshot
 
 
@@ -26,6 +27,7 @@ class NumpySolver:
         self._motion = motion or pipeline.begin(rig, rig.rest_pose)
         self._is_baked = False
         self._strands: Floats | None = None
+        self._led = NOT_LED
 
     @property
     def pose(self) -> Pose:
@@ -54,27 +56,35 @@ class NumpySolver:
             )
         )
 
-    def carry(self, pose: Pose, guides: Floats) -> None:
-        self._take(replace(self._motion, pose=pose, guides=checked_guides(self._rig, guides)))
-        self._is_baked = True
+    def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
+        self._take(carried_motion(self._rig, self._motion, pose, guides))
+        self._led, self._is_baked = led, True
 
     def guides(self) -> Floats:
         return self._motion.guides
 
     def strands(self) -> Floats:
-        if self._strands is None:
-            self._strands = pipeline.strands_now(self._rig, self._motion)
+        if self._strands is None and self._is_baked:
+            shown = self._motion
+            self._strands = pipeline.strands_at(self._rig, shown.pose, shown.guides, self._led)
+        elif self._strands is None:
+            self._strands, self._led = pipeline.strands_and_led(self._rig, self._motion)
         return self._strands
+
+    def led(self) -> LedOut:
+        self.strands()
+        return self._led
 
     def shown(self, snapshot: Snapshot) -> Snapshot:
         return replace(snapshot, points=self.strands(), device_points=None)
 
     def _take(self, motion: Motion) -> None:
         self._motion, self._is_baked, self._strands = motion, False, None
+        self._led = NOT_LED
 
 
-def checked_guides(rig: Rig, guides: Floats) -> Floats:
-    """Baked guides as float32, if they belong to this rig."""
+def carried_motion(rig: Rig, motion: Motion, pose: Pose, guides: Floats) -> Motion:
+    """A motion that shows baked guides, if they belong to this rig; colliders are no matter."""
     wanted = rig.guide_grid.shape
     if guides.shape != wanted:
         raise HairloomError(
@@ -82,7 +92,8 @@ def checked_guides(rig: Rig, guides: Floats) -> Floats:
             place="bake",
             remedy="Bake again",
         )
-    return np.ascontiguousarray(guides, np.float32)
+    guides = np.ascontiguousarray(guides, np.float32)
+    return replace(motion, pose=pose, guides=guides, colliders=(), clearance=None)
 
 
 def let_go(rig: Rig, shown: Motion) -> Motion:

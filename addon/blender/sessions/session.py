@@ -19,7 +19,7 @@ from ...errors import HairloomError
 from ...pipeline import Pose, Rig
 from ...render.snapshot import Snapshot
 from ...strands.arc_length import lengths
-from ..bakes.baked_rig import BakedRig, frame_arrays, rig_arrays
+from ..bakes.baked_rig import BakedRig, frame_arrays, led_in, rig_arrays
 from ..bakes.simulated import Arrays
 from ..base.latest_job import LatestJob
 from ..base.thread_work import ThreadWork
@@ -408,7 +408,7 @@ class Session:
         assert self._begun is not None, "it is simulated"
         pose, posed = self._begun
         rig = self.rig
-        guides = start(pipeline.carried_guides(rig, pose))
+        guides = start(pipeline.carried_guides(rig, pose), rig.curl_room)
         return Measure(guides, pipeline.carried(rig, pose), rig.strands.offsets, posed)
 
     def measure_into(self, measure: Measure) -> None:
@@ -425,7 +425,7 @@ class Session:
 
     def recorded(self) -> Arrays:
         """See `baked_rig.frame_arrays`."""
-        return frame_arrays(self.solver.pose, self.solver.guides())
+        return frame_arrays(self.solver.pose, self.solver.guides(), self.solver.led())
 
     def show_recorded(self, frame: Arrays) -> None:
         """Hair as it was recorded, on the head as that was.
@@ -440,7 +440,7 @@ class Session:
                 place=self.name,
                 remedy="Bake again, or delete the bake",
             )
-        self.solver.carry(baked.pose(frame), frame["guides"])
+        self.solver.carry(baked.pose(frame), frame["guides"], led_in(frame))
         self._show()
 
     def _show(self) -> None:

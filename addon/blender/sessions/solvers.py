@@ -19,6 +19,7 @@ from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.settings import GuideSettings
 from ...pipeline import Motion, Pose, Rig
+from ...refine.lead_out import NOT_LED, LedOut
 from ...render.snapshot import Snapshot
 from ...strands import StrandSet
 from ..base.gpu_context import gpu_in_use
@@ -61,8 +62,9 @@ class Solver(Protocol):
     ) -> None:
         """One frame of motion, as pipeline.advance."""
 
-    def carry(self, pose: Pose, guides: Floats) -> None:
-        """Show guides (guide_count, cv_count, 3) [m, world] that come from a bake.
+    def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
+        """Show guides (guide_count, cv_count, 3) [m, world], and strands that were led out of
+        colliders, which come from a bake.
 
         To advance from them is to let go of them at no speed.
 
@@ -74,7 +76,10 @@ class Solver(Protocol):
         """At the frame's end, (guide_count, cv_count, 3) [m, world]; read back if need be."""
 
     def strands(self) -> Floats:
-        """At the frame's end, (strand_count, cv_count, 3) [m, world]; read back if need be."""
+        """At the frame's end, (point_count, 3) [m, world]; read back if need be."""
+
+    def led(self) -> LedOut:
+        """Those of them that were led out of colliders; read back if need be."""
 
     def shown(self, snapshot: Snapshot) -> Snapshot:
         """The snapshot with the strands of this moment: an array, or a texture on the GPU."""

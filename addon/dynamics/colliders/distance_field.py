@@ -2,10 +2,10 @@
 
 Distance: exact near the surface, from the closest point of the mesh; farther away, where it only
 leads out what started inside, interpolated from fewer nodes, which saves nine tenths of the time.
-Sign: generalised winding number, which small
-holes, doubled faces and slivers do not upset. It is evaluated only at nodes nearer to the surface
-than one cell; between two neighbours of which one is farther than a cell there is no surface, so
-all other signs follow along the rows.
+Sign: generalised winding number, which holes, doubled faces and slivers do not upset; an opening,
+as at a neck, is closed where it is one half. It is evaluated at nodes nearer to the surface than
+one cell, and at one in STRIDE^3 others, whose neighbours are on its side; what is left follows
+along the rows.
 
 No part of the surface lies outside of what is looked up by more than a twentieth of a cell, see
 `covering`: hair that stays out of the one stays out of the other.
@@ -33,6 +33,8 @@ MARGIN = 2
 EXACT = 6.0
 #: Farther away one node in this many is exact, and the others are interpolated.
 STRIDE = 3
+#: So near to one half, the winding number of a block's middle does not tell that of the others.
+UNSURE = 0.35
 #: How far a part of the surface may lie outside of what is looked up, in cells.
 UNCOVERED = 0.05
 #: Cells between the nodes that tell how sharp the surface is.
@@ -248,12 +250,23 @@ def _filled_in(values: Floats, chosen: Ints, axis: int) -> Floats:
 def _inside(nodes: Floats, distance: Floats, surface: Surface, cell: float) -> Bools:
     """Whether each node (nx, ny, nz) lies inside; a mesh turned inside out counts as well."""
     is_near = distance <= cell * 1.001
-    known = np.zeros(distance.shape, bool)
-    known[is_near] = np.abs(winding_number(nodes[is_near], surface)) > 0.5
-    # each row starts outside, thanks to the margin; a far node is as the last near one before it
+    # in the middle of a block of three by three by three nodes, with no surface through it
+    is_middle = np.zeros(distance.shape, bool)
+    is_middle[1::STRIDE, 1::STRIDE, 1::STRIDE] = True
+    is_middle &= distance > cell * 1.7321
+    winding = np.zeros(distance.shape)
+    winding[is_middle] = np.abs(winding_number(nodes[is_middle], surface))
+    middles = np.ix_(
+        *(np.minimum(1 + STRIDE * (np.arange(n) // STRIDE), n - 1) for n in distance.shape)
+    )
+    winding = winding[middles]
+    of_middle = is_middle[middles] & ~is_near
+    is_asked = is_near | (of_middle & (np.abs(winding - 0.5) < UNSURE))
+    winding[is_asked] = np.abs(winding_number(nodes[is_asked], surface))
+    # each row starts outside, thanks to the margin; what is left is as the last one before it
     along = np.broadcast_to(np.arange(distance.shape[2]), distance.shape)
-    last = np.maximum.accumulate(np.where(is_near, along, 0), axis=2)
-    return np.take_along_axis(known, last, axis=2)
+    last = np.maximum.accumulate(np.where(is_asked | of_middle, along, 0), axis=2)
+    return np.take_along_axis(winding > 0.5, last, axis=2)
 
 
 def _broken(place: str, problem: str, remedy: str) -> HairloomError:

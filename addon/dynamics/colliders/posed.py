@@ -71,6 +71,10 @@ class PosedCollider:
             if name != "matrix_curvature" and np.linalg.cond(matrix[:3, :3]) > 1.0e6:
                 raise _broken("its scale is zero")
 
+    def at_begin(self) -> PosedCollider:
+        """Where it stands still at the frame's begin."""
+        return PosedCollider(self.collider, self.matrix_before, self.matrix_before)
+
     def matrix_at(self, moment: float) -> Floats:
         """Object to world (4, 4) float64 at `moment`, 0 the frame's begin and 1 its end."""
         displacement = self.matrix_now - self.matrix_before
@@ -186,17 +190,24 @@ def near_points(
     return index.take(kept), local.take(kept, axis=1, mode="clip"), reach.take(kept)
 
 
-def world_distance(pose: Pose, local: Floats) -> tuple[Floats, Floats]:
+def world_distance(pose: Pose, local: Floats, flattest: float = 0.0) -> tuple[Floats, Floats]:
     """Signed distance (n,) [m] and unit normal outwards (3, n), world, at points (3, n) of object
     space.
 
     The gradient transforms by the inverse transposed, and its length says how much the distance is
     scaled along it.
+
+    Args:
+        flattest: how long a gradient counts at least: a sampled one is short where two sides of the
+            collider are as near, and distances would have no bound there.
     """
     distance, gradient = pose.collider.distance(local)
     normal = np.einsum("ji,jn->in", pose.inverse[:3, :3], gradient)
     scale = np.maximum(np.sqrt(dot_rows(normal, normal)), TINY)
     normal /= scale
+    if flattest:
+        length = np.sqrt(dot_rows(gradient, gradient))
+        scale *= np.maximum(np.float32(flattest) / np.maximum(length, TINY), np.float32(1.0))
     distance /= scale
     return distance, normal
 

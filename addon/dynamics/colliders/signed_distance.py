@@ -12,6 +12,8 @@ import numpy as np
 from ...arrays import Floats
 from .posed import PosedCollider, near_points, world_distance
 
+#: How long the gradient of a sampled distance counts at least, see `world_distance`.
+FLATTEST = 0.5
 #: [m] colliders are asked for points that are at least this near, also inside of another.
 _LEAST = np.float32(1.0e-9)
 
@@ -37,7 +39,7 @@ def signed_distance(
         if pose is None:
             continue
         index, local, _ = near_points(pose, rows, np.maximum(distance, _LEAST))
-        found, normal = world_distance(pose, local)
+        found, normal = world_distance(pose, local, FLATTEST)
         nearer = (found < distance.take(index)).nonzero()[0]
         index = index.take(nearer)
         distance[index] = found.take(nearer)

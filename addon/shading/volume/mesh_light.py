@@ -15,12 +15,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Floats
+from ...strands.vectors import GOLDEN_ANGLE
 from .light_frame import LightFrame
 
 #: taps of the disk, and its radius as a fraction of the map's side; at least a texel
 MESH_TAPS, MESH_BLUR = 16, 0.003
-#: from one tap to the next [rad]
-GOLDEN_ANGLE = float(np.pi * (3.0 - np.sqrt(5.0)))
 #: how far in front of a place a mesh must be, as a fraction of the disk's radius and a texel
 MESH_BIAS = 0.5
 #: the steepest slope that is followed, as a tangent

@@ -157,3 +157,18 @@ def test_winding_counts(kit):
 def test_a_mesh_without_volume_is_named(positions, triangles, message):
     with pytest.raises(HairloomError, match=message):
         field_of(Surface(positions.astype(np.float32), triangles))
+
+
+def test_a_wide_opening_lets_nothing_of_the_inside_count_as_outside(kit):
+    """A ball cut off below, where rows of the grid enter it: by the exact winding number."""
+    ball = kit.icosphere(0.1)
+    kept = ball.positions[ball.triangles][:, :, 2].min(axis=1) > -0.06
+    bowl = Surface(ball.positions, ball.triangles[kept])
+    field = field_of(bowl)
+    points = scattered(0.11, 20000)
+    distance, _ = field.distance(points)
+    winding = np.abs(winding_number(points.T, bowl))
+    is_far = (np.abs(distance) > 1.5 * field.cell) & (np.abs(winding - 0.5) > 0.1)
+    assert ((winding > 0.5) & is_far).sum() > 4000
+    is_wrong = (distance < 0.0) != (winding > 0.5)
+    assert is_wrong[is_far].mean() < 1e-3, "some are, at the rim"

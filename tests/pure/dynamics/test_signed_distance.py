@@ -70,3 +70,17 @@ def test_nothing_is_far_away(count):
     assert not outward.any()
     ball = posed(SphereCollider((0, 0, 0), 0.1))
     assert signed_distance(points, [ball])[0].shape == (count,)
+
+
+def test_where_two_sides_are_as_near_the_distance_has_a_bound() -> None:
+    """In the middle of a plate the sampled distance has no gradient."""
+    axis = np.linspace(-0.2, 0.2, 41)
+    nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    plate = DistanceField(np.abs(nodes[..., 2]) - 0.05, nodes[0, 0, 0], axis[1] - axis[0])
+    random = np.random.default_rng(2)
+    points = random.uniform(-0.1, 0.1, (400, 3)) * [1.0, 1.0, 0.04]
+    for scale in (1.0, 3.0):
+        distance, _ = signed_distance(points * scale, [posed(plate, np.diag([scale] * 3 + [1.0]))])
+        expected = scale * (np.abs(points[:, 2]) - 0.05)
+        assert np.all(np.abs(distance - expected) <= 0.11 * scale)
+        assert distance.min() > -0.11 * scale

@@ -1,0 +1,15 @@
+// Points of some strands, put in place of where these ride to; one invocation a point.
+// Twin of LedOut.put in addon/refine/lead_out.py.
+#include "lib_strand_texel.glsl"
+
+void main()
+{
+  int index = int(gl_GlobalInvocationID.x);
+  if (index >= point_count) {
+    return;
+  }
+  ivec2 own = strand_texel(index, 0, 1);
+  ivec2 texel = ivec2(texelFetch(led_texels, own, 0).xy);
+  vec3 point = texelFetch(led_points, own, 0).xyz;
+  imageStore(cv_points, texel, vec4(point, imageLoad(cv_points, texel).w));
+}

@@ -1,0 +1,127 @@
+"""Strands led out of colliders: the GPU against numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.dynamics.colliders import (
+    CapsuleCollider,
+    Collider,
+    DistanceField,
+    PosedCollider,
+    SphereSetCollider,
+    signed_distance,
+)
+from hairloom.addon.refine.lead_out import LedOut, clearance_at, lead_out
+from hairloom.addon.strands.arc_length import steps
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+KEPT = 0.001
+
+
+def posed(*, moved: float) -> tuple[PosedCollider, ...]:
+    """A box, a capsule and two balls, turned and scaled a little."""
+    axis = np.linspace(-0.2, 0.2, 24)
+    nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    beside = np.abs(nodes) - 0.06
+    box = np.linalg.norm(np.maximum(beside, 0.0), axis=-1) - 0.02
+    box += np.minimum(beside.max(axis=-1), 0.0)
+    solids: tuple[Collider, ...] = (
+        DistanceField(box, nodes[0, 0, 0], axis[1] - axis[0]),
+        CapsuleCollider(np.array([0.1, 0.1, -0.1]), np.array([0.1, 0.1, 0.2]), 0.03),
+        SphereSetCollider(np.array([[-0.1, 0.0, 0.1], [-0.1, 0.1, 0.0]]), np.array([0.03, 0.05])),
+    )
+    matrix = np.eye(4)
+    matrix[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]
+    matrix[:3, :3] *= 1.1
+    matrix[:3, 3] = moved, 0.0, 0.01
+    return tuple(PosedCollider(solid, matrix, matrix) for solid in solids)
+
+
+def strands(count: int, fewest: int, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Waves from all sides through the solids."""
+    random = np.random.default_rng(2)
+    counts = random.integers(fewest, most + 1, count)
+    points = []
+    for number in counts:
+        begin, way = random.normal(size=3), random.normal(size=3)
+        begin *= 0.2 / np.linalg.norm(begin)
+        way = way - 12.0 * begin
+        along = np.linspace(0.0, 0.35, number)[:, None]
+        wave = 0.004 * np.sin(40.0 * along) * random.normal(size=3)
+        points.append(begin + along * way / np.linalg.norm(way) + wave)
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    return np.concatenate(points).astype(np.float32), offsets
+
+
+@pytest.mark.parametrize(("fewest", "most"), [(16, 16), (2, 60)])
+def test_equals_numpy(fewest: int, most: int) -> None:
+    from hairloom.addon.render.collider_textures import UploadedColliders
+    from hairloom.addon.render.lead_out_pass import LeadOutPass
+    from hairloom.addon.render.strand_layout import StrandLayout
+    from hairloom.addon.render.textures import texture_from, texture_to_array
+
+    points, offsets = strands(600, fewest, most)
+    layout = StrandLayout(offsets)
+    texels = layout.pixels(np.column_stack([points, np.full(len(points), 1e-4)]))
+    now = texture_from(texels, "RGBA32F")
+
+    def found() -> np.ndarray:
+        return layout.values(texture_to_array(now))
+
+    leading = LeadOutPass(layout, UploadedColliders())
+    assert leading.read() is None
+    leading.lead(now, posed(moved=0.0))
+    np.testing.assert_array_equal(found()[:, :3], points, "no motion has begun")
+
+    leading.begin(now, posed(moved=-0.05), KEPT)
+    clearance = clearance_at(points, offsets, posed(moved=-0.05), KEPT)
+    read = leading.read()
+    assert read is not None and read.kept == KEPT
+    np.testing.assert_allclose(read.points, clearance.points, atol=2e-6)
+
+    expected = points.copy()
+    led = lead_out(expected, offsets, posed(moved=0.0), clearance)
+    leading.lead(now, posed(moved=0.0))
+    assert 100 < len(led) < 550
+    assert len(np.setxor1d(led, leading.led())) <= 2, "rounding decides few"
+    off = np.maximum.reduceat(np.abs(found()[:, :3] - expected).max(axis=1), offsets[:-1])
+    assert np.median(off[led]) < 2e-6
+    assert (off > 1e-4).mean() < 0.05, "where two solids are as near, rounding decides"
+    np.testing.assert_array_equal(found()[:, 3], np.float32(1e-4), "radii stay")
+
+    def stuck(places: np.ndarray) -> float:
+        lack = clearance.points - signed_distance(places, posed(moved=0.0), KEPT)[0]
+        return float((np.maximum.reduceat(lack, offsets[:-1]) > 0.1 * KEPT).mean())
+
+    assert abs(stuck(found()[:, :3]) - stuck(expected)) < 0.01
+    assert stuck(points) > 0.2
+    np.testing.assert_allclose(steps(found()[:, :3], offsets), steps(points, offsets), atol=2e-6)
+
+    # another pass goes on with what was read
+    other, again = LeadOutPass(layout, UploadedColliders()), texture_from(texels, "RGBA32F")
+    other.take(read)
+    assert other.kept == KEPT and other.read() is read
+    other.lead(again, posed(moved=0.0))
+    np.testing.assert_array_equal(layout.values(texture_to_array(again)), found())
+    np.testing.assert_array_equal(other.led(), leading.led())
+    other.lead(again, ())
+    assert not len(other.led())
+
+
+def test_puts_what_was_led_earlier() -> None:
+    from hairloom.addon.render.collider_textures import UploadedColliders
+    from hairloom.addon.render.lead_out_pass import LeadOutPass
+    from hairloom.addon.render.strand_layout import StrandLayout
+    from hairloom.addon.render.textures import texture_from, texture_to_array
+
+    for fewest, most in ((16, 16), (2, 60)):
+        points, offsets = strands(600, fewest, most)
+        layout = StrandLayout(offsets)
+        now = texture_from(layout.pixels(np.pad(points, ((0, 0), (0, 1)))), "RGBA32F")
+        led = LedOut.of(np.array([0, 7, 599]), points + np.float32(0.5), offsets)
+        LeadOutPass(layout, UploadedColliders()).put(now, led)
+        led.put(points, offsets)
+        np.testing.assert_array_equal(layout.values(texture_to_array(now))[:, :3], points)

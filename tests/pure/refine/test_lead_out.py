@@ -1,0 +1,181 @@
+"""Strands led out of colliders: solids whose distance is known, lengths, and what stays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon import pipeline
+from hairloom.addon.dynamics.colliders import (
+    Collider,
+    PosedCollider,
+    SphereCollider,
+    SphereSetCollider,
+    signed_distance,
+)
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.groom.weights import GuideWeights
+from hairloom.addon.pipeline import Pose, Rig
+from hairloom.addon.refine.lead_out import SLACK, LedOut, clearance_at, lead_out
+from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands.arc_length import steps
+
+KEPT = 0.001
+BALL = SphereCollider((0.0, 0.0, 0.0), 0.1)
+
+
+def still(collider: Collider, *shift: float) -> tuple[PosedCollider, ...]:
+    matrix = np.eye(4)
+    matrix[:3, 3] = shift or (0.0, 0.0, 0.0)
+    return (PosedCollider(collider, matrix, matrix),)
+
+
+def lines(begin: np.ndarray, end: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Straight strands (n, 3) to (n, 3) of any point counts, and their offsets."""
+    points = [
+        one + np.linspace(0.0, 1.0, count)[:, None] * (other - one)
+        for one, other, count in zip(begin, end, counts, strict=True)
+    ]
+    return np.concatenate(points).astype(np.float32), np.concatenate([[0], np.cumsum(counts)])
+
+
+@pytest.fixture
+def across() -> tuple[np.ndarray, np.ndarray]:
+    """400 strands of 4 to 40 points, 0.3 m long; about half of them go through the ball."""
+    random = np.random.default_rng(4)
+    begin = random.normal(size=(400, 3))
+    begin *= 0.13 / np.linalg.norm(begin, axis=1, keepdims=True)
+    way = random.normal(size=(400, 3)) - 8.0 * begin
+    way *= 0.3 / np.linalg.norm(way, axis=1, keepdims=True)
+    return lines(begin, begin + way, random.integers(4, 41, 400))
+
+
+def test_strands_go_around_a_ball_and_keep_their_segments(across) -> None:
+    points, offsets = across
+    colliders = still(BALL)
+    clearance = clearance_at(points + 10.0, offsets, colliders, KEPT)
+    assert (clearance.points[offsets[:-1]] == -np.inf).all()
+    now = points.copy()
+    led = lead_out(now, offsets, colliders, clearance)
+    depth = np.linalg.norm(points, axis=1) - 0.1
+    were_near = np.minimum.reduceat(depth, offsets[:-1]) < KEPT * (1.0 - SLACK)
+    np.testing.assert_array_equal(led, np.flatnonzero(were_near))
+    assert 100 < len(led) < 350
+    assert np.linalg.norm(now, axis=1).min() > 0.1 + KEPT * (1.0 - SLACK) - 1.0e-7
+    np.testing.assert_allclose(steps(now, offsets), steps(points, offsets), atol=1e-7)
+    counts = np.diff(offsets)
+    kept = np.repeat(~were_near, counts)
+    np.testing.assert_array_equal(now[kept], points[kept])
+    np.testing.assert_array_equal(now[offsets[:-1]], points[offsets[:-1]])
+
+
+def test_what_comes_after_goes_along_in_its_shape() -> None:
+    """A strand that only its second point brings near."""
+    points = np.array([[0, 0, 0.102], [0.05, 0, 0.08], [0.1, 0.02, 0.1], [0.12, 0, 0.15]])
+    points = points.astype(np.float32)
+    now, offsets = points.copy(), np.array([0, 4])
+    led = lead_out(now, offsets, still(BALL), clearance_at(points + 1, offsets, still(BALL), KEPT))
+    assert led.tolist() == [0]
+    np.testing.assert_allclose(np.diff(now[1:], axis=0), np.diff(points[1:], axis=0), atol=1e-7)
+    assert np.linalg.norm(now[1]) >= 0.1 + KEPT * (1.0 - SLACK)
+
+
+def test_what_was_inside_may_stay_as_deep_and_no_deeper(across) -> None:
+    points, offsets = across
+    colliders = still(BALL)
+    clearance = clearance_at(points, offsets, colliders, KEPT)
+    now = points.copy()
+    assert not len(lead_out(now, offsets, colliders, clearance))
+    np.testing.assert_array_equal(now, points)
+    moved = still(BALL, 0.02, 0.0, 0.0)
+    led = lead_out(now, offsets, moved, clearance)
+    assert len(led)
+    lack = clearance.points - signed_distance(now, moved, KEPT)[0]
+    assert lack.max() <= SLACK * KEPT + 1e-7
+
+
+def test_a_fold_from_which_no_segment_leads_out() -> None:
+    """A bowl of balls: a strand that dives in is led past its rim."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    rings = [
+        np.stack([r * np.cos(angle), r * np.sin(angle), np.full(24, height)], axis=1)
+        for r, height in ((0.012, 0.0), (0.02, 0.012), (0.022, 0.024), (0.02, 0.034))
+    ]
+    centers = np.concatenate([*rings, [[0.0, 0.0, -0.004]]])
+    bowl = SphereSetCollider(centers, np.full(len(centers), 0.0085))
+    random = np.random.default_rng(6)
+    begin = random.uniform(-0.008, 0.008, (60, 3)) + [0.0, 0.0, 0.07]
+    end = random.uniform(-0.02, 0.02, (60, 3)) + [0.0, 0.0, -0.1]
+    points, offsets = lines(begin, end, np.full(60, 9))
+    colliders = still(bowl)
+    clearance = clearance_at(points + 1.0, offsets, colliders, KEPT)
+    now = points.copy()
+    led = lead_out(now, offsets, colliders, clearance)
+    assert len(led) > 40
+    distance = signed_distance(now, colliders, KEPT)[0]
+    assert distance.min() > KEPT * (1.0 - 2.0 * SLACK)
+    np.testing.assert_allclose(steps(now, offsets), steps(points, offsets), atol=1e-7)
+
+
+def test_strands_without_length_and_of_two_points_stay_finite() -> None:
+    points = np.zeros((9, 3), np.float32)
+    points[2:5] = [[0, 0, 0.11], [0, 0, 0.11], [0, 0, 0.02]]
+    offsets = np.array([0, 2, 5, 9])
+    now = points.copy()
+    clearance = clearance_at(points + 1.0, offsets, still(BALL), KEPT)
+    lead_out(now, offsets, still(BALL), clearance)
+    assert np.isfinite(now).all()
+    np.testing.assert_allclose(steps(now, offsets), steps(points, offsets), atol=1e-7)
+    none = np.zeros((0, 3), np.float32)
+    clearance = clearance_at(none, np.array([0]), still(BALL), KEPT)
+    assert not len(lead_out(none, np.array([0]), still(BALL), clearance))
+
+
+def test_led_strands_are_put_where_they_were(across) -> None:
+    points, offsets = across
+    led = LedOut.of(np.array([3, 90]), points, offsets)
+    assert led.fits(offsets)
+    there = np.zeros_like(points)
+    led.put(there, offsets)
+    is_one = np.isin(np.repeat(np.arange(400), np.diff(offsets)), [3, 90])
+    np.testing.assert_array_equal(there[is_one], points[is_one])
+    assert not there[~is_one].any()
+    for strands, count in (([400], 4), ([-1], 4), ([3], 1)):
+        assert not LedOut(np.array(strands), points[:count]).fits(offsets)
+
+
+def test_a_strand_between_guides_that_part_goes_around() -> None:
+    """A ball rises between two guides; the strand half way would go through it."""
+    along = np.linspace(0.0, 0.3, 16)
+    grid = np.zeros((3, 16, 3))
+    grid[..., 1] = -along
+    grid[:, :, 0] = np.array([-0.02, 0.0, 0.02])[:, None]
+    strands = StrandSet(
+        grid.reshape(-1, 3), np.arange(4) * 16, np.full(48, 4e-5), np.zeros(3, np.int32)
+    )
+    lines, guides = strands.grid, np.array([0, 2])
+    fractions = np.array([[1.0, 0.0, 0.0], [0.5, 0.0, 0.5], [0.0, 0.0, 1.0]])
+    weights = GuideWeights(np.array([[0, 0, 1]] * 3), fractions)
+    rig = Rig(strands, None, guides, lines[guides], weights, None)
+    motion = pipeline.begin(rig, rig.rest_pose)
+    before = np.eye(4)
+    before[:3, 3] = 0.0, -0.2, -0.25
+    settings = DynamicsSettings()
+    for _ in range(30):
+        now = before.copy()
+        now[2, 3] += 0.01
+        posed = (PosedCollider(BALL, before, now),)
+        pose = Pose(None, np.eye(4))
+        motion = pipeline.advance(rig, motion, pose, posed, settings, np.zeros(3), 1.0 / 30.0)
+        before = now
+        points = pipeline.strands_now(rig, motion)
+        depth = 0.1 - np.linalg.norm(points - now[:3, 3], axis=1)
+        assert depth.max() < 1e-6
+        np.testing.assert_allclose(
+            steps(points, strands.offsets), steps(strands.points, strands.offsets), atol=1e-6
+        )
+    led = pipeline.strands_and_led(rig, motion)[1]
+    unled = pipeline.strands_at(rig, motion.pose, motion.guides)
+    assert (0.1 - np.linalg.norm(unled - now[:3, 3], axis=1)).max() > 0.005
+    baked = pipeline.strands_at(rig, motion.pose, motion.guides, led)
+    np.testing.assert_array_equal(baked, points)
